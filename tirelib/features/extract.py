@@ -1,0 +1,187 @@
+r"""Features of each turn and gage, in the angle domain.
+
+Strain over wheel angle shows, in the order of time, a compressive peak CP1 before the contact, a
+steep rise at the leading edge, tension TP inside the contact, a steep fall at the trailing edge and a
+second compressive peak CP2 (dissertation, Fig. 3-7, 3-8, 4-10). Edges are read at the extremes of the
+strain rate, which lie a little inside or outside the true edges: the reading has a bias.
+
+Rates are per radian, so a calibration made at one speed holds at another.
+
+Integrals (Eq. 11, 12), over the contact angle :math:`l` read from the edges, with :math:`\xi` from its
+middle:
+
+.. math:: E_{vertical} = \int_{-l/2}^{l/2} \varepsilon\,d\xi, \qquad
+          \varepsilon_{fri}(\xi) = \tfrac12[\varepsilon(\xi) - \varepsilon(-\xi)], \qquad
+          E_{friction} = l \int_0^{l/2} |\varepsilon_{fri}|\,d\xi
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.features.peaks import peak
+from tirelib.flags import TurnFlag
+from tirelib.signal.turns import AFTER, Turns
+
+EDGE_REACH = 0.35
+"""How far outside the centre gage's pulse a leading edge is looked for, [rad]."""
+COMPRESSION_REACH = 0.6
+"""How far before the leading edge the first compressive peak is looked for, [rad]."""
+INTEGRAL_POINTS = 65
+"""Points of the trapezoidal rule over the contact angle (odd: the middle is one of them)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Features:
+    """Features of several turns; arrays over gages have shape (n, n_gages), the rest (n,).
+
+    Angles are from the middle of the centre gage's pulse, [rad]; strains are above the offset,
+    dimensionless; rates are per radian. NaN where a gage or a turn says nothing.
+
+    Attributes
+    ----------
+    lead, trail
+        Angles of the largest and the smallest strain rate: the edges.
+    contact_angle
+        ``trail - lead``.
+    rate_lead, rate_trail
+        Peak strain rates.
+    cp1, cp2, tp
+        Compressive peaks before and after, largest tension within the contact.
+    cp1_angle, cp2_angle, tp_angle
+        Where they are.
+    e_vertical, e_friction
+        Integrals of Eq. (11), (12), [rad], [rad2].
+    skew
+        First moment of the strain about the middle of the contact over e_vertical, [rad]: zero for a
+        symmetric contact.
+    mean
+        Mean strain of the preceding turn above the offset.
+    offset
+        Strain opposite the contact.
+    time, ready, period, omega, speed, pressure, camber, axis_shift
+        Of the turn, SI.
+    flags, gage_flags
+        `TurnFlag` bits.
+    lateral : shape (n_gages,), [m]
+        Gage positions, ISO.
+    """
+
+    lead: FloatArray
+    trail: FloatArray
+    rate_lead: FloatArray
+    rate_trail: FloatArray
+    cp1: FloatArray
+    cp2: FloatArray
+    tp: FloatArray
+    cp1_angle: FloatArray
+    cp2_angle: FloatArray
+    tp_angle: FloatArray
+    e_vertical: FloatArray
+    e_friction: FloatArray
+    skew: FloatArray
+    mean: FloatArray
+    offset: FloatArray
+    time: FloatArray
+    ready: FloatArray
+    period: FloatArray
+    omega: FloatArray
+    speed: FloatArray
+    pressure: FloatArray
+    camber: FloatArray
+    axis_shift: FloatArray
+    flags: IntArray
+    gage_flags: IntArray
+    lateral: FloatArray
+
+    @property
+    def contact_angle(self) -> FloatArray:
+        """Angle between the edges, shape (n, n_gages), [rad]."""
+        return self.trail - self.lead
+
+    @property
+    def centre_gage(self) -> int:
+        """Index of the gage nearest to the equator."""
+        return int(np.argmin(np.abs(self.lateral)))
+
+    def __len__(self) -> int:
+        return self.time.shape[0]
+
+
+def extract_features(turns: Turns) -> Features:
+    """Read the features of all turns and gages at once.
+
+    Source: dissertation, sections 3.4 and 4.1; Eq. (11), (12).
+    """
+    trace = turns.trace
+    phi, spacing = trace.phi, trace.spacing
+    pulse = trace.pulse[:, None, None]
+    axis = phi[None, None, :]
+
+    def largest(y: FloatArray, allowed: BoolArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+        return peak(y, np.broadcast_to(allowed, y.shape), float(phi[0]), spacing)
+
+    lead, rate_lead, weak_lead = largest(trace.rate, (axis >= -pulse - EDGE_REACH) & (axis <= 0.0))
+    trail, low_rate, weak_trail = largest(-trace.rate, (axis >= 0.0) & (axis <= pulse + AFTER))
+    before = (axis <= lead[..., None]) & (axis >= lead[..., None] - COMPRESSION_REACH)
+    inside = (axis >= lead[..., None]) & (axis <= trail[..., None])
+    after = axis >= trail[..., None]
+    cp1_angle, low_before, _ = largest(-trace.strain, before)
+    cp2_angle, low_after, _ = largest(-trace.strain, after)
+    tp_angle, tp, _ = largest(trace.strain, inside)
+    e_vertical, e_friction, skew = _integrals(trace.strain, phi, lead, trail)
+    gage_flags = turns.gage_flags | np.where(weak_lead | weak_trail, int(TurnFlag.WEAK_EDGE), 0)
+    weak = np.where((weak_lead | weak_trail).any(axis=1), int(TurnFlag.WEAK_EDGE), 0)
+    return Features(
+        lead=lead,
+        trail=trail,
+        rate_lead=rate_lead,
+        rate_trail=-low_rate,
+        cp1=-low_before,
+        cp2=-low_after,
+        tp=tp,
+        cp1_angle=cp1_angle,
+        cp2_angle=cp2_angle,
+        tp_angle=tp_angle,
+        e_vertical=e_vertical,
+        e_friction=e_friction,
+        skew=skew,
+        mean=turns.mean,
+        offset=turns.offset,
+        time=turns.time,
+        ready=turns.ready,
+        period=turns.period,
+        omega=trace.conditions.omega,
+        speed=trace.conditions.speed,
+        pressure=trace.conditions.pressure,
+        camber=trace.conditions.camber,
+        axis_shift=trace.axis_shift,
+        flags=turns.flags | weak,
+        gage_flags=gage_flags,
+        lateral=trace.lateral,
+    )
+
+
+def _integrals(
+    strain: FloatArray, phi: FloatArray, lead: FloatArray, trail: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Integrals over the contact angle of each turn and gage, by the trapezoidal rule."""
+    share = np.linspace(-0.5, 0.5, INTEGRAL_POINTS)
+    length = trail - lead
+    where = 0.5 * (lead + trail)[..., None] + length[..., None] * share
+    position = (where - phi[0]) / (phi[1] - phi[0])
+    known = np.isfinite(position)
+    index = np.clip(np.where(known, position, 0.0).astype(np.int64), 0, phi.size - 2)
+    left = np.take_along_axis(strain, index, axis=-1)
+    right = np.take_along_axis(strain, index + 1, axis=-1)
+    values = left + (right - left) * (position - index)
+    step = length[..., None] * (share[1] - share[0])
+    weight = np.full(INTEGRAL_POINTS, 1.0)
+    weight[[0, -1]] = 0.5
+    vertical = (values * weight * step).sum(axis=-1)
+    odd = 0.5 * np.abs(values - values[..., ::-1])
+    friction = length * 0.5 * (odd * weight * step).sum(axis=-1)
+    moment = (values * weight * step * (length[..., None] * share)).sum(axis=-1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return vertical, friction, moment / vertical

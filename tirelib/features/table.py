@@ -1,0 +1,80 @@
+"""Features as a table: one row per turn and gage."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+
+from tirelib.features.extract import Features
+from tirelib.flags import flag_names
+
+PER_GAGE = {
+    "lead": "rad",
+    "trail": "rad",
+    "contact_angle": "rad",
+    "cp1": "1",
+    "cp2": "1",
+    "tp": "1",
+    "cp1_angle": "rad",
+    "cp2_angle": "rad",
+    "tp_angle": "rad",
+    "rate_lead": "1/rad",
+    "rate_trail": "1/rad",
+    "e_vertical": "rad",
+    "e_friction": "rad2",
+    "skew": "rad",
+    "mean": "1",
+    "offset": "1",
+}
+"""Columns of one turn and gage with their units."""
+PER_TURN = {
+    "time": "s",
+    "period": "s",
+    "omega": "rad/s",
+    "speed": "m/s",
+    "pressure": "Pa",
+    "camber": "rad",
+    "axis_shift": "rad",
+}
+"""Columns of one turn with their units."""
+
+
+def feature_frame(features: Features, **extra: object) -> pd.DataFrame:
+    """Return one row per turn and gage, SI units, ISO axes.
+
+    Parameters
+    ----------
+    features : Features
+    **extra
+        Further columns, constant or of shape (n,), for example ``run=3``.
+    """
+    n, gages = len(features), features.lateral.size
+    columns: dict[str, object] = {
+        name: np.repeat(value, gages) if np.ndim(value) else value for name, value in extra.items()
+    }
+    columns["turn"] = np.repeat(np.arange(n), gages)
+    columns["gage"] = np.tile(np.arange(1, gages + 1), n)
+    columns["lateral"] = np.tile(features.lateral, n)
+    for name in PER_TURN:
+        columns[name] = np.repeat(getattr(features, name), gages)
+    for name in PER_GAGE:
+        columns[name] = getattr(features, name).ravel()
+    columns["slope_rate_lead"] = np.repeat(rate_slope(features), gages)
+    columns["flags"] = np.repeat([";".join(flag_names(f)) for f in features.flags], gages)
+    columns["gage_flags"] = [";".join(flag_names(f)) for f in features.gage_flags.ravel()]
+    return pd.DataFrame(columns)
+
+
+def rate_slope(features: Features) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """Slope of the peak strain rate over lateral position (Fig. 4-6), [1/(rad m)].
+
+    Least-squares line through the three middle gages, as in section 4.1.3. Shape (n,).
+    """
+    middle = np.sort(np.argsort(np.abs(features.lateral), kind="stable")[:3])
+    y = features.lateral[middle] - features.lateral[middle].mean()
+    return np.asarray(features.rate_lead[:, middle] @ y / (y @ y), dtype=np.float64)
+
+
+def units() -> Mapping[str, str]:
+    """Return the unit of every numeric column of `feature_frame`."""
+    return {**PER_TURN, **PER_GAGE, "lateral": "m", "slope_rate_lead": "1/(rad m)"}

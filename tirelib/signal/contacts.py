@@ -1,0 +1,215 @@
+"""Find the passages of a gage through the contact, sample by sample, in bounded memory.
+
+The innerliner is stretched inside the contact (the belt is flattened) and compressed just outside
+it, so a passage is a pulse of tension between two dips. A pulse begins when the strain rises above a
+level and ends when it falls below a lower one. Both levels lie between the extremes of the
+**preceding** turn, so a slow drift or a change of load moves them along. Before the first complete
+turn the extremes since the start are used; a contact found that way is marked `fresh`.
+
+The result depends on the samples alone, never on how they are cut into frames.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+
+RISE = 0.6
+"""Level of the pulse's edges, as a fraction from the lowest to the highest strain of a turn."""
+FALL = 0.5
+"""Level below which the pulse has ended (hysteresis against noise)."""
+JUMP = 2.5
+"""A swing this many times the one that set the levels shows that they were set by no contact."""
+PATIENCE = 2.5
+"""Turns to wait for a contact before starting afresh."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """One passage of the gage through the contact.
+
+    Attributes
+    ----------
+    rise, fall : float, [samples since the start]
+        Where the strain crosses the level, interpolated.
+    fresh : bool
+        No valid turn precedes it.
+    """
+
+    rise: float
+    fall: float
+    fresh: bool
+
+    @property
+    def middle(self) -> float:
+        """Centre of the pulse, [samples since the start]: the reference of wheel angle zero."""
+        return 0.5 * (self.rise + self.fall)
+
+
+class ContactFinder:
+    """Find contacts in the strain of one gage (the centre one).
+
+    Parameters
+    ----------
+    longest_turn : int, [samples]
+        A turn that lasts longer is taken as standstill; the search starts afresh.
+    smallest_swing : float, [-]
+        Strain swing below which nothing is called a contact, until a turn is known.
+
+    Examples
+    --------
+    >>> phi = 2 * np.pi * np.arange(3500) / 1000.0
+    >>> pulse = 8e-3 * np.exp(-((np.cos(phi / 2) / 0.1) ** 2))
+    >>> [(round(c.middle), c.fresh) for c in ContactFinder(5000).push(pulse)]
+    [(500, True), (1500, False), (2500, False)]
+    """
+
+    def __init__(self, longest_turn: int, *, smallest_swing: float = 5e-4) -> None:
+        self._longest_turn = longest_turn
+        self._smallest_swing = smallest_swing
+        self._count = 0  # samples taken, after the median
+        self._tail: FloatArray = np.empty(0)  # last two raw samples, for the median of three
+        self._held = np.nan  # last finite sample
+        self._restart()
+
+    def _restart(self) -> None:
+        self._level: float | None = None  # None: start-up
+        self._low_level = np.nan
+        self._swing = np.nan
+        self._lowest, self._highest = np.inf, -np.inf
+        self._pulse: list[FloatArray] | None = None  # samples since the rise, one before included
+        self._pulse_start = 0
+        self._before = np.nan  # sample before the current one
+        self._last_middle: float | None = None
+        self._last_period: float | None = None
+        self._since = self._count
+
+    def push(self, samples: FloatArray) -> list[Contact]:
+        """Take the next samples, shape (n,), and return the contacts that ended in them.
+
+        A sample that is not finite counts as time passed; for the search alone the last finite one
+        stands in its place.
+        """
+        x = self._without_gaps(np.asarray(samples, dtype=np.float64))
+        x = self._median_of_three(x)
+        found: list[Contact] = []
+        start = 0
+        while start < x.size:
+            start = self._advance(x, start, found)
+        return found
+
+    def _without_gaps(self, x: FloatArray) -> FloatArray:
+        finite = np.isfinite(x)
+        if not finite.all():
+            last = np.maximum.accumulate(np.where(finite, np.arange(x.size), -1))
+            x = np.where(last >= 0, x[last], self._held)
+        if x.size:
+            self._held = float(x[-1])
+        return x
+
+    def _median_of_three(self, x: FloatArray) -> FloatArray:
+        """Median of each sample and its two neighbours; a lone spike is no contact."""
+        x = np.concatenate((self._tail, x))
+        self._tail = x[-2:]
+        if x.size < 3:
+            return np.empty(0)
+        a, b, c = x[:-2], x[1:-1], x[2:]
+        low, high = np.minimum(a, b), np.maximum(a, b)
+        return np.maximum(low, np.minimum(high, c))
+
+    def _advance(self, x: FloatArray, start: int, found: list[Contact]) -> int:
+        """Go to the next event in ``x[start:]``; return the index from which to go on."""
+        y = x[start:]
+        if np.isnan(y[0]):  # nothing finite seen yet
+            finite = np.flatnonzero(~np.isnan(y))
+            skip = int(finite[0]) if finite.size else y.size
+            self._count += skip
+            self._since = self._count
+            return start + skip
+        y = self._until_jump(y)
+        if self._level is None:
+            lows = np.minimum(np.minimum.accumulate(y), self._lowest)
+            highs = np.maximum(np.maximum.accumulate(y), self._highest)
+            swing = highs - lows
+            known = swing > self._smallest_swing
+            above = known & (y > lows + RISE * swing)
+            below = ~known | (y < lows + FALL * swing)
+        else:
+            above, below = y > self._level, y < self._low_level
+        event = below if self._pulse is not None else above
+        first = int(np.argmax(event)) if event.any() else -1
+        taken = y if first < 0 else y[: first + 1]
+        taken = taken[: self._room()]
+        expired = taken.size < (y.size if first < 0 else first + 1) or self._room() <= taken.size
+        self._lowest = min(self._lowest, float(taken.min()))
+        self._highest = max(self._highest, float(taken.max()))
+        if self._pulse is not None:
+            self._pulse.append(taken)
+        elif first >= 0 and not expired:
+            before = float(taken[-2]) if taken.size > 1 else self._before
+            self._pulse = [np.array([before, taken[-1]])]
+            self._pulse_start = self._count + taken.size - 2
+        ended = event is below and first >= 0 and not expired
+        self._count += taken.size
+        self._before = float(taken[-1])
+        if expired:
+            self._restart()
+        elif ended:
+            self._finish(found)
+        return start + taken.size
+
+    def _until_jump(self, y: FloatArray) -> FloatArray:
+        """Return the samples before the swing outgrows the levels; go to start-up if it has."""
+        if self._level is None:
+            return y
+        limit = JUMP * self._swing
+        low, high = min(self._lowest, float(y.min())), max(self._highest, float(y.max()))
+        if high - low <= limit:
+            return y
+        lows = np.minimum(np.minimum.accumulate(y), self._lowest)
+        highs = np.maximum(np.maximum.accumulate(y), self._highest)
+        first = int(np.argmax(highs - lows > limit))
+        if first > 0:
+            return y[:first]
+        self._level, self._last_middle, self._last_period = None, None, None
+        return y
+
+    def _room(self) -> int:
+        """Samples until patience ends."""
+        patience = self._longest_turn
+        if self._last_period is not None:
+            patience = min(patience, int(PATIENCE * self._last_period))
+        return max(1, self._since + patience - self._count)
+
+    def _finish(self, found: list[Contact]) -> None:
+        """Close the pulse, and set the levels of the next one."""
+        pulse = np.concatenate(self._pulse or [])
+        self._pulse = None
+        swing = self._highest - self._lowest
+        own_level = self._lowest + RISE * swing
+        start_up = self._level is None
+        fresh = start_up or self._last_middle is None
+        level = own_level if self._level is None else self._level
+        above = np.flatnonzero(pulse > level)
+        i, j = (int(above[0]), int(above[-1])) if above.size else (0, 0)
+        seen = self._pulse_start + i - self._since
+        if i == 0 or j == pulse.size - 1 or (start_up and seen < j - i):
+            if not start_up:
+                self._restart()
+            return  # too little has been seen of what lies before it
+        self._level = own_level
+        self._low_level = self._lowest + FALL * swing
+        self._swing = swing
+        self._lowest = self._highest = self._before
+        rise = i - 1 + (level - pulse[i - 1]) / (pulse[i] - pulse[i - 1])
+        fall = j + (pulse[j] - level) / (pulse[j] - pulse[j + 1])
+        shift = self._pulse_start + 1  # the median of three lags by one sample
+        contact = Contact(float(rise + shift), float(fall + shift), fresh)
+        self._since = self._count
+        if fresh or self._last_middle is None:
+            self._last_period = None
+        else:
+            self._last_period = contact.middle - self._last_middle
+        self._last_middle = contact.middle
+        found.append(contact)

@@ -1,0 +1,99 @@
+"""What is wrong with a window of samples: missing, spiked, standing still.
+
+Nothing is repaired silently: at most two samples in a row are bridged by a straight line, and the
+gage then carries a flag for the turn. Anything longer makes the gage invalid for the turn.
+"""
+
+import numpy as np
+
+from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.flags import TurnFlag
+
+LONGEST_BRIDGE = 2
+"""Samples in a row that a straight line may replace."""
+SPIKE_SHARE = 0.05
+"""A sample is a spike when it departs from its neighbours' median by this share of the swing."""
+DEAD_SHARE = 0.2
+"""A gage is dead when it swings less than this share of the median gage."""
+FLAT_ANGLE = 0.04
+"""A gage is saturated when it stands still at its extreme over this wheel angle, [rad]..."""
+FLAT_SAMPLES = 6
+"""... and over at least this many samples."""
+UNUSABLE = TurnFlag.GAP | TurnFlag.SATURATED | TurnFlag.DEAD_GAGE
+"""Flags with which a gage says nothing in a turn."""
+
+
+def inspect(window: FloatArray, step: float) -> tuple[FloatArray, IntArray]:
+    """Look for faults in the samples of one turn's window.
+
+    Parameters
+    ----------
+    window : array, shape (n_gages, n), [-]
+        Raw strain; missing samples are NaN.
+    step : float, [rad]
+        Wheel angle per sample.
+
+    Returns
+    -------
+    mended : array, shape (n_gages, n)
+        With short gaps and spikes bridged (and flagged), and zeros where nothing can be said.
+    flags : array of int, shape (n_gages,)
+        `TurnFlag` bits of each gage.
+    """
+    flags = np.zeros(window.shape[0], dtype=np.int64)
+    missing = ~np.isfinite(window)
+    suspect = missing.any(axis=1)
+    if suspect.any():
+        flags[suspect] |= int(TurnFlag.BRIDGED)
+        too_long = _longest_run(missing) > LONGEST_BRIDGE
+        flags[too_long] = int(TurnFlag.GAP)
+    known = np.where(missing, np.nan, window)
+    with np.errstate(invalid="ignore"):
+        low = np.fmin.reduce(known, axis=1)
+        high = np.fmax.reduce(known, axis=1)
+    swing = np.nan_to_num(high - low)
+    flags[swing < DEAD_SHARE * np.median(swing)] |= int(TurnFlag.DEAD_GAGE)
+    flags[(swing == 0.0)] |= int(TurnFlag.DEAD_GAGE)
+    needed = max(FLAT_SAMPLES, int(FLAT_ANGLE / step))
+    flat = _longest_run(known == high[:, None]), _longest_run(known == low[:, None])
+    flags[(np.maximum(*flat) >= needed) & (swing > 0.0)] |= int(TurnFlag.SATURATED)
+    spiked = _spikes(known, swing)
+    if spiked.any():
+        rows = spiked.any(axis=1)
+        flags[rows] |= int(TurnFlag.SPIKE | TurnFlag.BRIDGED)
+        missing = missing | spiked
+        flags[_longest_run(missing) > LONGEST_BRIDGE] |= int(TurnFlag.GAP)
+    if missing.any():
+        window = _bridge(window, missing)
+    return window, flags
+
+
+def _spikes(known: FloatArray, swing: FloatArray) -> BoolArray:
+    """Mark samples that stand apart from the median of their four neighbours."""
+    apart = np.zeros(known.shape, dtype=np.bool_)
+    bend = np.abs(known[:, 2:] - 2.0 * known[:, 1:-1] + known[:, :-2])
+    limit = SPIKE_SHARE * swing[:, None]
+    if known.shape[1] < 5 or not (bend > limit).any():
+        return apart
+    around = np.stack((known[:, :-4], known[:, 1:-3], known[:, 3:-1], known[:, 4:]))
+    apart[:, 2:-2] = np.abs(known[:, 2:-2] - np.median(around, axis=0)) > limit
+    return apart & (swing[:, None] > 0.0)
+
+
+def _longest_run(mask: BoolArray) -> IntArray:
+    """Return the length of the longest run of True in each row."""
+    if not mask.any():
+        return np.zeros(mask.shape[0], dtype=np.int64)
+    count = np.cumsum(mask, axis=1)
+    reset = np.maximum.accumulate(np.where(mask, 0, count), axis=1)
+    return np.asarray((count - reset).max(axis=1), dtype=np.int64)
+
+
+def _bridge(window: FloatArray, missing: BoolArray) -> FloatArray:
+    """Replace missing samples by straight lines; rows without any sample become zero."""
+    mended = window.copy()
+    index = np.arange(window.shape[1])
+    for row in np.flatnonzero(missing.any(axis=1)):
+        good = ~missing[row]
+        mended[row] = np.interp(index, index[good], window[row, good]) if good.any() else 0.0
+    return mended

@@ -1,0 +1,379 @@
+"""Cut a stream of strain into turns, each ending with its contact.
+
+For the contact k, with the middles of the centre gage's pulses m at k-1 and k:
+
+- period and wheel angle per sample from the preceding turn: ``step = 2 pi / (m_k - m_(k-1))``,
+- offset of each gage: mean over +-0.5 rad round the point half-way between the two contacts,
+- conditions: mean over the preceding turn of what was held,
+- strain and rate over wheel angle: `tirelib.signal.lowpass`, up to 20 degrees after the pulse.
+
+`TurnCutter` takes samples in frames of any length; `cut_turns` gives it a whole record. Both run the
+same code, so they agree.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.errors import ParameterError, ShapeError
+from tirelib.flags import TurnFlag
+from tirelib.signal.contacts import Contact, ContactFinder
+from tirelib.signal.lowpass import LowPass, half_width, smooth_to_angle
+from tirelib.signal.quality import UNUSABLE, inspect
+from tirelib.traces import Conditions, StrainTrace
+
+PHI = np.linspace(-1.0, 0.8, 361)
+"""Wheel-angle grid of a turn, [rad]; zero is the middle of the centre gage's pulse."""
+AFTER = np.deg2rad(20.0)
+"""How far beyond the end of the pulse a turn is looked at, [rad]."""
+OFFSET_HALF_WIDTH = 0.5
+"""Half-width of the sector opposite the contact from which the offset is taken, [rad]."""
+LARGEST_MISSING = 0.1
+"""Share of missing samples with which an offset or a mean is still formed."""
+LARGEST_PERIOD_RATIO = 2.0
+DRIFT_SHARE = 0.05
+LONGEST_TURN = 3.0
+"""A turn that lasts longer is standstill, [s]."""
+_HELD = ("speed", "pressure", "camber")
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """One turn; arrays over gages and wheel angle. NaN where the flags say why.
+
+    `time` is the middle of the contact pulse, [s since the start]; `ready` is when the last sample
+    that the turn needs was taken, [s].
+    """
+
+    time: float
+    ready: float
+    period: float
+    pulse: float
+    axis_shift: float
+    speed: float
+    pressure: float
+    camber: float
+    offset: FloatArray
+    mean: FloatArray
+    strain: FloatArray
+    rate: FloatArray
+    gage_flags: IntArray
+    flags: int
+
+
+@dataclass(frozen=True, slots=True)
+class Turns:
+    """Several turns of one wheel.
+
+    Attributes
+    ----------
+    trace : StrainTrace
+    time, ready, period : shape (n,), [s]
+    offset : shape (n, n_gages), [-]
+        Strain opposite the contact: hoop strain of inflation and speed, and the gage's zero.
+    mean : shape (n, n_gages), [-]
+        Mean strain of the preceding turn, less the offset.
+    gage_flags : shape (n, n_gages); flags : shape (n,)
+        `TurnFlag` bits.
+    rate_hz : float, [Hz]
+    """
+
+    trace: StrainTrace
+    time: FloatArray
+    ready: FloatArray
+    period: FloatArray
+    offset: FloatArray
+    mean: FloatArray
+    gage_flags: IntArray
+    flags: IntArray
+    rate_hz: float
+
+    def __len__(self) -> int:
+        return self.time.shape[0]
+
+
+class TurnCutter:
+    """Cut frames of samples into turns, with bounded memory.
+
+    Parameters
+    ----------
+    lateral : sequence of float, [m]
+        Lateral gage positions (ISO), in the order of the samples' rows. The gage nearest to zero
+        finds the contacts.
+    rate : float, [Hz]
+        Sample rate.
+    low_pass : LowPass
+    """
+
+    def __init__(
+        self, lateral: Sequence[float], rate: float, low_pass: LowPass | None = None
+    ) -> None:
+        if not rate > 0.0:
+            raise ParameterError(f"sample rate = {rate} Hz; must be above 0")
+        self.lateral = np.asarray(lateral, dtype=np.float64)
+        self.rate = float(rate)
+        self.low_pass = low_pass or LowPass()
+        self._centre = int(np.argmin(np.abs(self.lateral)))
+        self._gages = self.lateral.size
+        longest = int(LONGEST_TURN * rate)
+        self._finder = ContactFinder(longest)
+        self._keep = 2 * longest
+        # rows: gages, then the held conditions, then the trigger
+        self._buffer = np.full((self._gages + len(_HELD) + 1, 2 * self._keep), np.nan)
+        self._filled = 0
+        self._base = 0  # sample number of the buffer's first column
+        self._waiting: deque[Contact] = deque()
+        self._previous: Contact | None = None
+        self._previous_period = np.nan
+        self._previous_offset: FloatArray | None = None
+
+    def push(
+        self,
+        strain: FloatArray,
+        *,
+        speed: FloatArray | float = np.nan,
+        pressure: FloatArray | float = np.nan,
+        camber: FloatArray | float = np.nan,
+        trigger: BoolArray | None = None,
+    ) -> list[Turn]:
+        """Take a frame and return the turns that it completes.
+
+        Parameters
+        ----------
+        strain : array, shape (n_gages, n), [-]
+            Raw strain, oldest first; a lost sample is NaN, so that time goes on.
+        speed, pressure, camber : array of shape (n,) or a number, [m/s], [Pa], [rad]
+            Conditions, held until changed.
+        trigger : array of bool, shape (n,)
+            True at the sample at which the gages pass the top of the wheel; None if there is none.
+        """
+        if strain.ndim != 2 or strain.shape[0] != self._gages:
+            raise ShapeError(f"strain has shape {strain.shape}; ({self._gages}, n) is needed")
+        turns: list[Turn] = []
+        for start in range(0, strain.shape[1], self._keep):
+            part = slice(start, min(start + self._keep, strain.shape[1]))
+            n = part.stop - part.start
+            columns = self._room(n)
+            self._buffer[: self._gages, columns] = strain[:, part]
+            for row, value in enumerate((speed, pressure, camber), start=self._gages):
+                held = value[part] if isinstance(value, np.ndarray) else value
+                self._buffer[row, columns] = held
+            self._buffer[-1, columns] = np.nan if trigger is None else trigger[part]
+            self._waiting.extend(self._finder.push(strain[self._centre, part]))
+            while self._waiting:
+                turn = self._next_turn()
+                if turn is None:
+                    break
+                turns.append(turn)
+        return turns
+
+    def _room(self, n: int) -> slice:
+        """Make room for n samples and return their columns."""
+        if self._filled + n > self._buffer.shape[1]:
+            drop = self._filled - (self._buffer.shape[1] - self._keep)
+            drop = max(drop, self._filled + n - self._buffer.shape[1])
+            self._buffer[:, : self._filled - drop] = self._buffer[:, drop : self._filled]
+            self._filled -= drop
+            self._base += drop
+        columns = slice(self._filled, self._filled + n)
+        self._filled += n
+        return columns
+
+    def _next_turn(self) -> Turn | None:
+        """Work on the first waiting contact; None while its samples are not all there."""
+        contact, before = self._waiting[0], self._previous
+        if contact.fresh or before is None:
+            self._waiting.popleft()
+            self._previous = contact
+            self._previous_period, self._previous_offset = np.nan, None
+            return self._first_turn(contact)
+        period = contact.middle - before.middle
+        step = 2.0 * np.pi / period
+        sigma = self.low_pass.sigma(self.rate / period)
+        last = contact.fall + (AFTER + half_width(sigma)) / step + 1.0
+        if last >= self._base + self._filled:
+            return None
+        self._waiting.popleft()
+        self._previous = contact
+        turn = self._full_turn(contact, before, step, sigma, last)
+        self._previous_period = period
+        self._previous_offset = turn.offset
+        return turn
+
+    def _first_turn(self, contact: Contact) -> Turn:
+        """Return the turn of a contact that no turn precedes: nothing is known of it."""
+        unknown = np.full(self._gages, np.nan)
+        empty = np.full((self._gages, PHI.size), np.nan)
+        return Turn(
+            time=contact.middle / self.rate,
+            ready=contact.fall / self.rate,
+            period=np.nan,
+            pulse=np.nan,
+            axis_shift=np.nan,
+            speed=np.nan,
+            pressure=np.nan,
+            camber=np.nan,
+            offset=unknown,
+            mean=unknown,
+            strain=empty,
+            rate=empty,
+            gage_flags=np.zeros(self._gages, dtype=np.int64),
+            flags=int(TurnFlag.FIRST_TURN),
+        )
+
+    def _full_turn(
+        self, contact: Contact, before: Contact, step: float, sigma: float, last: float
+    ) -> Turn:
+        period = contact.middle - before.middle
+        flags = TurnFlag(0)
+        ratio = period / self._previous_period
+        if not np.isnan(ratio) and not 1 / LARGEST_PERIOD_RATIO <= ratio <= LARGEST_PERIOD_RATIO:
+            flags |= TurnFlag.PERIOD_JUMP
+        if not self.low_pass.suits(self.rate / period, self.rate):
+            flags |= TurnFlag.CUT_OFF
+        pulse = 0.5 * (contact.fall - contact.rise) * step
+        strain, rate, gage_flags = self._window(contact.middle, step, sigma, pulse)
+        opposite = 0.5 * (contact.middle + before.middle)
+        half = OFFSET_HALF_WIDTH / step
+        offset, gap = self._mean(slice(0, self._gages), opposite - half, opposite + half)
+        mean, gap_in_turn = self._mean(slice(0, self._gages), before.middle, contact.middle)
+        gage_flags[gap | gap_in_turn] |= int(TurnFlag.GAP)
+        unusable = (gage_flags & int(UNUSABLE)) != 0
+        strain -= offset[:, None]
+        mean = np.where(unusable, np.nan, mean - offset)
+        strain[unusable], rate[unusable] = np.nan, np.nan
+        if self._previous_offset is not None:
+            moved = np.abs(offset - self._previous_offset)
+            swing = np.nanmax(strain, axis=1, initial=0.0) - np.nanmin(strain, axis=1, initial=0.0)
+            gage_flags[moved > DRIFT_SHARE * swing] |= int(TurnFlag.DRIFT)
+        conditions, _ = self._mean(
+            slice(self._gages, self._gages + len(_HELD)), before.middle, contact.middle
+        )
+        speed, pressure, camber = (float(value) for value in conditions)
+        if not np.isfinite(speed) or speed == 0.0:
+            flags |= TurnFlag.NO_SPEED
+        elif speed < 0.0:
+            flags |= TurnFlag.REVERSED
+        axis_shift, once = self._trigger(before.middle, contact.middle, step)
+        if not once:
+            flags |= TurnFlag.TRIGGER_MISMATCH
+        for value in gage_flags:
+            flags |= TurnFlag(int(value))
+        if unusable[self._centre] or unusable.sum() > 1:
+            flags |= TurnFlag.TOO_FEW_GAGES
+        elif unusable.any():
+            flags |= TurnFlag.REDUCED_GAGES
+        return Turn(
+            time=contact.middle / self.rate,
+            ready=last / self.rate,
+            period=period / self.rate,
+            pulse=pulse,
+            axis_shift=axis_shift,
+            speed=speed,
+            pressure=pressure,
+            camber=camber,
+            offset=offset,
+            mean=mean,
+            strain=strain,
+            rate=rate,
+            gage_flags=gage_flags,
+            flags=int(flags),
+        )
+
+    def _window(
+        self, middle: float, step: float, sigma: float, pulse: float
+    ) -> tuple[FloatArray, FloatArray, IntArray]:
+        """Strain and rate over `PHI`, NaN beyond the end of the window, and the gages' flags."""
+        seen = PHI <= pulse + AFTER
+        reach = half_width(sigma) / step + 2.0
+        first = int(middle + PHI[0] / step - reach) - self._base
+        stop = int(middle + PHI[seen][-1] / step + reach) + 1 - self._base
+        raw = self._buffer[: self._gages, max(first, 0) : min(stop, self._filled)]
+        mended, gage_flags = inspect(raw, step)
+        strain = np.full((self._gages, PHI.size), np.nan)
+        rate = np.full((self._gages, PHI.size), np.nan)
+        zero = middle - self._base - max(first, 0)
+        strain[:, seen], rate[:, seen] = smooth_to_angle(mended, zero, step, PHI[seen], sigma)
+        return strain, rate, gage_flags
+
+    def _mean(self, rows: slice, start: float, stop: float) -> tuple[FloatArray, BoolArray]:
+        """Mean of buffer rows between two sample numbers, and where too much is missing."""
+        a = max(round(start) - self._base, 0)
+        b = min(round(stop) - self._base, self._filled)
+        part = self._buffer[rows, a:b]
+        good = np.isfinite(part)
+        if good.all():
+            return part.mean(axis=1), np.zeros(part.shape[0], dtype=np.bool_)
+        count = good.sum(axis=1)
+        gap = count < (1.0 - LARGEST_MISSING) * part.shape[1]
+        total = np.where(good, part, 0.0).sum(axis=1)
+        return np.where(gap, np.nan, total / np.maximum(count, 1)), gap
+
+    def _trigger(self, start: float, stop: float, step: float) -> tuple[float, bool]:
+        """Wheel angle of the contact's middle from the trigger, and whether it came just once."""
+        a, b = round(start) - self._base, round(stop) - self._base
+        seen = self._buffer[-1, max(a, 0) : b]
+        if seen.size == 0 or np.isnan(seen).any():
+            return np.nan, True
+        on = np.flatnonzero((seen[1:] > 0.5) & (seen[:-1] <= 0.5)) + 1
+        if on.size != 1:
+            return np.nan, False
+        top = float(on[0]) - 0.5 + max(a, 0) + self._base  # passed between two samples
+        return -np.pi + (stop - top) * step, True
+
+
+def cut_turns(
+    strain: FloatArray,
+    rate: float,
+    lateral: Sequence[float],
+    *,
+    speed: FloatArray | float = np.nan,
+    pressure: FloatArray | float = np.nan,
+    camber: FloatArray | float = np.nan,
+    trigger: BoolArray | None = None,
+    low_pass: LowPass | None = None,
+) -> Turns:
+    """Cut a whole record into turns; parameters as in `TurnCutter` and its `push`."""
+    cutter = TurnCutter(lateral, rate, low_pass)
+    turns = cutter.push(strain, speed=speed, pressure=pressure, camber=camber, trigger=trigger)
+    return stack_turns(turns, cutter.lateral, rate)
+
+
+def stack_turns(turns: Sequence[Turn], lateral: FloatArray, rate: float) -> Turns:
+    """Stack single turns along a new first axis."""
+    gages = lateral.size
+
+    def column(name: str) -> FloatArray:
+        return np.array([getattr(turn, name) for turn in turns], dtype=np.float64)
+
+    def rows(name: str, *shape: int) -> FloatArray:
+        return column(name).reshape(len(turns), *shape)
+
+    trace = StrainTrace(
+        phi=PHI,
+        strain=rows("strain", gages, PHI.size),
+        rate=rows("rate", gages, PHI.size),
+        pulse=column("pulse"),
+        lateral=lateral,
+        axis_shift=column("axis_shift"),
+        conditions=Conditions(
+            omega=2.0 * np.pi / column("period"),
+            speed=column("speed"),
+            pressure=column("pressure"),
+            camber=column("camber"),
+        ),
+    )
+    return Turns(
+        trace=trace,
+        time=column("time"),
+        ready=column("ready"),
+        period=column("period"),
+        offset=rows("offset", gages),
+        mean=rows("mean", gages),
+        gage_flags=rows("gage_flags", gages).astype(np.int64),
+        flags=column("flags").astype(np.int64),
+        rate_hz=rate,
+    )
