@@ -1,0 +1,30 @@
+"""Campaigns: folders of measurements in the format ``tirelib-campaign/1``."""
+
+from tirelib.campaign.check import check_campaign
+from tirelib.campaign.model import (
+    BoolArray,
+    CampaignHeader,
+    FloatArray,
+    Run,
+    RunPlan,
+    TireGeometry,
+    Tolerance,
+)
+from tirelib.campaign.problem import Problem
+from tirelib.campaign.read import Campaign, read_campaign
+from tirelib.campaign.write import write_campaign
+
+__all__ = [
+    "BoolArray",
+    "Campaign",
+    "CampaignHeader",
+    "FloatArray",
+    "Problem",
+    "Run",
+    "RunPlan",
+    "TireGeometry",
+    "Tolerance",
+    "check_campaign",
+    "read_campaign",
+    "write_campaign",
+]

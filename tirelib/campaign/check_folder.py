@@ -1,0 +1,84 @@
+"""Checks of the folder: files that are there and not listed, copies, repeats."""
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+
+from tirelib.campaign import plan as plan_file
+from tirelib.campaign.model import RunPlan
+from tirelib.campaign.problem import Problem
+
+_SUFFIXES = frozenset({".mf4", ".mdf", ".dat"})
+
+
+def extra_files(folder: Path) -> list[Problem]:
+    """Return a warning for each recording in the folder that ``runs.csv`` does not list."""
+    listed = _listed(folder)
+    return [
+        Problem(
+            file,
+            "the file is not listed in runs.csv",
+            "every recording has its row",
+            "add a row, or take the file away",
+            "warning",
+        )
+        for file in sorted(
+            path.relative_to(folder).as_posix()
+            for path in folder.rglob("*")
+            if path.suffix.lower() in _SUFFIXES
+        )
+        if file not in listed
+    ]
+
+
+def _listed(folder: Path) -> set[str]:
+    """Return the files that the rows name, those of faulty rows included."""
+    try:
+        with (folder / plan_file.FILE).open(encoding="utf-8-sig", newline="") as stream:
+            rows = [{k.strip(): v for k, v in row.items() if k} for row in csv.DictReader(stream)]
+    except (OSError, UnicodeDecodeError, csv.Error):
+        return set()
+    return {(row.get("file") or "").strip().removeprefix("./") for row in rows}
+
+
+def repeat_problems(plans: Sequence[RunPlan]) -> list[Problem]:
+    """Return a warning when no set point was measured twice; sweeps repeat within themselves."""
+    if not plans or any(plan.kind == "sweep" for plan in plans):
+        return []
+    points = [
+        tuple(f"{getattr(plan, c.quantity):.6g}" for c in plan_file.SET_POINTS) for plan in plans
+    ]
+    if len(set(points)) < len(points):
+        return []
+    return [
+        Problem(
+            plan_file.FILE,
+            f"none of the {len(points)} set points was measured twice",
+            "a few repeats tell the noise",
+            "repeat some runs; without them no noise is known and diagnosis gives hints only",
+            "warning",
+        )
+    ]
+
+
+def copy_problems(digests: Sequence[tuple[str, str]]) -> list[Problem]:
+    """Return an error for each run whose samples are those of an earlier one.
+
+    Parameters
+    ----------
+    digests : sequence of (file, digest of its samples)
+    """
+    first: dict[str, str] = {}
+    problems: list[Problem] = []
+    for file, digest in digests:
+        if digest in first:
+            problems.append(
+                Problem(
+                    file,
+                    f"duplicate run: its samples are those of {first[digest]}",
+                    "a repeat is a new measurement with its own noise",
+                    "name the right file, or drop the copy",
+                )
+            )
+        first.setdefault(digest, file)
+    return problems

@@ -1,0 +1,87 @@
+"""Checks of the turns: enough of them, and a trigger that agrees with the rig."""
+
+import math
+
+import numpy as np
+
+from tirelib.campaign.finding import Finding, finding
+from tirelib.campaign.model import CampaignHeader, FloatArray, Run
+from tirelib.campaign.turns import expected_period, trigger_samples, turn_samples
+
+
+def turn_findings(run: Run, header: CampaignHeader) -> list[Finding]:
+    """Return what is wrong with the number of turns and with the trigger of one run."""
+    if run.strain is None or not math.isfinite(run.rate):
+        return []
+    found: list[Finding] = []
+    samples = turn_samples(run, header)
+    file = run.plan.file
+    count = run.strain.shape[1]
+    if samples is not None and count < 2.0 * samples * (1.0 - 1e-3):
+        found.append(
+            finding(
+                "turns",
+                file,
+                "",
+                f"{count / samples:.2f} turns of {samples / run.rate:.4g} s",
+                "two turns or more are needed: the first only sets the offset",
+                "record longer",
+            )
+        )
+    pulses = trigger_samples(run)
+    expected = expected_period(run, header)
+    if pulses is None:
+        return found
+    if pulses.size < 2:
+        if expected is not None and count > 2.5 * expected[0] * run.rate:
+            found.append(
+                finding(
+                    "trigger",
+                    file,
+                    "trigger",
+                    f"{pulses.size} pulse(s) in {count / run.rate / expected[0]:.1f} turns",
+                    "one pulse a turn is expected",
+                    "check the trigger's sensor or drop the channel",
+                )
+            )
+        return found
+    return found + _periods(run, np.diff(pulses), pulses[:-1].astype(float), expected)
+
+
+def _periods(
+    run: Run, gaps: FloatArray, begins: FloatArray, expected: tuple[float, str, float] | None
+) -> list[Finding]:
+    """Compare the trigger's periods with the rig and with each other."""
+    file = run.plan.file
+    period = float(np.median(gaps)) / run.rate
+    if expected is not None and abs(period / expected[0] - 1.0) > expected[2] + 2.0 / np.median(
+        gaps
+    ):
+        return [
+            finding(
+                "trigger",
+                file,
+                "trigger",
+                f"its period is {1e3 * period:.4g} ms, by {expected[1]} a turn takes "
+                f"{1e3 * expected[0]:.4g} ms (ratio {period / expected[0]:.3g})",
+                f"they must agree within {100 * expected[2]:.0f} %",
+                f"check one pulse a turn, rate_hz, and the unit of {expected[1]}",
+            )
+        ]
+    odd = np.flatnonzero(np.abs(gaps / np.median(gaps) - 1.0) > 0.2)
+    if run.plan.kind == "sweep" or not odd.size:
+        return []
+    first = int(odd[0])
+    what = "missing" if gaps[first] > np.median(gaps) else "extra"
+    return [
+        finding(
+            "trigger",
+            file,
+            "trigger",
+            f"{odd.size} uneven period(s), the first of "
+            f"{gaps[first] / np.median(gaps):.2f} turns: a pulse is {what}",
+            "one pulse a turn is expected",
+            "check the trigger's sensor or drop the channel",
+            at=f"sample {int(begins[first])} (t = {run.time()[int(begins[first])]:.4f} s)",
+        )
+    ]

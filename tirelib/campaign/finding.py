@@ -1,0 +1,71 @@
+"""Findings of the content checks, and the one line for a fault that many runs share."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from tirelib.campaign.problem import Problem, Severity
+
+SHARED_BY = 4
+"""From this many runs on, and from half of all, a shared fault gets one line for all of them."""
+
+_NAMED = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A problem of one run with what it is about, so that equal ones can be told.
+
+    Attributes
+    ----------
+    key : str
+        Kind of fault and channel, the same in every run that has it.
+    file : str
+        The run file.
+    channel : str
+        Empty for the run as a whole.
+    problem : Problem
+    """
+
+    key: str
+    file: str
+    channel: str
+    problem: Problem
+
+
+def finding(
+    key: str,
+    file: str,
+    channel: str,
+    given: str,
+    allowed: str,
+    remedy: str,
+    *,
+    at: str = "",
+    warning: bool = False,
+) -> Finding:
+    """Return a finding whose place is `file`, `channel` and, where that helps, `at`."""
+    where = ", ".join(part for part in (file, channel and f"channel {channel}", at) if part)
+    severity: Severity = "warning" if warning else "error"
+    problem = Problem(where, given, allowed, remedy, severity)
+    return Finding(f"{key} {channel} {severity}", file, channel, problem)
+
+
+def gathered(findings: Iterable[Finding], n_runs: int) -> list[Problem]:
+    """Return the problems in their order; one that most runs share becomes one line."""
+    by_key: dict[str, list[Finding]] = {}
+    listed = list(findings)
+    for item in listed:
+        by_key.setdefault(item.key, []).append(item)
+    problems: list[Problem] = []
+    for item in listed:
+        same = by_key[item.key]
+        files = list(dict.fromkeys(other.file for other in same))
+        if len(files) < SHARED_BY or 2 * len(files) < n_runs:
+            problems.append(item.problem)
+        elif item is same[0]:
+            named = ", ".join(files[:_NAMED])
+            where = f"{len(files)} of {n_runs} runs ({named}, ...)"
+            where += f", channel {item.channel}" if item.channel else ""
+            given = f"{item.problem.given} in the first of them"
+            problems.append(replace(item.problem, where=where, given=given))
+    return problems

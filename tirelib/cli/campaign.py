@@ -1,0 +1,201 @@
+"""``tirelib campaign``: is a folder of measurements sound, and what is in it."""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from rich.table import Table
+
+from tirelib.campaign.problem import Problem
+from tirelib.campaign.read import Campaign, read_campaign
+from tirelib.errors import FormatError
+
+CHECK_FORMAT = "tirelib-campaign-check/1"
+SHOW_FORMAT = "tirelib-campaign-show/1"
+
+_WIDE = 145
+
+
+@click.group()
+def campaign() -> None:
+    """Validate a folder of measurements, or show what is in it."""
+
+
+@contextmanager
+def _progress(what: str) -> Iterator[Any]:
+    """Yield a callback (done, total) that draws a bar on stderr when that is a terminal."""
+    console = Console(stderr=True)
+    with Progress(
+        TextColumn(what),
+        BarColumn(),
+        MofNCompleteColumn(),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    ) as progress:
+        task = progress.add_task(what, total=None)
+        yield lambda done, total: progress.update(task, completed=done, total=total)
+
+
+_CHECK_EXAMPLE = """\b
+Example:
+  tirelib campaign check data/my-campaign --json build/out/check.json
+
+\b
+Exit code: 0 no error (warnings are allowed), 1 errors were found,
+2 DIR is not a readable folder.
+"""
+
+
+@campaign.command(epilog=_CHECK_EXAMPLE)
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.option("--json", "json_file", metavar="FILE", type=click.Path(path_type=Path),
+              help="Write the problems as JSON.")  # fmt: skip
+@click.pass_context
+def check(context: click.Context, folder: Path, json_file: Path | None) -> None:
+    """List all problems of the campaign in DIR at once."""
+    from tirelib.campaign.check import check_campaign
+
+    try:
+        with _progress("checking") as progress:
+            problems = check_campaign(folder, progress=progress)
+    except FormatError as error:
+        click.echo(f"Error: {error}", err=True)
+        context.exit(2)
+    errors = sum(problem.severity == "error" for problem in problems)
+    _print_problems(folder, problems, errors)
+    if json_file is not None:
+        _write_json(json_file, check_document(folder, problems))
+    context.exit(1 if errors else 0)
+
+
+def _print_problems(folder: Path, problems: list[Problem], errors: int) -> None:
+    console = Console(highlight=False, soft_wrap=True)
+    for problem in problems:
+        colour = "red" if problem.severity == "error" else "yellow"
+        console.print(f"[bold {colour}]{problem.severity:>7}[/]  ", end="")
+        console.print(str(problem), markup=False)
+    warnings = len(problems) - errors
+    verdict = "[bold red]not usable as it stands[/]" if errors else "[bold green]sound[/]"
+    counts = f"{_count(errors, 'error')}, {_count(warnings, 'warning')}"
+    console.print(f"{folder}: {counts}: ", markup=False, end="")
+    console.print(verdict)
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def check_document(folder: Path, problems: list[Problem]) -> dict[str, Any]:
+    """Return what ``check --json`` writes."""
+    errors = sum(problem.severity == "error" for problem in problems)
+    return {
+        "format": CHECK_FORMAT,
+        "campaign": str(folder),
+        "errors": errors,
+        "warnings": len(problems) - errors,
+        "problems": [
+            {
+                "severity": problem.severity,
+                "where": problem.where,
+                "given": problem.given,
+                "allowed": problem.allowed,
+                "remedy": problem.remedy,
+            }
+            for problem in problems
+        ],
+    }
+
+
+_SHOW_EXAMPLE = """\b
+Example:
+  tirelib campaign show data/my-campaign --out build/out/show-my-campaign
+"""
+
+
+@campaign.command(epilog=_SHOW_EXAMPLE)
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.option("--out", metavar="DIR", type=click.Path(path_type=Path),
+              help="Folder for the overview plot; default build/out/show-NAME.")  # fmt: skip
+@click.option("--json", "json_file", metavar="FILE", type=click.Path(path_type=Path),
+              help="Write header and runs as JSON.")  # fmt: skip
+def show(folder: Path, out: Path | None, json_file: Path | None) -> None:
+    """Show header, runs with set points and measured means, and an overview plot of DIR."""
+    from tirelib.campaign.overview import RunRow, representative_plans, run_row
+    from tirelib.campaign.overview_plot import overview_figure, save_figure
+
+    data = read_campaign(folder)
+    chosen = {plan.run for plan in representative_plans(data.plans)}
+    rows: list[RunRow] = []
+    shown = []
+    with _progress("reading") as progress:
+        for done, run in enumerate(data.runs(), start=1):
+            rows.append(run_row(run))
+            shown += [run] if run.plan.run in chosen else []
+            progress(done, len(data.plans))
+    terminal = Console(highlight=False)
+    console = terminal if terminal.is_terminal else Console(highlight=False, width=_WIDE)
+    _print_header(console, data)
+    _print_runs(console, data, rows)
+    target = out or Path("build/out") / f"show-{folder.resolve().name}"
+    picture = save_figure(overview_figure(data.header, rows, shown), target / "overview.png")
+    if json_file is not None:
+        _write_json(json_file, _show_document(data, rows, picture))
+    console.print(f"overview plot: {picture}", markup=False, soft_wrap=True)
+
+
+def _print_header(console: Console, data: Campaign) -> None:
+    from tirelib.campaign.overview import header_lines
+
+    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
+    for name, value in header_lines(data.header):
+        table.add_row(name, value)
+    console.print(table)
+
+
+def _print_runs(console: Console, data: Campaign, rows: list[Any]) -> None:
+    """Print a run a line where there is room, else set point over mean."""
+    from tirelib.campaign.overview import COLUMNS
+
+    wide = console.width >= _WIDE
+    between = " / " if wide else "\n"
+    table = Table(
+        title=f"{len(rows)} runs: set point {'/' if wide else 'over'} measured mean, axes iso",
+        title_justify="left",
+        box=SIMPLE_HEAD,
+        padding=(0, 1) if wide else (0, 1, 0, 0),
+    )
+    table.add_column("run", justify="right", no_wrap=True)
+    table.add_column("kind", no_wrap=True)
+    for column in COLUMNS:
+        table.add_column(column.heading, justify="right", no_wrap=True)
+    table.add_column("strain\nsamples", justify="right", no_wrap=True)
+    for row in rows:
+        cells = [column.cell(row, between) for column in COLUMNS]
+        table.add_row(str(row.run), row.kind, *cells, str(row.samples) if row.samples else "-")
+    console.print(table)
+
+
+def _show_document(data: Campaign, rows: list[Any], picture: Path) -> dict[str, Any]:
+    from tirelib.campaign.overview import header_document, row_document
+
+    return {
+        "format": SHOW_FORMAT,
+        "campaign": str(data.path),
+        "axes": "iso",
+        "header": header_document(data.header),
+        "content_hash": data.content_hash(),
+        "runs": [row_document(row) for row in rows],
+        "plot": str(picture),
+    }
+
+
+def _write_json(file: Path, document: dict[str, Any]) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")

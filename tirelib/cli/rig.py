@@ -1,0 +1,140 @@
+"""``tirelib rig``: measure a virtual tire on the numerical flat-belt rig."""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from bench.rig.campaign import Truth
+
+RIG_FORMAT = "tirelib-rig/1"
+
+_EXAMPLE = """\b
+Example:
+  tirelib rig --plan set1 --out build/out/set1 --seed 1 --repeats 6
+
+\b
+The folder is a campaign (campaign.toml, runs.csv, runs/*.mf4). truth.csv in it holds
+the noise-free forces, slip, contact lengths and edges of each run, in SI and ISO signs.
+"""
+
+
+@contextmanager
+def _progress() -> Iterator[Any]:
+    """Yield a callback (done, total) that draws a bar on stderr when that is a terminal."""
+    console = Console(stderr=True)
+    with Progress(
+        TextColumn("rig"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    ) as progress:
+        task = progress.add_task("rig", total=None)
+        yield lambda done, total: progress.update(task, completed=done, total=total)
+
+
+@click.command(epilog=_EXAMPLE)
+@click.option("--plan", "plan_name", metavar="NAME", help="The test plan, see --list.")
+@click.option("--out", metavar="DIR", type=click.Path(path_type=Path), help="Campaign folder.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0),
+              help="The day: other noise and set-point errors, same tire and gages.")  # fmt: skip
+@click.option("--repeats", type=click.IntRange(min=0), metavar="K",
+              help="Runs repeated at the end.  [default: the plan's own]")  # fmt: skip
+@click.option("--tire", "tire_name", default="reference", show_default=True, metavar="NAME",
+              help="The virtual tire, see --list.")  # fmt: skip
+@click.option("--axes", default="iso", show_default=True, metavar="NAME",
+              help="Axis system of the files: iso, sae or adapted_sae.")  # fmt: skip
+@click.option("--jobs", default=2, show_default=True, type=click.IntRange(min=1),
+              help="Processes.")  # fmt: skip
+@click.option("--force", is_flag=True, help="Write into a folder that is not empty.")
+@click.option("--list", "show_list", is_flag=True, help="List plans and tires, then stop.")
+@click.option("--json", "json_file", metavar="FILE", type=click.Path(path_type=Path),
+              help="Write a summary as JSON.")  # fmt: skip
+def rig(
+    plan_name: str | None,
+    out: Path | None,
+    seed: int,
+    repeats: int | None,
+    tire_name: str,
+    axes: str,
+    jobs: int,
+    force: bool,
+    show_list: bool,
+    json_file: Path | None,
+) -> None:
+    """Measure a virtual tire on the numerical rig and write a campaign."""
+    if show_list:
+        _list(json_file)
+        return
+    if plan_name is None or out is None:
+        raise click.UsageError("--plan and --out are needed; --list shows the plans")
+    from bench.rig.campaign import run_plan
+    from bench.rig.plans import plan
+    from bench.rig.tire import tire
+
+    with _progress() as progress:
+        truths = run_plan(
+            plan(plan_name),
+            tire(tire_name),
+            out,
+            seed=seed,
+            repeats=repeats,
+            jobs=jobs,
+            axes=axes,
+            overwrite=force,
+            progress=progress,
+        )
+    click.echo(f"{len(truths)} runs of {plan_name} in {out} (axes {axes}, seed {seed})")
+    if json_file is not None:
+        _write_json(json_file, _document(plan_name, out, seed, tire_name, axes, truths))
+
+
+def _list(json_file: Path | None) -> None:
+    from bench.rig.plans import PLANS, with_repeats
+    from bench.rig.tire import TIRES
+
+    table = Table("plan", "runs", "about", box=SIMPLE_HEAD)
+    rows = []
+    for make in PLANS.values():
+        p = make()
+        count = len(with_repeats(p, p.repeats))
+        table.add_row(p.name, str(count), p.about)
+        rows.append({"plan": p.name, "runs": count, "about": p.about})
+    console = Console(highlight=False, soft_wrap=True)
+    console.print(table)
+    console.print(f"tires: {', '.join(TIRES)}")
+    if json_file is not None:
+        _write_json(json_file, {"format": RIG_FORMAT, "plans": rows, "tires": list(TIRES)})
+
+
+def _document(
+    plan_name: str, out: Path, seed: int, tire_name: str, axes: str, truths: "list[Truth]"
+) -> dict[str, Any]:
+    return {
+        "format": RIG_FORMAT,
+        "plan": plan_name,
+        "folder": str(out),
+        "seed": seed,
+        "tire": tire_name,
+        "axes": axes,
+        "runs": len(truths),
+        "Fz_N": [min(t.force.fz for t in truths), max(t.force.fz for t in truths)],
+        "Fy_N": [min(t.force.fy for t in truths), max(t.force.fy for t in truths)],
+        "Fx_N": [min(t.force.fx for t in truths), max(t.force.fx for t in truths)],
+    }
+
+
+def _write_json(file: Path, document: dict[str, Any]) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")

@@ -1,0 +1,369 @@
+"""Calibrate the chain of estimators on observations: one independent measurement per run.
+
+Each link is fitted on what the links before it would have said of a condition that they had not seen
+(held-out predictions), so that errors do not look smaller further down the chain than they are.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize
+
+from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.errors import CalibrationError
+from tirelib.estimators import basis
+from tirelib.estimators.chain import AngleModel, Chain
+from tirelib.estimators.fit import Fit, fit_best, mean_by
+from tirelib.estimators.laws import ConditionLaws
+from tirelib.estimators.polynomial import Polynomial, Range
+from tirelib.estimators.regressors import EVEN, ODD, compute_regressors
+from tirelib.observations import TRUTH, Observations
+
+FEWEST_CONDITIONS = 5
+"""Distinct conditions below which nothing is calibrated."""
+VARIES = {
+    "contact_angle": 0.02,
+    "traction": 0.08,
+    "camber": 0.02,
+    "slip_ratio": 0.02,
+    "load": 300.0,
+    "pressure": 1e4,
+    "speed_squared": 60.0,
+    "cp1_slope": 0.02,
+    "cp2_slope": 0.02,
+    "angle_slope": 0.002,
+    "tp_slope": 0.02,
+}
+"""Range (SI) that a regressor must cover in the data to enter a regression."""
+SLACK = {
+    "contact_angle": 0.01,
+    "compression": 0.03,
+    "traction": 0.05,
+    "cp1_slope": 0.02,
+    "cp2_slope": 0.02,
+    "tp_slope": 0.02,
+    "angle_slope": 0.004,
+    "utilisation": 0.02,
+    "camber": np.deg2rad(0.5),
+}
+"""Least distance (SI) beyond the calibrated range that is still taken as calibrated."""
+MARGIN = 0.05
+"""The same, as a share of the range."""
+FREE_ROLLING = 0.02
+"""Slip ratio up to which a run tells the effective rolling radius."""
+LEAST_FORCE = 0.05
+"""Range of Fy over mean Fz, and ..."""
+LEAST_LOAD = 0.1
+"""... range of Fz over mean Fz, and ..."""
+LEAST_ANGLE = np.deg2rad(0.5)
+"""... range of slip angle, [rad], below which the quantity cannot be calibrated."""
+LEAST_ANGLE_ERROR = np.deg2rad(0.02)
+"""Floor of the slip-angle error against which the cornering curve's flatness is weighed, [rad]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Links:
+    """What the fits of one chain leave behind for reports.
+
+    Rows are independent measurements (runs, or turns of sweeps). `held_out` are predictions by fits
+    that had not seen the row's condition; `refused` says why a quantity has no model.
+    """
+
+    unit: IntArray
+    groups: IntArray
+    values: dict[str, FloatArray]
+    truth: dict[str, FloatArray]
+    nominal: dict[str, FloatArray]
+    held_out: dict[str, FloatArray]
+    candidates: dict[str, tuple[tuple[int, float], ...]]
+    refused: dict[str, str]
+
+
+def calibrate_chain(
+    observations: Observations,
+    gages: Sequence[int],
+    progress: Callable[[str], None] | None = None,
+) -> tuple[Chain, Links]:
+    """Fit every link that the data can inform, with the given gages.
+
+    Raises
+    ------
+    CalibrationError
+        If fewer than `FEWEST_CONDITIONS` conditions were measured.
+    """
+    rows = observations.usable
+    regressors = compute_regressors(observations.features, gages)
+    for name in (*EVEN, *ODD):
+        rows = rows & np.isfinite(regressors[name])
+    unit = observations.unit
+    if np.unique(observations.group[rows]).size < FEWEST_CONDITIONS:
+        raise CalibrationError(
+            f"{', '.join(h.name for h in observations.headers)}: usable turns at "
+            f"{np.unique(observations.group[rows]).size} conditions; a calibration needs at least "
+            f"{FEWEST_CONDITIONS}; measure more runs or look at the flags with `tirelib features`"
+        )
+    values = {name: mean_by(unit, x, rows) for name, x in regressors.items()}
+    values["speed_squared"] = values["speed"] ** 2
+    truth = {name: mean_by(unit, observations.truth[name], rows) for name in TRUTH}
+    nominal = {name: mean_by(unit, x, rows) for name, x in observations.nominal.items()}
+    groups = mean_by(unit, observations.group.astype(np.float64), rows).astype(np.int64)
+    links = Links(np.unique(unit[rows]), groups, values, truth, nominal, {}, {}, {})
+    say = progress or (lambda _: None)
+    laws = _laws(observations, values)
+    load, mean_load = _fit_load(links, laws, say)
+    radius = _fit_radius(links, say)
+    force = _fit_force(links, say)
+    angle = _fit_angle(links, force is not None, say)
+    chain = Chain(
+        gages=tuple(gages),
+        guards={name: () for name in ("Fz", "alpha", "kappa", "Fy")},
+        laws=laws,
+        mean_load=mean_load,
+        load=load,
+        radius=radius,
+        force=force,
+        angle=angle,
+    )
+    return _with_ranges(_with_floor(chain, regressors, unit, rows), links), links
+
+
+def _varying(values: dict[str, FloatArray], names: Sequence[str]) -> set[str]:
+    """Return the regressors that cover a range worth fitting."""
+    return {
+        name
+        for name in names
+        if name in values
+        and np.isfinite(values[name]).all()
+        and np.ptp(values[name]) > VARIES[name]
+    }
+
+
+def _laws(observations: Observations, values: dict[str, FloatArray]) -> ConditionLaws:
+    tire = observations.headers[0].tire
+    varying = _varying(values, ("pressure", "speed_squared"))
+
+    def limits(x: FloatArray) -> tuple[float, float]:
+        return (float(x.min()), float(x.max())) if np.isfinite(x).all() else (np.nan, np.nan)
+
+    return ConditionLaws(
+        pressure=limits(values["pressure"]),
+        speed=limits(values["speed"]),
+        pressure_fitted="pressure" in varying,
+        speed_fitted="speed_squared" in varying,
+        contact_width=tire.belt_width or np.nan,
+        radius=tire.ring_radius or tire.free_radius,
+    )
+
+
+def _fit_load(
+    links: Links, laws: ConditionLaws, say: Callable[[str], None]
+) -> tuple[Polynomial | None, float]:
+    truth, values = links.truth["Fz"], links.values
+    mean = float(np.mean(truth)) if np.isfinite(truth).all() else np.nan
+    reason = ""
+    if not np.isfinite(mean):
+        reason = "the rig measured no Fz in some run"
+    elif np.ptp(truth) < LEAST_LOAD * mean or "contact_angle" not in _varying(
+        values, ["contact_angle"]
+    ):
+        reason = f"the load varies by {np.ptp(truth):.0f} N only; measure several loads"
+    if reason:
+        links.refused["Fz"] = reason
+        links.values["load"] = np.full(truth.shape, mean)
+        return None, mean
+    say("Fz")
+    correction, _ = laws.load_correction(values)
+    candidates = basis.load_candidates(_varying(values, list(VARIES)))
+    fit = fit_best(values, truth - correction, links.groups, candidates, odd=ODD, what="Fz")
+    _keep(links, "Fz", fit, fit.held_out + correction)
+    links.values["load"] = fit.held_out + correction
+    return fit.model, mean
+
+
+def _fit_radius(links: Links, say: Callable[[str], None]) -> Polynomial | None:
+    """Effective rolling radius ``v (1 + kappa) / Omega`` (Eq. 21, 22) from nearly free rolling."""
+    values, kappa = links.values, links.truth["slip_ratio"]
+    free = (np.abs(kappa) < FREE_ROLLING) & (values["speed"] > 0.0)
+    if free.sum() < 1:
+        links.refused["kappa"] = "no run rolls freely with a measured speed and slip ratio"
+        return None
+    say("kappa")
+    part = {name: x[free] for name, x in values.items()}
+    radius = part["speed"] * (1.0 + kappa[free]) / part["omega"]
+    varying = _varying(part, ["load", "pressure", "speed_squared"])
+    if "Fz" in links.refused:
+        varying.discard("load")
+    groups = links.groups[free]
+    if np.unique(groups).size < 2:
+        groups = np.arange(free.sum())
+    if np.unique(groups).size < 2:
+        groups, part = np.arange(2), {name: np.repeat(x, 2) for name, x in part.items()}
+        radius = np.repeat(radius, 2)
+    fit = fit_best(part, radius, groups, basis.radius_candidates(varying), what="R_eff")
+    held_radius = fit.model.predict(values)[0]
+    held_radius[np.flatnonzero(free)[: fit.held_out.size]] = fit.held_out[: int(free.sum())]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        held = values["omega"] * held_radius / values["speed"] - 1.0
+    _keep(links, "kappa", fit, held)
+    links.values["slip_ratio"] = held
+    links.values["slip_size"] = np.abs(held)
+    return fit.model
+
+
+def _fit_force(links: Links, say: Callable[[str], None]) -> Polynomial | None:
+    truth, values = links.truth["Fy"], links.values
+    if not np.isfinite(truth).all():
+        links.refused["Fy"] = "the rig measured no Fy in some run"
+        return None
+    if np.ptp(truth) < LEAST_FORCE * float(np.mean(values["load"])):
+        links.refused["Fy"] = f"Fy varies by {np.ptp(truth):.0f} N only; measure slip angles"
+        return None
+    say("Fy")
+    varying = _varying(values, list(VARIES))
+    varying -= _frozen_with_slip(links, varying)
+    fit = fit_best(
+        values, truth, links.groups, basis.force_candidates(varying), odd=(*ODD, "camber"),
+        centre=False, what="Fy",
+    )  # fmt: skip
+    _keep(links, "Fy", fit, fit.held_out)
+    return fit.model
+
+
+def _frozen_with_slip(links: Links, varying: set[str]) -> set[str]:
+    """Return the conditions that stand still wherever there is lateral force."""
+    cornering = np.abs(links.truth["Fy"]) > 0.2 * np.abs(links.truth["Fy"]).max()
+    part = {name: x[cornering] for name, x in links.values.items()}
+    return varying - _varying(part, sorted(varying))
+
+
+def _fit_angle(links: Links, has_force: bool, say: Callable[[str], None]) -> AngleModel | None:
+    truth, values = links.truth["slip_angle"], links.values
+    if not has_force:
+        links.refused["alpha"] = "it follows from Fy, which is not calibrated"
+        return None
+    if not np.isfinite(truth).all() or np.ptp(truth) < LEAST_ANGLE:
+        links.refused["alpha"] = "the slip angle was not measured or not varied"
+        return None
+    say("alpha")
+    values["utilisation"] = links.held_out["Fy"] / values["load"]
+    varying = _varying(values, list(VARIES))
+    varying -= _frozen_with_slip(links, varying)
+    if "Fz" in links.refused:
+        varying.discard("load")
+    candidates = basis.angle_candidates(varying)
+    blur = float(np.sqrt(np.mean(((links.truth["Fy"] - links.held_out["Fy"]) / values["load"]) ** 2)))
+    sharpness = blur / LEAST_ANGLE_ERROR
+    # where the cornering curve is flat, the same error of Fy means more slip angle: weigh it less
+    steep = _flatness(truth, values["utilisation"])
+    odd = ("utilisation", "camber")
+    weights = 1.0 / (1.0 + (sharpness * steep) ** 2)
+    for _ in range(2):
+        fit = fit_best(
+            values, truth, links.groups, candidates, odd=odd, weights=weights,
+            centre=False, what="alpha",
+        )  # fmt: skip
+        steep = np.maximum(steep, np.abs(fit.model.slope(values, "utilisation")))
+        weights = 1.0 / (1.0 + (sharpness * steep) ** 2)
+    _keep(links, "alpha", fit, fit.held_out)
+    return _weighed(fit.model, values, truth - fit.held_out)
+
+
+def _weighed(model: Polynomial, values: dict[str, FloatArray], error: FloatArray) -> AngleModel:
+    """Find how the held-out error grows where the cornering curve is flat.
+
+    Maximum likelihood of ``variance = leverage + a + b s^2 + c s^4``, s the slope d alpha / d u.
+    """
+    x = model.design(values)
+    leverage = np.einsum("ij,jk,ik->i", x, model.covariance, x)
+    steep = model.slope(values, "utilisation") ** 2
+    typical = float(np.median(steep))
+    unit = float(np.median(error**2)) + LEAST_ANGLE_ERROR**2 * 1e-3
+    shape = np.stack((np.ones_like(steep), steep / typical, (steep / typical) ** 2))
+
+    def surprise(logs: FloatArray) -> float:
+        variance = leverage + unit * (np.exp(logs) @ shape)
+        return float(np.sum(np.log(variance) + error**2 / variance))
+
+    best = minimize(
+        surprise, np.array([-1.0, -1.0, -3.0]), method="Nelder-Mead", bounds=[(-9.0, 9.0)] * 3,
+        options={"maxiter": 2000},
+    )  # fmt: skip
+    constant, square, fourth = np.exp(best.x) * unit
+    return AngleModel(
+        replace(model, residual=float(np.sqrt(constant))),
+        blur=float(np.sqrt(square / typical)),
+        bend=float(np.sqrt(fourth) / typical),
+    )
+
+
+def _flatness(angle: FloatArray, utilisation: FloatArray) -> FloatArray:
+    """Slope d alpha / d utilisation of a curve ``u = a tanh(alpha / b)`` through the data."""
+    size, share = np.abs(angle), np.abs(utilisation)
+    top = 1.02 * float(share.max())
+    width = float(np.median(size[size > 0] / np.arctanh(np.minimum(share[size > 0] / top, 0.98))))
+    return width / top * np.cosh(np.minimum(size / width, 6.0)) ** 2
+
+
+def _keep(links: Links, quantity: str, fit: Fit, held_out: FloatArray) -> None:
+    links.held_out[quantity] = held_out
+    links.candidates[quantity] = fit.candidates
+
+
+def _with_floor(
+    chain: Chain, regressors: dict[str, FloatArray], unit: IntArray, rows: BoolArray
+) -> Chain:
+    """Add what a single turn scatters about the mean of its run."""
+    estimates, radius = chain.predict(regressors)
+
+    def scatter(value: FloatArray) -> float:
+        good = rows & np.isfinite(value)
+        if not good.any():
+            return 0.0
+        count = np.bincount(unit[good])
+        mean = np.bincount(unit[good], weights=value[good]) / np.maximum(count, 1)
+        freedom = good.sum() - (count > 0).sum()
+        rest = value[good] - mean[unit[good]]
+        return float(np.sqrt((rest**2).sum() / freedom)) if freedom > 0 else 0.0
+
+    def floored(model: Polynomial | None, value: FloatArray) -> Polynomial | None:
+        return None if model is None else replace(model, floor=scatter(value))
+
+    none = np.full(radius.shape, np.nan)
+    angle = chain.angle
+    if angle is not None:
+        load = estimates["Fz"].value if "Fz" in estimates else chain.mean_load
+        angle = replace(angle, blur=float(np.hypot(angle.blur, scatter(estimates["Fy"].value / load))))
+    turning = radius
+    if "kappa" in estimates:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            turning = estimates["kappa"].value * regressors["speed"] / regressors["omega"]
+    return replace(
+        chain,
+        load=floored(chain.load, estimates["Fz"].value if "Fz" in estimates else none),
+        radius=floored(chain.radius, turning),
+        force=floored(chain.force, estimates["Fy"].value if "Fy" in estimates else none),
+        angle=angle,
+    )
+
+
+def _with_ranges(chain: Chain, links: Links) -> Chain:
+    """Add the calibrated range of every regressor that decides on validity."""
+
+    def limits(name: str, *, needed: bool = True) -> Range:
+        x = links.values[name]
+        low, high = float(np.nanmin(x)), float(np.nanmax(x))
+        return Range(name, low, high, max(SLACK[name], MARGIN * (high - low)), needed)
+
+    shape = tuple(limits(name) for name in ("contact_angle", "compression", "traction", *ODD))
+    if np.isfinite(links.values["camber"]).any():
+        shape = (*shape, limits("camber", needed=_uses(chain, "camber")))
+    angle = (limits("utilisation"),) if chain.angle is not None else ()
+    guards = {"Fz": shape, "Fy": shape, "alpha": (*shape, *angle), "kappa": ()}
+    return replace(chain, guards=guards)
+
+
+def _uses(chain: Chain, name: str) -> bool:
+    """Tell whether any model of the chain needs a regressor."""
+    models = [chain.load, chain.force, chain.angle.polynomial if chain.angle else None]
+    return any(name in [v.name for v in model.variables] for model in models if model is not None)

@@ -1,0 +1,218 @@
+"""A calibration: the chains of estimators of one tire and gage layout, with their statistics."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.errors import CalibrationError
+from tirelib.estimators.chain import QUANTITIES, Chain
+from tirelib.estimators.regressors import compute_regressors
+from tirelib.features.extract import Features
+from tirelib.flags import INVALIDATING, TurnFlag
+from tirelib.signal.quality import UNUSABLE
+
+UNITS = {"Fz": "N", "alpha": "rad", "kappa": "1", "Fy": "N"}
+"""Unit of each estimated quantity inside the library."""
+LARGEST_ANGLE_STD = float(np.deg2rad(1.0))
+"""A slip angle less certain than this is not called valid: the cornering curve is flat there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Estimates:
+    """Estimates of n turns, SI, ISO 8855.
+
+    Attributes
+    ----------
+    value, std : dict of arrays, shape (n,)
+        For each of Fz, alpha, kappa, Fy; NaN where not calibrated or not to be had.
+    valid : dict of bool arrays, shape (n,)
+        Whether each quantity may be used.
+    turn_valid : bool array, shape (n,)
+        The turn was measured well and every calibrated quantity lies in its calibrated range.
+    flags : int array, shape (n,)
+        `TurnFlag` bits.
+    notes : tuple of n tuples of str
+        Which quantity is out of range, saturated or extrapolated.
+    rolling : tuple of str, length n
+        ``free``, ``braking``, ``driving`` or ``unknown``, from CP1 against CP2.
+    radius : array, shape (n,), [m]
+        Effective rolling radius.
+    contact_length : array, shape (n, n_gages), [m]
+    """
+
+    value: dict[str, FloatArray]
+    std: dict[str, FloatArray]
+    valid: dict[str, BoolArray]
+    turn_valid: BoolArray
+    flags: IntArray
+    notes: tuple[tuple[str, ...], ...]
+    rolling: tuple[str, ...]
+    radius: FloatArray
+    contact_length: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Rolling:
+    """Threshold between free rolling and traction, on ``(CP1 - CP2) / TP``.
+
+    Under braking the second peak is deeper (traction > 0), under driving the first (section 4.1.5).
+    Free rolling itself shifts the balance a little through damping: `centre`.
+    """
+
+    centre: float
+    threshold: float
+
+    def classify(self, traction: FloatArray) -> tuple[str, ...]:
+        """Return the rolling condition of each turn."""
+        apart = traction - self.centre
+        words = np.where(apart > self.threshold, "braking", "free").astype(object)
+        words[apart < -self.threshold] = "driving"
+        words[~np.isfinite(apart)] = "unknown"
+        return tuple(str(word) for word in words)
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """Estimators for all gages, and for each set with one gage missing.
+
+    Attributes
+    ----------
+    tire : str
+    lateral : tuple of float, [m]
+        Gage positions, ISO, in file order.
+    chains : dict of int to Chain
+        By index of the missing gage; -1 is the full set.
+    order : float, [cycles per turn]
+        Cut-off of the low-pass with which the features were read.
+    cut_off : float or None, [Hz]
+        Fixed cut-off, where one was chosen.
+    """
+
+    tire: str
+    lateral: tuple[float, ...]
+    chains: Mapping[int, Chain]
+    rolling: Rolling
+    order: float
+    cut_off: float | None = None
+
+    def check_layout(self, tire: str, lateral: tuple[float, ...], where: str) -> None:
+        """Refuse data of another tire or gage layout.
+
+        Raises
+        ------
+        CalibrationError
+            Naming both.
+        """
+        if tire != self.tire:
+            raise CalibrationError(
+                f"{where}: the tire is {tire!r}, the calibration is of {self.tire!r}; "
+                "calibrate on a campaign of this tire"
+            )
+        same = len(lateral) == len(self.lateral) and np.allclose(lateral, self.lateral, atol=1e-4)
+        if not same:
+            raise CalibrationError(
+                f"{where}: gages lie at {_millimetres(lateral)} mm (ISO), the calibration has "
+                f"them at {_millimetres(self.lateral)} mm; calibrate with this layout"
+            )
+
+    def estimate(self, features: Features) -> Estimates:
+        """Estimate every turn; a turn with one gage out uses the chain without it."""
+        n = len(features)
+        value = {q: np.full(n, np.nan) for q in QUANTITIES}
+        std = {q: np.full(n, np.nan) for q in QUANTITIES}
+        valid = {q: np.zeros(n, dtype=np.bool_) for q in QUANTITIES}
+        flags = features.flags.copy()
+        radius = np.full(n, np.nan)
+        traction = np.full(n, np.nan)
+        out = (features.gage_flags & int(UNUSABLE)) != 0
+        extrapolated = np.zeros(n, dtype=np.bool_)
+        missing = np.where(out.any(axis=1), out.argmax(axis=1), -1)
+        missing[out.sum(axis=1) > 1] = -2
+        for index in np.unique(missing):
+            chain = self.chains.get(int(index))
+            rows = missing == index
+            if chain is None:
+                flags[rows] |= int(TurnFlag.TOO_FEW_GAGES)
+                continue
+            part = compute_regressors(features, chain.gages)
+            part = {name: x[rows] for name, x in part.items()}
+            estimates, radius[rows] = chain.predict(part)
+            traction[rows] = part["traction"]
+            extrapolated[rows] = chain.laws.extrapolated(part)
+            for quantity, estimate in estimates.items():
+                value[quantity][rows] = estimate.value
+                std[quantity][rows] = estimate.std
+                valid[quantity][rows] = estimate.valid
+            flags[rows] |= np.where(self._unknown_condition(chain, part), _NO_CONDITION, 0)
+        return self._finish(
+            features, value, std, valid, flags, radius, traction, extrapolated
+        )
+
+    def _unknown_condition(
+        self, chain: Chain, regressors: Mapping[str, FloatArray]
+    ) -> BoolArray:
+        """Tell where a condition that a model needs is not known."""
+        models = [chain.load, chain.force, chain.angle.polynomial if chain.angle else None]
+        used = {v.name for model in models if model is not None for v in model.variables}
+        unknown = np.zeros(regressors["omega"].shape, dtype=np.bool_)
+        for name, source in (("pressure",) * 2, ("camber",) * 2, ("speed_squared", "speed")):
+            if name in used:
+                unknown |= np.isnan(regressors[source]) & np.isfinite(regressors["omega"])
+        return unknown
+
+    def _finish(
+        self,
+        features: Features,
+        value: dict[str, FloatArray],
+        std: dict[str, FloatArray],
+        valid: dict[str, BoolArray],
+        flags: IntArray,
+        radius: FloatArray,
+        traction: FloatArray,
+        extrapolated: BoolArray,
+    ) -> Estimates:
+        measured = (flags & int(INVALIDATING)) == 0
+        full = self.chains[-1]
+        notes: list[list[str]] = [[] for _ in range(len(features))]
+        in_range = np.ones(len(features), dtype=np.bool_)
+        for quantity in QUANTITIES:
+            if not full.has(quantity):
+                continue
+            unfit = measured & ~valid[quantity]
+            if quantity == "kappa":
+                unfit &= (flags & int(TurnFlag.NO_SPEED)) == 0
+            in_range &= ~unfit
+            for row in np.flatnonzero(unfit):
+                notes[row].append(f"{quantity}_out_of_range")
+            valid[quantity] &= measured
+        saturated = valid["alpha"] & (std["alpha"] > LARGEST_ANGLE_STD)
+        valid["alpha"] &= ~saturated
+        for row in np.flatnonzero(saturated):
+            notes[row].append("alpha_saturated")
+        for row in np.flatnonzero(extrapolated & measured):
+            notes[row].append("condition_extrapolated")
+        flags = flags | np.where(measured & ~in_range, int(TurnFlag.OUT_OF_RANGE), 0)
+        bad = ~measured
+        for quantity in QUANTITIES:
+            value[quantity] = np.where(bad, np.nan, value[quantity])
+            std[quantity] = np.where(bad, np.nan, std[quantity])
+        return Estimates(
+            value=value,
+            std=std,
+            valid=valid,
+            turn_valid=measured & in_range,
+            flags=flags,
+            notes=tuple(tuple(row) for row in notes),
+            rolling=self.rolling.classify(traction),
+            radius=radius,
+            contact_length=features.contact_angle * radius[:, None],
+        )
+
+
+_NO_CONDITION = int(TurnFlag.NO_CONDITION)
+
+
+def _millimetres(lateral: tuple[float, ...]) -> str:
+    return ", ".join(f"{1e3 * y:+.0f}" for y in lateral)

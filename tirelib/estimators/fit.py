@@ -1,0 +1,157 @@
+"""Fit a polynomial by Bayesian ridge regression; choose its terms by leaving conditions out."""
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.linear_model import BayesianRidge
+from sklearn.model_selection import GroupKFold, LeaveOneGroupOut
+
+from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.errors import CalibrationError
+from tirelib.estimators.basis import Powers
+from tirelib.estimators.polynomial import Polynomial, Variable, design
+
+LARGEST_SHARE = 0.7
+"""Terms per distinct condition at the most."""
+MOST_FOLDS = 80
+"""Beyond so many groups, groups are held out together."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """A fitted polynomial and what cross-validation says of it.
+
+    `held_out` holds, for each row, the prediction by a fit that did not see its condition.
+    """
+
+    model: Polynomial
+    held_out: FloatArray
+    candidates: tuple[tuple[int, float], ...]
+
+
+def variables_for(
+    values: Mapping[str, FloatArray], terms: Sequence[Powers], odd: Sequence[str]
+) -> tuple[Variable, ...]:
+    """Standardise every regressor that the terms use: odd ones about zero, others about the mean."""
+    names = sorted({name for term in terms for name in term})
+    made = []
+    for name in names:
+        x = values[name]
+        centre = 0.0 if name in odd else float(np.mean(x))
+        scale = float(np.abs(x - centre).max()) or 1.0
+        made.append(Variable(name, centre, scale))
+    return tuple(made)
+
+
+def fit_best(
+    values: Mapping[str, FloatArray],
+    y: FloatArray,
+    groups: IntArray,
+    candidates: Sequence[Sequence[Powers]],
+    *,
+    odd: Sequence[str] = (),
+    weights: FloatArray | None = None,
+    centre: bool = True,
+    what: str = "quantity",
+) -> Fit:
+    """Fit each candidate and keep the one with the least held-out error.
+
+    Parameters
+    ----------
+    values : mapping of regressor name to array, shape (n,)
+    y : array, shape (n,)
+        One independent measurement per row.
+    groups : array of int, shape (n,)
+        Rows of one condition; they are held out together.
+    candidates : sequence of term lists
+    odd : names of regressors that are standardised about zero
+    weights : array, shape (n,), optional
+        Relative precision of the rows.
+    centre : bool
+        False for an odd quantity: shrink towards zero rather than towards the mean.
+
+    Raises
+    ------
+    CalibrationError
+        If there are too few conditions for even the smallest candidate.
+    """
+    conditions = np.unique(groups).size
+    tried: list[tuple[int, float]] = []
+    best: tuple[float, Fit] | None = None
+    weights = np.ones(y.size) if weights is None else weights
+    for terms in candidates:
+        if len(terms) > max(LARGEST_SHARE * conditions, 1.0 if len(terms) == 1 else 0.0):
+            continue
+        variables = variables_for(values, terms, odd)
+        exponents = tuple(tuple(term.get(v.name, 0) for v in variables) for term in terms)
+        x = design(variables, exponents, values)
+        held_out, held_std = _cross_validate(x, y, groups, weights, centre)
+        error = y - held_out
+        score = float(np.sqrt(np.average(error**2, weights=weights)))
+        tried.append((len(terms), score))
+        if best is not None and not score < 0.98 * best[0]:
+            continue
+        coefficients, covariance, noise = _ridge(x, y, weights, centre)
+        # held-out errors, not the fit's own residuals, say how large an error to expect
+        inflation = max(1.0, float(np.sqrt(np.average((error / held_std) ** 2, weights=weights))))
+        model = Polynomial(
+            variables=variables,
+            terms=exponents,
+            coefficients=coefficients,
+            covariance=covariance * inflation**2,
+            residual=noise * inflation,
+            floor=0.0,
+        )
+        best = (score, Fit(model, held_out, ()))
+    if best is None:
+        raise CalibrationError(
+            f"{what}: {conditions} distinct conditions are too few for "
+            f"{min(len(t) for t in candidates)} terms; at least "
+            f"{int(np.ceil(min(len(t) for t in candidates) / LARGEST_SHARE))} are needed; "
+            "measure more loads or slip angles, or calibrate several campaigns together"
+        )
+    return Fit(best[1].model, best[1].held_out, tuple(tried))
+
+
+def _ridge(
+    x: FloatArray, y: FloatArray, weights: FloatArray, centre: bool
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return coefficients, their covariance and the noise, in the unit of y."""
+    middle = float(np.average(y, weights=weights)) if centre else 0.0
+    spread = float(np.sqrt(np.average((y - middle) ** 2, weights=weights))) or 1.0
+    size = np.sqrt(np.mean(x**2, axis=0))
+    size[size == 0.0] = 1.0
+    ridge = BayesianRidge(fit_intercept=False, max_iter=500, tol=1e-5)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        ridge.fit(x / size, (y - middle) / spread, sample_weight=weights / weights.mean())
+    coefficients = ridge.coef_ * spread / size
+    covariance = ridge.sigma_ * spread**2 / np.outer(size, size)
+    coefficients[0] += middle  # the first term is the constant
+    return coefficients, covariance, spread / float(np.sqrt(ridge.alpha_))
+
+
+def _cross_validate(
+    x: FloatArray, y: FloatArray, groups: IntArray, weights: FloatArray, centre: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Return held-out predictions and their standard deviations, each of shape (n,)."""
+    count = np.unique(groups).size
+    splitter = LeaveOneGroupOut() if count <= MOST_FOLDS else GroupKFold(MOST_FOLDS)
+    predicted, std = np.empty_like(y), np.empty_like(y)
+    for train, test in splitter.split(x, y, groups):
+        coefficients, covariance, noise = _ridge(x[train], y[train], weights[train], centre)
+        predicted[test] = x[test] @ coefficients
+        spread = np.einsum("ij,jk,ik->i", x[test], covariance, x[test])
+        std[test] = np.sqrt(noise**2 + spread)
+    return predicted, std
+
+
+def mean_by(unit: IntArray, values: FloatArray, rows: BoolArray) -> FloatArray:
+    """Return the mean of `values` over the chosen rows of each unit, in the order of the units."""
+    chosen = unit[rows]
+    count = np.bincount(chosen)
+    total = np.bincount(chosen, weights=values[rows])
+    return np.asarray(total[count > 0] / count[count > 0], dtype=np.float64)

@@ -1,0 +1,135 @@
+r"""What is assumed of conditions that a calibration did not vary.
+
+**Pressure.** At a given contact length the belt is in contact over the area :math:`b\,l`; inflation
+carries its share over that area, the structure carries the rest. With the load calibrated at one
+pressure :math:`p_0` only,
+
+.. math:: F_z(l, p) = F_z(l, p_0) + (p - p_0)\, b\, l, \qquad l = \varphi_{contact} R
+
+with the belt's width b and its ring radius R. Source: balance of a flat membrane on the road; the
+dissertation's regressions hold at one pressure. The width is assumed to be the belt's at every load,
+so a tenth of the correction (at least) is doubt: the standard deviation grows with it.
+
+The rolling radius depends on load and pressure through the deflection, which follows their ratio:
+:math:`R_{eff}(F_z, p) = R_{eff}(F_z\,p_0/p, p_0)`; half of the change is doubt.
+
+**Speed.** Features are taken over wheel angle, so speed enters only through inertia and damping; no
+correction, but the standard deviation grows with the square of the speed's departure.
+
+Outside a declared envelope no estimate is valid.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.arrays import BoolArray, FloatArray
+
+PRESSURE_ENVELOPE = (0.5, 1.25)
+"""Pressure, relative to the calibrated one, for which the pressure law is taken to hold."""
+PRESSURE_DOUBT = 0.15
+"""Relative standard deviation of the pressure correction."""
+FORCE_DOUBT = 0.10
+"""Relative standard deviation of any estimate per relative departure of pressure."""
+FASTEST = 60.0
+"""Highest speed for which a calibration at another speed is taken to hold, [m/s]."""
+SPEED_DOUBT = 0.02
+"""Relative standard deviation of any estimate per (40 m/s)^2 of speed squared."""
+SPEED_UNIT = 1600.0
+RADIUS_SHARE = 0.5
+"""Doubt about what the ratio of load and pressure does to the rolling radius, as a share of it."""
+RADIUS_DOUBT = 0.003
+"""Relative standard deviation of the rolling radius per (40 m/s)^2 of speed squared."""
+CALIBRATED_SLACK = 0.05
+"""A condition that stays this close (relatively) to its calibrated range needs no law."""
+
+
+@dataclass(frozen=True, slots=True)
+class ConditionLaws:
+    """Calibrated conditions, and whether each was varied.
+
+    Attributes
+    ----------
+    pressure, speed : (low, high), [Pa], [m/s]
+        Range in the calibration data; NaN where it was not measured.
+    pressure_fitted, speed_fitted : bool
+        True where the condition was varied, so that the regression holds its effect.
+    contact_width, radius : float, [m]
+        Of the pressure law; NaN where the campaign does not give them.
+    """
+
+    pressure: tuple[float, float]
+    speed: tuple[float, float]
+    pressure_fitted: bool
+    speed_fitted: bool
+    contact_width: float
+    radius: float
+
+    @property
+    def reference_pressure(self) -> float:
+        """Middle of the calibrated pressures, [Pa]."""
+        return 0.5 * (self.pressure[0] + self.pressure[1])
+
+    def load_correction(self, values: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+        """Return the pressure law's load and its standard deviation, [N], each of shape (n,)."""
+        angle, pressure = values["contact_angle"], values["pressure"]
+        if self.pressure_fitted or not np.isfinite(self.reference_pressure):
+            return np.zeros_like(angle), np.zeros_like(angle)
+        width = self.contact_width * self.radius
+        if not np.isfinite(width):
+            return np.zeros_like(angle), np.zeros_like(angle)
+        known = np.isfinite(pressure)
+        change = np.where(known, pressure - self.reference_pressure, 0.0)
+        correction = change * width * angle
+        return correction, PRESSURE_DOUBT * np.abs(correction)
+
+    def equivalent_load(
+        self, load: FloatArray, values: Mapping[str, FloatArray]
+    ) -> FloatArray:
+        """Return the load that deflects the tire as much at the calibrated pressure, [N]."""
+        if self.pressure_fitted or not np.isfinite(self.reference_pressure):
+            return load
+        with np.errstate(invalid="ignore", divide="ignore"):
+            ratio = self.reference_pressure / values["pressure"]
+        return load * np.where(np.isfinite(ratio) & (ratio > 0.0), ratio, 1.0)
+
+    def allowed(self, values: Mapping[str, FloatArray]) -> BoolArray:
+        """Tell which turns lie within the envelope of the conditions; unknown ones do."""
+        pressure, speed = values["pressure"], values["speed"]
+        low, high = self.pressure
+        if not self.pressure_fitted:
+            low, high = low * PRESSURE_ENVELOPE[0], high * PRESSURE_ENVELOPE[1]
+        else:
+            slack = CALIBRATED_SLACK * (high - low)
+            low, high = low - slack, high + slack
+        good = ~(pressure < low) & ~(pressure > high)
+        fastest = self.speed[1] * 1.05 if self.speed_fitted else FASTEST
+        return good & ~(np.abs(speed) > fastest)
+
+    def spread(self, values: Mapping[str, FloatArray], value: FloatArray) -> FloatArray:
+        """Return the standard deviation due to conditions that were not varied, shape (n,)."""
+        doubt = np.zeros_like(value)
+        if not self.pressure_fitted and np.isfinite(self.reference_pressure):
+            apart = np.abs(values["pressure"] / self.reference_pressure - 1.0)
+            doubt += FORCE_DOUBT * np.maximum(np.nan_to_num(apart) - 0.02, 0.0)
+        return (doubt + SPEED_DOUBT * self.speed_departure(values)) * np.abs(value)
+
+    def speed_departure(self, values: Mapping[str, FloatArray]) -> FloatArray:
+        """Return how far the squared speed lies outside its calibrated range, [(40 m/s)^2]."""
+        squared = values["speed"] ** 2
+        if self.speed_fitted or not np.isfinite(self.speed[1]):
+            return np.zeros_like(squared)
+        apart = np.maximum(squared - self.speed[1] ** 2, self.speed[0] ** 2 - squared)
+        return np.maximum(np.nan_to_num(apart), 0.0) / SPEED_UNIT
+
+    def extrapolated(self, values: Mapping[str, FloatArray]) -> BoolArray:
+        """Tell which turns need a law instead of a calibration, shape (n,)."""
+        apart = np.zeros(values["pressure"].shape, dtype=np.bool_)
+        if not self.pressure_fitted:
+            ratio = values["pressure"] / self.reference_pressure
+            apart |= np.abs(np.nan_to_num(ratio, nan=1.0) - 1.0) > CALIBRATED_SLACK
+        if not self.speed_fitted:
+            speed = values["speed"]
+            apart |= (speed > 1.1 * self.speed[1]) | (speed < 0.9 * self.speed[0])
+        return apart

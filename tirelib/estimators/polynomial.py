@@ -1,0 +1,127 @@
+"""A polynomial in standardised regressors, with the covariance of its coefficients.
+
+Predicting needs numpy only, so the same code runs in a script, in a stream and inside an FMU.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.arrays import BoolArray, FloatArray
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """One regressor, standardised: ``z = (x - centre) / scale``, all in SI."""
+
+    name: str
+    centre: float
+    scale: float
+
+    def standardise(self, x: FloatArray) -> FloatArray:
+        """Return z."""
+        return (x - self.centre) / self.scale
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """The calibrated range of a regressor, and how far beyond it may still lie, in SI.
+
+    `needed` is False for a condition that no model uses: then it may be unknown (NaN), but a known
+    one must lie in the range all the same.
+    """
+
+    name: str
+    low: float
+    high: float
+    slack: float
+    needed: bool = True
+
+    def inside(self, x: FloatArray) -> BoolArray:
+        """Tell where x lies in the range, with its slack."""
+        within = (x >= self.low - self.slack) & (x <= self.high + self.slack)
+        return within if self.needed else within | np.isnan(x)
+
+
+Term = tuple[int, ...]
+"""Exponents of the variables, in their order."""
+
+
+@dataclass(frozen=True, slots=True)
+class Polynomial:
+    """``y = sum of coefficient * product of z^exponent``, with Gaussian uncertainty.
+
+    Attributes
+    ----------
+    variables : tuple of Variable
+    terms : tuple of exponents, length k
+    coefficients : array, shape (k,), in the unit of y
+    covariance : array, shape (k, k), unit of y squared
+    residual : float
+        Standard deviation of what the polynomial leaves, unit of y, cross-validated.
+    floor : float
+        Standard deviation of one turn about the mean of its run, unit of y.
+    """
+
+    variables: tuple[Variable, ...]
+    terms: tuple[Term, ...]
+    coefficients: FloatArray
+    covariance: FloatArray
+    residual: float
+    floor: float
+
+    def design(self, values: Mapping[str, FloatArray]) -> FloatArray:
+        """Return the terms' values, shape (n, k)."""
+        return design(self.variables, self.terms, values)
+
+    def predict(self, values: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+        """Return value and standard deviation (one turn), each of shape (n,)."""
+        x = self.design(values)
+        spread = np.einsum("ij,jk,ik->i", x, self.covariance, x)
+        std = np.sqrt(self.residual**2 + self.floor**2 + spread)
+        return x @ self.coefficients, std
+
+    def slope(self, values: Mapping[str, FloatArray], name: str) -> FloatArray:
+        """Return the derivative of y by the regressor `name`, shape (n,), unit of y per SI."""
+        index = [variable.name for variable in self.variables].index(name)
+        lowered = []
+        factor = np.zeros(len(self.terms))
+        for row, term in enumerate(self.terms):
+            factor[row] = term[index] / self.variables[index].scale
+            lowered.append(
+                tuple(max(e - 1, 0) if i == index else e for i, e in enumerate(term))
+            )
+        return design(self.variables, tuple(lowered), values) @ (factor * self.coefficients)
+
+    def names(self) -> list[str]:
+        """Return a readable name of each term."""
+        return [term_name(self.variables, term) for term in self.terms]
+
+
+def design(
+    variables: Sequence[Variable], terms: Sequence[Term], values: Mapping[str, FloatArray]
+) -> FloatArray:
+    """Return the terms' values for each row, shape (n, k)."""
+    n = next(iter(values.values())).shape[0]
+    highest = np.max(np.asarray(terms, dtype=np.int64).reshape(len(terms), -1), axis=0, initial=0)
+    powers: list[list[FloatArray]] = []
+    for variable, degree in zip(variables, highest, strict=True):
+        z = variable.standardise(values[variable.name])
+        row = [np.ones(n)]
+        for _ in range(int(degree)):
+            row.append(row[-1] * z)
+        powers.append(row)
+    x = np.ones((n, len(terms)))
+    for column, term in enumerate(terms):
+        for position, exponent in enumerate(term):
+            if exponent:
+                x[:, column] *= powers[position][exponent]
+    return x
+
+
+def term_name(variables: Sequence[Variable], term: Term) -> str:
+    """Return a term's name, for example ``contact_angle^2 pressure``."""
+    parts = [
+        v.name if e == 1 else f"{v.name}^{e}" for v, e in zip(variables, term, strict=True) if e
+    ]
+    return " ".join(parts) or "constant"

@@ -1,0 +1,71 @@
+"""Regressors: few numbers per turn, from the features of the gages that work.
+
+A quantity q read at several lateral positions y is described by a straight line fitted over the
+gages, q = q0 + q1 y / y_max: its **level** q0 is even, its **slope** q1 odd in slip angle and camber.
+Fitted lines also serve when a gage is out. Strains are divided by the mean tension inside the contact,
+so the gain that all gages share (temperature of the bridge, supply) drops out.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from tirelib.arrays import BoolArray, FloatArray
+from tirelib.features.extract import Features
+
+EVEN = ("contact_angle", "compression", "traction", "tension")
+"""Regressors that keep their sign when left and right change places."""
+ODD = ("cp1_slope", "cp2_slope", "angle_slope", "tp_slope")
+"""Regressors that change their sign when left and right change places."""
+CONDITIONS = ("pressure", "speed", "camber")
+
+
+def compute_regressors(features: Features, gages: Sequence[int]) -> dict[str, FloatArray]:
+    """Return the regressors of each turn.
+
+    Parameters
+    ----------
+    features : Features
+    gages : sequence of int
+        Indices of the gages to use, at least two.
+
+    Returns
+    -------
+    dict of arrays, shape (n,)
+        ``contact_angle`` [rad] mean contact angle; ``compression`` mean of CP1 and CP2 over TP;
+        ``traction`` (CP1 - CP2) / TP; ``tension`` mean TP [strain]; ``cp1_slope``, ``cp2_slope``,
+        ``tp_slope`` slopes over TP; ``angle_slope`` [rad]; ``omega`` [rad/s] and the conditions.
+    """
+    use = list(gages)
+    y = features.lateral[use]
+    basis = np.stack((np.ones(y.size), y / np.abs(features.lateral).max()), axis=1)
+    line = np.linalg.pinv(basis)  # (2, gages)
+
+    def level_slope(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        fitted = values[:, use] @ line.T
+        return fitted[:, 0], fitted[:, 1]
+
+    scale = features.tp[:, use].mean(axis=1)
+    angle, angle_slope = level_slope(features.contact_angle)
+    cp1, cp1_slope = level_slope(features.cp1)
+    cp2, cp2_slope = level_slope(features.cp2)
+    _, tp_slope = level_slope(features.tp)
+    return {
+        "contact_angle": angle,
+        "compression": 0.5 * (cp1 + cp2) / scale,
+        "traction": (cp1 - cp2) / scale,
+        "tension": scale,
+        "cp1_slope": cp1_slope / scale,
+        "cp2_slope": cp2_slope / scale,
+        "angle_slope": angle_slope,
+        "tp_slope": tp_slope / scale,
+        "omega": features.omega,
+        "pressure": features.pressure,
+        "speed": features.speed,
+        "camber": features.camber,
+    }
+
+
+def select(regressors: Mapping[str, FloatArray], rows: BoolArray) -> dict[str, FloatArray]:
+    """Return the given rows of every regressor."""
+    return {name: values[rows] for name, values in regressors.items()}

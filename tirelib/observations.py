@@ -1,0 +1,209 @@
+"""What a campaign shows: the features of every turn beside what the rig measured."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.campaign import Campaign, CampaignHeader, Run
+from tirelib.errors import CalibrationError
+from tirelib.features.extract import Features, extract_features
+from tirelib.flags import INVALIDATING
+from tirelib.signal import LowPass, cut_turns
+
+TRUTH = ("Fx", "Fy", "Fz", "Mz", "slip_angle", "slip_ratio")
+"""Rig quantities that an estimate is held against."""
+SET_POINTS = ("load", "pressure", "speed", "slip_angle", "camber", "slip_ratio")
+"""Nominal conditions of a run."""
+BLOCK = 10
+"""Turns of a sweep that are held out together in a cross-validation."""
+
+
+@dataclass(frozen=True, slots=True)
+class Observations:
+    """Turns of one or several campaigns of one tire and gage layout.
+
+    Attributes
+    ----------
+    features : Features
+        Of all turns, run after run.
+    run : array of int, shape (n,)
+        Run number of each turn.
+    campaign : array of int, shape (n,)
+        Index of the campaign that a turn comes from.
+    group : array of int, shape (n,)
+        Turns measured at the same nominal condition, or in the same block of a sweep.
+    sweep : array of bool, shape (n,)
+        True where the conditions change within the run.
+    truth : dict of arrays, shape (n,), SI, ISO
+        What the rig measured: mean of the run, or of the turn in a sweep. NaN where absent.
+    nominal : dict of arrays, shape (n,), SI, ISO
+        Set points; NaN in a sweep.
+    headers : tuple of CampaignHeader
+    """
+
+    features: Features
+    run: IntArray
+    campaign: IntArray
+    group: IntArray
+    sweep: BoolArray
+    truth: dict[str, FloatArray]
+    nominal: dict[str, FloatArray]
+    headers: tuple[CampaignHeader, ...]
+
+    def __len__(self) -> int:
+        return self.run.shape[0]
+
+    @property
+    def usable(self) -> BoolArray:
+        """Turns without a flag that forbids any estimate, shape (n,)."""
+        return (self.features.flags & int(INVALIDATING)) == 0
+
+    @property
+    def unit(self) -> IntArray:
+        """Number of the independent measurement of each turn: its run, or itself in a sweep."""
+        key = np.stack((self.campaign, self.run, np.where(self.sweep, np.arange(len(self)), -1)))
+        return np.asarray(np.unique(key, axis=1, return_inverse=True)[1], dtype=np.int64).ravel()
+
+
+def measure_run(
+    run: Run, header: CampaignHeader, low_pass: LowPass | None = None
+) -> tuple[Features, dict[str, FloatArray]]:
+    """Return the features of a run's turns and the rig's measurements for each of them."""
+    if run.strain is None:
+        raise CalibrationError(
+            f"{header.name}, run {run.plan.run}: the file holds no strain; "
+            "strain_1 .. strain_N are needed"
+        )
+    times = run.time()
+    held = {name: run.hold(name, times) for name in ("speed", "pressure", "camber")}
+    turns = cut_turns(
+        run.strain,
+        run.rate,
+        header.gage_lateral,
+        trigger=run.trigger,
+        low_pass=low_pass,
+        **{name: np.nan if value is None else value for name, value in held.items()},
+    )
+    features = extract_features(turns)
+    features = replace(
+        features, time=features.time + run.start_time, ready=features.ready + run.start_time
+    )
+    truth = {name: _truth(run, name, features) for name in TRUTH}
+    return features, truth
+
+
+def _truth(run: Run, name: str, features: Features) -> FloatArray:
+    """Rig quantity for each turn: mean over the run, or over the turn in a sweep."""
+    n = len(features)
+    samples, clock = run.rig.get(name), run.rig_time
+    if samples is None or clock is None or samples.size == 0:
+        return np.full(n, np.nan)
+    if run.plan.kind != "sweep":
+        return np.full(n, float(np.nanmean(samples)))
+    total = np.concatenate(([0.0], np.cumsum(samples)))
+    start = np.searchsorted(clock, features.time - np.nan_to_num(features.period))
+    stop = np.maximum(np.searchsorted(clock, features.time), start + 1)
+    stop = np.minimum(stop, samples.size)
+    start = np.minimum(start, stop - 1)
+    return np.asarray((total[stop] - total[start]) / (stop - start), dtype=np.float64)
+
+
+def observe(
+    campaigns: Sequence[Campaign],
+    *,
+    low_pass: LowPass | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Observations:
+    """Read campaigns of one tire and gage layout into observations.
+
+    Parameters
+    ----------
+    campaigns : sequence of Campaign
+    low_pass : LowPass, optional
+    progress : callable, optional
+        Called with a label after each run.
+
+    Raises
+    ------
+    CalibrationError
+        If the campaigns are of different tires or gage layouts, or hold no complete turn.
+    """
+    same_tire([campaign.header for campaign in campaigns])
+    parts: list[Features] = []
+    columns: dict[str, list[FloatArray]] = {name: [] for name in TRUTH}
+    plans: dict[str, list[FloatArray]] = {name: [] for name in SET_POINTS}
+    numbers: list[FloatArray] = []
+    for index, campaign in enumerate(campaigns):
+        for run in campaign.runs():
+            features, truth = measure_run(run, campaign.header, low_pass)
+            n = len(features)
+            parts.append(features)
+            for name in TRUTH:
+                columns[name].append(truth[name])
+            for name in SET_POINTS:
+                plans[name].append(np.full(n, getattr(run.plan, name)))
+            sweep = run.plan.kind == "sweep"
+            block = np.arange(n) // BLOCK if sweep else np.zeros(n)
+            numbers.append(
+                np.stack((np.full(n, run.plan.run), np.full(n, index), np.full(n, sweep), block))
+            )
+            if progress is not None:
+                progress(f"{campaign.header.name} run {run.plan.run}")
+    if not parts or not any(len(part) for part in parts):
+        raise CalibrationError(
+            f"{', '.join(c.header.name for c in campaigns)}: no contact was found in any run; "
+            "look at the strain with `tirelib campaign show`"
+        )
+    number = np.concatenate(numbers, axis=1)
+    nominal = {name: np.concatenate(values) for name, values in plans.items()}
+    sweep_mask = number[2] > 0
+    key = np.stack([np.nan_to_num(nominal[name], nan=-9e9) for name in SET_POINTS])
+    own = np.where(sweep_mask, 1 + number[0] * 1e6 + number[1] * 1e4 + number[3], 0.0)
+    group = np.unique(np.vstack((key, own)), axis=1, return_inverse=True)[1].ravel()
+    return Observations(
+        features=concatenate_features(parts),
+        run=number[0].astype(np.int64),
+        campaign=number[1].astype(np.int64),
+        group=np.asarray(group, dtype=np.int64),
+        sweep=sweep_mask,
+        truth={name: np.concatenate(values) for name, values in columns.items()},
+        nominal=nominal,
+        headers=tuple(campaign.header for campaign in campaigns),
+    )
+
+
+def concatenate_features(parts: Iterable[Features]) -> Features:
+    """Join the turns of several runs of the same gages."""
+    parts = list(parts)
+    names = [field.name for field in fields(Features) if field.name != "lateral"]
+    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    return Features(lateral=parts[0].lateral, **joined)
+
+
+def same_tire(headers: Sequence[CampaignHeader]) -> None:
+    """Refuse campaigns that one calibration cannot serve.
+
+    Raises
+    ------
+    CalibrationError
+        Naming the first difference in tire or gage layout.
+    """
+    first = headers[0]
+    for other in headers[1:]:
+        if other.tire.name != first.tire.name:
+            raise CalibrationError(
+                f"{other.name}: tire {other.tire.name!r} is not {first.tire.name!r} of "
+                f"{first.name}; a calibration holds for one tire; calibrate them apart"
+            )
+        if not same_layout(other.gage_lateral, first.gage_lateral):
+            raise CalibrationError(
+                f"{other.name}: gages at {other.gage_lateral} m, {first.name} has them at "
+                f"{first.gage_lateral} m; one calibration needs one layout"
+            )
+
+
+def same_layout(a: Sequence[float], b: Sequence[float]) -> bool:
+    """Tell whether two gage layouts are equal within a tenth of a millimetre."""
+    return len(a) == len(b) and bool(np.allclose(a, b, atol=1e-4))
