@@ -53,12 +53,12 @@ class Observations:
     headers: tuple[CampaignHeader, ...]
 
     def __len__(self) -> int:
-        return self.run.shape[0]
+        return int(self.run.shape[0])
 
     @property
     def usable(self) -> BoolArray:
         """Turns without a flag that forbids any estimate, shape (n,)."""
-        return (self.features.flags & int(INVALIDATING)) == 0
+        return np.asarray((self.features.flags & int(INVALIDATING)) == 0, dtype=np.bool_)
 
     @property
     def unit(self) -> IntArray:

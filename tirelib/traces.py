@@ -82,7 +82,7 @@ class StrainTrace:
                 )
 
     def __len__(self) -> int:
-        return self.pulse.shape[0]
+        return int(self.pulse.shape[0])
 
     @property
     def spacing(self) -> float:

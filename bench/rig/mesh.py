@@ -83,7 +83,7 @@ def _boundaries(fine: float, coarse: float, zone: float) -> Array:
 
 
 @lru_cache(maxsize=8)
-def mesh(fine: float = 0.011, coarse: float = 0.11, zone: float = 0.44) -> Mesh:
+def mesh(fine: float = 0.009, coarse: float = 0.09, zone: float = 0.42) -> Mesh:
     """Make a mesh.
 
     Parameters

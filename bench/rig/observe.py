@@ -3,12 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
-from bench.rig.belt import innerliner_strain
-from bench.rig.road import Road, road, wheel_torque
+from bench.rig.belt import FIELDS, PSI, innerliner_strain, internal
+from bench.rig.road import Road, add_forces, road, wheel_torque
 from bench.rig.solve import State
 from bench.rig.system import fields_at_points
-from bench.rig.tire import Array
+from bench.rig.tire import N_STRIPS, Array
 from bench.rig.tread import kinematics
 
 
@@ -104,18 +105,41 @@ def winding(state: State) -> float:
 
 
 def trace(state: State, points: int = 7200) -> Trace:
-    """Evaluate strain, slope and load sensitivity on an even grid of gage angles."""
+    """Evaluate strain, slope and load sensitivity on an even grid of gage angles.
+
+    Strain is taken at the Gauss points, where it is most accurate. Between them its membrane part
+    is a cubic spline; its bending part has the slope that the balance of moments gives,
+    EI psi'' / R = M' = the couple per radian on the section, road included. So the slope is
+    smooth and its peaks do not lock on to the mesh.
+    """
     step = 2.0 * np.pi / points
     phi = np.asarray(-np.pi + step * np.arange(points), dtype=np.float64)
     at = phi - winding(state)
-    strain = _strain(state, state.control, at)
-    h = 1e-4
-    ahead, behind = (_strain(state, state.control, at + d) for d in (h, -h))
+    strain, slope = _interpolated(state, state.control, state.height, at)
     nudge = 10.0
-    loaded = _strain(state, state.control + nudge * state.by_load, at)
-    return Trace(phi, strain, (ahead - behind) / (2.0 * h), (loaded - strain) / nudge)
+    control = state.control + nudge * state.by_load
+    more, _ = _interpolated(state, control, state.height - nudge / state.stiffness, at)
+    return Trace(phi, strain, slope, (more - strain) / nudge)
 
 
-def _strain(state: State, control: Array, phi: Array) -> Array:
-    values, slopes = state.grid.field(control, phi)
-    return innerliner_strain(state.tire, np.hstack([values, slopes]))
+def _interpolated(state: State, control: Array, height: float, phi: Array) -> tuple[Array, Array]:
+    tire, cond, grid = state.tire, state.condition, state.grid
+    z = fields_at_points(grid, control)
+    couple, tangent = internal(tire, cond, state.omega, z)
+    touching = road(tire, cond, grid, z, height, state.rolling_radius)
+    add_forces(cond, grid, touching, couple, tangent)
+    whole = innerliner_strain(tire, z)
+    fibre = tire.innerliner_offset / (tire.ring_radius + tire.innerliner_offset)
+    bend = fibre * z[:, FIELDS + PSI]
+    bend_slope = fibre * tire.ring_radius / (tire.bending / N_STRIPS) * couple[:, PSI]
+    turn = np.append(grid.phi, grid.phi[0] + 2.0 * np.pi)
+
+    def closed(values: Array) -> Array:
+        return np.vstack([values, values[:1]])
+
+    stretch = CubicSpline(turn, closed(whole - bend), bc_type="periodic")
+    bending = CubicHermiteSpline(turn, closed(bend), closed(bend_slope), extrapolate="periodic")
+    return (
+        np.asarray(stretch(phi) + bending(phi)),
+        np.asarray(stretch(phi, 1) + bending(phi, 1)),
+    )

@@ -15,7 +15,8 @@ TOLERANCE = 1e-9
 MAX_STEPS = 40
 REUSE = 0.03
 """The factors are kept where a step with them cut the residual to this share."""
-FIRST_DEFLECTIONS = (0.001, 0.004, 0.009, 0.015)
+FIRST_DEFLECTIONS = (0.002, 0.01)
+"""Deflections on the way from the unloaded tire to the first load [m]."""
 
 
 class SolverError(TirelibError, RuntimeError):
@@ -234,6 +235,7 @@ def _newton(
         control = control + scale * moved
         height, rolling = height + scale * float(step[-2]), rolling + scale * float(step[-1])
         if largest < TOLERANCE:
+            _check_zone(cond, now)
             unit = np.zeros_like(now.residual)
             unit[-2] = 1.0
             by_load = apply(unit)
@@ -250,6 +252,15 @@ def _newton(
                 steps=count,
             )
     raise SolverError(f"Newton's method did not converge at {cond}; take smaller steps")
+
+
+def _check_zone(cond: Condition, state: Balance) -> None:
+    touching = state.road.q[[0, -1]] > 0.0
+    if np.any(touching):
+        raise SolverError(
+            f"the contact leaves the refined part of the mesh at {cond}; "
+            "give a mesh with a wider zone or reduce the load"
+        )
 
 
 def _norm(state: Balance) -> float:

@@ -99,7 +99,7 @@ class RigTire:
     sidewall_lateral: float = 0.8
     sidewall_lateral_offset: float = 1.8e5
     sidewall_share: tuple[float, ...] = (0.26, 0.16, 0.16, 0.16, 0.26)
-    sidewall_damping: float = 0.02
+    sidewall_damping: float = 0.03
     sidewall_softening: float = 0.0
     softening_length: float = 0.02
     roll_lever: float = 0.005

@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.signal import find_peaks
 
 from bench.rig.belt import FIELDS, LATERAL, U, V
 from bench.rig.observe import contact, edges, forces, trace
@@ -127,13 +128,13 @@ def test_strain_rate_peaks_lie_near_the_true_edges() -> None:
 
 def test_strain_rate_carries_no_mesh_noise() -> None:
     for change in ({}, {"load": 8400.0}, {"slip_angle": 0.05}, {"slip_ratio": -0.05}):
-        tr = trace(state(**change), 3600)
+        tr = trace(state(**change))
         for slope in tr.slope.T:
-            turning = np.diff(np.sign(np.diff(slope))) != 0
-            height = np.abs(slope[1:-1][turning])
-            # wanted: two large peaks, shallow ones beside them, one step where sliding begins
-            assert turning.sum() <= 14
-            assert np.sum(height > 0.4 * np.abs(slope).max()) <= 5
+            size = np.abs(slope).max()
+            up, _ = find_peaks(slope, prominence=2e-3 * size)
+            down, _ = find_peaks(-slope, prominence=2e-3 * size)
+            # an up and a down at each edge and their recoil; one more where sliding begins
+            assert len(up) + len(down) <= 8
 
 
 def test_contact_grows_and_axle_sinks_with_load() -> None:

@@ -103,7 +103,7 @@ def _run_problems(
     summaries: list[RunSummary] = []
     signs: list[ForceSign] = []
     digests: list[tuple[str, str]] = []
-    with_strain = 0
+    strained: list[bool] = []
     for done, plan in enumerate(plans, start=1):
         run, faults = inspect_run(folder, plan, header)
         findings += [_as_finding(plan.file, fault) for fault in faults]
@@ -114,14 +114,14 @@ def _run_problems(
             summaries.append(summary_of(run, header, sound=sound))
             signs.append(force_sign_of(run))
             digests.append((plan.file, _digest(run)))
-            with_strain += run.strain is not None
+            strained += [run.strain is not None] if not errors_of(faults) else []
         if progress is not None:
             progress(done, len(plans))
     wrong, axes = force_sign_findings(signs, header)
     odd = {item.file for item in wrong}
     swapped, order = order_findings([s for s in summaries if s.file not in odd], header)
     problems = [*axes, *order, *gathered([*findings, *swapped, *wrong], len(plans))]
-    return [*problems, *copy_problems(digests), *_strain_missing(header, with_strain, len(digests))]
+    return [*problems, *copy_problems(digests), *_strain_missing(header, strained)]
 
 
 def _content(run: Run, header: CampaignHeader, *, whole: bool) -> list[Finding]:
@@ -147,15 +147,16 @@ def _digest(run: Run) -> str:
     return digest.hexdigest()
 
 
-def _strain_missing(header: CampaignHeader, with_strain: int, legible: int) -> list[Problem]:
-    """Warn when runs lack the strain that the header declares."""
-    if not header.gage_lateral or with_strain == legible:
+def _strain_missing(header: CampaignHeader, strained: list[bool]) -> list[Problem]:
+    """Warn when sound runs lack the strain that the header declares."""
+    missing = strained.count(False)
+    if not header.gage_lateral or not missing:
         return []
     return [
         Problem(
             header_file.FILE,
-            f"[gages] declares {len(header.gage_lateral)} gages, but {legible - with_strain} of "
-            f"{legible} runs have no strain",
+            f"[gages] declares {len(header.gage_lateral)} gages, but {missing} of "
+            f"{len(strained)} runs have no strain",
             "runs without strain serve forces only",
             "drop [gages] for a campaign without strain, or add the recordings",
             "warning",

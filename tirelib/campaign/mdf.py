@@ -3,8 +3,9 @@
 import struct
 import zlib
 from collections.abc import Sequence
+from contextlib import redirect_stdout
 from dataclasses import dataclass
-from io import BytesIO
+from io import BytesIO, StringIO
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +62,11 @@ def read_mdf(path: Path) -> list[Group]:
 
     try:
         # From memory: a truncated file then ends in an exception, never in a bus error.
-        with MDF(BytesIO(content), raise_on_multiple_occurrences=False) as mdf:
+        # The reader prints what it stumbles over; only the command line prints here.
+        with (
+            redirect_stdout(StringIO()),
+            MDF(BytesIO(content), raise_on_multiple_occurrences=False) as mdf,
+        ):
             return [_group(mdf, index) for index in range(len(mdf.groups))]
     except (
         MdfException,
@@ -117,23 +122,47 @@ def _checked_content(path: Path) -> bytes:
 
 
 def _has_header(content: bytes) -> bool:
-    """Return whether the header block and all that it links to lie within the file.
+    """Return whether the header and the chains of data and channel groups lie within the file.
 
     The reader would find that out too, but leaves a half-made object behind.
     """
     if len(content) < _HEADER_END or content[64:68] != b"##HD":
         return False
-    for address in struct.unpack_from("<6Q", content, 64 + _BLOCK_HEAD):
-        if address and address + _BLOCK_HEAD > len(content):
+    first_group, *others = struct.unpack_from("<6Q", content, 64 + _BLOCK_HEAD)
+    if any(address and _links(content, address) is None for address in others):
+        return False
+    to_visit, seen = [first_group], {0}
+    while to_visit:
+        address = to_visit.pop()
+        if address in seen:
+            continue
+        seen.add(address)
+        links = _links(content, address)
+        if links is None:
             return False
-        if address and address + struct.unpack_from("<Q", content, address + 8)[0] > len(content):
-            return False
+        # a data group links to the next one and its first channel group, that to the next
+        count = {b"##DG": 2, b"##CG": 1}.get(content[address : address + 4], 0)
+        to_visit += links[:count]
     return True
+
+
+def _links(content: bytes, address: int) -> list[int] | None:
+    """Return the links of the block at an address, None when it does not lie within the file."""
+    if address + _BLOCK_HEAD > len(content):
+        return None
+    length, count = struct.unpack_from("<2Q", content, address + 8)
+    if address + length > len(content) or _BLOCK_HEAD + 8 * count > length:
+        return None
+    return list(struct.unpack_from(f"<{count}Q", content, address + _BLOCK_HEAD))
 
 
 def _group(mdf: Any, index: int) -> Group:
     raw = mdf.groups[index]
     master = mdf.masters_db.get(index)
+    for channel in raw.channels:  # the reader's compiled part trusts these numbers blindly
+        last = channel.byte_offset + (channel.bit_offset + channel.bit_count + 7) // 8
+        if last > raw.channel_group.samples_byte_nr:
+            raise ValueError(f"{channel.name!r} lies outside of its record")
     signals = mdf.select(
         [(None, index, column) for column in range(len(raw.channels))], copy_master=False
     )

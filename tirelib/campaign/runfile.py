@@ -102,10 +102,26 @@ class _RunFile:
             names = [channel.name for channel in group.channels]
             for name in sorted({n for n in names if names.count(n) > 1}):
                 self.fault(name, "the channel is there twice", "each name once", "rename one")
+        if gage and others:
+            self.unread_at_gage_rate(gage[0])
         if not gage or others:
             return (gage[0] if gage else None), (others[0] if others else None)
         rest = tuple(c for c in gage[0].channels if not _is_gage(c))  # all at one rate
         return gage[0], Group(gage[0].index, gage[0].time, rest) if rest else None
+
+    def unread_at_gage_rate(self, group: Group) -> None:
+        """Warn of channels beside the strain that have no place in a Run."""
+        self.problems += [
+            Problem(
+                f"{self.plan.file}, channel {channel.name}",
+                "it is recorded at the rate of the gages, so it is left out",
+                "strain_N and trigger stand there; rig quantities have a group of their own",
+                "move it to the rig's group or drop it",
+                "warning",
+            )
+            for channel in group.channels
+            if not _is_gage(channel)
+        ]
 
     def strain(self, group: Group) -> FloatArray | None:
         """Return the strain, shape (n_gages, n_samples), in the order of the gages' numbers."""

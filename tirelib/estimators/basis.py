@@ -1,7 +1,7 @@
 """Which terms an estimator may use: candidates of growing size, chosen by cross-validation.
 
-Symmetry decides most of it. Fz is even in left and right, so it takes even regressors and products of
-two odd ones; Fy and the slip angle are odd, so every term holds an odd number of odd regressors.
+Symmetry decides most of it. Fz is even in left and right, so it takes even regressors and products
+of two odd ones; Fy and the slip angle are odd, so every term holds an odd number of odd regressors.
 Regressors that do not vary in the data are left out.
 """
 
@@ -76,7 +76,7 @@ def force_candidates(varying: Collection[str]) -> list[list[Powers]]:
     if "traction" in varying:
         even += [T1, T2]
     if "camber" in varying:
-        extra += grid([G1], [ONE, L1, C1]) + [times({"cp1_slope": 2}, G1)]
+        extra += [*grid([G1], [ONE, L1, C1]), times({"cp1_slope": 2}, G1)]
         extra += [times({"cp1_slope": 1}, G2)]
     cubes = [{name: 3} for name in ("cp1_slope", "cp2_slope", "tp_slope")]
     pressure = grid(odd, [P1]) if "pressure" in varying else []
@@ -103,7 +103,7 @@ def angle_candidates(varying: Collection[str]) -> list[list[Powers]]:
     if "traction" in varying:
         extra += grid([x1, x3], [T1, T2])
     if "slip_ratio" in varying:
-        extra += grid([x1, x3], [{"slip_size": 1}]) + [times(x1, {"slip_ratio": 2})]
+        extra += [*grid([x1, x3], [{"slip_size": 1}]), times(x1, {"slip_ratio": 2})]
     pressure = grid([x1, x3], [P1]) if "pressure" in varying else []
     lists = []
     for degree in (3, 5, 7):

@@ -1,7 +1,8 @@
 """Calibrate the chain of estimators on observations: one independent measurement per run.
 
-Each link is fitted on what the links before it would have said of a condition that they had not seen
-(held-out predictions), so that errors do not look smaller further down the chain than they are.
+Each link is fitted on what the links before it would have said of a condition that they had not
+seen (held-out predictions), so that errors do not look smaller further down the chain than they
+are.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,7 +15,7 @@ from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.errors import CalibrationError
 from tirelib.estimators import basis
 from tirelib.estimators.chain import AngleModel, Chain
-from tirelib.estimators.fit import Fit, fit_best, mean_by
+from tirelib.estimators.fit import Fit, fit_best, levels_of, mean_by
 from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.polynomial import Polynomial, Range
 from tirelib.estimators.regressors import EVEN, ODD, compute_regressors
@@ -79,6 +80,10 @@ class Links:
     candidates: dict[str, tuple[tuple[int, float], ...]]
     refused: dict[str, str]
 
+    def load_level(self) -> IntArray | None:
+        """Return the levels at which the load was held; None if it was not held at some."""
+        return levels_of(self.truth["Fz"])
+
 
 def calibrate_chain(
     observations: Observations,
@@ -117,7 +122,7 @@ def calibrate_chain(
     angle = _fit_angle(links, force is not None, say)
     chain = Chain(
         gages=tuple(gages),
-        guards={name: () for name in ("Fz", "alpha", "kappa", "Fy")},
+        guards=dict.fromkeys(("Fz", "alpha", "kappa", "Fy"), ()),
         laws=laws,
         mean_load=mean_load,
         load=load,
@@ -175,7 +180,10 @@ def _fit_load(
     say("Fz")
     correction, _ = laws.load_correction(values)
     candidates = basis.load_candidates(_varying(values, list(VARIES)))
-    fit = fit_best(values, truth - correction, links.groups, candidates, odd=ODD, what="Fz")
+    fit = fit_best(
+        values, truth - correction, links.groups, candidates, odd=ODD, level=links.load_level(),
+        what="Fz",
+    )  # fmt: skip
     _keep(links, "Fz", fit, fit.held_out + correction)
     links.values["load"] = fit.held_out + correction
     return fit.model, mean
@@ -224,7 +232,7 @@ def _fit_force(links: Links, say: Callable[[str], None]) -> Polynomial | None:
     varying -= _frozen_with_slip(links, varying)
     fit = fit_best(
         values, truth, links.groups, basis.force_candidates(varying), odd=(*ODD, "camber"),
-        centre=False, what="Fy",
+        level=links.load_level(), centre=False, what="Fy",
     )  # fmt: skip
     _keep(links, "Fy", fit, fit.held_out)
     return fit.model
@@ -252,7 +260,9 @@ def _fit_angle(links: Links, has_force: bool, say: Callable[[str], None]) -> Ang
     if "Fz" in links.refused:
         varying.discard("load")
     candidates = basis.angle_candidates(varying)
-    blur = float(np.sqrt(np.mean(((links.truth["Fy"] - links.held_out["Fy"]) / values["load"]) ** 2)))
+    blur = float(
+        np.sqrt(np.mean(((links.truth["Fy"] - links.held_out["Fy"]) / values["load"]) ** 2))
+    )
     sharpness = blur / LEAST_ANGLE_ERROR
     # where the cornering curve is flat, the same error of Fy means more slip angle: weigh it less
     steep = _flatness(truth, values["utilisation"])
@@ -260,8 +270,8 @@ def _fit_angle(links: Links, has_force: bool, say: Callable[[str], None]) -> Ang
     weights = 1.0 / (1.0 + (sharpness * steep) ** 2)
     for _ in range(2):
         fit = fit_best(
-            values, truth, links.groups, candidates, odd=odd, weights=weights,
-            centre=False, what="alpha",
+            values, truth, links.groups, candidates, odd=odd, level=links.load_level(),
+            weights=weights, centre=False, what="alpha",
         )  # fmt: skip
         steep = np.maximum(steep, np.abs(fit.model.slope(values, "utilisation")))
         weights = 1.0 / (1.0 + (sharpness * steep) ** 2)
@@ -333,7 +343,9 @@ def _with_floor(
     angle = chain.angle
     if angle is not None:
         load = estimates["Fz"].value if "Fz" in estimates else chain.mean_load
-        angle = replace(angle, blur=float(np.hypot(angle.blur, scatter(estimates["Fy"].value / load))))
+        angle = replace(
+            angle, blur=float(np.hypot(angle.blur, scatter(estimates["Fy"].value / load)))
+        )
     turning = radius
     if "kappa" in estimates:
         with np.errstate(invalid="ignore", divide="ignore"):

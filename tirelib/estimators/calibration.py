@@ -146,13 +146,9 @@ class Calibration:
                 std[quantity][rows] = estimate.std
                 valid[quantity][rows] = estimate.valid
             flags[rows] |= np.where(self._unknown_condition(chain, part), _NO_CONDITION, 0)
-        return self._finish(
-            features, value, std, valid, flags, radius, traction, extrapolated
-        )
+        return self._finish(features, value, std, valid, flags, radius, traction, extrapolated)
 
-    def _unknown_condition(
-        self, chain: Chain, regressors: Mapping[str, FloatArray]
-    ) -> BoolArray:
+    def _unknown_condition(self, chain: Chain, regressors: Mapping[str, FloatArray]) -> BoolArray:
         """Tell where a condition that a model needs is not known."""
         models = [chain.load, chain.force, chain.angle.polynomial if chain.angle else None]
         used = {v.name for model in models if model is not None for v in model.variables}

@@ -1,11 +1,13 @@
-"""The chain of estimators of one gage set: load, rolling radius, slip ratio, lateral force, slip angle.
+"""The chain of estimators of one gage set: load, radius, slip ratio, lateral force, slip angle.
 
 Each link may use what the links before it say:
 
-- ``Fz`` from the contact angle and the compression (and pressure, speed, traction where calibrated),
+- ``Fz`` from the contact angle and the compression (and pressure, speed, traction where
+  calibrated),
 - ``R_eff`` from load and pressure in free rolling; ``kappa = Omega R_eff / v - 1`` (Eq. 21, 22),
 - ``Fy`` from the slopes of CP1, CP2, contact angle and tension over the lateral position,
-- ``alpha`` from the lateral utilisation Fy/Fz and the load: the inverse of a tire's cornering curve.
+- ``alpha`` from the lateral utilisation Fy/Fz and the load: the inverse of a tire's cornering
+  curve.
 
 Prediction needs numpy only.
 """

@@ -5,9 +5,9 @@ Each load's cornering curve is fitted by the sine version of the Magic Formula,
 .. math:: F_y = D \sin\{C \arctan[B\alpha - E(B\alpha - \arctan B\alpha)]\},
           \qquad C_\alpha = B C D, \quad F_{yp} = D,
 
-in ISO signs (a positive slip angle gives a negative force), and both are regressed quadratically on the
-centre contact length at zero slip angle. Where the measured slip angles do not reach the peak, D is an
-extrapolation: its standard deviation says so.
+in ISO signs (a positive slip angle gives a negative force), and both are regressed quadratically on
+the centre contact length at zero slip angle. Where the measured slip angles do not reach the peak,
+D is an extrapolation: its standard deviation says so.
 """
 
 import warnings
@@ -87,7 +87,14 @@ def cornering_trend(means: Means) -> CorneringTrend | None:
         return np.pad(found, (0, 2 - degree))
 
     return CorneringTrend(
-        load, length, stiffness, stiffness_std, peak, peak_std, quadratic(stiffness), quadratic(peak)
+        load,
+        length,
+        stiffness,
+        stiffness_std,
+        peak,
+        peak_std,
+        quadratic(stiffness),
+        quadratic(peak),
     )
 
 

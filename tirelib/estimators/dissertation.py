@@ -1,8 +1,8 @@
 """The dissertation's own regressions (section 4.1), by ordinary least squares.
 
-They are always fitted and reported beside the estimators in use, so that a reader sees what each step
-away from them brings. Lengths in mm, strains in microstrain, forces in N and angles in degrees, as in
-Tables 4-1 and 4-2, so that coefficients can be compared; axes are ISO 8855.
+They are always fitted and reported beside the estimators in use, so that a reader sees what each
+step away from them brings. Lengths in mm, strains in microstrain, forces in N and angles in
+degrees, as in Tables 4-1 and 4-2, so that coefficients can be compared; axes are ISO 8855.
 """
 
 from collections.abc import Callable

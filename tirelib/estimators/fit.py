@@ -1,4 +1,10 @@
-"""Fit a polynomial by Bayesian ridge regression; choose its terms by leaving conditions out."""
+"""Fit a polynomial by Bayesian ridge regression; choose its terms by leaving conditions out.
+
+Two questions are asked of a candidate with equal weight: how well does it predict a condition that
+it has not seen (leave one condition out), and how well a whole load between others (leave one load
+out, never the outermost)? The second keeps a polynomial from bending between the loads that were
+measured.
+"""
 
 import warnings
 from collections.abc import Mapping, Sequence
@@ -16,6 +22,10 @@ from tirelib.estimators.polynomial import Polynomial, Variable, design
 
 LARGEST_SHARE = 0.7
 """Terms per distinct condition at the most."""
+MOST_LEVELS = 12
+"""More levels than these are no levels but a sweep."""
+LARGEST_LEVEL = 0.5
+"""A level that holds more than this share of the data cannot be held out."""
 MOST_FOLDS = 80
 """Beyond so many groups, groups are held out together."""
 
@@ -35,7 +45,7 @@ class Fit:
 def variables_for(
     values: Mapping[str, FloatArray], terms: Sequence[Powers], odd: Sequence[str]
 ) -> tuple[Variable, ...]:
-    """Standardise every regressor that the terms use: odd ones about zero, others about the mean."""
+    """Standardise every regressor in use: odd ones about zero, others about the mean."""
     names = sorted({name for term in terms for name in term})
     made = []
     for name in names:
@@ -53,6 +63,7 @@ def fit_best(
     candidates: Sequence[Sequence[Powers]],
     *,
     odd: Sequence[str] = (),
+    level: IntArray | None = None,
     weights: FloatArray | None = None,
     centre: bool = True,
     what: str = "quantity",
@@ -68,6 +79,8 @@ def fit_best(
         Rows of one condition; they are held out together.
     candidates : sequence of term lists
     odd : names of regressors that are standardised about zero
+    level : int array, shape (n,), optional
+        Load level, growing from 0; inner ones are held out whole.
     weights : array, shape (n,), optional
         Relative precision of the rows.
     centre : bool
@@ -90,7 +103,10 @@ def fit_best(
         x = design(variables, exponents, values)
         held_out, held_std = _cross_validate(x, y, groups, weights, centre)
         error = y - held_out
-        score = float(np.sqrt(np.average(error**2, weights=weights)))
+        squares = [float(np.average(error**2, weights=weights))]
+        if level is not None:
+            squares += _inner_levels(x, y, level, weights, centre)
+        score = float(np.sqrt(0.5 * squares[0] + 0.5 * np.mean(squares[1:] or squares)))
         tried.append((len(terms), score))
         if best is not None and not score < 0.98 * best[0]:
             continue
@@ -147,6 +163,41 @@ def _cross_validate(
         spread = np.einsum("ij,jk,ik->i", x[test], covariance, x[test])
         std[test] = np.sqrt(noise**2 + spread)
     return predicted, std
+
+
+def levels_of(x: FloatArray, share: float = 0.05) -> IntArray | None:
+    """Return the number of the level, from the lowest, at which a condition was held.
+
+    A gap wider than `share` of the range separates two levels. None unless there are three at least
+    and twelve at the most: otherwise the condition was not varied in steps.
+
+    Examples
+    --------
+    >>> levels_of(np.array([1.0, 5.1, 1.02, 5.0, 9.0])).tolist()
+    [0, 1, 0, 1, 2]
+    """
+    if not np.isfinite(x).all() or np.ptp(x) == 0.0:
+        return None
+    order = np.argsort(x, kind="stable")
+    steps = np.diff(x[order]) > share * np.ptp(x)
+    number = np.empty(x.size, dtype=np.int64)
+    number[order] = np.concatenate(([0], np.cumsum(steps)))
+    return number if 3 <= number.max() + 1 <= MOST_LEVELS else None
+
+
+def _inner_levels(
+    x: FloatArray, y: FloatArray, level: IntArray, weights: FloatArray, centre: bool
+) -> list[float]:
+    """Return the mean square error at each inner level by a fit without it."""
+    squares = []
+    for number in range(1, int(level.max())):
+        test = level == number
+        if test.mean() > LARGEST_LEVEL:
+            continue
+        coefficients, _, _ = _ridge(x[~test], y[~test], weights[~test], centre)
+        error = y[test] - x[test] @ coefficients
+        squares.append(float(np.average(error**2, weights=weights[test])))
+    return squares
 
 
 def mean_by(unit: IntArray, values: FloatArray, rows: BoolArray) -> FloatArray:

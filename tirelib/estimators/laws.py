@@ -7,8 +7,8 @@ pressure :math:`p_0` only,
 .. math:: F_z(l, p) = F_z(l, p_0) + (p - p_0)\, b\, l, \qquad l = \varphi_{contact} R
 
 with the belt's width b and its ring radius R. Source: balance of a flat membrane on the road; the
-dissertation's regressions hold at one pressure. The width is assumed to be the belt's at every load,
-so a tenth of the correction (at least) is doubt: the standard deviation grows with it.
+dissertation's regressions hold at one pressure. The width is assumed to be the belt's at every
+load, so a tenth of the correction (at least) is doubt: the standard deviation grows with it.
 
 The rolling radius depends on load and pressure through the deflection, which follows their ratio:
 :math:`R_{eff}(F_z, p) = R_{eff}(F_z\,p_0/p, p_0)`; half of the change is doubt.
@@ -84,9 +84,7 @@ class ConditionLaws:
         correction = change * width * angle
         return correction, PRESSURE_DOUBT * np.abs(correction)
 
-    def equivalent_load(
-        self, load: FloatArray, values: Mapping[str, FloatArray]
-    ) -> FloatArray:
+    def equivalent_load(self, load: FloatArray, values: Mapping[str, FloatArray]) -> FloatArray:
         """Return the load that deflects the tire as much at the calibrated pressure, [N]."""
         if self.pressure_fitted or not np.isfinite(self.reference_pressure):
             return load
@@ -105,7 +103,7 @@ class ConditionLaws:
             low, high = low - slack, high + slack
         good = ~(pressure < low) & ~(pressure > high)
         fastest = self.speed[1] * 1.05 if self.speed_fitted else FASTEST
-        return good & ~(np.abs(speed) > fastest)
+        return np.asarray(good & ~(np.abs(speed) > fastest), dtype=np.bool_)
 
     def spread(self, values: Mapping[str, FloatArray], value: FloatArray) -> FloatArray:
         """Return the standard deviation due to conditions that were not varied, shape (n,)."""
@@ -113,7 +111,8 @@ class ConditionLaws:
         if not self.pressure_fitted and np.isfinite(self.reference_pressure):
             apart = np.abs(values["pressure"] / self.reference_pressure - 1.0)
             doubt += FORCE_DOUBT * np.maximum(np.nan_to_num(apart) - 0.02, 0.0)
-        return (doubt + SPEED_DOUBT * self.speed_departure(values)) * np.abs(value)
+        doubt = doubt + SPEED_DOUBT * self.speed_departure(values)
+        return np.asarray(doubt * np.abs(value), dtype=np.float64)
 
     def speed_departure(self, values: Mapping[str, FloatArray]) -> FloatArray:
         """Return how far the squared speed lies outside its calibrated range, [(40 m/s)^2]."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
 
+
 @dataclass(frozen=True, slots=True)
 class Variable:
     """One regressor, standardised: ``z = (x - centre) / scale``, all in SI."""
@@ -88,9 +89,7 @@ class Polynomial:
         factor = np.zeros(len(self.terms))
         for row, term in enumerate(self.terms):
             factor[row] = term[index] / self.variables[index].scale
-            lowered.append(
-                tuple(max(e - 1, 0) if i == index else e for i, e in enumerate(term))
-            )
+            lowered.append(tuple(max(e - 1, 0) if i == index else e for i, e in enumerate(term)))
         return design(self.variables, tuple(lowered), values) @ (factor * self.coefficients)
 
     def names(self) -> list[str]:

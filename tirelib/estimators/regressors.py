@@ -1,9 +1,9 @@
 """Regressors: few numbers per turn, from the features of the gages that work.
 
 A quantity q read at several lateral positions y is described by a straight line fitted over the
-gages, q = q0 + q1 y / y_max: its **level** q0 is even, its **slope** q1 odd in slip angle and camber.
-Fitted lines also serve when a gage is out. Strains are divided by the mean tension inside the contact,
-so the gain that all gages share (temperature of the bridge, supply) drops out.
+gages, q = q0 + q1 y / y_max: its **level** q0 is even, its **slope** q1 odd in slip angle and
+camber. Fitted lines also serve when a gage is out. Strains are divided by the mean tension inside
+the contact, so the gain that all gages share (temperature of the bridge, supply) drops out.
 """
 
 from collections.abc import Mapping, Sequence

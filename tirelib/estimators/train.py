@@ -93,7 +93,7 @@ def train(
         cut_off=filtered.cut_off,
     )
     regressors = compute_regressors(features, range(count))
-    rows, average = averaging(observations)
+    average = averaging(observations)
     _, radius = full.predict(regressors)
     if not full.has("kappa"):
         radius = np.full(len(features), header.tire.ring_radius or header.tire.free_radius)
@@ -107,15 +107,13 @@ def train(
     return Trained(calibration, links, means, fit_all(means), cornering_trend(means))
 
 
-def averaging(
-    observations: Observations,
-) -> tuple[BoolArray, Callable[[FloatArray], FloatArray]]:
-    """Return the turns with every gage, and a function that averages over those of each run."""
+def averaging(observations: Observations) -> Callable[[FloatArray], FloatArray]:
+    """Return a function that averages over the turns of each run that have every gage."""
     features = observations.features
     rows = observations.usable & np.isfinite(features.contact_angle).all(axis=1)
     rows &= np.isfinite(features.cp1).all(axis=1) & np.isfinite(features.cp2).all(axis=1)
     unit = observations.unit
-    return rows, lambda values: mean_by(unit, values, rows)
+    return lambda values: mean_by(unit, values, rows)
 
 
 def _rolling(observations: Observations) -> Rolling:

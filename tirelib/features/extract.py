@@ -1,14 +1,14 @@
 r"""Features of each turn and gage, in the angle domain.
 
 Strain over wheel angle shows, in the order of time, a compressive peak CP1 before the contact, a
-steep rise at the leading edge, tension TP inside the contact, a steep fall at the trailing edge and a
-second compressive peak CP2 (dissertation, Fig. 3-7, 3-8, 4-10). Edges are read at the extremes of the
-strain rate, which lie a little inside or outside the true edges: the reading has a bias.
+steep rise at the leading edge, tension TP inside the contact, a steep fall at the trailing edge and
+a second compressive peak CP2 (dissertation, Fig. 3-7, 3-8, 4-10). Edges are read at the extremes of
+the strain rate, which lie a little inside or outside the true edges: the reading has a bias.
 
 Rates are per radian, so a calibration made at one speed holds at another.
 
-Integrals (Eq. 11, 12), over the contact angle :math:`l` read from the edges, with :math:`\xi` from its
-middle:
+Integrals (Eq. 11, 12), over the contact angle :math:`l` read from the edges, with :math:`\xi` from
+its middle:
 
 .. math:: E_{vertical} = \int_{-l/2}^{l/2} \varepsilon\,d\xi, \qquad
           \varepsilon_{fri}(\xi) = \tfrac12[\varepsilon(\xi) - \varepsilon(-\xi)], \qquad
@@ -54,8 +54,8 @@ class Features:
     e_vertical, e_friction
         Integrals of Eq. (11), (12), [rad], [rad2].
     skew
-        First moment of the strain about the middle of the contact over e_vertical, [rad]: zero for a
-        symmetric contact.
+        First moment of the strain about the middle of the contact over e_vertical, [rad]: zero for
+        a symmetric contact.
     mean
         Mean strain of the preceding turn above the offset.
     offset
@@ -106,7 +106,7 @@ class Features:
         return int(np.argmin(np.abs(self.lateral)))
 
     def __len__(self) -> int:
-        return self.time.shape[0]
+        return int(self.time.shape[0])
 
 
 def extract_features(turns: Turns) -> Features:

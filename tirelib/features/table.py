@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 import numpy as np
+import numpy.typing as npt
 import pandas as pd
 
 from tirelib.features.extract import Features
@@ -39,7 +40,7 @@ PER_TURN = {
 """Columns of one turn with their units."""
 
 
-def feature_frame(features: Features, **extra: object) -> pd.DataFrame:
+def feature_frame(features: Features, **extra: npt.ArrayLike) -> pd.DataFrame:
     """Return one row per turn and gage, SI units, ISO axes.
 
     Parameters
@@ -49,7 +50,7 @@ def feature_frame(features: Features, **extra: object) -> pd.DataFrame:
         Further columns, constant or of shape (n,), for example ``run=3``.
     """
     n, gages = len(features), features.lateral.size
-    columns: dict[str, object] = {
+    columns: dict[str, npt.ArrayLike | list[str]] = {
         name: np.repeat(value, gages) if np.ndim(value) else value for name, value in extra.items()
     }
     columns["turn"] = np.repeat(np.arange(n), gages)
@@ -60,8 +61,8 @@ def feature_frame(features: Features, **extra: object) -> pd.DataFrame:
     for name in PER_GAGE:
         columns[name] = getattr(features, name).ravel()
     columns["slope_rate_lead"] = np.repeat(rate_slope(features), gages)
-    columns["flags"] = np.repeat([";".join(flag_names(f)) for f in features.flags], gages)
-    columns["gage_flags"] = [";".join(flag_names(f)) for f in features.gage_flags.ravel()]
+    columns["flags"] = np.repeat([";".join(flag_names(f)) for f in features.flags.tolist()], gages)
+    columns["gage_flags"] = [";".join(flag_names(f)) for f in features.gage_flags.ravel().tolist()]
     return pd.DataFrame(columns)
 
 

@@ -1,8 +1,8 @@
 """Find the passages of a gage through the contact, sample by sample, in bounded memory.
 
 The innerliner is stretched inside the contact (the belt is flattened) and compressed just outside
-it, so a passage is a pulse of tension between two dips. A pulse begins when the strain rises above a
-level and ends when it falls below a lower one. Both levels lie between the extremes of the
+it, so a passage is a pulse of tension between two dips. A pulse begins when the strain rises above
+a level and ends when it falls below a lower one. Both levels lie between the extremes of the
 **preceding** turn, so a slow drift or a change of load moves them along. Before the first complete
 turn the extremes since the start are used; a contact found that way is marked `fresh`.
 
@@ -176,7 +176,7 @@ class ContactFinder:
         return y
 
     def _room(self) -> int:
-        """Samples until patience ends."""
+        """Return the samples left until patience ends."""
         patience = self._longest_turn
         if self._last_period is not None:
             patience = min(patience, int(PATIENCE * self._last_period))

@@ -7,8 +7,8 @@ For the contact k, with the middles of the centre gage's pulses m at k-1 and k:
 - conditions: mean over the preceding turn of what was held,
 - strain and rate over wheel angle: `tirelib.signal.lowpass`, up to 20 degrees after the pulse.
 
-`TurnCutter` takes samples in frames of any length; `cut_turns` gives it a whole record. Both run the
-same code, so they agree.
+`TurnCutter` takes samples in frames of any length; `cut_turns` gives it a whole record. Both run
+the same code, so they agree.
 """
 
 from collections import deque
@@ -92,7 +92,7 @@ class Turns:
     rate_hz: float
 
     def __len__(self) -> int:
-        return self.time.shape[0]
+        return int(self.time.shape[0])
 
 
 class TurnCutter:
@@ -287,7 +287,7 @@ class TurnCutter:
         self, middle: float, step: float, sigma: float, pulse: float
     ) -> tuple[FloatArray, FloatArray, IntArray]:
         """Strain and rate over `PHI`, NaN beyond the end of the window, and the gages' flags."""
-        seen = PHI <= pulse + AFTER
+        seen = pulse + AFTER >= PHI
         reach = half_width(sigma) / step + 2.0
         first = int(middle + PHI[0] / step - reach) - self._base
         stop = int(middle + PHI[seen][-1] / step + reach) + 1 - self._base

@@ -49,7 +49,7 @@ def make_run(
     lateral_force = -6e4 * slip_angle * load / 5e3
     omega = SPEED / (0.98 * RADIUS)
     count = int(turns * 2 * np.pi / omega * RATE)
-    angle = -np.pi + 0.4 + omega * np.arange(count) / RATE
+    angle = -np.pi + 0.4 + omega * np.arange(0.0, count) / RATE
     strain = np.stack([turn_strain(angle, load, lateral_force, y) for y in LATERAL])
     offsets = 4e-5 * np.array([1.0, -1.5, 0.5, 0.2, -0.8])[:, None]
     strain = strain + offsets + 3e-6 * random.standard_normal(strain.shape)

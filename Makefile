@@ -1,0 +1,39 @@
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+
+.PHONY: all demo test lint types contracts docs bench rig clean
+
+all: $(STAMP)
+
+$(STAMP): pyproject.toml .ci/constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed")'
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install --quiet --constraint .ci/constraints.txt --editable ".[fmu,bench,docs,dev]"
+	touch $@
+
+# The main job, end to end, on the numerical rig; ends by naming the files to open.
+demo: $(STAMP)
+	$(BIN)/python build/demo.py
+
+test: lint
+	$(BIN)/python -m pytest
+
+lint: $(STAMP)
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports --no-cache
+
+docs: $(STAMP)
+	$(BIN)/sphinx-build --fail-on-warning --quiet docs build/out/docs
+	@echo "open build/out/docs/index.html"
+
+# Timed, with ratios within one run; never part of `make test`.
+bench: $(STAMP)
+	$(BIN)/python -m pytest tests/speed --benchmark-only --benchmark-columns=min,median,max,rounds
+
+clean:
+	rm -rf build/out .pytest_cache .mypy_cache .ruff_cache

@@ -1,0 +1,265 @@
+"""``tirelib calibrate``: fit the regressions on campaigns of one tire."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+
+from tirelib import __version__
+from tirelib.campaign import Campaign, read_campaign
+from tirelib.cli.common import CAMPAIGN, FILE, low_pass_options, output, progress_bar, write_json
+from tirelib.cli.features import make_low_pass
+from tirelib.errors import CalibrationError
+from tirelib.estimators.calibration_file import write_calibration
+from tirelib.estimators.chain import QUANTITIES
+from tirelib.estimators.crossval import (
+    FACTOR,
+    REPORT_UNIT,
+    TRUTH_NAME,
+    HeldOut,
+    leave_levels_out,
+)
+from tirelib.estimators.dissertation import SMALL_ANGLE, Regression
+from tirelib.estimators.train import Trained, train
+from tirelib.observations import Observations, observe
+
+FORMAT = "tirelib-calibrate/1"
+
+_EXAMPLE = """\b
+Examples:
+  tirelib calibrate data/cornering --out build/out/cal.toml
+  tirelib calibrate data/cornering data/speeds data/braking --out build/out/cal.toml \\
+      --report build/out/calibration
+
+\b
+Several campaigns must be of the same tire and gages. More conditions in the data
+(pressure, speed, camber, slip ratio) make the calibration hold for them.
+"""
+
+
+@click.command(epilog=_EXAMPLE)
+@click.argument("folders", metavar="DIR...", type=CAMPAIGN, nargs=-1, required=True)
+@click.option("--out", "target", metavar="CAL.toml", type=FILE, required=True,
+              help="Calibration to write.")  # fmt: skip
+@click.option("--report", metavar="FOLDER", type=click.Path(path_type=Path),
+              help="Write statistics and residual plots as HTML.")  # fmt: skip
+@click.option("--quick", is_flag=True, help="Leave out the cross-validation by level.")
+@low_pass_options
+@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write statistics as JSON.")
+def calibrate(
+    folders: tuple[Path, ...],
+    target: Path,
+    report: Path | None,
+    quick: bool,
+    order: float | None,
+    cut_off: float | None,
+    json_file: Path | None,
+) -> None:
+    """Fit the estimators of Fz, alpha, kappa and Fy on the campaigns in DIR..."""
+    campaigns = [read_campaign(folder) for folder in folders]
+    repeated = [str(f) for f in folders if [p.resolve() for p in folders].count(f.resolve()) > 1]
+    if repeated:
+        raise CalibrationError(f"{repeated[0]}: is given twice; give every campaign once")
+    low_pass = make_low_pass(order, cut_off)
+    runs = sum(len(campaign.plans) for campaign in campaigns)
+    with progress_bar("reading", runs) as progress:
+        observations = observe(campaigns, low_pass=low_pass, progress=progress)
+    with progress_bar("fitting", 5 * 4) as progress:
+        trained = train(observations, low_pass=low_pass, progress=progress)
+    held_out: tuple[HeldOut, ...] = ()
+    if not quick:
+        with progress_bar("cross-validating") as progress:
+            held_out = leave_levels_out(observations, trained, progress)
+    document = statistics(campaigns, observations, trained, held_out)
+    write_calibration(trained.calibration, target, _provenance(document))
+    console = output()
+    _print(console, trained, document)
+    console.print(f"written: {target}")
+    if json_file is not None:
+        write_json(json_file, document)
+    if report is not None:
+        from tirelib.report.calibration import write_calibration_report
+
+        rows = [vars_of(row) for row in held_out]
+        page = write_calibration_report(trained, report, held_out=rows)
+        console.print(f"written: {page}")
+
+
+def vars_of(row: HeldOut) -> dict[str, Any]:
+    """Return a held-out row as a plain table."""
+    return {
+        "held_out": row.condition,
+        "level": row.level,
+        "quantity": row.quantity,
+        "unit": row.unit,
+        "inside": row.inside,
+        "n": row.n,
+        "dissertation": row.dissertation,
+        "in_use": row.in_use,
+    }
+
+
+def statistics(
+    campaigns: list[Campaign],
+    observations: Observations,
+    trained: Trained,
+    held_out: tuple[HeldOut, ...],
+) -> dict[str, Any]:
+    """Return everything a reader may want to know of a calibration."""
+    links = trained.links
+    in_use: dict[str, Any] = {}
+    for quantity in QUANTITIES:
+        if quantity not in links.held_out:
+            in_use[quantity] = None
+            continue
+        factor = FACTOR[REPORT_UNIT[quantity]]
+        truth = links.truth[TRUTH_NAME[quantity]]
+        error = (links.held_out[quantity] - truth) * factor
+        entry = {
+            "unit": REPORT_UNIT[quantity],
+            "n": int(error.size),
+            "conditions": int(np.unique(links.groups).size),
+            "cross_validated_rmse": float(np.sqrt(np.mean(error**2))),
+            "r2": float(1.0 - np.sum(error**2) / np.sum(((truth - truth.mean()) * factor) ** 2)),
+            "candidates": [
+                {"terms": terms, "score": score * factor}
+                for terms, score in links.candidates[quantity]
+            ],
+        }
+        if quantity == "alpha":
+            small = np.abs(truth) <= np.deg2rad(SMALL_ANGLE)
+            entry["cross_validated_rmse_small_angles"] = float(np.sqrt(np.mean(error[small] ** 2)))
+        in_use[quantity] = entry
+    return {
+        "format": FORMAT,
+        "axes": "iso",
+        "tirelib": __version__,
+        "tire": trained.calibration.tire,
+        "data": [
+            {"name": c.header.name, "runs": len(c.plans), "sha256": c.content_hash()}
+            for c in campaigns
+        ],
+        "turns": len(observations),
+        "usable_turns": int(observations.usable.sum()),
+        "in_use": in_use,
+        "refused": dict(links.refused),
+        "regressions": [_regression(regression) for regression in trained.regressions],
+        "held_out": [vars_of(row) for row in held_out],
+        "cornering": _cornering(trained),
+    }
+
+
+def _regression(regression: Regression) -> dict[str, Any]:
+    return {
+        "name": regression.name,
+        "source": regression.source,
+        "quantity": regression.quantity,
+        "unit": regression.unit,
+        "n": int(regression.measured.size),
+        "r2": regression.r2,
+        "rmse": regression.rmse,
+        "cross_validated_rmse": regression.cross_validated,
+        "terms": [
+            {
+                "name": term.name,
+                "coefficient": term.coefficient,
+                "std_error": term.std_error,
+                "p_value": term.p_value,
+            }
+            for term in regression.terms
+        ],
+    }
+
+
+def _cornering(trained: Trained) -> dict[str, Any] | None:
+    trend = trained.cornering
+    if trend is None:
+        return None
+    return {
+        "load_N": trend.load.tolist(),
+        "contact_length_mm": trend.contact_length.tolist(),
+        "cornering_stiffness_N_per_deg": trend.stiffness.tolist(),
+        "cornering_stiffness_std": trend.stiffness_std.tolist(),
+        "peak_force_N": trend.peak.tolist(),
+        "peak_force_std": trend.peak_std.tolist(),
+        "stiffness_over_length": trend.stiffness_fit.tolist(),
+        "peak_over_length": trend.peak_fit.tolist(),
+    }
+
+
+def _provenance(document: dict[str, Any]) -> dict[str, Any]:
+    """Return what of the statistics goes into the calibration file (TOML knows no null)."""
+
+    def without_null(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {k: without_null(v) for k, v in value.items() if v is not None}
+        if isinstance(value, list):
+            return [without_null(item) for item in value if item is not None]
+        return value
+
+    names = ("tirelib", "data", "in_use", "refused", "regressions", "held_out", "cornering")
+    return {
+        ("statistics" if name == "in_use" else name): without_null(document[name])
+        for name in names
+        if document[name]
+    }
+
+
+def _print(console: Console, trained: Trained, document: dict[str, Any]) -> None:
+    for regression in trained.regressions:
+        table = Table(
+            title=f"{regression.name} ({regression.source}): "
+            f"R2 {100 * regression.r2:.2f} %, rmse {regression.rmse:.4g} {regression.unit}, "
+            f"held out {regression.cross_validated:.4g} {regression.unit}, "
+            f"n = {regression.measured.size}",
+            box=SIMPLE_HEAD,
+            title_justify="left",
+        )
+        for column in ("term", "coefficient", "std error", "p value"):
+            table.add_column(column, justify="left" if column == "term" else "right")
+        for term in regression.terms:
+            table.add_row(term.name, f"{term.coefficient:.5g}", f"{term.std_error:.3g}",
+                          f"{term.p_value:.3f}")  # fmt: skip
+        console.print(table)
+    table = Table(title="Estimators in use (conditions held out)", box=SIMPLE_HEAD,
+                  title_justify="left")  # fmt: skip
+    for column in ("quantity", "rmse", "unit", "R2", "runs", "terms"):
+        table.add_column(column, justify="left" if column in ("quantity", "unit") else "right")
+    chain = trained.calibration.chains[-1]
+    models = {"Fz": chain.load, "kappa": chain.radius, "Fy": chain.force,
+              "alpha": chain.angle.polynomial if chain.angle else None}  # fmt: skip
+    for quantity in QUANTITIES:
+        entry, model = document["in_use"][quantity], models[quantity]
+        if entry is None or model is None:
+            why = trained.links.refused.get(quantity, "")
+            table.add_row(quantity, "not calibrated", "", "", "", why)
+            continue
+        table.add_row(quantity, f"{entry['cross_validated_rmse']:.4g}", entry["unit"],
+                      f"{entry['r2']:.5f}", str(entry["n"]), str(len(model.terms)))  # fmt: skip
+    console.print(table)
+    if document["held_out"]:
+        console.print(_held_out_table(document["held_out"]))
+
+
+def _held_out_table(rows: list[dict[str, Any]]) -> Table:
+    """Worst rmse over the levels of each condition: the dissertation's and ours."""
+    table = Table(title="Worst level held out, within the others (rmse over run means)",
+                  box=SIMPLE_HEAD, title_justify="left")  # fmt: skip
+    for column in ("held out", "quantity", "dissertation", "in use", "unit", "levels"):
+        table.add_column(
+            column, justify="right" if column in ("dissertation", "in use") else "left"
+        )
+    keys = dict.fromkeys((r["held_out"], r["quantity"]) for r in rows if r["inside"])
+    for condition, quantity in keys:
+        part = [r for r in rows if (r["held_out"], r["quantity"]) == (condition, quantity)]
+        part = [r for r in part if r["inside"]]
+        old = [r["dissertation"] for r in part if r["dissertation"] is not None]
+        table.add_row(
+            condition, quantity, f"{max(old):.4g}" if old else "-",
+            f"{max(r['in_use'] for r in part):.4g}", part[0]["unit"], str(len(part)),
+        )  # fmt: skip
+    return table

@@ -1,0 +1,91 @@
+"""What several verbs share: progress bars, JSON files, tables."""
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from tirelib.errors import FormatError
+
+CAMPAIGN = click.Path(path_type=Path)
+FILE = click.Path(path_type=Path, dir_okay=False)
+WIDTH = 120
+
+
+def output() -> Console:
+    """Return the console for results, wide enough for tables when it is no terminal."""
+    console = Console(highlight=False)
+    return console if console.is_terminal else Console(highlight=False, width=WIDTH)
+
+
+@contextmanager
+def progress_bar(what: str, total: int | None = None) -> Iterator[Callable[[str], None]]:
+    """Yield a callback that advances a bar on stderr by one step and shows a label."""
+    console = Console(stderr=True)
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[label]}", style="dim"),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    ) as bar:
+        task = bar.add_task(what, total=total, label="")
+
+        def advance(label: str) -> None:
+            bar.update(task, advance=1, label=label)
+
+        yield advance
+
+
+def write_json(path: Path, document: dict[str, Any]) -> None:
+    """Write JSON; NaN and infinity become null.
+
+    Raises
+    ------
+    FormatError
+        If the file cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(plain(document), indent=1, allow_nan=False) + "\n")
+    except OSError as error:
+        raise FormatError(f"{path}: cannot be written ({error.strerror}); choose another "
+                          "file") from None  # fmt: skip
+
+
+def plain(value: Any) -> Any:
+    """Return numbers and containers as JSON knows them."""
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return [plain(item) for item in value.tolist()]
+    if isinstance(value, np.bool_):
+        return bool(value)
+    if isinstance(value, np.integer):
+        return int(value)
+    if isinstance(value, float | np.floating):
+        return float(value) if np.isfinite(value) else None
+    return value
+
+
+def low_pass_options(function: Callable[..., None]) -> Callable[..., None]:
+    """Add the options that choose the low-pass."""
+    function = click.option(
+        "--cut-off", type=float, metavar="HZ", default=None,
+        help="Fixed cut-off instead; turns that it does not suit are flagged.",
+    )(function)  # fmt: skip
+    return click.option(
+        "--order", type=float, metavar="N", default=None,
+        help="Cut-off of the low-pass in cycles per turn (default 24: 225 Hz at 65 km/h).",
+    )(function)  # fmt: skip

@@ -1,0 +1,95 @@
+"""``tirelib estimate``: Fz, alpha, kappa and Fy of every turn, with standard deviations."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from tirelib.campaign import read_campaign
+from tirelib.cli.common import CAMPAIGN, FILE, output, progress_bar, write_json
+from tirelib.errors import CalibrationError
+from tirelib.estimators.calibration_file import read_calibration
+from tirelib.estimators.result import estimate_document
+from tirelib.observations import observe
+from tirelib.signal import LowPass
+
+_EXAMPLE = """\b
+Example:
+  tirelib estimate data/another-day --calibration build/out/cal.toml --json build/out/e.json
+
+\b
+JSON: N, deg, kappa without unit, ISO 8855 axes; null where a quantity has no calibration or
+cannot be told. Exit code 1: not one turn is valid.
+"""
+
+
+@click.command(epilog=_EXAMPLE)
+@click.argument("folder", metavar="DIR", type=CAMPAIGN)
+@click.option("--calibration", "calibration_file", metavar="CAL.toml", type=FILE, required=True,
+              help="Made by `tirelib calibrate`.")  # fmt: skip
+@click.option("--report", metavar="FOLDER", type=click.Path(path_type=Path),
+              help="Write accuracy and figures as HTML.")  # fmt: skip
+@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write every turn as JSON.")
+@click.pass_context
+def estimate(
+    context: click.Context,
+    folder: Path,
+    calibration_file: Path,
+    report: Path | None,
+    json_file: Path | None,
+) -> None:
+    """Estimate every turn of DIR, and compare with the rig where it measured."""
+    calibration = read_calibration(calibration_file)
+    campaign = read_campaign(folder)
+    calibration.check_layout(campaign.header.tire.name, campaign.header.gage_lateral, str(folder))
+    if not campaign.header.gage_lateral:
+        raise CalibrationError(f"{folder}: the campaign holds no strain; there is nothing to "
+                               "estimate from")  # fmt: skip
+    low_pass = LowPass(calibration.order, calibration.cut_off)
+    with progress_bar("reading", len(campaign.plans)) as progress:
+        observations = observe([campaign], low_pass=low_pass, progress=progress)
+    estimates = calibration.estimate(observations.features)
+    document = estimate_document(observations, estimates, calibration)
+    console = output()
+    turns = document["turns"]
+    valid = sum(turn["valid"] for turn in turns)
+    console.print(f"{campaign.header.name}: {len(turns)} turns, {valid} valid (ISO 8855 axes)")
+    console.print(_summary_table(document["summary"]))
+    counts: dict[str, int] = {}
+    for turn in turns:
+        for flag in turn["flags"]:
+            counts[flag] = counts.get(flag, 0) + 1
+    for name, count in sorted(counts.items(), key=lambda item: -item[1]):
+        console.print(f"  {count:5d} turns flagged {name}")
+    if json_file is not None:
+        write_json(json_file, document)
+        console.print(f"written: {json_file}")
+    if report is not None:
+        from tirelib.report.calibration import write_estimate_report
+
+        page = write_estimate_report(observations, estimates, calibration, report)
+        console.print(f"written: {page}")
+    context.exit(0 if valid else 1)
+
+
+def _summary_table(summary: dict[str, Any]) -> Table:
+    table = Table(box=SIMPLE_HEAD)
+    for column in ("quantity", "rmse", "unit", "% of range", "R2", "runs", "in 95 % interval"):
+        table.add_column(column, justify="left" if column in ("quantity", "unit") else "right")
+    for quantity, entry in summary.items():
+        if entry is None:
+            table.add_row(quantity, "not calibrated", *[""] * 5)
+            continue
+        if entry["rmse"] is None:
+            table.add_row(quantity, "not measured", entry["unit"], *[""] * 4)
+            continue
+        r2 = "-" if entry["r2"] is None else f"{entry['r2']:.5f}"
+        percent = entry["rmse_percent_of_range"]
+        table.add_row(
+            quantity, f"{entry['rmse']:.4g}", entry["unit"],
+            "-" if percent is None else f"{percent:.2f}", r2, str(entry["n"]),
+            f"{100 * entry['coverage_95']:.0f} %",
+        )  # fmt: skip
+    return table

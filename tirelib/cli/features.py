@@ -1,0 +1,85 @@
+"""``tirelib features``: one row per turn and gage."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from tirelib.campaign import read_campaign
+from tirelib.cli.common import CAMPAIGN, FILE, low_pass_options, output, progress_bar, write_json
+from tirelib.errors import FormatError
+from tirelib.features import feature_frame
+from tirelib.features.table import units
+from tirelib.flags import TurnFlag
+from tirelib.observations import Observations, observe
+from tirelib.signal import LowPass
+
+FORMAT = "tirelib-features/1"
+
+_EXAMPLE = """\b
+Example:
+  tirelib features data/my-campaign --out build/out/features.parquet
+
+\b
+One row per turn and gage, SI units, angles in rad from the middle of the centre
+gage's contact, ISO 8855 axes. FILE may end in .parquet or .csv.
+"""
+
+
+@click.command(epilog=_EXAMPLE)
+@click.argument("folder", metavar="DIR", type=CAMPAIGN)
+@click.option("--out", "target", metavar="FILE", type=FILE, required=True,
+              help="Table to write: .parquet or .csv.")  # fmt: skip
+@low_pass_options
+@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write a summary as JSON.")
+def features(
+    folder: Path, target: Path, order: float | None, cut_off: float | None, json_file: Path | None
+) -> None:
+    """Read contact edges, peaks and integrals of every turn and gage of DIR."""
+    if target.suffix not in (".parquet", ".csv"):
+        raise FormatError(f"{target}: ends in {target.suffix!r}; allowed are .parquet and .csv")
+    campaign = read_campaign(folder)
+    with progress_bar("reading", len(campaign.plans)) as progress:
+        observations = observe([campaign], low_pass=make_low_pass(order, cut_off),
+                               progress=progress)  # fmt: skip
+    table = feature_frame(observations.features, run=observations.run)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if target.suffix == ".csv":
+            table.to_csv(target, index=False)
+        else:
+            table.to_parquet(target, index=False)
+    except OSError as error:
+        raise FormatError(f"{target}: cannot be written ({error.strerror}); choose another "
+                          "file") from None  # fmt: skip
+    summary = _summary(observations)
+    console = output()
+    console.print(
+        f"{len(observations)} turns of {len(campaign.plans)} runs, "
+        f"{observations.features.lateral.size} gages; {summary['usable']} turns without a fault"
+    )
+    for name, count in summary["flags"].items():
+        console.print(f"  {count:5d} turns flagged {name}")
+    console.print(f"written: {target}")
+    if json_file is not None:
+        write_json(json_file, {"format": FORMAT, "axes": "iso", "table": str(target),
+                               "units": dict(units()), **summary})  # fmt: skip
+
+
+def make_low_pass(order: float | None, cut_off: float | None) -> LowPass | None:
+    """Return the filter that the options ask for; None for the default."""
+    if order is None and cut_off is None:
+        return None
+    return LowPass(cut_off=cut_off) if order is None else LowPass(order, cut_off)
+
+
+def _summary(observations: Observations) -> dict[str, Any]:
+    flags = observations.features.flags
+    counts = {
+        flag.name.lower(): int(((flags & int(flag)) != 0).sum()) for flag in TurnFlag if flag.name
+    }
+    return {
+        "turns": len(observations),
+        "usable": int(observations.usable.sum()),
+        "flags": {name: count for name, count in counts.items() if count},
+    }

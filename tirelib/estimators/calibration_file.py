@@ -1,0 +1,214 @@
+"""Calibrations as TOML files (``tirelib-calibration/1``): written once, read everywhere.
+
+Numbers keep all their digits, so an estimate from a file equals the one from memory.
+"""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from tirelib.arrays import FloatArray
+from tirelib.errors import FormatError
+from tirelib.estimators.calibration import Calibration, Rolling
+from tirelib.estimators.chain import AngleModel, Chain
+from tirelib.estimators.laws import ConditionLaws
+from tirelib.estimators.polynomial import Polynomial, Range, Variable
+
+FORMAT = "tirelib-calibration/1"
+_MODEL_UNITS = {"Fz": "N", "R_eff": "m", "Fy": "N", "alpha": "rad"}
+
+
+def write_calibration(
+    calibration: Calibration, path: str | Path, provenance: Mapping[str, Any] | None = None
+) -> None:
+    """Write a calibration; `provenance` holds further tables (data, statistics, history)."""
+    document: dict[str, Any] = {
+        "format": FORMAT,
+        "axes": "iso",
+        "tire": calibration.tire,
+        "lateral_m": list(calibration.lateral),
+        "filter": {"order": calibration.order},
+        "rolling": {
+            "centre": calibration.rolling.centre,
+            "threshold": calibration.rolling.threshold,
+        },
+        **(provenance or {}),
+        "chain": [
+            {"missing_gage": missing + 1, **_chain_table(chain)}
+            for missing, chain in sorted(calibration.chains.items())
+        ],
+    }
+    if calibration.cut_off is not None:
+        document["filter"]["cut_off_hz"] = calibration.cut_off
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(
+        "# Calibration of strain estimators. SI units, ISO 8855 axes; missing_gage = 0: none.\n"
+        + tomli_w.dumps(document),
+        encoding="utf-8",
+    )
+
+
+def read_calibration(path: str | Path) -> Calibration:
+    """Read a calibration.
+
+    Raises
+    ------
+    FormatError
+        If the file is no calibration of a known version, or a part is missing or of a wrong type.
+    """
+    where = str(path)
+    try:
+        document = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise FormatError(f"{where}: cannot be read ({error.strerror}); give a file made by "
+                          "`tirelib calibrate`") from None  # fmt: skip
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise FormatError(f"{where}: is not TOML ({error}); give a file made by "
+                          "`tirelib calibrate`") from None  # fmt: skip
+    given = document.get("format")
+    if given != FORMAT:
+        raise FormatError(
+            f"{where}: format = {given!r}; this version reads {FORMAT!r}; calibrate anew"
+        )
+    try:
+        calibration = _calibration(document)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise FormatError(
+            f"{where}: is damaged ({type(error).__name__}: {error}); calibrate anew"
+        ) from None
+    if -1 not in calibration.chains:
+        raise FormatError(f"{where}: holds no chain for all gages; calibrate anew")
+    return calibration
+
+
+def _calibration(document: Mapping[str, Any]) -> Calibration:
+    return Calibration(
+        tire=str(document["tire"]),
+        lateral=tuple(float(y) for y in document["lateral_m"]),
+        chains={int(table["missing_gage"]) - 1: _chain(table) for table in document["chain"]},
+        rolling=Rolling(
+            float(document["rolling"]["centre"]), float(document["rolling"]["threshold"])
+        ),
+        order=float(document["filter"]["order"]),
+        cut_off=document["filter"].get("cut_off_hz"),
+    )
+
+
+def _chain_table(chain: Chain) -> dict[str, Any]:
+    laws = chain.laws
+    table: dict[str, Any] = {
+        "gages": [gage + 1 for gage in chain.gages],
+        "mean_load": chain.mean_load,
+        "laws": {
+            "pressure": list(laws.pressure),
+            "speed": list(laws.speed),
+            "pressure_fitted": laws.pressure_fitted,
+            "speed_fitted": laws.speed_fitted,
+            "contact_width": laws.contact_width,
+            "radius": laws.radius,
+        },
+        "range": {
+            quantity: [
+                {"name": r.name, "low": r.low, "high": r.high, "slack": r.slack, "needed": r.needed}
+                for r in ranges
+            ]
+            for quantity, ranges in chain.guards.items()
+        },
+    }
+    models = {"Fz": chain.load, "R_eff": chain.radius, "Fy": chain.force}
+    for name, model in models.items():
+        if model is not None:
+            table[name] = _polynomial_table(model, _MODEL_UNITS[name])
+    if chain.angle is not None:
+        table["alpha"] = {
+            **_polynomial_table(chain.angle.polynomial, _MODEL_UNITS["alpha"]),
+            "blur": chain.angle.blur,
+            "bend": chain.angle.bend,
+        }
+    return table
+
+
+def _chain(table: Mapping[str, Any]) -> Chain:
+    laws = table["laws"]
+    angle = None
+    if "alpha" in table:
+        part = table["alpha"]
+        angle = AngleModel(_polynomial(part), float(part["blur"]), float(part["bend"]))
+    return Chain(
+        gages=tuple(int(gage) - 1 for gage in table["gages"]),
+        guards={
+            quantity: tuple(
+                Range(str(r["name"]), float(r["low"]), float(r["high"]), float(r["slack"]),
+                      bool(r["needed"]))
+                for r in ranges
+            )
+            for quantity, ranges in table["range"].items()
+        },
+        laws=ConditionLaws(
+            pressure=_pair(laws["pressure"]),
+            speed=_pair(laws["speed"]),
+            pressure_fitted=bool(laws["pressure_fitted"]),
+            speed_fitted=bool(laws["speed_fitted"]),
+            contact_width=float(laws["contact_width"]),
+            radius=float(laws["radius"]),
+        ),
+        mean_load=float(table["mean_load"]),
+        load=_polynomial(table["Fz"]) if "Fz" in table else None,
+        radius=_polynomial(table["R_eff"]) if "R_eff" in table else None,
+        force=_polynomial(table["Fy"]) if "Fy" in table else None,
+        angle=angle,
+    )  # fmt: skip
+
+
+def _polynomial_table(model: Polynomial, unit: str) -> dict[str, Any]:
+    std = np.sqrt(np.diag(model.covariance))
+    return {
+        "unit": unit,
+        "residual": model.residual,
+        "floor": model.floor,
+        "variable": [
+            {"name": v.name, "centre": v.centre, "scale": v.scale} for v in model.variables
+        ],
+        "term": [
+            {
+                "name": name,
+                "exponents": list(exponents),
+                "value": float(value),
+                "std": float(sigma),
+                "unit": unit,
+                "kind": "fitted",
+            }
+            for name, exponents, value, sigma in zip(
+                model.names(), model.terms, model.coefficients, std, strict=True
+            )
+        ],
+        "covariance": [[float(c) for c in row] for row in model.covariance],
+    }
+
+
+def _polynomial(table: Mapping[str, Any]) -> Polynomial:
+    terms: Sequence[Mapping[str, Any]] = table["term"]
+    covariance: FloatArray = np.asarray(table["covariance"], dtype=np.float64)
+    if covariance.shape != (len(terms), len(terms)):
+        raise ValueError(f"covariance has shape {covariance.shape} for {len(terms)} terms")
+    return Polynomial(
+        variables=tuple(
+            Variable(str(v["name"]), float(v["centre"]), float(v["scale"]))
+            for v in table["variable"]
+        ),
+        terms=tuple(tuple(int(e) for e in term["exponents"]) for term in terms),
+        coefficients=np.array([float(term["value"]) for term in terms]),
+        covariance=covariance,
+        residual=float(table["residual"]),
+        floor=float(table["floor"]),
+    )
+
+
+def _pair(values: Sequence[Any]) -> tuple[float, float]:
+    low, high = values
+    return float(low), float(high)

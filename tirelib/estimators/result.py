@@ -1,0 +1,106 @@
+"""Estimates as a document (``tirelib-estimate/1``): every turn, and how far the rig agrees.
+
+Units at this edge are what engineers say: N and deg. Axes are ISO 8855.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.estimators.calibration import Calibration, Estimates
+from tirelib.estimators.chain import QUANTITIES
+from tirelib.estimators.fit import mean_by
+from tirelib.flags import flag_names
+from tirelib.observations import Observations
+
+FORMAT = "tirelib-estimate/1"
+EDGE_UNIT = {"Fz": ("N", 1.0), "alpha": ("deg", 180.0 / np.pi), "kappa": ("1", 1.0),
+             "Fy": ("N", 1.0)}  # fmt: skip
+"""Unit and factor of each quantity in the document."""
+TRUTH = {"Fz": "Fz", "alpha": "slip_angle", "kappa": "slip_ratio", "Fy": "Fy"}
+
+
+def estimate_document(
+    observations: Observations, estimates: Estimates, calibration: Calibration
+) -> dict[str, Any]:
+    """Return summary and turns; errors are of the mean of a run's valid turns."""
+    chain = calibration.chains[-1]
+    return {
+        "format": FORMAT,
+        "axes": "iso",
+        "tire": calibration.tire,
+        "summary": {
+            quantity: _summary(quantity, observations, estimates) if chain.has(quantity) else None
+            for quantity in QUANTITIES
+        },
+        "turns": [
+            _turn(row, observations, estimates, calibration) for row in range(len(observations))
+        ],
+    }
+
+
+def run_means(
+    quantity: str, observations: Observations, estimates: Estimates
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return estimate, standard deviation and measurement of each run, SI, over its valid turns."""
+    truth = observations.truth[TRUTH[quantity]]
+    good = estimates.valid[quantity] & np.isfinite(estimates.value[quantity])
+    unit = observations.unit
+    return (
+        mean_by(unit, estimates.value[quantity], good),
+        mean_by(unit, estimates.std[quantity], good),
+        mean_by(unit, truth, good),
+    )
+
+
+def _summary(quantity: str, observations: Observations, estimates: Estimates) -> dict[str, Any]:
+    unit, factor = EDGE_UNIT[quantity]
+    value, std, truth = (x * factor for x in run_means(quantity, observations, estimates))
+    known = np.isfinite(truth)
+    value, std, truth = value[known], std[known], truth[known]
+    empty = {"rmse": None, "unit": unit, "r2": None, "n": 0, "rmse_percent_of_range": None,
+             "coverage_95": None, "bias": None}  # fmt: skip
+    if value.size == 0:
+        return empty
+    error = value - truth
+    rmse = float(np.sqrt(np.mean(error**2)))
+    spread = float(np.sum((truth - truth.mean()) ** 2))
+    span = float(np.ptp(truth))
+    return {
+        "rmse": rmse,
+        "unit": unit,
+        "r2": 1.0 - float(np.sum(error**2)) / spread if spread > 0.0 else None,
+        "n": int(value.size),
+        "rmse_percent_of_range": 100.0 * rmse / span if span > 0.0 else None,
+        "coverage_95": float(np.mean(np.abs(error) <= 1.96 * std)),
+        "bias": float(error.mean()),
+    }
+
+
+def _turn(
+    row: int, observations: Observations, estimates: Estimates, calibration: Calibration
+) -> dict[str, Any]:
+    features = observations.features
+    turn: dict[str, Any] = {
+        "run": int(observations.run[row]),
+        "t": _number(features.time[row]),
+        "ready": _number(features.ready[row]),
+    }
+    for quantity in QUANTITIES:
+        factor = EDGE_UNIT[quantity][1]
+        turn[quantity] = _number(estimates.value[quantity][row] * factor)
+        turn[f"{quantity}_std"] = _number(estimates.std[quantity][row] * factor)
+        turn[f"{quantity}_valid"] = bool(estimates.valid[quantity][row])
+    for gage in range(len(calibration.lateral)):
+        length = estimates.contact_length[row, gage]
+        turn[f"contact_length_{gage + 1}_mm"] = _number(1e3 * length)
+    turn["omega_rad_s"] = _number(features.omega[row])
+    turn["rolling"] = estimates.rolling[row]
+    turn["valid"] = bool(estimates.turn_valid[row])
+    turn["flags"] = [*flag_names(int(estimates.flags[row])), *estimates.notes[row]]
+    return turn
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,118 @@
+"""Estimates held against what the rig measured.
+
+Errors are judged on the mean of a run's valid turns (on each turn in a sweep); the coverage of the
+95 % intervals is counted over turns.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.estimators.calibration import Estimates
+from tirelib.estimators.fit import mean_by
+from tirelib.observations import Observations
+
+QUANTITIES = ("Fz", "alpha", "kappa", "Fy")
+TITLE = {
+    "Fz": "vertical load Fz",
+    "alpha": "slip angle",
+    "kappa": "slip ratio",
+    "Fy": "lateral force Fy",
+}
+UNIT = {"Fz": "N", "alpha": "deg", "kappa": "%", "Fy": "N"}
+FACTOR = {"Fz": 1.0, "alpha": float(180.0 / np.pi), "kappa": 100.0, "Fy": 1.0}
+TRUTH = {"Fz": "Fz", "alpha": "slip_angle", "kappa": "slip_ratio", "Fy": "Fy"}
+SIGNED = frozenset({"alpha", "kappa", "Fy"})
+WIDTH = 1.959964
+"""Half-width of a 95 % interval, in standard deviations."""
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """Valid turns of one quantity whose truth is known, in the unit of the report.
+
+    `measured`, `estimated`, `std`, `load` [N] and `unit` (the independent measurement's number) have
+    shape (n,); `turns` counts the turns that were measured well, valid or not.
+    """
+
+    quantity: str
+    measured: FloatArray
+    estimated: FloatArray
+    std: FloatArray
+    load: FloatArray
+    unit: IntArray
+    turns: int
+
+    @property
+    def inside(self) -> BoolArray:
+        """Tell which turns have the truth in their 95 % interval."""
+        return np.abs(self.estimated - self.measured) <= WIDTH * self.std
+
+    def means(self, values: FloatArray) -> FloatArray:
+        """Return the mean over each independent measurement."""
+        return mean_by(self.unit, values, np.ones(self.unit.shape, dtype=np.bool_))
+
+
+@dataclass(frozen=True, slots=True)
+class Accuracy:
+    """One row of an accuracy table; `rmse` in `unit`, NaN where it cannot be said."""
+
+    quantity: str
+    title: str
+    unit: str
+    runs: int
+    turns: int
+    turns_measured: int
+    rmse: float
+    percent_of_range: float
+    r2: float
+    coverage: float
+
+
+def compare(observations: Observations, estimates: Estimates, quantity: str) -> Compared:
+    """Pick the valid turns of a quantity whose truth is known."""
+    factor = FACTOR[quantity]
+    truth = observations.truth[TRUTH[quantity]] * factor
+    value, std = estimates.value[quantity] * factor, estimates.std[quantity] * factor
+    rows = estimates.valid[quantity] & np.isfinite(truth) & np.isfinite(value)
+    return Compared(
+        quantity,
+        truth[rows],
+        value[rows],
+        std[rows],
+        observations.truth["Fz"][rows],
+        observations.unit[rows],
+        int((observations.usable & np.isfinite(truth)).sum()),
+    )
+
+
+def accuracy(compared: Compared) -> Accuracy:
+    """Return the row of the accuracy table."""
+    measured = compared.means(compared.measured)
+    error = compared.means(compared.estimated) - measured
+    n = measured.size
+    rmse = float(np.sqrt(np.mean(error**2))) if n else np.nan
+    spread = float(np.ptp(measured)) if n else 0.0
+    scatter = float(np.sum((measured - measured.mean()) ** 2)) if n else 0.0
+    return Accuracy(
+        quantity=compared.quantity,
+        title=TITLE[compared.quantity],
+        unit=UNIT[compared.quantity],
+        runs=n,
+        turns=compared.measured.size,
+        turns_measured=compared.turns,
+        rmse=rmse,
+        percent_of_range=100.0 * rmse / spread if spread > 0.0 else np.nan,
+        r2=1.0 - float(np.sum(error**2)) / scatter if scatter > 0.0 else np.nan,
+        coverage=float(np.mean(compared.inside)) if n else np.nan,
+    )
+
+
+def accuracies(
+    observations: Observations, estimates: Estimates, quantities: Sequence[str] = QUANTITIES
+) -> list[Accuracy]:
+    """Return the accuracy table; a quantity without a single comparable turn is left out."""
+    rows = [accuracy(compare(observations, estimates, quantity)) for quantity in quantities]
+    return [row for row in rows if row.turns]

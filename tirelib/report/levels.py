@@ -1,0 +1,82 @@
+"""Levels of a condition that was set a few times: loads, cambers, slip angles."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.arrays import BoolArray, FloatArray
+from tirelib.estimators.dissertation import Means
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """One level of a condition.
+
+    `value` is the mean of its rows, `rows` tells which belong to it, `text` says it with a unit.
+    """
+
+    value: float
+    rows: BoolArray
+    text: str
+
+
+def find_levels(values: FloatArray, gap: float, text: str, digits: int = 0) -> list[Level]:
+    """Split values where neighbours lie further apart than `gap`, in rising order.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        NaN belongs to no level.
+    gap : float, unit of `values`
+    text : str
+        How to say a level, for example ``"{} N"``.
+    digits : int
+        As in `round`: -2 is to the hundred.
+
+    Examples
+    --------
+    >>> [x.text for x in find_levels(np.array([5.0, 1.0, 5.2, np.nan]), 1.0, "{} N")]
+    ['1 N', '5 N']
+    """
+    known = np.flatnonzero(np.isfinite(values))
+    order = known[np.argsort(values[known], kind="stable")]
+    if order.size == 0:
+        return []
+    cuts = np.flatnonzero(np.diff(values[order]) > gap) + 1
+    found = []
+    for part in np.split(order, cuts):
+        rows = np.zeros(values.shape, dtype=np.bool_)
+        rows[part] = True
+        mean = float(values[part].mean())
+        shown = round(mean, digits) + 0.0
+        found.append(Level(mean, rows, text.format(f"{shown:.{max(digits, 0)}f}")))
+    return found
+
+
+def load_levels(load: FloatArray) -> list[Level]:
+    """Return the loads of a campaign, [N], named to the nearest hundred."""
+    known = load[np.isfinite(load)]
+    gap = 0.06 * float(known.mean()) if known.size else 1.0
+    return find_levels(load, gap, "{} N", -2)
+
+
+def camber_levels(camber: FloatArray) -> list[Level]:
+    """Return the camber angles of a campaign, [deg]."""
+    return find_levels(np.round(camber, 2), 0.5, "{} deg")
+
+
+def angle_levels(angle: FloatArray) -> list[Level]:
+    """Return the slip angles of a campaign, [deg]."""
+    return find_levels(angle, 0.4, "{} deg")
+
+
+def upright(means: Means) -> BoolArray:
+    """Tell which rows have no camber (or an unknown one)."""
+    return ~(np.abs(means.camber) > 0.5)
+
+
+def reference_level(levels: list[Level]) -> Level:
+    """Return the load with the most rows; among equals the middle one."""
+    most = max(int(level.rows.sum()) for level in levels)
+    full = [level for level in levels if level.rows.sum() >= 0.8 * most]
+    return full[len(full) // 2]
