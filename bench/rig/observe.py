@@ -3,13 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline, CubicSpline
+from scipy.interpolate import CubicSpline
 
-from bench.rig.belt import FIELDS, PSI, innerliner_strain, internal
-from bench.rig.road import Road, add_forces, road, wheel_torque
+from bench.rig.belt import innerliner_strain
+from bench.rig.road import Road, road, wheel_torque
 from bench.rig.solve import State
 from bench.rig.system import fields_at_points
-from bench.rig.tire import N_STRIPS, Array
+from bench.rig.tire import Array
 from bench.rig.tread import kinematics
 
 
@@ -107,39 +107,21 @@ def winding(state: State) -> float:
 def trace(state: State, points: int = 7200) -> Trace:
     """Evaluate strain, slope and load sensitivity on an even grid of gage angles.
 
-    Strain is taken at the Gauss points, where it is most accurate. Between them its membrane part
-    is a cubic spline; its bending part has the slope that the balance of moments gives,
-    EI psi'' / R = M' = the couple per radian on the section, road included. So the slope is
-    smooth and its peaks do not lock on to the mesh.
+    Strain is taken at the Gauss points, where it is most accurate, and joined by a periodic cubic
+    spline: its slope is smooth, without the corners of the mesh.
     """
     step = 2.0 * np.pi / points
     phi = np.asarray(-np.pi + step * np.arange(points), dtype=np.float64)
     at = phi - winding(state)
-    strain, slope = _interpolated(state, state.control, state.height, at)
     nudge = 10.0
-    control = state.control + nudge * state.by_load
-    more, _ = _interpolated(state, control, state.height - nudge / state.stiffness, at)
-    return Trace(phi, strain, slope, (more - strain) / nudge)
+    base = _strain_spline(state, state.control)
+    more = _strain_spline(state, state.control + nudge * state.by_load)
+    strain = np.asarray(base(at))
+    return Trace(phi, strain, np.asarray(base(at, 1)), (more(at) - strain) / nudge)
 
 
-def _interpolated(state: State, control: Array, height: float, phi: Array) -> tuple[Array, Array]:
-    tire, cond, grid = state.tire, state.condition, state.grid
-    z = fields_at_points(grid, control)
-    couple, tangent = internal(tire, cond, state.omega, z)
-    touching = road(tire, cond, grid, z, height, state.rolling_radius)
-    add_forces(cond, grid, touching, couple, tangent)
-    whole = innerliner_strain(tire, z)
-    fibre = tire.innerliner_offset / (tire.ring_radius + tire.innerliner_offset)
-    bend = fibre * z[:, FIELDS + PSI]
-    bend_slope = fibre * tire.ring_radius / (tire.bending / N_STRIPS) * couple[:, PSI]
-    turn = np.append(grid.phi, grid.phi[0] + 2.0 * np.pi)
-
-    def closed(values: Array) -> Array:
-        return np.vstack([values, values[:1]])
-
-    stretch = CubicSpline(turn, closed(whole - bend), bc_type="periodic")
-    bending = CubicHermiteSpline(turn, closed(bend), closed(bend_slope), extrapolate="periodic")
-    return (
-        np.asarray(stretch(phi) + bending(phi)),
-        np.asarray(stretch(phi, 1) + bending(phi, 1)),
-    )
+def _strain_spline(state: State, control: Array) -> CubicSpline:
+    strain = innerliner_strain(state.tire, fields_at_points(state.grid, control))
+    phi = state.grid.phi
+    turn = np.append(phi, phi[0] + 2.0 * np.pi)
+    return CubicSpline(turn, np.vstack([strain, strain[:1]]), bc_type="periodic")

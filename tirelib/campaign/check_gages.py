@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import median_filter
 
 from tirelib.campaign.finding import Finding, finding
 from tirelib.campaign.model import BoolArray, CampaignHeader, FloatArray, Run
@@ -173,7 +172,7 @@ def _rails(run: Run, gage: int, samples: FloatArray, header: CampaignHeader) -> 
                 "widen the amplifier's range and record again",
             )
         )
-    if stuck.size:
+    if stuck.size and _is_lively(samples, int(lengths[stuck].max())):
         longest = int(stuck[np.argmax(lengths[stuck])])
         found.append(
             _held(
@@ -189,6 +188,22 @@ def _rails(run: Run, gage: int, samples: FloatArray, header: CampaignHeader) -> 
             )
         )
     return found
+
+
+def _is_lively(samples: FloatArray, length: int) -> bool:
+    """Return whether a channel, where it moves, moves by 3 steps of its converter or more.
+
+    Looked at in windows of `length` samples. In one that does not, a calm stretch of the turn may
+    well hold one value.
+    """
+    window = min(length, max(20, samples.size // 20))
+    count = samples.size // window
+    ranges = np.ptp(samples[: count * window].reshape(count, window), axis=1)
+    steps = np.abs(np.diff(samples))
+    moving = ranges > 0.0
+    if not moving.any():
+        return False
+    return bool(np.quantile(ranges[moving], 0.2) >= 2.5 * steps[steps > 0.0].min())
 
 
 def _held(
@@ -323,6 +338,8 @@ def spike_samples(samples: FloatArray, scale: float, window: int) -> npt.NDArray
     than 12 sigma of the noise and by more than 4 times the usual step around: that last one
     excuses the steep flanks of the contact.
     """
+    from scipy.ndimage import median_filter  # slow to import, and only the check needs it
+
     excess = np.abs(samples - median_filter(samples, size=window, mode="nearest"))
     noise = 1.4826 * float(np.median(np.abs(np.diff(samples)))) / math.sqrt(2.0)
     candidates: npt.NDArray[np.intp] = np.flatnonzero(excess > max(SPIKE * scale, 12.0 * noise))

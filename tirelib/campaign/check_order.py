@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from tirelib.campaign.finding import Finding, finding
 from tirelib.campaign.model import BoolArray, CampaignHeader, FloatArray, Run
@@ -213,6 +212,8 @@ def _best_order(cost: FloatArray) -> list[int]:
     cost : array, shape (n_gages, n_gages)
         Squared residual of a channel (column) at a place (row).
     """
+    from scipy.optimize import linear_sum_assignment  # slow to import, and rarely needed
+
     places, channels = linear_sum_assignment(cost)
     best = float(cost[places, channels].sum())
     here = np.diag(cost)

@@ -1,16 +1,15 @@
 """The command line, ``tirelib``: the only part of the library that prints."""
 
 import sys
+from importlib import import_module
 
 import click
 
 from tirelib import __version__
-from tirelib.cli.calibrate import calibrate
-from tirelib.cli.campaign import campaign
-from tirelib.cli.estimate import estimate
-from tirelib.cli.features import features
-from tirelib.cli.rig import rig
 from tirelib.errors import TirelibError
+
+VERBS = ("campaign", "features", "calibrate", "estimate", "rig")
+"""Verbs; each is the command of that name in the module of that name."""
 
 _EXAMPLE = """\b
 Examples:
@@ -24,14 +23,25 @@ Exit code: 0 done, 1 ran but the answer is negative, 2 bad input.
 """
 
 
-@click.group(epilog=_EXAMPLE)
+class Verbs(click.Group):
+    """A group that imports a verb only when it is asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the verbs in the order of the journey."""
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import and return one verb."""
+        if cmd_name not in VERBS:
+            return None
+        command = getattr(import_module(f"tirelib.cli.{cmd_name}"), cmd_name)
+        return command if isinstance(command, click.Command) else None
+
+
+@click.group(cls=Verbs, epilog=_EXAMPLE)
 @click.version_option(__version__, prog_name="tirelib")
 def program() -> None:
     """Innerliner strain to vertical load, slip angle, slip ratio and lateral force."""
-
-
-for _command in (campaign, features, calibrate, estimate, rig):
-    program.add_command(_command)
 
 
 def main() -> None:

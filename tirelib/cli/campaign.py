@@ -128,7 +128,7 @@ Example:
 def show(folder: Path, out: Path | None, json_file: Path | None) -> None:
     """Show header, runs with set points and measured means, and an overview plot of DIR."""
     from tirelib.campaign.overview import RunRow, representative_plans, run_row
-    from tirelib.campaign.overview_plot import overview_figure, save_figure
+    from tirelib.report.campaign_overview import overview_figure, save_figure
 
     data = read_campaign(folder)
     chosen = {plan.run for plan in representative_plans(data.plans)}

@@ -120,7 +120,7 @@ class ConditionLaws:
         if self.speed_fitted or not np.isfinite(self.speed[1]):
             return np.zeros_like(squared)
         apart = np.maximum(squared - self.speed[1] ** 2, self.speed[0] ** 2 - squared)
-        return np.maximum(np.nan_to_num(apart), 0.0) / SPEED_UNIT
+        return np.asarray(np.maximum(np.nan_to_num(apart), 0.0) / SPEED_UNIT, dtype=np.float64)
 
     def extrapolated(self, values: Mapping[str, FloatArray]) -> BoolArray:
         """Tell which turns need a law instead of a calibration, shape (n,)."""

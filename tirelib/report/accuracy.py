@@ -25,6 +25,8 @@ UNIT = {"Fz": "N", "alpha": "deg", "kappa": "%", "Fy": "N"}
 FACTOR = {"Fz": 1.0, "alpha": float(180.0 / np.pi), "kappa": 100.0, "Fy": 1.0}
 TRUTH = {"Fz": "Fz", "alpha": "slip_angle", "kappa": "slip_ratio", "Fy": "Fy"}
 SIGNED = frozenset({"alpha", "kappa", "Fy"})
+LEAST_RANGE = {"Fz": 200.0, "alpha": 0.5, "kappa": 1.0, "Fy": 200.0}
+"""Range of the truth, in the report's unit, below which a share of it or an R2 says nothing."""
 WIDTH = 1.959964
 """Half-width of a 95 % interval, in standard deviations."""
 
@@ -33,8 +35,8 @@ WIDTH = 1.959964
 class Compared:
     """Valid turns of one quantity whose truth is known, in the unit of the report.
 
-    `measured`, `estimated`, `std`, `load` [N] and `unit` (the independent measurement's number) have
-    shape (n,); `turns` counts the turns that were measured well, valid or not.
+    `measured`, `estimated`, `std`, `load` [N] and `unit` (the number of the independent
+    measurement) have shape (n,); `turns` counts the turns that were measured well, valid or not.
     """
 
     quantity: str
@@ -95,6 +97,7 @@ def accuracy(compared: Compared) -> Accuracy:
     n = measured.size
     rmse = float(np.sqrt(np.mean(error**2))) if n else np.nan
     spread = float(np.ptp(measured)) if n else 0.0
+    varied = spread >= LEAST_RANGE[compared.quantity]
     scatter = float(np.sum((measured - measured.mean()) ** 2)) if n else 0.0
     return Accuracy(
         quantity=compared.quantity,
@@ -104,8 +107,8 @@ def accuracy(compared: Compared) -> Accuracy:
         turns=compared.measured.size,
         turns_measured=compared.turns,
         rmse=rmse,
-        percent_of_range=100.0 * rmse / spread if spread > 0.0 else np.nan,
-        r2=1.0 - float(np.sum(error**2)) / scatter if scatter > 0.0 else np.nan,
+        percent_of_range=100.0 * rmse / spread if varied else np.nan,
+        r2=1.0 - float(np.sum(error**2)) / scatter if varied else np.nan,
         coverage=float(np.mean(compared.inside)) if n else np.nan,
     )
 

@@ -1,11 +1,12 @@
 """Levels of a condition that was set a few times: loads, cambers, slip angles."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.estimators.dissertation import Means
+from tirelib.report.style import signed_degrees
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,12 +63,17 @@ def load_levels(load: FloatArray) -> list[Level]:
 
 def camber_levels(camber: FloatArray) -> list[Level]:
     """Return the camber angles of a campaign, [deg]."""
-    return find_levels(np.round(camber, 2), 0.5, "{} deg")
+    return [
+        replace(level, text=f"camber {signed_degrees(level.value)}")
+        for level in find_levels(camber, 0.5, "{}")
+    ]
 
 
 def angle_levels(angle: FloatArray) -> list[Level]:
     """Return the slip angles of a campaign, [deg]."""
-    return find_levels(angle, 0.4, "{} deg")
+    return [
+        replace(level, text=signed_degrees(level.value)) for level in find_levels(angle, 0.4, "{}")
+    ]
 
 
 def upright(means: Means) -> BoolArray:

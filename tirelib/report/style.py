@@ -1,13 +1,13 @@
 """One look for every figure: colours that colour-blind readers can tell, labels, legends, files.
 
-Categories use the palette of Okabe and Ito and a marker of their own; ordered quantities (loads) use
-viridis without its palest end. Legends stand outside the axes, so they never cover data.
+Categories use the palette of Okabe and Ito and a marker of their own; ordered quantities (loads)
+use viridis without its palest end. Legends stand outside the axes, so they never cover data.
 """
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
 from pathlib import Path
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
 import numpy as np
@@ -24,7 +24,7 @@ BLUE, ORANGE, GREEN, RED = "#0072b2", "#e69f00", "#009e73", "#d55e00"
 PURPLE, SKY, BLACK = "#cc79a7", "#56b4e9", "#000000"
 CATEGORIES = (BLUE, ORANGE, GREEN, PURPLE, RED, SKY, BLACK)
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "h")
-STYLE = {
+STYLE: dict[Any, Any] = {
     "figure.facecolor": "white",
     "axes.facecolor": "white",
     "font.family": "DejaVu Sans",
@@ -53,6 +53,7 @@ STYLE = {
     "svg.hashsalt": "tirelib",
     "svg.fonttype": "path",
 }
+AGREEMENT = "estimated = measured"
 RESOLUTION = 110
 """Dots per inch of PNG files."""
 
@@ -99,12 +100,30 @@ def zero_line(axes: Axes) -> None:
     axes.axhline(0.0, color=FAINT, linewidth=0.9, zorder=1.5)
 
 
+def signed_degrees(value: float) -> str:
+    """Say an angle in whole degrees with its sign; zero has none.
+
+    Examples
+    --------
+    >>> signed_degrees(3.98), signed_degrees(-0.02)
+    ('+4 deg', '0 deg')
+    """
+    whole = round(value)
+    return f"{whole:+d} deg" if whole else "0 deg"
+
+
+def millimetres(y: float) -> str:
+    """Say a lateral position in whole millimetres with its sign; zero has none."""
+    whole = round(1e3 * y)
+    return f"{whole:+d} mm" if whole else "0 mm"
+
+
 def diagonal(axes: Axes, *values: Iterable[float]) -> None:
     """Draw the line of perfect agreement over the range of the values, labelled."""
     every = np.concatenate([np.asarray(list(v), dtype=np.float64).ravel() for v in values])
     every = every[np.isfinite(every)]
     ends = (float(every.min()), float(every.max())) if every.size else (0.0, 1.0)
-    axes.plot(ends, ends, color=FAINT, linewidth=1.0, zorder=1.5, label="estimated = measured")
+    axes.plot(ends, ends, color=FAINT, linewidth=1.0, zorder=1.5, label=AGREEMENT)
 
 
 def legend_below(
@@ -115,13 +134,19 @@ def legend_below(
     for axes in panels:
         for handle, text in zip(*axes.get_legend_handles_labels(), strict=True):
             found.setdefault(text, handle)
-    figure.legend(
-        list(found.values()),
-        list(found),
-        loc="outside lower center",
-        ncols=min(columns, max(len(found), 1)),
-        title=title,
-    )
+    if AGREEMENT in found:
+        found[AGREEMENT] = found.pop(AGREEMENT)
+    for ncols in range(min(columns, max(len(found), 1)), 0, -1):
+        legend = figure.legend(
+            list(found.values()),
+            list(found),
+            loc="outside lower center",
+            ncols=ncols,
+            title=title,
+        )
+        if ncols == 1 or legend.get_window_extent().width < 0.98 * figure.bbox.width:
+            return
+        legend.remove()
 
 
 def save(figure: Figure, folder: Path, name: str) -> str:

@@ -49,7 +49,9 @@ def typical_turns(
             )
         row = slice(int(good[good.size // 2]), int(good[good.size // 2]) + 1)
         traces.append(_one(turns.trace, row))
-        one = {f.name: getattr(features, f.name)[row] for f in fields(Features) if f.name != "lateral"}
+        one = {
+            f.name: getattr(features, f.name)[row] for f in fields(Features) if f.name != "lateral"
+        }
         parts.append(replace(features, **one))
     return TypicalTurns(_join(traces), concatenate_features(parts), tuple(labels))
 

@@ -15,10 +15,13 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 
-RISE = 0.6
+RISE = 0.7
 """Level of the pulse's edges, as a fraction from the lowest to the highest strain of a turn."""
-FALL = 0.5
-"""Level below which the pulse has ended (hysteresis against noise)."""
+FALL = 0.62
+"""Level below which the pulse has ended (hysteresis against noise).
+
+It must lie above the strain away from the contact, so the dips may be 1.6 times as deep as the pulse
+is high: beyond what a tire shows, even at half its pressure and one and a half times its load."""
 JUMP = 2.5
 """A swing this many times the one that set the levels shows that they were set by no contact."""
 PATIENCE = 2.5

@@ -7,7 +7,8 @@ The filter is a symmetric finite Gaussian, evaluated at the wheel angles that ar
           \quad |\varphi_i - \varphi| \le 4\sigma
 
 with the rate :math:`d\bar\varepsilon / d\varphi` as the slope of the straight line fitted with the
-same weights. Its gain has fallen to one half of the power at the cut-off
+same weights (and the strain as its value there: where the support ends between two samples, the
+weights are not quite symmetric). Its gain has fallen to one half of the power at the cut-off
 :math:`f_c = \sqrt{\ln 2}\,\Omega / (2\pi\sigma)`.
 
 A tire's contact is fixed in wheel angle, not in time: 300 Hz at 65 km/h keep harmonics up to the
@@ -135,6 +136,7 @@ def smooth_to_angle(
     centred = distance - mean
     slope = weight * centred
     slope /= np.einsum("ij,ij->i", slope, centred)[:, None]
+    weight -= mean * slope  # the fitted line at the wanted angle itself
     index = (nearest[:, None] + tap).ravel()
     ends = np.arange(0, index.size + 1, tap.size)
     shape = (phi.size, samples.shape[1])

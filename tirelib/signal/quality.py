@@ -19,6 +19,9 @@ FLAT_ANGLE = 0.04
 """A gage is saturated when it stands still at its extreme over this wheel angle, [rad]..."""
 FLAT_SAMPLES = 6
 """... and over at least this many samples."""
+CORNER_SHARE = 0.002
+"""... and the strain leaves the flat part by a jump of at least this share of the swing. A rounded
+peak of a quantised signal may stand still, too, but leaves it in single steps."""
 UNUSABLE = TurnFlag.GAP | TurnFlag.SATURATED | TurnFlag.DEAD_GAGE
 """Flags with which a gage says nothing in a turn."""
 
@@ -55,8 +58,11 @@ def inspect(window: FloatArray, step: float) -> tuple[FloatArray, IntArray]:
     flags[swing < DEAD_SHARE * np.median(swing)] |= int(TurnFlag.DEAD_GAGE)
     flags[(swing == 0.0)] |= int(TurnFlag.DEAD_GAGE)
     needed = max(FLAT_SAMPLES, int(FLAT_ANGLE / step))
-    flat = _longest_run(known == high[:, None]), _longest_run(known == low[:, None])
-    flags[(np.maximum(*flat) >= needed) & (swing > 0.0)] |= int(TurnFlag.SATURATED)
+    for extreme in (high, low):
+        length = _longest_run(known == extreme[:, None])
+        for row in np.flatnonzero((length >= needed) & (swing > 0.0)):
+            if _has_corner(known[row], extreme[row], CORNER_SHARE * swing[row]):
+                flags[row] |= int(TurnFlag.SATURATED)
     spiked = _spikes(known, swing)
     if spiked.any():
         rows = spiked.any(axis=1)
@@ -66,6 +72,13 @@ def inspect(window: FloatArray, step: float) -> tuple[FloatArray, IntArray]:
     if missing.any():
         window = _bridge(window, missing)
     return window, flags
+
+
+def _has_corner(samples: FloatArray, extreme: float, jump: float) -> bool:
+    """Tell whether the samples leave their extreme by more than `jump` from one to the next."""
+    flat = samples == extreme
+    edges = np.flatnonzero(flat[1:] != flat[:-1])
+    return bool((np.abs(samples[edges + 1] - samples[edges]) > jump).any())
 
 
 def _spikes(known: FloatArray, swing: FloatArray) -> BoolArray:

@@ -78,6 +78,18 @@ def test_each_fault_of_a_gage_has_its_message(
     says(the_one(check_campaign(folder)), f"runs/{number:03d}.mf4", message)
 
 
+@pytest.mark.parametrize("quantum", [1e-7, 2.5e-6, 5e-6, 1e-5, 2e-5])
+def test_equal_samples_of_a_coarse_converter_are_no_rail(
+    write: Write, sound_runs: Runs, quantum: float
+) -> None:
+    def coarse(strain: FloatArray) -> None:
+        strain += 3e-6 * np.random.default_rng(5).standard_normal(strain.shape)
+        np.round(strain / quantum, out=strain)
+        strain *= quantum
+
+    assert check_campaign(write(changed(sound_runs, 9, with_strain(coarse)))) == []
+
+
 def test_saturation_says_rail_value_and_length(write: Write, sound_runs: Runs) -> None:
     text = the_one(check_campaign(write(changed(sound_runs, 9, with_strain(clip)))))
     says(text, "saturated: flat maximum at", "samples on end", "equal samples on end are normal")

@@ -1,0 +1,275 @@
+"""Laws of cutting turns: frames do not matter, faults are flagged, nothing is repaired silently."""
+
+import tracemalloc
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.synthetic import LATERAL, RATE, frames, record
+from tirelib.errors import ParameterError, ShapeError
+from tirelib.flags import TurnFlag
+from tirelib.signal import LowPass, Turn, TurnCutter, Turns, cut_turns
+
+
+def turns_of(strain: np.ndarray, **options: object) -> Turns:
+    return cut_turns(strain, RATE, LATERAL, **{"speed": 18.0, **options})  # type: ignore[arg-type]
+
+
+def has(turns: Turns, flag: TurnFlag, turn: int, gage: int | None = None) -> bool:
+    flags = turns.flags[turn] if gage is None else turns.gage_flags[turn, gage]
+    return bool(flags & flag)
+
+
+def middle_of(turns: Turns, turn: int) -> int:
+    return int(turns.time[turn] * RATE)
+
+
+def assert_same(a: Turn, b: Turn) -> None:
+    for field in fields(Turn):
+        np.testing.assert_allclose(
+            getattr(a, field.name), getattr(b, field.name), rtol=1e-9, atol=1e-12
+        )
+
+
+@settings(max_examples=15)
+@given(
+    start=st.floats(-3.0, 3.0),
+    longest=st.sampled_from([1, 2, 10, 100, 2000]),
+    seed=st.integers(0, 99),
+)
+def test_frames_of_any_length_give_the_same_turns_as_the_whole_record(
+    start: float, longest: int, seed: int
+) -> None:
+    strain, trigger, _ = record(turns=4.3, noise=4e-6, start=start)
+    whole = TurnCutter(LATERAL, RATE).push(strain, speed=18.0, trigger=trigger)
+    cutter, pieces = TurnCutter(LATERAL, RATE), []
+    for part in frames(strain.shape[1], longest, seed):
+        pieces += cutter.push(strain[:, part], speed=18.0, trigger=trigger[part])
+    assert len(pieces) == len(whole) >= 3
+    for piece, turn in zip(pieces, whole, strict=True):
+        assert_same(piece, turn)
+
+
+def test_a_turn_is_ready_twenty_degrees_and_half_the_filter_after_the_pulse() -> None:
+    strain, _, omega = record(turns=4)
+    cutter = TurnCutter(LATERAL, RATE)
+    given_at = [
+        i for i in range(strain.shape[1]) if cutter.push(strain[:, i : i + 1], speed=18.0)
+    ]
+    turns = turns_of(strain)
+    for turn in range(1, len(turns)):
+        fall = turns.time[turn] * RATE + turns.trace.pulse[turn] / omega * RATE
+        reach = np.deg2rad(20.0) + 4 * LowPass().sigma(omega / (2 * np.pi))
+        assert 0 < given_at[turn] - fall <= reach / omega * RATE + 2
+
+
+def test_offset_of_every_gage_is_removed_and_reported() -> None:
+    strain, _, _ = record(noise=0.0)
+    offsets = np.array([1e-3, -2e-3, 0.0, 4e-3, 3e-4])
+    moved = turns_of(strain + offsets[:, None])
+    plain = turns_of(strain)
+    np.testing.assert_allclose(moved.trace.strain[1:], plain.trace.strain[1:], atol=1e-12)
+    np.testing.assert_allclose((moved.offset - plain.offset)[1:], np.tile(offsets, (4, 1)))
+
+
+@given(gain=st.floats(0.5, 1.8))
+@settings(max_examples=10)
+def test_strain_scales_with_the_gain(gain: float) -> None:
+    strain, _, _ = record(turns=3)
+    a, b = turns_of(strain), turns_of(gain * strain)
+    np.testing.assert_allclose(b.trace.strain[1:], gain * a.trace.strain[1:], atol=1e-9)
+
+
+def test_angle_domain_is_the_same_at_any_speed() -> None:
+    slow, _, _ = record(turns=3, speed=3.0)
+    fast, _, _ = record(turns=3, speed=40.0)
+    a, b = turns_of(slow, speed=3.0), turns_of(fast, speed=40.0)
+    # the pulse's flanks are crossed between samples: 2e-5 of 8e-3 at 40 m/s
+    np.testing.assert_allclose(a.trace.strain[1], b.trace.strain[1], atol=3e-5)
+    np.testing.assert_allclose(a.trace.rate[1], b.trace.rate[1], atol=3e-3)
+
+
+def test_turn_rate_is_that_of_the_preceding_turn() -> None:
+    strain, _, omega = record()
+    turns = turns_of(strain)
+    # crossings are interpolated linearly between samples: 0.02 of 1064
+    np.testing.assert_allclose(turns.trace.conditions.omega[1:], omega, rtol=2e-5)
+    assert np.isnan(turns.trace.conditions.omega[0])
+
+
+def test_the_first_turn_is_flagged_and_says_nothing() -> None:
+    strain, _, _ = record()
+    turns = turns_of(strain)
+    assert has(turns, TurnFlag.FIRST_TURN, 0)
+    assert np.isnan(turns.trace.strain[0]).all()
+    assert (turns.flags[1:] == 0).all()
+
+
+def test_the_trigger_gives_the_angle_from_the_wheel_axis() -> None:
+    strain, trigger, _ = record()
+    shifted = np.roll(trigger, -12)
+    step = 18.0 / 0.305 / RATE
+    plain, early = turns_of(strain, trigger=trigger), turns_of(strain, trigger=shifted)
+    np.testing.assert_allclose(plain.trace.axis_shift[1:], 0.0, atol=0.51 * step)
+    moved = early.trace.axis_shift[1:] - plain.trace.axis_shift[1:]
+    np.testing.assert_allclose(moved, 12 * step, rtol=2e-5)
+
+
+@pytest.mark.parametrize("fault", ["none", "twice"])
+def test_a_trigger_that_disagrees_is_flagged(fault: str) -> None:
+    strain, trigger, _ = record()
+    on = np.flatnonzero(trigger)
+    trigger = trigger.copy()
+    if fault == "none":
+        trigger[on[2]] = False
+    else:
+        trigger[on[2] + 50] = True
+    turns = turns_of(strain, trigger=trigger)
+    wrong = [has(turns, TurnFlag.TRIGGER_MISMATCH, turn) for turn in range(len(turns))]
+    assert wrong.count(True) == 1
+
+
+def test_two_missing_samples_are_bridged_and_flagged() -> None:
+    strain, _, _ = record()
+    clean = turns_of(strain)
+    at = middle_of(clean, 2) + 20
+    holed = strain.copy()
+    holed[1, at : at + 2] = np.nan
+    turns = turns_of(holed)
+    assert has(turns, TurnFlag.BRIDGED, 2, 1)
+    assert not has(turns, TurnFlag.GAP, 2, 1)
+    np.testing.assert_allclose(turns.trace.strain[2, 1], clean.trace.strain[2, 1], atol=1e-4)
+    assert turns.gage_flags[2, [0, 2, 3, 4]].tolist() == [0, 0, 0, 0]
+
+
+@pytest.mark.parametrize("length", [3, 30])
+def test_a_longer_gap_makes_the_gage_say_nothing(length: int) -> None:
+    strain, _, _ = record()
+    at = middle_of(turns_of(strain), 2) + 20
+    holed = strain.copy()
+    holed[1, at : at + length] = np.nan
+    turns = turns_of(holed)
+    assert has(turns, TurnFlag.GAP, 2, 1)
+    assert has(turns, TurnFlag.REDUCED_GAGES, 2)
+    assert np.isnan(turns.trace.strain[2, 1]).all()
+    assert np.isfinite(turns.trace.strain[2, 0]).any()
+
+
+def test_a_gap_in_the_centre_gage_forbids_an_estimate() -> None:
+    strain, _, _ = record()
+    at = middle_of(turns_of(strain), 2)
+    holed = strain.copy()
+    holed[2, at - 5 : at + 5] = np.nan
+    assert has(turns_of(holed), TurnFlag.TOO_FEW_GAGES, 2)
+
+
+def test_a_lost_frame_of_all_gages_forbids_an_estimate() -> None:
+    strain, _, _ = record()
+    at = middle_of(turns_of(strain), 2)
+    holed = strain.copy()
+    holed[:, at - 60 : at - 44] = np.nan
+    assert has(turns_of(holed), TurnFlag.TOO_FEW_GAGES, 2)
+
+
+@pytest.mark.parametrize("size", [0.004, -0.004, 0.02])
+def test_a_spike_is_flagged_and_does_not_bend_the_trace(size: float) -> None:
+    strain, _, _ = record(noise=4e-6)
+    clean = turns_of(strain)
+    spiked = strain.copy()
+    spiked[3, middle_of(clean, 2) - 10] += size
+    turns = turns_of(spiked)
+    assert has(turns, TurnFlag.SPIKE, 2, 3)
+    assert not has(turns, TurnFlag.SPIKE, 1, 3)
+    np.testing.assert_allclose(turns.trace.strain[2, 3], clean.trace.strain[2, 3], atol=3e-5)
+
+
+def test_a_clipped_gage_is_flagged_saturated() -> None:
+    strain, _, _ = record(noise=4e-6)
+    clipped = strain.copy()
+    clipped[0] = np.minimum(clipped[0], 0.0075)
+    turns = turns_of(clipped)
+    assert all(has(turns, TurnFlag.SATURATED, turn, 0) for turn in range(1, len(turns)))
+    assert not any(has(turns, TurnFlag.SATURATED, turn, 1) for turn in range(len(turns)))
+
+
+def test_a_flat_quantised_plateau_is_not_saturated() -> None:
+    strain, _, _ = record(noise=0.0, speed=3.0, half=0.3)
+    coarse = np.round(strain / 2.44e-6) * 2.44e-6
+    turns = turns_of(coarse, speed=3.0)
+    assert not (turns.gage_flags & int(TurnFlag.SATURATED)).any()
+
+
+@pytest.mark.parametrize("level", [0.0, 2.7e-3, -1.0])
+def test_a_dead_gage_is_flagged(level: float) -> None:
+    strain, _, _ = record(noise=4e-6)
+    dead = strain.copy()
+    dead[4] = level
+    turns = turns_of(dead)
+    assert all(has(turns, TurnFlag.DEAD_GAGE, turn, 4) for turn in range(1, len(turns)))
+    assert all(has(turns, TurnFlag.REDUCED_GAGES, turn) for turn in range(1, len(turns)))
+
+
+def test_drift_within_a_turn_is_flagged() -> None:
+    strain, _, _ = record()
+    n = strain.shape[1]
+    drifting = strain.copy()
+    drifting[1] += np.linspace(0.0, 6e-3, n)
+    turns = turns_of(drifting)
+    assert has(turns, TurnFlag.DRIFT, 3, 1)
+    assert not has(turns, TurnFlag.DRIFT, 3, 0)
+
+
+def test_an_unsuitable_cut_off_is_flagged() -> None:
+    strain, _, _ = record()
+    turns = turns_of(strain, low_pass=LowPass(cut_off=40.0))
+    assert has(turns, TurnFlag.CUT_OFF, 2)
+
+
+@pytest.mark.parametrize(
+    ("speed", "flag"), [(np.nan, TurnFlag.NO_SPEED), (0.0, TurnFlag.NO_SPEED),
+                        (-18.0, TurnFlag.REVERSED)],
+)  # fmt: skip
+def test_a_speed_that_says_nothing_is_flagged(speed: float, flag: TurnFlag) -> None:
+    strain, _, _ = record()
+    assert has(turns_of(strain, speed=speed), flag, 2)
+
+
+def test_half_the_period_is_flagged() -> None:
+    slow, _, _ = record(turns=3, speed=8.0)
+    fast, _, _ = record(turns=3, speed=30.0)
+    turns = turns_of(np.concatenate((slow, fast), axis=1))
+    assert any(has(turns, TurnFlag.PERIOD_JUMP, turn) for turn in range(len(turns)))
+
+
+def test_conditions_are_the_mean_of_what_was_held_over_the_turn() -> None:
+    strain, _, _ = record()
+    n = strain.shape[1]
+    pressure = np.where(np.arange(n) < n // 2, 2.0e5, 2.4e5)
+    turns = turns_of(strain, pressure=pressure)
+    assert turns.trace.conditions.pressure[1] == pytest.approx(2.0e5)
+    assert turns.trace.conditions.pressure[-1] == pytest.approx(2.4e5)
+
+
+def test_memory_does_not_grow() -> None:
+    strain, _, _ = record(turns=5)
+    cutter = TurnCutter(LATERAL, RATE)
+    for _ in range(3):
+        cutter.push(strain)
+    tracemalloc.start()
+    before = tracemalloc.get_traced_memory()[0]
+    for _ in range(40):
+        for part in frames(strain.shape[1], 20, 0):
+            cutter.push(strain[:, part])
+    grown = tracemalloc.get_traced_memory()[0] - before
+    tracemalloc.stop()
+    assert grown < 50_000
+
+
+def test_wrong_shapes_and_rates_are_refused() -> None:
+    with pytest.raises(ShapeError, match=r"strain has shape \(4, 10\); \(5, n\) is needed"):
+        TurnCutter(LATERAL, RATE).push(np.zeros((4, 10)))
+    with pytest.raises(ParameterError, match="must be above 0"):
+        TurnCutter(LATERAL, 0.0)
