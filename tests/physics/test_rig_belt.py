@@ -61,6 +61,24 @@ def test_rigid_motion_strains_nothing(turn: float, x: float, zeta: float, sidewa
     assert np.abs(belt_work(z)).max() < 1e-5
 
 
+@given(turn=st.floats(-1.5, 1.5), seed=st.integers(0, 1000))
+def test_a_turn_of_the_deformed_belt_changes_no_couple(turn: float, seed: int) -> None:
+    radius = TIRE.ring_radius
+    z = 0.005 * np.random.default_rng(seed).standard_normal((4, SIZE))
+    turned, cos, sin = z.copy(), np.cos(turn), np.sin(turn)
+    out, along = radius + z[:, U], z[:, V]
+    turned[:, U], turned[:, V] = out * cos - along * sin - radius, out * sin + along * cos
+    a, b = z[:, FIELDS + U] - along, out + z[:, FIELDS + V]
+    turned[:, FIELDS + U] = a * cos - b * sin + turned[:, V]
+    turned[:, FIELDS + V] = a * sin + b * cos - radius - turned[:, U]
+    turned[:, PSI] += turn
+    couples = np.concatenate([PSI, FIELDS + PSI, [FIELDS + LATERAL]])
+    before = belt_work(z)[:, couples]
+    np.testing.assert_allclose(
+        belt_work(turned)[:, couples], before, atol=1e-9 * np.abs(before).max()
+    )
+
+
 @pytest.mark.parametrize("pressure", [1e5, 2.3e5, 3e5])
 @pytest.mark.parametrize("omega", [0.0, 60.0, 140.0])
 def test_inflated_spinning_belt_is_the_analytical_ring(pressure: float, omega: float) -> None:

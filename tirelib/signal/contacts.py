@@ -78,6 +78,7 @@ class ContactFinder:
 
     def _restart(self) -> None:
         self._level: float | None = None  # None: start-up
+        self._armed = True  # the strain has been below the lower level since the last pulse
         self._low_level = np.nan
         self._swing = np.nan
         self._lowest, self._highest = np.inf, -np.inf
@@ -140,7 +141,8 @@ class ContactFinder:
             below = ~known | (y < lows + FALL * swing)
         else:
             above, below = y > self._level, y < self._low_level
-        event = below if self._pulse is not None else above
+        arming = self._pulse is None and not self._armed
+        event = below if self._pulse is not None or arming else above
         first = int(np.argmax(event)) if event.any() else -1
         taken = y if first < 0 else y[: first + 1]
         taken = taken[: self._room()]
@@ -149,11 +151,13 @@ class ContactFinder:
         self._highest = max(self._highest, float(taken.max()))
         if self._pulse is not None:
             self._pulse.append(taken)
+        elif first >= 0 and not expired and arming:
+            self._armed = True
         elif first >= 0 and not expired:
             before = float(taken[-2]) if taken.size > 1 else self._before
             self._pulse = [np.array([before, taken[-1]])]
             self._pulse_start = self._count + taken.size - 2
-        ended = event is below and first >= 0 and not expired
+        ended = event is below and first >= 0 and not expired and not arming
         self._count += taken.size
         self._before = float(taken[-1])
         if expired:
@@ -176,6 +180,7 @@ class ContactFinder:
         if first > 0:
             return y[:first]
         self._level, self._last_middle, self._last_period = None, None, None
+        self._armed = True
         return y
 
     def _room(self) -> int:
@@ -204,6 +209,7 @@ class ContactFinder:
         self._level = own_level
         self._low_level = self._lowest + FALL * swing
         self._swing = swing
+        self._armed = False  # the new levels may lie below the strain just reached
         self._lowest = self._highest = self._before
         rise = i - 1 + (level - pulse[i - 1]) / (pulse[i] - pulse[i - 1])
         fall = j + (pulse[j] - level) / (pulse[j] - pulse[j + 1])

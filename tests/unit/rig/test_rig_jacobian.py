@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.rig.belt import FIELDS, U
+from bench.rig.belt import FIELDS, PSI, U
 from bench.rig.mesh import mesh
 from bench.rig.system import Balance, balance
 from bench.rig.tire import Condition, RigTire
@@ -26,6 +26,7 @@ def test_jacobian_is_the_derivative_of_the_residual(slip_angle: float) -> None:
     cond = Condition(4000.0, 2.3e5, 18.0, slip_angle=slip_angle, camber=0.03)
     rng = np.random.default_rng(0)
     control = 1e-3 * rng.standard_normal((grid.n, FIELDS))
+    control[:, PSI] += 0.3 * np.sin(3.0 * grid.knots[:-1, None] + np.arange(5))
     control[:, U] -= 0.02 * np.exp(-((grid.knots[:-1, None] / 0.25) ** 2))
     belt = grid.n * FIELDS
     point = np.concatenate([control.ravel(), [tire.free_radius - 0.02, 0.309]])

@@ -112,3 +112,18 @@ def test_load_may_grow_and_fall_from_turn_to_turn() -> None:
     found = ContactFinder(int(3 * RATE)).push(scale * waveform(phi))
     assert np.diff(middles(found)) == pytest.approx(1000.0, abs=1.0)
     assert len(found) == 9
+
+
+@given(
+    start=st.floats(-np.pi, np.pi),
+    imbalance=st.floats(-2e-3, 2e-3),
+    seed=st.integers(0, 50),
+)
+def test_levels_that_move_make_no_contact_of_their_own(
+    start: float, imbalance: float, seed: int
+) -> None:
+    """A record may start where the extremes of the first turn are not yet seen."""
+    strain, _, omega = record(start=start, imbalance=imbalance, noise=8e-6, seed=seed)
+    found = ContactFinder(int(3 * RATE)).push(strain[2])
+    assert [contact.fresh for contact in found] == [True] + [False] * (len(found) - 1)
+    assert np.diff(middles(found)) == pytest.approx(2 * np.pi / omega * RATE, rel=1e-3)

@@ -1,0 +1,54 @@
+"""Observations of a made-up tire, made once."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.synthetic import cornering_runs, synthetic_run, write
+from tirelib.campaign import Campaign, read_campaign
+from tirelib.estimators.train import Trained, train
+from tirelib.observations import Observations, observe
+
+
+@pytest.fixture(scope="session")
+def cornering(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    return read_campaign(write(tmp_path_factory.mktemp("c") / "set1", cornering_runs()))
+
+
+@pytest.fixture(scope="session")
+def another_day(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    return read_campaign(write(tmp_path_factory.mktemp("c") / "day2", cornering_runs(seed=7)))
+
+
+@pytest.fixture(scope="session")
+def pressures(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    runs = [
+        synthetic_run(i, load=load, pressure=pressure, kind="free")
+        for i, (load, pressure) in enumerate(
+            (load, pressure) for load in (2500.0, 4500.0, 6500.0)
+            for pressure in (1.7e5, 2.0e5, 2.3e5, 2.6e5)
+        )
+    ]  # fmt: skip
+    return read_campaign(write(tmp_path_factory.mktemp("c") / "pressures", runs))
+
+
+@pytest.fixture(scope="session")
+def braking(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    slips = np.array([-0.3, -0.1, -0.05, -0.02, 0.0, 0.02, 0.05, 0.1, 0.3])
+    runs = [
+        synthetic_run(i, load=4500.0, slip_ratio=float(k),
+                      kind="free" if k == 0 else "brake" if k < 0 else "drive")
+        for i, k in enumerate(slips)
+    ]  # fmt: skip
+    return read_campaign(write(tmp_path_factory.mktemp("c") / "braking", runs))
+
+
+@pytest.fixture(scope="session")
+def observed(cornering: Campaign) -> Observations:
+    return observe([cornering])
+
+
+@pytest.fixture(scope="session")
+def trained(observed: Observations) -> Trained:
+    return train(observed)
