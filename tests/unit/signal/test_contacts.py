@@ -15,9 +15,9 @@ def middles(contacts: list[Contact]) -> list[float]:
 
 @given(
     speed=st.floats(2.0, 50.0),
-    half=st.floats(0.05, 0.35),
+    half=st.floats(0.08, 0.35),
     tension=st.floats(4e-3, 1.2e-2),
-    dip=st.floats(0.0, 1.4),
+    dip=st.floats(0.0, 1.0),
     start=st.floats(-np.pi, np.pi),
 )
 def test_every_contact_is_found_once_at_its_middle(
