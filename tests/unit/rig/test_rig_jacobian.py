@@ -38,14 +38,24 @@ def test_jacobian_is_the_derivative_of_the_residual(slip_angle: float) -> None:
     base = balance(tire, cond, grid, control, point[-2], point[-1], None)
     assert base.road.shear.sliding.any()
     jacobian = condensed(base, belt)
-    columns = [*rng.choice(belt, 40, replace=False), belt, belt + 1]
-    errors = []
+    near = np.flatnonzero(np.repeat(np.abs(grid.knots[:-1]) < 0.15, FIELDS))
+    chosen = np.union1d(rng.choice(belt, 20, replace=False), rng.choice(near, 40, replace=False))
+    columns = [*chosen, belt, belt + 1]
+    errors, wheel = [], []
     for column in columns:
         step = np.zeros(len(point))
         step[column] = 1e-7
         numeric = (residual(point + step) - residual(point - step)) / 2e-7
         error = np.abs(numeric - jacobian[:, column]).max() / np.abs(numeric).max()
         errors.append(error)
+        wheel.append(numeric[-2:] - jacobian[-2:, column])
     # a difference may straddle the moment when a bristle begins to touch or to slide
     assert np.median(errors) < 1e-6
     assert np.sort(errors)[-3] < 1e-4
+    # load and torque have their own scale; only coefficients in the contact move them
+    exact = np.abs(jacobian[-2:, columns[:-2]]).T
+    moves = exact > 0.01 * exact.max(axis=0)
+    assert moves.sum(axis=0).min() >= 5
+    relative = np.abs(np.array(wheel)[:-2])[moves] / exact[moves]
+    assert np.median(relative) < 1e-5
+    assert np.quantile(relative, 0.8) < 1e-3
