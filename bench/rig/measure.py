@@ -100,8 +100,12 @@ def settle(nominal: Condition, chain: Chain, seed: int, run: int) -> Condition:
 
 
 def slip_ratio(state: State) -> float:
-    """Return kappa = (Omega R_e - v_x) / v_x of a state."""
-    return state.free_radius / state.rolling_radius - 1.0
+    """Return kappa = (Omega R_e - v) / v of a state, v the travel speed.
+
+    A wheel that rolls freely at a slip angle alpha turns at v cos(alpha) / R_e, so it reads
+    cos(alpha) - 1: -0.004 at 5 deg.
+    """
+    return state.omega * state.free_radius / state.condition.speed - 1.0
 
 
 def record(

@@ -12,7 +12,7 @@ from tirelib.errors import ParameterError, TirelibError
 
 TOLERANCE = 1e-9
 """Largest Newton step of a solved state: metres and radians."""
-MAX_STEPS = 40
+MAX_STEPS = 25
 REUSE = 0.03
 """The factors are kept where a step with them cut the residual to this share."""
 FIRST_DEFLECTIONS = (0.002, 0.01)
@@ -36,7 +36,8 @@ class State:
     rolling_radius : float
         V_x / Omega [m].
     free_radius : float
-        R_e: the rolling radius of the freely rolling wheel at this load, pressure and speed [m].
+        R_e: the rolling radius of the upright, straight, freely rolling wheel at this load,
+        pressure and speed [m].
     by_load : array, shape (n, 16)
         Derivative of `control` with the load at constant rolling condition [1/N].
     stiffness : float
@@ -44,7 +45,7 @@ class State:
     steps : int
         Newton steps taken.
     straight : State or None
-        For a driven or braked state, the freely rolling one that defines R_e.
+        The straight, freely rolling state that defines R_e, where this is another.
     """
 
     tire: RigTire
@@ -107,9 +108,13 @@ def solve(
     free = replace(cond, slip_ratio=None)
     if start is None or start.grid is not grid:
         start = _from_unloaded(tire, free, grid)
-    if cond.slip_ratio is None:
-        return _approach(tire, free, start.straight or start)
     rolling = replace(free, slip_angle=0.0, camber=0.0)
+    if cond.slip_ratio is None:
+        state = _approach(tire, free, start.straight or start)
+        if free == rolling:
+            return state
+        upright = _approach(tire, rolling, start.straight or start)
+        return replace(state, free_radius=upright.rolling_radius, straight=upright)
     straight = _approach(tire, rolling, start.straight or start)
     radius = straight.rolling_radius
     if start.straight is not None:
@@ -159,7 +164,7 @@ def _approach(
     try:
         return _newton(tire, cond, start, free_radius)
     except SolverError:
-        return _halve(tire, cond, start, free_radius, 5)
+        return _halve(tire, cond, start, free_radius, 4)
 
 
 def _halve(

@@ -1,16 +1,13 @@
 """``tirelib rig``: measure a virtual tire on the numerical flat-belt rig."""
 
-import json
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+
+from tirelib.cli.common import output, progress_bar, write_json
 
 if TYPE_CHECKING:
     from bench.rig.campaign import Truth
@@ -25,23 +22,6 @@ Example:
 The folder is a campaign (campaign.toml, runs.csv, runs/*.mf4). truth.csv in it holds
 the noise-free forces, slip, contact lengths and edges of each run, in SI and ISO signs.
 """
-
-
-@contextmanager
-def _progress() -> Iterator[Any]:
-    """Yield a callback (done, total) that draws a bar on stderr when that is a terminal."""
-    console = Console(stderr=True)
-    with Progress(
-        TextColumn("rig"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    ) as progress:
-        task = progress.add_task("rig", total=None)
-        yield lambda done, total: progress.update(task, completed=done, total=total)
 
 
 @click.command(epilog=_EXAMPLE)
@@ -80,12 +60,14 @@ def rig(
     if plan_name is None or out is None:
         raise click.UsageError("--plan and --out are needed; --list shows the plans")
     from bench.rig.campaign import run_plan
-    from bench.rig.plans import plan
+    from bench.rig.plans import plan, with_repeats
     from bench.rig.tire import tire
 
-    with _progress() as progress:
+    chosen = plan(plan_name)
+    count = len(with_repeats(chosen, chosen.repeats if repeats is None else repeats))
+    with progress_bar(f"rig {plan_name}", count) as advance:
         truths = run_plan(
-            plan(plan_name),
+            chosen,
             tire(tire_name),
             out,
             seed=seed,
@@ -93,11 +75,11 @@ def rig(
             jobs=jobs,
             axes=axes,
             overwrite=force,
-            progress=progress,
+            progress=lambda done, total: advance(f"run {done} of {total}"),
         )
     click.echo(f"{len(truths)} runs of {plan_name} in {out} (axes {axes}, seed {seed})")
     if json_file is not None:
-        _write_json(json_file, _document(plan_name, out, seed, tire_name, axes, truths))
+        write_json(json_file, _document(plan_name, out, seed, tire_name, axes, truths))
 
 
 def _list(json_file: Path | None) -> None:
@@ -111,11 +93,11 @@ def _list(json_file: Path | None) -> None:
         count = len(with_repeats(p, p.repeats))
         table.add_row(p.name, str(count), p.about)
         rows.append({"plan": p.name, "runs": count, "about": p.about})
-    console = Console(highlight=False, soft_wrap=True)
+    console = output()
     console.print(table)
     console.print(f"tires: {', '.join(TIRES)}")
     if json_file is not None:
-        _write_json(json_file, {"format": RIG_FORMAT, "plans": rows, "tires": list(TIRES)})
+        write_json(json_file, {"format": RIG_FORMAT, "plans": rows, "tires": list(TIRES)})
 
 
 def _document(
@@ -133,8 +115,3 @@ def _document(
         "Fy_N": [min(t.force.fy for t in truths), max(t.force.fy for t in truths)],
         "Fx_N": [min(t.force.fx for t in truths), max(t.force.fx for t in truths)],
     }
-
-
-def _write_json(file: Path, document: dict[str, Any]) -> None:
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")

@@ -232,8 +232,13 @@ def test_what_was_not_varied_is_not_calibrated_and_says_why(braking: Campaign) -
 
 def test_sweeps_count_turn_by_turn(tmp_path: Path) -> None:
     runs = [replace(run, plan=replace(run.plan, kind="sweep")) for run in cornering_runs()[:10]]
+    ramp = np.linspace(1000.0, 3000.0, runs[3].rig["Fz"].size)
+    runs[3] = replace(runs[3], rig={**runs[3].rig, "Fz": ramp})
     swept = observe([read_campaign(write(tmp_path / "sweep", runs))])
     assert swept.sweep.all()
     assert np.unique(swept.unit).size == len(swept)
-    steady = swept.usable & (swept.run == 3)
+    steady, rising = (swept.usable & (swept.run == run) for run in (2, 3))
     np.testing.assert_allclose(swept.truth["Fz"][steady], 1500.0, atol=60.0)
+    turn = swept.features.time[rising] - 0.5 * swept.features.period[rising]
+    expected = 1000.0 + 2000.0 * turn / (ramp.size / 100.0)
+    np.testing.assert_allclose(swept.truth["Fz"][rising], expected, atol=60.0)

@@ -97,6 +97,22 @@ def test_integral_over_the_contact_converges_to_the_exact_one() -> None:
     assert (found.e_vertical[1:] < exact).all()
 
 
+def test_integrals_of_polynomials_are_exact() -> None:
+    """A constant and a straight line, between edges that lie off the grid."""
+    strain, _, _ = record(turns=3)
+    turns = cut_turns(strain, RATE, LATERAL)
+    phi = turns.trace.phi
+    flat = extract_features(turns)
+    turns.trace.strain[:] = 2.0 + 3.0 * phi
+    found = extract_features(turns)
+    length, middle = flat.contact_angle[1:], 0.5 * (flat.lead + flat.trail)[1:]
+    level = 2.0 + 3.0 * middle
+    np.testing.assert_allclose(found.e_vertical[1:], level * length, rtol=1e-9)
+    # odd part 3 xi: its integral over half the contact is 3 l^2 / 8; Eq. (12) times l
+    np.testing.assert_allclose(found.e_friction[1:], length * 3.0 * length**2 / 8.0, rtol=1e-3)
+    np.testing.assert_allclose(found.skew[1:], 3.0 * length**2 / 12.0 / level, rtol=1e-3)
+
+
 def test_many_turns_at_once_equal_each_turn_alone() -> None:
     strain, trigger, _ = record(turns=6, noise=4e-6)
     whole = extract_features(cut_turns(strain, RATE, LATERAL, trigger=trigger))

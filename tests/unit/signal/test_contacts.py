@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.synthetic import RATE, frames, record, waveform
+from tests.synthetic import RATE, frames, record, synthetic_run, waveform
 from tirelib.signal import Contact, ContactFinder
 
 
@@ -34,7 +34,7 @@ def test_every_contact_is_found_once_at_its_middle(
     # the last one by its end
     assert 3 <= len(found) <= true.size
     error = [np.abs(true - middle).min() for middle in middles(found)]
-    assert max(error) < 0.02 * RATE / omega  # the pulse is symmetric: its middle is phi = 0
+    assert max(error) < 0.1  # the pulse is symmetric: its middle is phi = 0
     assert np.diff(middles(found)) == pytest.approx(2 * np.pi / omega * RATE, rel=1e-4)
     assert [contact.fresh for contact in found] == [True] + [False] * (len(found) - 1)
 
@@ -127,3 +127,11 @@ def test_levels_that_move_make_no_contact_of_their_own(
     found = ContactFinder(int(3 * RATE)).push(strain[2])
     assert [contact.fresh for contact in found] == [True] + [False] * (len(found) - 1)
     assert np.diff(middles(found)) == pytest.approx(2 * np.pi / omega * RATE, rel=1e-3)
+
+
+def test_a_new_level_below_the_strain_just_reached_starts_no_pulse() -> None:
+    """The first turn's extremes were not all seen, so the second sets a lower level."""
+    run = synthetic_run(0, slip_ratio=-0.3)
+    assert run.strain is not None
+    found = ContactFinder(int(3 * RATE)).push(run.strain[2])
+    assert [contact.fresh for contact in found] == [True, False, False, False]

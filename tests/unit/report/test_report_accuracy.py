@@ -1,0 +1,91 @@
+"""Laws of the accuracy table, the levels and the study of the cut-off."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.unit.report.conftest import World
+from tirelib.report.accuracy import Compared, accuracies, accuracy, compare
+from tirelib.report.cutoff_study import nearest_runs, study_cut_off
+from tirelib.report.levels import camber_levels, find_levels, load_levels, reference_level
+from tirelib.signal.lowpass import DEFAULT_ORDER
+
+
+def made(error: np.ndarray, std: float = 1.0, turns_per_run: int = 4) -> Compared:
+    unit = np.repeat(np.arange(error.size // turns_per_run), turns_per_run)
+    truth = 1000.0 + 100.0 * unit.astype(np.float64)
+    return Compared("Fz", truth, truth + error, np.full(error.size, std), truth, unit, error.size)
+
+
+def test_a_perfect_estimate_has_no_error_and_full_determination() -> None:
+    row = accuracy(made(np.zeros(40)))
+    assert (row.rmse, row.r2, row.coverage, row.runs, row.turns) == (0.0, 1.0, 1.0, 10, 40)
+
+
+def test_errors_that_cancel_within_a_run_do_not_count() -> None:
+    row = accuracy(made(np.tile([3.0, -3.0, 5.0, -5.0], 10), std=2.0))
+    assert row.rmse == pytest.approx(0.0, abs=1e-9)
+    assert row.coverage == pytest.approx(0.5)  # 3 lies within 1.96 times 2, 5 does not
+
+
+def test_the_coverage_of_honest_intervals_is_95_percent() -> None:
+    error = np.random.default_rng(1).standard_normal(40000)
+    assert accuracy(made(error)).coverage == pytest.approx(0.95, abs=0.004)  # 3.7 sigma of 40000
+
+
+def test_a_constant_error_is_a_share_of_the_range() -> None:
+    row = accuracy(made(np.full(40, 9.0)))
+    assert row.rmse == pytest.approx(9.0)
+    assert row.percent_of_range == pytest.approx(1.0)  # the range is 900
+
+
+def test_a_quantity_that_was_not_varied_has_no_share_of_its_range(world: World) -> None:
+    rows = {r.quantity: r for r in accuracies(world.observations["set1"], world.estimates["set1"])}
+    assert np.isnan(rows["kappa"].r2)
+    assert np.isnan(rows["kappa"].percent_of_range)
+    assert rows["Fz"].r2 > 0.99
+
+
+def test_invalid_turns_are_left_out(world: World) -> None:
+    observations, estimates = world.observations["set1"], world.estimates["set1"]
+    none = {q: np.zeros_like(v) for q, v in estimates.valid.items()}
+    assert accuracies(observations, replace(estimates, valid=none)) == []
+    compared = compare(observations, estimates, "alpha")
+    assert np.isfinite(compared.measured).all()
+    assert np.abs(compared.measured).max() < 6.0  # degrees
+
+
+def test_levels_part_at_gaps_and_hold_every_known_value() -> None:
+    values = np.array([1200.0, 3010.0, 1190.0, 2990.0, np.nan, 4800.0])
+    levels = load_levels(values)
+    assert [level.text for level in levels] == ["1200 N", "3000 N", "4800 N"]
+    assert (sum(level.rows for level in levels) == np.isfinite(values)).all()
+    assert reference_level(levels).text == "3000 N"
+    assert find_levels(np.array([np.nan]), 1.0, "{}") == []
+    assert [x.text for x in camber_levels(np.array([-4.0, 0.0, 4.01]))] == [
+        "camber -4 deg",
+        "camber 0 deg",
+        "camber +4 deg",
+    ]
+
+
+def test_runs_for_the_cut_off_are_at_one_load(world: World) -> None:
+    plans = nearest_runs(world.campaigns["set3"])
+    assert [round(3.6 * plan.speed) for plan in plans] == [10, 65, 150]
+    assert {plan.load for plan in plans} == {4500.0}
+
+
+def test_the_shift_depends_on_the_order_and_not_on_the_speed(world: World) -> None:
+    campaign = world.campaigns["set3"]
+    study = study_cut_off(campaign, nearest_runs(campaign))
+    near = int(np.argmin(np.abs(study.order - DEFAULT_ORDER)))
+    assert np.abs(study.cp1_shift[:, near]).max() < 1.5e-4  # the nearest order is not the default
+    low = study.order < 20.0
+    # the made-up tire is the same at every speed; the noise is 20 microstrain
+    assert np.ptp(study.cp1_shift[:, low], axis=0).max() < 6e-5
+    assert np.ptp(study.fixed_cp1_shift) > 1e-4
+    above_nyquist = np.isnan(study.angle_scatter[:, -1])
+    assert above_nyquist.tolist() == [False, False, True]
+    last = np.where(above_nyquist, study.angle_scatter[:, -3], study.angle_scatter[:, -1])
+    assert (last > study.angle_scatter[:, near]).all()

@@ -1,0 +1,187 @@
+"""Every figure names its quantities and units, shows finite data, and hides nothing."""
+
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from tests.unit.report.conftest import World
+from tirelib.errors import CalibrationError
+from tirelib.estimators.cornering import CorneringTrend
+from tirelib.report import figures
+from tirelib.report.cutoff_study import nearest_runs, study_cut_off
+from tirelib.report.figures.contact import contact_area
+from tirelib.report.figures.cornering import bend_factor
+from tirelib.report.turns import TypicalTurns, typical_turns
+
+
+def trend(world: World) -> CorneringTrend:
+    assert world.trained.cornering is not None
+    return world.trained.cornering
+
+
+def turns(world: World, name: str, count: int) -> TypicalTurns:
+    campaign = world.campaigns[name]
+    plans = campaign.plans[:count]
+    return typical_turns(campaign, plans, [f"run {plan.run}" for plan in plans])
+
+
+DRAW: dict[str, Callable[[World], Figure]] = {
+    "3_7": lambda w: figures.figure_3_7(turns(w, "set1", 3)),
+    "4_1": lambda w: figures.figure_4_1(turns(w, "set1", 1)),
+    "4_2": lambda w: figures.figure_4_2(w.observations["set1"], w.estimates["set1"]),
+    "4_3": lambda w: figures.figure_4_3(w.trained.means),
+    "4_4": lambda w: figures.figure_4_4(w.trained),
+    "4_5": lambda w: figures.figure_4_5(w.trained),
+    "4_7": lambda w: figures.figure_4_7(w.trained),
+    "4_8": lambda w: figures.figure_4_8(w.observations["set1"], w.estimates["set1"]),
+    "4_12": lambda w: figures.figure_4_12(w.trained),
+    "4_14": lambda w: figures.figure_4_14(w.trained),
+    "4_16": lambda w: figures.figure_4_16(w.trained.means),
+    "4_17": lambda w: figures.figure_4_17(
+        turns(w, "brake_drive", 3), w.observations["brake_drive"], w.calibration.rolling
+    ),
+    "4_18": lambda w: figures.figure_4_18(
+        w.observations["brake_drive"], w.estimates["brake_drive"]
+    ),
+    "4_20": lambda w: figures.figure_4_20(w.trained.means, trend(w)),
+    "4_23": lambda w: figures.figure_4_23(trend(w)),
+    "accuracy": lambda w: figures.figure_accuracy(w.observations["set1"], w.estimates["set1"]),
+    "residuals": lambda w: figures.figure_residuals(w.trained, "alpha"),
+    "cut_off": lambda w: figures.figure_cut_off(
+        study_cut_off(w.campaigns["set3"], nearest_runs(w.campaigns["set3"]))
+    ),
+}
+SIGNLESS = {"3_7", "4_4", "4_23", "cut_off"}
+"""Figures of quantities whose sign does not depend on an axis system."""
+UNIT = re.compile(r"\[[^\]]+\]")
+
+
+@pytest.fixture(scope="module")
+def drawn(world: World) -> dict[str, Figure]:
+    made = {name: draw(world) for name, draw in DRAW.items()}
+    for figure in made.values():
+        figure.draw_without_rendering()
+    return made
+
+
+def with_data(figure: Figure) -> list[Axes]:
+    return [axes for axes in figure.axes if axes.has_data()]
+
+
+def label_of(axes: Axes, which: str) -> str:
+    """An axis' own label, or that of the axes or figure it shares it with."""
+    get = f"get_{which}label"
+    shared = getattr(axes, f"get_shared_{which}_axes")().get_siblings(axes)
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    whole = getattr(figure, f"get_sup{which}label")()
+    return "".join([getattr(axes, get)(), *(getattr(other, get)() for other in shared), whole])
+
+
+@pytest.mark.parametrize("name", DRAW)
+def test_every_axis_names_its_quantity_and_unit(drawn: dict[str, Figure], name: str) -> None:
+    assert with_data(drawn[name])
+    for axes in with_data(drawn[name]):
+        for which in "xy":
+            text = label_of(axes, which)
+            assert UNIT.search(text), f"{which} axis of {axes.get_title(loc='left')!r}: {text!r}"
+
+
+@pytest.mark.parametrize("name", sorted(set(DRAW) - SIGNLESS))
+def test_a_figure_with_signs_names_the_axis_system(drawn: dict[str, Figure], name: str) -> None:
+    texts = [label_of(axes, which) for axes in with_data(drawn[name]) for which in "xy"]
+    assert any("ISO 8855" in text for text in texts)
+
+
+@pytest.mark.parametrize("name", DRAW)
+def test_all_drawn_data_are_finite(drawn: dict[str, Figure], name: str) -> None:
+    points = 0
+    for axes in with_data(drawn[name]):
+        for collection in axes.collections:
+            offsets = np.asarray(collection.get_offsets(), dtype=np.float64)
+            assert np.isfinite(offsets).all()
+            points += len(offsets)
+        for line in axes.lines:
+            known = np.isfinite(np.asarray(line.get_xydata(), dtype=np.float64)).all(axis=1)
+            assert known.any() or line.get_xydata().size == 0  # a trace ends before its grid
+            points += int(known.sum())
+    assert points >= 10
+
+
+@pytest.mark.parametrize("name", DRAW)
+def test_legend_entries_are_distinct_and_stand_clear_of_the_data(
+    drawn: dict[str, Figure], name: str
+) -> None:
+    figure = drawn[name]
+    legends = [*figure.legends, *(a.get_legend() for a in figure.axes if a.get_legend())]
+    assert len(legends) == 1
+    texts = [text.get_text() for text in legends[0].get_texts()]
+    assert all(texts)
+    assert len(set(texts)) == len(texts)
+    frame = legends[0].get_window_extent()
+    for axes in with_data(figure):
+        assert not frame.overlaps(axes.get_window_extent())
+
+
+@pytest.mark.parametrize("name", DRAW)
+def test_nothing_leaves_the_figure_and_titles_do_not_meet(
+    drawn: dict[str, Figure], name: str
+) -> None:
+    figure = drawn[name]
+    renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+    page = figure.bbox.padded(1.0)
+    for legend in figure.legends:
+        box = legend.get_window_extent()
+        assert page.x0 <= box.x0
+        assert box.x1 <= page.x1
+    boxes = []
+    for axes in figure.axes:
+        title = axes._left_title  # type: ignore[attr-defined]
+        if title.get_text():
+            boxes.append(title.get_window_extent(renderer))
+    for i, box in enumerate(boxes):
+        assert page.x0 <= box.x0
+        assert box.x1 <= page.x1, figure.axes[i].get_title(loc="left")
+        for other in boxes[i + 1 :]:
+            assert not box.overlaps(other)
+
+
+def test_figures_do_not_need_pyplot() -> None:
+    code = "import sys, tirelib.report.figures; sys.exit('matplotlib.pyplot' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_drawing_leaves_the_settings_of_the_caller_alone(world: World) -> None:
+    import matplotlib as mpl
+
+    before = {name: mpl.rcParams[name] for name in mpl.rcParams}
+    figures.figure_4_3(world.trained.means)
+    assert {name: mpl.rcParams[name] for name in mpl.rcParams} == before
+
+
+def test_a_figure_without_its_data_says_what_it_needs(world: World) -> None:
+    from dataclasses import replace
+
+    bare = replace(world.trained, regressions=())
+    for draw in (figures.figure_4_4, figures.figure_4_7, figures.figure_4_12, figures.figure_4_14):
+        with pytest.raises(CalibrationError, match="needs"):
+            draw(bare)
+
+
+def test_contact_area_of_a_rectangle_is_length_times_width() -> None:
+    lateral = np.array([60.0, 30.0, 0.0, -30.0, -60.0])
+    assert contact_area(lateral, np.full(5, 100.0)) == pytest.approx(12000.0)
+
+
+def test_bend_factor_is_found_again() -> None:
+    from tirelib.estimators.cornering import magic_formula
+
+    angle = np.linspace(-8.0, 8.0, 17)
+    force = magic_formula(angle, 900.0, 4000.0, -1.5)
+    assert bend_factor(angle, force, 900.0, 4000.0) == pytest.approx(-1.5, abs=1e-3)
