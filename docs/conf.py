@@ -8,4 +8,3 @@ html_theme = "furo"
 html_title = "tirelib"
 exclude_patterns = ["_build"]
 autodoc_typehints = "none"
-mathjax_path = ""

@@ -1,0 +1,141 @@
+"""A recording holds the bytes as they came, and whatever is left of it can be read."""
+
+import math
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+
+from bench.conditions import Conditions, RunMark
+from bench.deadline import Deadline
+from bench.errors import DeviceError, RecordingError
+from bench.links.replay import ReplayLink
+from bench.recording import Recorder, Recording, RecordingHeader
+
+CONDITIONS = Conditions(
+    (0, 10_000, 20_000),
+    ((18.0, 2.3e5, 0.01), (math.nan, 2.3e5, -0.01), (18.1, math.nan, 0.0)),
+    (RunMark(7, 0, 0.25, {"Fz": 3000.0, "alpha": 0.02}),),
+    30_000,
+)
+READS = [b"\0abc", bytes(range(256)), b"x" * 5000]
+
+
+def write(path: Path) -> None:
+    header = RecordingHeader({"port": "p", "wheel": 3}, "format = 'x'", "ab" * 32)
+    with Recorder(path, header, CONDITIONS) as recorder:
+        for number, data in enumerate(READS):
+            recorder.raw(data, 1000 * number)
+
+
+def assert_same(a: Conditions, b: Conditions) -> None:
+    assert (a.t_us, a.loop_us, len(a.runs)) == (b.t_us, b.loop_us, len(b.runs))
+    for x, y in zip(a.values, b.values, strict=True):
+        assert x == pytest.approx(y, rel=1e-15, nan_ok=True)
+    assert a.runs[0].truth == pytest.approx(b.runs[0].truth, rel=1e-15)
+
+
+def test_what_was_recorded_comes_back(tmp_path: Path) -> None:
+    write(tmp_path / "a.mcap")
+    recording = Recording(tmp_path / "a.mcap")
+    assert recording.header.settings == {"port": "p", "wheel": 3}
+    assert recording.header.device == "format = 'x'"
+    assert recording.header.fmu == "ab" * 32
+    assert_same(recording.conditions, CONDITIONS)
+    assert [data for _, data in recording.raw()] == READS
+    assert recording.complete
+
+
+def test_a_replay_gives_the_same_reads_and_then_ends(tmp_path: Path) -> None:
+    write(tmp_path / "a.mcap")
+    link = ReplayLink(tmp_path / "a.mcap")
+    reads = [link.receive(Deadline.never()) for _ in range(4)]
+    assert [read[1] for read in reads[:3] if read] == READS
+    assert reads[3] is None
+    link.close()
+
+
+def test_other_programs_can_read_a_recording(tmp_path: Path) -> None:
+    write(tmp_path / "a.mcap")
+    with (tmp_path / "a.mcap").open("rb") as file:
+        messages = [(c.topic, m.data) for _, c, m in make_reader(file).iter_messages()]
+    assert [data for topic, data in messages if topic == "/serial"] == READS
+    assert messages[0][0] == "/conditions"
+
+
+@pytest.fixture(scope="module")
+def content(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    path = tmp_path_factory.mktemp("recording") / "a.mcap"
+    write(path)
+    return path.read_bytes()
+
+
+@given(share=st.floats(0.0, 1.0), flip=st.integers(-1, 10**6))
+def test_a_recording_cut_or_damaged_anywhere_gives_what_is_left(
+    content: bytes, tmp_path_factory: pytest.TempPathFactory, share: float, flip: int
+) -> None:
+    path = tmp_path_factory.mktemp("cut") / "a.mcap"
+    data = bytearray(content[: int(share * len(content))])
+    if flip >= 0 and data:
+        data[flip % len(data)] ^= 0x55
+    path.write_bytes(data)
+    try:
+        recording = Recording(path)
+    except RecordingError:
+        return  # not even the header is whole
+    reads = [data for _, data in recording.raw()]
+    recording.close()
+    if flip < 0:
+        assert reads == READS[: len(reads)]
+        assert recording.complete == (len(data) == len(content))
+
+
+def test_a_recording_is_never_overwritten(tmp_path: Path) -> None:
+    write(tmp_path / "a.mcap")
+    with pytest.raises(RecordingError, match=r"a.mcap: it exists; a recording is never"):
+        write(tmp_path / "a.mcap")
+
+
+def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.mcap").write_bytes(b"nonsense" * 100)
+    with pytest.raises(RecordingError, match=r"it has no header of a recording"):
+        Recording(tmp_path / "a.mcap")
+    with pytest.raises(RecordingError, match=r"cannot be read"):
+        Recording(tmp_path / "b.mcap")
+
+
+def test_an_unknown_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("bench.recording.FORMAT", "tirebench-recording/9")
+    write(tmp_path / "a.mcap")
+    monkeypatch.undo()
+    with pytest.raises(RecordingError, match=r"'tirebench-recording/9'; 'tirebench-recording/1'"):
+        Recording(tmp_path / "a.mcap")
+
+
+def test_conditions_are_held_and_repeat_in_a_loop() -> None:
+    assert CONDITIONS.at(9_999.0)[0] == 18.0
+    assert math.isnan(CONDITIONS.at(10_000.0)[0])
+    assert CONDITIONS.at(60_000.0 + 25_000.0)[0] == 18.1
+    assert CONDITIONS.run_at(61_000.0) == (CONDITIONS.runs[0], 60_000)
+    later = Conditions((5000, 6000), ((1.0, 2.0, 3.0),) * 2)
+    assert math.isnan(later.at(4000.0)[0])
+    assert later.run_at(7000.0) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{}", "format = None"),
+        ("[]", "format = 'list'"),
+        ("{", "cannot be read"),
+        ('{"format": "tirebench-conditions/1"}', "KeyError 't_us'; t_us, speed"),
+    ],
+)
+def test_a_wrong_sidecar_says_what_is_wrong(tmp_path: Path, text: str, message: str) -> None:
+    from bench.conditions import read_conditions
+
+    (tmp_path / "c.json").write_text(text)
+    with pytest.raises(DeviceError, match=message):
+        read_conditions(tmp_path / "c.json")

@@ -1,0 +1,147 @@
+"""Laws of the line of samples: time goes on, losses are counted, nothing is invented."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bench.device import Device
+from bench.frames import FrameFlag, Frames, select, strain_frames
+from bench.timeline import LATE, Samples, Timeline
+
+PERIOD = 1000  # ticks: 10 kHz
+
+
+def line_of(count: int, *, seq: int = 0, t_us: int = 0) -> Frames:
+    """Frames whose first gage counts samples."""
+    counts = np.zeros((16 * count, 5), np.int16)
+    counts[:, 0] = np.arange(16 * count)
+    return strain_frames(counts, period=PERIOD, seq=seq, t_us=t_us)
+
+
+def push(timeline: Timeline, frames: Frames, order: list[int] | None = None) -> list[Samples]:
+    rows = np.arange(len(frames)) if order is None else np.array(order)
+    return timeline.push(Frames(*(getattr(frames, n)[rows] for n in Frames.__slots__)))
+
+
+def joined(blocks: list[Samples]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """First gage of all samples, in counts."""
+    return np.concatenate([block.strain[:, 0] for block in blocks]) / Device().scale
+
+
+def test_frames_in_order_are_one_block() -> None:
+    blocks = push(Timeline(Device()), line_of(50))
+    assert [block.reset for block in blocks] == ["start", ""]
+    np.testing.assert_allclose(joined(blocks), np.arange(800), atol=1e-9)
+
+
+@pytest.mark.parametrize("seq", [0, 65530])
+@pytest.mark.parametrize("t_us", [0, 2**32 - 5000])
+def test_lost_frames_become_nan_across_wraps(seq: int, t_us: int) -> None:
+    timeline = Timeline(Device())
+    order = [i for i in range(20) if i not in (5, 6, 13)]
+    seen = joined(push(timeline, line_of(20, seq=seq, t_us=t_us), order))
+    lost = np.isin(np.arange(320) // 16, (5, 6, 13))
+    np.testing.assert_allclose(seen, np.where(lost, np.nan, np.arange(320)), atol=1e-9)
+    counts = timeline.counts
+    assert (counts.gaps, counts.lost_frames, counts.lost_samples, counts.resets) == (2, 3, 48, 0)
+
+
+@given(
+    keep=st.lists(st.sampled_from(["ok", "lost", "dup", "late"]), min_size=2, max_size=40),
+    pieces=st.integers(1, 7),
+)
+def test_samples_fill_the_device_time_and_batches_do_not_matter(
+    keep: list[str], pieces: int
+) -> None:
+    order: list[int] = [0]
+    for number, fate in enumerate(keep, start=1):
+        order += [] if fate == "lost" else [number]
+        order += [number] if fate == "dup" else [max(0, number - 2)] if fate == "late" else []
+    frames = line_of(len(keep) + 1, seq=65500, t_us=2**32 - 10_000)
+    whole, parts = Timeline(Device()), Timeline(Device())
+    together = joined(push(whole, frames, order))
+    apart = joined(
+        [
+            b
+            for i in range(0, len(order), pieces)
+            for b in push(parts, frames, order[i : i + pieces])
+        ]
+    )
+    np.testing.assert_array_equal(together, apart)
+    assert whole.counts == parts.counts
+    assert together.size == 16 * (1 + max(order))
+    known = np.isfinite(together)
+    np.testing.assert_allclose(together[known], np.flatnonzero(known), atol=1e-9)
+
+
+def test_repeated_and_late_frames_are_dropped_and_counted() -> None:
+    timeline = Timeline(Device())
+    seen = joined(push(timeline, line_of(10), [0, 1, 1, 2, 4, 3, 5, 5, 5]))
+    assert seen.size == 96
+    assert (timeline.counts.duplicates, timeline.counts.out_of_order) == (3, 1)
+
+
+def test_a_long_gap_starts_a_new_segment() -> None:
+    timeline = Timeline(Device())
+    blocks = push(timeline, line_of(1000), [0, 1, 700, 701])
+    assert [block.reset for block in blocks] == ["start", "", "long_gap", ""]
+    assert blocks[-1].segment == 1
+    assert timeline.counts.lost_frames == 698
+    assert not np.isnan(joined(blocks)).any()
+    assert blocks[2].t_us == 700 * 1600
+
+
+def test_a_time_reset_is_acted_on_once_and_may_be_announced_often() -> None:
+    timeline = Timeline(Device())
+    frames = line_of(30)
+    frames.flags.flags.writeable = True
+    flags = frames.flags.copy()
+    flags[10:18] = FrameFlag.TIME_RESET
+    flagged = Frames(*(flags if n == "flags" else getattr(frames, n) for n in Frames.__slots__))
+    blocks = push(timeline, flagged, [i for i in range(30) if i != 10])  # the first is lost
+    assert [block.reset for block in blocks if block.reset] == ["start", "time_reset"]
+    assert sum(len(block.strain) for block in blocks if block.segment == 1) == 19 * 16
+
+
+def test_a_transmitter_that_restarts_begins_a_segment_and_time_does_not_go_back() -> None:
+    timeline = Timeline(Device())
+    first = push(timeline, line_of(200, seq=5000, t_us=9_000_000))
+    second = push(timeline, line_of(3))
+    assert second[0].reset == "clock_back"
+    assert second[0].t_us >= first[-1].t_us + 16 * 100
+    assert timeline.counts.out_of_order == 0
+
+
+def test_a_frame_just_within_the_window_is_late_and_one_beyond_a_restart() -> None:
+    for back, resets in ((LATE, 0), (LATE + 1, 1)):
+        timeline = Timeline(Device())
+        push(timeline, line_of(200), [*range(150), 149 - back])
+        assert timeline.counts.resets == resets
+        assert timeline.counts.out_of_order == 1 - resets
+
+
+def test_another_sample_period_begins_a_segment() -> None:
+    timeline = Timeline(Device())
+    push(timeline, line_of(2))
+    other = strain_frames(np.zeros((16, 5), np.int16), period=500, seq=2, t_us=3200)
+    assert timeline.push(other)[0].reset == "period_change"
+
+
+def test_other_wheels_are_counted_and_left_alone() -> None:
+    timeline = Timeline(Device(), wheel=0)
+    frames = line_of(4)
+    other = Frames(*(getattr(frames, n) + (3 if n == "wheel" else 0) for n in Frames.__slots__))
+    assert timeline.push(other) == []
+    assert len(joined(timeline.push(frames))) == 64
+    assert timeline.counts.other_wheel == 4
+
+
+def test_a_sample_clock_that_is_a_little_off_loses_nothing() -> None:
+    frames = line_of(500)
+    drifted = select(frames, slice(None))
+    time = np.rint(np.arange(500) * 1600 * 1.0005).astype(np.int64)  # 500 ppm fast
+    drifted = Frames(*(time if n == "t_us" else getattr(frames, n) for n in Frames.__slots__))
+    timeline = Timeline(Device())
+    assert joined(timeline.push(drifted)).size == 8000
+    assert timeline.counts.gaps == 0
