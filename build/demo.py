@@ -9,6 +9,7 @@ import shlex
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -38,7 +39,7 @@ class Steps:
 
     def run(self, what: str, *arguments: str | Path) -> None:
         """Run ``tirelib`` with arguments; stop the demonstration where it fails."""
-        shown = shlex.join(["tirelib", *(_short(argument) for argument in arguments)])
+        shown = _shown(arguments)
         self.commands.append((what, shown))
         self.console.print(Rule(what, align="left", style="dim"))
         self.console.print(f"[bold]$ {shown}[/]", highlight=False, soft_wrap=True)
@@ -48,6 +49,11 @@ class Steps:
             self.console.print(f"[bold red]tirelib ended with exit code {done.returncode}[/]")
             sys.exit(done.returncode)
         self.console.print(f"[dim]{time.monotonic() - started:.0f} s[/]", highlight=False)
+
+
+def _shown(arguments: Sequence[str | Path]) -> str:
+    """Say a command as it is typed at the root of the repository."""
+    return shlex.join(["tirelib", *(_short(argument) for argument in arguments)])
 
 
 def _short(argument: str | Path) -> str:
@@ -62,12 +68,12 @@ def measure(steps: Steps, folder: Path, fresh: bool) -> dict[str, Path]:
     data = {}
     for name, (plan, seed) in PLANS.items():
         target = folder / name
+        what = f"Measure {name} on the numerical rig"
+        words = ("rig", "--plan", plan, "--seed", str(seed), "--out", target, "--force")
         if fresh or not (target / "truth.csv").exists():  # the rig writes it last
-            steps.run(
-                f"Measure {name} on the numerical rig",
-                *("rig", "--plan", plan, "--seed", str(seed), "--out", target, "--force"),
-            )
+            steps.run(what, *words)
         else:
+            steps.commands.append((what, _shown(words)))
             steps.console.print(f"{name}: measured before, used again (--fresh measures anew)")
         data[name] = target
     return data

@@ -149,7 +149,9 @@ def synthetic_run(
     )  # fmt: skip
 
 
-def header(name: str = "synthetic", tire: str = "made-up tire", axes: str = "iso") -> CampaignHeader:
+def header(
+    name: str = "synthetic", tire: str = "made-up tire", axes: str = "iso"
+) -> CampaignHeader:
     """Header of a campaign of the made-up tire."""
     return CampaignHeader(
         name=name,
@@ -170,7 +172,7 @@ def cornering_runs(seed: int = 0, **options: float) -> list[Run]:
     """Five loads times seven slip angles."""
     conditions = [(load, angle) for load in LOADS for angle in ANGLES]
     return [
-        synthetic_run(i, load=load, slip_angle=angle, seed=seed, **options)  # type: ignore[arg-type]
+        synthetic_run(i, load=load, slip_angle=angle, seed=seed, **options)  # type: ignore
         for i, (load, angle) in enumerate(conditions)
     ]
 

@@ -44,6 +44,10 @@ class TurnFlag(IntFlag):
     """A condition that the calibration needs (pressure, camber) is unknown."""
     WEAK_EDGE = 65536
     """A peak stands at the border of its search range: the edge is not distinct."""
+    NO_CONTACT = 131072
+    """No contact for two turns (standstill, gages frozen or dead). Live only: a batch has turns."""
+    FAULT = 262144
+    """The estimator met an error that it did not expect; the log names it. Live only."""
 
 
 INVALIDATING = (
@@ -55,6 +59,8 @@ INVALIDATING = (
     | TurnFlag.CUT_OFF
     | TurnFlag.TOO_FEW_GAGES
     | TurnFlag.NO_CONDITION
+    | TurnFlag.NO_CONTACT
+    | TurnFlag.FAULT
 )
 """Flags with which no estimate of the turn is valid."""
 

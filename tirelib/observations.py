@@ -90,11 +90,11 @@ def measure_run(
     features = replace(
         features, time=features.time + run.start_time, ready=features.ready + run.start_time
     )
-    truth = {name: _truth(run, name, features) for name in TRUTH}
+    truth = {name: truth_of(run, name, features) for name in TRUTH}
     return features, truth
 
 
-def _truth(run: Run, name: str, features: Features) -> FloatArray:
+def truth_of(run: Run, name: str, features: Features) -> FloatArray:
     """Rig quantity for each turn: mean over the run, or over the turn in a sweep."""
     n = len(features)
     samples, clock = run.rig.get(name), run.rig_time

@@ -1,23 +1,33 @@
-"""Shared by the tests of the bench: a tiny campaign, toy FMUs, and a pass through a real port."""
+"""Shared by the tests of the bench: a tiny campaign, toy FMUs, programs in their own process."""
 
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from pythonfmu import FmuBuilder
 
 from tests.bench.campaigns import write_tiny_campaign
+from tests.synthetic import cornering_runs, write
+from tirelib.campaign import read_campaign
+from tirelib.estimators.calibration import Calibration
+from tirelib.estimators.train import train
+from tirelib.observations import observe
 
 TOY = Path(__file__).with_name("toy_slave.py")
+Spawn = Callable[..., "subprocess.Popen[str]"]
 
 
 @pytest.fixture(scope="session")
 def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("campaign") / "tiny"
-    write_tiny_campaign(folder)
-    return folder
+    return write_tiny_campaign(tmp_path_factory.mktemp("campaign") / "tiny")
+
+
+@pytest.fixture(scope="session")
+def calibration(tmp_path_factory: pytest.TempPathFactory) -> Calibration:
+    folder = write(tmp_path_factory.mktemp("calibration") / "set1", cornering_runs())
+    return train(observe([read_campaign(folder)])).calibration
 
 
 def build_toy(folder: Path, samples: int) -> Path:
@@ -36,7 +46,7 @@ def toy_fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
 
 
 @pytest.fixture
-def spawn() -> Iterator[object]:
+def spawn() -> Iterator[Spawn]:
     """Start ``tirebench`` in a process of its own; whatever is left is ended."""
     started: list[subprocess.Popen[str]] = []
 

@@ -1,6 +1,7 @@
 """A recording holds the bytes as they came, and whatever is left of it can be read."""
 
 import math
+import time
 from pathlib import Path
 
 import pytest
@@ -27,7 +28,7 @@ def write(path: Path) -> None:
     header = RecordingHeader({"port": "p", "wheel": 3}, "format = 'x'", "ab" * 32)
     with Recorder(path, header, CONDITIONS) as recorder:
         for number, data in enumerate(READS):
-            recorder.raw(data, 1000 * number)
+            recorder.raw(data, time.monotonic_ns() + number)
 
 
 def assert_same(a: Conditions, b: Conditions) -> None:
@@ -46,6 +47,7 @@ def test_what_was_recorded_comes_back(tmp_path: Path) -> None:
     assert_same(recording.conditions, CONDITIONS)
     assert [data for _, data in recording.raw()] == READS
     assert recording.complete
+    recording.close()
 
 
 def test_a_replay_gives_the_same_reads_and_then_ends(tmp_path: Path) -> None:

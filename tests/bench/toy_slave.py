@@ -46,7 +46,7 @@ class ToyTire(Fmi2Slave):
             "kappa_std",
             "Fy_std",
             "age",
-            "t",
+            "contact_time",
         ):
             setattr(self, name, 0.0)
             self.register_variable(Real(name, causality=Fmi2Causality.output))
@@ -64,14 +64,14 @@ class ToyTire(Fmi2Slave):
     def do_step(self, current_time, step_size):
         if self.speed < 0.0:
             raise ValueError("speed is negative; it must be above 0")
-        for name in self.names:
+        for name in self.names[: round(step_size * self.sample_rate)]:
             x = getattr(self, name)
             self.lost += x != x
             if x == x:
                 self.peak = max(self.peak, x)
                 if x > 0.006 >= self.before:
                     self.turn += 1
-                    self.t = self.count / self.sample_rate
+                    self.contact_time = self.count / self.sample_rate
                     self.Fz, self.Fy = 1e5 * self.peak, float(self.lost)
                     self.kappa = self.alpha = self.speed
                     self.Fz_std = self.Fy_std = self.kappa_std = self.alpha_std = 1.0

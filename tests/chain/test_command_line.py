@@ -1,4 +1,4 @@
-"""The main job through the command line, as a user types it: answers, files, exit codes, messages."""
+"""The main job through the command line: answers, files, exit codes, messages."""
 
 import json
 import subprocess

@@ -1,7 +1,7 @@
 """Cost of the measured chain, beside what scipy's filter alone takes on the same samples.
 
-Run by `make bench`. Goals: features of one turn of five gages (10 kHz, 65 km/h) under 1 ms; a campaign
-of 60 runs featured in under 3 s, reading included.
+Run by `make bench`. Goals: features of one turn of five gages (10 kHz, 65 km/h) under 1 ms; a
+campaign of 60 runs featured in under 3 s, reading included.
 """
 
 from pathlib import Path

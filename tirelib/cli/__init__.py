@@ -8,7 +8,7 @@ import click
 from tirelib import __version__
 from tirelib.errors import TirelibError
 
-VERBS = ("campaign", "features", "calibrate", "estimate", "rig")
+VERBS = ("campaign", "features", "calibrate", "estimate", "fmu", "rig")
 """Verbs; each is the command of that name in the module of that name."""
 
 _EXAMPLE = """\b

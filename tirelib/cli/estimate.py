@@ -53,16 +53,7 @@ def estimate(
     estimates = calibration.estimate(observations.features)
     document = estimate_document(observations, estimates, calibration)
     console = output()
-    turns = document["turns"]
-    valid = sum(turn["valid"] for turn in turns)
-    console.print(f"{campaign.header.name}: {len(turns)} turns, {valid} valid (ISO 8855 axes)")
-    console.print(_summary_table(document["summary"]))
-    counts: dict[str, int] = {}
-    for turn in turns:
-        for flag in turn["flags"]:
-            counts[flag] = counts.get(flag, 0) + 1
-    for name, count in sorted(counts.items(), key=lambda item: -item[1]):
-        console.print(f"  {count:5d} turns flagged {name}")
+    valid = print_document(campaign.header.name, document)
     if json_file is not None:
         write_json(json_file, document)
         console.print(f"written: {json_file}")
@@ -72,6 +63,22 @@ def estimate(
         page = write_estimate_report(observations, estimates, calibration, report)
         console.print(f"written: {page}")
     context.exit(0 if valid else 1)
+
+
+def print_document(name: str, document: dict[str, Any]) -> int:
+    """Print the summary and the flags of an estimate document; return the number of valid turns."""
+    console = output()
+    turns = document["turns"]
+    valid = sum(turn["valid"] for turn in turns)
+    console.print(f"{name}: {len(turns)} turns, {valid} valid (ISO 8855 axes)")
+    console.print(_summary_table(document["summary"]))
+    counts: dict[str, int] = {}
+    for turn in turns:
+        for flag in turn["flags"]:
+            counts[flag] = counts.get(flag, 0) + 1
+    for flag, count in sorted(counts.items(), key=lambda item: -item[1]):
+        console.print(f"  {count:5d} turns flagged {flag}")
+    return valid
 
 
 def _summary_table(summary: dict[str, Any]) -> Table:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomli_w
 
 from tirelib.arrays import FloatArray
 from tirelib.errors import FormatError
@@ -26,6 +25,8 @@ def write_calibration(
     calibration: Calibration, path: str | Path, provenance: Mapping[str, Any] | None = None
 ) -> None:
     """Write a calibration; `provenance` holds further tables (data, statistics, history)."""
+    import tomli_w  # writing only: an FMU reads calibrations without it
+
     document: dict[str, Any] = {
         "format": FORMAT,
         "axes": "iso",

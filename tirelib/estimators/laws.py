@@ -110,7 +110,7 @@ class ConditionLaws:
         doubt = np.zeros_like(value)
         if not self.pressure_fitted and np.isfinite(self.reference_pressure):
             apart = np.abs(values["pressure"] / self.reference_pressure - 1.0)
-            doubt += FORCE_DOUBT * np.maximum(np.nan_to_num(apart) - 0.02, 0.0)
+            doubt += FORCE_DOUBT * np.fmax(apart - 0.02, 0.0)  # unknown: no doubt
         doubt = doubt + SPEED_DOUBT * self.speed_departure(values)
         return np.asarray(doubt * np.abs(value), dtype=np.float64)
 
@@ -120,14 +120,14 @@ class ConditionLaws:
         if self.speed_fitted or not np.isfinite(self.speed[1]):
             return np.zeros_like(squared)
         apart = np.maximum(squared - self.speed[1] ** 2, self.speed[0] ** 2 - squared)
-        return np.asarray(np.maximum(np.nan_to_num(apart), 0.0) / SPEED_UNIT, dtype=np.float64)
+        return np.asarray(np.fmax(apart, 0.0) / SPEED_UNIT, dtype=np.float64)
 
     def extrapolated(self, values: Mapping[str, FloatArray]) -> BoolArray:
         """Tell which turns need a law instead of a calibration, shape (n,)."""
         apart = np.zeros(values["pressure"].shape, dtype=np.bool_)
         if not self.pressure_fitted:
             ratio = values["pressure"] / self.reference_pressure
-            apart |= np.abs(np.nan_to_num(ratio, nan=1.0) - 1.0) > CALIBRATED_SLACK
+            apart |= np.abs(ratio - 1.0) > CALIBRATED_SLACK
         if not self.speed_fitted:
             speed = values["speed"]
             apart |= (speed > 1.1 * self.speed[1]) | (speed < 0.9 * self.speed[0])

@@ -5,10 +5,11 @@ Predicting needs numpy only, so the same code runs in a script, in a stream and 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.arrays import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,12 +86,10 @@ class Polynomial:
     def slope(self, values: Mapping[str, FloatArray], name: str) -> FloatArray:
         """Return the derivative of y by the regressor `name`, shape (n,), unit of y per SI."""
         index = [variable.name for variable in self.variables].index(name)
-        lowered = []
-        factor = np.zeros(len(self.terms))
-        for row, term in enumerate(self.terms):
-            factor[row] = term[index] / self.variables[index].scale
-            lowered.append(tuple(max(e - 1, 0) if i == index else e for i, e in enumerate(term)))
-        return design(self.variables, tuple(lowered), values) @ (factor * self.coefficients)
+        lowered = exponents(self.terms).copy()
+        factor = lowered[:, index] / self.variables[index].scale
+        lowered[:, index] = np.maximum(lowered[:, index] - 1, 0)
+        return _products(self.variables, lowered, values) @ (factor * self.coefficients)
 
     def names(self) -> list[str]:
         """Return a readable name of each term."""
@@ -101,20 +100,25 @@ def design(
     variables: Sequence[Variable], terms: Sequence[Term], values: Mapping[str, FloatArray]
 ) -> FloatArray:
     """Return the terms' values for each row, shape (n, k)."""
+    return _products(variables, exponents(tuple(terms)), values)
+
+
+@lru_cache(maxsize=256)
+def exponents(terms: tuple[Term, ...]) -> IntArray:
+    """Return the exponents as a matrix, shape (k, n_variables); not to be written to."""
+    return np.asarray(terms, dtype=np.int64).reshape(len(terms), -1)
+
+
+def _products(
+    variables: Sequence[Variable], powers_of: IntArray, values: Mapping[str, FloatArray]
+) -> FloatArray:
+    """Multiply the standardised variables, each to its power; shape (n, k)."""
     n = next(iter(values.values())).shape[0]
-    highest = np.max(np.asarray(terms, dtype=np.int64).reshape(len(terms), -1), axis=0, initial=0)
-    powers: list[list[FloatArray]] = []
-    for variable, degree in zip(variables, highest, strict=True):
-        z = variable.standardise(values[variable.name])
-        row = [np.ones(n)]
-        for _ in range(int(degree)):
-            row.append(row[-1] * z)
-        powers.append(row)
-    x = np.ones((n, len(terms)))
-    for column, term in enumerate(terms):
-        for position, exponent in enumerate(term):
-            if exponent:
-                x[:, column] *= powers[position][exponent]
+    x = np.ones((n, powers_of.shape[0]))
+    for variable, exponent in zip(variables, powers_of.T, strict=True):
+        powers = np.ones((n, int(exponent.max(initial=0)) + 1))
+        powers[:, 1:] = variable.standardise(values[variable.name])[:, None]
+        x *= np.multiply.accumulate(powers, axis=1)[:, exponent]
     return x
 
 

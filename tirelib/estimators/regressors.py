@@ -7,6 +7,7 @@ the contact, so the gain that all gages share (temperature of the bridge, supply
 """
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 
 import numpy as np
 
@@ -38,8 +39,7 @@ def compute_regressors(features: Features, gages: Sequence[int]) -> dict[str, Fl
     """
     use = list(gages)
     y = features.lateral[use]
-    basis = np.stack((np.ones(y.size), y / np.abs(features.lateral).max()), axis=1)
-    line = np.linalg.pinv(basis)  # (2, gages)
+    line = _line(tuple((y / np.abs(features.lateral).max()).tolist()))
 
     def level_slope(values: FloatArray) -> tuple[FloatArray, FloatArray]:
         fitted = values[:, use] @ line.T
@@ -64,6 +64,12 @@ def compute_regressors(features: Features, gages: Sequence[int]) -> dict[str, Fl
         "speed": features.speed,
         "camber": features.camber,
     }
+
+
+@cache
+def _line(y: tuple[float, ...]) -> FloatArray:
+    """Return the matrix, shape (2, n), that fits level and slope over the positions y."""
+    return np.asarray(np.linalg.pinv(np.stack((np.ones(len(y)), np.array(y)), axis=1)))
 
 
 def select(regressors: Mapping[str, FloatArray], rows: BoolArray) -> dict[str, FloatArray]:

@@ -119,31 +119,34 @@ def extract_features(turns: Turns) -> Features:
     pulse = trace.pulse[:, None, None]
     axis = phi[None, None, :]
 
-    def largest(y: FloatArray, allowed: BoolArray) -> tuple[FloatArray, FloatArray, BoolArray]:
-        return peak(y, np.broadcast_to(allowed, y.shape), float(phi[0]), spacing)
+    def largest(
+        curves: tuple[FloatArray, ...], allowed: tuple[BoolArray, ...]
+    ) -> tuple[FloatArray, FloatArray, BoolArray]:
+        return peak(np.stack(curves), np.stack(allowed), float(phi[0]), spacing)
 
-    lead, rate_lead, weak_lead = largest(trace.rate, (axis >= -pulse - EDGE_REACH) & (axis <= 0.0))
-    trail, low_rate, weak_trail = largest(-trace.rate, (axis >= 0.0) & (axis <= pulse + AFTER))
+    shape = trace.rate.shape
+    rising = np.broadcast_to((axis >= -pulse - EDGE_REACH) & (axis <= 0.0), shape)
+    falling = np.broadcast_to((axis >= 0.0) & (axis <= pulse + AFTER), shape)
+    edges, rates, weak_edges = largest((trace.rate, -trace.rate), (rising, falling))
+    lead, trail = edges
     before = (axis <= lead[..., None]) & (axis >= lead[..., None] - COMPRESSION_REACH)
     inside = (axis >= lead[..., None]) & (axis <= trail[..., None])
     after = axis >= trail[..., None]
-    cp1_angle, low_before, _ = largest(-trace.strain, before)
-    cp2_angle, low_after, _ = largest(-trace.strain, after)
-    tp_angle, tp, _ = largest(trace.strain, inside)
+    low = -trace.strain
+    angles, sizes, _ = largest((low, low, trace.strain), (before, after, inside))
     e_vertical, e_friction, skew = _integrals(trace.strain, phi, lead, trail)
-    gage_flags = turns.gage_flags | np.where(weak_lead | weak_trail, int(TurnFlag.WEAK_EDGE), 0)
-    weak = np.where((weak_lead | weak_trail).any(axis=1), int(TurnFlag.WEAK_EDGE), 0)
+    weak = np.where(weak_edges.any(axis=0), int(TurnFlag.WEAK_EDGE), 0)
     return Features(
         lead=lead,
         trail=trail,
-        rate_lead=rate_lead,
-        rate_trail=-low_rate,
-        cp1=-low_before,
-        cp2=-low_after,
-        tp=tp,
-        cp1_angle=cp1_angle,
-        cp2_angle=cp2_angle,
-        tp_angle=tp_angle,
+        rate_lead=rates[0],
+        rate_trail=-rates[1],
+        cp1=-sizes[0],
+        cp2=-sizes[1],
+        tp=sizes[2],
+        cp1_angle=angles[0],
+        cp2_angle=angles[1],
+        tp_angle=angles[2],
         e_vertical=e_vertical,
         e_friction=e_friction,
         skew=skew,
@@ -157,8 +160,8 @@ def extract_features(turns: Turns) -> Features:
         pressure=trace.conditions.pressure,
         camber=trace.conditions.camber,
         axis_shift=trace.axis_shift,
-        flags=turns.flags | weak,
-        gage_flags=gage_flags,
+        flags=turns.flags | weak.max(axis=1, initial=0),
+        gage_flags=turns.gage_flags | weak,
         lateral=trace.lateral,
     )
 

@@ -36,16 +36,17 @@ def peak(
     """
     known = allowed & np.isfinite(y)
     masked = np.where(known, y, -np.inf)
-    at = np.clip(masked.argmax(axis=-1), 1, y.shape[-1] - 2)[..., None]
-    a, b, c = (np.take_along_axis(y, at + k, axis=-1)[..., 0] for k in (-1, 0, 1))
-    top = np.take_along_axis(masked, at, axis=-1)[..., 0]
-    none = ~known.any(axis=-1)
+    index = masked.argmax(axis=-1)
+    at = np.minimum(np.maximum(index, 1), y.shape[-1] - 2)
+    row = np.arange(at.size).reshape(at.shape)
+    curves, candidates = y.reshape(-1, y.shape[-1]), masked.reshape(-1, y.shape[-1])
+    a, b, c = curves[row, at - 1], curves[row, at], curves[row, at + 1]
+    top, highest = candidates[row, at], candidates[row, index]
+    none = highest == -np.inf
     at_border = ~((b >= a) & (b >= c) & np.isfinite(top)) & ~none
     bend = a - 2.0 * b + c
     with np.errstate(invalid="ignore", divide="ignore"):
         shift = np.where(at_border | (bend == 0.0), 0.0, 0.5 * (a - c) / bend)
-    highest = masked.max(axis=-1)
-    index = masked.argmax(axis=-1)
-    position = start + spacing * np.where(at_border, index, at[..., 0] + shift)
+    position = start + spacing * np.where(at_border, index, at + shift)
     value = np.where(at_border, highest, b - 0.25 * (a - c) * shift)
     return np.where(none, np.nan, position), np.where(none, np.nan, value), at_border

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
+from tirelib.errors import CalibrationError
 from tirelib.estimators.dissertation import Means
 from tirelib.report.style import signed_degrees
 
@@ -55,9 +56,14 @@ def find_levels(values: FloatArray, gap: float, text: str, digits: int = 0) -> l
 
 
 def load_levels(load: FloatArray) -> list[Level]:
-    """Return the loads of a campaign, [N], named to the nearest hundred."""
+    """Return the loads of a campaign, [N], named to the nearest hundred.
+
+    One level holds every row where no load was measured.
+    """
     known = load[np.isfinite(load)]
-    gap = 0.06 * float(known.mean()) if known.size else 1.0
+    if known.size == 0:
+        return [Level(float("nan"), np.ones(load.shape, dtype=np.bool_), "load not measured")]
+    gap = 0.06 * float(np.abs(known).mean())
     return find_levels(load, gap, "{} N", -2)
 
 
@@ -82,7 +88,17 @@ def upright(means: Means) -> BoolArray:
 
 
 def reference_level(levels: list[Level]) -> Level:
-    """Return the load with the most rows; among equals the middle one."""
+    """Return the load with the most rows; among equals the middle one.
+
+    Raises
+    ------
+    CalibrationError
+        If there is no level.
+    """
+    if not levels:
+        raise CalibrationError(
+            "no run without camber and traction whose load was measured; the figure needs some"
+        )
     most = max(int(level.rows.sum()) for level in levels)
     full = [level for level in levels if level.rows.sum() >= 0.8 * most]
     return full[len(full) // 2]

@@ -154,5 +154,8 @@ def save(figure: Figure, folder: Path, name: str) -> str:
     folder.mkdir(parents=True, exist_ok=True)
     with mpl.rc_context(STYLE):
         figure.savefig(folder / f"{name}.png", dpi=RESOLUTION)
+        engine = figure.get_layout_engine()
+        figure.set_layout_engine("none")  # the places are found; do not look for them twice
         figure.savefig(folder / f"{name}.svg", metadata={"Date": None})
+        figure.set_layout_engine(engine)
     return f"{name}.png"

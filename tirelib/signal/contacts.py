@@ -20,8 +20,8 @@ RISE = 0.7
 FALL = 0.62
 """Level below which the pulse has ended (hysteresis against noise).
 
-It must lie above the strain away from the contact, so the dips may be 1.6 times as deep as the pulse
-is high: beyond what a tire shows, even at half its pressure and one and a half times its load."""
+It must lie above the strain away from the contact, so the dips may be 1.6 times as deep as the
+pulse is high: beyond what a tire shows, even at half its pressure and 1.5 times its load."""
 JUMP = 2.5
 """A swing this many times the one that set the levels shows that they were set by no contact."""
 PATIENCE = 2.5
@@ -89,6 +89,13 @@ class ContactFinder:
         self._last_period: float | None = None
         self._since = self._count
 
+    @property
+    def oldest(self) -> int:
+        """Number of the first sample that the next contact or its turn may begin with."""
+        if self._last_middle is not None:
+            return int(self._last_middle) - 1
+        return self._pulse_start if self._pulse is not None else self._count - 1
+
     def push(self, samples: FloatArray) -> list[Contact]:
         """Take the next samples, shape (n,), and return the contacts that ended in them.
 
@@ -98,10 +105,33 @@ class ContactFinder:
         x = self._without_gaps(np.asarray(samples, dtype=np.float64))
         x = self._median_of_three(x)
         found: list[Contact] = []
+        if self._nothing_happens(x):
+            return found
         start = 0
         while start < x.size:
             start = self._advance(x, start, found)
         return found
+
+    def _nothing_happens(self, x: FloatArray) -> bool:
+        """Pass over a frame in which neither a level is crossed nor patience ends.
+
+        The same as `_advance`, for the many short frames of a stream.
+        """
+        n = x.size
+        if self._level is None or n == 0 or self._room() <= n:
+            return n == 0
+        low, high = float(x.min()), float(x.max())
+        falling = self._pulse is not None or not self._armed
+        within = low >= self._low_level if falling else high <= self._level
+        lowest, highest = min(self._lowest, low), max(self._highest, high)
+        if not within or not highest - lowest <= JUMP * self._swing:
+            return False
+        self._lowest, self._highest = lowest, highest
+        if self._pulse is not None:
+            self._pulse.append(x)
+        self._count += n
+        self._before = float(x[-1])
+        return True
 
     def _without_gaps(self, x: FloatArray) -> FloatArray:
         finite = np.isfinite(x)

@@ -128,19 +128,22 @@ def smooth_to_angle(
             f"filter needs samples {nearest[0] - reach} .. {nearest[-1] + reach}; "
             f"given are 0 .. {samples.shape[1] - 1}"
         )
-    tap = np.arange(-reach, reach + 1)
-    distance = (tap - (position - nearest)[:, None]) * step
-    weight = np.exp(distance**2 * (-0.5 / sigma**2))
-    weight /= weight.sum(axis=1, keepdims=True)
-    mean = np.einsum("ij,ij->i", weight, distance)[:, None]
-    centred = distance - mean
-    slope = weight * centred
-    slope /= np.einsum("ij,ij->i", slope, centred)[:, None]
-    weight -= mean * slope  # the fitted line at the wanted angle itself
-    index = (nearest[:, None] + tap).ravel()
-    ends = np.arange(0, index.size + 1, tap.size)
-    shape = (phi.size, samples.shape[1])
-    columns = np.ascontiguousarray(samples.T)
-    strain = csr_array((weight.ravel(), index, ends), shape=shape) @ columns
-    rate = csr_array((slope.ravel(), index, ends), shape=shape) @ columns
-    return np.ascontiguousarray(strain.T), np.ascontiguousarray(rate.T)
+    tap = np.arange(-reach, reach + 1, dtype=np.int32)
+    distance = tap * step - ((position - nearest) * step)[:, None]
+    weight = distance * distance
+    weight *= -0.5 / sigma**2
+    np.exp(weight, out=weight)
+    moment = weight * distance
+    total, first = weight.sum(axis=1), moment.sum(axis=1)
+    second = np.einsum("ij,ij->i", moment, distance)
+    index = (nearest.astype(np.int32)[:, None] + tap).ravel()
+    ends = np.arange(0, 2 * index.size + 1, tap.size, dtype=np.int32)
+    data = np.concatenate((weight.ravel(), moment.ravel()))
+    taps = csr_array(
+        (data, np.concatenate((index, index)), ends), shape=(2 * phi.size, samples.shape[1])
+    )
+    sums = (taps @ np.ascontiguousarray(samples.T)).T
+    plain, moments = sums[:, : phi.size], sums[:, phi.size :]
+    mean = first / total  # of the distance: the weights are not quite symmetric
+    rate = (moments - mean * plain) / (second - mean * first)
+    return plain / total - mean * rate, np.ascontiguousarray(rate)

@@ -59,7 +59,10 @@ def inspect(window: FloatArray, step: float) -> tuple[FloatArray, IntArray]:
     flags[(swing == 0.0)] |= int(TurnFlag.DEAD_GAGE)
     needed = max(FLAT_SAMPLES, int(FLAT_ANGLE / step))
     for extreme in (high, low):
-        length = _longest_run(known == extreme[:, None])
+        same = known == extreme[:, None]
+        if not (same.sum(axis=1) >= needed).any():
+            continue
+        length = _longest_run(same)
         for row in np.flatnonzero((length >= needed) & (swing > 0.0)):
             if _has_corner(known[row], extreme[row], CORNER_SHARE * swing[row]):
                 flags[row] |= int(TurnFlag.SATURATED)

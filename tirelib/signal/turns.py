@@ -173,14 +173,30 @@ class TurnCutter:
     def _room(self, n: int) -> slice:
         """Make room for n samples and return their columns."""
         if self._filled + n > self._buffer.shape[1]:
-            drop = self._filled - (self._buffer.shape[1] - self._keep)
-            drop = max(drop, self._filled + n - self._buffer.shape[1])
+            drop = max(self._oldest() - self._base, self._filled + n - self._buffer.shape[1])
             self._buffer[:, : self._filled - drop] = self._buffer[:, drop : self._filled]
             self._filled -= drop
             self._base += drop
         columns = slice(self._filled, self._filled + n)
         self._filled += n
         return columns
+
+    def _oldest(self) -> int:
+        """Return the number of the first sample that a turn still to come may need."""
+        first = self._finder.oldest
+        if self._waiting and self._previous is not None:
+            first = min(first, int(self._previous.middle) - 1)
+        return max(self._base, min(first, self._base + self._filled))
+
+    def needed(self) -> FloatArray:
+        """Return the samples that turns to come may need, newest last, conditions below."""
+        return self._buffer[:, self._oldest() - self._base : self._filled].copy()
+
+    def refill(self, samples: FloatArray) -> None:
+        """Put back what `needed` returned, with all else as it was then."""
+        self._base += self._filled - samples.shape[1]
+        self._filled = samples.shape[1]
+        self._buffer[:, : self._filled] = samples
 
     def _next_turn(self) -> Turn | None:
         """Work on the first waiting contact; None while its samples are not all there."""
@@ -247,7 +263,8 @@ class TurnCutter:
         strain[unusable], rate[unusable] = np.nan, np.nan
         if self._previous_offset is not None:
             moved = np.abs(offset - self._previous_offset)
-            swing = np.nanmax(strain, axis=1, initial=0.0) - np.nanmin(strain, axis=1, initial=0.0)
+            swing = np.fmax.reduce(strain, axis=1, initial=0.0)
+            swing -= np.fmin.reduce(strain, axis=1, initial=0.0)
             gage_flags[moved > DRIFT_SHARE * swing] |= int(TurnFlag.DRIFT)
         conditions, _ = self._mean(
             slice(self._gages, self._gages + len(_HELD)), before.middle, contact.middle
@@ -260,8 +277,7 @@ class TurnCutter:
         axis_shift, once = self._trigger(before.middle, contact.middle, step)
         if not once:
             flags |= TurnFlag.TRIGGER_MISMATCH
-        for value in gage_flags:
-            flags |= TurnFlag(int(value))
+        flags |= TurnFlag(int(np.bitwise_or.reduce(gage_flags)))
         if unusable[self._centre] or unusable.sum() > 1:
             flags |= TurnFlag.TOO_FEW_GAGES
         elif unusable.any():

@@ -1,7 +1,5 @@
 """Observations of a made-up tire, made once."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 

@@ -218,7 +218,7 @@ def test_campaigns_of_different_tires_are_not_mixed() -> None:
 
 def test_too_few_conditions_are_refused(observed: Observations) -> None:
     few = take(observed, observed.group < 4)
-    with pytest.raises(CalibrationError, match="usable turns at 4 conditions; .* at least 5"):
+    with pytest.raises(CalibrationError, match=r"usable turns at 4 conditions; .* at least 5"):
         train(few)
 
 

@@ -38,7 +38,7 @@ def test_gain_has_fallen_to_half_the_power_at_the_cut_off(order: float) -> None:
 def test_no_phase_shift_at_any_frequency(order: float, sigma: float) -> None:
     index = np.arange(2000) - 1000.0
     odd = np.sin(order * index * STEP)
-    strain, rate = evaluate(odd, np.array([0.0]), sigma)
+    strain, _ = evaluate(odd, np.array([0.0]), sigma)
     assert abs(strain[0, 0]) < 1e-12
     even = np.cos(order * index * STEP)
     assert abs(evaluate(even, np.array([0.0]), sigma)[1][0, 0]) < 1e-9
@@ -93,7 +93,7 @@ def test_a_slow_sample_rate_does_not_suit() -> None:
 
 @pytest.mark.parametrize("order", [0.0, 7.9, 121.0, np.nan])
 def test_an_unsuitable_order_is_refused(order: float) -> None:
-    with pytest.raises(ParameterError, match="allowed are 8 .. 120 cycles per turn"):
+    with pytest.raises(ParameterError, match=r"allowed are 8 \.\. 120 cycles per turn"):
         LowPass(order)
 
 

@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tirelib.arrays import FloatArray
+from tirelib.errors import CalibrationError
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.dissertation import Means
 from tirelib.estimators.train import averaging
@@ -23,6 +24,7 @@ from tirelib.report.style import (
 )
 
 MOST_SHAPES = 17
+FEWEST_ANGLES = 3
 ZERO = "nearest to zero slip angle"
 
 
@@ -43,6 +45,11 @@ def figure_4_2(observations: Observations, estimates: Estimates) -> Figure:
     """Contact shapes from the contact lengths at all gages, one outline for each slip angle.
 
     Of the middle load, without camber, run means. Source: dissertation, Fig. 4-2.
+
+    Raises
+    ------
+    CalibrationError
+        If no slip angle was measured.
     """
     features = observations.features
     average = averaging(observations)
@@ -58,6 +65,8 @@ def figure_4_2(observations: Observations, estimates: Estimates) -> Figure:
     levels = load_levels(np.where(plain, load, np.nan))
     level = reference_level(levels)
     angles = angle_levels(np.where(level.rows, np.rad2deg(angle), np.nan))[:MOST_SHAPES]
+    if not angles:
+        raise CalibrationError("the slip angle was not measured; the contact shapes need it")
     order = np.argsort(features.lateral)
     lateral = 1e3 * features.lateral[order]
     columns = min(6, len(angles) + 1)
@@ -96,8 +105,18 @@ def figure_4_3(means: Means) -> Figure:
     """Contact length of each gage over slip angle, and its scatter in percent.
 
     Source: dissertation, Fig. 4-3.
+
+    Raises
+    ------
+    CalibrationError
+        If the slip angle was not varied.
     """
     level = reference_level(load_levels(np.where(upright(means), means.load, np.nan)))
+    if len(angle_levels(means.slip_angle[level.rows])) < FEWEST_ANGLES:
+        raise CalibrationError(
+            f"{level.text}: fewer than {FEWEST_ANGLES} slip angles without camber; the figure "
+            "needs them"
+        )
     figure = new_figure(11.0, 4.6)
     left, right = figure.subplots(1, 2, width_ratios=(3, 2))
     order = np.argsort(means.lateral)

@@ -1,0 +1,5 @@
+"""``python -m bench``: the same as ``tirebench``."""
+
+from bench.cli import main
+
+main()

@@ -1,0 +1,53 @@
+"""The command line of the bench, ``tirebench``: the only part of it that prints."""
+
+import sys
+from importlib import import_module
+
+import click
+
+from bench.errors import BenchError
+from tirelib import __version__
+from tirelib.errors import TirelibError
+
+VERBS = ("ports", "emulate", "run")
+"""Verbs; each is the command of that name in the module of that name."""
+
+_EXAMPLE = """\b
+Examples:
+  tirebench emulate --campaign build/out/set1 --run 3 --port-file build/out/port
+  tirebench run --port /dev/ttyUSB0 --fmu build/out/StrainTire.fmu --speed 65 --record live.mcap
+  tirebench run --replay live.mcap --fmu build/out/StrainTire.fmu --json live.json
+
+\b
+Exit code: 0 done, 1 ran but the answer is negative, 2 bad input.
+"""
+
+
+class Verbs(click.Group):
+    """A group that imports a verb only when it is asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the verbs in the order of use."""
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import and return one verb."""
+        if cmd_name not in VERBS:
+            return None
+        command = getattr(import_module(f"bench.cli.{cmd_name}"), cmd_name)
+        return command if isinstance(command, click.Command) else None
+
+
+@click.group(cls=Verbs, epilog=_EXAMPLE)
+@click.version_option(__version__, prog_name="tirebench")
+def program() -> None:
+    """Read a wheel transmitter, estimate live with an FMU, record, replay."""
+
+
+def main() -> None:
+    """Run the command line; an error that is raised on purpose ends with exit code 2."""
+    try:
+        program(prog_name="tirebench")
+    except (BenchError, TirelibError) as error:
+        click.echo(f"Error: {error}", err=True)
+        sys.exit(2)

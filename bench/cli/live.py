@@ -1,0 +1,107 @@
+"""What `tirebench run` shows while it runs: a live table on a terminal, plain lines elsewhere."""
+
+import math
+import time
+from collections import deque
+from collections.abc import Sequence
+from types import TracebackType
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from bench.chain import Chain, Turn
+from bench.document import QUANTITIES, flags, line_document, quantity_valid
+
+ROWS = 20
+"""Turns that the live table holds."""
+REFRESH = 0.25
+"""Time between two drawings, [s]."""
+FORMATS = {"Fz": (".0f", "N"), "alpha": (".2f", "deg"), "kappa": (".4f", ""), "Fy": (".0f", "N")}
+PLAIN = ("run", "t [s]", *QUANTITIES, "valid", "flags")
+LOSSES = ("crc_bad", "framing_bad", "lost_frames", "duplicates", "out_of_order", "resets")
+
+
+class Screen:
+    """Show turns and the line's counters; a context manager.
+
+    Parameters
+    ----------
+    console : Console
+    chain : Chain
+        Whose counters are shown.
+    title : str
+    """
+
+    def __init__(self, console: Console, chain: Chain, title: str) -> None:
+        self._console = console
+        self._chain = chain
+        self._title = title
+        self._turns: deque[Turn] = deque(maxlen=ROWS)
+        self._live = Live(console=console, auto_refresh=False) if console.is_terminal else None
+        self._drawn = 0.0
+
+    def __enter__(self) -> "Screen":
+        if self._live is not None:
+            self._live.start()
+        else:
+            self._console.print(_plain_row(PLAIN), soft_wrap=True)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._live is not None:
+            self._live.update(self._table(), refresh=True)
+            self._live.stop()
+
+    def watch(self, turns: Sequence[Turn]) -> None:
+        """Show new turns; called after each read."""
+        self._turns.extend(turns)
+        if self._live is None:
+            for turn in turns:
+                self._console.print(_plain_row(_cells(turn)), soft_wrap=True)
+        elif time.monotonic() - self._drawn > REFRESH:
+            self._live.update(self._table(), refresh=True)
+            self._drawn = time.monotonic()
+
+    def _table(self) -> RenderableType:
+        table = Table(box=SIMPLE_HEAD, title=self._title)
+        for name in PLAIN:
+            unit = FORMATS.get(name, ("", ""))[1]
+            justify = "left" if name == "flags" else "right"
+            table.add_column(f"{name} [{unit}]" if unit else name, justify=justify)  # type: ignore[arg-type]
+        for turn in self._turns:
+            table.add_row(*_cells(turn), style=None if turn.valid else "dim")
+        return Group(table, Text(counters(self._chain)))
+
+
+def counters(chain: Chain) -> str:
+    """Return the state of the line in one line; what is zero is left out but for the frames."""
+    counts = line_document(*chain.counts)
+    parts = [f"{counts['frames']} frames"]
+    parts += [f"{counts[name]} {name}" for name in LOSSES if counts[name]]
+    saturated = {f"gage {i}": n for i, n in enumerate(counts["saturated_samples"], 1) if n}
+    parts += [f"{n} saturated samples of {gage}" for gage, n in saturated.items()]
+    return ", ".join(parts)
+
+
+def _cells(turn: Turn) -> tuple[str, ...]:
+    cells = [str(turn.run), f"{turn.ready if math.isnan(turn.t) else turn.t:.3f}"]
+    for name, (_, factor) in QUANTITIES.items():
+        value = turn.outputs[name] * factor
+        std = turn.outputs.get(f"{name}_std", math.nan) * factor
+        spec = FORMATS[name][0]
+        mark = "" if quantity_valid(turn, name) else "?"
+        cells.append("-" if math.isnan(value) else f"{value:{spec}} +-{std:{spec}}{mark}")
+    return (*cells, "yes" if turn.valid else "no", " ".join(flags(turn)))
+
+
+def _plain_row(cells: Sequence[str]) -> str:
+    widths = (4, 9, 15, 15, 17, 15, 5, 0)
+    return "  ".join(f"{cell:>{width}}" for cell, width in zip(cells, widths, strict=True))

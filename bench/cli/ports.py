@@ -1,0 +1,34 @@
+"""``tirebench ports``: the serial ports of this machine."""
+
+from pathlib import Path
+
+import click
+
+_EXAMPLE = """\b
+Example:
+  tirebench ports
+
+\b
+Exit code: 0 at least one, 1 none.
+"""
+
+
+@click.command(epilog=_EXAMPLE)
+@click.option("--json", "json_file", metavar="FILE",
+              type=click.Path(path_type=Path, dir_okay=False), help="Write the list.")  # fmt: skip
+@click.pass_context
+def ports(context: click.Context, json_file: Path | None) -> None:
+    """List serial ports: device, description, identity."""
+    from serial.tools import list_ports
+
+    from tirelib.cli.common import write_json
+
+    found = sorted(list_ports.comports())
+    for port in found:
+        click.echo(f"{port.device}  {port.description}  {port.hwid}")
+    if not found:
+        click.echo("no serial port; plug the receiver in, or start `tirebench emulate`")
+    if json_file is not None:
+        rows = [{"device": p.device, "description": p.description, "hwid": p.hwid} for p in found]
+        write_json(json_file, {"format": "tirebench-ports/1", "ports": rows})
+    context.exit(0 if found else 1)

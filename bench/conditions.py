@@ -1,0 +1,198 @@
+"""What the wheel does not send: travel speed, pressure, camber, over device time.
+
+They come from options (one value each) or from a sidecar (``tirebench-conditions/1``, JSON) that
+the emulator writes, and are held from one value to the next. A sidecar also tells where in device
+time each run of the campaign was played and what the rig measured, so that estimates can be
+compared.
+
+Files hold what engineers say (km/h, bar, deg, N); inside everything is SI and ISO 8855.
+"""
+
+import json
+import math
+from bisect import bisect_right
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from bench.errors import DeviceError
+from tirelib.units import from_si, to_si
+
+FORMAT = "tirebench-conditions/1"
+QUANTITIES = {"speed": ("km/h", "speed"), "pressure": ("bar", "pressure"),
+              "camber": ("deg", "angle")}  # fmt: skip
+"""Unit in files and dimension of each condition."""
+TRUTH = {"Fz": ("N", "force"), "alpha": ("deg", "angle"), "kappa": ("1", "ratio"),
+         "Fy": ("N", "force")}  # fmt: skip
+ROUNDING = 0.6
+"""Device time is a whole number of microseconds; a condition this close has begun, [us]."""
+UNKNOWN = (math.nan, math.nan, math.nan)
+
+Condition = tuple[float, float, float]
+"""speed [m/s], pressure [Pa], camber [rad]; NaN where unknown."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunMark:
+    """Where a run of a campaign begins in device time.
+
+    Attributes
+    ----------
+    run : int
+    t_us : int, [us]
+        Device time of the run's first sample.
+    start_time : float, [s]
+        The run's own clock at that sample.
+    truth : dict of float, SI
+        What the rig measured in the run, mean: Fz, alpha, kappa, Fy; NaN where absent.
+    """
+
+    run: int
+    t_us: int
+    start_time: float
+    truth: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """Conditions over device time, held from each entry to the next; unknown before the first.
+
+    Attributes
+    ----------
+    t_us : tuple of int, [us]
+        Increasing.
+    values : tuple of Condition
+    runs : tuple of RunMark
+        In order of device time; empty if nothing is known of runs.
+    loop_us : int
+        After this time everything repeats; 0 for never.
+    """
+
+    t_us: tuple[int, ...]
+    values: tuple[Condition, ...]
+    runs: tuple[RunMark, ...] = ()
+    loop_us: int = 0
+
+    @classmethod
+    def constant(
+        cls, speed: float = math.nan, pressure: float = math.nan, camber: float = math.nan
+    ) -> "Conditions":
+        """Return conditions that do not change, SI."""
+        return cls((0,), ((speed, pressure, camber),))
+
+    def at(self, t_us: float) -> Condition:
+        """Return what holds at a device time."""
+        if len(self.t_us) == 1 and self.t_us[0] == 0:
+            return self.values[0]
+        index = bisect_right(self.t_us, self._within(t_us) + ROUNDING) - 1
+        return self.values[index] if index >= 0 else UNKNOWN
+
+    def next_change(self, t_us: float) -> float:
+        """Return the device time of the next entry after `t_us`; infinite if there is none."""
+        if len(self.t_us) == 1 and not self.loop_us:
+            return math.inf
+        within = self._within(t_us)
+        index = bisect_right(self.t_us, within + ROUNDING)
+        ahead = self.t_us[index] if index < len(self.t_us) else self.loop_us + self.t_us[0]
+        return t_us + (ahead - within) if index < len(self.t_us) or self.loop_us else math.inf
+
+    def run_at(self, t_us: float) -> tuple[RunMark, int] | None:
+        """Return the run that is played at a device time, and the device time it began."""
+        within = self._within(t_us)
+        index = bisect_right([mark.t_us for mark in self.runs], within + ROUNDING) - 1
+        if index < 0:
+            return None
+        mark = self.runs[index]
+        return mark, mark.t_us + round(t_us - within)
+
+    def _within(self, t_us: float) -> float:
+        return t_us % self.loop_us if self.loop_us else t_us
+
+
+def conditions_document(conditions: Conditions) -> dict[str, Any]:
+    """Return conditions as a sidecar holds them."""
+    columns: dict[str, Any] = {}
+    for index, (name, (unit, dimension)) in enumerate(QUANTITIES.items()):
+        column = [value[index] for value in conditions.values]
+        columns[name] = {
+            "unit": unit,
+            "values": [None if math.isnan(x) else from_si(x, unit, dimension) for x in column],
+        }
+    return {
+        "format": FORMAT,
+        "axes": "iso",
+        "loop_us": conditions.loop_us,
+        "t_us": list(conditions.t_us),
+        **columns,
+        "runs": [
+            {
+                "run": mark.run,
+                "t_us": mark.t_us,
+                "start_s": mark.start_time,
+                "truth": {
+                    name: from_si(x, *TRUTH[name]) for name, x in mark.truth.items() if x == x
+                },
+            }
+            for mark in conditions.runs
+        ],
+    }
+
+
+def parse_conditions(document: Any, where: str) -> Conditions:
+    """Return the conditions that a sidecar holds.
+
+    Raises
+    ------
+    DeviceError
+        If it is not what this program writes.
+    """
+    given = document.get("format") if isinstance(document, dict) else type(document).__name__
+    if given != FORMAT:
+        raise DeviceError(
+            f"{where}: format = {given!r}; {FORMAT!r} is understood here; "
+            "take the file that `tirebench emulate --conditions` wrote"
+        )
+    try:
+        times = tuple(int(t) for t in document["t_us"])
+        columns = [_column(document[name], *row) for name, row in QUANTITIES.items()]
+        values = tuple(zip(*columns, strict=True))
+        runs = tuple(_mark(entry) for entry in document["runs"])
+        loop = int(document["loop_us"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise DeviceError(
+            f"{where}: {type(error).__name__} {error}; t_us, speed, pressure, camber, runs and "
+            "loop_us are needed, lists of one length; write it anew with `tirebench emulate`"
+        ) from None
+    if len(values) != len(times) or not times or list(times) != sorted(times):
+        raise DeviceError(
+            f"{where}: {len(times)} times for {len(values)} conditions; as many are needed, at "
+            "least one, in order of time; write it anew with `tirebench emulate`"
+        )
+    return Conditions(times, values, runs, loop)
+
+
+def read_conditions(path: Path) -> Conditions:
+    """Read a sidecar; errors as `parse_conditions`."""
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise DeviceError(
+            f"{path}: it cannot be read ({error}); JSON as `tirebench emulate --conditions` "
+            "writes it is needed; check the path"
+        ) from None
+    return parse_conditions(document, str(path))
+
+
+def _column(entry: dict[str, Any], unit: str, dimension: str) -> list[float]:
+    if entry["unit"] != unit:
+        raise ValueError(f"unit {entry['unit']!r} instead of {unit!r}")
+    return [
+        math.nan if x is None else float(to_si(float(x), unit, dimension)) for x in entry["values"]
+    ]
+
+
+def _mark(entry: dict[str, Any]) -> RunMark:
+    truth = {
+        name: float(to_si(float(x), *TRUTH[name])) for name, x in entry.get("truth", {}).items()
+    }
+    return RunMark(int(entry["run"]), int(entry["t_us"]), float(entry["start_s"]), truth)

@@ -1,0 +1,136 @@
+"""Estimates of a line as a document (``tirelib-estimate/1``), as `tirelib estimate --json` has it.
+
+Units at this edge are what engineers say: N and deg. Axes are ISO 8855. Where a sidecar told what
+the rig measured, the summary holds the errors of each run's mean; else its numbers are null.
+"""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from bench.chain import Turn
+from bench.conditions import RunMark
+from bench.decoder import LineCounts
+from bench.frames import GAGES
+from bench.timeline import TimelineCounts
+from tirelib.flags import TurnFlag, flag_names
+
+FORMAT = "tirelib-estimate/1"
+QUANTITIES = {"Fz": ("N", 1.0), "alpha": ("deg", 180.0 / math.pi), "kappa": ("1", 1.0),
+              "Fy": ("N", 1.0)}  # fmt: skip
+"""Unit and factor of each quantity in the document."""
+
+
+def document(
+    turns: Sequence[Turn],
+    runs: Iterable[RunMark],
+    counts: tuple[LineCounts, TimelineCounts],
+    source: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Return summary, turns, what the line lost, and where all came from."""
+    truth = {mark.run: mark.truth for mark in runs}
+    return {
+        "format": FORMAT,
+        "axes": "iso",
+        "summary": {name: _summary(name, turns, truth) for name in QUANTITIES},
+        "turns": [turn_document(turn) for turn in turns],
+        "line": line_document(*counts),
+        "source": dict(source),
+    }
+
+
+def line_document(line: LineCounts, timeline: TimelineCounts) -> dict[str, Any]:
+    """Return what a line has shown: good frames, and every loss by its kind."""
+    return {
+        "bytes": line.bytes,
+        "frames": line.ok,
+        "crc_bad": line.crc,
+        "framing_bad": line.framing,
+        "unknown_type": line.unknown,
+        "gaps": timeline.gaps,
+        "lost_frames": timeline.lost_frames,
+        "lost_samples": timeline.lost_samples,
+        "duplicates": timeline.duplicates,
+        "out_of_order": timeline.out_of_order,
+        "other_wheel": timeline.other_wheel,
+        "resets": timeline.resets,
+        "saturated_samples": list(timeline.saturated),
+        "low_battery": timeline.low_battery,
+        "radio_loss": timeline.radio_loss,
+    }
+
+
+def turn_document(turn: Turn) -> dict[str, Any]:
+    """Return one turn in the units of the document."""
+    outputs = turn.outputs
+    entry: dict[str, Any] = {
+        "run": turn.run,
+        "t": _number(turn.t),
+        "ready": _number(turn.ready),
+    }
+    for name, (_, factor) in QUANTITIES.items():
+        entry[name] = _number(outputs[name] * factor)
+        entry[f"{name}_std"] = _number(outputs.get(f"{name}_std", math.nan) * factor)
+        entry[f"{name}_valid"] = quantity_valid(turn, name)
+    for gage in range(1, GAGES + 1):
+        length = outputs.get(f"contact_length_{gage}", math.nan)
+        entry[f"contact_length_{gage}_mm"] = _number(1e3 * length)
+    entry["omega_rad_s"] = _number(outputs.get("turn_rate", math.nan))
+    entry["rolling"] = turn.texts.get("rolling", "unknown")
+    entry["valid"] = turn.valid
+    entry["flags"] = flags(turn)
+    entry["segment"] = turn.segment
+    entry["device_time"] = turn.device_time
+    entry["saturated_samples"] = list(turn.saturated)
+    return entry
+
+
+def flags(turn: Turn) -> list[str]:
+    """Return the names of a turn's flags, then the estimator's notes."""
+    names = flag_names(turn.flags)
+    said = turn.texts.get("status", "").split(";")
+    return [*names, *(note for note in said if note and note not in names)]
+
+
+def quantity_valid(turn: Turn, name: str) -> bool:
+    """Whether one quantity of a turn may be used.
+
+    An FMU with an output ``Fz_valid`` says so itself; without it the whole turn decides, and a slip
+    ratio needs a speed.
+    """
+    own = turn.outputs.get(f"{name}_valid")
+    if own is not None:
+        return own > 0.5
+    known = math.isfinite(turn.outputs[name])
+    return turn.valid and known and not (name == "kappa" and turn.flags & TurnFlag.NO_SPEED)
+
+
+def _summary(
+    name: str, turns: Sequence[Turn], truth: Mapping[int, Mapping[str, float]]
+) -> dict[str, Any]:
+    unit, factor = QUANTITIES[name]
+    empty = {"rmse": None, "unit": unit, "r2": None, "n": 0, "rmse_percent_of_range": None}
+    means: dict[int, list[float]] = {}
+    for turn in turns:
+        if quantity_valid(turn, name) and name in truth.get(turn.run, {}):
+            means.setdefault(turn.run, []).append(turn.outputs[name])
+    if not means:
+        return empty
+    measured = factor * np.array([truth[run][name] for run in means])
+    error = factor * np.array([np.mean(values) for values in means.values()]) - measured
+    spread = float(np.sum((measured - measured.mean()) ** 2))
+    span = float(np.ptp(measured))
+    rmse = float(np.sqrt(np.mean(error**2)))
+    return {
+        "rmse": rmse,
+        "unit": unit,
+        "r2": 1.0 - float(np.sum(error**2)) / spread if spread > 0.0 else None,
+        "n": len(means),
+        "rmse_percent_of_range": 100.0 * rmse / span if span > 0.0 else None,
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

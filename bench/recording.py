@@ -1,0 +1,249 @@
+"""Recording of a live run (``tirebench-recording/1``, MCAP): raw bytes as they came, bad ones too.
+
+The file is MCAP without chunks, so every read of the port stands on disk (in the kernel's cache, at
+least) before it is decoded: a process that is killed loses nothing that it had read. MCAP readers
+that take a stream (and PlotJuggler, Foxglove) open it; a file without its end does as well.
+
+==============  ===================  ============================================================
+part            encoding             content
+==============  ===================  ============================================================
+metadata        ``tirebench``        format, settings (JSON), start on both clocks, device file
+``/serial``     ``serial-v1``        bytes of one read; log time is UTC, publish time monotonic
+``/conditions`` ``json``             conditions as a sidecar holds them (``tirebench-conditions/1``)
+metadata        ``end``              why the run ended
+==============  ===================  ============================================================
+"""
+
+import json
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from mcap.exceptions import McapError
+from mcap.records import Channel, Message, Metadata
+from mcap.stream_reader import StreamReader
+from mcap.writer import CompressionType, Writer
+
+from bench.conditions import Conditions, conditions_document, parse_conditions
+from bench.errors import DeviceError, RecordingError
+
+FORMAT = "tirebench-recording/1"
+RAW, CONDITIONS = "/serial", "/conditions"
+LARGEST_RECORD = 64 * 2**20
+"""A longer record is damage, not data, [bytes]."""
+
+
+class Recorder:
+    """Write a recording; a context manager that closes it whatever happens.
+
+    Parameters
+    ----------
+    path : Path
+        A file that does not exist yet.
+    header : dict of str
+        What the run was: see `RecordingHeader`.
+
+    Raises
+    ------
+    RecordingError
+        If the file exists or cannot be written.
+    """
+
+    def __init__(self, path: Path, header: "RecordingHeader", conditions: Conditions) -> None:
+        self.path = path
+        self._clock = time.time_ns() - time.monotonic_ns()
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file: BinaryIO = path.open("xb")
+        except FileExistsError:
+            raise RecordingError(
+                f"{path}: it exists; a recording is never overwritten; name another file"
+            ) from None
+        except OSError as error:
+            raise _unwritable(path, error) from None
+        self._writer = Writer(self._file, use_chunking=False, compression=CompressionType.NONE)
+        self._writer.start("tirebench", FORMAT)
+        self._writer.add_metadata("tirebench", header.as_text())
+        self._raw = self._writer.register_channel(RAW, "serial-v1", 0)
+        channel = self._writer.register_channel(CONDITIONS, "json", 0)
+        self._number = 0
+        text = json.dumps(conditions_document(conditions)).encode()
+        self._message(channel, text, time.monotonic_ns())
+
+    def raw(self, data: bytes, arrival: int) -> None:
+        """Write the bytes of one read; `arrival` is `time.monotonic_ns`."""
+        self._message(self._raw, data, arrival)
+
+    def _message(self, channel: int, data: bytes, arrival: int) -> None:
+        self._number += 1
+        try:
+            self._writer.add_message(
+                channel, arrival + self._clock, data, arrival, self._number % 2**32
+            )
+            self._file.flush()
+        except OSError as error:
+            raise _unwritable(self.path, error) from None
+
+    def close(self, reason: str) -> None:
+        """Finish the file; `reason` says why the run ended."""
+        if self._file.closed:
+            return
+        try:
+            self._writer.add_metadata("end", {"reason": reason})
+            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._file.close()
+        except OSError as error:
+            raise _unwritable(self.path, error) from None
+
+    def __enter__(self) -> "Recorder":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self.close("closed" if kind is None else kind.__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingHeader:
+    """What a recording says of itself.
+
+    Attributes
+    ----------
+    settings : dict
+        Options of the run, as JSON knows them.
+    device : str
+        Text of the device file; empty for the default device.
+    fmu : str
+        SHA-256 of the FMU file, hex.
+    wall_ns, monotonic_ns : int
+        The start on both clocks.
+    """
+
+    settings: dict[str, Any]
+    device: str = ""
+    fmu: str = ""
+    wall_ns: int = field(default_factory=time.time_ns)
+    monotonic_ns: int = field(default_factory=time.monotonic_ns)
+
+    def as_text(self) -> dict[str, str]:
+        """Return the header as MCAP metadata."""
+        return {
+            "format": FORMAT,
+            "settings": json.dumps(self.settings),
+            "device": self.device,
+            "fmu_sha256": self.fmu,
+            "wall_ns": str(self.wall_ns),
+            "monotonic_ns": str(self.monotonic_ns),
+        }
+
+
+class Recording:
+    """Read a recording, a damaged or unfinished one up to where it breaks off.
+
+    Attributes
+    ----------
+    header : RecordingHeader
+    conditions : Conditions
+    complete : bool or None
+        Whether the file has its end; None until all of it has been read.
+
+    Raises
+    ------
+    RecordingError
+        If the file cannot be read, is no recording, or of an unknown version.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.complete: bool | None = None
+        try:
+            self._file: BinaryIO = path.open("rb")
+        except OSError as error:
+            raise RecordingError(
+                f"{path}: it cannot be read ({error.strerror}); a recording of `tirebench run "
+                "--record` is needed; check the path"
+            ) from None
+        self._records = StreamReader(self._file, record_size_limit=LARGEST_RECORD).records
+        self._topics: dict[int, str] = {}
+        try:
+            self.header, self.conditions = self._open()
+        except RecordingError:
+            self.close()
+            raise
+
+    def _open(self) -> tuple[RecordingHeader, Conditions]:
+        """Read up to the conditions, which stand before all raw bytes."""
+        header: RecordingHeader | None = None
+        for record in self._sound():
+            if isinstance(record, Metadata) and record.name == "tirebench":
+                header = self._header(record.metadata)
+            elif isinstance(record, Message) and self._topics.get(record.channel_id) == CONDITIONS:
+                if header is None:
+                    break
+                return header, self._conditions(record.data)
+        raise RecordingError(
+            f"{self.path}: it has no header of a recording; a file of `tirebench run --record` is "
+            "needed; name one"
+        )
+
+    def raw(self) -> Iterator[tuple[int, bytes]]:
+        """Yield arrival [ns, monotonic] and bytes of each read, in order; once."""
+        for record in self._sound():
+            if isinstance(record, Message) and self._topics.get(record.channel_id) == RAW:
+                yield record.publish_time, record.data
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def _sound(self) -> Iterator[object]:
+        """Yield records up to the end of the file or the first that is broken."""
+        try:
+            for record in self._records:
+                if isinstance(record, Channel):
+                    self._topics[record.id] = record.topic
+                yield record
+            self.complete = True
+        except (McapError, ValueError, EOFError, OSError, LookupError) as error:
+            self.complete = False
+            self.damage = str(error) or type(error).__name__
+        except Exception as error:  # struct.error and whatever a damaged file provokes in mcap
+            self.complete = False
+            self.damage = str(error) or type(error).__name__
+
+    def _header(self, text: dict[str, str]) -> RecordingHeader:
+        if text.get("format") != FORMAT:
+            raise RecordingError(
+                f"{self.path}: format = {text.get('format')!r}; {FORMAT!r} is understood here; "
+                "take a program of that version"
+            )
+        try:
+            return RecordingHeader(
+                settings=dict(json.loads(text["settings"])),
+                device=text["device"],
+                fmu=text["fmu_sha256"],
+                wall_ns=int(text["wall_ns"]),
+                monotonic_ns=int(text["monotonic_ns"]),
+            )
+        except (KeyError, TypeError, ValueError) as error:
+            raise RecordingError(
+                f"{self.path}: the header is damaged ({error}); settings, device, fmu_sha256 and "
+                "both clocks are needed; take another recording"
+            ) from None
+
+    def _conditions(self, data: bytes) -> Conditions:
+        try:
+            return parse_conditions(json.loads(data), f"{self.path}: {CONDITIONS}")
+        except (ValueError, DeviceError) as error:
+            raise RecordingError(
+                f"{self.path}: the conditions are damaged ({error}); JSON is needed; "
+                "take another recording"
+            ) from None
+
+
+def _unwritable(path: Path, error: OSError) -> RecordingError:
+    return RecordingError(
+        f"{path}: it cannot be written ({error.strerror}); a place with room for 0.5 GB an hour "
+        "is needed; free space or name another file"
+    )

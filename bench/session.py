@@ -1,0 +1,142 @@
+"""One session at the bench: read a link, record, estimate, until something ends it."""
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from bench.chain import Chain, Turn
+from bench.deadline import Deadline
+from bench.errors import UnpluggedError
+from bench.links import Link
+from bench.recording import Recorder
+
+WAIT = 0.2
+"""The longest wait for bytes before the screen is looked after, [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """When a session ends by itself; None for never.
+
+    Attributes
+    ----------
+    duration : float or None, [s]
+        Since the session's start.
+    silence : float or None, [s]
+        Without a byte, after the first has come.
+    turns : int or None
+    """
+
+    duration: float | None = None
+    silence: float | None = None
+    turns: int | None = None
+
+
+@dataclass(slots=True)
+class Outcome:
+    """What a session brought.
+
+    Attributes
+    ----------
+    reason : str
+        ``end`` (of a recording), ``duration``, ``silence``, ``turns``, ``stopped``, ``unplugged``.
+    message : str
+        Of the port that went away.
+    turns : list of Turn
+    latency : deque of float, [s]
+        Arrival of the bytes that ended a turn to its estimate; the last 1000.
+    """
+
+    reason: str = "end"
+    message: str = ""
+    turns: list[Turn] = field(default_factory=list)
+    latency: deque[float] = field(default_factory=lambda: deque(maxlen=1000))
+
+
+class Session:
+    """Read, record, estimate.
+
+    Parameters
+    ----------
+    link : Link
+    chain : Chain
+    recorder : Recorder, optional
+        Gets every byte before it is decoded.
+    limits : Limits
+    watch : callable, optional
+        Called with the new turns after each read, an empty list included; for the screen.
+    """
+
+    def __init__(
+        self,
+        link: Link,
+        chain: Chain,
+        *,
+        recorder: Recorder | None = None,
+        limits: Limits | None = None,
+        watch: Callable[[list[Turn]], None] | None = None,
+    ) -> None:
+        self.outcome = Outcome()
+        self._link = link
+        self._chain = chain
+        self._recorder = recorder
+        self._limits = limits or Limits()
+        self._watch = watch
+        self._stopped = False
+
+    def stop(self) -> None:
+        """Ask the session to end; safe in a signal handler."""
+        self._stopped = True
+
+    def run(self) -> Outcome:
+        """Go on until a limit, the end of the link, or `stop`."""
+        limits, outcome = self._limits, self.outcome
+        end = Deadline.never() if limits.duration is None else Deadline.after(limits.duration)
+        last_byte: float | None = None
+        while True:
+            if self._stopped:
+                outcome.reason = "stopped"
+            elif end.expired:
+                outcome.reason = "duration"
+            elif limits.turns is not None and len(outcome.turns) >= limits.turns:
+                outcome.reason = "turns"
+            elif self._silent(last_byte):
+                outcome.reason = "silence"
+            else:
+                try:
+                    read = self._link.receive(end.sooner(WAIT))
+                except UnpluggedError as error:
+                    outcome.reason, outcome.message = "unplugged", str(error)
+                    break
+                if read is None:
+                    break
+                arrival, data = read
+                last_byte = time.monotonic() if data else last_byte
+                self._take(arrival, data)
+                continue
+            break
+        self._note(self._chain.finish())
+        return outcome
+
+    def _silent(self, last_byte: float | None) -> bool:
+        limit = self._limits.silence
+        if limit is None or last_byte is None:
+            return False
+        return time.monotonic() - last_byte > limit
+
+    def _take(self, arrival: int, data: bytes) -> None:
+        if not data:
+            self._note([])
+            return
+        if self._recorder is not None:
+            self._recorder.raw(data, arrival)
+        turns = self._chain.push(data)
+        if turns:
+            self.outcome.latency.append(1e-9 * (time.monotonic_ns() - arrival))
+        self._note(turns)
+
+    def _note(self, turns: list[Turn]) -> None:
+        self.outcome.turns.extend(turns)
+        if self._watch is not None:
+            self._watch(turns)

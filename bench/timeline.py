@@ -1,0 +1,238 @@
+"""Frames to an unbroken line of samples: sequence and device time make every loss visible.
+
+Device time decides. A short gap is filled with NaN samples, so that time goes on; after a gap that
+is too long to fill, a time reset, or a change of the sample period a new **segment** begins, and
+whatever follows must forget what came before. What comes again or late is dropped and counted.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.device import Device
+from bench.frames import GAGES, TICK, FrameFlag, Frames, select
+from tirelib.arrays import BoolArray, FloatArray, IntArray
+
+LONGEST_FILL = 1.0
+"""A gap up to this long is filled with NaN, [s]; a longer one begins a new segment."""
+LATE = 64
+"""A frame up to this many numbers back is late; further back, the transmitter restarted."""
+SEQ_RANGE = 2**16
+TIME_RANGE = 2**32
+
+
+@dataclass(slots=True)
+class TimelineCounts:
+    """What was lost and mended, in frames unless said otherwise.
+
+    Attributes
+    ----------
+    gaps, lost_frames, lost_samples : int
+        Places where something is missing; frames by sequence; samples by device time.
+    duplicates, out_of_order : int
+        Frames that came again, or late; they are dropped.
+    other_wheel : int
+        Good frames of a wheel that is not looked at.
+    resets : int
+        New segments after the first.
+    saturated : list of int
+        Samples of each gage at an end of its range.
+    low_battery, radio_loss : int
+        Frames with that flag.
+    """
+
+    gaps: int = 0
+    lost_frames: int = 0
+    lost_samples: int = 0
+    duplicates: int = 0
+    out_of_order: int = 0
+    other_wheel: int = 0
+    resets: int = 0
+    saturated: list[int] = field(default_factory=lambda: [0] * GAGES)
+    low_battery: int = 0
+    radio_loss: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Samples:
+    """Samples that follow each other without a gap in time.
+
+    Attributes
+    ----------
+    segment : int
+    reset : str
+        Why a new segment begins with this block; empty if it goes on.
+    start : int
+        Number of the first sample within the segment.
+    t_us : int, [us]
+        Device time of the first sample, unwrapped; it never goes back, not even when a device
+        clock that restarts does.
+    period : float, [s]
+    strain : array, shape (n, 5)
+        NaN where lost or saturated.
+    lost : bool array, shape (n,)
+        True where no frame brought the sample.
+    saturated : bool array, shape (n, 5)
+    """
+
+    segment: int
+    reset: str
+    start: int
+    t_us: int
+    period: float
+    strain: FloatArray
+    lost: BoolArray
+    saturated: BoolArray
+
+
+class Timeline:
+    """Put the frames of one wheel in line.
+
+    Parameters
+    ----------
+    device : Device
+        Counts to strain.
+    wheel : int, optional
+        Wheel to look at; by default that of the first frame.
+    """
+
+    def __init__(self, device: Device, wheel: int | None = None) -> None:
+        self.counts = TimelineCounts()
+        self.wheel = wheel
+        self._device = device
+        self._segment = -1
+        self._start = 0  # samples in the segment so far
+        self._seq = -1  # of the last frame
+        self._wire_time = 0  # t_us of the last frame, as sent
+        self._time = 0  # the same, unwrapped
+        self._samples = 0  # in the last frame
+        self._period = 0  # ticks
+        self._flagged = False  # last frame had the time-reset flag
+
+    def push(self, frames: Frames) -> list[Samples]:
+        """Take frames in the order of the wire and return what they add."""
+        if self.wheel is None and len(frames):
+            self.wheel = int(frames.wheel[0])
+        mine = frames.wheel == self.wheel
+        if not mine.all():
+            self.counts.other_wheel += int((~mine).sum())
+            frames = select(frames, mine)
+        blocks: list[Samples] = []
+        first = 0
+        while first < len(frames):
+            count = self._unbroken(frames, first)
+            if count:
+                rows = slice(first, first + count)
+                blocks.append(self._block(select(frames, rows), ""))
+                first += count
+            else:
+                blocks.extend(self._single(select(frames, slice(first, first + 1))))
+                first += 1
+        return blocks
+
+    def _unbroken(self, frames: Frames, first: int) -> int:
+        """Return the number of frames from `first` on that just continue what came before."""
+        if self._segment < 0:
+            return 0
+        part = slice(first, None)
+        seq = np.concatenate(([self._seq], frames.seq[part]))
+        sent = np.concatenate(([self._wire_time], frames.t_us[part]))
+        length = np.full(len(frames) - first, frames.samples)
+        length[0] = self._samples
+        ticks = _signed(np.diff(sent), TIME_RANGE) * 10 - length * self._period
+        going = (np.diff(seq) % SEQ_RANGE == 1) & (np.abs(ticks) * 2 < self._period)
+        going &= frames.period[part] == self._period
+        reset = (frames.flags[part] & int(FrameFlag.TIME_RESET)) != 0
+        if reset.any() or self._flagged:
+            before = np.concatenate(([self._flagged], reset[:-1]))
+            going &= ~reset | before
+        return int(going.size if going.all() else np.argmin(going))
+
+    def _single(self, frame: Frames) -> list[Samples]:
+        """Take one frame that does not simply continue: decide what happened."""
+        reset = bool(frame.flags[0] & int(FrameFlag.TIME_RESET)) and not self._flagged
+        if self._segment < 0:
+            return [self._begin(frame, "start")]
+        if reset:
+            return [self._begin(frame, "time_reset")]
+        if frame.period[0] != self._period:
+            return [self._begin(frame, "period_change")]
+        steps = int(_signed(frame.seq - self._seq, SEQ_RANGE)[0])
+        elapsed = int(_signed(frame.t_us - self._wire_time, TIME_RANGE)[0])
+        if steps == 0 and elapsed == 0:
+            self.counts.duplicates += 1
+            return []
+        if -LATE <= steps < 0 and elapsed < 0:
+            self.counts.out_of_order += 1
+            return []
+        missing = round(elapsed * 10 / self._period) - self._samples
+        if missing < 0:
+            return [self._begin(frame, "clock_back")]
+        self.counts.gaps += 1
+        self.counts.lost_frames += max((steps - 1) % SEQ_RANGE, 0)
+        self.counts.lost_samples += missing
+        if missing * self._period * TICK > LONGEST_FILL:
+            return [self._begin(frame, "long_gap")]
+        return [self._fill(missing), self._block(frame, "")]
+
+    def _begin(self, frame: Frames, why: str) -> Samples:
+        if self._segment < 0:
+            self._time = int(frame.t_us[0])
+        else:
+            self.counts.resets += 1
+            elapsed = int(_signed(frame.t_us - self._wire_time, TIME_RANGE)[0])
+            self._time += elapsed if elapsed > 0 else self._frame_time
+        self._segment += 1
+        self._start = 0
+        return self._block(frame, why)
+
+    @property
+    def _frame_time(self) -> int:
+        """Microseconds from the first sample of the last frame to the end of that frame."""
+        return round(self._samples * self._period / 10)
+
+    def _fill(self, missing: int) -> Samples:
+        time = self._time + self._frame_time
+        return self._samples_of(
+            np.full((missing, GAGES), np.nan),
+            np.ones(missing, np.bool_),
+            np.zeros((missing, GAGES), np.bool_),
+            time,
+            "",
+        )
+
+    def _block(self, frames: Frames, why: str) -> Samples:
+        """Join frames that follow each other, and remember the last one."""
+        if why:
+            time = self._time
+        else:
+            time = self._time + int(_signed(frames.t_us[:1] - self._wire_time, TIME_RANGE)[0])
+        self._period = int(frames.period[0])
+        strain, saturated = self._device.strain(frames.counts, frames.flags)
+        if saturated.any():
+            seen = saturated.sum(axis=0).tolist()
+            self.counts.saturated = [
+                a + b for a, b in zip(self.counts.saturated, seen, strict=True)
+            ]
+        self.counts.low_battery += int(((frames.flags & FrameFlag.LOW_BATTERY) != 0).sum())
+        self.counts.radio_loss += int(((frames.flags & FrameFlag.RADIO_LOSS) != 0).sum())
+        block = self._samples_of(strain, np.zeros(len(strain), np.bool_), saturated, time, why)
+        self._time = time + int(_signed(frames.t_us[-1:] - frames.t_us[0], TIME_RANGE)[0])
+        self._wire_time, self._seq = int(frames.t_us[-1]), int(frames.seq[-1])
+        self._samples = frames.samples
+        self._flagged = bool(frames.flags[-1] & int(FrameFlag.TIME_RESET))
+        return block
+
+    def _samples_of(
+        self, strain: FloatArray, lost: BoolArray, saturated: BoolArray, time: int, why: str
+    ) -> Samples:
+        block = Samples(self._segment, why, self._start, time, self._period * TICK,
+                        strain, lost, saturated)  # fmt: skip
+        self._start += len(strain)
+        return block
+
+
+def _signed(difference: npt.NDArray[np.int64], span: int) -> IntArray:
+    """Return differences of wrapping counters as signed numbers."""
+    return np.asarray((difference + span // 2) % span - span // 2, dtype=np.int64)

@@ -1,0 +1,96 @@
+"""An FMU file through FMPy: any number of samples a step, fresh starts, errors with a cause."""
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bench.chain import Chain
+from bench.conditions import Conditions
+from bench.device import Device
+from bench.emulator import write_script
+from bench.errors import FmuError
+from bench.faults import Faults
+from bench.fmu_archive import read_fmu
+from bench.fmu_model import FmuModel
+from tests.bench.campaigns import tiny_runs
+
+STEADY = Conditions.constant(18.0, 2.3e5, 0.0)
+
+
+def turns(path: Path, conditions: Conditions = STEADY) -> list[tuple[float, ...]]:
+    script = write_script(tiny_runs(), Device(), Faults({}))
+    with FmuModel(read_fmu(path)) as model:
+        chain = Chain(model, Device(), conditions)
+        found = [*chain.push(b"".join(script.frames)), *chain.finish()]
+    return [(turn.segment, turn.t, turn.ready, turn.outputs["Fz"]) for turn in found]
+
+
+def test_the_samples_a_step_are_those_of_the_file(toy_fmus: dict[int, Path]) -> None:
+    for samples, path in toy_fmus.items():
+        with FmuModel(read_fmu(path)) as model:
+            assert model.samples == samples
+
+
+def test_estimates_are_the_same_with_any_samples_a_step(toy_fmus: dict[int, Path]) -> None:
+    first = turns(toy_fmus[16])
+    assert len(first) >= 15
+    for samples in (1, 10):
+        np.testing.assert_allclose(turns(toy_fmus[samples]), first, rtol=1e-9)
+
+
+def test_a_fresh_start_forgets(toy_fmus: dict[int, Path]) -> None:
+    strain = np.tile(np.linspace(0.0, 0.01, 16)[:, None], (1, 5))
+    with FmuModel(read_fmu(toy_fmus[16])) as model:
+        seen = []
+        for _ in range(2):
+            model.start(1e-4)
+            steps = [model.step(strain, (18.0, 2.3e5, 0.0), True) for _ in range(3)]
+            seen.append([None if out is None else (out[0]["turn"], out[0]["age"]) for out in steps])
+    assert seen[0] == seen[1]
+    assert seen[0][0] is not None
+
+
+def test_an_error_of_the_fmu_names_its_cause(toy_fmus: dict[int, Path]) -> None:
+    with pytest.raises(
+        FmuError, match=r"(?s)failed in a step .*speed is negative; it must be above"
+    ):
+        turns(toy_fmus[16], Conditions.constant(-1.0))
+
+
+def test_the_unpacked_files_are_removed(toy_fmus: dict[int, Path]) -> None:
+    model = FmuModel(read_fmu(toy_fmus[16]))
+    folder = Path(model._folder.name)
+    assert folder.is_dir()
+    model.close()
+    model.close()
+    assert not folder.exists()
+
+
+def edited(source: Path, path: Path, old: str, new: str) -> Path:
+    """Return a copy of an FMU with another description."""
+    with zipfile.ZipFile(source) as old_file, zipfile.ZipFile(path, "w") as new_file:
+        for name in old_file.namelist():
+            content = old_file.read(name)
+            if name == "modelDescription.xml":
+                content = content.replace(old.encode(), new.encode())
+            new_file.writestr(name, content)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('name="strain_3_2"', 'name="other"', r"strain_3_2 are missing; .* StrainTire.fmu"),
+        ('name="age"', 'name="old"', r"age are missing"),
+        ("<fmiModelDescription", "<fmiModel", r"cannot be loaded"),
+        ('modelIdentifier="', 'modelIdentifier="x', r"cannot be loaded"),
+    ],
+)
+def test_another_fmu_is_refused(
+    toy_fmus: dict[int, Path], tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    path = edited(toy_fmus[16], tmp_path / "x.fmu", old, new)
+    with pytest.raises(FmuError, match=message):
+        FmuModel(read_fmu(path))

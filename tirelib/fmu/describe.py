@@ -1,0 +1,129 @@
+"""What pythonfmu leaves out of ``modelDescription.xml``: units, limits, unknowns at the start.
+
+Also the page that a user of the FMU sees first, and a zip whose bytes depend on its content alone.
+"""
+
+import html
+import math
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from xml.etree import ElementTree as Xml
+
+from tirelib.fmu.variables import Variable
+
+UNITS: Mapping[str, tuple[dict[str, str], dict[str, float]]] = {
+    "1": ({}, {"ustrain": 1e6, "%": 1e2}),
+    "N": ({"kg": "1", "m": "1", "s": "-2"}, {"kN": 1e-3}),
+    "rad": ({"rad": "1"}, {"deg": 180.0 / math.pi}),
+    "m": ({"m": "1"}, {"mm": 1e3}),
+    "m/s": ({"m": "1", "s": "-1"}, {"km/h": 3.6}),
+    "Pa": ({"kg": "1", "m": "-1", "s": "-2"}, {"bar": 1e-5}),
+    "rad/s": ({"rad": "1", "s": "-1"}, {"rpm": 30.0 / math.pi}),
+    "s": ({"s": "1"}, {"ms": 1e3}),
+    "Hz": ({"s": "-1"}, {"kHz": 1e-3}),
+}
+"""Exponents of the base units, and factors of the display units, of every unit in use."""
+EPOCH = (2000, 1, 1, 0, 0, 0)
+"""Time of every file in the zip, so that the same content has the same bytes."""
+
+
+def described(source: bytes, table: Sequence[Variable]) -> bytes:
+    """Return a model description with units, limits and unknowns added.
+
+    Parameters
+    ----------
+    source : bytes
+        What pythonfmu wrote.
+    table : sequence of Variable
+        In the order of the scalar variables.
+    """
+    root = Xml.fromstring(source)
+    root.attrib.pop("generationDateAndTime", None)
+    simulation = root.find("CoSimulation")
+    scalars = root.find("ModelVariables")
+    structure = root.find("ModelStructure")
+    if simulation is None or scalars is None or structure is None:
+        raise ValueError("pythonfmu wrote no CoSimulation, ModelVariables or ModelStructure")
+    root.insert(list(root).index(simulation) + 1, _unit_definitions())
+    unknown = Xml.SubElement(structure, "InitialUnknowns")
+    for number, (scalar, variable) in enumerate(zip(scalars, table, strict=True), start=1):
+        _describe(scalar, variable)
+        if variable.causality == "output":
+            Xml.SubElement(unknown, "Unknown", {"index": str(number), "dependencies": ""})
+    Xml.indent(root)
+    return Xml.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"
+
+
+def _describe(scalar: Xml.Element, variable: Variable) -> None:
+    if scalar.get("name") != variable.name:
+        raise ValueError(f"variable {scalar.get('name')!r} stands where {variable.name!r} should")
+    kind = scalar.find(variable.kind)
+    if kind is None:
+        raise ValueError(f"{variable.name} is not of type {variable.kind}")
+    if kind.get("start") == "nan":
+        kind.set("start", "NaN")
+    if variable.causality == "output":
+        kind.attrib.pop("start", None)
+    optional = {
+        "unit": variable.unit,
+        "displayUnit": variable.display,
+        "min": variable.low,
+        "max": variable.high,
+        "nominal": variable.nominal,
+    }
+    for name, value in optional.items():
+        if value is not None:
+            kind.set(name, value if isinstance(value, str) else f"{value:.16g}")
+
+
+def _unit_definitions() -> Xml.Element:
+    definitions = Xml.Element("UnitDefinitions")
+    for name, (base, displays) in UNITS.items():
+        unit = Xml.SubElement(definitions, "Unit", {"name": name})
+        Xml.SubElement(unit, "BaseUnit", base)
+        for display, factor in displays.items():
+            Xml.SubElement(unit, "DisplayUnit", {"name": display, "factor": f"{factor:.16g}"})
+    return definitions
+
+
+def page(title: str, facts: Mapping[str, str], table: Sequence[Variable]) -> str:
+    """Return ``documentation/index.html``: what the FMU holds and what its variables mean."""
+    rows = "\n".join(
+        "<tr>"
+        + "".join(
+            f"<td>{html.escape(text)}</td>"
+            for text in (v.name, v.causality, v.kind, v.unit or "", v.display or "", v.description)
+        )
+        + "</tr>"
+        for v in table
+    )
+    given = "\n".join(
+        f"<dt>{html.escape(name)}</dt><dd>{html.escape(text)}</dd>" for name, text in facts.items()
+    )
+    head = "".join(
+        f"<th>{name}</th>" for name in ("name", "causality", "type", "unit", "shown in", "meaning")
+    )
+    return (
+        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
+        "</head><body>\n"
+        f"<h1>{title}</h1>\n<dl>\n{given}\n</dl>\n<table>\n<tr>{head}</tr>\n{rows}\n</table>\n"
+        "</body></html>\n"
+    )
+
+
+def repack(source: Path, target: Path, replaced: Mapping[str, bytes]) -> None:
+    """Write a zip again, sorted, compressed and without times, with some files replaced or added.
+
+    The model description comes first, where importers look for it.
+    """
+    with zipfile.ZipFile(source) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    files |= replaced
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+        for name in sorted(files, key=lambda name: (name != "modelDescription.xml", name)):
+            entry = zipfile.ZipInfo(name, EPOCH)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, files[name])

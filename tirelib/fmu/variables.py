@@ -1,0 +1,112 @@
+"""The variables of ``StrainTire.fmu``: one ordered table. Value references follow its order."""
+
+import math
+from dataclasses import dataclass
+
+from tirelib.estimators.chain import QUANTITIES
+
+NAN = math.nan
+UNITS = {"Fz": "N", "alpha": "rad", "kappa": "1", "Fy": "N"}
+DISPLAY = {"Fz": None, "alpha": "deg", "kappa": "%", "Fy": None}
+MEANING = {"Fz": "vertical load", "alpha": "slip angle", "kappa": "slip ratio",
+           "Fy": "lateral force"}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """One scalar variable.
+
+    `kind` is ``Real``, ``Integer``, ``Boolean`` or ``String``; `causality` ``parameter``, ``input``
+    or ``output``. Only a Real has units; its value is in `unit`, tools may show `display`.
+    """
+
+    name: str
+    kind: str
+    causality: str
+    description: str
+    start: float | int | bool | str
+    unit: str | None = None
+    display: str | None = None
+    nominal: float | None = None
+    low: float | None = None
+    high: float | None = None
+
+
+def parameters(sample_rate: float, limits: tuple[float, float]) -> list[Variable]:
+    """Return the parameters, fixed after initialisation."""
+    return [
+        Variable("sample_rate", "Real", "parameter", "sample rate of the gages", sample_rate,
+                 "Hz", low=limits[0], high=limits[1]),
+        Variable("axes", "String", "parameter",
+                 "axis system of outputs and gage order: iso, sae or adapted_sae", "iso"),
+        Variable("calibration", "String", "parameter",
+                 "path of another calibration of the same gage layout; empty: the embedded one",
+                 ""),
+    ]  # fmt: skip
+
+
+def inputs(lateral: tuple[float, ...], samples: int) -> list[Variable]:
+    """Return the inputs: strain sample by sample, oldest first, then the conditions."""
+    table = []
+    for sample in range(1, samples + 1):
+        for gage, y in enumerate(lateral, start=1):
+            name = f"strain_{gage}" if samples == 1 else f"strain_{sample}_{gage}"
+            which = "" if samples == 1 else f", sample {sample} of {samples}, oldest first"
+            text = f"raw strain at lateral position {1e3 * y:+g} mm of the chosen axes{which}"
+            table.append(
+                Variable(name, "Real", "input", f"{text}; NaN: missing", 0.0, "1", "ustrain", 1e-3)
+            )
+    return [
+        *table,
+        Variable("speed", "Real", "input", "travel speed; NaN: unknown", NAN, "m/s", "km/h", 10.0),
+        Variable("pressure", "Real", "input", "inflation pressure (gauge); NaN: unknown", NAN,
+                 "Pa", "bar", 1e5),
+        Variable("camber", "Real", "input", "camber angle; NaN: unknown", NAN, "rad", "deg", 0.1),
+        Variable("omega", "Real", "input",
+                 "measured turn rate, for the watchdog only (zero: standing); NaN: unknown", NAN,
+                 "rad/s", "rpm", 10.0),
+        Variable("frame_valid", "Boolean", "input",
+                 "false: the frame was lost or damaged, its samples are missing", True),
+    ]  # fmt: skip
+
+
+def outputs(lateral: tuple[float, ...]) -> list[Variable]:
+    """Return the outputs: what `Wheel.outputs` gives, in its order."""
+    nominal = {"Fz": 1e3, "alpha": 0.1, "kappa": 0.1, "Fy": 1e3}
+    table = [
+        Variable(q, "Real", "output", f"{MEANING[q]}; NaN: not to be had", NAN, UNITS[q],
+                 DISPLAY[q], nominal[q])
+        for q in QUANTITIES
+    ]  # fmt: skip
+    table += [
+        Variable(f"{q}_std", "Real", "output", f"standard deviation of {q}", NAN, UNITS[q],
+                 DISPLAY[q], 0.01 * nominal[q])
+        for q in QUANTITIES
+    ]  # fmt: skip
+    table += [
+        Variable(f"contact_length_{gage}", "Real", "output",
+                 f"contact length at lateral position {1e3 * y:+g} mm of the chosen axes", NAN,
+                 "m", "mm", 0.1)
+        for gage, y in enumerate(lateral, start=1)
+    ]  # fmt: skip
+    return [
+        *table,
+        Variable("rolling_radius", "Real", "output", "effective rolling radius", NAN, "m", "mm",
+                 0.3),
+        Variable("turn_rate", "Real", "output", "turn rate from the strain's contacts", NAN,
+                 "rad/s", "rpm", 10.0),
+        Variable("contact_time", "Real", "output",
+                 "middle of the contact, since the start of the first sample", NAN, "s", "ms", 1.0),
+        Variable("age", "Real", "output", "time since the estimate was made", NAN, "s", "ms", 0.1),
+        Variable("turn", "Integer", "output", "number of contacts since the start", 0),
+        Variable("flags", "Integer", "output", "sum of flag bits (tirelib.flags.TurnFlag)", 1),
+        Variable("valid", "Boolean", "output",
+                 "every calibrated quantity may be used now", False),
+        *(
+            Variable(f"{q}_valid", "Boolean", "output", f"{q} may be used now", False)
+            for q in QUANTITIES
+        ),
+        Variable("rolling", "String", "output", "free, braking, driving or unknown", "unknown"),
+        Variable("status", "String", "output", "names of the flags and notes, by semicolons",
+                 "first_turn"),
+    ]  # fmt: skip

@@ -1,0 +1,191 @@
+"""The report of a calibration: statistics, residuals, cross-validation, and what is missing."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tirelib.errors import CalibrationError
+from tirelib.estimators.cornering import CorneringTrend
+from tirelib.estimators.train import Trained
+from tirelib.report import figures
+from tirelib.report.accuracy import QUANTITIES, TITLE
+from tirelib.report.estimate import write_estimate_report
+from tirelib.report.page import Drawing, Section, draw_all, number, write_page
+from tirelib.report.statistics import (
+    estimator_tables,
+    held_out_table,
+    in_use_table,
+    refused_table,
+    regression_tables,
+)
+
+
+def write_calibration_report(
+    trained: Trained,
+    folder: str | Path,
+    *,
+    held_out: Sequence[Mapping[str, Any]] = (),
+    title: str | None = None,
+) -> Path:
+    """Write ``index.html`` and its figures.
+
+    Parameters
+    ----------
+    trained : Trained
+    folder : path
+        Made if needed; an earlier report in it is overwritten.
+    held_out : sequence of mappings
+        Cross-validation by level: ``held_out, level, quantity, unit, dissertation, in_use`` and
+        optionally ``inside, n``.
+    title : str, optional
+
+    Returns
+    -------
+    page : Path
+        The ``index.html``.
+    """
+    folder = Path(folder)
+    calibration = trained.calibration
+    sections = [
+        Section(
+            "Estimators in use",
+            "in-use",
+            "Each estimate is a polynomial in a few regressors, its terms chosen by leaving "
+            "conditions out.",
+            [in_use_table(trained), *estimator_tables(trained)],
+        ),
+        Section(
+            "Residuals",
+            "residuals",
+            "Each point is one independent measurement (a run, or a turn of a sweep), estimated by "
+            "a fit that had not seen its condition. Below: the dissertation's regression.",
+            pictures=draw_all(folder, _residuals(trained)),
+        ),
+    ]
+    if held_out:
+        sections.append(
+            Section("Levels held out", "held-out", tables=[held_out_table(list(held_out))])
+        )
+    sections.append(
+        Section(
+            "The dissertation's regressions",
+            "regressions",
+            "Ordinary least squares on run means, as in section 4.1 of the dissertation. Lengths "
+            "in mm, strains in microstrain, forces in N, angles in deg, signs ISO 8855 (the "
+            "dissertation prints SAE: Fy, slip angle and left and right change sign).",
+            regression_tables(trained.regressions),
+            draw_all(folder, regression_drawings(trained)),
+        )
+    )
+    if trained.links.refused:
+        sections.append(Section("Not calibrated", "refused", tables=[refused_table(trained)]))
+    return write_page(
+        folder,
+        "calibration.html",
+        title=title or f"Calibration: {calibration.tire}",
+        tire=calibration.tire,
+        gages=", ".join(number(1e3 * y, 3) for y in calibration.lateral),
+        measurements=trained.links.unit.size,
+        conditions=np.unique(trained.links.groups).size,
+        low_pass=f"{number(calibration.cut_off)} Hz"
+        if calibration.cut_off
+        else f"order {number(calibration.order)} of the turn rate",
+        sections=sections,
+    )
+
+
+def _residuals(trained: Trained) -> list[Drawing]:
+    return [
+        Drawing(
+            f"residuals_{quantity}",
+            f"Residuals of the {TITLE[quantity]}",
+            "Over the estimate, the load and the slip angle; right: against a normal law. Each row "
+            "has its own scale.",
+            lambda quantity=quantity: figures.figure_residuals(trained, quantity),  # type: ignore[misc]
+        )
+        for quantity in QUANTITIES
+        if quantity in trained.links.held_out
+    ]
+
+
+def regression_drawings(trained: Trained) -> list[Drawing]:
+    """Return the figures of section 4.1 that a calibration's data can inform."""
+    means = trained.means
+    drawings = [
+        Drawing(
+            "figure_4_3",
+            "Contact length over slip angle (Fig. 4-3)",
+            "The off-centre lengths follow the slip angle, the centre one hardly: it tells load.",
+            lambda: figures.figure_4_3(means),
+        ),
+        Drawing(
+            "figure_4_4",
+            "Load from the centre contact length (Fig. 4-4)",
+            "Left the quadratic, middle its residuals, right the held-out residuals of the "
+            "estimator in use on the same scale.",
+            lambda: figures.figure_4_4(trained),
+        ),
+        Drawing(
+            "figure_4_5",
+            "Slip angle from the in/out ratio of peak rates (Fig. 4-5)",
+            "Thin lines are fits to one load each: the ratio depends on the load, too.",
+            lambda: figures.figure_4_5(trained),
+        ),
+        Drawing(
+            "figure_4_7",
+            "Slip angle from the slope of peak rates (Fig. 4-7)",
+            "Thin lines are fits to one load each. Right: the estimator in use, held out, on the "
+            "same scale.",
+            lambda: figures.figure_4_7(trained),
+        ),
+        Drawing(
+            "figure_4_12",
+            "Lateral force by load (Fig. 4-12)",
+            "Left six regressors, right the estimator in use, held out; below their residuals.",
+            lambda: figures.figure_4_12(trained),
+        ),
+    ]
+    if any(r.source == "Table 4-2" for r in trained.regressions):
+        drawings.append(
+            Drawing(
+                "figure_4_14",
+                "Lateral force under camber (Fig. 4-14)",
+                "Six regressors refitted at each camber, one fit for all, the estimator in use.",
+                lambda: figures.figure_4_14(trained),
+            )
+        )
+    trend = trained.cornering
+    drawings.append(
+        Drawing(
+            "figure_4_20",
+            "Cornering curves (Fig. 4-20)",
+            "Run means and the Magic Formula through them.",
+            lambda: figures.figure_4_20(means, _needed(trend)),
+        )
+    )
+    drawings.append(
+        Drawing(
+            "figure_4_23",
+            "Cornering stiffness and peak force over contact length (Fig. 4-23)",
+            "Bars are 95 % intervals; a hollow ring is a peak that the slip angles did not reach.",
+            lambda: figures.figure_4_23(_needed(trend)),
+        )
+    )
+    return drawings
+
+
+def _needed(trend: CorneringTrend | None) -> CorneringTrend:
+    if trend is None:
+        raise CalibrationError(
+            "the figure needs three loads with at least six slip angles each, without camber"
+        )
+    return trend
+
+
+__all__ = [
+    "regression_drawings",
+    "write_calibration_report",
+    "write_estimate_report",
+]

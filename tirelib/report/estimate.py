@@ -1,0 +1,133 @@
+"""The report of a campaign that was estimated with a calibration."""
+
+from pathlib import Path
+
+from tirelib.estimators.calibration import Calibration, Estimates
+from tirelib.flags import flag_names
+from tirelib.observations import Observations
+from tirelib.report import figures
+from tirelib.report.accuracy import QUANTITIES, TITLE, Accuracy, accuracies
+from tirelib.report.page import DASH, Drawing, Section, Table, draw_all, number, write_page
+
+
+def write_estimate_report(
+    observations: Observations,
+    estimates: Estimates,
+    calibration: Calibration,
+    folder: str | Path,
+    *,
+    title: str | None = None,
+) -> Path:
+    """Write ``index.html`` and its figures; return the page."""
+    folder = Path(folder)
+    names = ", ".join(header.name for header in observations.headers)
+    rows = accuracies(observations, estimates)
+    drawings = []
+    if rows:
+        drawings.append(
+            Drawing(
+                "accuracy",
+                "Estimated against measured, turn by turn",
+                "Above the agreement, below the residual with its 95 % interval.",
+                lambda: figures.figure_accuracy(observations, estimates),
+            )
+        )
+    if any(row.quantity == "alpha" for row in rows):
+        drawings.append(
+            Drawing(
+                "figure_4_8",
+                "Slip angle turn after turn (Fig. 4-8)",
+                "Steps are measured, dots are estimated; each load for itself.",
+                lambda: figures.figure_4_8(observations, estimates),
+            )
+        )
+    sections = [
+        Section(
+            "Accuracy",
+            "accuracy",
+            "" if rows else "The campaign holds no measurement to compare with.",
+            [accuracy_table(rows)] if rows else [],
+            draw_all(folder, drawings),
+        ),
+        Section(
+            "Validity",
+            "validity",
+            "A turn that was not measured well, or that lies outside the calibrated range, gets a "
+            "flag and no valid estimate; nothing is clamped.",
+            [_validity(estimates, calibration), _flags(estimates)],
+        ),
+    ]
+    return write_page(
+        folder,
+        "estimate.html",
+        title=title or f"Estimates: {names}",
+        tire=calibration.tire,
+        campaigns=names,
+        gages=", ".join(number(1e3 * y, 3) for y in calibration.lateral),
+        turns=len(observations),
+        valid=int(estimates.turn_valid.sum()),
+        sections=sections,
+    )
+
+
+def accuracy_table(
+    rows: list[Accuracy], title: str = "Accuracy against the rig", names: list[str] | None = None
+) -> Table:
+    """Return the accuracy table; `names` adds a first column, the campaign of each row."""
+    columns = [
+        "quantity", "unit", "rmse", "% of range", "R\u00b2", "turns in 95 % interval", "runs",
+        "valid turns", "measured turns",
+    ]  # fmt: skip
+    cells = [
+        [
+            row.title,
+            row.unit,
+            number(row.rmse),
+            f"{row.percent_of_range:.2f}" if row.percent_of_range == row.percent_of_range else DASH,
+            f"{row.r2:.5f}" if row.r2 == row.r2 else DASH,
+            f"{100.0 * row.coverage:.0f} %",
+            str(row.runs),
+            str(row.turns),
+            str(row.turns_measured),
+        ]
+        for row in rows
+    ]
+    if names is not None:
+        columns = ["campaign", *columns]
+        cells = [[name, *row] for name, row in zip(names, cells, strict=True)]
+    return Table(
+        title,
+        columns,
+        cells,
+        texts=2 if names is None else 3,
+        note="Errors are of the mean of a run's valid turns (of each turn in a sweep); the share "
+        "in the 95 % interval is of single turns. A dash: the quantity was not varied, a share of "
+        "its range says nothing.",
+    )
+
+
+def _validity(estimates: Estimates, calibration: Calibration) -> Table:
+    chain = calibration.chains[-1]
+    total = estimates.turn_valid.size
+    return Table(
+        "Valid turns",
+        ("quantity", "valid turns", "of"),
+        [
+            (TITLE[q], str(int(estimates.valid[q].sum())) if chain.has(q) else "not calibrated",
+             str(total))
+            for q in QUANTITIES
+        ],
+    )  # fmt: skip
+
+
+def _flags(estimates: Estimates) -> Table:
+    counts: dict[str, int] = {}
+    for value, notes in zip(estimates.flags, estimates.notes, strict=True):
+        for name in (*flag_names(int(value)), *notes):
+            counts[name] = counts.get(name, 0) + 1
+    ordered = sorted(counts.items(), key=lambda item: -item[1])
+    return Table(
+        "Flags and notes",
+        ("flag", "turns"),
+        [(name.replace("_", " "), str(count)) for name, count in ordered] or [("none", "0")],
+    )

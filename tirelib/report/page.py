@@ -1,0 +1,139 @@
+"""Self-contained pages: tables, figures, and the templates that hold them."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from matplotlib.figure import Figure
+
+from tirelib import __version__
+from tirelib.errors import TirelibError
+from tirelib.report.style import AXES_NAME, save
+
+DASH = "\N{EN DASH}"
+MINUS = "\N{MINUS SIGN}"
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table of finished cells; the first `texts` columns are words, the rest numbers."""
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    texts: int = 1
+    note: str = ""
+    folded: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """A figure still to be drawn: file name, title, what to see in it, and how to draw it."""
+
+    name: str
+    title: str
+    caption: str
+    draw: Callable[[], Figure]
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A figure on disk; `reason` says why there is none."""
+
+    name: str
+    title: str
+    caption: str
+    file: str = ""
+    vector: str = ""
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A part of a page."""
+
+    title: str
+    anchor: str
+    text: str = ""
+    tables: Sequence[Table] = ()
+    pictures: Sequence[Picture] = field(default_factory=tuple)
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """Say a number with so many significant digits; a dash where there is none.
+
+    Examples
+    --------
+    >>> number(1234.567), number(0.000012345, 3), number(float("nan")), number(-2.0)
+    ('1235', '1.23e-05', '\N{EN DASH}', '\N{MINUS SIGN}2')
+    """
+    if value is None or not math.isfinite(value):
+        return DASH
+    size = abs(value)
+    if value == 0.0:
+        return "0"
+    if size < 1e-4 or size >= 1e7:
+        return (
+            f"{value:.{digits - 1}e}".replace("-", MINUS, 1)
+            if value < 0
+            else (f"{value:.{digits - 1}e}")
+        )
+    decimals = max(0, digits - 1 - math.floor(math.log10(size)))
+    text = f"{value:.{decimals}f}"
+    if "." in text:
+        text = text.rstrip("0").rstrip(".")
+    return text.replace("-", MINUS)
+
+
+def p_value(value: float) -> str:
+    """Say a p-value as statistics tables do.
+
+    Examples
+    --------
+    >>> p_value(0.0004), p_value(0.0123)
+    ('< 0.001', '0.012')
+    """
+    return "< 0.001" if value < 0.001 else f"{value:.3f}"
+
+
+def draw_all(folder: Path, drawings: Sequence[Drawing]) -> list[Picture]:
+    """Draw figures into a folder; one that the data cannot inform is kept with the reason."""
+    pictures = []
+    for drawing in drawings:
+        try:
+            figure = drawing.draw()
+        except TirelibError as error:
+            pictures.append(
+                Picture(drawing.name, drawing.title, drawing.caption, reason=str(error))
+            )
+            continue
+        file = save(figure, folder / "figures", drawing.name)
+        pictures.append(
+            Picture(
+                drawing.name,
+                drawing.title,
+                drawing.caption,
+                file=f"figures/{file}",
+                vector=f"figures/{drawing.name}.svg",
+            )
+        )
+    return pictures
+
+
+def write_page(folder: Path, template: str, **content: Any) -> Path:
+    """Fill a template and write it as ``index.html`` of the folder."""
+    environment = Environment(
+        loader=PackageLoader("tirelib.report", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    text = environment.get_template(template).render(axes=AXES_NAME, version=__version__, **content)
+    folder.mkdir(parents=True, exist_ok=True)
+    page = folder / "index.html"
+    page.write_text(text, encoding="utf-8")
+    return page

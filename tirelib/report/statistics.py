@@ -1,0 +1,246 @@
+"""Statistics of a calibration as tables: the dissertation's regressions and those in use."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from tirelib.estimators.dissertation import Regression
+from tirelib.estimators.polynomial import Polynomial
+from tirelib.estimators.train import Trained
+from tirelib.report.accuracy import FACTOR, QUANTITIES, TITLE, UNIT
+from tirelib.report.figures.regression import in_use, rms
+from tirelib.report.page import DASH, Table, number, p_value
+
+SMALL_ANGLE = 5.5
+"""Slip angle, [deg], up to which the dissertation regresses."""
+REGRESSOR_UNIT = {
+    "contact_angle": "rad",
+    "angle_slope": "rad",
+    "load": "N",
+    "pressure": "Pa",
+    "speed_squared": "m2/s2",
+    "camber": "rad",
+}
+"""SI units of regressors; the others are ratios."""
+
+
+def regression_tables(regressions: Sequence[Regression]) -> list[Table]:
+    """Return Table 4-1 of every regression, and the cambers side by side as in Table 4-2."""
+    single = [r for r in regressions if r.source != "Table 4-2"]
+    cambers = [r for r in regressions if r.source == "Table 4-2"]
+    tables = [_one_regression(regression) for regression in single]
+    return [*tables, _side_by_side(cambers)] if cambers else tables
+
+
+def _summary(regression: Regression) -> str:
+    return (
+        f"R\u00b2 = {100.0 * regression.r2:.2f} %, rmse = {number(regression.rmse)} "
+        f"{regression.unit}, cross-validated = {number(regression.cross_validated)} "
+        f"{regression.unit}, n = {regression.measured.size}"
+    )
+
+
+def _one_regression(regression: Regression) -> Table:
+    return Table(
+        title=f"{regression.name} ({regression.source})",
+        columns=("term", "coefficient", "std error", "p value"),
+        rows=[
+            (
+                term.name,
+                number(term.coefficient, 5),
+                number(term.std_error, 3),
+                p_value(term.p_value),
+            )
+            for term in regression.terms
+        ],
+        note=_summary(regression),
+    )
+
+
+def _side_by_side(regressions: Sequence[Regression]) -> Table:
+    """Coefficients and p-values of the same terms at several cambers."""
+    levels = [regression.name.split("camber ")[-1] for regression in regressions]
+    levels = ["0 deg" if level in ("-0 deg", "+0 deg") else level for level in levels]
+    columns = ["term"]
+    for what in ("coefficient", "std error", "p value"):
+        columns += [f"{what}, {level}" for level in levels]
+    rows = []
+    for i, term in enumerate(regressions[0].terms):
+        terms = [regression.terms[i] for regression in regressions]
+        rows.append(
+            [
+                term.name,
+                *[number(t.coefficient, 5) for t in terms],
+                *[number(t.std_error, 3) for t in terms],
+                *[p_value(t.p_value) for t in terms],
+            ]
+        )
+    note = "; ".join(
+        f"{level}: {_summary(r)}" for level, r in zip(levels, regressions, strict=True)
+    )
+    return Table("Fy from six regressors at each camber (Table 4-2)", columns, rows, note=note)
+
+
+def models(trained: Trained) -> dict[str, Polynomial]:
+    """Return the polynomial of each calibrated quantity (for kappa: of the rolling radius)."""
+    chain = trained.calibration.chains[-1]
+    found = {
+        "Fz": chain.load,
+        "alpha": chain.angle.polynomial if chain.angle else None,
+        "kappa": chain.radius,
+        "Fy": chain.force,
+    }
+    return {quantity: model for quantity, model in found.items() if model is not None}
+
+
+def in_use_table(trained: Trained) -> Table:
+    """Return one row per quantity: held-out error, R2, terms, and the dissertation's beside it."""
+    rows = []
+    for quantity in QUANTITIES:
+        held = in_use(trained, quantity)
+        model = models(trained).get(quantity)
+        if held is None or model is None:
+            continue
+        measured, estimated = held
+        error = measured - estimated
+        small = np.abs(np.rad2deg(trained.links.truth["slip_angle"])) <= SMALL_ANGLE
+        spread = float(np.sum((measured - measured.mean()) ** 2))
+        r2 = 1.0 - float(np.sum(error**2)) / spread if spread > 0.0 else float("nan")
+        old = [r.cross_validated for r in trained.regressions if _same(r, quantity)]
+        rows.append(
+            (
+                TITLE[quantity],
+                UNIT[quantity],
+                number(rms(error)),
+                number(rms(error[small])) if quantity == "alpha" else DASH,
+                number(min(old)) if old else DASH,
+                f"{r2:.5f}",
+                str(error.size),
+                str(len(model.terms)),
+            )
+        )
+    return Table(
+        "Estimators in use: errors at conditions that the fit had not seen",
+        (
+            "quantity", "unit", "held out", f"up to {SMALL_ANGLE} deg", "dissertation, held out",
+            "R\u00b2", "measurements", "terms",
+        ),
+        rows,
+        texts=2,
+        note="Held out: one condition after the other is left out of the fit and then estimated. "
+        "The dissertation's column is the best of its own regressions of the quantity, on the same "
+        f"data up to {SMALL_ANGLE} deg of slip angle.",
+    )  # fmt: skip
+
+
+def _same(regression: Regression, quantity: str) -> bool:
+    return regression.quantity == quantity and regression.source != "Table 4-2"
+
+
+def estimator_tables(trained: Trained) -> list[Table]:
+    """Return coefficients, regressors and candidates of every estimator in use, folded."""
+    tables = []
+    for quantity, model in models(trained).items():
+        name, unit, factor = TITLE[quantity], UNIT[quantity], FACTOR[quantity]
+        if quantity == "kappa":
+            name, unit, factor = "effective rolling radius (for the slip ratio)", "mm", 1e3
+        std = np.sqrt(np.diag(model.covariance))
+        tables.append(
+            Table(
+                f"{name}: {len(model.terms)} terms",
+                ("term", f"coefficient [{unit}]", f"std [{unit}]"),
+                [
+                    (term, number(factor * b, 5), number(factor * s, 3))
+                    for term, b, s in zip(model.names(), model.coefficients, std, strict=True)
+                ],
+                note=f"Regressors are standardised, (x {DASH} centre) / scale. What the polynomial "
+                f"leaves: {number(factor * model.residual)} {unit}; scatter of one turn about the "
+                f"mean of its run: {number(factor * model.floor)} {unit}.",
+                folded=True,
+            )
+        )
+        tables.append(_regressors(trained, quantity, name, model))
+        tables.append(_candidates(trained, quantity, name, model))
+    return tables
+
+
+def _regressors(trained: Trained, quantity: str, name: str, model: Polynomial) -> Table:
+    guards = trained.calibration.chains[-1].guards.get(quantity, ())
+    rows = [
+        (v.name, REGRESSOR_UNIT.get(v.name, "1"), number(v.centre, 5), number(v.scale, 5), "", "")
+        for v in model.variables
+    ]
+    known = {v.name: i for i, v in enumerate(model.variables)}
+    for guard in guards:
+        limits = (number(guard.low - guard.slack), number(guard.high + guard.slack))
+        unit = REGRESSOR_UNIT.get(guard.name, "1")
+        if guard.name in known:
+            rows[known[guard.name]] = (*rows[known[guard.name]][:4], *limits)
+        else:
+            rows.append((guard.name, unit, DASH, DASH, *limits))
+    return Table(
+        f"{name}: regressors and where they are valid",
+        ("regressor", "SI unit", "centre", "scale", "valid from", "to"),
+        rows,
+        texts=2,
+        folded=True,
+    )
+
+
+def _candidates(trained: Trained, quantity: str, name: str, model: Polynomial) -> Table:
+    tried = trained.links.candidates[quantity]
+    factor, unit = FACTOR[quantity], UNIT[quantity]
+    if quantity == "kappa":
+        factor, unit = 1e3, "mm of radius"
+    fitting = [score for terms, score in tried if terms == len(model.terms)]
+    best = min(fitting) if fitting else float("nan")
+    note = "The error is weighed: less where the cornering curve is flat." * (quantity == "alpha")
+    return Table(
+        f"{name}: candidates tried",
+        ("terms", f"held-out error [{unit}]", ""),
+        [
+            (
+                str(terms),
+                number(factor * score),
+                "in use" if terms == len(model.terms) and score == best else "",
+            )
+            for terms, score in tried
+        ],
+        texts=0,
+        note=note,
+        folded=True,
+    )
+
+
+def held_out_table(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """Return the cross-validation by level: each level of a condition left out of the fit."""
+    return Table(
+        "Error at a level that the fit had not seen",
+        ("held out", "level", "quantity", "unit", "where", "runs", "dissertation", "in use"),
+        [
+            (
+                str(row["held_out"]).replace("_", " "),
+                str(row["level"]),
+                TITLE.get(str(row["quantity"]), str(row["quantity"])),
+                str(row["unit"]),
+                {True: "between others", False: "beyond others"}.get(row.get("inside"), ""),  # type: ignore[arg-type]
+                str(row.get("n", "")),
+                number(row["dissertation"]),
+                number(row["in_use"]),
+            )
+            for row in rows
+        ],
+        texts=5,
+        note="A level beyond the others is an extrapolation. Root mean square over run means.",
+    )
+
+
+def refused_table(trained: Trained) -> Table:
+    """Return the quantities that could not be calibrated, and why."""
+    return Table(
+        "Quantities without a calibration",
+        ("quantity", "why"),
+        [(TITLE.get(q, q), why) for q, why in trained.links.refused.items()],
+        texts=2,
+    )

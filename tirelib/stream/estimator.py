@@ -1,0 +1,276 @@
+"""The streaming estimator: frames in, the estimates of completed turns out."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tirelib.arrays import BoolArray, FloatArray
+from tirelib.errors import FormatError, ParameterError
+from tirelib.estimators.calibration import Calibration, Estimates
+from tirelib.features.extract import Features, extract_features
+from tirelib.flags import TurnFlag
+from tirelib.signal.lowpass import LowPass
+from tirelib.signal.turns import LONGEST_TURN, Turn, TurnCutter, stack_turns
+from tirelib.stream.snapshot import from_plain, restore_cutter, snapshot_cutter, to_plain
+
+STATE_FORMAT = "tirelib-stream-state/1"
+WATCHDOG_TURNS = 2.0
+"""Turns after the middle of the last contact at which an estimate ceases to be valid."""
+STANDSTILL = 0.05
+"""Turn rate below which a wheel whose rate is measured counts as standing, [rad/s]."""
+RATES = (100.0, 1e6)
+"""Sample rates that are taken, [Hz]."""
+
+
+@dataclass(frozen=True, slots=True)
+class TurnEstimate:
+    """What one turn says: one row of `Features` and of `Estimates`, SI, ISO 8855.
+
+    Attributes
+    ----------
+    turn : int
+        Number of the turn since the start, from 1.
+    features : Features
+        Of one row; ``time`` and ``ready`` are in s since the first sample.
+    estimates : Estimates
+        Of one row: value, std and valid of Fz, alpha, kappa, Fy; flags, notes, contact lengths.
+    """
+
+    turn: int
+    features: Features
+    estimates: Estimates
+
+    @property
+    def valid(self) -> bool:
+        """Whether the turn was measured well and every calibrated quantity is in range."""
+        return bool(self.estimates.turn_valid[0])
+
+    @property
+    def flags(self) -> int:
+        """`TurnFlag` bits of the turn."""
+        return int(self.estimates.flags[0])
+
+    @property
+    def time(self) -> float:
+        """Middle of the contact, [s since the first sample]."""
+        return float(self.features.time[0])
+
+    @property
+    def ready(self) -> float:
+        """When the last sample that the turn needs was taken, [s since the first sample]."""
+        return float(self.features.ready[0])
+
+    def value(self, quantity: str) -> float:
+        """Return Fz [N], alpha [rad], kappa [1] or Fy [N]; NaN where it is not to be had."""
+        return float(self.estimates.value[quantity][0])
+
+    def std(self, quantity: str) -> float:
+        """Return the standard deviation of a quantity, in its unit."""
+        return float(self.estimates.std[quantity][0])
+
+    def is_valid(self, quantity: str) -> bool:
+        """Tell whether a quantity may be used."""
+        return bool(self.estimates.valid[quantity][0])
+
+
+class StreamEstimator:
+    """Estimate load, slip angle, slip ratio and lateral force from frames of strain.
+
+    An estimate comes after each contact, at most 20 degrees of wheel angle, half the filter and one
+    frame after the trailing edge, and is that of the batch (`observe`, `Calibration.estimate`),
+    however the samples are cut into frames. Memory is bounded: the samples of the current turn.
+
+    Between turns the last estimate stands, and `valid` and `flags` say whether it still holds: it
+    ceases to when `WATCHDOG_TURNS` turns have passed since its contact (standstill, frozen or dead
+    gages, a cut cable), counted in samples, or when a measured turn rate is zero.
+
+    Parameters
+    ----------
+    calibration : Calibration
+    rate : float, [Hz]
+        Sample rate of the gages.
+    lateral : sequence of float, optional, [m]
+        Lateral positions of the gages (ISO) in the order of a frame's rows, checked against the
+        calibration.
+    tire : str, optional
+        Name of the tire, checked against the calibration.
+
+    Raises
+    ------
+    CalibrationError
+        If the gages or the tire are not those of the calibration.
+    ParameterError
+        If the rate is out of range.
+    """
+
+    def __init__(
+        self,
+        calibration: Calibration,
+        rate: float,
+        *,
+        lateral: Sequence[float] | None = None,
+        tire: str | None = None,
+    ) -> None:
+        low, high = RATES
+        if not low <= rate <= high:
+            raise ParameterError(
+                f"sample rate = {rate} Hz; allowed are {low:g} .. {high:g} Hz; give the rate of "
+                "the gages"
+            )
+        gages = calibration.lateral if lateral is None else tuple(float(y) for y in lateral)
+        name = calibration.tire if tire is None else tire
+        calibration.check_layout(name, gages, "stream")
+        self.calibration = calibration
+        self.rate = float(rate)
+        self.gages = len(calibration.lateral)
+        self._low_pass = LowPass(calibration.order, calibration.cut_off)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything but the calibration and the rate."""
+        self._cutter = TurnCutter(self.calibration.lateral, self.rate, self._low_pass)
+        self._count = 0
+        self._turns = 0
+        self._latest: TurnEstimate | None = None
+        self._deadline = LONGEST_TURN * self.rate
+        self._standing = -1  # number of the last sample at which the wheel stood
+
+    def push(
+        self,
+        frame: FloatArray,
+        *,
+        speed: FloatArray | float = math.nan,
+        pressure: FloatArray | float = math.nan,
+        camber: FloatArray | float = math.nan,
+        trigger: BoolArray | None = None,
+        omega: FloatArray | float = math.nan,
+    ) -> list[TurnEstimate]:
+        """Take the next samples and return the estimates of the turns that they complete.
+
+        Parameters
+        ----------
+        frame : array, shape (n_gages, n), [-]
+            Raw strain, oldest first; lost samples are NaN, so that time goes on.
+        speed, pressure, camber : array of shape (n,) or a number, [m/s], [Pa], [rad]
+            Conditions, held until changed; NaN where unknown.
+        trigger : array of bool, shape (n,), optional
+            True at the sample at which the gages pass the top of the wheel; it only checks.
+        omega : array of shape (n,) or a number, [rad/s]
+            Measured turn rate; only a standing wheel is read from it, estimates use the contacts.
+
+        Raises
+        ------
+        ShapeError
+            If the frame has another number of gages.
+        """
+        turns = self._cutter.push(
+            frame, speed=speed, pressure=pressure, camber=camber, trigger=trigger
+        )
+        self._watch(omega, frame.shape[1])
+        self._count += frame.shape[1]
+        return [self._estimate(turn) for turn in turns] if turns else []
+
+    def _watch(self, omega: FloatArray | float, n: int) -> None:
+        """Note the last sample at which the wheel stood."""
+        if isinstance(omega, np.ndarray):
+            standing = np.flatnonzero(np.abs(omega) < STANDSTILL)
+            if standing.size:
+                self._standing = self._count + int(standing[-1])
+        elif abs(omega) < STANDSTILL and n:
+            self._standing = self._count + n - 1
+
+    def _estimate(self, turn: Turn) -> TurnEstimate:
+        self._turns += 1
+        features = extract_features(stack_turns([turn], self._cutter.lateral, self.rate))
+        self._latest = TurnEstimate(self._turns, features, self.calibration.estimate(features))
+        period = turn.period if math.isfinite(turn.period) else LONGEST_TURN / WATCHDOG_TURNS
+        self._deadline = (turn.time + WATCHDOG_TURNS * period) * self.rate
+        return self._latest
+
+    @property
+    def latest(self) -> TurnEstimate | None:
+        """The last turn's estimate; None before the first contact."""
+        return self._latest
+
+    @property
+    def turns(self) -> int:
+        """Number of contacts since the start."""
+        return self._turns
+
+    @property
+    def time(self) -> float:
+        """Time taken by the samples so far, [s]."""
+        return self._count / self.rate
+
+    @property
+    def age(self) -> float:
+        """Time since the last estimate was made, [s]; NaN before the first."""
+        return math.nan if self._latest is None else self.time - self._latest.ready
+
+    @property
+    def stale(self) -> bool:
+        """Whether contacts have stayed away for too long, or the wheel stands."""
+        if self._count > self._deadline:
+            return True
+        ready = -1.0 if self._latest is None else self._latest.ready * self.rate
+        return self._standing >= 0 and self._standing >= ready
+
+    @property
+    def flags(self) -> int:
+        """`TurnFlag` bits that hold now: those of the last turn, and the watchdog's."""
+        own = int(TurnFlag.FIRST_TURN) if self._latest is None else self._latest.flags
+        return own | int(TurnFlag.NO_CONTACT) if self.stale else own
+
+    @property
+    def valid(self) -> bool:
+        """Whether the last estimate may be used now."""
+        return self._latest is not None and self._latest.valid and not self.stale
+
+    def is_valid(self, quantity: str) -> bool:
+        """Tell whether a quantity of the last estimate may be used now."""
+        return self._latest is not None and self._latest.is_valid(quantity) and not self.stale
+
+    def state(self) -> dict[str, Any]:
+        """Return everything that the estimator remembers, as JSON knows it.
+
+        An estimator of the same calibration and rate that restores it goes on exactly alike.
+        """
+        return {
+            "format": STATE_FORMAT,
+            "rate": self.rate,
+            "lateral": list(self.calibration.lateral),
+            "count": self._count,
+            "turns": self._turns,
+            "deadline": self._deadline,
+            "standing": self._standing,
+            "latest": to_plain(self._latest),
+            "cutter": snapshot_cutter(self._cutter),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Take up a state.
+
+        Raises
+        ------
+        FormatError
+            If it is no state of this version, or of another rate or gage layout.
+        """
+        given = state.get("format")
+        if given != STATE_FORMAT:
+            raise FormatError(
+                f"state: format = {given!r}; this version reads {STATE_FORMAT!r}; save it anew"
+            )
+        if state["rate"] != self.rate or state["lateral"] != list(self.calibration.lateral):
+            raise FormatError(
+                f"state: it is of {state['rate']:g} Hz and gages at {state['lateral']} m, the "
+                f"estimator of {self.rate:g} Hz and {list(self.calibration.lateral)} m; restore "
+                "it where it was saved"
+            )
+        self.reset()
+        restore_cutter(self._cutter, state["cutter"])
+        self._count, self._turns = state["count"], state["turns"]
+        self._deadline, self._standing = state["deadline"], state["standing"]
+        self._latest = from_plain(state["latest"])
