@@ -44,6 +44,9 @@ G1, G2 = {"camber": 1}, {"camber": 2}
 def load_candidates(varying: Collection[str]) -> list[list[Powers]]:
     """Return candidate term lists for Fz, from the dissertation's quadratic upwards."""
     quadratic = [ONE, L1, L2]
+    least: list[Powers] = [P1, times(P1, L1)] if "pressure" in varying else []
+    least += [V] if "speed_squared" in varying else []
+    least += [T1, T2] if "traction" in varying else []
     bent = [*quadratic, L3, C1, times(C1, L1), C2]
     conditions: list[Powers] = []
     if "pressure" in varying:
@@ -65,7 +68,9 @@ def load_candidates(varying: Collection[str]) -> list[list[Powers]]:
     ]
     if "camber" in varying:
         skewed += [G2, times(G1, {"cp1_slope": 1})]
-    return _unique([quadratic + conditions, bent + conditions, bent + conditions + skewed])
+    return _unique(
+        [quadratic + least, quadratic + conditions, bent + conditions, bent + conditions + skewed]
+    )
 
 
 def force_candidates(varying: Collection[str]) -> list[list[Powers]]:

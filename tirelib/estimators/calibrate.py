@@ -224,7 +224,7 @@ def _fit_force(links: Links, say: Callable[[str], None]) -> Polynomial | None:
     if not np.isfinite(truth).all():
         links.refused["Fy"] = "the rig measured no Fy in some run"
         return None
-    if np.ptp(truth) < LEAST_FORCE * float(np.mean(values["load"])):
+    if np.ptp(truth) < LEAST_FORCE * float(np.nanmax(np.append(values["load"], 2000.0))):
         links.refused["Fy"] = f"Fy varies by {np.ptp(truth):.0f} N only; measure slip angles"
         return None
     say("Fy")
@@ -252,6 +252,9 @@ def _fit_angle(links: Links, has_force: bool, say: Callable[[str], None]) -> Ang
         return None
     if not np.isfinite(truth).all() or np.ptp(truth) < LEAST_ANGLE:
         links.refused["alpha"] = "the slip angle was not measured or not varied"
+        return None
+    if not np.isfinite(values["load"]).all():
+        links.refused["alpha"] = "it needs the load, and the rig measured no Fz"
         return None
     say("alpha")
     values["utilisation"] = links.held_out["Fy"] / values["load"]
@@ -371,7 +374,20 @@ def _with_ranges(chain: Chain, links: Links) -> Chain:
     if np.isfinite(links.values["camber"]).any():
         shape = (*shape, limits("camber", needed=_uses(chain, "camber")))
     angle = (limits("utilisation"),) if chain.angle is not None else ()
-    guards = {"Fz": shape, "Fy": shape, "alpha": (*shape, *angle), "kappa": ()}
+
+    def own(quantity: str, measured: str) -> tuple[Range, ...]:
+        if not chain.has(quantity):
+            return ()
+        x = links.truth[measured]
+        low, high = float(x.min()), float(x.max())
+        return (Range(quantity, low, high, MARGIN * (high - low)),)
+
+    guards = {
+        "Fz": (*shape, *own("Fz", "Fz")),
+        "Fy": (*shape, *own("Fy", "Fy")),
+        "alpha": (*shape, *angle, *own("alpha", "slip_angle")),
+        "kappa": (),
+    }
     return replace(chain, guards=guards)
 
 

@@ -61,7 +61,8 @@ class Chain:
     gages : tuple of int
         Indices of the gages used.
     guards : dict of tuples of Range
-        For each quantity, the regressors whose calibrated range decides on validity.
+        For each quantity, the regressors whose calibrated range decides on validity, and the range
+        of the quantity itself under its own name.
     mean_load : float, [N]
         Stands for the load where no load model could be calibrated.
     """
@@ -163,5 +164,5 @@ class Chain:
     ) -> BoolArray:
         inside = np.isfinite(value) & np.isfinite(std)
         for guard in self.guards[quantity]:
-            inside &= guard.inside(values[guard.name])
+            inside &= guard.inside(value if guard.name == quantity else values[guard.name])
         return inside

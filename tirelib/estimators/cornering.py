@@ -21,6 +21,8 @@ from tirelib.estimators.dissertation import Means
 
 FEWEST_ANGLES = 6
 FEWEST_LOADS = 3
+LEAST_SHARE = 0.01
+"""Floor of the relative standard deviation with which the fits of a load are weighed."""
 SHAPE = 1.3
 """Shape factor C, held: it cannot be told from E without data beyond the peak."""
 
@@ -82,8 +84,9 @@ def cornering_trend(means: Means) -> CorneringTrend | None:
     load, length, stiffness, stiffness_std, peak, peak_std = table
     degree = min(2, len(rows) - 1)
 
-    def quadratic(y: FloatArray) -> FloatArray:
-        found = np.polynomial.polynomial.polyfit(length, y, degree)
+    def quadratic(y: FloatArray, std: FloatArray) -> FloatArray:
+        weight = 1.0 / np.hypot(std, LEAST_SHARE * np.abs(y))
+        found = np.polynomial.polynomial.polyfit(length, y, degree, w=weight)
         return np.pad(found, (0, 2 - degree))
 
     return CorneringTrend(
@@ -93,8 +96,8 @@ def cornering_trend(means: Means) -> CorneringTrend | None:
         stiffness_std,
         peak,
         peak_std,
-        quadratic(stiffness),
-        quadratic(peak),
+        quadratic(stiffness, stiffness_std),
+        quadratic(peak, peak_std),
     )
 
 

@@ -9,7 +9,7 @@ from tirelib.arrays import BoolArray, FloatArray
 from tirelib.errors import CalibrationError
 from tirelib.estimators.calibrate import calibrate_chain
 from tirelib.estimators.dissertation import SMALL_ANGLE, Means
-from tirelib.estimators.fit import mean_by
+from tirelib.estimators.fit import LARGEST_LEVEL, mean_by
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.train import Trained, take
 from tirelib.observations import Observations
@@ -94,8 +94,11 @@ def _levels(observations: Observations) -> Iterator[tuple[str, str, bool, BoolAr
             continue
         for level in levels:
             rows = known & (np.abs(nominal - level) <= 0.5 * step)
+            if rows.sum() > LARGEST_LEVEL * known.sum():
+                continue  # most of the data: what remains cannot stand for it
             inside = bool(levels[0] < level < levels[-1])
-            yield condition, f"{level * FACTOR[unit]:.4g} {unit}", inside, rows
+            value = float(np.mean(nominal[rows])) * FACTOR[unit] + 0.0
+            yield condition, f"{value:.4g} {unit}", inside, rows
 
 
 def _dissertation(

@@ -74,6 +74,7 @@ class Means:
     cp1: FloatArray
     rate_lead: FloatArray
     rate_slope: FloatArray
+    slip_ratio: FloatArray
     load: FloatArray
     lateral_force: FloatArray
     slip_angle: FloatArray
@@ -115,6 +116,7 @@ def means_for_tables(
         lateral_force=truth["Fy"],
         slip_angle=np.rad2deg(truth["slip_angle"]),
         camber=np.rad2deg(average(features.camber)),
+        slip_ratio=truth["slip_ratio"],
         groups=groups,
     )
 
@@ -139,13 +141,14 @@ def fit_all(means: Means) -> tuple[Regression, ...]:
         if fitted is not None:
             made.append(fitted)
 
+    plain = ~(np.abs(means.camber) > UPRIGHT) & ~(np.abs(means.slip_ratio) > FREE)
     middle = length[:, centre]
     add(
         "load from centre contact length", "Fig. 4-4", "Fz", "N", means.load,
-        {"CL@centre": middle, "CL@centre^2": middle**2},
+        {"CL@centre": middle, "CL@centre^2": middle**2}, plain,
     )  # fmt: skip
     ratio = rate[:, right] / rate[:, left]
-    small = np.abs(means.slip_angle) <= SMALL_ANGLE
+    small = plain & (np.abs(means.slip_angle) <= SMALL_ANGLE)
     add(
         "slip angle from in/out ratio of peak rates", "Fig. 4-5", "alpha", "deg",
         means.slip_angle, {"ratio": ratio, "ratio^2": ratio**2}, small,
@@ -161,9 +164,9 @@ def fit_all(means: Means) -> tuple[Regression, ...]:
     levels = np.unique(np.round(means.camber[np.isfinite(means.camber)]))
     if levels.size > 1:
         for level in levels:
-            rows = np.round(means.camber) == level
+            rows = (np.round(means.camber) == level) & ~(np.abs(means.slip_ratio) > FREE)
             add(
-                f"Fy from six regressors, camber {level:+.0f} deg", "Table 4-2", "Fy", "N",
+                f"Fy from six regressors, camber {level + 0.0:+.0f} deg", "Table 4-2", "Fy", "N",
                 force, lengths | peaks, rows,
             )  # fmt: skip
     return tuple(made)
@@ -171,6 +174,10 @@ def fit_all(means: Means) -> tuple[Regression, ...]:
 
 SMALL_ANGLE = 5.5
 """Slip angle, [deg], up to which the dissertation regresses (test set 1)."""
+UPRIGHT = 0.5
+"""Camber, [deg], above which a run belongs to Table 4-2 and not to the other regressions."""
+FREE = 0.02
+"""Slip ratio above which a run belongs to none of them."""
 
 
 def _fit(

@@ -18,6 +18,8 @@ FORMAT = "tirelib-estimate/1"
 EDGE_UNIT = {"Fz": ("N", 1.0), "alpha": ("deg", 180.0 / np.pi), "kappa": ("1", 1.0),
              "Fy": ("N", 1.0)}  # fmt: skip
 """Unit and factor of each quantity in the document."""
+VARIED = {"Fz": 300.0, "alpha": 0.5, "kappa": 0.01, "Fy": 300.0}
+"""Range below which a quantity stood still: R2 and a share of the range would say nothing."""
 TRUTH = {"Fz": "Fz", "alpha": "slip_angle", "kappa": "slip_ratio", "Fy": "Fy"}
 
 
@@ -67,12 +69,13 @@ def _summary(quantity: str, observations: Observations, estimates: Estimates) ->
     rmse = float(np.sqrt(np.mean(error**2)))
     spread = float(np.sum((truth - truth.mean()) ** 2))
     span = float(np.ptp(truth))
+    varied = span > VARIED[quantity]
     return {
         "rmse": rmse,
         "unit": unit,
-        "r2": 1.0 - float(np.sum(error**2)) / spread if spread > 0.0 else None,
+        "r2": 1.0 - float(np.sum(error**2)) / spread if varied else None,
         "n": int(value.size),
-        "rmse_percent_of_range": 100.0 * rmse / span if span > 0.0 else None,
+        "rmse_percent_of_range": 100.0 * rmse / span if varied else None,
         "coverage_95": float(np.mean(np.abs(error) <= 1.96 * std)),
         "bias": float(error.mean()),
     }

@@ -1,0 +1,215 @@
+"""End to end without hardware: emulator, pseudo-terminal, FMU file, recording, replay."""
+
+import json
+import signal
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bench.recording import Recording
+from tests.bench.conftest import Spawn
+from tirelib.campaign import read_campaign
+from tirelib.estimators.calibration import Calibration
+from tirelib.estimators.calibration_file import write_calibration
+from tirelib.estimators.result import estimate_document
+from tirelib.fmu.build import build_fmu
+from tirelib.observations import observe
+
+PATIENCE = 30.0
+
+
+@pytest.fixture(scope="module")
+def fmus(calibration: Calibration, tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
+    folder = tmp_path_factory.mktemp("fmus")
+    write_calibration(calibration, folder / "cal.toml")
+    return {
+        k: build_fmu(folder / "cal.toml", folder / f"StrainTire{k}.fmu", samples_per_step=k)
+        for k in (1, 10, 16)
+    }
+
+
+def port_of(file: Path) -> str:
+    """Wait for the emulator's port."""
+    end = time.monotonic() + PATIENCE
+    while not file.exists() and time.monotonic() < end:
+        time.sleep(0.02)
+    return file.read_text().strip()
+
+
+def finish(process: "subprocess.Popen[str]") -> tuple[int, str, str]:
+    out, err = process.communicate(timeout=PATIENCE)
+    assert "Traceback" not in err
+    return process.returncode, out, err
+
+
+def result(path: Path) -> dict[str, Any]:
+    return dict(json.loads(path.read_text()))
+
+
+def recorded(path: Path) -> tuple[bytes, bool | None]:
+    recording = Recording(path)
+    data = b"".join(data for _, data in recording.raw())
+    recording.close()
+    return data, recording.complete
+
+
+def compare(bench: dict[str, Any], library: dict[str, Any]) -> None:
+    assert len(bench["turns"]) == len(library["turns"])
+    for mine, theirs in zip(bench["turns"], library["turns"], strict=True):
+        for key, value in theirs.items():
+            if isinstance(value, float):
+                assert mine[key] == pytest.approx(value, rel=1e-9, abs=1e-12), key
+            else:
+                assert mine[key] == value, key
+
+
+def test_library_live_and_replay_give_the_same_estimates(
+    spawn: Spawn, campaign: Path, calibration: Calibration, fmus: dict[int, Path], tmp_path: Path
+) -> None:
+    emulator = spawn("emulate", "--campaign", campaign, "--all", "--port-file", tmp_path / "port",
+                     "--conditions", tmp_path / "c.json", "--json", tmp_path / "e.json",
+                     "--speedup", 2)  # fmt: skip
+    port = port_of(tmp_path / "port")
+    live = spawn("run", "--port", port, "--fmu", fmus[16], "--conditions", tmp_path / "c.json",
+                 "--record", tmp_path / "a.mcap", "--json", tmp_path / "live.json",
+                 "--silence", 0.5, "--no-page")  # fmt: skip
+    code, out, _ = finish(live)
+    assert code == 0
+    assert finish(emulator)[0] == 0
+    observations = observe([read_campaign(campaign)])
+    library = estimate_document(
+        observations, calibration.estimate(observations.features), calibration
+    )
+    bench = result(tmp_path / "live.json")
+    assert sum(turn["valid"] for turn in bench["turns"]) >= 12
+    compare(bench, library)
+    for name, entry in library["summary"].items():
+        assert bench["summary"][name] == pytest.approx(entry, rel=1e-6)
+    assert bench["line"]["frames"] == result(tmp_path / "e.json")["frames"]
+    assert bench["line"]["lost_samples"] == bench["line"]["crc_bad"] == 0
+    assert bench["source"]["fmu_sha256"] in out
+    assert "first_turn" in out
+    replays = [
+        spawn("run", "--replay", tmp_path / "a.mcap", "--fmu", fmu, "--json",
+              tmp_path / f"r{k}.json", "--no-page")
+        for k, fmu in fmus.items()
+    ]  # fmt: skip
+    assert [finish(replay)[0] for replay in replays] == [0, 0, 0]
+    again = result(tmp_path / "r16.json")
+    assert (again["turns"], again["line"]) == (bench["turns"], bench["line"])
+    compare(result(tmp_path / "r1.json"), library)
+    compare(result(tmp_path / "r10.json"), library)
+
+
+def test_every_fault_is_counted_and_none_passes_for_a_number(
+    spawn: Spawn, campaign: Path, fmus: dict[int, Path], tmp_path: Path
+) -> None:
+    emulator = spawn("emulate", "--campaign", campaign, "--run", 2, "--port-file",
+                     tmp_path / "port", "--json", tmp_path / "e.json", "--seed", 3,
+                     "--fault", "flips=0.03", "--fault", "lost=0.03", "--fault", "dup=0.05",
+                     "--fault", "saturate=5")  # fmt: skip
+    port = port_of(tmp_path / "port")
+    live = spawn("run", "--port", port, "--fmu", fmus[16], "--speed", 64.8, "--pressure", 2.3,
+                 "--camber", 0, "--record", tmp_path / "a.mcap", "--json", tmp_path / "live.json",
+                 "--silence", 0.5)  # fmt: skip
+    finish(live)
+    finish(emulator)
+    sent, seen = result(tmp_path / "e.json"), result(tmp_path / "live.json")
+    done, line = sent["faults"], seen["line"]
+    assert line["duplicates"] == done["dup"] > 5
+    assert done["flips"] <= line["crc_bad"] + line["framing_bad"] <= 2 * done["flips"]
+    unheard = sent["frames"] - line["frames"] + done["dup"]
+    assert done["lost"] + done["flips"] <= unheard <= done["lost"] + 2 * done["flips"]
+    assert unheard - 3 <= line["lost_frames"] <= unheard  # the last ones are not missed
+    assert line["saturated_samples"][4] > 0
+    assert seen["summary"]["Fz"]["rmse"] is None
+    assert {turn["run"] for turn in seen["turns"]} == {0}
+    for turn in seen["turns"]:
+        assert not turn["valid"] or "reduced_gages" in turn["flags"]
+    replay = spawn("run", "--replay", tmp_path / "a.mcap", "--fmu", fmus[16], "--json",
+                   tmp_path / "r.json", "--no-page")  # fmt: skip
+    finish(replay)
+    assert result(tmp_path / "r.json")["turns"] == seen["turns"]
+
+
+def test_an_unplugged_cable_is_told_and_the_recording_kept(
+    spawn: Spawn, campaign: Path, toy_fmus: dict[int, Path], tmp_path: Path
+) -> None:
+    emulator = spawn("emulate", "--campaign", campaign, "--all", "--port-file", tmp_path / "port",
+                     "--unplug", 1.2)  # fmt: skip
+    port = port_of(tmp_path / "port")
+    code, out, err = finish(
+        spawn("run", "--port", port, "--fmu", toy_fmus[16], "--speed", 65, "--record",
+              tmp_path / "a.mcap", "--json", tmp_path / "live.json")
+    )  # fmt: skip
+    assert code == 1
+    assert f"unplugged: {port}: the port went away" in out
+    assert finish(emulator)[0] == 0
+    data, complete = recorded(tmp_path / "a.mcap")
+    assert complete
+    line = result(tmp_path / "live.json")["line"]
+    assert len(data) == line["bytes"] > 50_000
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
+def test_a_stopped_or_killed_run_leaves_a_recording_that_replays(
+    spawn: Spawn, campaign: Path, toy_fmus: dict[int, Path], tmp_path: Path, number: signal.Signals
+) -> None:
+    spawn("emulate", "--campaign", campaign, "--all", "--loop", "--port-file", tmp_path / "port")
+    port = port_of(tmp_path / "port")
+    start = time.monotonic()
+    live = spawn("run", "--port", port, "--fmu", toy_fmus[16], "--speed", 65, "--record",
+                 tmp_path / "a.mcap")  # fmt: skip
+    while not (tmp_path / "a.mcap").exists() and time.monotonic() - start < PATIENCE:
+        time.sleep(0.02)
+    time.sleep(1.0)
+    live.send_signal(number)
+    code, out, _ = finish(live)
+    data, complete = recorded(tmp_path / "a.mcap")
+    assert len(data) > 0.5 * 112_500  # a second of one wheel, less a start and what was on its way
+    if number == signal.SIGKILL:
+        assert code == -signal.SIGKILL
+        assert not complete
+    else:
+        assert code == 0
+        assert complete
+        assert "ended: stopped" in out
+    code, out, _ = finish(
+        spawn("run", "--replay", tmp_path / "a.mcap", "--fmu", toy_fmus[16], "--no-page")
+    )
+    assert code == 0
+    assert ("breaks off" in out) == (number == signal.SIGKILL)
+
+
+def test_bad_input_ends_with_code_2_and_a_message(
+    spawn: Spawn, campaign: Path, toy_fmus: dict[int, Path], tmp_path: Path
+) -> None:
+    (tmp_path / "d.toml").write_text('format = "tirebench-device/1"\n')
+    (tmp_path / "x.fmu").write_bytes(b"no zip")
+    fmu = toy_fmus[16]
+    cases = {
+        "just one of --port and --replay is needed": ("run", "--fmu", fmu),
+        "the port cannot be opened": ("run", "--port", tmp_path / "none", "--fmu", fmu),
+        "it is no FMU": ("run", "--port", "p", "--fmu", tmp_path / "x.fmu"),
+        "just one of [scale] and [bridge]": (
+            "run", "--port", "p", "--fmu", fmu, "--device", tmp_path / "d.toml"),
+        "it cannot be read": ("run", "--replay", tmp_path / "none.mcap", "--fmu", fmu),
+        "run 9; its runs are 1, 2, 3": ("emulate", "--campaign", campaign, "--run", 9),
+        "'rust' is not known": ("emulate", "--campaign", campaign, "--fault", "rust"),
+        "nobody opened the port in time": ("emulate", "--campaign", campaign, "--wait", 0.1),
+    }  # fmt: skip
+    started = {message: spawn(*arguments) for message, arguments in cases.items()}
+    for message, process in started.items():
+        code, _, err = finish(process)
+        assert code == 2, message
+        assert message in err
+
+
+def test_ports_lists_what_there_is(spawn: Spawn, tmp_path: Path) -> None:
+    code, out, _ = finish(spawn("ports", "--json", tmp_path / "p.json"))
+    found = result(tmp_path / "p.json")["ports"]
+    assert code == (0 if found else 1)
+    assert all(port["device"] in out for port in found)

@@ -1,0 +1,126 @@
+"""A session ends when it should, records before it decodes, and outlives an unplugged cable."""
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from bench.chain import Chain, Outputs, Turn
+from bench.conditions import Condition, Conditions
+from bench.deadline import Deadline
+from bench.device import Device
+from bench.emulator import write_script
+from bench.errors import UnpluggedError
+from bench.faults import Faults
+from bench.recording import Recorder, Recording, RecordingHeader
+from bench.session import Limits, Session
+from tests.bench.campaigns import tiny_runs
+from tirelib.arrays import FloatArray
+
+
+class Counter:
+    """An estimator that ends a turn every 1000 samples."""
+
+    samples = 16
+
+    def start(self, period: float) -> None:
+        self.count = 0
+
+    def step(self, strain: FloatArray, conditions: Condition, valid: bool) -> Outputs | None:
+        before, self.count = self.count, self.count + len(strain)
+        if before // 1000 == self.count // 1000:
+            return None
+        names = ("Fz", "alpha", "kappa", "Fy", "flags", "age")
+        return {**dict.fromkeys(names, 0.0), "valid": 1.0}, {}
+
+
+class Scripted:
+    """A link that gives prepared reads; None ends it, an exception is raised."""
+
+    name, live = "scripted", True
+
+    def __init__(self, reads: Sequence[bytes | Exception | None]) -> None:
+        self._reads = list(reads)
+
+    def receive(self, deadline: Deadline) -> tuple[int, bytes] | None:
+        if not self._reads:
+            time.sleep(min(deadline.remaining, 0.01))
+            return time.monotonic_ns(), b""
+        read = self._reads.pop(0)
+        if isinstance(read, Exception):
+            raise read
+        return None if read is None else (time.monotonic_ns(), read)
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.fixture(scope="module")
+def wire() -> list[bytes]:
+    return list(write_script(tiny_runs()[:1], Device(), Faults({})).frames)
+
+
+def session(reads: Sequence[bytes | Exception | None], **options: object) -> Session:
+    chain = Chain(Counter(), Device(), Conditions.constant())
+    return Session(Scripted(reads), chain, **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("limits", "end", "reason"),
+    [
+        (Limits(), [None], "end"),
+        (Limits(turns=2), [], "turns"),
+        (Limits(silence=0.05), [], "silence"),
+        (Limits(duration=0.1), [], "duration"),
+        (Limits(), [UnpluggedError("gone")], "unplugged"),
+    ],
+)
+def test_a_session_ends_for_a_reason(
+    wire: list[bytes], limits: Limits, end: list[Exception | None], reason: str
+) -> None:
+    outcome = session([*wire, *end], limits=limits).run()
+    assert outcome.reason == reason
+    assert len(outcome.turns) == (2 if reason == "turns" else 6)
+    assert outcome.message == ("gone" if reason == "unplugged" else "")
+
+
+def test_silence_counts_from_the_first_byte() -> None:
+    outcome = session([], limits=Limits(duration=0.2, silence=0.05)).run()
+    assert outcome.reason == "duration"
+
+
+def test_stop_ends_in_good_order(wire: list[bytes]) -> None:
+    seen: list[Turn] = []
+    running = session(wire, watch=lambda turns: (seen.extend(turns), running.stop())[0])
+    assert running.run().reason == "stopped"
+
+
+def test_bytes_are_recorded_before_they_are_decoded(tmp_path: Path) -> None:
+    """Whatever the decoder does with them, damaged or not, they stand in the file."""
+    noise = [bytes(range(256)), b"\0\0\0", b"\xff" * 5000]
+    running = session([*noise, None])
+    running._chain.push = lambda data: 1 / 0  # type: ignore[method-assign,assignment,return-value]
+    recorder = Recorder(tmp_path / "a.mcap", RecordingHeader({}), Conditions.constant())
+    running._recorder = recorder
+    with recorder, pytest.raises(ZeroDivisionError):
+        running.run()
+    recording = Recording(tmp_path / "a.mcap")
+    assert [data for _, data in recording.raw()] == noise[:1]
+    recording.close()
+
+
+def test_a_pass_of_a_loop_goes_on_in_time_and_number() -> None:
+    runs, device = tiny_runs()[:2], Device()
+    passes = [write_script(runs, device, Faults({}), turn=turn) for turn in (0, 1, 2)]
+    known = passes[0].conditions
+    looped = Conditions(known.t_us, known.values, known.runs, round(passes[0].duration * 1e6))
+    chain = Chain(Counter(), device, looped)
+    turns = [t for script in passes for t in chain.push(b"".join(script.frames))] + chain.finish()
+    assert chain.timeline.counts.resets == 5
+    assert chain.timeline.counts.lost_frames == 0
+    per_pass = [t.run for t in turns[: len(turns) // 3]]
+    assert [turn.run for turn in turns] == per_pass * 3
+    assert [turn.ready for turn in turns[: len(per_pass)]] == pytest.approx(
+        [turn.ready for turn in turns[-len(per_pass) :]], abs=1e-5
+    )
