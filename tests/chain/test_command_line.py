@@ -121,7 +121,7 @@ def broken(place: Path, tmp_path: Path) -> dict[str, tuple[list[object], str]]:
     write(tmp_path / "other", [synthetic_run(0)], tire="another tire")
     write(tmp_path / "few", [synthetic_run(i, load=2000.0 + 900.0 * i) for i in range(3)])
     (tmp_path / "old.toml").write_text('format = "tirelib-calibration/9"\n')
-    (tmp_path / "cut.toml").write_text(cal.read_text()[:4000])
+    (tmp_path / "cut.toml").write_text(cal.read_text()[:400] + '\nname = "cut')
     (tmp_path / "half.toml").write_text(cal.read_text().replace("[chain.laws]", "[chain.lows]"))
     estimate = ["estimate", data, "--calibration"]
     out = ["--out", tmp_path / "x.toml"]
@@ -129,7 +129,7 @@ def broken(place: Path, tmp_path: Path) -> dict[str, tuple[list[object], str]]:
         "no folder": (["estimate", tmp_path / "none", "--calibration", cal], "campaign.toml"),
         "no calibration": ([*estimate, tmp_path / "none.toml"], "cannot be read"),
         "unknown version": ([*estimate, tmp_path / "old.toml"], "this version reads"),
-        "cut off": ([*estimate, tmp_path / "cut.toml"], "calibrate anew"),
+        "cut off": ([*estimate, tmp_path / "cut.toml"], "is not TOML"),
         "damaged": ([*estimate, tmp_path / "half.toml"], "is damaged"),
         "another tire": (["estimate", tmp_path / "other", "--calibration", cal], "another tire"),
         "mixed tires": (["calibrate", data, tmp_path / "other", *out], "holds for one tire"),
