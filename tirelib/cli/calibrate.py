@@ -147,6 +147,7 @@ def statistics(
         "usable_turns": int(observations.usable.sum()),
         "in_use": in_use,
         "refused": dict(links.refused),
+        "skipped": dict(trained.skipped),
         "regressions": [_regression(regression) for regression in trained.regressions],
         "held_out": [vars_of(row) for row in held_out],
         "cornering": _cornering(trained),
@@ -225,6 +226,8 @@ def _print(console: Console, trained: Trained, document: dict[str, Any]) -> None
             table.add_row(term.name, f"{term.coefficient:.5g}", f"{term.std_error:.3g}",
                           f"{term.p_value:.3f}")  # fmt: skip
         console.print(table)
+    for name, reason in trained.skipped.items():
+        console.print(f"not fitted: {name}: {reason}")
     table = Table(title="Estimators in use (conditions held out)", box=SIMPLE_HEAD,
                   title_justify="left")  # fmt: skip
     for column in ("quantity", "rmse", "unit", "R2", "runs", "terms"):

@@ -43,9 +43,7 @@ def fmu() -> None:
               help="Start value of the parameter of that name.")  # fmt: skip
 def build(calibration: Path, out: Path, samples_per_step: int, sample_rate: float) -> None:
     """Write StrainTire.fmu with a calibration inside."""
-    path = build_fmu(
-        calibration, out, samples_per_step=samples_per_step, sample_rate=sample_rate
-    )
+    path = build_fmu(calibration, out, samples_per_step=samples_per_step, sample_rate=sample_rate)
     loaded = embedded_calibration(path)
     gages = ", ".join(f"{1e3 * y:+g}" for y in loaded.lateral)
     console = output()

@@ -121,8 +121,15 @@ def means_for_tables(
     )
 
 
-def fit_all(means: Means) -> tuple[Regression, ...]:
-    """Fit every regression of section 4.1 that the data can inform."""
+def fit_all(means: Means) -> tuple[tuple[Regression, ...], dict[str, str]]:
+    """Fit every regression of section 4.1 that the data can inform; say why not the others.
+
+    Returns
+    -------
+    regressions : tuple of Regression
+    skipped : dict of str to str
+        Name of each regression that was left out, and the reason.
+    """
     order = np.argsort(means.lateral)
     near = np.sort(np.argsort(np.abs(means.lateral), kind="stable")[:3])
     near = near[np.argsort(means.lateral[near])]
@@ -132,14 +139,16 @@ def fit_all(means: Means) -> tuple[Regression, ...]:
     lengths = {f"CL@{label[i]}": length[:, i] for i in (right, centre, left)}
     peaks = {f"CP1@{label[i]}": peak[:, i] for i in (right, centre, left)}
     made: list[Regression] = []
+    skipped: dict[str, str] = {}
 
     def add(
         name: str, source: str, quantity: str, unit: str, y: FloatArray,
         columns: dict[str, FloatArray], rows: BoolArray | None = None,
     ) -> None:  # fmt: skip
-        fitted = _fit(name, source, quantity, unit, y, columns, means.groups, rows)
-        if fitted is not None:
-            made.append(fitted)
+        try:
+            made.append(_fit(name, source, quantity, unit, y, columns, means.groups, rows))
+        except CalibrationError as error:
+            skipped[name] = str(error)
 
     plain = ~(np.abs(means.camber) > UPRIGHT) & ~(np.abs(means.slip_ratio) > FREE)
     middle = length[:, centre]
@@ -169,11 +178,15 @@ def fit_all(means: Means) -> tuple[Regression, ...]:
                 f"Fy from six regressors, camber {level + 0.0:+.0f} deg", "Table 4-2", "Fy", "N",
                 force, lengths | peaks, rows,
             )  # fmt: skip
-    return tuple(made)
+    return tuple(made), skipped
 
 
 SMALL_ANGLE = 5.5
 """Slip angle, [deg], up to which the dissertation regresses (test set 1)."""
+LEAST_RANGE = {"Fz": 300.0, "alpha": 0.5, "Fy": 100.0}
+"""Range, in the unit of the tables, that a quantity must cover."""
+STANDS_STILL = 1e-6
+"""Relative range below which a regressor does not vary."""
 UPRIGHT = 0.5
 """Camber, [deg], above which a run belongs to Table 4-2 and not to the other regressions."""
 FREE = 0.02
@@ -189,18 +202,29 @@ def _fit(
     columns: dict[str, FloatArray],
     groups: IntArray,
     rows: BoolArray | None,
-) -> Regression | None:
-    """Fit one regression; None where the data hold too little or no variation."""
+) -> Regression:
+    """Fit one regression; an error where the data hold too little or no variation."""
     x = np.stack(list(columns.values()), axis=1)
     use = np.isfinite(x).all(axis=1) & np.isfinite(y)
     use &= np.ones(y.size, dtype=np.bool_) if rows is None else rows
     x, y, groups = x[use], y[use], groups[use]
-    if np.unique(groups).size < x.shape[1] + 2 or np.ptp(y) < 1e-9:
-        return None
-    if quantity == "Fz" and np.ptp(y) < 0.1 * np.mean(y):
-        return None
-    if quantity != "Fz" and np.ptp(y) < {"deg": 0.5, "N": 100.0}[unit]:
-        return None
+    conditions = np.unique(groups).size
+    if conditions < x.shape[1] + 2:
+        raise CalibrationError(
+            f"{conditions} conditions for {x.shape[1] + 1} coefficients; "
+            f"at least {x.shape[1] + 2} are needed"
+        )
+    if np.ptp(y) < LEAST_RANGE[quantity]:
+        raise CalibrationError(
+            f"{quantity} varies by {np.ptp(y):.3g} {unit} only; "
+            f"at least {LEAST_RANGE[quantity]:g} {unit} are needed"
+        )
+    for column, values in zip(columns, x.T, strict=True):
+        if np.ptp(values) < STANDS_STILL * np.abs(values).max():
+            raise CalibrationError(
+                f"regressor {column} is {values.mean():.4g} in every run; "
+                "a regression needs variation"
+            )
     design = sm.add_constant(x, has_constant="add")
     result = sm.OLS(y, design).fit()
     held_out = np.empty_like(y)
@@ -226,18 +250,3 @@ def _fit(
         regressor=x[:, 0],
         rows=use,
     )
-
-
-def without_variation(x: FloatArray, name: str) -> None:
-    """Refuse a regressor that does not vary.
-
-    Raises
-    ------
-    CalibrationError
-        Naming the regressor and its value.
-    """
-    if np.ptp(x) < 1e-12 + 1e-6 * np.abs(x).max():
-        raise CalibrationError(
-            f"regressor {name} is {x[0]:.6g} in every run; a regression needs variation; "
-            "measure other loads or slip angles, or leave the regressor out"
-        )

@@ -113,13 +113,12 @@ def _products(
     variables: Sequence[Variable], powers_of: IntArray, values: Mapping[str, FloatArray]
 ) -> FloatArray:
     """Multiply the standardised variables, each to its power; shape (n, k)."""
-    n = next(iter(values.values())).shape[0]
-    x = np.ones((n, powers_of.shape[0]))
-    for variable, exponent in zip(variables, powers_of.T, strict=True):
-        powers = np.ones((n, int(exponent.max(initial=0)) + 1))
-        powers[:, 1:] = variable.standardise(values[variable.name])[:, None]
-        x *= np.multiply.accumulate(powers, axis=1)[:, exponent]
-    return x
+    n, count = next(iter(values.values())).shape[0], len(variables)
+    powers = np.ones((n, count, int(powers_of.max(initial=0)) + 1))
+    for position, variable in enumerate(variables):
+        powers[:, position, 1:] = variable.standardise(values[variable.name])[:, None]
+    np.multiply.accumulate(powers, axis=2, out=powers)
+    return np.multiply.reduce(powers[:, np.arange(count), powers_of], axis=2)
 
 
 def term_name(variables: Sequence[Variable], term: Term) -> str:

@@ -28,13 +28,15 @@ FREE_FORCE = 0.03
 class Trained:
     """A calibration with everything that was seen while making it.
 
-    `links` are those of the full gage set; `cornering` is None without enough slip angles.
+    `links` are those of the full gage set; `skipped` says why a regression of the dissertation
+    could not be fitted; `cornering` is None without enough slip angles.
     """
 
     calibration: Calibration
     links: Links
     means: Means
     regressions: tuple[Regression, ...]
+    skipped: dict[str, str]
     cornering: CorneringTrend | None
 
 
@@ -104,7 +106,8 @@ def train(
         average(observations.group.astype(np.float64)).astype(np.int64),
         average,
     )
-    return Trained(calibration, links, means, fit_all(means), cornering_trend(means))
+    regressions, skipped = fit_all(means)
+    return Trained(calibration, links, means, regressions, skipped, cornering_trend(means))
 
 
 def averaging(observations: Observations) -> Callable[[FloatArray], FloatArray]:

@@ -11,6 +11,7 @@ from tirelib.campaign import Campaign, read_campaign
 from tirelib.errors import CalibrationError
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
+from tirelib.estimators.dissertation import fit_all
 from tirelib.estimators.result import estimate_document
 from tirelib.estimators.train import Trained, take, train
 from tirelib.features import Features
@@ -81,9 +82,7 @@ def test_a_common_gain_of_all_gages_changes_no_estimate(trained: Trained) -> Non
 
 
 @pytest.mark.parametrize("gage", [0, 1, 3, 4])
-def test_with_one_gage_dead_the_other_four_estimate_and_say_so(
-    trained: Trained, gage: int
-) -> None:
+def test_with_one_gage_dead_the_other_four_estimate_and_say_so(trained: Trained, gage: int) -> None:
     run = synthetic_run(0, load=5000.0, slip_angle=np.deg2rad(2.0))
     assert run.strain is not None
     run.strain[gage] = 1e-3
@@ -176,9 +175,7 @@ def test_without_speed_there_is_no_slip_ratio_but_a_load(trained: Trained) -> No
 def test_a_contact_length_is_the_angle_times_the_rolling_radius(trained: Trained) -> None:
     features = features_of()
     found = trained.calibration.estimate(features)
-    np.testing.assert_allclose(
-        found.contact_length, features.contact_angle * found.radius[:, None]
-    )
+    np.testing.assert_allclose(found.contact_length, features.contact_angle * found.radius[:, None])
     np.testing.assert_allclose(found.radius[1:], 0.312 - 1e-6 * 4000.0, atol=1e-4)
 
 
@@ -242,3 +239,27 @@ def test_sweeps_count_turn_by_turn(tmp_path: Path) -> None:
     turn = swept.features.time[rising] - 0.5 * swept.features.period[rising]
     expected = 1000.0 + 2000.0 * turn / (ramp.size / 100.0)
     np.testing.assert_allclose(swept.truth["Fz"][rising], expected, atol=60.0)
+
+
+def test_a_regressor_without_variation_is_named(braking: Campaign) -> None:
+    skipped = train(observe([braking])).skipped
+    assert "3 conditions for 3 coefficients" in skipped["load from centre contact length"]
+    assert "at least" in skipped["Fy from six regressors"]
+
+
+def test_a_regression_on_a_regressor_that_stands_still_is_refused(trained: Trained) -> None:
+    still = replace(trained.means, rate_slope=np.full_like(trained.means.rate_slope, 3.2))
+    _, skipped = fit_all(still)
+    assert "regressor slope is 3.2 in every run" in skipped["slip angle from slope of peak rates"]
+
+
+def test_a_campaign_without_measured_load_gives_what_it_can(observed: Observations) -> None:
+    blind = replace(observed, truth={**observed.truth, "Fz": np.full(len(observed), np.nan)})
+    trained = train(blind)
+    assert "no Fz" in trained.links.refused["Fz"]
+    assert "no Fz" in trained.links.refused["alpha"]
+    assert trained.calibration.chains[-1].has("Fy")
+    assert trained.calibration.chains[-1].has("kappa")
+    found = trained.calibration.estimate(features_of(slip_angle=np.deg2rad(2.0)))
+    assert np.isnan(found.value["Fz"]).all()
+    assert (found.value["Fy"][1:] < 0).all()
