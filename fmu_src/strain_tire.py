@@ -4,7 +4,10 @@ All work is in `tirelib.fmu.wheel`, which the build copies into the FMU beside t
 name of its own, so that FMUs of several versions can live in one process.
 """
 
+import ctypes
+import functools
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +15,34 @@ from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Intege
 from pythonfmu.default_experiment import DefaultExperiment
 from pythonfmu.enums import Fmi2Status
 
-from tirelib.errors import ParameterError, TirelibError
+from tirelib.errors import FormatError, ParameterError
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.fmu.variables import Variable, inputs, outputs, parameters
 from tirelib.fmu.wheel import Wheel, load_wheel
 from tirelib.stream.estimator import RATES
 
 KINDS = {"Real": Real, "Integer": Integer, "Boolean": Boolean, "String": String}
+
+
+def _guarded(method: Callable[..., Any]) -> Callable[..., Any]:
+    """Let an error reach the importer as an FMI error, with its cause in the log.
+
+    On every exception pythonfmu 0.7.0 gives up a reference to the class, to the instance and to its
+    log, and goes on using them: a reset or a free that followed would touch freed memory. Each gets
+    one more reference here, so that the importer lives.
+    """
+
+    @functools.wraps(method)
+    def call(self: Any, *args: Any) -> Any:
+        try:
+            return method(self, *args)
+        except Exception as error:
+            self.log(f"{type(error).__name__}: {error}", Fmi2Status.error)
+            for kept in (type(self), self, self.log_queue):
+                ctypes.pythonapi.Py_IncRef(ctypes.py_object(kept))
+            raise
+
+    return call
 
 
 class StrainTire(Fmi2Slave):
@@ -43,7 +67,7 @@ class StrainTire(Fmi2Slave):
         )
         table = [variable for group in groups for variable in group]
         self._real: list[Any] = [v.start if v.kind == "Real" else None for v in table]
-        self._other = {v.name: v.start for v in table if v.kind != "Real"}
+        self._other: dict[str, Any] = {v.name: v.start for v in table if v.kind != "Real"}
         self._reference = {v.name: number for number, v in enumerate(table)}
         for variable in table:
             self.register_variable(self._scalar(variable))
@@ -84,16 +108,19 @@ class StrainTire(Fmi2Slave):
         """Refuse to set an output, or a parameter that is fixed by now."""
         if not self._settable.issuperset(references):
             names = [self.vars[r].name for r in references if r not in self._settable]
-            self._refuse(
-                ParameterError(f"{', '.join(names)}: cannot be set now; inputs may be set at any "
-                               "time, parameters before initialisation, outputs never")
-            )  # fmt: skip
+            raise ParameterError(
+                f"{', '.join(names)}: cannot be set now; inputs may be set at any time, parameters "
+                "before initialisation, outputs never"
+            )
 
-    def _refuse(self, error: Exception) -> None:
-        """Log the cause and raise: the importer sees an FMI error."""
-        self.log(str(error), Fmi2Status.error)
-        raise error
+    get_integer = _guarded(Fmi2Slave.get_integer)
+    get_boolean = _guarded(Fmi2Slave.get_boolean)
+    get_string = _guarded(Fmi2Slave.get_string)
+    set_integer = _guarded(Fmi2Slave.set_integer)
+    set_boolean = _guarded(Fmi2Slave.set_boolean)
+    set_string = _guarded(Fmi2Slave.set_string)
 
+    @_guarded
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         """Set Reals by value reference."""
         if not self._settable.issuperset(vrs):
@@ -104,6 +131,7 @@ class StrainTire(Fmi2Slave):
                 raise TypeError(f"{self.vars[reference].name} is not of type Real")
             real[reference] = value
 
+    @_guarded
     def get_real(self, vrs: list[int]) -> list[float]:
         """Return Reals by value reference."""
         real = self._real
@@ -112,19 +140,21 @@ class StrainTire(Fmi2Slave):
             raise TypeError(f"{self.vars[vrs[values.index(None)]].name} is not of type Real")
         return values
 
+    @_guarded
     def exit_initialization_mode(self) -> None:
         """Take up the parameters."""
-        try:
-            self._wheel, _ = load_wheel(
-                self._folder / "calibration.toml",
-                str(self._other["calibration"]),
-                self._real[self._reference["sample_rate"]],
-                self._samples,
-                str(self._other["axes"]),
-            )
-        except TirelibError as error:
-            self._refuse(error)
+        self._start()
+
+    def _start(self) -> Wheel:
+        self._wheel = load_wheel(
+            self._folder / "calibration.toml",
+            str(self._other["calibration"]),
+            self._real[self._reference["sample_rate"]],
+            self._samples,
+            str(self._other["axes"]),
+        )
         self._settable = self._inputs
+        return self._wheel
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Push the frame; an error is logged, the last values are held and are not valid."""
@@ -164,6 +194,7 @@ class StrainTire(Fmi2Slave):
             self.log(message, Fmi2Status.error)
         self._last_error = message
 
+    @_guarded
     def _get_fmu_state(self) -> dict[str, Any]:
         return {
             "real": [None if value is None else float(value).hex() for value in self._real],
@@ -171,11 +202,21 @@ class StrainTire(Fmi2Slave):
             "wheel": None if self._wheel is None else self._wheel.state(),
         }
 
+    @_guarded
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
+        if "real" not in state:
+            raise FormatError("the bytes are no state of this FMU; save it anew")
         real = [None if value is None else float.fromhex(value) for value in state["real"]]
         self._real[:] = real
         self._other.update(state["other"])
         self._wheel, self._settable = None, self._inputs | self._fixed
         if state["wheel"] is not None:
-            self.exit_initialization_mode()
-            self._wheel.restore(state["wheel"])  # type: ignore[union-attr]
+            self._start().restore(state["wheel"])
+
+    @staticmethod
+    def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
+        try:
+            content = json.loads(state)
+        except ValueError:
+            return {}
+        return content if isinstance(content, dict) else {}

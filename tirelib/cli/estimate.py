@@ -69,7 +69,7 @@ def print_document(name: str, document: dict[str, Any]) -> int:
     """Print the summary and the flags of an estimate document; return the number of valid turns."""
     console = output()
     turns = document["turns"]
-    valid = sum(turn["valid"] for turn in turns)
+    valid = sum(bool(turn["valid"]) for turn in turns)
     console.print(f"{name}: {len(turns)} turns, {valid} valid (ISO 8855 axes)")
     console.print(_summary_table(document["summary"]))
     counts: dict[str, int] = {}

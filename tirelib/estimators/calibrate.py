@@ -17,7 +17,8 @@ from tirelib.estimators import basis
 from tirelib.estimators.chain import AngleModel, Chain
 from tirelib.estimators.fit import Fit, fit_best, levels_of, mean_by
 from tirelib.estimators.laws import ConditionLaws
-from tirelib.estimators.polynomial import Polynomial, Range
+from tirelib.estimators.polynomial import Polynomial
+from tirelib.estimators.ranges import with_ranges
 from tirelib.estimators.regressors import EVEN, ODD, compute_regressors
 from tirelib.observations import TRUTH, Observations
 
@@ -37,20 +38,6 @@ VARIES = {
     "tp_slope": 0.02,
 }
 """Range (SI) that a regressor must cover in the data to enter a regression."""
-SLACK = {
-    "contact_angle": 0.01,
-    "compression": 0.03,
-    "traction": 0.05,
-    "cp1_slope": 0.02,
-    "cp2_slope": 0.02,
-    "tp_slope": 0.02,
-    "angle_slope": 0.004,
-    "utilisation": 0.02,
-    "camber": np.deg2rad(0.5),
-}
-"""Least distance (SI) beyond the calibrated range that is still taken as calibrated."""
-MARGIN = 0.05
-"""The same, as a share of the range."""
 FREE_ROLLING = 0.02
 """Slip ratio up to which a run tells the effective rolling radius."""
 LEAST_FORCE = 0.05
@@ -130,7 +117,7 @@ def calibrate_chain(
         force=force,
         angle=angle,
     )
-    return _with_ranges(_with_floor(chain, regressors, unit, rows), links), links
+    return with_ranges(_with_floor(chain, regressors, unit, rows), values, truth), links
 
 
 def _varying(values: dict[str, FloatArray], names: Sequence[str]) -> set[str]:
@@ -360,38 +347,3 @@ def _with_floor(
         force=floored(chain.force, estimates["Fy"].value if "Fy" in estimates else none),
         angle=angle,
     )
-
-
-def _with_ranges(chain: Chain, links: Links) -> Chain:
-    """Add the calibrated range of every regressor that decides on validity."""
-
-    def limits(name: str, *, needed: bool = True) -> Range:
-        x = links.values[name]
-        low, high = float(np.nanmin(x)), float(np.nanmax(x))
-        return Range(name, low, high, max(SLACK[name], MARGIN * (high - low)), needed)
-
-    shape = tuple(limits(name) for name in ("contact_angle", "compression", "traction", *ODD))
-    if np.isfinite(links.values["camber"]).any():
-        shape = (*shape, limits("camber", needed=_uses(chain, "camber")))
-    angle = (limits("utilisation"),) if chain.angle is not None else ()
-
-    def own(quantity: str, measured: str) -> tuple[Range, ...]:
-        if not chain.has(quantity):
-            return ()
-        x = links.truth[measured]
-        low, high = float(x.min()), float(x.max())
-        return (Range(quantity, low, high, MARGIN * (high - low)),)
-
-    guards = {
-        "Fz": (*shape, *own("Fz", "Fz")),
-        "Fy": (*shape, *own("Fy", "Fy")),
-        "alpha": (*shape, *angle, *own("alpha", "slip_angle")),
-        "kappa": (),
-    }
-    return replace(chain, guards=guards)
-
-
-def _uses(chain: Chain, name: str) -> bool:
-    """Tell whether any model of the chain needs a regressor."""
-    models = [chain.load, chain.force, chain.angle.polynomial if chain.angle else None]
-    return any(name in [v.name for v in model.variables] for model in models if model is not None)

@@ -118,7 +118,8 @@ def _products(
     for position, variable in enumerate(variables):
         powers[:, position, 1:] = variable.standardise(values[variable.name])[:, None]
     np.multiply.accumulate(powers, axis=2, out=powers)
-    return np.multiply.reduce(powers[:, np.arange(count), powers_of], axis=2)
+    products = np.multiply.reduce(powers[:, np.arange(count), powers_of], axis=2)
+    return np.asarray(products, dtype=np.float64)
 
 
 def term_name(variables: Sequence[Variable], term: Term) -> str:

@@ -70,14 +70,17 @@ def build_fmu(
     text = Path(calibration).read_text(encoding="utf-8")
     slave = slave_file()
     sources = collect(slave)
-    settings = {"samples_per_step": samples_per_step, "sample_rate": sample_rate}
+    settings: dict[str, int | float | str] = {
+        "samples_per_step": samples_per_step,
+        "sample_rate": sample_rate,
+    }
     digest = content_hash(
         {
             **sources,
             "slave": slave.read_text(encoding="utf-8"),
             "calibration": text,
             "settings": json.dumps(settings),
-            "pythonfmu": metadata.version("pythonfmu"),
+            "pythonfmu": _pythonfmu(),
         }
     )
     guid = str(uuid5(_NAMESPACE, digest))
@@ -87,9 +90,7 @@ def build_fmu(
     with tempfile.TemporaryDirectory(prefix="tirelib_fmu_") as name:
         folder = Path(name)
         script = folder / f"strain_tire_{digest}.py"
-        script.write_text(
-            renamed(slave.read_text(encoding="utf-8"), package), encoding="utf-8"
-        )
+        script.write_text(renamed(slave.read_text(encoding="utf-8"), package), encoding="utf-8")
         (folder / "calibration.toml").write_text(text, encoding="utf-8")
         (folder / "settings.json").write_text(json.dumps(settings, indent=1), encoding="utf-8")
         content = [
@@ -104,6 +105,16 @@ def build_fmu(
             raise FormatError(f"{target}: cannot be written ({error.strerror}); choose another "
                               "file") from None  # fmt: skip
     return target
+
+
+def _pythonfmu() -> str:
+    """Return the version of pythonfmu."""
+    try:
+        return metadata.version("pythonfmu")
+    except metadata.PackageNotFoundError:
+        raise FormatError(
+            "fmu build: pythonfmu is not installed; it writes the FMU; `pip install tirelib[fmu]`"
+        ) from None
 
 
 def slave_file() -> Path:

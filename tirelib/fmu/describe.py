@@ -52,7 +52,8 @@ def described(source: bytes, table: Sequence[Variable]) -> bytes:
         if variable.causality == "output":
             Xml.SubElement(unknown, "Unknown", {"index": str(number), "dependencies": ""})
     Xml.indent(root)
-    return Xml.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"
+    text: bytes = Xml.tostring(root, encoding="UTF-8", xml_declaration=True)
+    return text + b"\n"
 
 
 def _describe(scalar: Xml.Element, variable: Variable) -> None:

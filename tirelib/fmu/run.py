@@ -4,6 +4,8 @@ import math
 import shutil
 from collections.abc import Callable, Iterator, Mapping
 from ctypes import Array, c_double, c_uint32
+from dataclasses import fields
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -32,9 +34,14 @@ class LoadedFmu:
     """
 
     def __init__(self, path: str | Path, *, name: str = "wheel") -> None:
-        from fmpy import extract, read_model_description
-        from fmpy.fmi2 import FMU2Slave
-
+        try:
+            from fmpy import extract, read_model_description
+            from fmpy.fmi2 import FMU2Slave
+        except ModuleNotFoundError as error:
+            raise FormatError(
+                f"fmu run: {error.name} is not installed; it steps the FMU; "
+                "`pip install tirelib[fmu]`"
+            ) from None
         self.path = Path(path)
         self.calibration = embedded_calibration(path)
         self.messages: list[str] = []
@@ -43,8 +50,7 @@ class LoadedFmu:
         except Exception as error:  # FMPy raises bare exceptions
             raise FormatError(f"{path}: is no FMU ({error}); build it anew") from None
         self.references = {v.name: v.valueReference for v in description.modelVariables}
-        self.units = {v.name: v.unit for v in description.modelVariables}
-        strains = [n for n in self.references if n.startswith("strain_")]
+        strains = [name for name in self.references if name.startswith("strain_")]
         self.samples = len(strains) // len(self.calibration.lateral)
         self._folder = extract(str(path))
         self.slave: Any = FMU2Slave(
@@ -53,7 +59,13 @@ class LoadedFmu:
             modelIdentifier=description.coSimulation.modelIdentifier,
             instanceName=name,
         )
-        self.slave.instantiate(loggingOn=True, callbacks=self._callbacks())
+        try:
+            self.slave.instantiate(loggingOn=True, callbacks=self._callbacks())
+        except Exception as error:  # FMPy raises bare exceptions
+            shutil.rmtree(self._folder, ignore_errors=True)
+            raise FormatError(
+                f"{path}: cannot be instantiated: {'; '.join(self.messages) or error}"
+            ) from None
         self._frame = self._buffer(*strains, *CONDITIONS)
 
     def __enter__(self) -> "LoadedFmu":
@@ -69,13 +81,13 @@ class LoadedFmu:
 
     def _callbacks(self) -> Any:
         """Return callbacks that keep the FMU's messages."""
+        from fmpy import calloc, free
         from fmpy.fmi2 import (
             fmi2CallbackAllocateMemoryTYPE,
             fmi2CallbackFreeMemoryTYPE,
             fmi2CallbackFunctions,
             fmi2CallbackLoggerTYPE,
         )
-        from fmpy import calloc, free
 
         def keep(_: Any, __: Any, ___: Any, ____: Any, message: bytes) -> None:
             self.messages.append(message.decode("utf-8", "replace"))
@@ -108,8 +120,9 @@ class LoadedFmu:
             self.slave.enterInitializationMode()
             self.slave.exitInitializationMode()
         except Exception as error:
+            causes = [text for text in self.messages if not text.startswith("Fatal py")]
             raise FormatError(
-                f"{self.path}: refuses its parameters: {'; '.join(self.messages) or error}"
+                f"{self.path}: refuses its parameters: {'; '.join(causes) or error}"
             ) from None
         self.rate = rate
         self.count = 0
@@ -117,7 +130,7 @@ class LoadedFmu:
     def step(self, frame: FloatArray, conditions: FloatArray) -> None:
         """Set a frame, shape (n_gages, n), n up to `samples`, with its conditions, and step."""
         references, size, values = self._frame
-        view = np.frombuffer(values, dtype=np.float64)
+        view = np.ctypeslib.as_array(values)
         view[: frame.size] = frame.T.ravel()
         view[-conditions.size :] = conditions
         self.slave.fmi2SetReal(self.slave.component, references, size, values)
@@ -145,9 +158,7 @@ class LoadedFmu:
         values: dict[str, Any] = dict(zip(reals, self.reals(*reals), strict=True))
         slave, at = self.slave, self.references
         values |= zip(booleans, map(bool, slave.getBoolean([at[n] for n in booleans])), strict=True)
-        values |= zip(
-            ("turn", "flags"), slave.getInteger([at["turn"], at["flags"]]), strict=True
-        )
+        values |= zip(("turn", "flags"), slave.getInteger([at["turn"], at["flags"]]), strict=True)
         texts = slave.getString([at["rolling"], at["status"]])
         values |= zip(("rolling", "status"), (text.decode() for text in texts), strict=True)
         return values
@@ -193,7 +204,7 @@ def _frames(conditions: FloatArray, samples: int) -> Iterator[slice]:
     before, after = conditions[:, :-1], conditions[:, 1:]
     changed = ((before != after) & ~(np.isnan(before) & np.isnan(after))).any(axis=0)
     borders = [0, *(np.flatnonzero(changed) + 1).tolist(), conditions.shape[1]]
-    for start, stop in zip(borders[:-1], borders[1:], strict=True):
+    for start, stop in pairwise(borders):
         for first in range(start, stop, samples):
             yield slice(first, min(first + samples, stop))
 
@@ -251,8 +262,6 @@ def _column(rows: list[dict[str, Any]], name: str) -> FloatArray:
 
 def _features(rows: list[dict[str, Any]], calibration: Calibration) -> Features:
     """Return features of which only times, turn rate and flags are known."""
-    from dataclasses import fields
-
     per_gage = np.full((len(rows), len(calibration.lateral)), np.nan)
     values: dict[str, Any] = {field.name: per_gage for field in fields(Features)}
     per_turn = np.full(len(rows), np.nan)

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.axes import sign
 from tirelib.errors import ParameterError
 from tirelib.estimators.calibration import Calibration
@@ -185,9 +184,7 @@ class Wheel:
         self._held = None if held is None else (_unhex(held[0]), tuple(held[1]))
 
 
-def load_wheel(
-    embedded: Path, override: str, rate: float, samples: int, axes: str
-) -> tuple[Wheel, Calibration]:
+def load_wheel(embedded: Path, override: str, rate: float, samples: int, axes: str) -> Wheel:
     """Return a wheel with the embedded calibration, or with another of the same gage layout.
 
     Raises
@@ -204,7 +201,7 @@ def load_wheel(
         other = read_calibration(override)
         other.check_layout(other.tire, calibration.lateral, "StrainTire.fmu")
         calibration = other
-    return Wheel(calibration, rate, samples, axes), calibration
+    return Wheel(calibration, rate, samples, axes)
 
 
 def _gage_order(lateral: tuple[float, ...], side: float, axes: str) -> list[int]:

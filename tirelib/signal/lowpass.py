@@ -20,7 +20,7 @@ The dissertation's 200 to 400 Hz at 65 km/h (section 3.4) are orders 21 to 42; t
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array
+from numpy.lib.stride_tricks import sliding_window_view
 
 from tirelib.arrays import FloatArray
 from tirelib.errors import ParameterError
@@ -128,22 +128,16 @@ def smooth_to_angle(
             f"filter needs samples {nearest[0] - reach} .. {nearest[-1] + reach}; "
             f"given are 0 .. {samples.shape[1] - 1}"
         )
-    tap = np.arange(-reach, reach + 1, dtype=np.int32)
-    distance = tap * step - ((position - nearest) * step)[:, None]
+    distance = np.arange(-reach, reach + 1) * step - ((position - nearest) * step)[:, None]
     weight = distance * distance
     weight *= -0.5 / sigma**2
     np.exp(weight, out=weight)
     moment = weight * distance
     total, first = weight.sum(axis=1), moment.sum(axis=1)
     second = np.einsum("ij,ij->i", moment, distance)
-    index = (nearest.astype(np.int32)[:, None] + tap).ravel()
-    ends = np.arange(0, 2 * index.size + 1, tap.size, dtype=np.int32)
-    data = np.concatenate((weight.ravel(), moment.ravel()))
-    taps = csr_array(
-        (data, np.concatenate((index, index)), ends), shape=(2 * phi.size, samples.shape[1])
-    )
-    sums = (taps @ np.ascontiguousarray(samples.T)).T
-    plain, moments = sums[:, : phi.size], sums[:, phi.size :]
+    windows = sliding_window_view(samples, 2 * reach + 1, axis=1)[:, nearest - reach]
+    plain = np.einsum("gij,ij->gi", windows, weight)
+    moments = np.einsum("gij,ij->gi", windows, moment)
     mean = first / total  # of the distance: the weights are not quite symmetric
     rate = (moments - mean * plain) / (second - mean * first)
-    return plain / total - mean * rate, np.ascontiguousarray(rate)
+    return plain / total - mean * rate, rate

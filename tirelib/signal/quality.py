@@ -50,7 +50,7 @@ def inspect(window: FloatArray, step: float) -> tuple[FloatArray, IntArray]:
         flags[suspect] |= int(TurnFlag.BRIDGED)
         too_long = _longest_run(missing) > LONGEST_BRIDGE
         flags[too_long] = int(TurnFlag.GAP)
-    known = np.where(missing, np.nan, window)
+    known = np.where(missing, np.nan, window) if suspect.any() else window
     with np.errstate(invalid="ignore"):
         low = np.fmin.reduce(known, axis=1)
         high = np.fmax.reduce(known, axis=1)

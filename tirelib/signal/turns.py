@@ -208,13 +208,14 @@ class TurnCutter:
             return self._first_turn(contact)
         period = contact.middle - before.middle
         step = 2.0 * np.pi / period
-        sigma = self.low_pass.sigma(self.rate / period)
+        suits = self.low_pass.suits(self.rate / period, self.rate)
+        sigma = (self.low_pass if suits else LowPass()).sigma(self.rate / period)
         last = contact.fall + (AFTER + half_width(sigma)) / step + 1.0
         if last >= self._base + self._filled:
             return None
         self._waiting.popleft()
         self._previous = contact
-        turn = self._full_turn(contact, before, step, sigma, last)
+        turn = self._full_turn(contact, before, step, sigma if suits else None, last)
         self._previous_period = period
         self._previous_offset = turn.offset
         return turn
@@ -241,14 +242,14 @@ class TurnCutter:
         )
 
     def _full_turn(
-        self, contact: Contact, before: Contact, step: float, sigma: float, last: float
+        self, contact: Contact, before: Contact, step: float, sigma: float | None, last: float
     ) -> Turn:
         period = contact.middle - before.middle
         flags = TurnFlag(0)
         ratio = period / self._previous_period
         if not np.isnan(ratio) and not 1 / LARGEST_PERIOD_RATIO <= ratio <= LARGEST_PERIOD_RATIO:
             flags |= TurnFlag.PERIOD_JUMP
-        if not self.low_pass.suits(self.rate / period, self.rate):
+        if sigma is None:
             flags |= TurnFlag.CUT_OFF
         pulse = 0.5 * (contact.fall - contact.rise) * step
         strain, rate, gage_flags = self._window(contact.middle, step, sigma, pulse)
@@ -300,17 +301,19 @@ class TurnCutter:
         )
 
     def _window(
-        self, middle: float, step: float, sigma: float, pulse: float
+        self, middle: float, step: float, sigma: float | None, pulse: float
     ) -> tuple[FloatArray, FloatArray, IntArray]:
         """Strain and rate over `PHI`, NaN beyond the end of the window, and the gages' flags."""
+        strain = np.full((self._gages, PHI.size), np.nan)
+        rate = np.full((self._gages, PHI.size), np.nan)
+        if sigma is None:
+            return strain, rate, np.zeros(self._gages, dtype=np.int64)
         seen = pulse + AFTER >= PHI
         reach = half_width(sigma) / step + 2.0
         first = int(middle + PHI[0] / step - reach) - self._base
         stop = int(middle + PHI[seen][-1] / step + reach) + 1 - self._base
         raw = self._buffer[: self._gages, max(first, 0) : min(stop, self._filled)]
         mended, gage_flags = inspect(raw, step)
-        strain = np.full((self._gages, PHI.size), np.nan)
-        rate = np.full((self._gages, PHI.size), np.nan)
         zero = middle - self._base - max(first, 0)
         strain[:, seen], rate[:, seen] = smooth_to_angle(mended, zero, step, PHI[seen], sigma)
         return strain, rate, gage_flags
@@ -321,10 +324,10 @@ class TurnCutter:
         b = min(round(stop) - self._base, self._filled)
         part = self._buffer[rows, a:b]
         good = np.isfinite(part)
-        if good.all():
+        if good.size and good.all():
             return part.mean(axis=1), np.zeros(part.shape[0], dtype=np.bool_)
         count = good.sum(axis=1)
-        gap = count < (1.0 - LARGEST_MISSING) * part.shape[1]
+        gap = count < max((1.0 - LARGEST_MISSING) * part.shape[1], 1.0)
         total = np.where(good, part, 0.0).sum(axis=1)
         return np.where(gap, np.nan, total / np.maximum(count, 1)), gap
 

@@ -263,3 +263,13 @@ def test_a_campaign_without_measured_load_gives_what_it_can(observed: Observatio
     found = trained.calibration.estimate(features_of(slip_angle=np.deg2rad(2.0)))
     assert np.isnan(found.value["Fz"]).all()
     assert (found.value["Fy"][1:] < 0).all()
+
+
+@pytest.mark.parametrize("factor", [1e6, 1e-6, 2.0])
+def test_strain_in_a_wrong_unit_is_out_of_range(trained: Trained, factor: float) -> None:
+    run = synthetic_run(0)
+    assert run.strain is not None
+    found = trained.calibration.estimate(
+        measure_run(replace(run, strain=factor * run.strain), header())[0]
+    )
+    assert not found.turn_valid.any()

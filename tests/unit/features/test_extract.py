@@ -152,9 +152,7 @@ def test_a_weak_edge_is_flagged() -> None:
     assert not found.flags[1] & TurnFlag.WEAK_EDGE
 
 
-@given(
-    shift=st.floats(-0.9, 0.9), curvature=st.floats(0.1, 50.0), height=st.floats(-5.0, 5.0)
-)
+@given(shift=st.floats(-0.9, 0.9), curvature=st.floats(0.1, 50.0), height=st.floats(-5.0, 5.0))
 def test_a_parabola_is_found_exactly(shift: float, curvature: float, height: float) -> None:
     x = np.arange(-10.0, 11.0)
     position, value, border = peak(height - curvature * (x - shift) ** 2, x == x, -10.0, 1.0)

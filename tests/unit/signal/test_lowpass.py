@@ -67,9 +67,7 @@ def test_noise_falls_with_the_width_of_the_filter() -> None:
     rng = np.random.default_rng(0)
     noise = rng.standard_normal((400, 2000))
     phi = np.array([0.0])
-    spread = [
-        smooth_to_angle(noise, 1000.0, STEP, phi, sigma)[0].std() for sigma in (0.02, 0.08)
-    ]
+    spread = [smooth_to_angle(noise, 1000.0, STEP, phi, sigma)[0].std() for sigma in (0.02, 0.08)]
     assert spread[0] / spread[1] == pytest.approx(2.0, rel=0.2)  # root of the width's ratio
 
 

@@ -48,6 +48,20 @@ def test_restored_through_json_it_goes_on_exactly_alike(at: int) -> None:
     assert track(other, strain[:, at:]) == track(one, strain[:, at:])
 
 
+def test_it_goes_on_alike_from_every_sample_round_the_edges_of_a_contact() -> None:
+    strain, _ = live.strain_of(4.2e3, 0.06, turns=3.4)
+    last = stream().push(strain, **HELD)[-1]
+    half = last.features.trail[0, 2] / last.features.omega[0]
+    wanted = track(stream(), strain)
+    for edge in (last.time - half, last.time + half):
+        for at in range(int(edge * live.RATE) - 8, int(edge * live.RATE) + 8):
+            one, other = stream(), stream()
+            one.push(strain[:, :at], **HELD)
+            other.restore(json.loads(json.dumps(one.state())))
+            turns = other.push(strain[:, at:], **HELD)
+            assert json.dumps(to_plain(turns[-1])) in wanted
+
+
 def test_restoring_twice_rolls_back() -> None:
     strain = faulty_strain()
     estimator = stream()

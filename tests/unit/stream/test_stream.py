@@ -281,6 +281,23 @@ def test_a_fixed_cut_off_of_the_calibration_is_used() -> None:
     assert turn.features.tp[0, 0] != played(strain)[-1].features.tp[0, 0]
 
 
+@pytest.mark.parametrize("start", [3.0, 1.0, -1.0])
+def test_a_turn_does_not_depend_on_what_lies_far_before_it(start: float) -> None:
+    strain, _ = live.strain_of(4e3, 0.05, turns=124.0, start=start)
+    estimator, found = stream(), []
+    for first in range(0, strain.shape[1], 10):
+        found += estimator.push(strain[:, first : first + 10], **HELD)
+    assert strain.shape[1] > 65_000  # the buffer of 12 s has been compacted
+    for turn in found[108:118]:
+        stop = int(turn.ready * live.RATE) + 2
+        fresh = played(strain[:, stop - 4 * TURN : stop])[-1]
+        for quantity in QUANTITIES:
+            # positions are counted from another start: the last digits of 68000 samples
+            np.testing.assert_allclose(
+                turn.value(quantity), fresh.value(quantity), rtol=1e-7, atol=1e-9
+            )
+
+
 def test_memory_does_not_grow() -> None:
     strain, _ = live.strain_of(4e3, 0.05, turns=6.0)
     estimator = stream()

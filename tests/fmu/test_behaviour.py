@@ -1,0 +1,394 @@
+"""Laws of the running FMU: it is the library, and no fault reaches the importer as a crash."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fmpy.fmi1 import FMICallException
+
+from tests.fmu import live
+from tests.synthetic import LATERAL
+from tirelib.errors import FormatError
+from tirelib.estimators.calibration_file import read_calibration, write_calibration
+from tirelib.flags import TurnFlag, flag_names
+from tirelib.fmu.run import LoadedFmu
+from tirelib.stream import StreamEstimator
+
+CONDITIONS = np.array([live.SPEED, live.PRESSURE, 0.0])
+QUANTITIES = ("Fz", "alpha", "kappa", "Fy")
+
+
+@pytest.fixture(scope="module", params=[1, 10])
+def fmu(request: pytest.FixtureRequest) -> Iterator[LoadedFmu]:
+    with LoadedFmu(live.fmu_file(request.param)) as loaded:
+        yield loaded
+
+
+@pytest.fixture(scope="module")
+def ten() -> Iterator[LoadedFmu]:
+    with LoadedFmu(live.fmu_file(10)) as loaded:
+        yield loaded
+
+
+def strain(load: float = 4e3, tilt: float = 0.05, turns: float = 3.4) -> np.ndarray:
+    found = live.strain_of(load, tilt, turns=turns)[0]
+    return found[:, : found.shape[1] // 10 * 10]
+
+
+def play(fmu: LoadedFmu, samples: np.ndarray, conditions: np.ndarray = CONDITIONS) -> list[Any]:
+    """Outputs after every step, to the last digit."""
+    seen = []
+    for first in range(0, samples.shape[1], fmu.samples):
+        fmu.step(samples[:, first : first + fmu.samples], conditions)
+        seen.append(fmu.read())
+    return seen
+
+
+def same(a: list[Any], b: list[Any]) -> bool:
+    return json.dumps(a) == json.dumps(b)
+
+
+def test_after_every_step_the_outputs_are_those_of_the_library(fmu: LoadedFmu) -> None:
+    samples = strain()
+    samples[1, 700:1500] = np.nan
+    estimator = StreamEstimator(live.calibration(), live.RATE)
+    fmu.start(live.RATE)
+    for step, values in enumerate(play(fmu, samples)):
+        part = slice(step * fmu.samples, (step + 1) * fmu.samples)
+        estimator.push(samples[:, part], speed=live.SPEED, pressure=live.PRESSURE, camber=0.0)
+        latest = estimator.latest
+        assert values["valid"] == estimator.valid
+        assert values["flags"] == estimator.flags
+        assert values["turn"] == estimator.turns
+        np.testing.assert_allclose(values["age"], estimator.age, rtol=1e-9)
+        if latest is None:
+            continue
+        for quantity in QUANTITIES:
+            wanted = (latest.value(quantity), latest.std(quantity))
+            given = (values[quantity], values[f"{quantity}_std"])
+            np.testing.assert_allclose(given, wanted, rtol=1e-9)
+            assert values[f"{quantity}_valid"] == estimator.is_valid(quantity)
+        np.testing.assert_allclose(
+            [values[f"contact_length_{gage}"] for gage in range(1, 6)],
+            latest.estimates.contact_length[0], rtol=1e-9,
+        )  # fmt: skip
+        np.testing.assert_allclose(values["contact_time"], latest.time, rtol=1e-9)
+        assert values["rolling"] == latest.estimates.rolling[0]
+    assert "reduced_gages" in values["status"]
+
+
+def test_a_step_shorter_than_the_frame_takes_its_first_samples(ten: LoadedFmu) -> None:
+    samples = strain()
+    ten.start(live.RATE)
+    whole = play(ten, samples)[-1]
+    ten.start(live.RATE)
+    at = 0
+    for n in (3, 7, 10) * (samples.shape[1] // 20):
+        ten.step(samples[:, at : at + n], CONDITIONS)
+        at += n
+    assert ten.count == samples.shape[1] // 20 * 20
+    ten.step(samples[:, at:], CONDITIONS) if at < samples.shape[1] else None
+    parts = ten.read()
+    assert parts["turn"] == whole["turn"]
+    for name in QUANTITIES:
+        np.testing.assert_allclose(parts[name], whole[name], rtol=1e-12)
+
+
+def test_samples_missing_between_frames_are_a_gap(ten: LoadedFmu) -> None:
+    samples = strain()
+    ten.start(live.RATE)
+    estimator = StreamEstimator(live.calibration(), live.RATE)
+    names = [f"strain_{sample}_{gage}" for sample in range(1, 11) for gage in range(1, 6)]
+    names += ["speed", "pressure", "camber"]
+    for first in range(0, samples.shape[1] - 20, 20):
+        frame = samples[:, first : first + 10]
+        values = np.concatenate((frame.T.ravel(), CONDITIONS)).tolist()
+        ten.slave.setReal([ten.references[name] for name in names], values)
+        ten.slave.doStep(first / live.RATE, 20 / live.RATE)
+        holed = np.concatenate((frame, np.full((5, 10), np.nan)), axis=1)
+        estimator.push(holed, speed=live.SPEED, pressure=live.PRESSURE, camber=0.0)
+    last, latest = ten.read(), estimator.latest
+    assert latest is not None
+    assert last["contact_time"] == latest.time
+    assert last["turn"] >= 3
+    assert np.isnan(last["Fz"])
+    assert {"gap", "too_few_gages"} <= set(flag_names(last["flags"]))
+
+
+@pytest.mark.parametrize("step", [0.5, 1.5, 0.0, -1.0, np.nan])
+def test_a_step_that_is_no_whole_number_of_samples_is_discarded_with_its_cause(
+    ten: LoadedFmu, step: float
+) -> None:
+    ten.start(live.RATE)
+    samples = strain()
+    before = play(ten, samples[:, :1200])[-1]
+    with pytest.raises(FMICallException, match="discard"):
+        ten.slave.doStep(ten.count / live.RATE, step / live.RATE)
+    assert "a whole number of samples is needed" in ten.messages[-1]
+    assert ten.read() == before
+    ten.step(samples[:, 1200:1210], CONDITIONS)
+
+
+def test_four_instances_are_independent() -> None:
+    loads = (3e3, 3.5e3, 4.2e3, 5e3)
+    fmus = [LoadedFmu(live.fmu_file(10), name=f"wheel_{n}") for n in range(4)]
+    records = [strain(load) for load in loads]
+    try:
+        for fmu in fmus:
+            fmu.start(live.RATE)
+        n = min(record.shape[1] for record in records)
+        for first in range(0, n, 10):
+            for fmu, record in zip(fmus, records, strict=True):
+                fmu.step(record[:, first : first + 10], CONDITIONS)
+        together = [fmu.read() for fmu in fmus]
+        alone = []
+        for record in records:
+            fmus[0].start(live.RATE)
+            alone.append(play(fmus[0], record[:, :n])[-1])
+        assert same(together, alone)
+        assert len({values["Fz"] for values in together}) == 4
+    finally:
+        for fmu in fmus:
+            fmu.close()
+
+
+def test_two_versions_in_one_process_run_their_own_code(tmp_path: Path) -> None:
+    other = read_calibration(live.calibration_file())
+    path = tmp_path / "other.toml"
+    write_calibration(other, path, {"note": {"text": "another version"}})
+    from tirelib.fmu.build import build_fmu
+
+    second = build_fmu(path, tmp_path / "other.fmu", samples_per_step=10, sample_rate=live.RATE)
+    with LoadedFmu(live.fmu_file(10)) as one, LoadedFmu(second) as two:
+        names = [
+            next((Path(fmu.slave.unzipDirectory) / "resources").glob("tirelib_*")).name
+            for fmu in (one, two)
+        ]
+        assert names[0] != names[1]
+        for fmu in (one, two):
+            fmu.start(live.RATE)
+        assert same(play(one, strain()), play(two, strain()))
+
+
+def test_reset_forgets_everything(fmu: LoadedFmu) -> None:
+    samples = strain()
+    fmu.start(live.RATE)
+    first = play(fmu, samples)
+    fmu.start(live.RATE)
+    assert fmu.read()["turn"] == 0
+    assert same(play(fmu, samples), first)
+
+
+def test_a_state_rolls_back_exactly_and_survives_reset_and_serialisation(fmu: LoadedFmu) -> None:
+    samples = strain()
+    fmu.start(live.RATE)
+    play(fmu, samples[:, :1130])
+    state = fmu.slave.getFMUState()
+    text = fmu.slave.serializeFMUState(state)
+    count, now = fmu.count, fmu.read()
+    wanted = play(fmu, samples[:, 1130:])
+    fmu.slave.setFMUState(state)
+    fmu.count = count
+    assert same([fmu.read()], [now])
+    assert same(play(fmu, samples[:, 1130:]), wanted)
+    fmu.start(live.RATE)
+    again = fmu.slave.deSerializeFMUstate(text)
+    fmu.slave.setFMUState(again)
+    fmu.count = count
+    assert same([fmu.read()], [now])
+    assert same(play(fmu, samples[:, 1130:]), wanted)
+    for used in (state, again):
+        fmu.slave.freeFMUState(used)
+
+
+def test_a_lost_frame_is_flagged_and_the_fmu_recovers(ten: LoadedFmu) -> None:
+    samples = strain(turns=6.4)
+    ten.start(live.RATE)
+    seen = []
+    for first in range(0, samples.shape[1], 10):
+        lost = 1650 <= first < 1750
+        ten.slave.setBoolean([ten.references["frame_valid"]], [not lost])
+        ten.step(samples[:, first : first + 10], CONDITIONS)
+        seen.append(ten.read())
+    lost_turn = [v for v in seen if v["flags"] & TurnFlag.GAP]
+    assert lost_turn
+    assert not any(v["valid"] for v in lost_turn)
+    assert all(np.isnan(v["Fz"]) for v in lost_turn)
+    assert seen[-1]["valid"]
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_numbers_that_are_none_are_missing_samples_and_the_fmu_recovers(
+    ten: LoadedFmu, value: float
+) -> None:
+    samples = strain(turns=6.4)
+    samples[:, 1600:1800] = value
+    ten.start(live.RATE)
+    seen = play(ten, samples)
+    assert any(v["flags"] & TurnFlag.GAP for v in seen)
+    assert seen[-1]["valid"]
+    assert np.isfinite(seen[-1]["Fz"])
+
+
+def test_a_dead_gage_is_told(ten: LoadedFmu) -> None:
+    samples = strain()
+    samples[3] = 0.0
+    ten.start(live.RATE)
+    last = play(ten, samples)[-1]
+    assert {"dead_gage", "reduced_gages"} <= set(flag_names(last["flags"]))
+    assert last["valid"]
+    assert np.isnan(last["contact_length_4"])
+
+
+def test_when_contacts_stay_away_validity_drops_and_values_are_held(ten: LoadedFmu) -> None:
+    samples = strain(turns=3.0)
+    ten.start(live.RATE)
+    before = play(ten, samples)[-1]
+    assert before["valid"]
+    still = np.repeat(samples[:, -1:], 10 * 150, axis=1)
+    last = play(ten, still)[-1]
+    assert not any(last[f"{name}_valid"] for name in QUANTITIES)
+    assert not last["valid"]
+    assert last["flags"] == TurnFlag.NO_CONTACT
+    assert last["status"] == "no_contact"
+    assert last["Fz"] == before["Fz"]
+    assert last["age"] > before["age"] + 0.2
+
+
+@pytest.mark.parametrize(
+    ("speed", "flag"), [(np.nan, "no_speed"), (0.0, "no_speed"), (-live.SPEED, "reversed")]
+)
+def test_a_speed_that_says_nothing_is_flagged(ten: LoadedFmu, speed: float, flag: str) -> None:
+    ten.start(live.RATE)
+    last = play(ten, strain(), np.array([speed, live.PRESSURE, 0.0]))[-1]
+    assert flag in last["status"]
+    assert np.isnan(last["kappa"])
+
+
+def test_a_measured_standstill_drops_validity(ten: LoadedFmu) -> None:
+    samples = strain(turns=3.0)
+    ten.start(live.RATE)
+    assert play(ten, samples)[-1]["valid"]
+    ten.slave.setReal([ten.references["omega"]], [0.0])
+    ten.step(samples[:, -10:], CONDITIONS)
+    assert not ten.read()["valid"]
+
+
+@pytest.mark.parametrize(
+    ("axes", "signs"), [("sae", (-1, -1, 1, -1)), ("adapted_sae", (1, 1, 1, -1))]
+)
+def test_axes_turn_signs_and_the_side_of_the_gages(
+    ten: LoadedFmu, axes: str, signs: tuple[int, ...]
+) -> None:
+    samples = strain(tilt=0.1)
+    ten.start(live.RATE)
+    plain = play(ten, samples)[-1]
+    ten.start(live.RATE, axes=axes)
+    turned = play(ten, samples[::-1])[-1]
+    for name, sign in zip(QUANTITIES, signs, strict=True):
+        np.testing.assert_allclose(turned[name], sign * plain[name], rtol=1e-12)
+        np.testing.assert_allclose(turned[f"{name}_std"], plain[f"{name}_std"], rtol=1e-12)
+    for gage in range(1, 6):
+        np.testing.assert_allclose(
+            turned[f"contact_length_{6 - gage}"], plain[f"contact_length_{gage}"], rtol=1e-12
+        )
+
+
+def test_parameters_out_of_range_are_fmi_errors_with_their_cause(
+    ten: LoadedFmu, tmp_path: Path
+) -> None:
+    for rate in (5.0, 1e7, np.nan):
+        with pytest.raises(FormatError, match=r"sample rate = .* allowed are 100 \.\. 1e\+06 Hz"):
+            ten.start(rate)
+    with pytest.raises(FormatError, match="axes = 'up'; allowed are"):
+        ten.start(live.RATE, axes="up")
+    with pytest.raises(FormatError, match="cannot be read"):
+        ten.start(live.RATE, calibration=str(tmp_path / "none.toml"))
+    ten.start(live.RATE)
+    assert play(ten, strain())[-1]["valid"]
+
+
+def test_a_calibration_of_another_gage_layout_is_refused(ten: LoadedFmu, tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    path = tmp_path / "other.toml"
+    write_calibration(replace(live.calibration(), lateral=tuple(1.1 * y for y in LATERAL)), path)
+    with pytest.raises(FormatError, match="gages lie at"):
+        ten.start(live.RATE, calibration=str(path))
+
+
+def test_another_calibration_of_the_same_layout_is_taken_up(ten: LoadedFmu, tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    given = live.calibration()
+    chains = {
+        missing: replace(
+            chain, load=replace(chain.load, coefficients=1.1 * chain.load.coefficients)
+        )
+        for missing, chain in given.chains.items()
+        if chain.load is not None
+    }
+    path = tmp_path / "other.toml"
+    write_calibration(replace(given, chains=chains), path)
+    ten.start(live.RATE)
+    plain = play(ten, strain())[-1]["Fz"]
+    ten.start(live.RATE, calibration=str(path))
+    # the pressure law adds a little that is not scaled
+    assert play(ten, strain())[-1]["Fz"] == pytest.approx(1.1 * plain, rel=1e-3)
+
+
+def test_forbidden_calls_are_fmi_errors_again_and_again_and_the_importer_lives(
+    ten: LoadedFmu,
+) -> None:
+    at = ten.references
+    for _ in range(25):
+        ten.start(live.RATE)
+        for call, cause in (
+            (lambda: ten.slave.setReal([at["Fz"]], [1.0]), "Fz: cannot be set now"),
+            (lambda: ten.slave.setReal([at["sample_rate"]], [1e3]), "sample_rate: cannot be"),
+            (lambda: ten.slave.setString([at["axes"]], ["sae"]), "axes: cannot be set now"),
+            (lambda: ten.slave.getReal([at["turn"]]), "turn is not of type Real"),
+            (lambda: ten.slave.getInteger([at["Fz"]]), "not of type Integer"),
+            (lambda: ten.slave.getReal([9999]), "IndexError"),
+        ):
+            ten.messages.clear()
+            with pytest.raises(FMICallException):
+                call()
+            assert any(cause in text for text in ten.messages), ten.messages
+    assert play(ten, strain())[-1]["valid"]
+
+
+def test_an_unexpected_error_holds_the_values_invalid_and_the_fmu_recovers(
+    ten: LoadedFmu, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import sys
+
+    ten.start(live.RATE)
+    samples = strain(turns=3.0)
+    before = play(ten, samples)[-1]
+    resources = Path(ten.slave.unzipDirectory) / "resources"
+    package = next(resources.glob("tirelib_*")).name
+    cutter = sys.modules[f"{package}.signal.turns"].TurnCutter
+    good, calls = cutter.push, [0]
+
+    def fails_once(*arguments: Any, **options: Any) -> Any:
+        calls[0] += 1
+        if calls[0] == 1:
+            raise ZeroDivisionError("made by a test")
+        return good(*arguments, **options)
+
+    monkeypatch.setattr(cutter, "push", fails_once)
+    ten.messages.clear()
+    after = play(ten, samples[:, :20])
+    assert ten.messages == ["ZeroDivisionError: made by a test"]
+    assert not any(v["valid"] for v in after)
+    assert all(v["flags"] & TurnFlag.FAULT for v in after)
+    assert [v["Fz"] for v in after] == [before["Fz"]] * 2
+    assert after[-1]["age"] > before["age"]
+    recovered = play(ten, samples)[-1]
+    assert recovered["valid"]
+    assert recovered["turn"] > before["turn"]
+    assert recovered["contact_time"] > before["contact_time"] + 0.2

@@ -1,0 +1,173 @@
+"""Laws of the build: a valid, described, reproducible FMU that brings all it needs."""
+
+import json
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from xml.etree import ElementTree as Xml
+
+import pytest
+from fmpy import extract, read_model_description
+from fmpy.validation import validate_fmu
+
+from tests.fmu import live
+from tirelib.errors import FormatError, ParameterError
+from tirelib.fmu.build import build_fmu, embedded_calibration, slave_file
+from tirelib.fmu.bundle import collect, content_hash, renamed
+from tirelib.units import TABLE
+
+GIVEN = {"1": "ratio", "N": "force", "rad": "angle", "m": "length", "m/s": "speed",
+         "Pa": "pressure", "rad/s": "angular_speed", "s": "time", "Hz": "frequency"}  # fmt: skip
+
+
+@pytest.mark.parametrize("samples", [1, 10])
+def test_fmpy_finds_no_problem(samples: int) -> None:
+    assert validate_fmu(str(live.fmu_file(samples))) == []
+
+
+@pytest.mark.parametrize("samples", [1, 10])
+def test_inputs_and_outputs_are_those_of_the_contract(samples: int) -> None:
+    description = read_model_description(str(live.fmu_file(samples)))
+    names = {v.name: v.causality for v in description.modelVariables}
+    strains = (
+        [f"strain_{g}" for g in range(1, 6)]
+        if samples == 1
+        else [f"strain_{s}_{g}" for s in range(1, samples + 1) for g in range(1, 6)]
+    )
+    inputs = [*strains, "speed", "pressure", "camber", "omega", "frame_valid"]
+    assert [name for name, causality in names.items() if causality == "input"] == inputs
+    for name in ("Fz", "alpha", "kappa", "Fy"):
+        assert names[name] == names[f"{name}_std"] == "output"
+    for name in (*(f"contact_length_{g}" for g in range(1, 6)), "turn", "age", "valid", "flags"):
+        assert names[name] == "output"
+    for name in ("sample_rate", "axes", "calibration"):
+        assert names[name] == "parameter"
+    assert float(description.defaultExperiment.stepSize) == samples / live.RATE
+
+
+def test_every_real_has_a_unit_and_display_units_convert_as_the_library_does() -> None:
+    description = read_model_description(str(live.fmu_file(10)))
+    units = {unit.name: unit for unit in description.unitDefinitions}
+    reals = [v for v in description.modelVariables if v.type == "Real"]
+    assert all(v.unit in units for v in reals)
+    factors = {(row.unit, row.dimension): row.factor for row in TABLE}
+    checked = 0
+    for name, unit in units.items():
+        for display in unit.displayUnits:
+            known = factors.get((display.name, GIVEN[name]))
+            if known is not None:
+                assert display.factor * known == pytest.approx(1.0, rel=1e-12)
+                checked += 1
+    assert checked >= 8
+    shown = {v.name: v.displayUnit for v in reals}
+    assert (shown["alpha"], shown["speed"], shown["pressure"]) == ("deg", "km/h", "bar")
+    assert shown["strain_1_1"] == "ustrain"
+
+
+def test_all_outputs_are_unknown_at_the_start_and_depend_on_nothing_then() -> None:
+    with zipfile.ZipFile(live.fmu_file(1)) as archive:
+        root = Xml.fromstring(archive.read("modelDescription.xml"))
+    variables = list(root.iterfind("ModelVariables/ScalarVariable"))
+    outputs = [n for n, v in enumerate(variables, 1) if v.get("causality") == "output"]
+    unknowns = list(root.iterfind("ModelStructure/InitialUnknowns/Unknown"))
+    assert [int(unknown.get("index", "0")) for unknown in unknowns] == outputs
+    assert {unknown.get("dependencies") for unknown in unknowns} == {""}
+
+
+def test_same_calibration_same_bytes(tmp_path: Path) -> None:
+    twin = build_fmu(
+        live.calibration_file(), tmp_path / "twin.fmu", samples_per_step=10, sample_rate=live.RATE
+    )
+    assert twin.read_bytes() == live.fmu_file(10).read_bytes()
+    assert live.fmu_file(1).read_bytes() != twin.read_bytes()
+
+
+def test_the_build_leaves_no_trace_in_the_process(tmp_path: Path) -> None:
+    path, modules = list(sys.path), set(sys.modules)
+    build_fmu(live.calibration_file(), tmp_path / "x.fmu", samples_per_step=3)
+    assert sys.path == path
+    assert not [n for n in set(sys.modules) - modules if n.startswith(("tirelib", "strain_tire"))]
+
+
+def test_the_embedded_calibration_is_the_one_given() -> None:
+    assert embedded_calibration(live.fmu_file(1)).lateral == live.calibration().lateral
+
+
+def test_the_bundle_is_named_by_its_content_and_holds_the_core_only() -> None:
+    sources = collect(slave_file())
+    assert "signal/turns.py" in sources
+    assert "stream/estimator.py" in sources
+    for absent in ("features/table.py", "observations.py", "estimators/fit.py", "cli/fmu.py"):
+        assert absent not in sources
+    changed = {**sources, "flags.py": sources["flags.py"] + "\n"}
+    assert content_hash(changed) != content_hash(sources)
+    with zipfile.ZipFile(live.fmu_file(1)) as archive:
+        names = archive.namelist()
+    assert not any(name.startswith("resources/tirelib/") for name in names)
+
+
+def test_a_module_that_needs_more_than_numpy_and_scipy_is_refused(tmp_path: Path) -> None:
+    slave = tmp_path / "slave.py"
+    slave.write_text("import pandas\n")
+    with pytest.raises(FormatError, match=r"slave\.py: imports pandas; an FMU has numpy and scipy"):
+        collect(slave)
+
+
+def test_only_imports_of_the_library_are_renamed() -> None:
+    source = "from tirelib.flags import x\nimport tirelib.axes\nname = 'tirelib.flags'\n"
+    assert renamed(source, "t_1") == (
+        "from t_1.flags import x\nimport t_1.axes\nname = 'tirelib.flags'\n"
+    )
+
+
+_ALONE = """
+import json, sys
+from importlib.abc import MetaPathFinder
+
+class Blocked(MetaPathFinder):
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in {blocked!r}:
+            raise ModuleNotFoundError(name + " is blocked")
+
+sys.meta_path.insert(0, Blocked())
+sys.path.insert(0, {resources!r})
+from importlib import import_module
+module = import_module(open({resources!r} + "/slavemodule.txt").read())
+slave = module.StrainTire(instance_name="alone", resources={resources!r})
+slave.exit_initialization_mode()
+for step in range(5):
+    slave.set_real([3, 4, 5, 6, 7], [1e-3] * 5)
+    done = slave.do_step(step * 2e-4, 2e-4)
+print(json.dumps([done, sorted({{name.split(".")[0] for name in sys.modules}})]))
+"""
+
+
+def test_it_runs_without_the_repository_and_with_numpy_and_scipy_only(tmp_path: Path) -> None:
+    folder = extract(str(live.fmu_file(1)), unzipdir=str(tmp_path))
+    resources = str(Path(folder) / "resources")
+    blocked = ["tirelib", "pandas", "sklearn", "statsmodels", "asammdf", "matplotlib", "click",
+               "rich", "tomli_w", "fmpy", "pyarrow"]  # fmt: skip
+    script = _ALONE.format(blocked=blocked, resources=resources)
+    told = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, cwd="/", check=False
+    )
+    assert told.returncode == 0, told.stderr
+    done, modules = json.loads(told.stdout)
+    assert done
+    assert not set(blocked) & set(modules)
+    assert "numpy" in modules
+
+
+@pytest.mark.parametrize("samples", [0, 257])
+def test_a_frame_length_out_of_range_is_refused(tmp_path: Path, samples: int) -> None:
+    with pytest.raises(ParameterError, match="samples per step"):
+        build_fmu(live.calibration_file(), tmp_path / "x.fmu", samples_per_step=samples)
+
+
+def test_bad_files_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match="cannot be read"):
+        build_fmu(tmp_path / "none.toml", tmp_path / "x.fmu")
+    (tmp_path / "no.fmu").write_text("nothing")
+    with pytest.raises(FormatError, match="is no FMU made by"):
+        embedded_calibration(tmp_path / "no.fmu")

@@ -1,0 +1,121 @@
+"""A campaign played to the FMU gives the document of `tirelib estimate`."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from tests.fmu import live
+from tirelib.campaign import read_campaign, write_campaign
+from tirelib.cli.estimate import estimate
+from tirelib.cli.fmu import fmu
+from tirelib.errors import CalibrationError, FormatError
+from tirelib.fmu.build import build_fmu
+from tirelib.fmu.run import LoadedFmu, play_campaign
+
+
+def assert_equal(given: Any, wanted: Any, where: str = "") -> None:
+    """All keys alike, all numbers within 1e-9."""
+    if isinstance(wanted, dict):
+        assert given.keys() == wanted.keys(), where
+        for key in wanted:
+            assert_equal(given[key], wanted[key], f"{where}/{key}")
+    elif isinstance(wanted, list):
+        assert len(given) == len(wanted), where
+        for number, (a, b) in enumerate(zip(given, wanted, strict=True)):
+            assert_equal(a, b, f"{where}/{number}")
+    elif isinstance(wanted, float):
+        np.testing.assert_allclose(given, wanted, rtol=1e-9, atol=1e-9, err_msg=where)
+    else:
+        assert given == wanted, where
+
+
+def told(command: Any, *arguments: str) -> Any:
+    result = CliRunner().invoke(command, list(arguments), catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+@pytest.fixture(scope="module")
+def wanted(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    path = tmp_path_factory.mktemp("estimate") / "e.json"
+    told(estimate, str(live.campaign_folder()), "--calibration", str(live.calibration_file()),
+         "--json", str(path))  # fmt: skip
+    return json.loads(path.read_text())
+
+
+@pytest.mark.parametrize("samples", [1, 10])
+def test_the_document_is_that_of_estimate(tmp_path: Path, wanted: Any, samples: int) -> None:
+    file, result = tmp_path / "X.fmu", tmp_path / "f.json"
+    output = told(
+        fmu, "build", "--calibration", str(live.calibration_file()), "--out", str(file),
+        "--samples-per-step", str(samples), "--sample-rate", "4000",
+    )  # fmt: skip
+    assert "live tire" in output
+    output = told(fmu, "run", str(file), str(live.campaign_folder()), "--json", str(result))
+    given = json.loads(result.read_text())
+    assert given["format"] == "tirelib-estimate/1"
+    assert len(given["turns"]) >= 3 * 15
+    assert_equal(given, wanted)
+    assert "Fz" in output
+
+
+def test_another_tire_is_refused(tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    header = replace(live.HEADER, tire=replace(live.HEADER.tire, name="another"))
+    write_campaign(tmp_path / "c", header, live.make_runs()[:1])
+    with (
+        LoadedFmu(live.fmu_file(10)) as loaded,
+        pytest.raises(CalibrationError, match="the tire is 'another'"),
+    ):
+        play_campaign(loaded, read_campaign(tmp_path / "c"))
+
+
+def test_frames_longer_than_a_turn_are_an_error_not_a_lost_turn(tmp_path: Path) -> None:
+    fast = [live.make_run(1, 4e3, 0.0, speed=300.0, turns=20.0)]
+    write_campaign(tmp_path / "c", live.HEADER, fast)
+    file = build_fmu(live.calibration_file(), tmp_path / "x.fmu", samples_per_step=256)
+    with (
+        LoadedFmu(file) as loaded,
+        pytest.raises(FormatError, match="turns end within one frame of 256"),
+    ):
+        play_campaign(loaded, read_campaign(tmp_path / "c"))
+
+
+def test_a_file_that_is_no_fmu_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "no.fmu").write_text("nothing")
+    with pytest.raises(FormatError, match="is no FMU"):
+        LoadedFmu(tmp_path / "no.fmu")
+
+
+def test_the_example_of_the_documentation_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    page = Path(__file__).parents[2] / "docs" / "fmu.md"
+    code = page.read_text().split("```python\n")[1].split("```")[0]
+    code = code.replace('"StrainTire.fmu", 1e4', f'"{live.fmu_file(10)}", {live.RATE}')
+    assert len(code.splitlines()) <= 22
+    strain, _ = live.strain_of(4e3, 0.0)
+    frames = [strain[:, i : i + 10] for i in range(0, strain.shape[1] - 9, 10)]
+    exec(code, {"frames": frames})
+    load, std, age = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert load == pytest.approx(4e3, abs=6 * std)
+    assert age > 0.0
+
+
+@pytest.mark.shared
+def test_lab_data_give_the_numbers_of_estimate(tmp_path: Path, shared_data: Path) -> None:
+    from tirelib.cli.calibrate import calibrate
+
+    folder = shared_data / "lab-set1"
+    if not folder.is_dir():
+        pytest.skip(f"no {folder}")
+    calibration, file = tmp_path / "cal.toml", tmp_path / "x.fmu"
+    told(calibrate, str(folder), "--out", str(calibration))
+    told(estimate, str(folder), "--calibration", str(calibration), "--json", str(tmp_path / "e"))
+    told(fmu, "build", "--calibration", str(calibration), "--out", str(file),
+         "--samples-per-step", "10")  # fmt: skip
+    told(fmu, "run", str(file), str(folder), "--json", str(tmp_path / "f"))
+    assert_equal(json.loads((tmp_path / "f").read_text()), json.loads((tmp_path / "e").read_text()))

@@ -1,0 +1,67 @@
+"""The range in which each regressor and each quantity was calibrated, and the slack beyond it."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.estimators.chain import Chain
+from tirelib.estimators.polynomial import Range
+from tirelib.estimators.regressors import ODD
+
+SLACK = {
+    "contact_angle": 0.01,
+    "compression": 0.03,
+    "traction": 0.05,
+    "cp1_slope": 0.02,
+    "cp2_slope": 0.02,
+    "tp_slope": 0.02,
+    "angle_slope": 0.004,
+    "utilisation": 0.02,
+    "camber": np.deg2rad(0.5),
+}
+"""Least distance (SI) beyond the calibrated range that is still taken as calibrated."""
+MARGIN = 0.05
+"""The same, as a share of the range."""
+GAIN_SLACK = 0.3
+"""Share by which the tension may leave its range: gains drift, but a wrong unit is caught."""
+
+
+def with_ranges(
+    chain: Chain, values: Mapping[str, FloatArray], truth: Mapping[str, FloatArray]
+) -> Chain:
+    """Add the calibrated range of every regressor that decides on validity."""
+
+    def limits(name: str, *, needed: bool = True) -> Range:
+        x = values[name]
+        low, high = float(np.nanmin(x)), float(np.nanmax(x))
+        slack = GAIN_SLACK * high if name == "tension" else SLACK[name]
+        return Range(name, low, high, max(slack, MARGIN * (high - low)), needed)
+
+    names = ("contact_angle", "compression", "traction", "tension", *ODD)
+    shape = tuple(limits(name) for name in names)
+    if np.isfinite(values["camber"]).any():
+        shape = (*shape, limits("camber", needed=_uses(chain, "camber")))
+    angle = (limits("utilisation"),) if chain.angle is not None else ()
+
+    def own(quantity: str, measured: str) -> tuple[Range, ...]:
+        if not chain.has(quantity):
+            return ()
+        x = truth[measured]
+        low, high = float(x.min()), float(x.max())
+        return (Range(quantity, low, high, MARGIN * (high - low)),)
+
+    guards = {
+        "Fz": (*shape, *own("Fz", "Fz")),
+        "Fy": (*shape, *own("Fy", "Fy")),
+        "alpha": (*shape, *angle, *own("alpha", "slip_angle")),
+        "kappa": (),
+    }
+    return replace(chain, guards=guards)
+
+
+def _uses(chain: Chain, name: str) -> bool:
+    """Tell whether any model of the chain needs a regressor."""
+    models = [chain.load, chain.force, chain.angle.polynomial if chain.angle else None]
+    return any(name in [v.name for v in model.variables] for model in models if model is not None)
