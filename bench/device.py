@@ -96,12 +96,14 @@ class Device:
         DeviceError
             Naming both.
         """
-        if self.lateral is None or np.allclose(lateral, self.lateral, atol=1e-4):
+        if len(lateral) == GAGES and (
+            self.lateral is None or np.allclose(lateral, self.lateral, atol=1e-4)
+        ):
             return
         raise DeviceError(
-            f"{where}: gages lie at {_millimetres(lateral)} mm (ISO), the device file "
-            f"{self.name!r} has them at {_millimetres(self.lateral)} mm; both must agree; "
-            "take the device file of this wheel"
+            f"{where}: gages lie at {_millimetres(lateral)} mm (ISO), the device "
+            f"{self.name!r} has {_millimetres(self.lateral) if self.lateral else GAGES} of them; "
+            "both must agree; take the device file of this wheel"
         )
 
 

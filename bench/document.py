@@ -15,11 +15,11 @@ from bench.conditions import RunMark
 from bench.decoder import LineCounts
 from bench.frames import GAGES
 from bench.timeline import TimelineCounts
+from tirelib.estimators.calibration import Calibration
+from tirelib.estimators.result import EDGE_UNIT, FORMAT, VARIED
 from tirelib.flags import TurnFlag, flag_names
 
-FORMAT = "tirelib-estimate/1"
-QUANTITIES = {"Fz": ("N", 1.0), "alpha": ("deg", 180.0 / math.pi), "kappa": ("1", 1.0),
-              "Fy": ("N", 1.0)}  # fmt: skip
+QUANTITIES = EDGE_UNIT
 """Unit and factor of each quantity in the document."""
 
 
@@ -28,13 +28,22 @@ def document(
     runs: Iterable[RunMark],
     counts: tuple[LineCounts, TimelineCounts],
     source: Mapping[str, Any],
+    calibration: Calibration | None = None,
 ) -> dict[str, Any]:
-    """Return summary, turns, what the line lost, and where all came from."""
+    """Return summary, turns, what the line lost, and where all came from.
+
+    `calibration` is that of the FMU, where it is known: a quantity that it lacks has no summary.
+    """
     truth = {mark.run: mark.truth for mark in runs}
+    chain = None if calibration is None else calibration.chains[-1]
     return {
         "format": FORMAT,
         "axes": "iso",
-        "summary": {name: _summary(name, turns, truth) for name in QUANTITIES},
+        "tire": None if calibration is None else calibration.tire,
+        "summary": {
+            name: _summary(name, turns, truth) if chain is None or chain.has(name) else None
+            for name in QUANTITIES
+        },
         "turns": [turn_document(turn) for turn in turns],
         "line": line_document(*counts),
         "source": dict(source),
@@ -111,24 +120,30 @@ def _summary(
     name: str, turns: Sequence[Turn], truth: Mapping[int, Mapping[str, float]]
 ) -> dict[str, Any]:
     unit, factor = QUANTITIES[name]
-    empty = {"rmse": None, "unit": unit, "r2": None, "n": 0, "rmse_percent_of_range": None}
-    means: dict[int, list[float]] = {}
+    empty = {"rmse": None, "unit": unit, "r2": None, "n": 0, "rmse_percent_of_range": None,
+             "coverage_95": None, "bias": None}  # fmt: skip
+    rows: dict[int, list[tuple[float, float]]] = {}
     for turn in turns:
         if quantity_valid(turn, name) and name in truth.get(turn.run, {}):
-            means.setdefault(turn.run, []).append(turn.outputs[name])
-    if not means:
+            std = turn.outputs.get(f"{name}_std", math.nan)
+            rows.setdefault(turn.run, []).append((turn.outputs[name], std))
+    if not rows:
         return empty
-    measured = factor * np.array([truth[run][name] for run in means])
-    error = factor * np.array([np.mean(values) for values in means.values()]) - measured
+    measured = factor * np.array([truth[run][name] for run in rows])
+    means = factor * np.array([np.mean(values, axis=0) for values in rows.values()])
+    error = means[:, 0] - measured
     spread = float(np.sum((measured - measured.mean()) ** 2))
     span = float(np.ptp(measured))
+    varied = span > VARIED[name]
     rmse = float(np.sqrt(np.mean(error**2)))
     return {
         "rmse": rmse,
         "unit": unit,
-        "r2": 1.0 - float(np.sum(error**2)) / spread if spread > 0.0 else None,
-        "n": len(means),
-        "rmse_percent_of_range": 100.0 * rmse / span if span > 0.0 else None,
+        "r2": 1.0 - float(np.sum(error**2)) / spread if varied else None,
+        "n": len(rows),
+        "rmse_percent_of_range": 100.0 * rmse / span if varied else None,
+        "coverage_95": float(np.mean(np.abs(error) <= 1.96 * means[:, 1])),
+        "bias": float(error.mean()),
     }
 
 

@@ -5,7 +5,8 @@ because the wheel does not turn on from one run to the next.
 """
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -101,47 +102,49 @@ def write_script(
     return Script(tuple(due), tuple(wire), conditions, length)
 
 
-def play(
-    script: Script,
-    sink: Sink,
-    *,
-    start: float,
-    speedup: float = 1.0,
-    progress: Callable[[int], None] | None = None,
-) -> tuple[int, float]:
-    """Send a script at the right pace.
+@dataclass(slots=True)
+class Tally:
+    """What has been sent so far.
 
-    Parameters
+    Attributes
     ----------
-    sink : Sink
-        `send` may block while the reader is behind.
-    start : float, [s]
-        Moment on `time.monotonic` that is device time zero.
-    speedup : float
-    progress : callable, optional
-        Called with the number of frames sent so far after each burst.
-
-    Returns
-    -------
+    sent : int
+        Frames, lost ones included.
     unheard : int
         Frames sent while nobody listened.
     late : float, [s]
         The largest delay of a burst against its time.
     """
-    unheard, late, first = 0, 0.0, 0
+
+    sent: int = 0
+    unheard: int = 0
+    late: float = 0.0
+
+
+def play(script: Script, sink: Sink, tally: Tally, *, start: float, speedup: float = 1.0) -> None:
+    """Send a script at the right pace, and keep the tally.
+
+    Parameters
+    ----------
+    sink : Sink
+        `send` may block while the reader is behind.
+    tally : Tally
+    start : float, [s]
+        Moment on `time.monotonic` that is device time zero.
+    speedup : float
+    """
+    first = 0
     while first < len(script.frames):
         wait = start + script.due[first] / speedup - time.monotonic()
         if wait > 0.0:
             time.sleep(max(wait, BURST))
         now = (time.monotonic() - start) * speedup
-        stop = max(int(np.searchsorted(script.due, now, side="right")), first + 1)
-        late = max(late, (now - script.due[first]) / speedup)
-        if not sink.send(b"".join(script.frames[first:stop])):
-            unheard += stop - first
+        stop = max(bisect_right(script.due, now), first + 1)
+        tally.late = max(tally.late, now / speedup - script.due[first] / speedup - BURST)
+        heard = sink.send(b"".join(script.frames[first:stop]))
+        tally.sent += stop - first
+        tally.unheard += 0 if heard else stop - first
         first = stop
-        if progress is not None:
-            progress(first)
-    return unheard, late
 
 
 def _frames(

@@ -18,6 +18,7 @@ from fmpy.fmi2 import (
     FMU2Slave,
     fmi2CallbackFunctions,
     fmi2CallbackLoggerTYPE,
+    fmi2Fatal,
     fmi2ValueReference,
 )
 from fmpy.logging import addLoggerProxy
@@ -28,6 +29,9 @@ from bench.errors import FmuError
 from bench.fmu_archive import FmuArchive
 from bench.frames import GAGES
 from tirelib.arrays import FloatArray
+from tirelib.errors import FormatError
+from tirelib.estimators.calibration import Calibration
+from tirelib.estimators.calibration_file import read_calibration
 
 CONDITIONS = ("speed", "pressure", "camber")
 RATE = "sample_rate"
@@ -169,6 +173,15 @@ class FmuModel:
             )
         return _Ports(self._slave, variables, kinds.pop())
 
+    @property
+    def calibration(self) -> Calibration | None:
+        """The calibration inside, where the FMU has one that can be read."""
+        path = Path(self._folder.name) / "resources" / "calibration.toml"
+        try:
+            return read_calibration(path) if path.is_file() else None
+        except FormatError:
+            return None
+
     def start(self, period: float) -> None:
         """Begin afresh, with this sample period [s]; whatever came before is forgotten."""
         slave = self._slave
@@ -255,6 +268,8 @@ class FmuModel:
 
     def _error(self, what: str, error: Exception) -> FmuError:
         said = "; it says: " + " | ".join(self._messages) if self._messages else ""
+        if isinstance(error, FMICallException) and error.status == fmi2Fatal:
+            self._slave = None  # FMI allows no call after this, not even to free the instance
         cause = str(error) or type(error).__name__
         cause = cause if len(cause) <= LONGEST_CAUSE else cause[:LONGEST_CAUSE] + " ..."
         return FmuError(
@@ -279,10 +294,3 @@ class FmuModel:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def model_of(path: Path, archive: FmuArchive | None = None) -> FmuModel:
-    """Load the estimator of an FMU file; see `FmuModel`."""
-    from bench.fmu_archive import read_fmu
-
-    return FmuModel(archive or read_fmu(path))

@@ -43,13 +43,18 @@ class Outcome:
         ``end`` (of a recording), ``duration``, ``silence``, ``turns``, ``stopped``, ``unplugged``.
     message : str
         Of the port that went away.
+    count, valid : int
+        Turns so far, and those that may be used.
     turns : list of Turn
+        Empty unless they are to be kept.
     latency : deque of float, [s]
         Arrival of the bytes that ended a turn to its estimate; the last 1000.
     """
 
     reason: str = "end"
     message: str = ""
+    count: int = 0
+    valid: int = 0
     turns: list[Turn] = field(default_factory=list)
     latency: deque[float] = field(default_factory=lambda: deque(maxlen=1000))
 
@@ -64,6 +69,8 @@ class Session:
     recorder : Recorder, optional
         Gets every byte before it is decoded.
     limits : Limits
+    keep : bool
+        Keep all turns in the outcome.
     watch : callable, optional
         Called with the new turns after each read, an empty list included; for the screen.
     """
@@ -75,6 +82,7 @@ class Session:
         *,
         recorder: Recorder | None = None,
         limits: Limits | None = None,
+        keep: bool = True,
         watch: Callable[[list[Turn]], None] | None = None,
     ) -> None:
         self.outcome = Outcome()
@@ -82,6 +90,7 @@ class Session:
         self._chain = chain
         self._recorder = recorder
         self._limits = limits or Limits()
+        self._keep = keep
         self._watch = watch
         self._stopped = False
 
@@ -99,7 +108,7 @@ class Session:
                 outcome.reason = "stopped"
             elif end.expired:
                 outcome.reason = "duration"
-            elif limits.turns is not None and len(outcome.turns) >= limits.turns:
+            elif limits.turns is not None and outcome.count >= limits.turns:
                 outcome.reason = "turns"
             elif self._silent(last_byte):
                 outcome.reason = "silence"
@@ -137,6 +146,9 @@ class Session:
         self._note(turns)
 
     def _note(self, turns: list[Turn]) -> None:
-        self.outcome.turns.extend(turns)
+        self.outcome.count += len(turns)
+        self.outcome.valid += sum(turn.valid for turn in turns)
+        if self._keep:
+            self.outcome.turns.extend(turns)
         if self._watch is not None:
             self._watch(turns)

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import click
 
+from bench.cli.stop import on_stop
 from bench.conditions import Conditions, conditions_document
 from bench.deadline import Deadline
 from bench.device import Device, read_device
-from bench.emulator import Script, play, write_script
+from bench.emulator import Script, Tally, play, write_script
 from bench.errors import DeviceError, UnpluggedError
 from bench.faults import Faults, parse_faults
 from bench.links.pseudo import PseudoTerminal
@@ -78,32 +79,44 @@ def emulate(
     device.check_layout(campaign.header.gage_lateral, str(folder))
     runs = _runs(campaign, numbers, everything)
     script = write_script(runs, device, faults, wheel=wheel)
-    port = PseudoTerminal()
+    port, tally = PseudoTerminal(), Tally()
     try:
         if sidecar is not None:
             write_json(sidecar, _sidecar(script, loop))
         click.echo(port.path)
         if port_file is not None:
             _announce(port_file, port.path)
-        port.wait_for_reader(Deadline.after(patience))
-        sent, unheard, late = _play(
-            script, runs, device, faults, wheel, port, loop, speedup, unplug
-        )
-        if unplug is None:
+        with on_stop(_interrupt):
+            port.wait_for_reader(Deadline.after(patience))
+            cable = _Cable(port, unplug)
+            start, turn = time.monotonic(), 0
+            while True:
+                play(script, cable, tally, start=start, speedup=speedup)
+                turn += 1
+                if not loop:
+                    break
+                script = write_script(runs, device, faults, wheel=wheel, turn=turn)
             port.drain(Deadline.after(LINGER))
             port.wait_for_leave(Deadline.after(LINGER))
+    except (KeyboardInterrupt, UnpluggedError) as error:
+        click.echo(str(error) or "stopped", err=True)
     finally:
         port.close()
-    click.echo(f"{sent} frames in {len(runs)} runs, {unheard} of them unheard, "
-               f"at most {1e3 * late:.1f} ms late")  # fmt: skip
+    click.echo(f"{tally.sent} frames in {len(runs)} runs, {tally.unheard} of them unheard, "
+               f"at most {1e3 * tally.late:.1f} ms late")  # fmt: skip
     for name, count in faults.done.items():
         click.echo(f"  {count:6d} {name}")
     if json_file is not None:
         write_json(json_file, {
             "format": "tirebench-emulation/1", "runs": [run.plan.run for run in runs],
-            "frames": sent, "unheard": unheard, "late_s": late, "faults": dict(faults.done),
+            "frames": tally.sent, "unheard": tally.unheard, "late_s": tally.late,
+            "faults": dict(faults.done),
         })  # fmt: skip
-    context.exit(1 if unheard else 0)
+    context.exit(1 if tally.unheard else 0)
+
+
+def _interrupt() -> None:
+    raise KeyboardInterrupt
 
 
 def _runs(campaign: Campaign, numbers: Sequence[int], everything: bool) -> list[Run]:
@@ -144,33 +157,3 @@ class _Cable:
             self._port.close()
             raise UnpluggedError(f"{self._port.path}: the cable was pulled, as asked for")
         return self._port.send(data)
-
-
-def _play(
-    script: Script,
-    runs: Sequence[Run],
-    device: Device,
-    faults: Faults,
-    wheel: int,
-    port: PseudoTerminal,
-    loop: bool,
-    speedup: float,
-    unplug: float | None,
-) -> tuple[int, int, float]:
-    """Play one pass, or passes until Ctrl-C; return frames, unheard frames, largest delay."""
-    cable = _Cable(port, unplug)
-    start = time.monotonic()
-    sent, unheard, late, turn = 0, 0, 0.0, 0
-    try:
-        while True:
-            missed, delay = play(script, cable, start=start, speedup=speedup)
-            sent, unheard, late = sent + len(script.frames), unheard + missed, max(late, delay)
-            turn += 1
-            if not loop:
-                break
-            script = write_script(runs, device, faults, wheel=wheel, turn=turn)
-    except KeyboardInterrupt:
-        click.echo("stopped", err=True)
-    except UnpluggedError as error:
-        click.echo(str(error), err=True)
-    return sent, unheard, late

@@ -20,7 +20,8 @@ ROWS = 20
 REFRESH = 0.25
 """Time between two drawings, [s]."""
 FORMATS = {"Fz": (".0f", "N"), "alpha": (".2f", "deg"), "kappa": (".4f", ""), "Fy": (".0f", "N")}
-PLAIN = ("run", "t [s]", *QUANTITIES, "valid", "flags")
+UNITS = [f"{name} [{unit}]" if unit else name for name, (_, unit) in FORMATS.items()]
+HEADINGS = ("run", "t [s]", *UNITS, "valid", "flags")
 LOSSES = ("crc_bad", "framing_bad", "lost_frames", "duplicates", "out_of_order", "resets")
 
 
@@ -47,7 +48,7 @@ class Screen:
         if self._live is not None:
             self._live.start()
         else:
-            self._console.print(_plain_row(PLAIN), soft_wrap=True)
+            self._console.print(_plain_row(HEADINGS), soft_wrap=True, markup=False)
         return self
 
     def __exit__(
@@ -65,17 +66,15 @@ class Screen:
         self._turns.extend(turns)
         if self._live is None:
             for turn in turns:
-                self._console.print(_plain_row(_cells(turn)), soft_wrap=True)
+                self._console.print(_plain_row(_cells(turn)), soft_wrap=True, markup=False)
         elif time.monotonic() - self._drawn > REFRESH:
             self._live.update(self._table(), refresh=True)
             self._drawn = time.monotonic()
 
     def _table(self) -> RenderableType:
         table = Table(box=SIMPLE_HEAD, title=self._title)
-        for name in PLAIN:
-            unit = FORMATS.get(name, ("", ""))[1]
-            justify = "left" if name == "flags" else "right"
-            table.add_column(f"{name} [{unit}]" if unit else name, justify=justify)  # type: ignore[arg-type]
+        for heading in HEADINGS:
+            table.add_column(Text(heading), justify="left" if heading == "flags" else "right")
         for turn in self._turns:
             table.add_row(*_cells(turn), style=None if turn.valid else "dim")
         return Group(table, Text(counters(self._chain)))

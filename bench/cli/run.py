@@ -4,7 +4,7 @@ import time
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
@@ -23,6 +23,9 @@ from bench.recording import Recorder, RecordingHeader
 from bench.session import Limits, Outcome, Session
 from tirelib.cli.common import FILE, output, write_json
 from tirelib.units import to_si
+
+if TYPE_CHECKING:
+    from bench.fmu_model import FmuModel
 
 _EXAMPLE = """\b
 Examples:
@@ -99,8 +102,8 @@ def run(
     given = _conditions(speed, pressure, camber, sidecar)
     device = None if device_file is None else read_device(device_file)
     console = output()
+    console.print(f"FMU {fmu_file}, sha256 {archive.sha256}", soft_wrap=True)
     with ExitStack() as stack:
-        console.print(f"FMU {fmu_file}, sha256 {archive.sha256}", soft_wrap=True)
         from bench.fmu_model import FmuModel  # late: FMPy takes a second to import
 
         model = stack.enter_context(FmuModel(archive))
@@ -110,7 +113,9 @@ def run(
             source = _live(str(port), baud, given, device, device_file, wheel)
         stack.callback(source.link.close)
         console.print(f"{source.link.name} -> {model.name}, {model.samples} samples a step")
-        chain = Chain(model, source.device, source.conditions, source.wheel)
+        calibration = model.calibration
+        if calibration is not None:
+            source.device.check_layout(calibration.lateral, str(fmu_file))
         recorder = None
         if record is not None:
             settings = {"port": port, "baud": baud, "wheel": wheel, "fmu": str(fmu_file),
@@ -118,29 +123,48 @@ def run(
                         "camber_deg": camber}  # fmt: skip
             header = RecordingHeader(settings, source.device_text, archive.sha256)
             recorder = stack.enter_context(Recorder(record, header, source.conditions))
-        screen = stack.enter_context(Screen(console, chain, source.link.name))
+        chain = Chain(model, source.device, source.conditions, source.wheel)
+        limits = Limits(duration, silence, turns)
+        keep = json_file is not None
+        outcome, used = _session(source, chain, model, recorder, limits, keep, console)
+    _summary(console, outcome, chain, used, source, record)
+    if json_file is not None:
+        origin = {"link": source.link.name, "fmu_sha256": archive.sha256, "ended": outcome.reason,
+                  "cpu_share": used if source.link.live else None}  # fmt: skip
+        runs = source.conditions.runs
+        write_json(json_file, document(outcome.turns, runs, chain.counts, origin, calibration))
+        console.print(f"written: {json_file}", soft_wrap=True)
+    good = outcome.valid > 0 and outcome.reason != "unplugged"
+    context.exit(0 if good else 1)
+
+
+def _session(
+    source: Source,
+    chain: Chain,
+    model: "FmuModel",
+    recorder: Recorder | None,
+    limits: Limits,
+    keep: bool,
+    console: Console,
+) -> tuple[Outcome, float]:
+    """Run until something ends it; return what came of it and the share of a core it took."""
+    with Screen(console, chain, source.link.name) as screen:
 
         def watch(turns: list[Turn]) -> None:
             for said in model.take_messages():
                 console.print(f"FMU: {said}", soft_wrap=True, markup=False)
             screen.watch(turns)
 
-        session = Session(source.link, chain, recorder=recorder, watch=watch,
-                          limits=Limits(duration, silence, turns))  # fmt: skip
+        session = Session(
+            source.link, chain, recorder=recorder, limits=limits, keep=keep, watch=watch
+        )
         start = time.monotonic(), time.process_time()
         with on_stop(session.stop):
             outcome = session.run()
         used = (time.process_time() - start[1]) / max(time.monotonic() - start[0], 1e-9)
-        if recorder is not None:
-            recorder.close(outcome.reason)
-    _summary(console, outcome, chain, used, source, record)
-    if json_file is not None:
-        origin = {"link": source.link.name, "fmu_sha256": archive.sha256, "ended": outcome.reason,
-                  "cpu_share": used if source.link.live else None}  # fmt: skip
-        write_json(json_file, document(outcome.turns, source.conditions.runs, chain.counts, origin))
-        console.print(f"written: {json_file}", soft_wrap=True)
-    good = any(turn.valid for turn in outcome.turns) and outcome.reason != "unplugged"
-    context.exit(0 if good else 1)
+    if recorder is not None:
+        recorder.close(outcome.reason)
+    return outcome, used
 
 
 def _conditions(
@@ -215,9 +239,8 @@ def _summary(
     """Say how it ended and what came of it."""
     if outcome.message:
         console.print(f"unplugged: {outcome.message}", soft_wrap=True, markup=False)
-    valid = sum(turn.valid for turn in outcome.turns)
     console.print(
-        f"ended: {outcome.reason}; {len(outcome.turns)} turns, {valid} valid (ISO 8855 axes); "
+        f"ended: {outcome.reason}; {outcome.count} turns, {outcome.valid} valid (ISO 8855 axes); "
         f"{counters(chain)}",
         soft_wrap=True,
     )

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM as a request to end, not as an exception in the middle of something."""
+"""Ctrl-C and SIGTERM as a request to end in good order, also for a program in the background."""
 
 import signal
 from collections.abc import Callable, Iterator

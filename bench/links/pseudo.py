@@ -78,6 +78,8 @@ class PseudoTerminal:
 
     def drain(self, deadline: Deadline) -> bool:
         """Wait until the reader has taken everything; False at the deadline or if it left."""
+        if not self.listened:
+            return False
         waiting = array.array("i", [0])
         slave = os.open(self.path, os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK)
         try:

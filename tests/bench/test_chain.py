@@ -128,6 +128,9 @@ def test_the_last_turn_comes_with_its_last_sample(calibration: Calibration, scri
             frames = write_script(short, Device(), Faults({})).frames
             counts.append(len(estimates(calibration, frames, constant(script), samples)[0]))
         assert counts == [len(turns) - 1, len(turns)]
+    followed = write_script([_shortened(run, last + 1), tiny_runs()[1]], Device(), Faults({}))
+    both = estimates(calibration, followed.frames, constant(followed))[0]
+    assert sum(turn.run == 1 for turn in both) == len(turns)
 
 
 def _shortened(run, length):  # type: ignore[no-untyped-def]

@@ -1,5 +1,6 @@
 """An FMU file through FMPy: any number of samples a step, fresh starts, errors with a cause."""
 
+import gc
 import zipfile
 from pathlib import Path
 
@@ -57,6 +58,14 @@ def test_an_error_of_the_fmu_names_its_cause(toy_fmus: dict[int, Path]) -> None:
         FmuError, match=r"(?s)failed in a step .*speed is negative; it must be above"
     ):
         turns(toy_fmus[16], Conditions.constant(-1.0))
+
+
+def test_after_a_fatal_error_the_process_lives(toy_fmus: dict[int, Path]) -> None:
+    """FMI allows no call after `fatal`; a pythonfmu instance that is freed then breaks the heap."""
+    for _ in range(5):
+        with pytest.raises(FmuError):
+            turns(toy_fmus[16], Conditions.constant(-1.0))
+        gc.collect()
 
 
 def test_the_unpacked_files_are_removed(toy_fmus: dict[int, Path]) -> None:

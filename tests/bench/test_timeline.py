@@ -102,6 +102,7 @@ def test_a_time_reset_is_acted_on_once_and_may_be_announced_often() -> None:
     blocks = push(timeline, flagged, [i for i in range(30) if i != 10])  # the first is lost
     assert [block.reset for block in blocks if block.reset] == ["start", "time_reset"]
     assert sum(len(block.strain) for block in blocks if block.segment == 1) == 19 * 16
+    assert (timeline.counts.gaps, timeline.counts.resets) == (0, 1)
 
 
 def test_a_transmitter_that_restarts_begins_a_segment_and_time_does_not_go_back() -> None:
