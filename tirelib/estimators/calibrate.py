@@ -111,6 +111,7 @@ def calibrate_chain(
         gages=tuple(gages),
         guards=dict.fromkeys(("Fz", "alpha", "kappa", "Fy"), ()),
         laws=laws,
+        force_laws=_force_laws(links, laws),
         mean_load=mean_load,
         load=load,
         radius=radius,
@@ -145,6 +146,27 @@ def _laws(observations: Observations, values: dict[str, FloatArray]) -> Conditio
         speed_fitted="speed_squared" in varying,
         contact_width=tire.belt_width or np.nan,
         radius=tire.ring_radius or tire.free_radius,
+    )
+
+
+def _force_laws(links: Links, laws: ConditionLaws) -> ConditionLaws:
+    """Return the laws of what depends on lateral force: only what varied with it is fitted."""
+    force = np.abs(links.truth["Fy"])
+    cornering = force > 0.2 * np.nanmax(force) if np.isfinite(force).any() else force > 0.0
+    if not cornering.any():
+        return laws
+    part = {name: x[cornering] for name, x in links.values.items()}
+    varying = _varying(part, ("pressure", "speed_squared"))
+
+    def limits(x: FloatArray) -> tuple[float, float]:
+        return (float(x.min()), float(x.max())) if np.isfinite(x).all() else (np.nan, np.nan)
+
+    return replace(
+        laws,
+        pressure=limits(part["pressure"]),
+        speed=limits(part["speed"]),
+        pressure_fitted="pressure" in varying,
+        speed_fitted="speed_squared" in varying,
     )
 
 

@@ -140,7 +140,9 @@ class Calibration:
             part = {name: x[rows] for name, x in part.items()}
             estimates, radius[rows] = chain.predict(part)
             traction[rows] = part["traction"]
-            extrapolated[rows] = chain.laws.extrapolated(part)
+            extrapolated[rows] = chain.laws.extrapolated(part) | (
+                chain.force_laws.extrapolated(part) if chain.has("Fy") else False
+            )
             for quantity, estimate in estimates.items():
                 value[quantity][rows] = estimate.value
                 std[quantity][rows] = estimate.std

@@ -15,7 +15,7 @@ from tirelib.errors import FormatError
 from tirelib.estimators.calibration import Calibration, Rolling
 from tirelib.estimators.chain import AngleModel, Chain
 from tirelib.estimators.laws import ConditionLaws
-from tirelib.estimators.polynomial import Polynomial, Range, Variable
+from tirelib.estimators.polynomial import Cloud, Polynomial, Range, Variable
 
 FORMAT = "tirelib-calibration/1"
 _MODEL_UNITS = {"Fz": "N", "R_eff": "m", "Fy": "N", "alpha": "rad"}
@@ -101,18 +101,11 @@ def _calibration(document: Mapping[str, Any]) -> Calibration:
 
 
 def _chain_table(chain: Chain) -> dict[str, Any]:
-    laws = chain.laws
     table: dict[str, Any] = {
         "gages": [gage + 1 for gage in chain.gages],
         "mean_load": chain.mean_load,
-        "laws": {
-            "pressure": list(laws.pressure),
-            "speed": list(laws.speed),
-            "pressure_fitted": laws.pressure_fitted,
-            "speed_fitted": laws.speed_fitted,
-            "contact_width": laws.contact_width,
-            "radius": laws.radius,
-        },
+        "laws": _laws_table(chain.laws),
+        "force_laws": _laws_table(chain.force_laws),
         "range": {
             quantity: [
                 {"name": r.name, "low": r.low, "high": r.high, "slack": r.slack, "needed": r.needed}
@@ -121,6 +114,13 @@ def _chain_table(chain: Chain) -> dict[str, Any]:
             for quantity, ranges in chain.guards.items()
         },
     }
+    if chain.cloud is not None:
+        table["cloud"] = {
+            "names": list(chain.cloud.names),
+            "scale": chain.cloud.scale.tolist(),
+            "points": chain.cloud.points.tolist(),
+            "reach": chain.cloud.reach,
+        }
     models = {"Fz": chain.load, "R_eff": chain.radius, "Fy": chain.force}
     for name, model in models.items():
         if model is not None:
@@ -135,8 +135,17 @@ def _chain_table(chain: Chain) -> dict[str, Any]:
 
 
 def _chain(table: Mapping[str, Any]) -> Chain:
-    laws = table["laws"]
     angle = None
+    cloud = None
+    if "cloud" in table:
+        part = table["cloud"]
+        first, second = part["names"]
+        cloud = Cloud(
+            (str(first), str(second)),
+            np.asarray(part["scale"], dtype=np.float64),
+            np.asarray(part["points"], dtype=np.float64).reshape(-1, 2),
+            float(part["reach"]),
+        )
     if "alpha" in table:
         part = table["alpha"]
         angle = AngleModel(_polynomial(part), float(part["blur"]), float(part["bend"]))
@@ -150,19 +159,14 @@ def _chain(table: Mapping[str, Any]) -> Chain:
             )
             for quantity, ranges in table["range"].items()
         },
-        laws=ConditionLaws(
-            pressure=_pair(laws["pressure"]),
-            speed=_pair(laws["speed"]),
-            pressure_fitted=bool(laws["pressure_fitted"]),
-            speed_fitted=bool(laws["speed_fitted"]),
-            contact_width=float(laws["contact_width"]),
-            radius=float(laws["radius"]),
-        ),
+        laws=_laws(table["laws"]),
+        force_laws=_laws(table["force_laws"]),
         mean_load=float(table["mean_load"]),
         load=_polynomial(table["Fz"]) if "Fz" in table else None,
         radius=_polynomial(table["R_eff"]) if "R_eff" in table else None,
         force=_polynomial(table["Fy"]) if "Fy" in table else None,
         angle=angle,
+        cloud=cloud,
     )  # fmt: skip
 
 
@@ -207,6 +211,28 @@ def _polynomial(table: Mapping[str, Any]) -> Polynomial:
         covariance=covariance,
         residual=float(table["residual"]),
         floor=float(table["floor"]),
+    )
+
+
+def _laws_table(laws: ConditionLaws) -> dict[str, Any]:
+    return {
+        "pressure": list(laws.pressure),
+        "speed": list(laws.speed),
+        "pressure_fitted": laws.pressure_fitted,
+        "speed_fitted": laws.speed_fitted,
+        "contact_width": laws.contact_width,
+        "radius": laws.radius,
+    }
+
+
+def _laws(table: Mapping[str, Any]) -> ConditionLaws:
+    return ConditionLaws(
+        pressure=_pair(table["pressure"]),
+        speed=_pair(table["speed"]),
+        pressure_fitted=bool(table["pressure_fitted"]),
+        speed_fitted=bool(table["speed_fitted"]),
+        contact_width=float(table["contact_width"]),
+        radius=float(table["radius"]),
     )
 
 

@@ -18,8 +18,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
-from tirelib.estimators.laws import RADIUS_DOUBT, RADIUS_SHARE, ConditionLaws
-from tirelib.estimators.polynomial import Polynomial, Range
+from tirelib.estimators.laws import (
+    RADIUS_DOUBT,
+    RADIUS_SHARE,
+    UNKNOWN_CAMBER,
+    ConditionLaws,
+)
+from tirelib.estimators.polynomial import Cloud, Polynomial, Range
 
 QUANTITIES = ("Fz", "alpha", "kappa", "Fy")
 
@@ -63,6 +68,11 @@ class Chain:
     guards : dict of tuples of Range
         For each quantity, the regressors whose calibrated range decides on validity, and the range
         of the quantity itself under its own name.
+    laws, force_laws : ConditionLaws
+        Of load and radius; of lateral force and slip angle, where only conditions that were varied
+        while there was lateral force count as varied.
+    cloud : Cloud or None
+        Combinations of traction and lateral distortion that were calibrated.
     mean_load : float, [N]
         Stands for the load where no load model could be calibrated.
     """
@@ -70,11 +80,13 @@ class Chain:
     gages: tuple[int, ...]
     guards: Mapping[str, tuple[Range, ...]]
     laws: ConditionLaws
+    force_laws: ConditionLaws
     mean_load: float
     load: Polynomial | None = None
     radius: Polynomial | None = None
     force: Polynomial | None = None
     angle: AngleModel | None = None
+    cloud: Cloud | None = None
 
     def has(self, quantity: str) -> bool:
         """Tell whether a quantity is calibrated."""
@@ -118,17 +130,34 @@ class Chain:
             result["kappa"] = Estimate(kappa, std, valid)
         values["slip_size"] = np.abs(values["slip_ratio"])
         if self.force is not None:
-            force, std = self.force.predict(values)
-            std = np.hypot(std, self.laws.spread(values, force))
-            result["Fy"] = Estimate(force, std, self._valid("Fy", values, force, std) & extended)
-            with np.errstate(invalid="ignore", divide="ignore"):
-                values["utilisation"] = force / load
-            if self.angle is not None:
-                angle, std = self.angle.predict(values)
-                std = np.hypot(std, self.laws.spread(values, angle))
-                valid = self._valid("alpha", values, angle, std) & extended
-                result["alpha"] = Estimate(angle, std, valid)
+            self._lateral(self.force, values, load, extended, result)
         return result, radius
+
+    def _lateral(
+        self,
+        model: Polynomial,
+        values: dict[str, FloatArray],
+        load: FloatArray,
+        extended: BoolArray,
+        result: dict[str, Estimate],
+    ) -> None:
+        """Add lateral force and slip angle to the result."""
+        laws = self.force_laws
+        extended = extended & laws.allowed(values)
+        force, std = model.predict(values)
+        factor, doubt = laws.force_factor(values)
+        tilted = np.where(np.isnan(values["camber"]), UNKNOWN_CAMBER * np.abs(load), 0.0)
+        law = np.hypot(doubt * np.abs(force) + laws.spread(values, factor * force), tilted)
+        force, std = factor * force, np.hypot(factor * std, law)
+        result["Fy"] = Estimate(force, std, self._valid("Fy", values, force, std) & extended)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            values["utilisation"] = force / load
+        if self.angle is not None:
+            angle, std = self.angle.predict(values)
+            slope = self.angle.polynomial.slope(values, "utilisation")
+            std = np.hypot(std, np.abs(slope / load) * law)
+            valid = self._valid("alpha", values, angle, std) & extended
+            result["alpha"] = Estimate(angle, std, valid)
 
     def _rolling_radius(
         self, values: Mapping[str, FloatArray], load: Estimate | None
@@ -165,4 +194,6 @@ class Chain:
         inside = np.isfinite(value) & np.isfinite(std)
         for guard in self.guards[quantity]:
             inside &= guard.inside(value if guard.name == quantity else values[guard.name])
+        if self.cloud is not None and quantity != "kappa":
+            inside &= self.cloud.inside(values)
         return inside

@@ -26,6 +26,10 @@ MOST_LEVELS = 12
 """More levels than these are no levels but a sweep."""
 LARGEST_LEVEL = 0.5
 """A level that holds more than this share of the data cannot be held out."""
+LEVEL_SLACK = 0.05
+"""Share of a term's range by which a held-out row may lie outside what remains."""
+FEWEST_ROWS = 3
+"""Rows of a held-out level below which it says nothing."""
 MOST_FOLDS = 80
 """Beyond so many groups, groups are held out together."""
 
@@ -195,8 +199,13 @@ def _inner_levels(
         if test.mean() > LARGEST_LEVEL:
             continue
         coefficients, _, _ = _ridge(x[~test], y[~test], weights[~test], centre)
-        error = y[test] - x[test] @ coefficients
-        squares.append(float(np.average(error**2, weights=weights[test])))
+        low, high = x[~test].min(axis=0), x[~test].max(axis=0)
+        slack = LEVEL_SLACK * (high - low)
+        inside = ((x[test] >= low - slack) & (x[test] <= high + slack)).all(axis=1)
+        if inside.sum() < FEWEST_ROWS:
+            continue  # what was measured at this level only cannot be asked of the others
+        error = (y[test] - x[test] @ coefficients)[inside]
+        squares.append(float(np.average(error**2, weights=weights[test][inside])))
     return squares
 
 

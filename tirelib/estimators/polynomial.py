@@ -45,6 +45,33 @@ class Range:
         return within if self.needed else within | np.isnan(x)
 
 
+@dataclass(frozen=True, slots=True)
+class Cloud:
+    """Combinations of two regressors that were calibrated: what lies near none of them was not.
+
+    Attributes
+    ----------
+    names : tuple of two str
+    scale : array, shape (2,), SI
+        Half of each regressor's range.
+    points : array, shape (m, 2), in units of `scale`
+    reach : float
+        Distance from the nearest point, in the same units, that is still taken as calibrated.
+    """
+
+    names: tuple[str, str]
+    scale: FloatArray
+    points: FloatArray
+    reach: float
+
+    def inside(self, values: Mapping[str, FloatArray]) -> BoolArray:
+        """Tell which rows lie near a calibrated combination, shape (n,)."""
+        x = np.stack([values[name] for name in self.names], axis=1) / self.scale
+        apart = x[:, None, :] - self.points
+        nearest = np.einsum("ijk,ijk->ij", apart, apart).min(axis=1)
+        return np.asarray(nearest <= self.reach**2, dtype=np.bool_)
+
+
 Term = tuple[int, ...]
 """Exponents of the variables, in their order."""
 

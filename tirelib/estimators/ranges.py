@@ -7,13 +7,13 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.estimators.chain import Chain
-from tirelib.estimators.polynomial import Range
+from tirelib.estimators.polynomial import Cloud, Range
 from tirelib.estimators.regressors import ODD
 
 SLACK = {
     "contact_angle": 0.01,
     "compression": 0.03,
-    "traction": 0.05,
+    "traction": 0.03,
     "cp1_slope": 0.02,
     "cp2_slope": 0.02,
     "tp_slope": 0.02,
@@ -22,6 +22,12 @@ SLACK = {
     "camber": np.deg2rad(0.5),
 }
 """Least distance (SI) beyond the calibrated range that is still taken as calibrated."""
+LEAST_TRACTION = 0.08
+"""Range of the traction regressor above which traction was varied on purpose."""
+LEAST_HALF_RANGE = 0.02
+"""Floor of the scale with which combinations are compared."""
+REACH = (0.1, 0.2)
+"""Least and largest distance from a calibrated combination, in half ranges."""
 MARGIN = 0.05
 """The same, as a share of the range."""
 GAIN_SLACK = 0.3
@@ -58,7 +64,21 @@ def with_ranges(
         "alpha": (*shape, *angle, *own("alpha", "slip_angle")),
         "kappa": (),
     }
-    return replace(chain, guards=guards)
+    return replace(chain, guards=guards, cloud=_cloud(values))
+
+
+def _cloud(values: Mapping[str, FloatArray]) -> Cloud | None:
+    """Return the combinations of traction and CP1 slope; None where traction was not varied."""
+    names = ("traction", "cp1_slope")
+    x = np.stack([values[name] for name in names], axis=1)
+    if np.ptp(values["traction"]) < LEAST_TRACTION:
+        return None
+    scale = np.maximum(0.5 * np.ptp(x, axis=0), LEAST_HALF_RANGE)
+    points = x / scale
+    apart = np.linalg.norm(points[:, None, :] - points, axis=2)
+    np.fill_diagonal(apart, np.inf)
+    gap = float(np.quantile(apart.min(axis=1), 0.9))
+    return Cloud(names, scale, points, float(np.clip(1.5 * gap, *REACH)))
 
 
 def _uses(chain: Chain, name: str) -> bool:
