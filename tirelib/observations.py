@@ -16,6 +16,8 @@ TRUTH = ("Fx", "Fy", "Fz", "Mz", "slip_angle", "slip_ratio")
 """Rig quantities that an estimate is held against."""
 SET_POINTS = ("load", "pressure", "speed", "slip_angle", "camber", "slip_ratio")
 """Nominal conditions of a run."""
+LATE = 3.0
+"""Rig samples after which the last one is no longer held."""
 BLOCK = 10
 """Turns of a sweep that are held out together in a cross-validation."""
 
@@ -77,14 +79,14 @@ def measure_run(
             "strain_1 .. strain_N are needed"
         )
     times = run.time()
-    held = {name: run.hold(name, times) for name in ("speed", "pressure", "camber")}
+    held = {name: _held(run, name, times) for name in ("speed", "pressure", "camber")}
     turns = cut_turns(
         run.strain,
         run.rate,
         header.gage_lateral,
         trigger=run.trigger,
         low_pass=low_pass,
-        **{name: np.nan if value is None else value for name, value in held.items()},
+        **held,
     )
     features = extract_features(turns)
     features = replace(
@@ -94,20 +96,36 @@ def measure_run(
     return features, truth
 
 
+def _held(run: Run, name: str, times: FloatArray) -> FloatArray | float:
+    """Return a condition at the gage samples: what the rig measured, else the set point.
+
+    A measurement that has ended says nothing of later samples.
+    """
+    values = run.hold(name, times)
+    if values is None or run.rig_time is None:
+        return float(getattr(run.plan, name))
+    step = float(np.median(np.diff(run.rig_time))) if run.rig_time.size > 1 else np.inf
+    return np.where(times > run.rig_time[-1] + LATE * step, np.nan, values)
+
+
 def truth_of(run: Run, name: str, features: Features) -> FloatArray:
     """Rig quantity for each turn: mean over the run, or over the turn in a sweep."""
     n = len(features)
     samples, clock = run.rig.get(name), run.rig_time
     if samples is None or clock is None or samples.size == 0:
         return np.full(n, np.nan)
+    known = np.isfinite(samples)
+    if not known.any():
+        return np.full(n, np.nan)
     if run.plan.kind != "sweep":
-        return np.full(n, float(np.nanmean(samples)))
-    total = np.concatenate(([0.0], np.cumsum(samples)))
+        return np.full(n, float(samples[known].mean()))
+    total = np.concatenate(([0.0], np.cumsum(np.where(known, samples, 0.0))))
+    count = np.concatenate(([0], np.cumsum(known)))
     start = np.searchsorted(clock, features.time - np.nan_to_num(features.period))
-    stop = np.maximum(np.searchsorted(clock, features.time), start + 1)
-    stop = np.minimum(stop, samples.size)
-    start = np.minimum(start, stop - 1)
-    return np.asarray((total[stop] - total[start]) / (stop - start), dtype=np.float64)
+    stop = np.searchsorted(clock, features.time)
+    held = count[stop] - count[start]
+    mean = (total[stop] - total[start]) / np.maximum(held, 1)
+    return np.asarray(np.where(held > 0, mean, np.nan), dtype=np.float64)
 
 
 def observe(

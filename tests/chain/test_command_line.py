@@ -130,7 +130,7 @@ def broken(place: Path, tmp_path: Path) -> dict[str, tuple[list[object], str]]:
         "no calibration": ([*estimate, tmp_path / "none.toml"], "cannot be read"),
         "unknown version": ([*estimate, tmp_path / "old.toml"], "this version reads"),
         "cut off": ([*estimate, tmp_path / "cut.toml"], "is not TOML"),
-        "damaged": ([*estimate, tmp_path / "half.toml"], "is damaged"),
+        "damaged": ([*estimate, tmp_path / "half.toml"], "chain[0].laws: is missing"),
         "another tire": (["estimate", tmp_path / "other", "--calibration", cal], "another tire"),
         "mixed tires": (["calibrate", data, tmp_path / "other", *out], "holds for one tire"),
         "too few": (["calibrate", tmp_path / "few", *out], "at least 5"),
@@ -148,6 +148,22 @@ def test_bad_input_ends_with_exit_code_two_and_a_message(place: Path, tmp_path: 
         assert done.returncode == 2, (name, done.stdout, done.stderr)
         assert message in done.stderr, (name, done.stderr)
         assert "Traceback" not in done.stderr, name
+
+
+def test_names_with_markup_stay_names(place: Path, tmp_path: Path) -> None:
+    write(tmp_path / "day [b]", [synthetic_run(0)], name="x [/b] y [red]z")
+    done = run("estimate", tmp_path / "day [b]", "--calibration", place / "cal.toml", "--json",
+               tmp_path / "a[/b].json")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "x [/b] y [red]z" in done.stdout
+    assert "a[/b].json" in done.stdout
+
+
+def test_an_output_that_cannot_be_written_is_bad_input(place: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    done = run("calibrate", place / "set1", "--quick", "--out", tmp_path / "file" / "c.toml")
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
 
 
 @pytest.mark.parametrize("verb", ["campaign", "features", "calibrate", "estimate", "rig"])

@@ -51,3 +51,6 @@ def main() -> None:
     except TirelibError as error:
         click.echo(f"Error: {error}", err=True)
         sys.exit(2)
+    except OSError as error:
+        click.echo(f"Error: {error.filename}: {error.strerror}; choose another place", err=True)
+        sys.exit(2)

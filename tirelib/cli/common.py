@@ -20,8 +20,10 @@ WIDTH = 120
 
 def output() -> Console:
     """Return the console for results, wide enough for tables when it is no terminal."""
-    console = Console(highlight=False)
-    return console if console.is_terminal else Console(highlight=False, width=WIDTH)
+    console = Console(highlight=False, markup=False)
+    if console.is_terminal:
+        return console
+    return Console(highlight=False, markup=False, width=WIDTH, soft_wrap=True)
 
 
 @contextmanager
@@ -33,7 +35,7 @@ def progress_bar(what: str, total: int | None = None) -> Iterator[Callable[[str]
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
-        TextColumn("{task.fields[label]}", style="dim"),
+        TextColumn("{task.fields[label]}", style="dim", markup=False),
         console=console,
         transient=True,
         disable=not console.is_terminal,

@@ -7,6 +7,7 @@ are.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from scipy.optimize import minimize
@@ -38,6 +39,8 @@ VARIES = {
     "tp_slope": 0.02,
 }
 """Range (SI) that a regressor must cover in the data to enter a regression."""
+MOSTLY = 0.5
+"""Share of turns with a measurement above which those without are left out."""
 FREE_ROLLING = 0.02
 """Slip ratio up to which a run tells the effective rolling radius."""
 LEAST_FORCE = 0.05
@@ -48,6 +51,9 @@ LEAST_ANGLE = np.deg2rad(0.5)
 """... range of slip angle, [rad], below which the quantity cannot be calibrated."""
 LEAST_ANGLE_ERROR = np.deg2rad(0.02)
 """Floor of the slip-angle error against which the cornering curve's flatness is weighed, [rad]."""
+
+
+Model = TypeVar("Model")
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +101,7 @@ def calibrate_chain(
             f"{np.unique(observations.group[rows]).size} conditions; a calibration needs at least "
             f"{FEWEST_CONDITIONS}; measure more runs or look at the flags with `tirelib features`"
         )
+    rows = measured(observations, rows)
     values = {name: mean_by(unit, x, rows) for name, x in regressors.items()}
     values["speed_squared"] = values["speed"] ** 2
     truth = {name: mean_by(unit, observations.truth[name], rows) for name in TRUTH}
@@ -104,9 +111,9 @@ def calibrate_chain(
     say = progress or (lambda _: None)
     laws = _laws(observations, values)
     load, mean_load = _fit_load(links, laws, say)
-    radius = _fit_radius(links, say)
-    force = _fit_force(links, say)
-    angle = _fit_angle(links, force is not None, say)
+    radius = _or_refused(links, "kappa", lambda: _fit_radius(links, say))
+    force = _or_refused(links, "Fy", lambda: _fit_force(links, say))
+    angle = _or_refused(links, "alpha", lambda: _fit_angle(links, force is not None, say))
     chain = Chain(
         gages=tuple(gages),
         guards=dict.fromkeys(("Fz", "alpha", "kappa", "Fy"), ()),
@@ -119,6 +126,24 @@ def calibrate_chain(
         angle=angle,
     )
     return with_ranges(_with_floor(chain, regressors, unit, rows), values, truth), links
+
+
+def measured(observations: Observations, rows: BoolArray) -> BoolArray:
+    """Leave out the few turns for which the rig did not measure what it measured for most."""
+    for name in ("Fz", "Fy", "slip_angle", "slip_ratio"):
+        known = np.isfinite(observations.truth[name])
+        if known[rows].mean() > MOSTLY:
+            rows = rows & known
+    return rows
+
+
+def _or_refused(links: Links, quantity: str, fit: Callable[[], Model | None]) -> Model | None:
+    """Return a fitted model; where the data cannot inform it, keep the reason."""
+    try:
+        return fit()
+    except CalibrationError as error:
+        links.refused[quantity] = str(error)
+        return None
 
 
 def _varying(values: dict[str, FloatArray], names: Sequence[str]) -> set[str]:
@@ -189,10 +214,15 @@ def _fit_load(
     say("Fz")
     correction, _ = laws.load_correction(values)
     candidates = basis.load_candidates(_varying(values, list(VARIES)))
-    fit = fit_best(
-        values, truth - correction, links.groups, candidates, odd=ODD, level=links.load_level(),
-        what="Fz",
-    )  # fmt: skip
+    try:
+        fit = fit_best(
+            values, truth - correction, links.groups, candidates, odd=ODD,
+            level=links.load_level(), what="Fz",
+        )  # fmt: skip
+    except CalibrationError as error:
+        links.refused["Fz"] = str(error)
+        links.values["load"] = np.full(truth.shape, mean)
+        return None, mean
     _keep(links, "Fz", fit, fit.held_out + correction)
     links.values["load"] = fit.held_out + correction
     return fit.model, mean

@@ -13,6 +13,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.errors import FormatError
 from tirelib.estimators.calibration import Calibration, Rolling
+from tirelib.estimators.calibration_check import faults
 from tirelib.estimators.chain import AngleModel, Chain
 from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.polynomial import Cloud, Polynomial, Range, Variable
@@ -76,6 +77,9 @@ def read_calibration(path: str | Path) -> Calibration:
         raise FormatError(
             f"{where}: format = {given!r}; this version reads {FORMAT!r}; calibrate anew"
         )
+    found = [f"{where}: {fault}; calibrate anew" for fault in faults(document)]
+    if found:
+        raise FormatError(found)
     try:
         calibration = _calibration(document)
     except (KeyError, TypeError, ValueError, AttributeError) as error:

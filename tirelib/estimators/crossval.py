@@ -8,13 +8,13 @@ import numpy as np
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.errors import CalibrationError
 from tirelib.estimators.calibrate import calibrate_chain
-from tirelib.estimators.dissertation import SMALL_ANGLE, Means
+from tirelib.estimators.dissertation import FREE, SMALL_ANGLE, UPRIGHT, Means
 from tirelib.estimators.fit import LARGEST_LEVEL, mean_by
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.train import Trained, take
 from tirelib.observations import Observations
 
-LEVELS = {"load": (50.0, "N"), "pressure": (1e4, "bar"), "speed": (0.5 / 3.6, "km/h"),
+LEVELS = {"load": (250.0, "N"), "pressure": (1e4, "bar"), "speed": (0.5 / 3.6, "km/h"),
           "camber": (0.01, "deg"), "slip_ratio": (0.005, "1")}  # fmt: skip
 """Conditions of which a level is held out, with the least distance of two levels (SI)."""
 FACTOR = {"bar": 1e-5, "km/h": 3.6, "deg": 180.0 / np.pi, "N": 1.0, "1": 1.0}
@@ -122,7 +122,8 @@ def _dissertation(
     rows &= np.isfinite(features.cp1).all(axis=1) & np.isfinite(features.cp2).all(axis=1)
     held = mean_by(observations.unit, test.astype(np.float64), rows) > 0.5
     use = np.isfinite(x).all(axis=1) & np.isfinite(y)
-    if quantity == "alpha":
+    use &= ~(np.abs(means.camber) > UPRIGHT) & ~(np.abs(means.slip_ratio) > FREE)
+    if quantity != "Fz":
         use &= np.abs(means.slip_angle) <= SMALL_ANGLE
     train, hold = use & ~held, use & held
     if train.sum() < x.shape[1] + 3 or not hold.any():

@@ -9,7 +9,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.estimators.calibration import Calibration, Estimates
-from tirelib.estimators.chain import QUANTITIES
+from tirelib.estimators.chain import QUANTITIES, Chain
 from tirelib.estimators.fit import mean_by
 from tirelib.flags import flag_names
 from tirelib.observations import Observations
@@ -33,7 +33,9 @@ def estimate_document(
         "axes": "iso",
         "tire": calibration.tire,
         "summary": {
-            quantity: _summary(quantity, observations, estimates) if chain.has(quantity) else None
+            quantity: _summary(quantity, observations, estimates, _floor(chain, quantity))
+            if chain.has(quantity)
+            else None
             for quantity in QUANTITIES
         },
         "turns": [
@@ -43,22 +45,37 @@ def estimate_document(
 
 
 def run_means(
-    quantity: str, observations: Observations, estimates: Estimates
+    quantity: str, observations: Observations, estimates: Estimates, floor: float = 0.0
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return estimate, standard deviation and measurement of each run, SI, over its valid turns."""
+    """Return estimate, standard deviation and measurement of each run, SI, over its valid turns.
+
+    `floor` is the standard deviation of a single turn about the mean of its run; of the mean of n
+    turns it is 1/sqrt(n) of that.
+    """
     truth = observations.truth[TRUTH[quantity]]
     good = estimates.valid[quantity] & np.isfinite(estimates.value[quantity])
     unit = observations.unit
+    turns = np.bincount(unit[good])
+    turns = turns[turns > 0]
+    variance = mean_by(unit, estimates.std[quantity] ** 2, good) - floor**2 * (1.0 - 1.0 / turns)
     return (
         mean_by(unit, estimates.value[quantity], good),
-        mean_by(unit, estimates.std[quantity], good),
+        np.sqrt(np.maximum(variance, 0.0)),
         mean_by(unit, truth, good),
     )
 
 
-def _summary(quantity: str, observations: Observations, estimates: Estimates) -> dict[str, Any]:
+def _floor(chain: Chain, quantity: str) -> float:
+    """Return the scatter of a single turn about the mean of its run, SI."""
+    model = {"Fz": chain.load, "Fy": chain.force}.get(quantity)
+    return 0.0 if model is None else model.floor
+
+
+def _summary(
+    quantity: str, observations: Observations, estimates: Estimates, floor: float
+) -> dict[str, Any]:
     unit, factor = EDGE_UNIT[quantity]
-    value, std, truth = (x * factor for x in run_means(quantity, observations, estimates))
+    value, std, truth = (x * factor for x in run_means(quantity, observations, estimates, floor))
     known = np.isfinite(truth)
     value, std, truth = value[known], std[known], truth[known]
     empty = {"rmse": None, "unit": unit, "r2": None, "n": 0, "rmse_percent_of_range": None,

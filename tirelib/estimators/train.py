@@ -7,7 +7,7 @@ import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.errors import CalibrationError
-from tirelib.estimators.calibrate import Links, calibrate_chain
+from tirelib.estimators.calibrate import Links, calibrate_chain, measured
 from tirelib.estimators.calibration import Calibration, Rolling
 from tirelib.estimators.cornering import CorneringTrend, cornering_trend
 from tirelib.estimators.dissertation import Means, Regression, fit_all, means_for_tables
@@ -115,6 +115,7 @@ def averaging(observations: Observations) -> Callable[[FloatArray], FloatArray]:
     features = observations.features
     rows = observations.usable & np.isfinite(features.contact_angle).all(axis=1)
     rows &= np.isfinite(features.cp1).all(axis=1) & np.isfinite(features.cp2).all(axis=1)
+    rows = measured(observations, rows)
     unit = observations.unit
     return lambda values: mean_by(unit, values, rows)
 

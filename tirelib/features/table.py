@@ -53,6 +53,7 @@ def feature_frame(features: Features, **extra: npt.ArrayLike) -> pd.DataFrame:
     columns: dict[str, npt.ArrayLike | list[str]] = {
         name: np.repeat(value, gages) if np.ndim(value) else value for name, value in extra.items()
     }
+    columns["axes"] = ["iso"] * (n * gages)
     columns["turn"] = np.repeat(np.arange(n), gages)
     columns["gage"] = np.tile(np.arange(1, gages + 1), n)
     columns["lateral"] = np.tile(features.lateral, n)

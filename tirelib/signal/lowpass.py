@@ -58,8 +58,8 @@ class LowPass:
             raise ParameterError(
                 f"filter order = {self.order}; allowed are {low:g} .. {high:g} cycles per turn"
             )
-        if self.cut_off is not None and not self.cut_off > 0.0:
-            raise ParameterError(f"filter cut-off = {self.cut_off} Hz; must be above 0")
+        if self.cut_off is not None and not 0.0 < self.cut_off < float("inf"):
+            raise ParameterError(f"filter cut-off = {self.cut_off} Hz; must be above 0 and finite")
 
     def frequency(self, turn_rate: float) -> float:
         """Return the cut-off at half power, [Hz], at a turn rate in turns per second."""

@@ -3,7 +3,7 @@
 For the contact k, with the middles of the centre gage's pulses m at k-1 and k:
 
 - period and wheel angle per sample from the preceding turn: ``step = 2 pi / (m_k - m_(k-1))``,
-- offset of each gage: mean over +-0.5 rad round the point half-way between the two contacts,
+- offset of each gage: median over +-0.5 rad round the point half-way between the two contacts,
 - conditions: mean over the preceding turn of what was held,
 - strain and rate over wheel angle: `tirelib.signal.lowpass`, up to 20 degrees after the pulse.
 
@@ -255,7 +255,8 @@ class TurnCutter:
         strain, rate, gage_flags = self._window(contact.middle, step, sigma, pulse)
         opposite = 0.5 * (contact.middle + before.middle)
         half = OFFSET_HALF_WIDTH / step
-        offset, gap = self._mean(slice(0, self._gages), opposite - half, opposite + half)
+        sector = (slice(0, self._gages), opposite - half, opposite + half)
+        offset, gap = self._mean(*sector, robust=True)
         mean, gap_in_turn = self._mean(slice(0, self._gages), before.middle, contact.middle)
         gage_flags[gap | gap_in_turn] |= int(TurnFlag.GAP)
         unusable = (gage_flags & int(UNUSABLE)) != 0
@@ -318,18 +319,24 @@ class TurnCutter:
         strain[:, seen], rate[:, seen] = smooth_to_angle(mended, zero, step, PHI[seen], sigma)
         return strain, rate, gage_flags
 
-    def _mean(self, rows: slice, start: float, stop: float) -> tuple[FloatArray, BoolArray]:
-        """Mean of buffer rows between two sample numbers, and where too much is missing."""
+    def _mean(
+        self, rows: slice, start: float, stop: float, *, robust: bool = False
+    ) -> tuple[FloatArray, BoolArray]:
+        """Mean (or median) of buffer rows between two sample numbers; where too much is missing."""
         a = max(round(start) - self._base, 0)
         b = min(round(stop) - self._base, self._filled)
         part = self._buffer[rows, a:b]
         good = np.isfinite(part)
         if good.size and good.all():
-            return part.mean(axis=1), np.zeros(part.shape[0], dtype=np.bool_)
+            middle = np.median(part, axis=1) if robust else part.mean(axis=1)
+            return middle, np.zeros(part.shape[0], dtype=np.bool_)
         count = good.sum(axis=1)
         gap = count < max((1.0 - LARGEST_MISSING) * part.shape[1], 1.0)
-        total = np.where(good, part, 0.0).sum(axis=1)
-        return np.where(gap, np.nan, total / np.maximum(count, 1)), gap
+        middle = np.full(part.shape[0], np.nan)
+        average = np.median if robust else np.mean
+        for row in np.flatnonzero(~gap):
+            middle[row] = average(part[row, good[row]])
+        return middle, gap
 
     def _trigger(self, start: float, stop: float, step: float) -> tuple[float, bool]:
         """Wheel angle of the contact's middle from the trigger, and whether it came just once."""

@@ -273,3 +273,79 @@ def test_strain_in_a_wrong_unit_is_out_of_range(trained: Trained, factor: float)
         measure_run(replace(run, strain=factor * run.strain), header())[0]
     )
     assert not found.turn_valid.any()
+
+
+def test_combinations_that_were_never_measured_are_out_of_range(
+    cornering: Campaign, braking: Campaign
+) -> None:
+    both = train(observe([cornering, braking]))
+    straight = estimate(both, load=4500.0, slip_ratio=-0.1)
+    corner = estimate(both, load=4500.0, slip_angle=np.deg2rad(4.0))
+    mixed = estimate(both, load=4500.0, slip_angle=np.deg2rad(4.0), slip_ratio=-0.1)
+    assert straight.turn_valid[1:].all()
+    assert corner.turn_valid[1:].all()
+    assert not mixed.turn_valid.any()
+
+
+def test_adding_a_campaign_does_not_spoil_the_first(
+    cornering: Campaign, braking: Campaign, another_day: Campaign
+) -> None:
+    day = observe([another_day])
+
+    def load_error(trained: Trained) -> float:
+        summary = estimate_document(
+            day, trained.calibration.estimate(day.features), trained.calibration
+        )["summary"]
+        return float(summary["Fz"]["rmse"])
+
+    alone = load_error(train(observe([cornering])))
+    assert load_error(train(observe([cornering, braking]))) < 2.0 * alone + 5.0
+
+
+def test_lateral_force_grows_with_a_pressure_that_was_not_varied(trained: Trained) -> None:
+    laws = trained.calibration.chains[-1].force_laws
+    reference = laws.reference_pressure
+    pressure = reference * np.array([0.6, 1.0, 1.2, np.nan])
+    factor, doubt = laws.force_factor({"pressure": pressure})
+    np.testing.assert_allclose(factor, [0.6**0.8, 1.0, 1.2**0.8, 1.0])
+    assert doubt[1] == 0.0
+    assert doubt[0] > doubt[2] > 0.0
+    assert doubt[3] == 0.15
+
+
+@pytest.mark.parametrize("name", ["pressure", "camber"])
+def test_a_condition_that_nobody_measures_widens_the_interval(trained: Trained, name: str) -> None:
+    features = features_of(slip_angle=np.deg2rad(3.0))
+    unknown = replace(features, **{name: np.full(len(features), np.nan)})
+    known = trained.calibration.estimate(features)
+    blind = trained.calibration.estimate(unknown)
+    for quantity in ("Fy", "alpha") if name == "camber" else ("Fz", "Fy", "alpha"):
+        assert (blind.std[quantity][1:] > 2.5 * known.std[quantity][1:]).all(), quantity
+
+
+def test_a_set_point_stands_in_for_a_channel_that_is_missing() -> None:
+    run = synthetic_run(0, pressure=2.0e5)
+    rig = {name: x for name, x in run.rig.items() if name != "pressure"}
+    features, _ = measure_run(replace(run, rig=rig), header())
+    np.testing.assert_allclose(features.pressure[1:], 2.0e5)
+
+
+def test_a_rig_that_stopped_recording_says_nothing_of_later_turns() -> None:
+    run = synthetic_run(0, kind="sweep")
+    assert run.rig_time is not None
+    half = run.rig_time.size // 2
+    short = replace(
+        run, rig={name: x[:half] for name, x in run.rig.items()}, rig_time=run.rig_time[:half]
+    )
+    features, truth = measure_run(short, header())
+    assert np.isfinite(truth["Fz"][1])
+    assert np.isnan(truth["Fz"][-1])
+    assert np.isnan(features.speed[-1])
+
+
+def test_a_missing_rig_sample_does_not_erase_later_ones() -> None:
+    run = synthetic_run(0, kind="sweep")
+    force = run.rig["Fz"].copy()
+    force[5] = np.nan
+    _, truth = measure_run(replace(run, rig={**run.rig, "Fz": force}), header())
+    np.testing.assert_allclose(truth["Fz"][1:], 4000.0, atol=40.0)

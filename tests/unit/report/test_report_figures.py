@@ -14,9 +14,11 @@ from tests.unit.report.conftest import World
 from tirelib.errors import CalibrationError
 from tirelib.estimators.cornering import CorneringTrend
 from tirelib.report import figures
+from tirelib.report.accuracy import QUANTITIES
 from tirelib.report.cutoff_study import nearest_runs, study_cut_off
 from tirelib.report.figures.contact import contact_area
 from tirelib.report.figures.cornering import bend_factor
+from tirelib.report.figures.live import LastTurn, Strip
 from tirelib.report.turns import TypicalTurns, typical_turns
 
 
@@ -29,6 +31,21 @@ def turns(world: World, name: str, count: int) -> TypicalTurns:
     campaign = world.campaigns[name]
     plans = campaign.plans[:count]
     return typical_turns(campaign, plans, [f"run {plan.run}" for plan in plans])
+
+
+def live(world: World) -> Figure:
+    """Two runs of four turns; the first turn of each has no estimate."""
+    rng = np.random.default_rng(5)
+    known = np.where(np.arange(8) % 4 == 0, np.nan, 1.0)
+    strip = Strip(
+        time=0.1 * np.arange(8),
+        run=np.repeat([3, 7], 4),
+        value={name: known * rng.normal(3.0, 0.1, 8) for name in QUANTITIES},
+        std=dict.fromkeys(QUANTITIES, known * 0.1),
+        truth={name: np.full(8, 3.0) for name in QUANTITIES},
+    )
+    trace = turns(world, "set1", 1).trace
+    return figures.figure_live(LastTurn(7, trace.phi, trace.strain[0], trace.lateral), strip)
 
 
 DRAW: dict[str, Callable[[World], Figure]] = {
@@ -53,6 +70,7 @@ DRAW: dict[str, Callable[[World], Figure]] = {
     "4_23": lambda w: figures.figure_4_23(trend(w)),
     "accuracy": lambda w: figures.figure_accuracy(w.observations["set1"], w.estimates["set1"]),
     "residuals": lambda w: figures.figure_residuals(w.trained, "alpha"),
+    "live": live,
     "cut_off": lambda w: figures.figure_cut_off(
         study_cut_off(w.campaigns["set3"], nearest_runs(w.campaigns["set3"]))
     ),

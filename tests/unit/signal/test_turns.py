@@ -275,3 +275,15 @@ def test_wrong_shapes_and_rates_are_refused() -> None:
         TurnCutter(LATERAL, RATE).push(np.zeros((4, 10)))
     with pytest.raises(ParameterError, match="must be above 0"):
         TurnCutter(LATERAL, 0.0)
+
+
+def test_spikes_away_from_the_contact_do_not_move_the_offset() -> None:
+    strain, _, omega = record(noise=4e-6)
+    clean = turns_of(strain)
+    spiked = strain.copy()
+    half_turn = int(np.pi / omega * RATE)
+    for turn in range(1, 5):
+        at = middle_of(clean, turn) - half_turn
+        spiked[:, at - 10 : at + 10 : 10] += 0.5
+    turns = turns_of(spiked)
+    np.testing.assert_allclose(turns.offset[1:], clean.offset[1:], atol=2e-6)

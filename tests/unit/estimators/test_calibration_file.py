@@ -1,0 +1,77 @@
+"""A damaged calibration is refused, and every fault of it is named."""
+
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import tomli_w
+
+from tirelib.errors import FormatError
+from tirelib.estimators.calibration_file import read_calibration, write_calibration
+from tirelib.estimators.train import Trained
+
+Edit = Callable[[dict[str, Any]], None]
+
+
+def put(*path: str | int, value: object) -> Edit:
+    def edit(document: dict[str, Any]) -> None:
+        place: Any = document
+        for step in path[:-1]:
+            place = place[step]
+        place[path[-1]] = value
+
+    return edit
+
+
+FZ = ("chain", 0, "Fz")
+FAULTS: dict[str, tuple[Edit, str]] = {
+    "axes": (put("axes", value="sae"), "axes = 'sae'"),
+    "unit": (put(*FZ, "unit", value="kN"), "unit = 'kN'; only 'N' is allowed"),
+    "nan": (put(*FZ, "term", 1, "value", value=float("nan")), "term[1].value = nan"),
+    "text": (put(*FZ, "term", 1, "value", value="12"), "term[1].value = '12'"),
+    "truth value": (put(*FZ, "term", 1, "value", value=True), "term[1].value = True"),
+    "power": (put(*FZ, "term", 1, "exponents", 0, value=-1), "whole numbers from 0"),
+    "broken power": (put(*FZ, "term", 1, "exponents", 0, value=1.7), "whole numbers from 0"),
+    "huge power": (put(*FZ, "term", 1, "exponents", 0, value=10**9), "whole numbers from 0"),
+    "regressor": (put(*FZ, "variable", 0, "name", value="luck"), "name = 'luck' is unknown"),
+    "scale": (put(*FZ, "variable", 0, "scale", value=0.0), "scale = 0"),
+    "residual": (put(*FZ, "residual", value=-1.0), "residual = -1.0"),
+    "covariance": (put(*FZ, "covariance", 0, 0, value=-1.0), "negative variance"),
+    "asymmetric": (put(*FZ, "covariance", 0, 1, value=1e9), "is not symmetric"),
+    "gage": (put("chain", 0, "gages", 0, value=9), "numbers from 1 to 5"),
+    "range": (put("chain", 0, "range", "Fz", value=[]), "it decides on validity"),
+    "needed": (put("chain", 0, "range", "Fz", 0, "needed", value="no"), "true or false"),
+    "order": (put("filter", "order", value="24"), "filter.order = '24'"),
+    "twice": (put("chain", 1, "missing_gage", value=0), "each once"),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def sound(trained: Trained, tmp_path_factory: pytest.TempPathFactory) -> str:
+    path = tmp_path_factory.mktemp("cal") / "cal.toml"
+    write_calibration(trained.calibration, path)
+    return path.read_text()
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_damaged_number_is_refused_and_named(sound: str, tmp_path: Path, fault: str) -> None:
+    edit, message = FAULTS[fault]
+    document = tomllib.loads(sound)
+    edit(document)
+    (tmp_path / "bad.toml").write_text(tomli_w.dumps(document))
+    with pytest.raises(FormatError) as caught:
+        read_calibration(tmp_path / "bad.toml")
+    assert message in str(caught.value)
+    assert "bad.toml" in str(caught.value)
+
+
+def test_all_faults_are_listed_at_once(sound: str, tmp_path: Path) -> None:
+    document = tomllib.loads(sound)
+    for name in ("axes", "unit", "gage"):
+        FAULTS[name][0](document)
+    (tmp_path / "bad.toml").write_text(tomli_w.dumps(document))
+    with pytest.raises(FormatError) as caught:
+        read_calibration(tmp_path / "bad.toml")
+    assert len(caught.value.problems) == 3

@@ -1,0 +1,172 @@
+"""What may be wrong with a calibration file: every fault, before any number of it is used."""
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+AXES = "iso"
+UNITS = {"Fz": "N", "R_eff": "m", "Fy": "N", "alpha": "rad"}
+"""Models of a chain with the unit of their coefficients."""
+REGRESSORS = frozenset(
+    ("contact_angle", "compression", "traction", "tension", "cp1_slope", "cp2_slope", "tp_slope",
+     "angle_slope", "pressure", "speed_squared", "camber", "load", "utilisation", "slip_ratio",
+     "slip_size")
+)  # fmt: skip
+"""Names that a polynomial or a range may use."""
+QUANTITIES = frozenset(("Fz", "alpha", "kappa", "Fy"))
+HIGHEST_POWER = 12
+
+
+def faults(document: Mapping[str, Any]) -> Iterator[str]:
+    """Yield every fault of a calibration document, each saying where it is."""
+    if document.get("axes") != AXES:
+        yield f"axes = {document.get('axes')!r}; only {AXES!r} is allowed"
+    yield from _numbers(document, "filter", ("order",))
+    yield from _numbers(document, "rolling", ("centre", "threshold"))
+    lateral = document.get("lateral_m")
+    if not isinstance(lateral, list) or len(lateral) < 3 or not all(map(_finite, lateral)):
+        yield f"lateral_m = {lateral!r}; a list of three numbers at least is needed"
+        return
+    chains = document.get("chain")
+    if not isinstance(chains, list) or not chains:
+        yield "chain: is missing; one table per gage set is needed"
+        return
+    seen = [chain.get("missing_gage") for chain in chains if isinstance(chain, dict)]
+    if len(set(seen)) != len(chains) or 0 not in seen:
+        yield f"chain: missing_gage = {seen}; each once, and 0 (none missing) among them"
+    for index, chain in enumerate(chains):
+        yield from _chain(chain, f"chain[{index}]", len(lateral))
+
+
+def _chain(chain: Any, where: str, gages: int) -> Iterator[str]:
+    if not isinstance(chain, dict):
+        yield f"{where}: is no table"
+        return
+    used = chain.get("gages")
+    good = isinstance(used, list) and all(_whole(g, 1, gages) for g in used)
+    if not isinstance(used, list) or not good or not len(set(used)) == len(used) >= 2:
+        yield f"{where}.gages = {used!r}; numbers from 1 to {gages}, each once"
+    if not isinstance(chain.get("mean_load"), float | int):
+        yield f"{where}.mean_load = {chain.get('mean_load')!r}; a number is needed"
+    for name in ("laws", "force_laws"):
+        yield from _laws(chain.get(name), f"{where}.{name}")
+    ranges = chain.get("range")
+    if not isinstance(ranges, dict) or set(ranges) != QUANTITIES:
+        yield f"{where}.range: one list for each of {', '.join(sorted(QUANTITIES))} is needed"
+    else:
+        for quantity, entries in ranges.items():
+            for position, entry in enumerate(entries):
+                yield from _range(entry, f"{where}.range.{quantity}[{position}]")
+            calibrated = quantity in chain and quantity != "kappa"
+            if calibrated and not entries:
+                yield f"{where}.range.{quantity}: is empty; it decides on validity"
+    for name, unit in UNITS.items():
+        if name in chain:
+            yield from _model(chain[name], f"{where}.{name}", unit)
+    if "alpha" in chain:
+        yield from _numbers(chain, "alpha", ("blur", "bend"), where)
+
+
+def _laws(table: Any, where: str) -> Iterator[str]:
+    if not isinstance(table, dict):
+        yield f"{where}: is missing"
+        return
+    for name in ("pressure", "speed"):
+        pair = table.get(name)
+        if not (isinstance(pair, list) and len(pair) == 2 and all(map(_number, pair))):
+            yield f"{where}.{name} = {pair!r}; two numbers are needed"
+        if not isinstance(table.get(f"{name}_fitted"), bool):
+            yield f"{where}.{name}_fitted: true or false is needed"
+    for name in ("contact_width", "radius"):
+        if not _number(table.get(name)):
+            yield f"{where}.{name} = {table.get(name)!r}; a number is needed"
+
+
+def _range(entry: Any, where: str) -> Iterator[str]:
+    given = entry.get("name") if isinstance(entry, dict) else entry
+    if given not in REGRESSORS | QUANTITIES:
+        yield f"{where}: name = {given!r} is unknown"
+        return
+    for name in ("low", "high", "slack"):
+        if not _finite(entry.get(name)):
+            yield f"{where}.{name} = {entry.get(name)!r}; a finite number is needed"
+    if not isinstance(entry.get("needed"), bool):
+        yield f"{where}.needed = {entry.get('needed')!r}; true or false is needed"
+
+
+def _model(table: Any, where: str, unit: str) -> Iterator[str]:
+    if not isinstance(table, dict):
+        yield f"{where}: is no table"
+        return
+    if table.get("unit") != unit:
+        yield f"{where}.unit = {table.get('unit')!r}; only {unit!r} is allowed"
+    for name in ("residual", "floor"):
+        if not _finite(table.get(name)) or table[name] < 0.0:
+            yield f"{where}.{name} = {table.get(name)!r}; a number from 0 is needed"
+    variables, terms = table.get("variable"), table.get("term")
+    if not isinstance(variables, list) or not isinstance(terms, list) or not terms:
+        yield f"{where}: variable and term are needed"
+        return
+    for position, variable in enumerate(variables):
+        if variable.get("name") not in REGRESSORS:
+            yield f"{where}.variable[{position}]: name = {variable.get('name')!r} is unknown"
+        if not _finite(variable.get("centre")) or not _finite(variable.get("scale")):
+            yield f"{where}.variable[{position}]: centre and scale must be finite numbers"
+        elif variable["scale"] == 0.0:
+            yield f"{where}.variable[{position}].scale = 0; another number is needed"
+    for position, term in enumerate(terms):
+        powers = term.get("exponents")
+        good = isinstance(powers, list) and len(powers) == len(variables)
+        if not good or not all(_whole(p, 0, HIGHEST_POWER) for p in powers):
+            yield (
+                f"{where}.term[{position}].exponents = {powers!r}; {len(variables)} whole numbers "
+                f"from 0 to {HIGHEST_POWER} are needed"
+            )
+        value = term.get("value")
+        if not _finite(value):
+            yield f"{where}.term[{position}].value = {value!r}; a finite number is needed"
+    yield from _covariance(table.get("covariance"), f"{where}.covariance", len(terms))
+
+
+def _covariance(rows: Any, where: str, size: int) -> Iterator[str]:
+    good = isinstance(rows, list) and len(rows) == size
+    if not good or not all(
+        isinstance(row, list) and len(row) == size and all(map(_finite, row)) for row in rows
+    ):
+        yield f"{where}: {size} rows of {size} finite numbers are needed"
+        return
+    matrix = np.asarray(rows, dtype=np.float64)
+    top = float(np.abs(matrix).max())
+    if not np.allclose(matrix, matrix.T, rtol=1e-6, atol=1e-9 * top):
+        yield f"{where}: is not symmetric"
+    elif (np.diag(matrix) < 0.0).any():
+        yield f"{where}: has a negative variance"
+
+
+def _numbers(
+    document: Mapping[str, Any], table: str, names: tuple[str, ...], where: str = ""
+) -> Iterator[str]:
+    part = document.get(table)
+    prefix = f"{where}.{table}" if where else table
+    for name in names:
+        value = part.get(name) if isinstance(part, dict) else None
+        if not _finite(value):
+            yield f"{prefix}.{name} = {value!r}; a finite number is needed"
+    if table == "filter" and isinstance(part, dict):
+        fixed = part.get("cut_off_hz", 1.0)
+        if not _finite(fixed):
+            yield f"filter.cut_off_hz = {fixed!r}; a finite number is needed"
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, float | int) and not isinstance(value, bool)
+
+
+def _finite(value: Any) -> bool:
+    return _number(value) and math.isfinite(value)
+
+
+def _whole(value: Any, low: int, high: int) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and low <= value <= high
