@@ -1,13 +1,17 @@
 """The demonstration from ready campaigns: every step runs, and the page holds what they give."""
 
+import importlib.util
 import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from tests.synthetic import cornering_runs, synthetic_run, write
 
@@ -66,12 +70,120 @@ def test_the_page_tells_the_accuracy_that_estimate_tells(made: tuple[Path, str])
 def test_the_page_shows_the_commands_and_every_image(made: tuple[Path, str]) -> None:
     out, _ = made
     page = (out / "index.html").read_text()
-    for verb in ("campaign check", "features", "calibrate", "estimate"):
+    for verb in ("campaign check", "features", "calibrate", "estimate", "fmu build", "fmu run"):
         assert f"tirelib {verb} " in page
+    for verb in ("emulate --campaign", "run --port", "run --replay"):
+        assert f"tirebench {verb} " in page
     images = re.findall(r'<img src="([^"]+)"', page)
     assert len(images) >= 12
     assert all((out / image).is_file() for image in images)
     assert not re.search(r"https?://", page)
+
+
+def cells(page: str, first: str) -> list[str]:
+    """Return the cells of the row of the table of agreement that begins with `first`."""
+    table = page[page.index("<caption>Library = FMU = bench</caption>") :]
+    row = re.search(rf"<tr><td[^>]*>{first}</td>(.*?)</tr>", table)
+    assert row
+    return re.findall(r"<td[^>]*>([^<]*)</td>", row[1])
+
+
+def turns_of(file: Path) -> dict[int, list[dict[str, object]]]:
+    runs: dict[int, list[dict[str, object]]] = {}
+    for turn in json.loads(file.read_text())["turns"]:
+        runs.setdefault(turn["run"], []).append(turn)
+    return runs
+
+
+@pytest.mark.parametrize(("title", "key"), [("vertical load Fz", "Fz"), ("lateral force Fy", "Fy")])
+def test_the_live_table_tells_the_differences_of_the_files(
+    made: tuple[Path, str], title: str, key: str
+) -> None:
+    out, _ = made
+    library, fmu = turns_of(out / "set1-unseen.json"), turns_of(out / "fmu.json")
+    live, replay = turns_of(out / "live/live.json"), turns_of(out / "live/replay.json")
+    assert live == replay
+    assert len(live) == 6
+    _, count, largest, _, live_count, replayed, count_2, beside, _ = cells(
+        (out / "index.html").read_text(), title
+    )
+    for one, other, turns, text in (
+        (library, fmu, count, largest),
+        (live, replay, live_count, replayed),
+        (live, library, count_2, beside),
+    ):
+        apart = [
+            abs(float(str(a[key])) - float(str(b[key])))
+            for run in one
+            for a, b in zip(one[run], other[run], strict=True)
+            if a[key] is not None and b[key] is not None
+        ]
+        assert int(turns) == len(apart) > 15
+        assert float(text) == pytest.approx(max(apart), rel=0.06)  # two digits
+    assert float(beside) > 1e-3  # strain of the made-up tire does not lie on the rig's steps
+    assert "rounds strain to whole counts of 2.44 microstrain" in (out / "index.html").read_text()
+
+
+def demo_module() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("demo", ROOT / "build/demo.py")
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_a_difference_makes_the_demonstration_fail(
+    made: tuple[Path, str], campaigns: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from tirelib.report.live import LiveFiles
+
+    out, _ = made
+    live = out / "live"
+    files = LiveFiles(out / "set1-unseen.json", out / "fmu.json", live / "live.json",
+                      live / "replay.json", live / "conditions.json",
+                      live / "device.toml")  # fmt: skip
+    judge, data = demo_module().judge, campaigns / "set1-unseen"
+    judge(Console(), files, data)
+    for name in ("fmu", "replay"):
+        document = json.loads(getattr(files, name).read_text())
+        turn = next(turn for turn in document["turns"] if turn["Fz_valid"])
+        turn["Fz"] *= 1.0 + 1e-8
+        changed = tmp_path / f"{name}.json"
+        changed.write_text(json.dumps(document))
+        with pytest.raises(SystemExit) as end:
+            judge(Console(), replace(files, **{name: changed}), data)
+        assert end.value.code == 1
+        assert "NOT EQUAL" in capsys.readouterr().out
+
+
+def test_nothing_is_left_running_when_a_step_fails(tmp_path: Path) -> None:
+    module = demo_module()
+    module.PROGRAMS = Path("/bin")
+    steps = module.Steps(Console(quiet=True))
+    with (
+        pytest.raises(RuntimeError, match="in the middle"),
+        steps.beside("wait", "60", program="sleep", log=tmp_path / "log") as process,
+    ):
+        raise RuntimeError("in the middle")
+    assert process.poll() is not None
+
+
+def test_a_platform_without_pseudo_terminals_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = demo_module()
+    monkeypatch.delattr(module.os, "openpty")
+    with pytest.raises(SystemExit, match="no pseudo-terminal.*--no-live"):
+        module.require_terminal()
+
+
+def test_an_emulator_that_ends_early_is_told(tmp_path: Path) -> None:
+    module = demo_module()
+    log = tmp_path / "log"
+    log.write_text("it broke")
+    gone = subprocess.Popen([sys.executable, "-c", "raise SystemExit(3)"])
+    gone.wait()
+    with pytest.raises(SystemExit, match="(?s)ended with 3.*it broke"):
+        module.wait_for_port(tmp_path / "port", gone, log)
 
 
 def test_figures_that_the_campaigns_cannot_inform_are_left_out(made: tuple[Path, str]) -> None:

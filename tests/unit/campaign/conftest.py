@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-from campaign_synthetic import HEADER, Write, make_runs
 
+from tests.unit.campaign.campaign_synthetic import HEADER, Write, make_runs
 from tirelib.campaign import CampaignHeader, Run, write_campaign
 
 

@@ -5,9 +5,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from campaign_faults import channel, put, says, the_one
-from campaign_synthetic import HEADER, Write, changed, make_run, rewrite, with_rig, with_strain
 
+from tests.unit.campaign.campaign_faults import channel, put, says, the_one
+from tests.unit.campaign.campaign_synthetic import (
+    HEADER,
+    Write,
+    changed,
+    make_run,
+    rewrite,
+    with_rig,
+    with_strain,
+)
 from tirelib.campaign import FloatArray, Run, check_campaign, read_campaign
 from tirelib.errors import FormatError
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from campaign_faults import channel, says, the_one
-from campaign_synthetic import Write, changed, rewrite
 
+from tests.unit.campaign.campaign_faults import channel, says, the_one
+from tests.unit.campaign.campaign_synthetic import Write, changed, rewrite
 from tirelib.campaign import FloatArray, Run, check_campaign, read_campaign
 from tirelib.campaign.mdf import Channel, Group, read_mdf, write_mdf
 from tirelib.errors import FormatError

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from campaign_synthetic import HEADER, Write, changed, with_rig
 from click.testing import CliRunner, Result
 
+from tests.unit.campaign.campaign_synthetic import HEADER, Write, changed, with_rig
 from tirelib.campaign import Run, RunPlan, write_campaign
 from tirelib.cli.campaign import campaign
 from tirelib.errors import FormatError

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from campaign_synthetic import HEADER, RATE, Write, changed
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from tests.unit.campaign.campaign_synthetic import HEADER, RATE, Write, changed
 from tirelib.axes import FLIPPED, sign
 from tirelib.campaign import (
     CampaignHeader,

@@ -84,8 +84,8 @@ def test_the_shift_depends_on_the_order_and_not_on_the_speed(world: World) -> No
     low = study.order < 20.0
     # the made-up tire is the same at every speed; the noise is 20 microstrain
     assert np.ptp(study.cp1_shift[:, low], axis=0).max() < 6e-5
-    assert np.ptp(study.fixed_cp1_shift) > 1e-4
-    above_nyquist = np.isnan(study.angle_scatter[:, -1])
-    assert above_nyquist.tolist() == [False, False, True]
-    last = np.where(above_nyquist, study.angle_scatter[:, -3], study.angle_scatter[:, -1])
-    assert (last > study.angle_scatter[:, near]).all()
+    refused = np.isnan(study.fixed_cp1_shift)  # 300 Hz are order 209 at 10 km/h
+    assert refused.tolist() == [True, False, False]
+    assert np.ptp(study.fixed_cp1_shift[~refused]) > 1e-4
+    assert np.isfinite(study.cp1_shift).all()
+    assert (study.angle_scatter[:, -1] > study.angle_scatter[:, near]).all()

@@ -82,7 +82,7 @@ def test_equal_documents_have_no_fault(
     compared = sum(t["Fz"] is not None for t in documents["library"]["turns"])
     live = sum(t["Fz"] is not None for t in documents["live"]["turns"])
     assert row(table.rows, "vertical load Fz") == [
-        "vertical load Fz", "N", str(compared), "0", "0", str(live), "0", "0", str(live), "0", "0",
+        "vertical load Fz", "N", str(compared), "0", "0", str(live), "0", str(live), "0", "0",
     ]  # fmt: skip
 
 
@@ -98,8 +98,8 @@ def test_the_table_tells_the_largest_difference_of_each_pair(
     largest = max(abs(t["Fz"]) for t in documents["library"]["turns"] if t["Fz"] is not None)
     assert float(load[3]) == pytest.approx(2.5e-8, rel=0.05)  # two digits
     assert float(load[4]) == pytest.approx(2.5e-8 / largest, rel=0.05)
-    assert (load[6], load[9]) == ("0", "0")
-    assert (force[3], force[6], force[9]) == ("0", "0", difference(1.5))
+    assert (load[6], load[8]) == ("0", "0")
+    assert (force[3], force[6], force[8]) == ("0", "0", difference(1.5))
 
 
 def test_library_and_fmu_must_agree_to_1e_9(
@@ -109,7 +109,7 @@ def test_library_and_fmu_must_agree_to_1e_9(
     turn["Fz"] *= 1.0 + 1e-8
     files, campaign = written(tmp_path, documents), world.campaigns["set1"]
     (fault,) = find_faults(files, campaign)
-    assert "library and FMU: vertical load Fz differs" in fault
+    assert "library \N{MINUS SIGN} FMU: vertical load Fz differs" in fault
     table = live_table(files, read_line(files, campaign))
     assert table.title.startswith("NOT EQUAL")
     assert fault in table.note
@@ -121,7 +121,7 @@ def test_live_and_replay_must_agree_to_the_last_bit(
     turn = valid_turn(documents["replay"])
     turn["contact_length_3_mm"] = float(np.nextafter(turn["contact_length_3_mm"], np.inf))
     (fault,) = find_faults(written(tmp_path, documents), world.campaigns["set1"])
-    assert "live and replay: contact lengths differs" in fault
+    assert "live \N{MINUS SIGN} replay: contact lengths differs" in fault
 
 
 @pytest.mark.parametrize(
