@@ -172,7 +172,7 @@ def test_nothing_is_left_running_when_a_step_fails(tmp_path: Path) -> None:
 def test_a_platform_without_pseudo_terminals_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     module = demo_module()
     monkeypatch.delattr(module.os, "openpty")
-    with pytest.raises(SystemExit, match="no pseudo-terminal.*--no-live"):
+    with pytest.raises(SystemExit, match=r"no pseudo-terminal.*--no-live"):
         module.require_terminal()
 
 
@@ -182,7 +182,7 @@ def test_an_emulator_that_ends_early_is_told(tmp_path: Path) -> None:
     log.write_text("it broke")
     gone = subprocess.Popen([sys.executable, "-c", "raise SystemExit(3)"])
     gone.wait()
-    with pytest.raises(SystemExit, match="(?s)ended with 3.*it broke"):
+    with pytest.raises(SystemExit, match=r"(?s)ended with 3.*it broke"):
         module.wait_for_port(tmp_path / "port", gone, log)
 
 

@@ -24,6 +24,7 @@ from tirelib.estimators.crossval import (
     leave_levels_out,
 )
 from tirelib.estimators.dissertation import SMALL_ANGLE, Regression
+from tirelib.estimators.result import VARIED
 from tirelib.estimators.train import Trained, train
 from tirelib.observations import Observations, observe
 
@@ -119,12 +120,15 @@ def statistics(
         factor = FACTOR[REPORT_UNIT[quantity]]
         truth = links.truth[TRUTH_NAME[quantity]]
         error = (links.held_out[quantity] - truth) * factor
+        moved = float(np.ptp(truth)) * factor > VARIED[quantity]
         entry = {
             "unit": REPORT_UNIT[quantity],
             "n": int(error.size),
             "conditions": int(np.unique(links.groups).size),
             "cross_validated_rmse": float(np.sqrt(np.mean(error**2))),
-            "r2": float(1.0 - np.sum(error**2) / np.sum(((truth - truth.mean()) * factor) ** 2)),
+            "r2": float(1.0 - np.sum(error**2) / np.sum(((truth - truth.mean()) * factor) ** 2))
+            if moved
+            else None,
             "candidates": [
                 {"terms": terms, "score": score * factor}
                 for terms, score in links.candidates[quantity]
@@ -241,8 +245,11 @@ def _print(console: Console, trained: Trained, document: dict[str, Any]) -> None
             why = trained.links.refused.get(quantity, "")
             table.add_row(quantity, "not calibrated", "", "", "", why)
             continue
-        table.add_row(quantity, f"{entry['cross_validated_rmse']:.4g}", entry["unit"],
-                      f"{entry['r2']:.5f}", str(entry["n"]), str(len(model.terms)))  # fmt: skip
+        r2 = "-" if entry["r2"] is None else f"{entry['r2']:.5f}"
+        table.add_row(
+            quantity, f"{entry['cross_validated_rmse']:.4g}", entry["unit"], r2, str(entry["n"]),
+            str(len(model.terms)),
+        )  # fmt: skip
     console.print(table)
     if document["held_out"]:
         console.print(_held_out_table(document["held_out"]))

@@ -59,6 +59,8 @@ class Agreement:
     @property
     def faults(self) -> list[str]:
         """Say every difference that is not allowed."""
+        if math.isnan(self.tolerance):
+            return []
         limit = "exactly 0" if self.tolerance == 0.0 else f"below {self.tolerance:g}"
         found = [f"{self.title}: {text}" for text in self.apart]
         for row in self.rows:
@@ -118,9 +120,7 @@ def agreement(
     for text, unit, keys in _quantities(first):
         rows.append(_compare(text, unit, keys, pairs))
         lonely = sum(
-            (_number(a, key) is None) != (_number(b, key) is None)
-            for a, b in pairs
-            for key in keys
+            (_number(a, key) is None) != (_number(b, key) is None) for a, b in pairs for key in keys
         )
         if lonely:
             apart.append(f"{text} is there in one and missing in the other {lonely} times")
@@ -128,16 +128,21 @@ def agreement(
 
 
 def agreement_table(agreements: Sequence[Agreement], note: str) -> Table:
-    """Return a row for each quantity and, for each comparison, turns and largest difference."""
+    """Return a row for each quantity; for each comparison turns and largest difference.
+
+    The relative difference stands beside it unless none at all is allowed.
+    """
     faults = [fault for one in agreements for fault in one.faults]
     columns = ["quantity", "unit"]
     for one in agreements:
-        columns += [f"{one.title}: turns", "largest difference", "relative"]
+        columns += ["turns", one.title, *([] if one.tolerance == 0.0 else ["relative"])]
     rows = []
     for parts in zip(*(one.rows for one in agreements), strict=True):
         cells = [parts[0].title, parts[0].unit]
-        for part in parts:
-            cells += [str(part.turns), difference(part.largest), difference(part.relative)]
+        for one, part in zip(agreements, parts, strict=True):
+            cells += [str(part.turns), difference(part.largest)]
+            if one.tolerance != 0.0:
+                cells.append(difference(part.relative))
         rows.append(cells)
     title = "Library = FMU = bench"
     if faults:

@@ -18,9 +18,10 @@ from tirelib.errors import CalibrationError
 from tirelib.features.extract import Features, extract_features
 from tirelib.flags import TurnFlag
 from tirelib.signal import LowPass, cut_turns
+from tirelib.signal.lowpass import SUITABLE_ORDERS
 
-ORDERS = np.geomspace(8.0, 256.0, 21)
-"""Cut-offs that are tried, cycles per turn; more than is allowed, to show why."""
+ORDERS = np.geomspace(1.05 * SUITABLE_ORDERS[0], SUITABLE_ORDERS[1] / 1.05, 15)
+"""Cut-offs that are tried, cycles per turn: all that are allowed; others give no features."""
 SPEEDS = (10.0 / 3.6, 65.0 / 3.6, 150.0 / 3.6)
 FIXED = 300.0
 SPOILT = int(TurnFlag.FIRST_TURN | TurnFlag.PERIOD_JUMP | TurnFlag.TOO_FEW_GAGES)
@@ -37,9 +38,9 @@ class CutOffStudy:
     order : shape (n_orders,), [cycles per turn]
     angle_shift, angle_scatter : [rad]
     cp1_shift, cp1_scatter : [-]
-        NaN where the cut-off lies above half the sample rate.
+        NaN where the cut-off is refused: it does not suit the turn rate or the sample rate.
     fixed_angle_shift, fixed_cp1_shift : shape (n_speeds,)
-        Shift at 300 Hz.
+        Shift at 300 Hz; NaN where that is refused.
     """
 
     speed: FloatArray
@@ -132,9 +133,15 @@ def _features(run: Run, campaign: Campaign, low_pass: LowPass) -> Features:
 def _statistics(
     features: Features, turns: np.ndarray[tuple[int], np.dtype[np.int64]]
 ) -> tuple[float, float, float, float]:
-    """Mean and scatter of contact angle and CP1 over turns, pooled over gages."""
+    """Mean and scatter of contact angle and CP1 over turns, pooled over gages.
+
+    NaN where fewer than two turns have them: a cut-off far from the turn rate gives no features.
+    """
     turns = turns[turns < len(features)]
     angle, cp1 = features.contact_angle[turns], features.cp1[turns]
+
+    if (np.isfinite(angle) & np.isfinite(cp1)).all(axis=1).sum() < 2:  # a cut-off that is refused
+        return np.nan, np.nan, np.nan, np.nan
 
     def scatter(x: FloatArray) -> float:
         return float(np.sqrt(np.nanmean(np.nanvar(x, axis=0, ddof=1))))

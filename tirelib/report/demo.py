@@ -17,6 +17,7 @@ from tirelib.report.calibration import regression_drawings
 from tirelib.report.cutoff_study import nearest_runs, study_cut_off
 from tirelib.report.estimate import accuracy_table
 from tirelib.report.figures.regression import find_regression, in_use, rms
+from tirelib.report.live import LiveFiles, live_drawing, live_table, live_text, read_line
 from tirelib.report.page import DASH, Drawing, Section, Table, draw_all, number, write_page
 from tirelib.report.turns import TypicalTurns, typical_turns
 from tirelib.signal import LowPass
@@ -40,6 +41,7 @@ def write_demo_page(
     data: Mapping[str, str | Path],
     calibration: Calibration,
     *,
+    live: LiveFiles | None = None,
     commands: Sequence[tuple[str, str]] = (),
     reports: Sequence[tuple[str, str]] = (),
     progress: Callable[[str], None] | None = None,
@@ -54,6 +56,8 @@ def write_demo_page(
         ``set3`` their figures, too.
     calibration : Calibration
         Made without the unseen campaigns.
+    live : LiveFiles, optional
+        What FMU and bench made of runs of ``set1-unseen``; without them no section "Live".
     commands : sequence of (what, command), optional
         Shown on the page.
     reports : sequence of (title, file), optional
@@ -86,6 +90,9 @@ def write_demo_page(
     for title, anchor, text, drawings in _parts(seen, trained, camber, calibration):
         say(f"drawing: {title.lower()}")
         sections.append(Section(title, anchor, text, pictures=draw_all(folder, drawings)))
+    if live is not None:
+        say("drawing: live")
+        sections.insert(1, _live(folder, live, seen["set1-unseen"].campaign, low_pass))
     return write_page(
         folder,
         "demo.html",
@@ -110,9 +117,22 @@ def _read(folder: Path, calibration: Calibration) -> Seen:
 def _lead(seen: Mapping[str, Seen], calibration: Calibration) -> str:
     day = seen["set1-unseen"]
     return (
-        f"Tire {calibration.tire}: {len(calibration.lateral)} strain gages on the innerliner, "
-        f"calibrated on a rig, then asked about {len(day.observations)} turns of a day that the "
-        f"calibration had not seen ({day.campaign.header.name}, {len(day.campaign.plans)} runs)."
+        f"A tire ({calibration.tire}) with {len(calibration.lateral)} strain gages on its "
+        f"innerliner was calibrated on a rig. It was then asked about {len(day.observations)} "
+        "turns of a day that the calibration had not seen "
+        f"({day.campaign.header.name}, {len(day.campaign.plans)} runs)."
+    )
+
+
+def _live(folder: Path, live: LiveFiles, campaign: Campaign, low_pass: LowPass) -> Section:
+    line = read_line(live, campaign)
+    drawing = live_drawing(live, campaign, low_pass)
+    return Section(
+        "Live",
+        "live",
+        live_text(line),
+        tables=[live_table(live, line)],
+        pictures=draw_all(folder, [drawing]),
     )
 
 
@@ -345,7 +365,8 @@ def _cut_off(part: Seen) -> Drawing:
         "Why the low-pass is set by order of the turn rate",
         "Shift: change of a feature from its value at order 24. Scatter: standard deviation over "
         "the turns of a run. By order (left) the shifts agree at all speeds, so a calibration "
-        "carries over. At a fixed 300 Hz (right) slow rolling is hardly filtered and noise moves "
-        "the edges, while fast rolling is smeared and CP1 loses depth.",
+        "carries over. At a fixed 300 Hz (right) fast rolling is smeared and CP1 loses depth; slow "
+        "rolling would hardly be filtered, and where the order leaves the allowed range the "
+        "cut-off is refused.",
         lambda: figures.figure_cut_off(study_cut_off(part.campaign, nearest_runs(part.campaign))),
     )

@@ -62,10 +62,14 @@ def agreements(files: LiveFiles, rounding: float) -> list[Agreement]:
     """
     library, live = read_turns(files.library), read_turns(files.live)
     return [
-        agreement("library and FMU", library, read_turns(files.fmu), TOLERANCE),
-        agreement("live and replay", live, read_turns(files.replay), 0.0),
+        agreement("library \N{MINUS SIGN} FMU", library, read_turns(files.fmu), TOLERANCE),
+        agreement("live \N{MINUS SIGN} replay", live, read_turns(files.replay), 0.0),
         agreement(
-            "live and library", live, library, np.nan if rounding else TOLERANCE, same_runs=False
+            "live \N{MINUS SIGN} library",
+            live,
+            library,
+            np.nan if rounding else TOLERANCE,
+            same_runs=False,
         ),
     ]
 
@@ -107,8 +111,9 @@ def live_table(files: LiveFiles, line: Line) -> Table:
     )
     return agreement_table(
         agreements(files, line.rounding),
-        f"{rounded}. Relative: to the largest number of the quantity; library and FMU must agree "
-        f"to {TOLERANCE:g}, live and replay to the last bit. Turns are matched by their order "
+        f"Turns compared, and the largest difference. {rounded}. Relative: to the largest number "
+        f"of the quantity; library and FMU must agree to {TOLERANCE:.0e}, live and replay to the "
+        "last bit. Turns are matched by their order "
         "within each run; the first turn of a run has no estimate in any of them.",
     )
 

@@ -5,6 +5,7 @@ from tirelib.report.figures.contact import figure_4_2, figure_4_3
 from tirelib.report.figures.cornering import figure_4_20, figure_4_23
 from tirelib.report.figures.cutoff import figure_cut_off
 from tirelib.report.figures.lateral_force import figure_4_12, figure_4_14
+from tirelib.report.figures.live import figure_live
 from tirelib.report.figures.load import figure_4_4
 from tirelib.report.figures.overview import figure_accuracy
 from tirelib.report.figures.residuals import figure_residuals
@@ -30,5 +31,6 @@ __all__ = [
     "figure_4_23",
     "figure_accuracy",
     "figure_cut_off",
+    "figure_live",
     "figure_residuals",
 ]

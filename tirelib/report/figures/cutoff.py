@@ -67,9 +67,14 @@ def figure_cut_off(study: CutOffStudy) -> Figure:
 def _at_fixed(angle: Axes, cp1: Axes, study: CutOffStudy) -> None:
     """Say in the titles what a fixed cut-off means at each speed."""
     orders = ", ".join(f"{FIXED / rate:.0f}" for rate in study.turn_rate)
-    shifts = ", ".join(f"{x:+.2f}" for x in np.rad2deg(study.fixed_angle_shift))
+    shifts = ", ".join(_signed(x, 2) for x in np.rad2deg(study.fixed_angle_shift))
     angle.set_title(
         f"Cut-off in Hz: 300 Hz are orders {orders}\nand shift the contact angle by {shifts} deg"
     )
-    shifts = ", ".join(f"{1e6 * x:+.0f}" for x in study.fixed_cp1_shift)
+    shifts = ", ".join(_signed(1e6 * x, 0) for x in study.fixed_cp1_shift)
     cp1.set_title(f"300 Hz shift CP1 by {shifts} microstrain")
+
+
+def _signed(value: float, decimals: int) -> str:
+    """Say a shift; a cut-off that does not suit the turn rate is refused and has none."""
+    return f"{value:+.{decimals}f}" if np.isfinite(value) else "(refused)"

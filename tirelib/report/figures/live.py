@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -57,7 +58,8 @@ class Strip:
 def figure_live(last: LastTurn, strip: Strip) -> Figure:
     """Strain of the last turn above; below a row for each quantity, right its difference."""
     figure = new_figure(12.0, 12.5)
-    top, below = figure.subfigures(2, 1, height_ratios=(1.0, 2.5))
+    halves = figure.subfigures(2, 1, squeeze=False, height_ratios=(1.0, 2.5))
+    top, below = halves[0, 0], halves[1, 0]
     strain = top.subplots()
     _draw_strain(strain, last)
     grid = below.subplots(len(QUANTITIES), 2, sharex=True, width_ratios=(1.5, 1.0))
@@ -134,7 +136,7 @@ def _stretches(strip: Strip, name: str) -> Iterator[slice]:
 def _name_runs(axes: Axes, strip: Strip) -> None:
     """Write the number of each run above its turns."""
     changes = [0, *(np.flatnonzero(np.diff(strip.run)) + 1), len(strip.run)]
-    for first, stop in zip(changes[:-1], changes[1:], strict=True):
+    for first, stop in pairwise(changes):
         axes.annotate(
             f"run {strip.run[first]}", (float(strip.time[first:stop].mean()), 1.0),
             xycoords=("data", "axes fraction"), xytext=(0, 3), textcoords="offset points",
