@@ -23,6 +23,9 @@ from bench.frames import (
 )
 
 _COUNT_AT = 10  # offset of `n` in the header
+_PERIOD_AT = 8  # offset of `period` in the header
+SHORTEST_PERIOD = 50
+"""Sample period, in ticks of 0.1 us, below which a header is taken as damaged (200 kHz)."""
 
 
 @dataclass(slots=True)
@@ -101,7 +104,7 @@ class SerialDecoder:
             self._reject("crc")
         elif body[0] != STRAIN:
             self.counts.unknown += 1
-        elif body[_COUNT_AT] == 0 or len(body) != frame_size(body[_COUNT_AT]):
+        elif not _sound(body):
             self._reject("framing")
         else:
             self.counts.ok += 1
@@ -110,6 +113,13 @@ class SerialDecoder:
     def _reject(self, counter: str) -> None:
         if self._joined:
             setattr(self.counts, counter, getattr(self.counts, counter) + 1)
+
+
+def _sound(body: bytes) -> bool:
+    """Tell whether period, number of samples and length of a strain frame can be true."""
+    period = int.from_bytes(body[_PERIOD_AT : _PERIOD_AT + 2], "little")
+    count = body[_COUNT_AT]
+    return period >= SHORTEST_PERIOD and count > 0 and len(body) == frame_size(count)
 
 
 def _batch(bodies: list[bytes], size: int) -> Frames:

@@ -38,11 +38,14 @@ class Contact:
         Where the strain crosses the level, interpolated.
     fresh : bool
         No valid turn precedes it.
+    damaged : bool
+        Samples are missing where it begins or ends, so its middle is not to be trusted.
     """
 
     rise: float
     fall: float
     fresh: bool
+    damaged: bool = False
 
     @property
     def middle(self) -> float:

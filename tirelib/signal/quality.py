@@ -19,9 +19,11 @@ FLAT_ANGLE = 0.04
 """A gage is saturated when it stands still at its extreme over this wheel angle, [rad]..."""
 FLAT_SAMPLES = 6
 """... and over at least this many samples."""
-CORNER_SHARE = 0.002
-"""... and the strain leaves the flat part by a jump of at least this share of the swing. A rounded
-peak of a quantised signal may stand still, too, but leaves it in single steps."""
+CORNER_ANGLE = 0.02
+"""... and within this wheel angle, [rad], after the flat part the strain has left it ..."""
+CORNER_SHARE = 0.02
+"""... by this share of the swing. A rounded peak of a quantised signal may stand still, too, but
+leaves slowly."""
 UNUSABLE = TurnFlag.GAP | TurnFlag.SATURATED | TurnFlag.DEAD_GAGE
 """Flags with which a gage says nothing in a turn."""
 
@@ -64,7 +66,7 @@ def inspect(window: FloatArray, step: float) -> tuple[FloatArray, IntArray]:
             continue
         length = _longest_run(same)
         for row in np.flatnonzero((length >= needed) & (swing > 0.0)):
-            if _has_corner(known[row], extreme[row], CORNER_SHARE * swing[row]):
+            if _has_corner(known[row], extreme[row], CORNER_SHARE * swing[row], step):
                 flags[row] |= int(TurnFlag.SATURATED)
     spiked = _spikes(known, swing)
     if spiked.any():
@@ -77,11 +79,12 @@ def inspect(window: FloatArray, step: float) -> tuple[FloatArray, IntArray]:
     return window, flags
 
 
-def _has_corner(samples: FloatArray, extreme: float, jump: float) -> bool:
-    """Tell whether the samples leave their extreme by more than `jump` from one to the next."""
-    flat = samples == extreme
-    edges = np.flatnonzero(flat[1:] != flat[:-1])
-    return bool((np.abs(samples[edges + 1] - samples[edges]) > jump).any())
+def _has_corner(samples: FloatArray, extreme: float, jump: float, step: float) -> bool:
+    """Tell whether the samples leave their extreme by more than `jump` within a corner's angle."""
+    flat = np.flatnonzero(samples == extreme)
+    reach = max(1, round(CORNER_ANGLE / step))
+    ends = np.clip((flat[0] - reach, flat[-1] + reach), 0, samples.size - 1)
+    return bool((np.abs(samples[ends] - extreme) > jump).any())
 
 
 def _spikes(known: FloatArray, swing: FloatArray) -> BoolArray:

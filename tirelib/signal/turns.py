@@ -13,7 +13,7 @@ the same code, so they agree.
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,6 +34,8 @@ OFFSET_HALF_WIDTH = 0.5
 LARGEST_MISSING = 0.1
 """Share of missing samples with which an offset or a mean is still formed."""
 LARGEST_PERIOD_RATIO = 2.0
+NEAR_EDGE = 3
+"""Samples before a pulse's edge that must be there, as those beside it, for the edge to count."""
 DRIFT_SHARE = 0.05
 LONGEST_TURN = 3.0
 """A turn that lasts longer is standstill, [s]."""
@@ -203,22 +205,38 @@ class TurnCutter:
         contact, before = self._waiting[0], self._previous
         if contact.fresh or before is None:
             self._waiting.popleft()
-            self._previous = contact
+            self._previous = replace(contact, damaged=self._damaged(contact))
             self._previous_period, self._previous_offset = np.nan, None
             return self._first_turn(contact)
         period = contact.middle - before.middle
         step = 2.0 * np.pi / period
         suits = self.low_pass.suits(self.rate / period, self.rate)
         sigma = (self.low_pass if suits else LowPass()).sigma(self.rate / period)
-        last = contact.fall + (AFTER + half_width(sigma)) / step + 1.0
-        if last >= self._base + self._filled:
+        stop = self._stop(contact, step, sigma)
+        if stop > self._base + self._filled:
             return None
         self._waiting.popleft()
+        contact = replace(contact, damaged=self._damaged(contact))
         self._previous = contact
-        turn = self._full_turn(contact, before, step, sigma if suits else None, last)
+        turn = self._full_turn(contact, before, step, sigma if suits else None, stop)
         self._previous_period = period
         self._previous_offset = turn.offset
         return turn
+
+    def _stop(self, contact: Contact, step: float, sigma: float) -> int:
+        """Return the number of the sample after the last one that a turn needs."""
+        pulse = 0.5 * (contact.fall - contact.rise) * step
+        end = float(PHI[pulse + AFTER >= PHI][-1])
+        return int(contact.middle + (end + half_width(sigma)) / step + 2.0) + 1
+
+    def _damaged(self, contact: Contact) -> bool:
+        """Tell whether samples of the centre gage are missing where the contact begins or ends."""
+        for edge in (contact.rise, contact.fall):
+            near = int(edge) - self._base
+            part = self._buffer[self._centre, max(near - NEAR_EDGE, 0) : near + 2]
+            if not np.isfinite(part).all():
+                return True
+        return False
 
     def _first_turn(self, contact: Contact) -> Turn:
         """Return the turn of a contact that no turn precedes: nothing is known of it."""
@@ -242,7 +260,7 @@ class TurnCutter:
         )
 
     def _full_turn(
-        self, contact: Contact, before: Contact, step: float, sigma: float | None, last: float
+        self, contact: Contact, before: Contact, step: float, sigma: float | None, stop: int
     ) -> Turn:
         period = contact.middle - before.middle
         flags = TurnFlag(0)
@@ -251,8 +269,10 @@ class TurnCutter:
             flags |= TurnFlag.PERIOD_JUMP
         if sigma is None:
             flags |= TurnFlag.CUT_OFF
+        if contact.damaged or before.damaged:
+            flags |= TurnFlag.FIRST_TURN | TurnFlag.GAP  # its period is unknown
         pulse = 0.5 * (contact.fall - contact.rise) * step
-        strain, rate, gage_flags = self._window(contact.middle, step, sigma, pulse)
+        strain, rate, gage_flags = self._window(contact.middle, step, sigma, pulse, stop)
         opposite = 0.5 * (contact.middle + before.middle)
         half = OFFSET_HALF_WIDTH / step
         sector = (slice(0, self._gages), opposite - half, opposite + half)
@@ -274,6 +294,7 @@ class TurnCutter:
         speed, pressure, camber = (float(value) for value in conditions)
         if not np.isfinite(speed) or speed == 0.0:
             flags |= TurnFlag.NO_SPEED
+            speed = np.nan  # a wheel that turns does not stand
         elif speed < 0.0:
             flags |= TurnFlag.REVERSED
         axis_shift, once = self._trigger(before.middle, contact.middle, step)
@@ -286,7 +307,7 @@ class TurnCutter:
             flags |= TurnFlag.REDUCED_GAGES
         return Turn(
             time=contact.middle / self.rate,
-            ready=last / self.rate,
+            ready=(stop - 1) / self.rate,
             period=period / self.rate,
             pulse=pulse,
             axis_shift=axis_shift,
@@ -302,7 +323,7 @@ class TurnCutter:
         )
 
     def _window(
-        self, middle: float, step: float, sigma: float | None, pulse: float
+        self, middle: float, step: float, sigma: float | None, pulse: float, stop: int
     ) -> tuple[FloatArray, FloatArray, IntArray]:
         """Strain and rate over `PHI`, NaN beyond the end of the window, and the gages' flags."""
         strain = np.full((self._gages, PHI.size), np.nan)
@@ -312,8 +333,7 @@ class TurnCutter:
         seen = pulse + AFTER >= PHI
         reach = half_width(sigma) / step + 2.0
         first = int(middle + PHI[0] / step - reach) - self._base
-        stop = int(middle + PHI[seen][-1] / step + reach) + 1 - self._base
-        raw = self._buffer[: self._gages, max(first, 0) : min(stop, self._filled)]
+        raw = self._buffer[: self._gages, max(first, 0) : stop - self._base]
         mended, gage_flags = inspect(raw, step)
         zero = middle - self._base - max(first, 0)
         strain[:, seen], rate[:, seen] = smooth_to_angle(mended, zero, step, PHI[seen], sigma)

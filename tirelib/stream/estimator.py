@@ -216,7 +216,7 @@ class StreamEstimator:
         if self._count > self._deadline:
             return True
         ready = -1.0 if self._latest is None else self._latest.ready * self.rate
-        return self._standing >= 0 and self._standing >= ready
+        return self._standing >= 0 and self._standing + 1 > ready
 
     @property
     def flags(self) -> int:

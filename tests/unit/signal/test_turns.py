@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tests.synthetic import LATERAL, RATE, frames, record
 from tirelib.errors import ParameterError, ShapeError
-from tirelib.flags import TurnFlag
+from tirelib.flags import INVALIDATING, TurnFlag
 from tirelib.signal import LowPass, Turn, TurnCutter, Turns, cut_turns
 
 
@@ -287,3 +287,49 @@ def test_spikes_away_from_the_contact_do_not_move_the_offset() -> None:
         spiked[:, at - 10 : at + 10 : 10] += 0.5
     turns = turns_of(spiked)
     np.testing.assert_allclose(turns.offset[1:], clean.offset[1:], atol=2e-6)
+
+
+@pytest.mark.parametrize("length", [2, 3, 16, 64])
+@pytest.mark.parametrize("shift", [-40, -34, -30, 20, 30, 34, 40])
+def test_a_gap_at_one_contact_does_not_spoil_the_next_turn(length: int, shift: int) -> None:
+    """The middle of a damaged contact moves, and with it the period of the turn that follows."""
+    strain, _, omega = record(noise=4e-6)
+    at = middle_of(turns_of(strain), 2) + shift
+    holed = strain.copy()
+    holed[:, at : at + length] = np.nan
+    turns = turns_of(holed)
+    usable = (turns.flags & int(INVALIDATING)) == 0
+    np.testing.assert_allclose(turns.trace.conditions.omega[usable], omega, rtol=1e-4)
+    assert usable[3:].sum() >= 1
+
+
+@pytest.mark.parametrize("before", range(-6, 7))
+@pytest.mark.parametrize("length", [1, 3, 5])
+def test_a_gap_at_the_end_of_the_window_reads_the_same_in_any_frames(
+    before: int, length: int
+) -> None:
+    strain, _, _ = record(turns=3.6)
+    ready = round(turns_of(strain).ready[1] * RATE)
+    strain[2, ready + before : ready + before + length] = np.nan
+    whole = TurnCutter(LATERAL, RATE).push(strain, speed=18.0)
+    for size in (1, 7, 16):
+        cutter, pieces = TurnCutter(LATERAL, RATE), []
+        for start in range(0, strain.shape[1], size):
+            pieces += cutter.push(strain[:, start : start + size], speed=18.0)
+        for piece, turn in zip(pieces, whole, strict=True):
+            assert_same(piece, turn)
+
+
+@pytest.mark.parametrize("speed", [2.8, 18.0, 40.0])
+@pytest.mark.parametrize("share", [0.5, 0.7, 0.9])
+def test_clipping_is_seen_at_any_speed(speed: float, share: float) -> None:
+    strain, _, _ = record(noise=4e-6, speed=speed, turns=4)
+    low, high = strain[2].min(), strain[2].max()
+    strain[2] = np.minimum(strain[2], low + share * (high - low))
+    turns = turns_of(strain, speed=speed)
+    assert all(has(turns, TurnFlag.SATURATED, turn, 2) for turn in range(1, len(turns)))
+
+
+def test_a_wheel_that_turns_does_not_stand() -> None:
+    strain, _, _ = record()
+    assert np.isnan(turns_of(strain, speed=0.0).trace.conditions.speed).all()
