@@ -9,7 +9,7 @@ from cobs import cobs
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.decoder import SerialDecoder
+from bench.decoder import SHORTEST_PERIOD, SerialDecoder
 from bench.frames import LONGEST_ON_WIRE, Frames, encode, strain_frames
 from tests.synthetic import frames as cuts
 
@@ -22,7 +22,7 @@ def some_frames(count: int, seed: int, samples: int = 16) -> Frames:
         wheel=rng.integers(0, 256, count),
         seq=rng.integers(0, 2**16, count),
         t_us=rng.integers(0, 2**32, count),
-        period=rng.integers(1, 2**16, count),
+        period=rng.integers(SHORTEST_PERIOD, 2**16, count),
         flags=rng.integers(0, 256, count),
         rssi=rng.integers(-128, 128, count),
         temperature=rng.integers(-128, 128, count),
@@ -148,3 +148,14 @@ def test_a_record_becomes_full_frames_with_device_time() -> None:
     frames = strain_frames(np.zeros((64, 5), np.int16), period=1000, seq=65534, t_us=2**32 - 1600)
     assert frames.seq.tolist() == [65534, 65535, 0, 1]
     assert frames.t_us.tolist() == [2**32 - 1600, 0, 1600, 3200]
+
+
+@pytest.mark.parametrize("period", [0, 1, SHORTEST_PERIOD - 1])
+def test_a_period_that_cannot_be_true_is_damage(period: int) -> None:
+    """Such a frame may have a right checksum all the same; it must not end a session."""
+    good = strain_frames(np.zeros((16, 5), np.int16), period=1000)
+    bad = strain_frames(np.zeros((16, 5), np.int16), period=period)
+    decoder = SerialDecoder()
+    batches = decoder.push(b"".join(encode(good) + encode(bad) + encode(good)))
+    assert sum(len(batch) for batch in batches) == 2
+    assert decoder.counts.framing == 1
