@@ -39,3 +39,20 @@ class FormatError(TirelibError, ValueError):
 
 class CalibrationError(TirelibError, ValueError):
     """A calibration cannot be made from these data, or does not fit them."""
+
+
+class ConvergenceError(TirelibError, RuntimeError):
+    """An iteration ended without a solution.
+
+    Attributes
+    ----------
+    iterate : object
+        The last iterate, for inspection.
+    residual : float
+        What is left of the equations there, in their own unit (the message names it).
+    """
+
+    def __init__(self, message: str, iterate: object, residual: float) -> None:
+        self.iterate = iterate
+        self.residual = residual
+        super().__init__(message)

@@ -111,6 +111,21 @@ TABLE: tuple[UnitRow, ...] = (
     UnitRow("g", "acceleration", 9.80665),
     UnitRow("V", "voltage", 1.0),
     UnitRow("mV", "voltage", 1e-3),
+    UnitRow("N/m", "stiffness", 1.0),
+    UnitRow("N/mm", "stiffness", 1e3),
+    UnitRow("kN/m", "stiffness", 1e3),
+    UnitRow("N/m^2", "line_stiffness", 1.0),
+    UnitRow("kN/m^2", "line_stiffness", 1e3),
+    UnitRow("N/m^2/bar", "stiffness_per_pressure", 1e-5),
+    UnitRow("N/m^2/Pa", "stiffness_per_pressure", 1.0),
+    UnitRow("N m^2", "bending_stiffness", 1.0),
+    UnitRow("Nm^2", "bending_stiffness", 1.0),
+    UnitRow("kg/m", "line_density", 1.0),
+    UnitRow("kg m", "rotary_inertia", 1.0),
+    UnitRow("1/m", "curvature", 1.0),
+    UnitRow("1/mm", "curvature", 1e3),
+    UnitRow("rad/Nm", "compliance", 1.0),
+    UnitRow("deg/Nm", "compliance", _DEG),
 )
 """Every unit that files may carry. A unit in two dimensions stands in two rows."""
 

@@ -99,6 +99,21 @@ ONE = {
     ("g", "acceleration"): 9.80665,
     ("V", "voltage"): 1.0,
     ("mV", "voltage"): 0.001,
+    ("N/m", "stiffness"): 1.0,
+    ("N/mm", "stiffness"): 1000.0,
+    ("kN/m", "stiffness"): 1000.0,
+    ("N/m^2", "line_stiffness"): 1.0,
+    ("kN/m^2", "line_stiffness"): 1000.0,
+    ("N/m^2/bar", "stiffness_per_pressure"): 1e-5,
+    ("N/m^2/Pa", "stiffness_per_pressure"): 1.0,
+    ("N m^2", "bending_stiffness"): 1.0,
+    ("Nm^2", "bending_stiffness"): 1.0,
+    ("kg/m", "line_density"): 1.0,
+    ("kg m", "rotary_inertia"): 1.0,
+    ("1/m", "curvature"): 1.0,
+    ("1/mm", "curvature"): 1000.0,
+    ("rad/Nm", "compliance"): 1.0,
+    ("deg/Nm", "compliance"): 0.017453292519943295,
 }
 
 rows = pytest.mark.parametrize("row", TABLE, ids=lambda row: f"{row.unit}-{row.dimension}")

@@ -1,0 +1,1 @@
+"""Contact of the ring with a flat road."""

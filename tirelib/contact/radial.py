@@ -1,0 +1,330 @@
+"""Contact of the rolling ring with a flat road through radial tread springs.
+
+Eq. (78), (90)-(97), (114). Where the tread is pressed the pressure follows from its compression,
+elsewhere there is none: a complementarity problem. Its operator (tread spring plus ring compliance)
+is positive definite, so it has one solution. That is found as a free-boundary problem: inside the
+patch [a, b] the pressure solves a Fredholm equation of the second kind, collocated on Gauss-Legendre
+nodes, and the two edges follow from q(a) = q(b) = 0, both at once. At the solution a shift of one edge changes the pressure nowhere else (it
+enters with q(edge) = 0), so Newton's matrix for the two edges is diagonal and the iteration needs no
+derivative of the ring. It starts from the patch that the undeformed tire would have, an upper bound, not a
+guess, and ends with a test of complementarity outside the patch.
+
+Deflection, load, or both contact angles can be given (`press`, `load`, `fit_edges`).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.contact.fourier import evaluate, load_harmonics
+from tirelib.contact.free_boundary import (
+    LARGEST_ANGLE,
+    MAX_ITERATIONS,
+    N_NODES,
+    TOLERANCE,
+    ComplianceAt,
+    Constant,
+    Problem,
+    solve,
+)
+from tirelib.contact.patch import Nodes, PatchEquation, place
+from tirelib.contact.tread import Tread
+from tirelib.errors import ConvergenceError, ParameterError
+from tirelib.ring.compliance import Compliance
+from tirelib.ring.ring import ComplexArray
+
+
+@dataclass(frozen=True, slots=True)
+class RadialContact:
+    """The tire on the road, one row per operating point.
+
+    Attributes
+    ----------
+    edges : shape (n_points, 2), [rad]
+        Leading (negative) and trailing contact angle, from below the axle.
+    deflection : shape (n_points,), [m]
+        d0, free radius minus loaded radius.
+    phi, weights, delta : shape (n_points, n_nodes), [rad], [rad], [m]
+        Gauss nodes in the patch, their weights and the tread's compression there.
+    compliance : Compliance
+        Of the ring, at the solution.
+    tread : Tread
+    extra : shape (n_points, n_modes + 1, 3) or None, [N/m]
+        Harmonics of other line loads on the belt.
+    edge_mismatch : shape (n_points,), [m]
+        Tread compression left at the leading minus at the trailing edge; zero unless the angles
+        were given.
+    iterations : int
+    """
+
+    edges: FloatArray
+    deflection: FloatArray
+    phi: FloatArray
+    weights: FloatArray
+    delta: FloatArray
+    compliance: Compliance
+    tread: Tread
+    extra: ComplexArray | None
+    edge_mismatch: FloatArray
+    iterations: int
+
+    def __len__(self) -> int:
+        return int(self.deflection.shape[0])
+
+    @property
+    def pressure(self) -> FloatArray:
+        """Pressure at the nodes, inward positive, per length of belt, [N/m]."""
+        return self.tread.force(self.delta)
+
+    @property
+    def load(self) -> FloatArray:
+        """Vertical load Fz = R int q cos(phi) dphi, [N], shape (n_points,)."""
+        return self._moment(np.cos(self.phi))
+
+    @property
+    def drag(self) -> FloatArray:
+        """Horizontal resultant of the radial pressure along +phi at the road, [N]."""
+        return self._moment(-np.sin(self.phi))
+
+    @property
+    def pressure_centre(self) -> FloatArray:
+        """R int q sin / int q cos: where the resultant cuts the belt, negative toward the entry."""
+        centre: FloatArray = -self.compliance.radius * self.drag / self.load
+        return centre
+
+    @property
+    def harmonics(self) -> ComplexArray:
+        """Harmonics of the pressure, inward positive, [N/m], shape (n_points, n_modes + 1)."""
+        return load_harmonics(self.phi, self.weights * self.pressure, self.compliance.n_modes)
+
+    @property
+    def displacement(self) -> ComplexArray:
+        """Harmonics of (u, v, beta), shape (n_points, n_modes + 1, 3), [m], [m], [rad]."""
+        out: ComplexArray = -self.compliance.matrix[..., :, 0] * self.harmonics[..., None]
+        if self.extra is not None:
+            out = out + (self.compliance.matrix @ self.extra[..., None])[..., 0]
+        return out
+
+    def compression(self, phi: FloatArray) -> FloatArray:
+        """Return delta at the angles (n_phi,) or (n_points, n_phi), [m]; negative is clearance."""
+        u = evaluate(self.displacement[..., 0], phi)
+        r0 = np.reshape(np.asarray(self.tread.free_radius, dtype=float), (-1, 1))
+        delta: FloatArray = self.deflection[:, None] - r0 * (1.0 - np.cos(phi)) + u
+        return delta
+
+    def pressure_at(self, phi: FloatArray) -> FloatArray:
+        """Return the pressure at the angles (n_phi,) or (n_points, n_phi), [N/m]."""
+        inside = (phi >= self.edges[:, :1]) & (phi <= self.edges[:, 1:])
+        return np.where(inside, self.tread.pressure(self.compression(phi)), 0.0)
+
+    def _moment(self, weight: FloatArray) -> FloatArray:
+        total: FloatArray = self.compliance.radius * np.sum(
+            self.weights * self.pressure * weight, axis=1
+        )
+        return total
+
+
+def press(
+    compliance: Compliance | ComplianceAt,
+    tread: Tread,
+    deflection: float | FloatArray,
+    *,
+    extra: ComplexArray | None = None,
+    n_nodes: int = N_NODES,
+) -> RadialContact:
+    """Return the contact at given deflections d0.
+
+    Parameters
+    ----------
+    compliance : Compliance or callable
+        Of the ring; a callable takes the deflections (n_points,), [m], and returns it, for
+        sidewalls that soften with deflection, Eq. (54).
+    tread : Tread
+    deflection : float or shape (n_points,), [m]
+    extra : shape (n_points, n_modes + 1, 3), optional, [N/m]
+        Harmonics of line loads (q_u, q_v, q_beta) on the belt besides the radial pressure, for
+        instance traction.
+    n_nodes : int
+        Gauss nodes in the patch, even.
+
+    Raises
+    ------
+    ParameterError
+        If a deflection is not positive, or larger than the linear ring can describe.
+    ConvergenceError
+        If the edges do not settle or the patch splits; carries the last contact.
+    """
+    n_points = max(np.size(deflection), len(tread), _length(compliance))
+    d0 = _column(deflection, n_points, "deflection", "m")
+    return _solve(compliance, tread, d0, None, extra, n_nodes)
+
+
+def load(
+    compliance: Compliance | ComplianceAt,
+    tread: Tread,
+    vertical_load: float | FloatArray,
+    *,
+    extra: ComplexArray | None = None,
+    n_nodes: int = N_NODES,
+) -> RadialContact:
+    """Return the contact at given vertical loads Fz, Eq. (114).
+
+    Parameters
+    ----------
+    compliance, tread, extra, n_nodes
+        As for `press`.
+    vertical_load : float or shape (n_points,), [N]
+
+    Raises
+    ------
+    ParameterError
+        If a load is not positive, or more than the tire carries within the ring's validity.
+    ConvergenceError
+        As for `press`.
+    """
+    n_points = max(np.size(vertical_load), len(tread), _length(compliance))
+    target = _column(vertical_load, n_points, "vertical load", "N")
+    return _solve(compliance, tread, None, target, extra, n_nodes)
+
+
+def fit_edges(
+    compliance: Compliance, tread: Tread, edges: FloatArray, n_nodes: int = N_NODES
+) -> RadialContact:
+    """Return the contact whose edges are known, for identification (Fig. 6-17).
+
+    The deflection is the one that leaves the least tread compression at the two edges; what is
+    left stands in `edge_mismatch`: not zero when these angles cannot belong to this ring.
+
+    Parameters
+    ----------
+    edges : shape (n_points, 2), [rad]
+        Leading and trailing contact angle.
+
+    Raises
+    ------
+    ParameterError
+        If the edges are not in order, or outside the ring's validity.
+    """
+    if edges.ndim != 2 or edges.shape[1] != 2 or not (edges[:, 0] < edges[:, 1]).all():
+        raise ParameterError(
+            f"contact: edges of shape {edges.shape}; (n_points, 2) with leading < trailing is "
+            "needed; check the order and the angle's zero"
+        )
+    if np.abs(edges).max() > LARGEST_ANGLE:
+        raise ParameterError(
+            f"contact: an edge at {np.abs(edges).max():.3f} rad; the ring holds up to "
+            f"{LARGEST_ANGLE} rad; check the angle's zero"
+        )
+    nodes = Nodes.of(n_nodes)
+    compliance, tread = compliance.spread(len(edges)), tread.spread(len(edges))
+    problem = Problem(Constant(compliance), tread, None, None)
+    delta = np.zeros((len(edges), n_nodes))
+    d0 = np.zeros(len(edges))
+    for iteration in range(1, MAX_ITERATIONS + 1):
+        step = PatchEquation.of(compliance, tread, nodes, edges, delta, None)
+        lift, rest = step.lift @ nodes.ends.T, step.rest @ nodes.ends.T
+        used, d0 = d0, -np.sum(lift * rest, axis=1) / np.sum(lift**2, axis=1)
+        delta = step.compression(d0)
+        if np.abs(d0 - used).max() < TOLERANCE:
+            break
+    contact = _contact(problem, nodes, edges, delta, d0, iteration)
+    left = delta @ nodes.ends.T
+    return replace(contact, edge_mismatch=left[:, 0] - left[:, 1])
+
+
+def _solve(
+    compliance: Compliance | ComplianceAt,
+    tread: Tread,
+    deflection: FloatArray | None,
+    vertical_load: FloatArray | None,
+    extra: ComplexArray | None,
+    n_nodes: int,
+) -> RadialContact:
+    given = deflection if deflection is not None else vertical_load
+    assert given is not None  # noqa: S101 - one of the two is always given
+    if isinstance(compliance, Compliance):
+        compliance = Constant(compliance.spread(given.size))
+    problem = Problem(compliance, tread.spread(given.size), vertical_load, extra)
+    edges, d0, delta, iterations, change = solve(problem, deflection, n_nodes)
+    contact = _contact(problem, Nodes.of(n_nodes), edges, delta, d0, iterations)
+    moving = np.flatnonzero(~(change < TOLERANCE))
+    if moving.size:
+        worst = float(change[moving].max())
+        raise ConvergenceError(
+            f"contact: {moving.size} of {d0.size} points, the first number {moving[0]} at "
+            f"d0 = {1e3 * d0[moving[0]]:.2f} mm, still move by {worst:.2e} rad after "
+            f"{iterations} iterations; look at the last contact (attribute iterate), use a "
+            "smaller load or a stiffer belt",
+            contact,
+            worst,
+        )
+    _check_complementarity(contact)
+    return contact
+
+
+def _contact(
+    problem: Problem,
+    nodes: Nodes,
+    edges: FloatArray,
+    delta: FloatArray,
+    d0: FloatArray,
+    iterations: int,
+) -> RadialContact:
+    phi, weights = place(nodes, edges)
+    return RadialContact(
+        edges, d0, phi, weights, delta, problem.at(d0), problem.tread, problem.extra,
+        np.zeros_like(d0), iterations,
+    )  # fmt: skip
+
+
+def _length(compliance: Compliance | ComplianceAt) -> int:
+    return len(compliance) if isinstance(compliance, Compliance) else 1
+
+
+def _check_complementarity(contact: RadialContact) -> None:
+    """Refuse a patch that pulls inside or is pressed outside."""
+    half = np.abs(contact.edges).max(axis=1)
+    d0 = contact.deflection
+    if (half > LARGEST_ANGLE).any():
+        point = int(np.argmax(half))
+        raise ParameterError(
+            f"contact: point {point} at d0 = {1e3 * d0[point]:.1f} mm, "
+            f"Fz = {contact.load[point]:.0f} N has a half contact angle of {half[point]:.2f} rad; "
+            f"the ring holds up to {LARGEST_ANGLE} rad; lower the load or check the stiffness"
+        )
+    scale = contact.pressure.max(axis=1)
+    pull = -contact.pressure.min(axis=1) / scale
+    away = np.array([0.03, 0.1, 0.3, 0.8])
+    outside = np.concatenate(
+        [contact.edges[:, :1] - away * half[:, None], contact.edges[:, 1:] + away * half[:, None]],
+        axis=1,
+    )
+    press = contact.compression(outside).max(axis=1) / d0
+    wrong = (pull > 1e-6) | (press > 1e-6)
+    if wrong.any():
+        point = int(np.flatnonzero(wrong)[0])
+        raise ConvergenceError(
+            f"contact: point {point} at d0 = {1e3 * d0[point]:.2f} mm is not one patch: tension "
+            f"inside {pull[point]:.1e} of the peak, overlap outside {press[point]:.1e} of d0; "
+            "the belt lifts off or buckles: a stiffer belt or a smaller load is needed",
+            contact,
+            float(max(pull[point], press[point])),
+        )
+
+
+def _column(value: float | FloatArray, n_points: int, name: str, unit: str) -> FloatArray:
+    """Return (n_points,) numbers > 0."""
+    array = np.asarray(value, dtype=float)
+    if array.ndim > 1 or array.size not in (1, n_points):
+        raise ParameterError(
+            f"contact: {name} has shape {array.shape} for {n_points} points; one value or one a "
+            "point is needed"
+        )
+    good = np.isfinite(array) & (array > 0)
+    if not good.all():
+        raise ParameterError(
+            f"contact: {name} = {np.atleast_1d(array)[~np.atleast_1d(good)][0]:.6g} {unit}; a "
+            "finite number > 0 is needed"
+        )
+    return np.broadcast_to(array, (n_points,)).copy()

@@ -1,0 +1,90 @@
+"""Radial tread springs between belt and road, Eq. (48), (78), (80).
+
+The tread's outer surface has the free radius; the road lies at the loaded radius. Along the radius
+through phi the road leaves the tread the compression
+
+    delta(phi) = d0 - R0 (1 - cos phi) + u(phi),
+
+with the deflection d0 under the axle and the belt's outward displacement u. The tread answers with
+an inward pressure q = k_t delta (1 + c delta / h), c its hardening; it can only push.
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from tirelib.arrays import FloatArray, IntArray
+from tirelib.errors import ParameterError
+from tirelib.parameters import Tire
+
+
+@dataclass(frozen=True, slots=True)
+class Tread:
+    """Constants of the tread, one value per operating point (or one for all).
+
+    Attributes
+    ----------
+    free_radius : [m]
+        R0, of the unloaded tire.
+    normal_stiffness : [N/m^2]
+        k_t per length of circumference.
+    thickness : [m]
+        h, of the rubber between belt and road.
+    hardening : [-]
+        c: relative growth of the stiffness when the whole thickness is pressed; 0 is linear.
+    """
+
+    free_radius: float | FloatArray
+    normal_stiffness: float | FloatArray
+    thickness: float | FloatArray = 0.0125
+    hardening: float | FloatArray = 0.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = np.asarray(getattr(self, field.name), dtype=float)
+            good = np.isfinite(value) & ((value > 0) | (field.name == "hardening"))
+            if not good.all():
+                raise ParameterError(
+                    f"tread: {field.name} = {value[~good].flat[0] if value.ndim else value:.6g}; "
+                    "a finite number > 0 is needed"
+                )
+
+    @classmethod
+    def of(cls, tire: Tire) -> "Tread":
+        """Return the tread of a tire."""
+        return cls(
+            tire.free_radius, tire.tread_stiffness, tire.tread_thickness, tire.tread_hardening
+        )
+
+    def __len__(self) -> int:
+        return max(np.size(getattr(self, field.name)) for field in fields(self))
+
+    def spread(self, n_points: int) -> "Tread":
+        """Return the tread with one value per point in every field."""
+        return Tread(*[np.broadcast_to(getattr(self, f.name), (n_points,)) for f in fields(self)])
+
+    def take(self, index: IntArray) -> "Tread":
+        """Return the tread of some points (of a tread with one value per point)."""
+        return Tread(*[np.asarray(getattr(self, f.name))[index] for f in fields(self)])
+
+    def force(self, compression: FloatArray) -> FloatArray:
+        """Return q for a compression of shape (n_points, ...), [N/m], as if the tread could pull."""
+        k, s = self._columns(compression.ndim)
+        q: FloatArray = k * compression * (1.0 + s * np.maximum(compression, 0.0))
+        return q
+
+    def pressure(self, compression: FloatArray) -> FloatArray:
+        """Return q, [N/m]; zero where the tread is off the road."""
+        return self.force(np.maximum(compression, 0.0))
+
+    def tangent(self, compression: FloatArray) -> FloatArray:
+        """Return dq/ddelta of the pressed tread, [N/m^2]."""
+        k, s = self._columns(compression.ndim)
+        t: FloatArray = k * (1.0 + 2.0 * s * np.maximum(compression, 0.0))
+        return t
+
+    def _columns(self, ndim: int) -> tuple[FloatArray, FloatArray]:
+        shape = (-1, *([1] * (ndim - 1)))
+        k = np.reshape(np.asarray(self.normal_stiffness, dtype=float), shape)
+        s = np.reshape(np.asarray(self.hardening / np.asarray(self.thickness), dtype=float), shape)
+        return k, s

@@ -1,0 +1,175 @@
+"""The parameters of a tire model, and what each of them may be."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from difflib import get_close_matches
+from types import MappingProxyType
+from typing import NamedTuple
+
+from tirelib.errors import ParameterError
+
+
+class Field(NamedTuple):
+    """One parameter: where it stands in a tire file, and its allowed range (SI, inclusive)."""
+
+    group: str
+    unit: str
+    dimension: str
+    lowest: float
+    highest: float
+    meaning: str
+
+
+_ANY = math.inf
+
+FIELDS: Mapping[str, Field] = MappingProxyType(
+    {
+        "ring_radius": Field("geometry", "mm", "length", 0.05, 2.0, "R, neutral line of the belt"),
+        "free_radius": Field("geometry", "mm", "length", 0.05, 2.0, "R0, unloaded, inflated tire"),
+        "belt_width": Field("geometry", "mm", "length", 0.01, 1.0, "b, carries the pressure"),
+        "tread_thickness": Field(
+            "geometry", "mm", "length", 1e-4, 0.1, "h0, rubber between belt and road"
+        ),
+        "innerliner_offset": Field(
+            "geometry", "mm", "length", -0.05, -1e-6, "y, gages from the neutral line, inward"
+        ),
+        "bending_stiffness": Field(
+            "belt", "N m^2", "bending_stiffness", 1e-3, 1e3, "EI, in the wheel plane"
+        ),
+        "mass": Field("belt", "kg/m", "line_density", 0.0, 100.0, "rho A, belt and tread"),
+        "extension_stiffness": Field(
+            "belt", "N", "force", 1e4, _ANY, "EA; inf is the inextensible belt"
+        ),
+        "shear_stiffness": Field(
+            "belt", "N", "force", 1e3, _ANY, "GA; inf is the Bernoulli-Euler belt"
+        ),
+        "rotary_inertia": Field("belt", "kg m", "rotary_inertia", 0.0, 1.0, "rho I"),
+        "pressure": Field(
+            "inflation", "bar", "pressure", 0.0, 2e6, "reference pressure of the sidewall values"
+        ),
+        "radial_stiffness": Field("sidewall", "N/m^2", "line_stiffness", 1e3, 1e8, "k_u"),
+        "radial_pressure_slope": Field(
+            "sidewall", "N/m^2/bar", "stiffness_per_pressure", -100.0, 100.0, "d k_u / d p"
+        ),
+        "radial_deflection_rate": Field(
+            "sidewall", "1/m", "curvature", -100.0, 100.0, "B of k_u = A exp(B d0), softening < 0"
+        ),
+        "tangential_stiffness": Field("sidewall", "N/m^2", "line_stiffness", 0.0, 1e8, "k_v"),
+        "tangential_pressure_slope": Field(
+            "sidewall", "N/m^2/bar", "stiffness_per_pressure", -100.0, 100.0, "d k_v / d p"
+        ),
+        "damping": Field("sidewall", "1", "ratio", 0.0, 1.0, "lambda of c_n = 2 lambda sqrt(m k)"),
+        "tread_stiffness": Field("tread", "N/m^2", "line_stiffness", 1e4, 1e11, "k_t, normal"),
+        "tread_hardening": Field("tread", "1", "ratio", 0.0, 50.0, "growth of k_t over h0"),
+        "tread_shear_stiffness": Field("tread", "N/m^2", "line_stiffness", 0.0, 1e11, "k_Gt"),
+        "friction": Field("tread", "1", "ratio", 0.0, 5.0, "mu, tread on road"),
+        "crown_curvature": Field(
+            "lateral", "1/m", "curvature", -20.0, 20.0, "curvature of the tread's crown"
+        ),
+        "lateral_bending": Field(
+            "lateral", "N m^2", "bending_stiffness", 1e-2, 1e7, "EI_z of the belt in its own plane"
+        ),
+        "lateral_stiffness": Field(
+            "lateral", "N/m^2", "line_stiffness", 1e2, 1e9, "k_l, sidewall, lateral"
+        ),
+        "roll_lever": Field(
+            "lateral", "mm", "length", -0.5, 0.5, "height of the sidewalls' lateral force"
+        ),
+        "bristle_lateral": Field("brush", "N/m^2", "line_stiffness", 1e3, 1e11, "c_py"),
+        "bristle_longitudinal": Field("brush", "N/m^2", "line_stiffness", 1e3, 1e11, "c_px"),
+        "carcass_stiffness": Field("brush", "N/m", "stiffness", 1e2, _ANY, "lateral, whole tire"),
+    }
+)
+"""Every parameter, in the order of a tire file."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tire:
+    """A tire as the models see it; SI units, meanings and ranges in `FIELDS`.
+
+    The sidewall's values hold at the reference pressure and follow the actual one along a line.
+
+    Raises
+    ------
+    ParameterError
+        If a value is not a number, outside its range, or contradicts another.
+    """
+
+    ring_radius: float
+    free_radius: float
+    belt_width: float
+    tread_thickness: float
+    innerliner_offset: float
+    bending_stiffness: float
+    mass: float
+    pressure: float
+    radial_stiffness: float
+    tangential_stiffness: float
+    tread_stiffness: float
+    extension_stiffness: float = math.inf
+    shear_stiffness: float = math.inf
+    rotary_inertia: float = 0.0
+    radial_pressure_slope: float = 0.0
+    radial_deflection_rate: float = 0.0
+    tangential_pressure_slope: float = 0.0
+    damping: float = 0.0
+    tread_hardening: float = 0.0
+    tread_shear_stiffness: float = 0.0
+    friction: float = 1.0
+    crown_curvature: float = 0.7
+    lateral_bending: float = 1500.0
+    lateral_stiffness: float = 2.0e5
+    roll_lever: float = 0.005
+    bristle_lateral: float = 1.0e7
+    bristle_longitudinal: float = 1.5e7
+    carcass_stiffness: float = math.inf
+
+    def __post_init__(self) -> None:
+        found = [
+            fault
+            for field in fields(self)
+            if (fault := range_fault(field.name, getattr(self, field.name))) is not None
+        ]
+        if not found and not self.ring_radius < self.free_radius:
+            found.append(
+                f"ring_radius = {1e3 * self.ring_radius:g} mm is not below free_radius = "
+                f"{1e3 * self.free_radius:g} mm; the belt lies inside the tread; exchange or correct"
+            )
+        if found:
+            raise ParameterError("tire: " + "; ".join(found))
+
+    def changed(self, **values: float) -> "Tire":
+        """Return the tire with some values replaced.
+
+        Raises
+        ------
+        ParameterError
+            If a name is unknown or a value not allowed.
+        """
+        for name in values:
+            if name not in FIELDS:
+                raise ParameterError(unknown_name(name))
+        return replace(self, **values)
+
+
+def unknown_name(name: str) -> str:
+    """Return the message for a parameter that no tire has."""
+    near = get_close_matches(name, FIELDS, n=2)
+    hint = f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(FIELDS)}"
+    return f"tire parameter {name!r} is unknown; {hint}"
+
+
+def range_fault(name: str, value: float) -> str | None:
+    """Return what is wrong with a value, or None."""
+    field = FIELDS[name]
+    if not isinstance(value, int | float) or math.isnan(value):
+        return f"{name} = {value!r} is not a number; give it in {field.unit} ({field.meaning})"
+    if not field.lowest <= value <= field.highest or (
+        math.isinf(value) and not math.isinf(field.highest)
+    ):
+        return (
+            f"{name} = {value:g} (SI) is outside {field.lowest:g} to {field.highest:g}; "
+            f"check value and unit ({field.unit}, {field.meaning})"
+        )
+    return None

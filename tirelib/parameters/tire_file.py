@@ -1,0 +1,208 @@
+"""Tire files: TOML with one table per number (``tirelib-tire/1``, also inside ``tirelib-model/1``)."""
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from tirelib.errors import FormatError, ParameterError, UnitError
+from tirelib.parameters.tire import FIELDS, Tire, range_fault, unknown_name
+from tirelib.units import from_si, to_si
+
+FORMAT = "tirelib-tire/1"
+FORMATS = (FORMAT, "tirelib-model/1")
+KINDS = ("measured", "fitted", "literature", "assumed")
+REQUIRED = (
+    "ring_radius", "free_radius", "belt_width", "tread_thickness", "innerliner_offset",
+    "bending_stiffness", "mass", "pressure", "radial_stiffness", "tangential_stiffness",
+    "tread_stiffness",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """One number of a tire file.
+
+    Attributes
+    ----------
+    value, std : float
+        In SI; std is NaN where nobody knows it.
+    kind : str
+        measured, fitted, literature or assumed.
+    source : str
+    notes : mapping
+        Further entries of the table, kept (interval, flags).
+    """
+
+    value: float
+    std: float
+    kind: str
+    source: str
+    notes: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class TireFile:
+    """A tire with what is known about each of its numbers.
+
+    Attributes
+    ----------
+    name : str
+    numbers : mapping of str to Number
+        Only the parameters that the file states; the others have the defaults of `Tire`.
+    extra : mapping
+        Other top-level tables of the file (provenance, effects, history), as read.
+    """
+
+    name: str
+    numbers: Mapping[str, Number]
+    extra: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+
+    @property
+    def tire(self) -> Tire:
+        """The values alone."""
+        return Tire(**{name: number.value for name, number in self.numbers.items()})
+
+
+def models_folder() -> Path:
+    """Return the folder of the models that come with the library."""
+    inside = Path(__file__).parents[1] / "models"
+    return inside if inside.is_dir() else Path(__file__).parents[2] / "models"
+
+
+def find_tire(name: str | Path) -> Path:
+    """Return the file for a path, or for the name of a tire that comes with the library.
+
+    Raises
+    ------
+    ParameterError
+        If there is neither.
+    """
+    path = Path(name)
+    if path.is_file():
+        return path
+    shipped = {
+        file.stem: file
+        for folder in (models_folder() / "tires", models_folder())
+        for file in sorted(folder.glob("*.toml"))
+    }
+    if str(name) in shipped:
+        return shipped[str(name)]
+    near = get_close_matches(str(name), shipped, n=2)
+    hint = f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(shipped)}"
+    raise ParameterError(f"model {str(name)!r}: no such file and no tire of that name; {hint}")
+
+
+def read_tire(name: str | Path) -> TireFile:
+    """Read a tire (or the tire of a model) by path or name.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such file.
+    FormatError
+        With every fault of the file.
+    """
+    path = find_tire(name)
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise FormatError(f"{path}: is not TOML ({error}); mend that line") from None
+    if document.get("format") not in FORMATS:
+        raise FormatError(
+            f"{path}: format = {document.get('format')!r}; allowed are "
+            f"{' and '.join(map(repr, FORMATS))}; give a tire or model file"
+        )
+    numbers, faults = _numbers(document)
+    if not faults:
+        try:
+            Tire(**{key: number.value for key, number in numbers.items()})
+        except ParameterError as error:
+            faults.append(str(error).removeprefix("tire: "))
+    if faults:
+        raise FormatError([f"{path}: {fault}" for fault in faults])
+    groups = {entry.group for entry in FIELDS.values()}
+    extra = {k: v for k, v in document.items() if k not in groups | {"format", "name"}}
+    return TireFile(str(document.get("name", path.stem)), numbers, extra)
+
+
+def _numbers(document: Mapping[str, Any]) -> tuple[dict[str, Number], list[str]]:
+    """Return the numbers of a document and every fault."""
+    numbers: dict[str, Number] = {}
+    faults: list[str] = []
+    for group in dict.fromkeys(entry.group for entry in FIELDS.values()):
+        table = document.get(group, {})
+        if not isinstance(table, dict):
+            faults.append(f"[{group}] is no table; write [{group}.name] with value and unit")
+            continue
+        for name, entry in table.items():
+            if name not in FIELDS or FIELDS[name].group != group:
+                right = (
+                    f"stands in [{FIELDS[name].group}]" if name in FIELDS else unknown_name(name)
+                )
+                faults.append(f"[{group}.{name}]: {right}")
+                continue
+            try:
+                numbers[name] = _number(name, entry)
+            except (ParameterError, UnitError) as error:
+                faults.append(f"[{group}.{name}]: {error}")
+    faults += [
+        f"[{FIELDS[name].group}.{name}] is missing ({FIELDS[name].meaning}); add value and unit"
+        for name in REQUIRED
+        if name not in document.get(FIELDS[name].group, {})
+    ]
+    return numbers, faults
+
+
+def _number(name: str, entry: Any) -> Number:
+    if not isinstance(entry, dict) or "value" not in entry or "unit" not in entry:
+        raise ParameterError(f"{entry!r} lacks value or unit; write a table with both")
+    value, std = entry["value"], entry.get("std", math.nan)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ParameterError(f"value = {value!r} is not a number")
+    if isinstance(std, bool) or not isinstance(std, int | float) or std < 0:
+        raise ParameterError(f"std = {std!r}; a number >= 0 is needed, in the value's unit")
+    kind = entry.get("kind", "assumed")
+    if kind not in KINDS:
+        raise ParameterError(f"kind = {kind!r}; allowed are {', '.join(KINDS)}")
+    dimension = FIELDS[name].dimension
+    unit = str(entry["unit"])
+    si = to_si(float(value), unit, dimension) if math.isfinite(value) else float(value)
+    spread = to_si(float(std), unit, dimension) if math.isfinite(std) else math.nan
+    if (fault := range_fault(name, si)) is not None:
+        raise ParameterError(fault)
+    notes = {k: v for k, v in entry.items() if k not in {"value", "unit", "std", "kind", "source"}}
+    return Number(si, spread, kind, str(entry.get("source", "")), notes)
+
+
+def write_tire(file: TireFile, path: str | Path, file_format: str = FORMAT) -> None:
+    """Write a tire; numbers go to the units of `FIELDS` and keep all their digits."""
+    import tomli_w
+
+    document: dict[str, Any] = {"format": file_format, "name": file.name}
+    for name, entry in FIELDS.items():
+        number = file.numbers.get(name)
+        if number is None:
+            continue
+        table: dict[str, Any] = {"value": _at_edge(number.value, name), "unit": entry.unit}
+        if math.isfinite(number.std):
+            table["std"] = _at_edge(number.std, name)
+        table |= {"kind": number.kind, "source": number.source, **number.notes}
+        document.setdefault(entry.group, {})[name] = table
+    document |= file.extra
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(
+        "# A tire of tirelib: one table per number. Signs: u outward, innerliner offset < 0.\n"
+        + tomli_w.dumps(document),
+        encoding="utf-8",
+    )
+
+
+def _at_edge(value: float, name: str) -> float:
+    entry = FIELDS[name]
+    return from_si(value, entry.unit, entry.dimension) if math.isfinite(value) else value

@@ -1,0 +1,1 @@
+"""The flexible ring: how the belt answers loads from the road."""

@@ -1,0 +1,223 @@
+"""The rotating ring on its sidewall: modal stiffness, Eq. (55)-(62), (74)-(89), (107).
+
+The belt is a circular beam of radius R on radial and tangential springs, under the tension
+N = p b R + rho A R^2 Omega^2. Three displacements describe it over the wheel angle: u radial
+outward, v tangential along +phi, beta rotation of the cross-section. Three line loads act on it:
+q_u outward, q_v along +phi, and the moment q_beta. Seen from the road every field is steady,
+
+    f(phi) = Re sum_n F_n exp(i n phi),    n = 0 ... n_modes,
+
+and each harmonic obeys its own 3 x 3 system D_n X_n = Q_n (per length of circumference). The
+dissertation's ring is the special case without extension (u = -v') and without shear
+(beta = (v - u') / R); there D_n shrinks to the scalar M_n - G_n + i C_n of Eq. (89).
+
+Known differences to the print: the tension holds its centrifugal part, so that without damping the
+rolling ring has the same shape at every speed; damping acts on the non-rotating stiffness.
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+import numpy.typing as npt
+
+from tirelib.arrays import FloatArray
+from tirelib.errors import ParameterError
+from tirelib.parameters import Tire
+
+ComplexArray = npt.NDArray[np.complex128]
+
+
+@dataclass(frozen=True, slots=True)
+class Ring:
+    """Constants of the ring, one value per operating point (or one for all).
+
+    Attributes
+    ----------
+    radius : float or shape (n_points,), [m]
+        R, of the neutral line.
+    bending_stiffness : [N m^2]
+        EI of the belt in its plane.
+    mass : [kg/m]
+        rho A per length of circumference.
+    inflation : [N/m]
+        p b, inflation pressure times belt width.
+    radial_stiffness, tangential_stiffness : [N/m^2]
+        k_u and k_v of the sidewall per length of circumference.
+    damping : [-]
+        lambda of Eq. (107): c_n = 2 lambda sqrt(m_n k_n), k_n without rotation.
+    extension_stiffness : [N]
+        EA; infinite for the dissertation's inextensible ring.
+    shear_stiffness : [N]
+        GA of the Timoshenko beam; infinite for Bernoulli-Euler.
+    rotary_inertia : [kg m]
+        rho I of the cross-section; the dissertation leaves it out.
+    inertia_share : [-]
+        Share of the rotating inertia (Coriolis, centrifugal and its tension) that acts; 1 is all.
+    """
+
+    radius: float | FloatArray
+    bending_stiffness: float | FloatArray
+    mass: float | FloatArray
+    inflation: float | FloatArray
+    radial_stiffness: float | FloatArray
+    tangential_stiffness: float | FloatArray
+    damping: float | FloatArray = 0.0
+    extension_stiffness: float | FloatArray = np.inf
+    shear_stiffness: float | FloatArray = np.inf
+    rotary_inertia: float | FloatArray = 0.0
+    inertia_share: float | FloatArray = 1.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = np.asarray(getattr(self, field.name), dtype=float)
+            lowest = value.min() if value.size else np.nan
+            positive = field.name in _POSITIVE
+            if np.isnan(value).any() or (lowest <= 0 if positive else lowest < 0):
+                worst = lowest if not np.isnan(value).any() else np.nan
+                raise ParameterError(
+                    f"ring: {field.name} = {worst:.6g}; a number {'>' if positive else '>='} 0 is "
+                    "needed; check the tire's value and its dependence on pressure and deflection"
+                )
+
+    @classmethod
+    def of(
+        cls, tire: Tire, pressure: float | FloatArray, deflection: float | FloatArray = 0.0
+    ) -> "Ring":
+        """Return the ring of a tire at inflation pressures [Pa] and deflections d0 [m].
+
+        k_u and k_v follow the pressure along a line; k_u the deflection as in Eq. (54),
+        k_u = A exp(B d0).
+
+        Raises
+        ------
+        ParameterError
+            If a pressure is negative, or the line leads to a stiffness that is not physical.
+        """
+        p = np.asarray(pressure, dtype=float)
+        if not (np.isfinite(p) & (p >= 0)).all():
+            raise ParameterError(
+                f"ring: inflation pressure {np.min(p) / 1e5:g} bar; a finite number >= 0 is "
+                "needed, gauge"
+            )
+        above = p - tire.pressure
+        radial = tire.radial_stiffness + tire.radial_pressure_slope * above
+        return cls(
+            radius=tire.ring_radius,
+            bending_stiffness=tire.bending_stiffness,
+            mass=tire.mass,
+            inflation=p * tire.belt_width,
+            radial_stiffness=radial * np.exp(tire.radial_deflection_rate * np.asarray(deflection)),
+            tangential_stiffness=tire.tangential_stiffness + tire.tangential_pressure_slope * above,
+            damping=tire.damping,
+            extension_stiffness=tire.extension_stiffness,
+            shear_stiffness=tire.shear_stiffness,
+            rotary_inertia=tire.rotary_inertia,
+        )
+
+    @property
+    def inextensible(self) -> bool:
+        """Whether the belt cannot stretch."""
+        return bool(np.isinf(self.extension_stiffness).all())
+
+    @property
+    def unshearable(self) -> bool:
+        """Whether cross-sections stay normal to the belt."""
+        return bool(np.isinf(self.shear_stiffness).all())
+
+
+_POSITIVE = frozenset(
+    {"radius", "bending_stiffness", "mass", "extension_stiffness", "shear_stiffness"}
+) | {"radial_stiffness"}
+
+
+def modal_stiffness(ring: Ring, omega: float | FloatArray, n_modes: int) -> ComplexArray:
+    """Return what harmonic n of (u, v, beta) costs in (q_u, q_v, q_beta).
+
+    Extension and shear are left out (they are constraints or penalties that `compliance` adds), so
+    this is bending, tension, pressure, sidewall and steady inertia of Eq. (76).
+
+    Parameters
+    ----------
+    ring : Ring
+    omega : [rad/s]
+        Turn rate, one value or one per point.
+    n_modes : int
+        Highest harmonic.
+
+    Returns
+    -------
+    shape (n_points, n_modes + 1, 3, 3)
+        D_n, Hermitian, without damping.
+    """
+    elastic, inertial = modal_parts(ring, omega, n_modes)
+    return elastic + inertial
+
+
+def columns(*values: float | FloatArray) -> list[FloatArray]:
+    """Return the values as columns over operating points, shape (n_points, 1)."""
+    arrays = np.broadcast_arrays(*[np.atleast_1d(np.asarray(v, dtype=float)) for v in values])
+    return [array[:, None] for array in arrays]
+
+
+def modal_parts(
+    ring: Ring, omega: float | FloatArray, n_modes: int
+) -> tuple[ComplexArray, ComplexArray]:
+    """Return the non-rotating stiffness and the part that rotation adds."""
+    r, ei, m, pb, ku, kv, rho_i, share, w = columns(
+        ring.radius,
+        ring.bending_stiffness,
+        ring.mass,
+        ring.inflation,
+        ring.radial_stiffness,
+        ring.tangential_stiffness,
+        ring.rotary_inertia,
+        ring.inertia_share,
+        omega,
+    )
+    n = np.arange(n_modes + 1.0)[None, :]
+    shape = (r.shape[0], n_modes + 1, 3, 3)
+    elastic = np.zeros(shape, dtype=complex)
+    tension = pb / r  # N / R^2 without rotation
+    elastic[..., 0, 0] = ku + tension * n**2 - pb / r
+    elastic[..., 1, 1] = kv + tension - pb / r
+    elastic[..., 0, 1] = 1j * n * (tension - pb / r)
+    elastic[..., 1, 0] = -elastic[..., 0, 1]
+    elastic[..., 2, 2] = ei * n**2 / r**2
+
+    rotation = share * m * w**2
+    inertial = np.zeros(shape, dtype=complex)
+    # centrifugal tension, then inertia: -(n^2 + 1) with Coriolis 2 i n
+    inertial[..., 0, 0] = rotation * (n**2 - (n**2 + 1.0))
+    inertial[..., 1, 1] = rotation * (1.0 - (n**2 + 1.0))
+    inertial[..., 0, 1] = rotation * (1j * n - 2j * n)
+    inertial[..., 1, 0] = -inertial[..., 0, 1]
+    inertial[..., 2, 2] = -rho_i * (n * w) ** 2
+    return elastic, inertial
+
+
+def modal_damping_time(ring: Ring, n_modes: int) -> FloatArray:
+    """Return c_n / k_n = 2 lambda sqrt(m_n / k_n) of Eq. (107), [s], shape (n_points, n_modes + 1).
+
+    m_n and k_n are those of the inextensible Bernoulli-Euler ring, Eq. (85), without rotation.
+    """
+    m, lam = columns(ring.mass, ring.damping)
+    k = plain_stiffness(ring, n_modes)
+    n = np.arange(n_modes + 1.0)[None, :]
+    time: FloatArray = 2.0 * lam * np.sqrt(m * (1.0 + n**2) / k)
+    return time
+
+
+def plain_stiffness(ring: Ring, n_modes: int) -> FloatArray:
+    """Return k_n of Eq. (85) without rotation, [N/m^2], shape (n_points, n_modes + 1)."""
+    r, ei, pb, ku, kv = columns(
+        ring.radius,
+        ring.bending_stiffness,
+        ring.inflation,
+        ring.radial_stiffness,
+        ring.tangential_stiffness,
+    )
+    n = np.arange(n_modes + 1.0)[None, :]
+    k: FloatArray = (
+        (ei / r**4 * n**2 + pb / r) * (1.0 - n**2) ** 2 - pb / r * (1.0 - n**2) + kv + ku * n**2
+    )
+    return k
