@@ -63,6 +63,7 @@ TABLE: tuple[UnitRow, ...] = (
     UnitRow("°", "angle", _DEG),
     UnitRow("1", "ratio", 1.0),
     UnitRow("-", "ratio", 1.0),
+    UnitRow("none", "ratio", 1.0),  # tire test consortium
     UnitRow("%", "ratio", 1e-2),
     UnitRow("rad/s", "angular_speed", 1.0),
     UnitRow("deg/s", "angular_speed", _DEG),
@@ -94,7 +95,9 @@ TABLE: tuple[UnitRow, ...] = (
     UnitRow("K", "temperature", 1.0),
     UnitRow("degC", "temperature", 1.0, 273.15),
     UnitRow("°C", "temperature", 1.0, 273.15),
+    UnitRow("deg C", "temperature", 1.0, 273.15),
     UnitRow("degF", "temperature", 5.0 / 9.0, 273.15 - 32.0 * 5.0 / 9.0),
+    UnitRow("deg F", "temperature", 5.0 / 9.0, 273.15 - 32.0 * 5.0 / 9.0),
     UnitRow("°F", "temperature", 5.0 / 9.0, 273.15 - 32.0 * 5.0 / 9.0),
     UnitRow("1", "strain", 1.0),
     UnitRow("strain", "strain", 1.0),

@@ -2,14 +2,15 @@
 
 import sys
 from importlib import import_module
+from keyword import iskeyword
 
 import click
 
 from tirelib import __version__
 from tirelib.errors import TirelibError
 
-VERBS = ("campaign", "features", "calibrate", "estimate", "fmu", "rig")
-"""Verbs; each is the command of that name in the module of that name."""
+VERBS = ("campaign", "import", "features", "calibrate", "estimate", "simulate", "fmu", "rig")
+"""Verbs; each is the command of that name in the module of that name (`import_` for import)."""
 
 _EXAMPLE = """\b
 Examples:
@@ -34,7 +35,8 @@ class Verbs(click.Group):
         """Import and return one verb."""
         if cmd_name not in VERBS:
             return None
-        command = getattr(import_module(f"tirelib.cli.{cmd_name}"), cmd_name)
+        name = f"{cmd_name}_" if iskeyword(cmd_name) else cmd_name
+        command = getattr(import_module(f"tirelib.cli.{name}"), name)
         return command if isinstance(command, click.Command) else None
 
 

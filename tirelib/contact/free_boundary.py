@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.arrays import FloatArray, IntArray
-from tirelib.contact.patch import Nodes, PatchEquation
+from tirelib.contact.patch import Nodes, PatchEquation, between
+from tirelib.contact.start import EdgeEstimate
 from tirelib.contact.tread import Tread
 from tirelib.errors import ParameterError
 from tirelib.ring.compliance import Compliance
@@ -16,14 +17,26 @@ LARGEST_ANGLE = 0.75
 """Half contact angle beyond which the linear ring has no meaning, [rad]."""
 
 N_NODES = 40
-COARSE_NODES = 12
-CHUNK = 64
+COARSE_NODES = 16
+COARSE_TOLERANCE = 2e-2
+COARSE_ITERATIONS = 10
+CHUNK = 32
 """Points that are solved together: their matrices fit into the processor's cache."""
 
-TOLERANCE = 1e-7
-"""Largest last shift of an edge, [rad]; Newton's next would be its square."""
+TOLERANCE = 2e-5
+"""Largest last shift of an edge, in half patches, and change of d0 and compression, relative.
+
+What it leaves is of second order: a shift s [rad] leaves some 20 s^2 [rad], below 1e-9, and less
+than 1e-9 of the load.
+"""
+
+_COMPRESSION_WEIGHT = 3.0
+_DEFLECTION_WEIGHT = 2e4
+"""For sidewalls that soften: there a change of d0 counts in first order."""
 
 MAX_ITERATIONS = 40
+
+_OUTWARD = np.array([-1.0, 1.0])
 
 ComplianceAt = Callable[[FloatArray], Compliance]
 
@@ -49,66 +62,118 @@ class Problem:
     extra: ComplexArray | None
 
 
+@dataclass(frozen=True)
+class Solution:
+    """Edges; the patch (edges before their last shift) with its compression; deflection."""
+
+    edges: FloatArray
+    patch: FloatArray
+    deflection: FloatArray
+    delta: FloatArray
+    iterations: int
+    change: FloatArray
+
+
 class _State:
-    """Edges, deflection and compression on their way to the solution, all points at once."""
+    """Edges, deflection and compression on their way to the solution, all points at once.
+
+    The compression belongs to `patch`, the edges before their last shift. A shift changes load and
+    pressure in second order only, so below the tolerance the two need not be made equal.
+    """
 
     def __init__(self, problem: Problem, d0: FloatArray, edges: FloatArray) -> None:
         self.problem = problem
+        self.constant = isinstance(problem.at, Constant)
+        self.linear = problem.tread.linear
         self.d0, self.edges = d0, edges
+        self.patch = edges.copy()
         self.delta = np.zeros((d0.size, 0))
         self.secant = _Secant(d0)
         self.change = np.full(d0.size, np.inf)
 
-    def settle(self, nodes: Nodes, tolerance: float) -> int:
-        """Iterate until no edge moves by more than the tolerance; return the iterations."""
-        self.delta = np.zeros((self.d0.size, nodes.xi.size))
+    def settle(self, nodes: Nodes, tolerance: float, limit: int) -> int:
+        """Iterate until nothing changes by more than the tolerance; return the iterations."""
+        self.delta = _refine(self.delta, nodes)
         self.change[:] = np.inf
-        todo = np.arange(self.d0.size)
+        n_points = self.d0.size
+        todo = np.arange(n_points)
         iterations = 0
-        while todo.size and iterations < MAX_ITERATIONS:
+        while todo.size and iterations < limit:
             iterations += 1
+            ring = self.problem.at(self.d0)
             for first in range(0, todo.size, CHUNK):
-                self._advance(nodes, todo[first : first + CHUNK])
+                last = first + CHUNK
+                every = todo.size == n_points
+                self._advance(nodes, ring, slice(first, last) if every else todo[first:last])
             _refuse_large(self.edges, self.d0, self.problem.vertical_load)
             todo = np.flatnonzero(~(self.change < tolerance))
         return iterations
 
-    def _advance(self, nodes: Nodes, part: IntArray) -> None:
+    def _advance(self, nodes: Nodes, ring: Compliance, part: IntArray | slice) -> None:
         problem = self.problem
-        ring, rubber = problem.at(self.d0).take(part), problem.tread.take(part)
+        if self.d0.size > 1:
+            ring, rubber = ring.take(part), problem.tread.take(part)
+        else:
+            rubber = problem.tread
         extra = None if problem.extra is None else problem.extra[part]
-        step = PatchEquation.of(ring, rubber, nodes, self.edges[part], self.delta[part], extra)
+        edges, before = self.edges[part], self.delta[part]
+        step = PatchEquation.of(ring, rubber, nodes, edges, before, extra)
         used = self.d0[part]
         target = problem.vertical_load
         wanted = used if target is None else step.deflection(target[part])
-        self.delta[part] = step.compression(wanted)
-        moved = _move_edges(nodes, self.edges[part], self.delta[part])
-        self.change[part] = np.abs(moved - self.edges[part]).max(axis=1) + np.abs(wanted - used)
+        delta = step.compression(wanted)
+        moved = _move_edges(nodes, edges, delta)
+        change = np.abs(moved - edges).max(axis=1) / (0.5 * (edges[:, 1] - edges[:, 0]))
+        if not self.linear:
+            moved_by = np.abs(delta - before).max(axis=1) / np.abs(delta).max(axis=1)
+            change += _COMPRESSION_WEIGHT * moved_by
+        if target is not None:
+            change += (1.0 if self.constant else _DEFLECTION_WEIGHT) * np.abs(wanted / used - 1.0)
+        self.patch[part], self.delta[part], self.change[part] = edges, delta, change
         self.edges[part] = moved
-        constant = isinstance(problem.at, Constant)
-        self.d0[part] = wanted if constant else self.secant.next(part, used, wanted)
+        free = target is None or self.constant
+        self.d0[part] = wanted if free else self.secant.next(part, used, wanted)
 
 
-def solve(
-    problem: Problem, deflection: FloatArray | None, n_nodes: int
-) -> tuple[FloatArray, FloatArray, FloatArray, int, FloatArray]:
-    """Return edges, deflection, compression at the nodes, iterations, and the last change."""
-    d0, edges = _start(problem.tread, deflection, problem.vertical_load)
+def solve(problem: Problem, deflection: FloatArray | None, n_nodes: int) -> Solution:
+    """Return where edges, deflection and compression settle, or where they stand at the limit."""
+    nodes, coarse = Nodes.of(n_nodes), Nodes.of(min(COARSE_NODES, n_nodes))
+    d0, edges = _start(problem, deflection)
     state = _State(problem, d0, edges)
-    iterations = state.settle(Nodes.of(min(COARSE_NODES, n_nodes)), 1e-2)
-    iterations += state.settle(Nodes.of(n_nodes), TOLERANCE)
-    return state.edges, state.d0, state.delta, iterations, state.change
+    iterations = state.settle(coarse, COARSE_TOLERANCE, COARSE_ITERATIONS)
+    lost = np.flatnonzero(~(state.change < COARSE_TOLERANCE))
+    if lost.size:  # from the patch of the undeformed tire, which holds the true one
+        state.d0[lost] = 0.02 if deflection is None else deflection[lost]
+        state.edges[lost] = _undeformed(problem.tread, state.d0)[lost]
+        state.delta[lost] = 0.0
+        state.secant = _Secant(state.d0)
+        iterations += state.settle(coarse, COARSE_TOLERANCE, MAX_ITERATIONS)
+    iterations += state.settle(nodes, TOLERANCE, MAX_ITERATIONS)
+    return Solution(state.edges, state.patch, state.d0, state.delta, iterations, state.change)
 
 
-def _start(
-    tread: Tread, deflection: FloatArray | None, vertical_load: FloatArray | None
-) -> tuple[FloatArray, FloatArray]:
-    """Return the deflection and the patch of the undeformed tire, which holds the true one."""
-    if deflection is None:
-        assert vertical_load is not None  # noqa: S101 - one of the two is always given
-        d0 = np.full(vertical_load.size, 0.02)
-    else:
-        d0 = deflection.copy()
+def _start(problem: Problem, deflection: FloatArray | None) -> tuple[FloatArray, FloatArray]:
+    """Return a deflection and a patch near the solution."""
+    tread, vertical_load = problem.tread, problem.vertical_load
+    d0 = np.full(len(tread), 0.02) if deflection is None else deflection.copy()
+    undeformed = _undeformed(tread, d0)
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        estimate = EdgeEstimate.of(problem.at(d0), tread)
+        if estimate is None:
+            return d0, undeformed
+        if vertical_load is None:
+            half = estimate.half_angle(d0)
+        else:
+            guess, half = estimate.for_load(vertical_load)
+            d0 = np.where((guess > 0) & (guess < 0.25 * tread.free_radius), guess, d0)
+            undeformed = _undeformed(tread, d0)
+        good = (half > 0.05 * undeformed[:, 1]) & (half < undeformed[:, 1])
+    half = np.where(good, half, undeformed[:, 1])
+    return d0, np.stack([-half, half], axis=1)
+
+
+def _undeformed(tread: Tread, d0: FloatArray) -> FloatArray:
+    """Return the patch of the undeformed tire."""
     ratio = d0 / np.asarray(tread.free_radius, dtype=float)
     if (ratio > 0.5).any():
         raise ParameterError(
@@ -116,15 +181,26 @@ def _start(
             "radius; give it in metres, at most some 15 % of the radius"
         )
     half = np.arccos(1.0 - ratio)
-    return d0, np.stack([-half, half], axis=1)
+    return np.stack([-half, half], axis=1)
+
+
+def _refine(delta: FloatArray, nodes: Nodes) -> FloatArray:
+    """Return the compression at other nodes of the same patch."""
+    if delta.shape[1] == 0:
+        return np.zeros((delta.shape[0], nodes.xi.size))
+    if delta.shape[1] == nodes.xi.size:
+        return delta
+    out: FloatArray = delta @ between(delta.shape[1], nodes.xi.size).T
+    return out
 
 
 def _move_edges(nodes: Nodes, edges: FloatArray, delta: FloatArray) -> FloatArray:
     """Return the edges after one Newton step on delta(edge) = 0, of limited length."""
     half = 0.5 * (edges[:, 1:] - edges[:, :1])
-    outward = np.array([-1.0, 1.0])
-    value = delta @ nodes.ends.T
-    fall = -(delta @ nodes.end_slopes.T) * outward / half  # how fast delta falls outward
+    outward = _OUTWARD
+    read = delta @ nodes.readers
+    value = read[:, :2]
+    fall = -read[:, 2:] * outward / half  # how fast delta falls outward
     reach = half * 2.0 / 3.0
     with np.errstate(divide="ignore", invalid="ignore"):
         shift = np.where(fall > 0, value / fall, np.sign(value) * np.inf)
@@ -139,7 +215,8 @@ class _Secant:
         self.last = start.copy()
         self.rest = np.full(start.shape, np.nan)
 
-    def next(self, index: IntArray, used: FloatArray, wanted: FloatArray) -> FloatArray:
+    def next(self, index: IntArray | slice, used: FloatArray, wanted: FloatArray) -> FloatArray:
+        """Return the deflection to try after `used` came back as `wanted`."""
         rest = wanted - used
         with np.errstate(divide="ignore", invalid="ignore"):
             gain = (used - self.last[index]) / (rest - self.rest[index])
@@ -151,6 +228,8 @@ class _Secant:
 
 def _refuse_large(edges: FloatArray, d0: FloatArray, vertical_load: FloatArray | None) -> None:
     """Refuse what the linear ring cannot describe."""
+    if not np.abs(edges).max() > 1.5 * LARGEST_ANGLE:
+        return
     beyond = (np.abs(edges).max(axis=1) > 1.5 * LARGEST_ANGLE) & np.isfinite(d0)
     if beyond.any():
         point = int(np.flatnonzero(beyond)[0])

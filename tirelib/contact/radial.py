@@ -3,11 +3,12 @@
 Eq. (78), (90)-(97), (114). Where the tread is pressed the pressure follows from its compression,
 elsewhere there is none: a complementarity problem. Its operator (tread spring plus ring compliance)
 is positive definite, so it has one solution. That is found as a free-boundary problem: inside the
-patch [a, b] the pressure solves a Fredholm equation of the second kind, collocated on Gauss-Legendre
-nodes, and the two edges follow from q(a) = q(b) = 0, both at once. At the solution a shift of one edge changes the pressure nowhere else (it
-enters with q(edge) = 0), so Newton's matrix for the two edges is diagonal and the iteration needs no
-derivative of the ring. It starts from the patch that the undeformed tire would have, an upper bound, not a
-guess, and ends with a test of complementarity outside the patch.
+patch [a, b] the pressure solves a Fredholm equation of the second kind, collocated on
+Gauss-Legendre nodes, and the two edges follow from q(a) = q(b) = 0, both at once. At the solution a
+shift of one edge changes the pressure nowhere else (it enters with q(edge) = 0), so Newton's matrix
+for the two edges is diagonal and the iteration needs no derivative of the ring. It starts from an
+estimate in closed form (`tirelib.contact.start`), else from the patch of the undeformed tire, an
+upper bound, and ends with a test of complementarity outside the patch.
 
 Deflection, load, or both contact angles can be given (`press`, `load`, `fit_edges`).
 """
@@ -26,6 +27,7 @@ from tirelib.contact.free_boundary import (
     ComplianceAt,
     Constant,
     Problem,
+    Solution,
     solve,
 )
 from tirelib.contact.patch import Nodes, PatchEquation, place
@@ -33,6 +35,12 @@ from tirelib.contact.tread import Tread
 from tirelib.errors import ConvergenceError, ParameterError
 from tirelib.ring.compliance import Compliance
 from tirelib.ring.ring import ComplexArray
+
+_FIT_TOLERANCE = 1e-10
+"""Largest last change of a fitted deflection, [m]; only a hardening tread needs a second step."""
+
+_OUTSIDE = np.linspace(0.02, 1.0, 14)
+"""Where clearance is tested beyond both edges, in half patches of the undeformed tire."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +116,7 @@ class RadialContact:
 
     def compression(self, phi: FloatArray) -> FloatArray:
         """Return delta at the angles (n_phi,) or (n_points, n_phi), [m]; negative is clearance."""
-        u = evaluate(self.displacement[..., 0], phi)
+        u = evaluate(self._radial_displacement(), phi)
         r0 = np.reshape(np.asarray(self.tread.free_radius, dtype=float), (-1, 1))
         delta: FloatArray = self.deflection[:, None] - r0 * (1.0 - np.cos(phi)) + u
         return delta
@@ -117,6 +125,13 @@ class RadialContact:
         """Return the pressure at the angles (n_phi,) or (n_points, n_phi), [N/m]."""
         inside = (phi >= self.edges[:, :1]) & (phi <= self.edges[:, 1:])
         return np.where(inside, self.tread.pressure(self.compression(phi)), 0.0)
+
+    def _radial_displacement(self) -> ComplexArray:
+        """Return the harmonics of u alone."""
+        u: ComplexArray = -self.compliance.radial * self.harmonics
+        if self.extra is not None:
+            u = u + (self.compliance.matrix[..., 0, :] * self.extra).sum(axis=-1)
+        return u
 
     def _moment(self, weight: FloatArray) -> FloatArray:
         total: FloatArray = self.compliance.radius * np.sum(
@@ -221,14 +236,15 @@ def fit_edges(
     problem = Problem(Constant(compliance), tread, None, None)
     delta = np.zeros((len(edges), n_nodes))
     d0 = np.zeros(len(edges))
-    for iteration in range(1, MAX_ITERATIONS + 1):
+    iteration, moving = 0, True
+    while moving and iteration < MAX_ITERATIONS:
+        iteration += 1
         step = PatchEquation.of(compliance, tread, nodes, edges, delta, None)
         lift, rest = step.lift @ nodes.ends.T, step.rest @ nodes.ends.T
         used, d0 = d0, -np.sum(lift * rest, axis=1) / np.sum(lift**2, axis=1)
         delta = step.compression(d0)
-        if np.abs(d0 - used).max() < TOLERANCE:
-            break
-    contact = _contact(problem, nodes, edges, delta, d0, iteration)
+        moving = not np.abs(d0 - used).max() < _FIT_TOLERANCE
+    contact = _contact(problem, Solution(edges, edges, d0, delta, iteration, np.zeros_like(d0)))
     left = delta @ nodes.ends.T
     return replace(contact, edge_mismatch=left[:, 0] - left[:, 1])
 
@@ -244,17 +260,22 @@ def _solve(
     given = deflection if deflection is not None else vertical_load
     assert given is not None  # noqa: S101 - one of the two is always given
     if isinstance(compliance, Compliance):
+        _one_or_each(len(compliance), given.size, "compliance")
         compliance = Constant(compliance.spread(given.size))
+    _one_or_each(len(tread), given.size, "tread")
     problem = Problem(compliance, tread.spread(given.size), vertical_load, extra)
-    edges, d0, delta, iterations, change = solve(problem, deflection, n_nodes)
-    contact = _contact(problem, Nodes.of(n_nodes), edges, delta, d0, iterations)
+    if extra is not None:
+        start = np.full(given.size, 0.02) if deflection is None else deflection
+        _check_extra(extra, (given.size, problem.at(start).n_modes + 1, 3))
+    found = solve(problem, deflection, n_nodes)
+    contact, d0, change = _contact(problem, found), found.deflection, found.change
     moving = np.flatnonzero(~(change < TOLERANCE))
     if moving.size:
         worst = float(change[moving].max())
         raise ConvergenceError(
             f"contact: {moving.size} of {d0.size} points, the first number {moving[0]} at "
-            f"d0 = {1e3 * d0[moving[0]]:.2f} mm, still move by {worst:.2e} rad after "
-            f"{iterations} iterations; look at the last contact (attribute iterate), use a "
+            f"d0 = {1e3 * d0[moving[0]]:.2f} mm, still change by {worst:.2e} of half the patch after "
+            f"{found.iterations} iterations; look at the last contact (attribute iterate), use a "
             "smaller load or a stiffer belt",
             contact,
             worst,
@@ -263,18 +284,12 @@ def _solve(
     return contact
 
 
-def _contact(
-    problem: Problem,
-    nodes: Nodes,
-    edges: FloatArray,
-    delta: FloatArray,
-    d0: FloatArray,
-    iterations: int,
-) -> RadialContact:
-    phi, weights = place(nodes, edges)
+def _contact(problem: Problem, found: Solution) -> RadialContact:
+    phi, weights = place(Nodes.of(found.delta.shape[1]), found.patch)
+    d0 = found.deflection
     return RadialContact(
-        edges, d0, phi, weights, delta, problem.at(d0), problem.tread, problem.extra,
-        np.zeros_like(d0), iterations,
+        found.edges, d0, phi, weights, found.delta, problem.at(d0), problem.tread, problem.extra,
+        np.zeros_like(d0), found.iterations,
     )  # fmt: skip
 
 
@@ -293,13 +308,10 @@ def _check_complementarity(contact: RadialContact) -> None:
             f"Fz = {contact.load[point]:.0f} N has a half contact angle of {half[point]:.2f} rad; "
             f"the ring holds up to {LARGEST_ANGLE} rad; lower the load or check the stiffness"
         )
-    scale = contact.pressure.max(axis=1)
-    pull = -contact.pressure.min(axis=1) / scale
-    away = np.array([0.03, 0.1, 0.3, 0.8])
-    outside = np.concatenate(
-        [contact.edges[:, :1] - away * half[:, None], contact.edges[:, 1:] + away * half[:, None]],
-        axis=1,
-    )
+    pressure = contact.pressure
+    pull = -pressure.min(axis=1) / pressure.max(axis=1)
+    away = np.arccos(1.0 - d0 / contact.tread.free_radius)[:, None] * _OUTSIDE
+    outside = np.concatenate([contact.edges[:, :1] - away, contact.edges[:, 1:] + away], axis=1)
     press = contact.compression(outside).max(axis=1) / d0
     wrong = (pull > 1e-6) | (press > 1e-6)
     if wrong.any():
@@ -310,6 +322,22 @@ def _check_complementarity(contact: RadialContact) -> None:
             "the belt lifts off or buckles: a stiffer belt or a smaller load is needed",
             contact,
             float(max(pull[point], press[point])),
+        )
+
+
+def _one_or_each(given: int, n_points: int, name: str) -> None:
+    if given not in (1, n_points):
+        raise ParameterError(
+            f"contact: the {name} has {given} points for {n_points} points; one value or one a "
+            "point is needed"
+        )
+
+
+def _check_extra(extra: ComplexArray, shape: tuple[int, int, int]) -> None:
+    if extra.shape != shape or not np.isfinite(extra).all():
+        raise ParameterError(
+            f"contact: extra has shape {extra.shape}; finite harmonics of shape {shape} (points, "
+            "modes + 1, loads on u, v, beta) are needed"
         )
 
 

@@ -9,6 +9,7 @@ with the deflection d0 under the axle and the belt's outward displacement u. The
 an inward pressure q = k_t delta (1 + c delta / h), c its hardening; it can only push.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -42,11 +43,12 @@ class Tread:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = np.asarray(getattr(self, field.name), dtype=float)
-            good = np.isfinite(value) & ((value > 0) | (field.name == "hardening"))
+            zero = field.name == "hardening"
+            good = np.isfinite(value) & ((value >= 0) if zero else (value > 0))
             if not good.all():
                 raise ParameterError(
                     f"tread: {field.name} = {value[~good].flat[0] if value.ndim else value:.6g}; "
-                    "a finite number > 0 is needed"
+                    f"a finite number {'>=' if zero else '>'} 0 is needed; check the tire's value"
                 )
 
     @classmethod
@@ -61,14 +63,26 @@ class Tread:
 
     def spread(self, n_points: int) -> "Tread":
         """Return the tread with one value per point in every field."""
-        return Tread(*[np.broadcast_to(getattr(self, f.name), (n_points,)) for f in fields(self)])
+        return self._with(lambda value: np.broadcast_to(value, (n_points,)))
 
-    def take(self, index: IntArray) -> "Tread":
+    def take(self, index: IntArray | slice) -> "Tread":
         """Return the tread of some points (of a tread with one value per point)."""
-        return Tread(*[np.asarray(getattr(self, f.name))[index] for f in fields(self)])
+        return self._with(lambda value: np.asarray(value)[index])
+
+    def _with(self, change: Callable[[float | FloatArray], FloatArray]) -> "Tread":
+        """Return the tread with every field rearranged; its numbers are checked already."""
+        out = object.__new__(Tread)
+        for name in _NAMES:
+            object.__setattr__(out, name, change(getattr(self, name)))
+        return out
+
+    @property
+    def linear(self) -> bool:
+        """Whether the stiffness does not depend on the compression."""
+        return not np.any(self.hardening)
 
     def force(self, compression: FloatArray) -> FloatArray:
-        """Return q for a compression of shape (n_points, ...), [N/m], as if the tread could pull."""
+        """Return q for compressions (n_points, ...), [N/m], as if the tread could pull."""
         k, s = self._columns(compression.ndim)
         q: FloatArray = k * compression * (1.0 + s * np.maximum(compression, 0.0))
         return q
@@ -88,3 +102,6 @@ class Tread:
         k = np.reshape(np.asarray(self.normal_stiffness, dtype=float), shape)
         s = np.reshape(np.asarray(self.hardening / np.asarray(self.thickness), dtype=float), shape)
         return k, s
+
+
+_NAMES = tuple(field.name for field in fields(Tread))

@@ -134,7 +134,8 @@ class Tire:
         if not found and not self.ring_radius < self.free_radius:
             found.append(
                 f"ring_radius = {1e3 * self.ring_radius:g} mm is not below free_radius = "
-                f"{1e3 * self.free_radius:g} mm; the belt lies inside the tread; exchange or correct"
+                f"{1e3 * self.free_radius:g} mm; the belt lies inside the tread; exchange or "
+                "correct them"
             )
         if found:
             raise ParameterError("tire: " + "; ".join(found))

@@ -1,4 +1,4 @@
-"""Tire files: TOML with one table per number (``tirelib-tire/1``, also inside ``tirelib-model/1``)."""
+"""Tire files: TOML, one table per number (``tirelib-tire/1``, also inside ``tirelib-model/1``)."""
 
 import math
 import tomllib
@@ -10,8 +10,8 @@ from types import MappingProxyType
 from typing import Any
 
 from tirelib.errors import FormatError, ParameterError, UnitError
-from tirelib.parameters.tire import FIELDS, Tire, range_fault, unknown_name
-from tirelib.units import from_si, to_si
+from tirelib.parameters.tire import FIELDS, Field, Tire, range_fault, unknown_name
+from tirelib.units import from_si, to_si, units_of
 
 FORMAT = "tirelib-tire/1"
 FORMATS = (FORMAT, "tirelib-model/1")
@@ -21,6 +21,8 @@ REQUIRED = (
     "bending_stiffness", "mass", "pressure", "radial_stiffness", "tangential_stiffness",
     "tread_stiffness",
 )  # fmt: skip
+
+_GROUPS = tuple(dict.fromkeys(entry.group for entry in FIELDS.values()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,8 +127,7 @@ def read_tire(name: str | Path) -> TireFile:
             faults.append(str(error).removeprefix("tire: "))
     if faults:
         raise FormatError([f"{path}: {fault}" for fault in faults])
-    groups = {entry.group for entry in FIELDS.values()}
-    extra = {k: v for k, v in document.items() if k not in groups | {"format", "name"}}
+    extra = {k: v for k, v in document.items() if k not in {*_GROUPS, "format", "name"}}
     return TireFile(str(document.get("name", path.stem)), numbers, extra)
 
 
@@ -134,7 +135,13 @@ def _numbers(document: Mapping[str, Any]) -> tuple[dict[str, Number], list[str]]
     """Return the numbers of a document and every fault."""
     numbers: dict[str, Number] = {}
     faults: list[str] = []
-    for group in dict.fromkeys(entry.group for entry in FIELDS.values()):
+    for name in document:
+        near = get_close_matches(name, _GROUPS, n=1, cutoff=0.75)
+        if name in FIELDS:
+            faults.append(f"{name} stands at the top; move it to [{FIELDS[name].group}]")
+        elif near and name not in _GROUPS:
+            faults.append(f"[{name}] is no table of a tire; did you mean [{near[0]}]?")
+    for group in _GROUPS:
         table = document.get(group, {})
         if not isinstance(table, dict):
             faults.append(f"[{group}] is no table; write [{group}.name] with value and unit")
@@ -153,9 +160,14 @@ def _numbers(document: Mapping[str, Any]) -> tuple[dict[str, Number], list[str]]
     faults += [
         f"[{FIELDS[name].group}.{name}] is missing ({FIELDS[name].meaning}); add value and unit"
         for name in REQUIRED
-        if name not in document.get(FIELDS[name].group, {})
+        if name not in _table(document, FIELDS[name].group)
     ]
     return numbers, faults
+
+
+def _table(document: Mapping[str, Any], group: str) -> Mapping[str, Any]:
+    table = document.get(group, {})
+    return table if isinstance(table, dict) else {}
 
 
 def _number(name: str, entry: Any) -> Number:
@@ -164,8 +176,8 @@ def _number(name: str, entry: Any) -> Number:
     value, std = entry["value"], entry.get("std", math.nan)
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ParameterError(f"value = {value!r} is not a number")
-    if isinstance(std, bool) or not isinstance(std, int | float) or std < 0:
-        raise ParameterError(f"std = {std!r}; a number >= 0 is needed, in the value's unit")
+    if isinstance(std, bool) or not isinstance(std, int | float) or std < 0 or math.isinf(std):
+        raise ParameterError(f"std = {std!r}; a finite number >= 0 is needed, in the value's unit")
     kind = entry.get("kind", "assumed")
     if kind not in KINDS:
         raise ParameterError(f"kind = {kind!r}; allowed are {', '.join(KINDS)}")
@@ -188,9 +200,10 @@ def write_tire(file: TireFile, path: str | Path, file_format: str = FORMAT) -> N
         number = file.numbers.get(name)
         if number is None:
             continue
-        table: dict[str, Any] = {"value": _at_edge(number.value, name), "unit": entry.unit}
-        if math.isfinite(number.std):
-            table["std"] = _at_edge(number.std, name)
+        unit, value, std = _at_edge(number, entry)
+        table: dict[str, Any] = {"value": value, "unit": unit}
+        if math.isfinite(std):
+            table["std"] = std
         table |= {"kind": number.kind, "source": number.source, **number.notes}
         document.setdefault(entry.group, {})[name] = table
     document |= file.extra
@@ -203,6 +216,23 @@ def write_tire(file: TireFile, path: str | Path, file_format: str = FORMAT) -> N
     )
 
 
-def _at_edge(value: float, name: str) -> float:
-    entry = FIELDS[name]
-    return from_si(value, entry.unit, entry.dimension) if math.isfinite(value) else value
+def _at_edge(number: Number, entry: Field) -> tuple[str, float, float]:
+    """Return unit, value and std; the SI unit where the usual one would lose a digit."""
+    both = (number.value, number.std)
+    try:
+        value, std = (_exactly(si, entry.unit, entry.dimension) for si in both)
+    except LookupError:
+        plain = (u for u in units_of(entry.dimension) if to_si(1.0, u, entry.dimension) == 1.0)
+        return next(plain), *both
+    return entry.unit, value, std
+
+
+def _exactly(si: float, unit: str, dimension: str) -> float:
+    """Return the number that `read_tire` turns back into exactly this SI value."""
+    if not math.isfinite(si):
+        return si
+    near = from_si(si, unit, dimension)
+    for value in (near, math.nextafter(near, math.inf), math.nextafter(near, -math.inf)):
+        if to_si(value, unit, dimension) == si:
+            return value
+    raise LookupError(unit)

@@ -9,16 +9,20 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.arrays import FloatArray, IntArray
+from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.errors import ParameterError
 from tirelib.ring.ring import (
+    FREE,
     ComplexArray,
     Ring,
     columns,
-    modal_parts,
     modal_damping_time,
+    modal_parts,
     plain_stiffness,
 )
+
+_RIM = 1e9
+"""Stiffness, in k_u, that takes the belt along with the rim where k_v = 0 does not (n = 0)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +51,8 @@ class Compliance:
             np.broadcast_to(self.matrix, (n_points, *self.matrix.shape[1:])),
         )
 
-    def take(self, index: IntArray) -> "Compliance":
-        """Return the compliance of some points."""
-        if index.size == len(self):
-            return self
+    def take(self, index: IntArray | slice) -> "Compliance":
+        """Return the compliance of some points (of one with a row per point)."""
         return Compliance(self.radius[index], self.matrix[index])
 
     @property
@@ -60,7 +62,7 @@ class Compliance:
 
     @property
     def radial(self) -> ComplexArray:
-        """u per q_u, shape (n_points, n_modes + 1)."""
+        """Displacement u per q_u, shape (n_points, n_modes + 1)."""
         out: ComplexArray = self.matrix[..., 0, 0]
         return out
 
@@ -100,7 +102,8 @@ def _plain(ring: Ring, omega: float | FloatArray, n_modes: int) -> ComplexArray:
     )
     n = np.arange(n_modes + 1.0)[None, :]
     static = plain_stiffness(ring, n_modes)
-    static = np.where(static == 0.0, np.inf, static)  # k_v = 0: the rim takes the belt along
+    free = _unheld(ring, static)
+    static = np.where(free, 1.0, static)
     # (1 - n^2)^2 from the centrifugal tension, -(1 + n^2)^2 + 4 n^2 from inertia: they cancel
     rotation = share * m * w**2 * ((1.0 - n**2) ** 2 - (1.0 + n**2) ** 2 + 4.0 * n**2)
     rotary = -rho_i * (n * w * (1.0 - n**2) / r) ** 2
@@ -109,7 +112,8 @@ def _plain(ring: Ring, omega: float | FloatArray, n_modes: int) -> ComplexArray:
     shape = np.stack(
         np.broadcast_arrays(-1j * n + 0 * r, np.ones_like(n * r), (1.0 - n**2) / r + 0j), axis=-1
     )
-    out: ComplexArray = shape[..., :, None] * shape[..., None, :].conj() / dynamic[..., None, None]
+    each = np.where(free, 0.0, 1.0 / dynamic)
+    out: ComplexArray = shape[..., :, None] * shape[..., None, :].conj() * each[..., None, None]
     return out
 
 
@@ -126,6 +130,8 @@ def _general(ring: Ring, omega: float | FloatArray, n_modes: int) -> ComplexArra
     if not ring.unshearable:
         shear = np.stack([1j * n / r + zero, -one / r, one], axis=-1)
         elastic = elastic + ga[..., None, None] * _outer(shear)
+    free = _unheld(ring, plain_stiffness(ring, n_modes))
+    elastic[..., 1, 1] += np.where(free, _RIM * np.asarray(ring.radial_stiffness).max(), 0.0)
     lag = 1.0 + 1j * n * w * modal_damping_time(ring, n_modes)
     dynamic = elastic * lag[..., None, None] + inertial
     if ring.inextensible:  # v and beta are free, u = -v'
@@ -144,6 +150,13 @@ def _general(ring: Ring, omega: float | FloatArray, n_modes: int) -> ComplexArra
     return out
 
 
+def _unheld(ring: Ring, static: FloatArray) -> BoolArray:
+    """Return where nothing holds the belt round the rim (k_v = 0): there it is taken along."""
+    (ku,) = columns(ring.radial_stiffness)
+    out: BoolArray = static < FREE * ku
+    return out
+
+
 def _basis(*shapes: list[npt.NDArray[Any]]) -> ComplexArray:
     """Return free displacement shapes as columns, shape (n_points, n_modes + 1, 3, n_free)."""
     out: ComplexArray = np.stack([np.stack(shape, axis=-1) for shape in shapes], axis=-1)
@@ -158,6 +171,7 @@ def _outer(row: ComplexArray) -> ComplexArray:
 
 def _refuse_critical(stiffness: FloatArray, scale: FloatArray) -> None:
     if (stiffness <= 0).any():
+        scale = np.broadcast_to(scale, stiffness.shape)
         point, mode = np.argwhere(stiffness <= 0)[0]
         raise ParameterError(
             f"ring: point {point} has no stiffness left in harmonic {mode} "

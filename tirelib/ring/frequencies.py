@@ -261,7 +261,7 @@ def fit_stiffness(
         rest = (right - design @ solved) / spread
         fitted = omega**2 - rest * spread / inertia
         square = np.where(fitted > 0.0, fitted, omega**2)
-    misfit = float(rest @ rest) / freedom if freedom else np.nan
+    misfit = float(rest @ rest) / freedom if freedom > 0 else np.nan
     level = 0.5 + 0.5 * confidence
     unknown = np.isinf(np.diag(cov))
     if sigma is None:

@@ -125,6 +125,9 @@ class Ring:
         return bool(np.isinf(self.shear_stiffness).all())
 
 
+FREE = 1e-12
+"""Share of k_u below which a harmonic's stiffness is none (n = 0 without k_v)."""
+
 _POSITIVE = frozenset(
     {"radius", "bending_stiffness", "mass", "extension_stiffness", "shear_stiffness"}
 ) | {"radial_stiffness"}
@@ -198,10 +201,12 @@ def modal_parts(
 def modal_damping_time(ring: Ring, n_modes: int) -> FloatArray:
     """Return c_n / k_n = 2 lambda sqrt(m_n / k_n) of Eq. (107), [s], shape (n_points, n_modes + 1).
 
-    m_n and k_n are those of the inextensible Bernoulli-Euler ring, Eq. (85), without rotation.
+    m_n and k_n are those of the inextensible Bernoulli-Euler ring, Eq. (85), without rotation; a
+    harmonic without stiffness (k_v = 0, n = 0) has none.
     """
-    m, lam = columns(ring.mass, ring.damping)
+    m, lam, ku = columns(ring.mass, ring.damping, ring.radial_stiffness)
     k = plain_stiffness(ring, n_modes)
+    k = np.where(k < FREE * ku, np.inf, k)
     n = np.arange(n_modes + 1.0)[None, :]
     time: FloatArray = 2.0 * lam * np.sqrt(m * (1.0 + n**2) / k)
     return time

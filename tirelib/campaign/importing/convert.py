@@ -1,0 +1,386 @@
+"""The table of a file and a map to runs in SI and ISO; every fault is kept.
+
+Times, numbers and lengths are looked at here; what a tire test can show, the checks of a campaign
+look at afterwards.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from tirelib.axes import sign
+from tirelib.campaign.finding import Finding
+from tirelib.campaign.importing.columns import Column, Table, did_you_mean, row_list
+from tirelib.campaign.importing.mapfile import ChannelRule, ImportMap
+from tirelib.campaign.importing.mapheader import GAGE_TIME, is_gage, strain_number
+from tirelib.campaign.importing.signs import sign_findings
+from tirelib.campaign.model import BoolArray, FloatArray
+from tirelib.campaign.plan import SET_POINTS
+from tirelib.campaign.problem import Problem
+from tirelib.campaign.timebase import gage_time_problems
+from tirelib.errors import UnitError
+from tirelib.units import dimensions_of_unit, from_si, to_si
+
+_SAME = 1e-9  # a set point's column varies by less within a run, relative
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Piece:
+    """One run, SI and ISO, before it stands in a campaign.
+
+    Attributes
+    ----------
+    number : int
+    source : str
+        File, and run where the file holds several.
+    rows : int
+        Of the rig quantities, of the gages where there are none.
+    rig : mapping of quantity to array, shape (n_rig,)
+    rig_time : array, shape (n_rig,), or None, [s]
+    strain : array, shape (n_gages, n_samples), or None
+    gage_time : array, shape (n_samples,), or None, [s]
+    trigger : bool array, shape (n_samples,), or None
+    points : mapping of column of ``runs.csv`` to float
+        Set points that the file's columns give, in the units of ``runs.csv`` and the map's axes.
+    """
+
+    number: int
+    source: str
+    rows: int
+    rig: dict[str, FloatArray] = field(default_factory=dict)
+    rig_time: FloatArray | None = None
+    strain: FloatArray | None = None
+    gage_time: FloatArray | None = None
+    trigger: BoolArray | None = None
+    points: dict[str, float] = field(default_factory=dict)
+
+
+def convert(table: Table, rules: ImportMap, number: int) -> tuple[list[Piece], list[Finding]]:
+    """Apply a map to the table of one file.
+
+    Parameters
+    ----------
+    table : Table
+    rules : ImportMap
+    number : int
+        Of the run, when the file holds one.
+
+    Returns
+    -------
+    pieces : list of Piece
+        In the order of the rows; without those that the map skips. Empty when a column is missing
+        or cannot be used.
+    findings : list of Finding
+        Every fault.
+    """
+    work = _Conversion(table, rules)
+    columns = work.columns()
+    rig = [q for q in columns if not is_gage(q) and q not in ("time", GAGE_TIME)]
+    gages = [q for q in columns if is_gage(q)]
+    rig_time = work.times(columns, rig, "time") if rig else None
+    gage_time = work.times(columns, gages, GAGE_TIME) if gages else None
+    spans = work.spans(number, [t for t in (rig_time, gage_time) if t is not None])
+    if work.found or not rules.sound:
+        work.look(columns, _distinct(rig_time, gage_time))
+        return [], work.found
+    clocks = {**dict.fromkeys(rig, rig_time), **dict.fromkeys(gages, gage_time)}
+    values = {q: work.si(q, columns[q], clock) for q, clock in clocks.items() if clock is not None}
+    work.check_finite(columns, values, spans)
+    pieces = [work.piece(run, span, values, rig_time, gage_time) for run, span in spans]
+    return pieces, work.found
+
+
+class _Conversion:
+    """One file under conversion, with every fault found so far."""
+
+    def __init__(self, table: Table, rules: ImportMap) -> None:
+        self.table = table
+        self.rules = rules
+        self.found: list[Finding] = []
+
+    def fault(self, key: str, where: str, given: str, allowed: str, remedy: str) -> None:
+        """Note a fault; `where` is a column or empty."""
+        place = f"{self.table.file}, {where}" if where else self.table.file
+        problem = Problem(place, given, allowed, remedy)
+        self.found.append(Finding(f"{key} {where}", self.table.file, where, problem))
+
+    def named(self, name: str, purpose: str) -> Column | None:
+        """Return a column by its name, or None after noting what is there instead."""
+        column = self.table.columns.get(name)
+        if column is not None:
+            return column
+        reason = self.table.left_out.get(name)
+        if reason is not None:
+            self.fault("left out", f"column {name!r} ({purpose})", f"it cannot be used: {reason}",
+                       "one number a row is needed", "map another column, or export it as "
+                       "numbers")  # fmt: skip
+        else:
+            known = [*self.table.columns, *self.table.left_out]
+            self.fault("missing", f"column {name!r} ({purpose})", "the file has no such column",
+                       did_you_mean(name, known), f"correct [channels] in {self.rules.file}, see "
+                       "`tirelib import FILE --list`")  # fmt: skip
+        return None
+
+    def columns(self) -> dict[str, Column]:
+        """Return the column of each quantity; note those missing and those of a wrong unit."""
+        found: dict[str, Column] = {}
+        for quantity, rule in self.rules.channels.items():
+            column = self.named(rule.column, quantity) if rule.column else None
+            before = len(self.found)
+            if column is not None:
+                self.check_unit(rule, column)
+                found |= {quantity: column} if len(self.found) == before else {}
+        if self.rules.run_column:
+            self.named(self.rules.run_column, "run_column")
+        for name, point in self.rules.set_points.items():
+            if point.column:
+                self.named(point.column, name)
+        return found
+
+    def check_unit(self, rule: ChannelRule, column: Column) -> None:
+        """Note a unit that is given nowhere, or that file and map state differently."""
+        where = f"column {column.name!r} ({rule.quantity})"
+        if not rule.unit:
+            try:
+                to_si(1.0, column.unit, rule.dimension)
+            except UnitError as error:
+                given, allowed, _ = str(error).split("; ", 2)
+                given = f"the file's {given}" if column.unit else "map and file state no unit"
+                self.fault("unit", where, given, allowed,
+                           f"state unit in {self.rules.file}")  # fmt: skip
+        elif not rule.converts and not _same_unit(column.unit, rule):
+            self.fault("unit", where, f"the file states {column.unit!r}, the map {rule.unit!r}",
+                       "both must agree", f"correct unit in {self.rules.file}, or say "
+                       "override_unit = true where the file is wrong")  # fmt: skip
+
+    def times(
+        self, columns: dict[str, Column], quantities: Sequence[str], clock: str
+    ) -> FloatArray | None:
+        """Return the times of some quantities, [s], or None after noting why there are none."""
+        varying = [columns[q] for q in quantities if not columns[q].constant]
+        own = sorted({column.clock for column in varying if column.clock})
+        rule = self.rules.channels.get(clock)
+        if rule is None and (clock == "time" or not own):
+            rule = self.rules.channels.get("time")
+        if rule is None and len(own) == 1:
+            rule = ChannelRule("time", own[0], "")
+            column = self.named(own[0], "time")
+            if column is not None:
+                self.check_unit(rule, column)
+        if rule is None:
+            what = "the strain" if clock == GAGE_TIME else "the rig quantities"
+            given = f"{what} stand on {len(own)} clocks ({', '.join(own)})" if own else \
+                f"no time is mapped for {what}"  # fmt: skip
+            if not self.rules.sound:  # the map says what is wrong
+                return None
+            self.fault("time", "", given, "one clock is needed", f"add time to [channels] in "
+                       f"{self.rules.file}, or bring them to one rate")  # fmt: skip
+            return None
+        column = self.table.columns.get(rule.column)
+        if rule.column and column is None:
+            return None
+        count = column.values.size if column is not None else max(
+            (item.values.size for item in varying), default=0)  # fmt: skip
+        self.check_lengths(varying, count, rule.column)
+        if count < 2:
+            self.fault("rows", "", f"{count} row(s) of data", "two are needed at least",
+                       "export it again")  # fmt: skip
+        if column is None:
+            return np.asarray(np.arange(count) / rule.rate, np.float64)
+        return self.si("time", column, column.values, rule)
+
+    def check_lengths(self, columns: Sequence[Column], count: int, clock: str) -> None:
+        """Note the columns that are not as long as their clock."""
+        against = f"the time column {clock!r}" if clock else "the longest"
+        for column in columns:
+            if column.values.size != count:
+                self.fault("length", f"column {column.name!r}",
+                           f"it has {column.values.size} rows, {against} has {count}",
+                           "every sample needs its time", "export both together; gages at a rate "
+                           "of their own need gage_time")  # fmt: skip
+
+    def si(
+        self, quantity: str, column: Column, clock: FloatArray, rule: ChannelRule | None = None
+    ) -> FloatArray:
+        """Return a column in SI and ISO."""
+        rule = rule or self.rules.channels[quantity]
+        given = rule.factor * column.rows(clock.size) + rule.offset
+        turn = sign(quantity, self.rules.header.axes)
+        return turn * to_si(given, rule.unit or column.unit, rule.dimension)
+
+    def spans(self, number: int, clocks: Sequence[FloatArray]) -> list[tuple[int, slice]]:
+        """Return number and rows of each run that the map does not skip."""
+        skipped = {run for run, entry in self.rules.runs.items() if entry.skip}
+        whole = [(number, slice(None))]
+        if not self.rules.run_column:
+            return [item for item in whole if item[0] not in skipped]
+        column = self.table.columns.get(self.rules.run_column)
+        if column is None or self.found:
+            return []
+        where = f"column {column.name!r} (run_column)"
+        lengths = sorted({clock.size for clock in clocks} | {column.values.size})
+        if len(lengths) > 1 and not column.constant:
+            self.fault("length", where, f"rows of {' and '.join(map(str, lengths))} samples",
+                       "run_column divides rows of one length",
+                       "give a file for each run")  # fmt: skip
+            return []
+        runs = column.rows(clocks[0].size)
+        wrong = np.flatnonzero(~((runs >= 0) & (runs == np.floor(runs)) & np.isfinite(runs)))
+        if wrong.size:
+            self.fault("run", where, f"{runs[wrong[0]]:g} in {row_list(wrong)}",
+                       "a whole number, 0 or more, is needed", "correct the column")  # fmt: skip
+            return []
+        edges = np.flatnonzero(np.diff(runs)) + 1
+        spans = [(int(runs[start]), slice(int(start), int(stop)))
+                 for start, stop in zip([0, *edges], [*edges, runs.size], strict=True)]  # fmt: skip
+        seen: set[int] = set()
+        for run, span in spans:
+            if run in seen:
+                self.fault("run", where, f"run {run} comes again in row {span.start + 1}",
+                           "the rows of a run stand together", "sort the rows, or number the "
+                           "runs anew")  # fmt: skip
+            seen.add(run)
+        return [item for item in spans if item[0] not in skipped]
+
+    def check_finite(
+        self,
+        columns: dict[str, Column],
+        values: dict[str, FloatArray],
+        spans: Sequence[tuple[int, slice]],
+    ) -> None:
+        """Note the rows in which a quantity is no number."""
+        for quantity, samples in values.items():
+            kept = np.zeros(samples.size, dtype=bool)
+            for _, span in spans:
+                kept[span] = True
+            rows = np.flatnonzero(kept & ~np.isfinite(samples))
+            if rows.size:
+                self.fault("finite", f"column {columns[quantity].name!r} ({quantity})",
+                           f"{rows.size} value(s) are NaN or infinite, in {row_list(rows)}",
+                           "finite numbers are needed",
+                           "drop these rows, or map another column")  # fmt: skip
+
+    def look(self, columns: dict[str, Column], clocks: Sequence[FloatArray]) -> None:
+        """Note what else is wrong in a file that cannot be imported as it stands."""
+        if any(entry.skip for entry in self.rules.runs.values()):
+            return  # what is wrong may stand in a run that is skipped
+        if not self.rules.run_column:
+            for times in clocks:
+                self.check_growth(self.table.file, slice(None), times)
+        rows = np.empty(max((item.values.size for item in columns.values()), default=0))
+        values = {
+            quantity: self.si(quantity, column, rows)
+            for quantity, column in columns.items()
+            if quantity not in ("time", GAGE_TIME)
+        }
+        self.check_finite(columns, values, [(0, slice(None))])
+        rig = {q: v for q, v in values.items() if not is_gage(q) and v.size == rows.size}
+        if self.rules.sound:
+            self.found += sign_findings(self.table.file, rig, self.rules)
+
+    def piece(
+        self,
+        run: int,
+        span: slice,
+        values: dict[str, FloatArray],
+        rig_time: FloatArray | None,
+        gage_time: FloatArray | None,
+    ) -> Piece:
+        """Return one run and note what is wrong with its clocks, signs and set points."""
+        source = self.table.file + (f", run {run}" if self.rules.run_column else "")
+        before = len(self.found)
+        for times in _distinct(rig_time, gage_time):
+            self.check_growth(source, span, times)
+        strains = sorted((number, q) for q in values if (number := strain_number(q)) is not None)
+        gages = None if gage_time is None else gage_time[span]
+        if gages is not None and len(self.found) == before:
+            for problem in gage_time_problems(source, gages, self.rate(gages)):
+                told = replace(problem, allowed=problem.allowed.replace(
+                    "campaign.toml", self.rules.file))  # fmt: skip
+                self.found.append(Finding("gage time", source, "", told))
+        trigger = values.get("trigger")
+        piece = Piece(
+            number=run,
+            source=source,
+            rows=0,
+            rig={q: samples[span] for q, samples in values.items() if not is_gage(q)},
+            rig_time=None if rig_time is None else rig_time[span],
+            strain=np.stack([values[q][span] for _, q in strains]) if strains else None,
+            gage_time=gages,
+            trigger=None if trigger is None else trigger[span] > 0.5,
+            points=dict(self.points(source, span)),
+        )
+        clock = piece.rig_time if piece.rig_time is not None else piece.gage_time
+        self.found += sign_findings(source, piece.rig, self.rules)
+        return replace(piece, rows=0 if clock is None else clock.size)
+
+    def rate(self, times: FloatArray) -> float:
+        """Return the declared rate of the gages, else that of the times, [Hz]."""
+        if np.isfinite(self.rules.header.rate):
+            return self.rules.header.rate
+        return (times.size - 1) / float(times[-1] - times[0])
+
+    def check_growth(self, source: str, span: slice, times: FloatArray) -> None:
+        """Note times that are no number, stand twice or fall."""
+        rows = np.arange(times.size, dtype=np.intp)[span]
+        inside = times[span]
+        steps = np.diff(inside)
+        for wrong, given in (
+            (~np.isfinite(inside), "no finite time"),
+            (np.append(False, steps == 0.0), "the time of the row before stands again"),
+            (np.append(False, steps < 0.0), "the time falls"),
+        ):
+            if wrong.any():
+                count = int(np.count_nonzero(wrong))
+                first = int(np.flatnonzero(wrong)[0])
+                problem = Problem(
+                    f"{source}, time",
+                    f"{given} in {row_list(rows[wrong])} (t = {inside[first]:.6g} s"
+                    + (f", {count} in all)" if count > 1 else ")"),
+                    "time must grow from row to row",
+                    "sort out the clock at its source, or drop these rows",
+                )
+                self.found.append(Finding(given, source, "time", problem))
+
+    def points(self, source: str, span: slice) -> Iterator[tuple[str, float]]:
+        """Yield the set points that columns give; note one that changes within the run."""
+        for target in SET_POINTS:
+            rule = self.rules.set_points.get(target.name)
+            column = self.table.columns.get(rule.column) if rule is not None else None
+            if rule is None or column is None:
+                continue
+            inside = column.values if column.constant else column.values[span]
+            low, high = (float(inside.min()), float(inside.max())) if inside.size else (np.nan,) * 2
+            if not high - low <= _SAME * max(abs(low), abs(high)):
+                problem = Problem(
+                    f"{source}, column {column.name!r} ({target.name})",
+                    f"the set point goes from {low:g} to {high:g} within the run",
+                    "one value a run is needed",
+                    "map another column, divide the runs, or import a sweep",
+                )
+                self.found.append(Finding(f"point {target.name}", source, column.name, problem))
+            else:
+                si = to_si(low, rule.unit, target.dimension)
+                yield target.name, from_si(si, target.unit, target.dimension)
+
+
+def _same_unit(stated: str, rule: ChannelRule) -> bool:
+    """Return whether a unit that a file states is that of the map, or says nothing."""
+    if stated == "none" or not dimensions_of_unit(stated):
+        return True
+    if rule.dimension not in dimensions_of_unit(stated):
+        return False
+    return all(
+        to_si(value, stated, rule.dimension) == to_si(value, rule.unit, rule.dimension)
+        for value in (0.0, 1.0)
+    )
+
+
+def _distinct(*clocks: npt.NDArray[np.float64] | None) -> list[FloatArray]:
+    """Return the clocks that are there, one that serves twice once."""
+    present = [clock for clock in clocks if clock is not None]
+    if len(present) == 2 and np.array_equal(present[0], present[1], equal_nan=True):
+        return present[:1]
+    return present

@@ -1,0 +1,351 @@
+"""The import map, ``tirelib-map/1``: which column is which quantity, in which unit and axes."""
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tirelib.campaign.importing.columns import did_you_mean
+from tirelib.campaign.importing.delimited import CsvOptions
+from tirelib.campaign.importing.mapheader import GAGE_TIME, header_of, strain_number
+from tirelib.campaign.importing.mapreader import (
+    FORMAT,
+    MapReader,
+    read_csv_options,
+    read_document,
+)
+from tirelib.campaign.model import KINDS, CampaignHeader, TireGeometry
+from tirelib.campaign.plan import SET_POINTS
+from tirelib.campaign.problem import Problem, errors_of, raise_errors
+from tirelib.errors import UnitError
+from tirelib.units import QUANTITIES, dimension_of, to_si
+
+POINTS = tuple(column.name for column in SET_POINTS)
+"""Names of the set points, as in ``runs.csv``."""
+
+_TOP = ("format", "axes", "name", "kind", "run_column", "tire", "gages", "tolerance", "rig",
+        "channels", "set_points", "runs", "csv")  # fmt: skip
+_CHANNEL = ("column", "unit", "factor", "sign", "offset", "override_unit")
+_NAMES = (*(name for name in QUANTITIES if name != "load"), GAGE_TIME, "temperature")
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelRule:
+    """How a column becomes a quantity: ``sign * factor * column + offset``, in `unit`.
+
+    Attributes
+    ----------
+    quantity : str
+        As in a campaign; ``time`` and ``gage_time`` are the clocks.
+    column : str
+        Empty for a clock that has a `rate` instead.
+    unit : str
+        Empty when the file itself states it.
+    factor, offset : float
+        `factor` includes the sign.
+    rate : float, [Hz]
+        Of a clock without a column, else NaN.
+    override : bool
+        `unit` holds even where the file states another one.
+    """
+
+    quantity: str
+    column: str
+    unit: str
+    factor: float = 1.0
+    offset: float = 0.0
+    rate: float = math.nan
+    override: bool = False
+
+    @property
+    def converts(self) -> bool:
+        """Whether the unit is not that of the column as it stands in the file."""
+        return self.override or abs(self.factor) != 1.0 or self.offset != 0.0
+
+    @property
+    def dimension(self) -> str:
+        """Dimension of the quantity."""
+        if self.quantity == GAGE_TIME:
+            return "time"
+        return dimension_of(self.quantity) or ""
+
+
+@dataclass(frozen=True, slots=True)
+class SetPointRule:
+    """Where a set point comes from, in the unit of its column in ``runs.csv``.
+
+    Attributes
+    ----------
+    value : float
+        The same for all runs; NaN when it comes from elsewhere.
+    column, unit : str
+        A column of the file that is constant within a run.
+    mean_to : float
+        The run's mean, rounded to a multiple of this; NaN when not used.
+    """
+
+    value: float = math.nan
+    column: str = ""
+    unit: str = ""
+    mean_to: float = math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class RunEntry:
+    """What the map says of one run: a kind, set points, start, further conditions."""
+
+    kind: str
+    points: Mapping[str, float]
+    start: float | None
+    extra: Mapping[str, float | str]
+    skip: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ImportMap:
+    """An import map.
+
+    Attributes
+    ----------
+    file : str
+        The map's own file, for messages.
+    header : CampaignHeader
+        With NaN for a rate that the map leaves to the time column.
+    kind : str
+        Of the runs that have no entry of their own.
+    run_column : str
+        Empty: each file is a run.
+    channels : mapping of quantity to ChannelRule
+    set_points : mapping of column of ``runs.csv`` to SetPointRule
+    runs : mapping of run number to RunEntry
+    csv : CsvOptions
+    warnings : tuple of Problem
+    sound : bool
+        False when the map has a fault; then axes and set points mean nothing.
+    """
+
+    file: str
+    header: CampaignHeader
+    kind: str
+    run_column: str
+    channels: Mapping[str, ChannelRule]
+    set_points: Mapping[str, SetPointRule]
+    runs: Mapping[int, RunEntry]
+    csv: CsvOptions
+    warnings: tuple[Problem, ...] = ()
+    sound: bool = True
+
+
+def read_map(path: str | Path, name: str = "import") -> ImportMap:
+    """Read an import map.
+
+    Parameters
+    ----------
+    path : str or Path
+    name : str
+        Of the campaign, when the map gives none.
+
+    Raises
+    ------
+    FormatError
+        With every fault of the map.
+    """
+    rules, problems = parse_map(path, name)
+    raise_errors(problems)
+    return rules
+
+
+def parse_map(path: str | Path, name: str) -> tuple[ImportMap, list[Problem]]:
+    """Read an import map and keep its faults, so that the files can be looked at as well.
+
+    Returns
+    -------
+    rules : ImportMap
+        What is right in it; `ImportMap.sound` is False when anything is wrong.
+    problems : list of Problem
+
+    Raises
+    ------
+    FormatError
+        If the map is illegible.
+    """
+    file = str(path)
+    reader = MapReader(file, read_document(file, Path(path)))
+    if reader.document.get("format") != FORMAT:
+        given = reader.document.get("format")
+        said = "the key is missing" if given is None else f"{given!r} is an unknown version"
+        reader.fault("format", said, f"{FORMAT!r} is what this version of tirelib reads",
+                     "state it, or use the tirelib that knows it")  # fmt: skip
+    reader.known("", reader.document, _TOP)
+    channels, wrong = _channels(reader)
+    kind = _kind(reader, "kind", reader.text("", reader.document, "kind") or "sweep")
+    run_column = reader.text("", reader.document, "run_column")
+    set_points = _set_points(reader, channels)
+    runs = _runs(reader)
+    options = read_csv_options(reader)
+    header, faults = header_of(file, reader.document, channels, name)
+    problems = [*reader.problems, *faults]
+    errors = errors_of(problems)
+    warnings = tuple(problem for problem in problems if problem not in errors)
+    sound = header is not None and not errors
+    header = header or CampaignHeader("", "iso", TireGeometry("", math.nan))
+    right = {quantity: rule for quantity, rule in channels.items() if quantity not in wrong}
+    rules = ImportMap(file, header, kind, run_column, right, set_points, runs, options, warnings,
+                      sound)  # fmt: skip
+    return rules, problems
+
+
+def _kind(reader: MapReader, where: str, kind: str) -> str:
+    if kind and kind not in KINDS:
+        reader.fault(where, f"{kind!r} is given", f"{', '.join(KINDS)} are allowed",
+                     did_you_mean(kind, KINDS))  # fmt: skip
+    return kind
+
+
+def _channels(reader: MapReader) -> tuple[dict[str, ChannelRule], set[str]]:
+    """Return the rules, and the quantities whose rule has a fault."""
+    given = reader.table("channels")
+    if not given:
+        reader.fault("[channels]", "no channel is mapped", "at least one quantity is needed",
+                     'write for instance Fz = { column = "FZ", unit = "N" }')  # fmt: skip
+    rules: dict[str, ChannelRule] = {}
+    wrong: set[str] = set()
+    for quantity, entry in given.items():
+        before = len(reader.problems)
+        where = f"[channels] {quantity}"
+        if not _is_quantity(quantity):
+            reader.fault(where, "the quantity is unknown",
+                         "names of quantities such as Fz, slip_angle, strain_1, ..._temperature "
+                         "are allowed", did_you_mean(quantity, _NAMES))  # fmt: skip
+        elif not isinstance(entry, dict):
+            reader.fault(where, f"{entry!r} is given", "a table is needed",
+                         'write { column = "...", unit = "..." }')  # fmt: skip
+        else:
+            rules[quantity] = _channel(reader, where, quantity, entry)
+        wrong |= {quantity} if len(reader.problems) > before else set()
+    used: dict[str, str] = {}
+    for quantity, rule in rules.items():
+        if rule.column and rule.column in used:
+            reader.fault(f"[channels] {quantity}",
+                         f"column {rule.column!r} is that of {used[rule.column]} already",
+                         "each column is one quantity", "correct one of them")  # fmt: skip
+        used.setdefault(rule.column, quantity)
+    return rules, wrong
+
+
+def _is_quantity(name: str) -> bool:
+    return (
+        name in _NAMES
+        or strain_number(name) is not None
+        or re.fullmatch(r"\w+_temperature", name) is not None
+    )
+
+
+def _channel(reader: MapReader, where: str, quantity: str, entry: Mapping[str, Any]) -> ChannelRule:
+    clock = quantity in ("time", GAGE_TIME)
+    reader.known(where, entry, (*_CHANNEL, "rate_hz") if clock else _CHANNEL)
+    column = reader.text(where, entry, "column")
+    rate = reader.number(where, entry, "rate_hz", math.nan) if clock else math.nan
+    if not column and not ("rate_hz" in entry and clock):
+        reader.fault(where, "no column is named", "column = a name in the files",
+                     "name it, or rate_hz for a clock without a column" if clock
+                     else "name it")  # fmt: skip
+    if "rate_hz" in entry and clock and (column or not rate > 0.0):
+        reader.fault(where, f"rate_hz = {rate:g}" + (" beside a column" if column else ""),
+                     "a rate above 0 instead of a column", "give one of them")  # fmt: skip
+    unit = reader.text(where, entry, "unit")
+    factor = reader.number(where, entry, "factor", 1.0)
+    turn = reader.number(where, entry, "sign", 1.0)
+    offset = reader.number(where, entry, "offset", 0.0)
+    if turn not in (1.0, -1.0):
+        reader.fault(f"{where} sign", f"{turn:g} is given", "1 and -1 are allowed",
+                     "use factor for a scale")  # fmt: skip
+    if factor == 0.0:
+        reader.fault(f"{where} factor", "0 is given", "any other number is allowed", "correct it")
+    override = entry.get("override_unit", False)
+    if not isinstance(override, bool) or (override and not unit):
+        reader.fault(
+            f"{where} override_unit",
+            f"{override!r} is given" + ("" if unit else " without a unit"),
+            "true or false, beside a unit",
+            "correct it",
+        )
+    rule = ChannelRule(quantity, column, unit, turn * factor, offset, rate, override is True)
+    _check_unit(reader, where, unit, rule.dimension)
+    return rule
+
+
+def _check_unit(reader: MapReader, where: str, unit: str, dimension: str) -> None:
+    """Note a unit of the wrong dimension; an empty one is left to the file."""
+    try:
+        if unit:
+            to_si(1.0, unit, dimension)
+    except UnitError as error:
+        given, allowed, _ = str(error).split("; ", 2)
+        reader.fault(f"{where} unit", given, allowed, "write the unit of the column")
+
+
+def _set_points(reader: MapReader, channels: Mapping[str, ChannelRule]) -> dict[str, SetPointRule]:
+    given = reader.table("set_points")
+    reader.known("[set_points]", given, POINTS)
+    rules: dict[str, SetPointRule] = {}
+    for column in SET_POINTS:
+        entry = given.get(column.name)
+        where = f"[set_points] {column.name}"
+        if entry is None:
+            continue
+        if not isinstance(entry, dict):
+            rules[column.name] = SetPointRule(
+                reader.number("[set_points]", given, column.name, 0.0)
+            )
+        elif "mean_to" in entry:
+            reader.known(where, entry, ("mean_to",))
+            step = reader.number(where, entry, "mean_to", 1.0)
+            measured = "Fz" if column.quantity == "load" else column.quantity
+            if not step > 0.0:
+                reader.fault(f"{where} mean_to", f"{step:g} is given", "a step above 0",
+                             f"write {{ mean_to = 50 }}, say, in {column.unit}")  # fmt: skip
+            if measured not in channels:
+                reader.fault(where, f"the mean of {measured} is asked for",
+                             f"[channels] {measured} is needed for that", "map it")  # fmt: skip
+            rules[column.name] = SetPointRule(mean_to=step)
+        else:
+            reader.known(where, entry, ("column", "unit"))
+            unit = reader.text(where, entry, "unit") or column.unit
+            _check_unit(reader, where, unit, column.dimension)
+            name = reader.text(where, entry, "column")
+            if not name:
+                reader.fault(where, "no column is named", "a number, { column, unit } or "
+                             "{ mean_to } is allowed", "name it")  # fmt: skip
+            rules[column.name] = SetPointRule(column=name, unit=unit)
+    return rules
+
+
+def _runs(reader: MapReader) -> dict[int, RunEntry]:
+    entries: dict[int, RunEntry] = {}
+    for key, values in reader.table("runs").items():
+        where = f"[runs.{key}]"
+        if not key.isdecimal() or not isinstance(values, dict):
+            reader.fault(where, f"{key!r} with {values!r}"[:60], "a table for a run number",
+                         "write for instance [runs.18]")  # fmt: skip
+            continue
+        kind = _kind(reader, f"{where} kind", reader.text(where, values, "kind"))
+        points = {n: reader.number(where, values, n, math.nan) for n in POINTS if n in values}
+        start = reader.number(where, values, "start_s", 0.0) if "start_s" in values else None
+        extra: dict[str, float | str] = {}
+        for name, value in values.items():
+            if name in (*POINTS, "kind", "start_s", "skip"):
+                continue
+            if isinstance(value, str | int | float) and name not in ("run", "file"):
+                extra[name] = value if isinstance(value, str) else float(value)
+            else:
+                reader.fault(f"{where} {name}", f"{value!r} is given",
+                             "a further condition is a number or a text, and run and file are "
+                             "taken", "correct it")  # fmt: skip
+        skip = values.get("skip", False)
+        if not isinstance(skip, bool):
+            reader.fault(f"{where} skip", f"{skip!r} is given", "true or false", "correct it")
+        entries[int(key)] = RunEntry(kind, points, start, extra, skip is True)
+    return entries

@@ -1,0 +1,190 @@
+"""What stands in a file, and a first draft of its map for names that are known.
+
+The names are those of the tire test consortium (FX, SA, IA, ...), of TYDEX (FYW, SLIPANGL, ...)
+and of a campaign itself. What the file does not say, the draft leaves open.
+"""
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tirelib.campaign.importing.columns import Column, FloatArray, Table
+from tirelib.campaign.importing.delimited import CsvOptions
+from tirelib.campaign.importing.formats import read_table
+from tirelib.campaign.importing.mapheader import is_gage, strain_number
+from tirelib.campaign.importing.mapreader import FORMAT
+from tirelib.units import QUANTITIES, dimension_of, dimensions_of_unit
+
+KNOWN_NAMES: Mapping[str, str] = {
+    "ET": "time", "V": "speed", "N": "omega", "SA": "slip_angle", "IA": "camber",
+    "RL": "loaded_radius", "RE": "effective_radius", "P": "pressure", "FX": "Fx", "FY": "Fy",
+    "FZ": "Fz", "MX": "Mx", "MY": "My", "MZ": "Mz", "SL": "slip_ratio",
+    "RST": "road_temperature", "TSTI": "tread_inner_temperature", "TSTC": "tread_temperature",
+    "TSTO": "tread_outer_temperature", "AMBTMP": "ambient_temperature",
+    "RUNTIME": "time", "FXW": "Fx", "FYW": "Fy", "FZW": "Fz", "MXW": "Mx", "MYW": "My",
+    "MZW": "Mz", "SLIPANGL": "slip_angle", "INCLANGL": "camber", "LONGSLIP": "slip_ratio",
+    "INFLPRES": "pressure", "WHROTSPD": "omega", "TRAJVELW": "speed", "TRAJVELH": "speed",
+    "DSTGRWHC": "loaded_radius", "T": "time", "TIMESTAMP": "time",
+}  # fmt: skip
+"""Column names of the field, in capitals, and their quantities."""
+
+
+@dataclass(frozen=True, slots=True)
+class ColumnSummary:
+    """A column at a glance.
+
+    Attributes
+    ----------
+    name, unit : str
+        As the file has them.
+    rows : int
+    low, high : float
+        Extremes of the finite values, in the file's own unit; NaN when there are none.
+    missing : int
+        Values that are NaN or infinite.
+    quantity : str
+        What the name is taken for; empty when it is not known.
+    """
+
+    name: str
+    unit: str
+    rows: int
+    low: float
+    high: float
+    missing: int
+    quantity: str
+
+
+def list_columns(
+    path: str | Path, options: CsvOptions | None = None
+) -> tuple[Table, list[ColumnSummary]]:
+    """Return the table of a file and a summary of each column.
+
+    Parameters
+    ----------
+    path : str or Path
+    options : CsvOptions, optional
+        For text tables that do not show their layout.
+
+    Raises
+    ------
+    FormatError
+        If the file cannot be read.
+    """
+    table = read_table(Path(path), options)
+    return table, [_summary(column) for column in table.columns.values()]
+
+
+def _summary(column: Column) -> ColumnSummary:
+    finite = column.values[np.isfinite(column.values)]
+    low, high = (float(finite.min()), float(finite.max())) if finite.size else (np.nan, np.nan)
+    missing = column.values.size - finite.size
+    return ColumnSummary(
+        column.name, column.unit, column.values.size, low, high, missing, quantity_of(column.name)
+    )
+
+
+def quantity_of(name: str) -> str:
+    """Return the quantity that a column name is known to mean, empty when it is not.
+
+    Examples
+    --------
+    >>> quantity_of("SA"), quantity_of("Fz [kN]"), quantity_of("strain_2"), quantity_of("X7")
+    ('slip_angle', 'Fz', 'strain_2', '')
+    """
+    bare = re.sub(r"\s*[\[(].*[\])]$", "", name.rpartition(".")[2].rpartition("/")[2]).strip()
+    own = {quantity.casefold(): quantity for quantity in QUANTITIES if quantity != "load"}
+    if bare.casefold() in own:
+        return own[bare.casefold()]
+    if strain_number(bare.casefold()) is not None or bare.endswith("_temperature"):
+        return bare.casefold()
+    return KNOWN_NAMES.get(bare.upper(), "")
+
+
+def suggest_map(path: str | Path, options: CsvOptions | None = None) -> str:
+    """Return the draft of a map for a file, as TOML.
+
+    Axes are told from the sign of Fz and of Fy against the slip angle, and marked as a guess; a
+    unit that the file does not state stays empty, and the import then asks for it.
+
+    Parameters
+    ----------
+    path : str or Path
+    options : CsvOptions, optional
+        For text tables that do not show their layout.
+
+    Raises
+    ------
+    FormatError
+        If the file cannot be read.
+    """
+    table, summaries = list_columns(path, options)
+    known: dict[str, ColumnSummary] = {}
+    others: list[ColumnSummary] = []
+    for item in summaries:
+        useless = item.low == item.high and item.quantity != "time" and item.rows > 1
+        if item.quantity and item.quantity not in known and not useless:
+            known[item.quantity] = item
+        else:
+            others.append(item)
+    axes, reason = _guessed_axes(table, known)
+    lines = [
+        f'format = "{FORMAT}"',
+        f'axes = "{axes}"  # {reason}',
+        f"name = {_quoted(Path(path).stem)}",
+        'kind = "sweep"  # or the kind of steady runs, with [set_points]',
+        "",
+        "[tire]",
+        "# free_radius_m = ...  # required",
+        "",
+    ]
+    strains = [quantity for quantity in known if strain_number(quantity) is not None]
+    if strains:
+        lines += ["[gages]", f"# lateral_m = [...]  # required: {len(strains)} positions", ""]
+    lines.append("[channels]")
+    lines += [_channel_line(quantity, item) for quantity, item in known.items()
+              if strains or not is_gage(quantity)]  # fmt: skip
+    lines += [f"# {_quoted(item.name)}: {item.low:g} .. {item.high:g} {item.unit}".rstrip()
+              for item in others]  # fmt: skip
+    return "\n".join([*lines, ""])
+
+
+def _channel_line(quantity: str, item: ColumnSummary) -> str:
+    dimension = dimension_of(quantity) or ""
+    fits = dimension in dimensions_of_unit(item.unit)
+    unit = item.unit if fits else ""
+    hint = "" if fits else f"state the unit of this {dimension}, "
+    return (
+        f"{quantity} = {{ column = {_quoted(item.name)}, unit = {_quoted(unit)} }}"
+        f"  # {hint}{item.low:g} .. {item.high:g}"
+    )
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
+
+
+def _guessed_axes(table: Table, known: Mapping[str, ColumnSummary]) -> tuple[str, str]:
+    """Return the axis system that the signs fit, empty when they do not tell, and why."""
+    load, force, angle = (_values(table, known, name) for name in ("Fz", "Fy", "slip_angle"))
+    if load is None:
+        return "", "required: iso, sae or adapted_sae; without Fz the file does not tell"
+    if float(np.nanmedian(load)) < 0.0:
+        return "sae", "a guess: Fz is negative; check it"
+    if force is None or angle is None or force.size != angle.size:
+        return "", "required: iso or adapted_sae; Fz is positive, Fy or slip angle is missing"
+    agreement = float(np.nansum(np.sign(force) * np.sign(angle)))
+    if abs(agreement) < 0.5 * force.size:
+        return "", "required: iso or adapted_sae; Fy against slip angle does not tell"
+    if agreement < 0.0:
+        return "iso", "a guess: Fz > 0, Fy and slip angle have opposite signs; check it"
+    return "adapted_sae", "a guess: Fz > 0, Fy and slip angle have the same sign; check it"
+
+
+def _values(table: Table, known: Mapping[str, ColumnSummary], quantity: str) -> FloatArray | None:
+    item = known.get(quantity)
+    return None if item is None else table.columns[item.name].values
