@@ -10,7 +10,6 @@ from scipy.stats import binom
 from tirelib.errors import ParameterError, ShapeError
 from tirelib.ring.frequencies import (
     belt_mass,
-    fit_stiffness,
     natural_frequency,
     rim_stiffness,
     sidewall_stiffness,
@@ -18,6 +17,7 @@ from tirelib.ring.frequencies import (
     three_mode_sensitivity,
     tread_stiffness,
 )
+from tirelib.ring.frequency_fit import fit_stiffness
 
 R, WIDTH, MASS, PRESSURE = 0.3, 0.165, 3.16, 1.32e5
 RING = {

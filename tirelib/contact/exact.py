@@ -1,29 +1,33 @@
 """The static ring without small-displacement assumptions, pressed on the road.
 
 The linear ring of the dissertation turns its cross-sections by up to 0.3 rad in the contact and yet
-keeps the undeformed circle as reference; at usual loads that costs 5 to 10 % in deflection and in the
-compressive peaks. Here the belt is a geometrically exact, extensible Bernoulli-Euler beam: with
-a = R + u + v' and c = u' - v (along the circle's tangent and normal)
+keeps the undeformed circle as reference; at usual loads that costs 5 to 10 % in deflection and in
+the compressive peaks. Here the belt is a geometrically exact, extensible Bernoulli-Euler beam: with
+a = R + u + v' and c = u' - v (along the circle's tangent and normal) its measures are
 
-    stretch   eps = sqrt(a^2 + c^2) / R - 1,      curvature change   k = (a c' - c a') / (a^2 + c^2),
+    stretch             eps = sqrt(a^2 + c^2) / R - 1,
+    change of curvature k / R = (a c' - c a') / (a^2 + c^2) / R.
 
-and the energy per angle is R (p b R eps + EA eps^2 / 2) + EI k^2 / (2 R) from the belt, R (k_u u^2 +
-k_v v^2) / 2 from the sidewall, - p b dA from the enclosed area, and R k_t delta^2 / 2 from the tread,
-whose tip h below the belt's normal overlaps the road by delta > 0. The load is vertical, without
-friction. Harmonics of u (even) and v (odd) and the deflection are found by Newton on the energy.
+The energy per angle is R (p b R eps + EA eps^2 / 2) + EI k^2 / (2 R) of the belt,
+R (k_u u^2 + k_v v^2) / 2 of the sidewall, -p b dA of the enclosed area, and R k_t delta^2 / 2 of
+the tread, whose tip h below the belt's normal overlaps the road by delta > 0. The load is vertical,
+without friction. Harmonics of u (even) and v (odd) and the deflection are found by Newton on the
+energy, from the linear ring's solution.
 
 Steady rolling leaves the shape of an inextensible belt as it is (the centrifugal tension balances
 the inertia exactly), so the static solution serves at every speed; damping is not in it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 
 from tirelib.arrays import FloatArray
+from tirelib.contact import radial
 from tirelib.contact.tread import Tread
 from tirelib.errors import ConvergenceError, ParameterError
+from tirelib.ring.compliance import compliance
 from tirelib.ring.ring import Ring, columns
 
 N_MODES = 48
@@ -66,7 +70,7 @@ class ExactContact:
     iterations: int
 
     def strain(self, offset: float | FloatArray, phi: FloatArray) -> FloatArray:
-        """Return eps - y k / R at gages `offset` = y < 0 from the neutral line, (n_points, n_phi)."""
+        """Return eps - y k / R at gages y < 0 from the neutral line, (n_points, n_phi)."""
         local = np.einsum(
             "pid,nd->npi", _basis(phi), np.concatenate([self.even, self.odd[:, 1:]], axis=1)
         )
@@ -125,10 +129,16 @@ def load_exact(ring: Ring, tread: Tread, vertical_load: float | FloatArray) -> E
             f"exact contact: load {np.min(loads):g} N; finite numbers > 0 are needed"
         )
     constants, loads = _constants(ring, tread, loads)
-    parts = [
-        _newton(constants.take(slice(i, i + CHUNK)), loads[i : i + CHUNK])
-        for i in range(0, loads.size, CHUNK)
-    ]
+    still = replace(ring, damping=0.0)
+    linear = radial.load(compliance(still, 0.0, N_MODES), tread, loads)
+    shape = linear.displacement
+    start = np.concatenate([shape[..., 0].real, -shape[:, 1:, 1].imag], axis=1)
+    parts = []
+    for first in range(0, loads.size, CHUNK):
+        rows = slice(first, first + CHUNK)
+        parts.append(
+            _newton(constants.take(rows), loads[rows], start[rows], linear.deflection[rows])
+        )
     x = np.concatenate([part[0] for part in parts])
     d0 = np.concatenate([part[1] for part in parts])
     half = np.concatenate([part[2] for part in parts])
@@ -180,14 +190,18 @@ def _basis_at_nodes() -> FloatArray:
     return _basis(_quadrature()[0])
 
 
-def _newton(k: _Constants, loads: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, int]:
+def _newton(
+    k: _Constants, loads: FloatArray, x: FloatArray, d0: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, int]:
     """Return coefficients, deflection, half contact angle and iterations."""
     angle, weight = _quadrature()
     basis = _basis_at_nodes()
     flat = basis.reshape(-1, basis.shape[2])
     n, size = loads.size, basis.shape[2]
-    x, d0 = np.zeros((n, size)), np.full(n, 0.01)
-    for iteration in range(1, MAX_ITERATIONS + 1):
+    x, d0 = x.copy(), d0.copy()
+    iterations, moving = 0, True
+    while moving and iterations < MAX_ITERATIONS:
+        iterations += 1
         local = (x @ flat.T).reshape(n, -1, 6)
         slope, curve, force, by_local, by_depth = _energy(local, d0[:, None], k, angle)
         matrix = np.empty((n, size + 1, size + 1))
@@ -206,16 +220,15 @@ def _newton(k: _Constants, loads: FloatArray) -> tuple[FloatArray, FloatArray, F
         scale = np.minimum(1.0, LONGEST_STEP / np.maximum(reach, 1e-300))
         x += scale[:, None] * step[:, :size]
         d0 += scale * step[:, size]
-        if reach.max() < TOLERANCE:
-            break
-    else:
+        moving = bool(reach.max() >= TOLERANCE)
+    if moving:
         raise ConvergenceError(
             f"exact contact: Newton still moves by {reach.max():.1e} m after {MAX_ITERATIONS} "
             f"steps (loads up to {loads.max():.0f} N); use a smaller load or a stiffer belt",
             d0,
             float(reach.max()),
         )
-    return x, d0, _half_angle(x, d0, k, loads), iteration
+    return x, d0, _half_angle(x, d0, k, loads), iterations
 
 
 def _half_angle(x: FloatArray, d0: FloatArray, k: _Constants, loads: FloatArray) -> FloatArray:

@@ -127,8 +127,8 @@ class _State:
         if not self.linear:
             moved_by = np.abs(delta - before).max(axis=1) / np.abs(delta).max(axis=1)
             change += _COMPRESSION_WEIGHT * moved_by
-        if target is not None:
-            change += (1.0 if self.constant else _DEFLECTION_WEIGHT) * np.abs(wanted / used - 1.0)
+        if target is not None and not self.constant:
+            change += _DEFLECTION_WEIGHT * np.abs(wanted / used - 1.0)
         self.patch[part], self.delta[part], self.change[part] = edges, delta, change
         self.edges[part] = moved
         free = target is None or self.constant
@@ -169,7 +169,8 @@ def _start(problem: Problem, deflection: FloatArray | None) -> tuple[FloatArray,
             undeformed = _undeformed(tread, d0)
         good = (half > 0.05 * undeformed[:, 1]) & (half < undeformed[:, 1])
     half = np.where(good, half, undeformed[:, 1])
-    return d0, np.stack([-half, half], axis=1)
+    middle = np.where(good & (np.abs(estimate.lag) < 0.2 * half), -estimate.lag, 0.0)
+    return d0, middle[:, None] + half[:, None] * _OUTWARD
 
 
 def _undeformed(tread: Tread, d0: FloatArray) -> FloatArray:

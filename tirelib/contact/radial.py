@@ -274,7 +274,7 @@ def _solve(
         worst = float(change[moving].max())
         raise ConvergenceError(
             f"contact: {moving.size} of {d0.size} points, the first number {moving[0]} at "
-            f"d0 = {1e3 * d0[moving[0]]:.2f} mm, still change by {worst:.2e} of half the patch after "
+            f"d0 = {1e3 * d0[moving[0]]:.2f} mm, still change by {worst:.2e} after "
             f"{found.iterations} iterations; look at the last contact (attribute iterate), use a "
             "smaller load or a stiffer belt",
             contact,

@@ -37,6 +37,8 @@ class EdgeEstimate:
     free_radius: FloatArray
     foundation: FloatArray
     bulge: FloatArray
+    lag: FloatArray
+    """Angle by which the damped belt answers late; the patch moves toward the entry by as much."""
 
     @classmethod
     def of(cls, compliance: Compliance, tread: Tread) -> "EdgeEstimate | None":
@@ -70,6 +72,7 @@ class EdgeEstimate:
             r0,
             c * compliance.radius,
             _bulge(compliance, a, b, c),
+            -np.angle(compliance.radial[:, _HARMONICS[1]]) / _HARMONICS[1],
         )
 
     def half_angle(self, d0: FloatArray) -> FloatArray:

@@ -97,8 +97,8 @@ def compliance(ring: Ring, omega: float | FloatArray, n_modes: int = 60) -> Comp
 
 def _plain(ring: Ring, omega: float | FloatArray, n_modes: int) -> ComplexArray:
     """Compliance of the inextensible Bernoulli-Euler ring: one scalar a harmonic, Eq. (89)."""
-    r, m, rho_i, share, w = columns(
-        ring.radius, ring.mass, ring.rotary_inertia, ring.inertia_share, omega
+    r, m, rho_i, share, more, w = columns(
+        ring.radius, ring.mass, ring.rotary_inertia, ring.inertia_share, ring.tension, omega
     )
     n = np.arange(n_modes + 1.0)[None, :]
     static = plain_stiffness(ring, n_modes)
@@ -107,7 +107,9 @@ def _plain(ring: Ring, omega: float | FloatArray, n_modes: int) -> ComplexArray:
     # (1 - n^2)^2 from the centrifugal tension, -(1 + n^2)^2 + 4 n^2 from inertia: they cancel
     rotation = share * m * w**2 * ((1.0 - n**2) ** 2 - (1.0 + n**2) ** 2 + 4.0 * n**2)
     rotary = -rho_i * (n * w * (1.0 - n**2) / r) ** 2
-    dynamic = static * (1.0 + 1j * n * w * modal_damping_time(ring, n_modes)) + rotation + rotary
+    further = more * ((1.0 - n**2) / r) ** 2
+    lagging = static * (1.0 + 1j * n * w * modal_damping_time(ring, n_modes))
+    dynamic = lagging + rotation + rotary + further
     _refuse_critical(dynamic.real, static)
     shape = np.stack(
         np.broadcast_arrays(-1j * n + 0 * r, np.ones_like(n * r), (1.0 - n**2) / r + 0j), axis=-1

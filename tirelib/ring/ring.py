@@ -53,6 +53,8 @@ class Ring:
         rho I of the cross-section; the dissertation leaves it out.
     inertia_share : [-]
         Share of the rotating inertia (Coriolis, centrifugal and its tension) that acts; 1 is all.
+    tension : [N]
+        Belt tension beside p b R + rho A R^2 Omega^2, either sign; it has no damping of its own.
     """
 
     radius: float | FloatArray
@@ -66,13 +68,15 @@ class Ring:
     shear_stiffness: float | FloatArray = np.inf
     rotary_inertia: float | FloatArray = 0.0
     inertia_share: float | FloatArray = 1.0
+    tension: float | FloatArray = 0.0
 
     def __post_init__(self) -> None:
         for field in fields(self):
             value = np.asarray(getattr(self, field.name), dtype=float)
             lowest = value.min() if value.size else np.nan
             positive = field.name in _POSITIVE
-            if np.isnan(value).any() or (lowest <= 0 if positive else lowest < 0):
+            negative = lowest < 0 and field.name not in _SIGNED
+            if np.isnan(value).any() or negative or (positive and lowest == 0):
                 worst = lowest if not np.isnan(value).any() else np.nan
                 raise ParameterError(
                     f"ring: {field.name} = {worst:.6g}; a number {'>' if positive else '>='} 0 is "
@@ -131,6 +135,7 @@ FREE = 1e-12
 _POSITIVE = frozenset(
     {"radius", "bending_stiffness", "mass", "extension_stiffness", "shear_stiffness"}
 ) | {"radial_stiffness"}
+_SIGNED = frozenset({"tension"})
 
 
 def modal_stiffness(ring: Ring, omega: float | FloatArray, n_modes: int) -> ComplexArray:
@@ -165,8 +170,8 @@ def columns(*values: float | FloatArray) -> list[FloatArray]:
 def modal_parts(
     ring: Ring, omega: float | FloatArray, n_modes: int
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Return the non-rotating stiffness and the part that rotation adds."""
-    r, ei, m, pb, ku, kv, rho_i, share, w = columns(
+    """Return the non-rotating stiffness and what rotation and further tension add."""
+    r, ei, m, pb, ku, kv, rho_i, share, more, w = columns(
         ring.radius,
         ring.bending_stiffness,
         ring.mass,
@@ -175,6 +180,7 @@ def modal_parts(
         ring.tangential_stiffness,
         ring.rotary_inertia,
         ring.inertia_share,
+        ring.tension,
         omega,
     )
     n = np.arange(n_modes + 1.0)[None, :]
@@ -195,6 +201,11 @@ def modal_parts(
     inertial[..., 0, 1] = rotation * (1j * n - 2j * n)
     inertial[..., 1, 0] = -inertial[..., 0, 1]
     inertial[..., 2, 2] = -rho_i * (n * w) ** 2
+    pull = more / r**2
+    inertial[..., 0, 0] += pull * n**2
+    inertial[..., 1, 1] += pull
+    inertial[..., 0, 1] += pull * 1j * n
+    inertial[..., 1, 0] -= pull * 1j * n
     return elastic, inertial
 
 

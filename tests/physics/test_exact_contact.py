@@ -1,0 +1,129 @@
+"""Laws of the geometrically exact ring on the road."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import simpson
+
+from tirelib.contact import exact, radial
+from tirelib.contact.exact import load_exact
+from tirelib.contact.tread import Tread
+from tirelib.errors import ParameterError
+from tirelib.ring.compliance import compliance
+from tirelib.ring.ring import Ring
+
+RING = Ring(
+    radius=0.302,
+    bending_stiffness=1.8,
+    mass=3.3,
+    inflation=2.1e5 * 0.165,
+    radial_stiffness=4.5e5,
+    tangential_stiffness=1.6e5,
+)
+TREAD = Tread(free_radius=0.3155, normal_stiffness=8.5e7, thickness=0.012)
+LOADS = np.array([1500.0, 3000.0, 4500.0, 6000.0, 7500.0])
+PHI = np.linspace(-np.pi, np.pi, 720, endpoint=False)
+
+
+def test_a_small_load_gives_the_linear_ring() -> None:
+    """The difference falls with the load: it is of second order in the displacement."""
+    still = compliance(RING, 0.0, exact.N_MODES)
+    errors = []
+    for load in (100.0, 300.0, 900.0):
+        linear = radial.load(still, TREAD, load).deflection[0]
+        errors.append(abs(load_exact(RING, TREAD, load).deflection[0] / linear - 1.0))
+    assert errors[0] < 3e-3
+    assert errors[0] < errors[1] < errors[2]
+
+
+def test_a_large_load_does_not() -> None:
+    still = compliance(RING, 0.0, exact.N_MODES)
+    linear = radial.load(still, TREAD, 7500.0).deflection[0]
+    assert load_exact(RING, TREAD, 7500.0).deflection[0] > 1.05 * linear
+
+
+def test_the_load_is_the_slope_of_the_energy() -> None:
+    """Work of the load between two deflections equals the integral of load over deflection."""
+    loads = np.linspace(3000.0, 3400.0, 9)
+    solved = load_exact(RING, TREAD, loads)
+    energy = _energy(solved)
+    work = simpson(loads, x=solved.deflection)
+    assert energy[-1] - energy[0] == pytest.approx(work, rel=5e-5)  # the edge lies between nodes
+
+
+def _energy(solved: exact.ExactContact) -> np.ndarray:
+    """Return the stored energy, integrated over angle on a fine grid, [J]."""
+    phi = np.linspace(0.0, np.pi, 20001)
+    basis = exact._basis(phi)
+    x = np.concatenate([solved.even, solved.odd[:, 1:]], axis=1)
+    u, v, e, c, da, dc = np.moveaxis(np.einsum("pid,nd->npi", basis, x), -1, 0)
+    r, pb = 0.302, 2.1e5 * 0.165
+    a = r + e
+    q = a**2 + c**2
+    stretch = np.sqrt(q) / r - 1.0
+    bend = (a * dc - c * da) / q
+    lean = phi - np.arctan2(c, a)
+    h = 0.3155 - r
+    tip = (r + u) * np.cos(phi) - v * np.sin(phi) + h * np.cos(lean)
+    delta = np.maximum(tip - (0.3155 - solved.deflection[:, None]), 0.0)
+    density = (
+        r * (pb * r * stretch + 0.5 * exact.INEXTENSIBLE * stretch**2)
+        + 0.5 * 1.8 * bend**2 / r
+        + 0.5 * r * (4.5e5 * u**2 + 1.6e5 * v**2)
+        - 0.5 * pb * ((r + u) * a - v * c)
+        + 0.5 * r * 8.5e7 * delta**2
+    )
+    return 2.0 * np.trapezoid(density, phi, axis=1)
+
+
+def test_the_inextensible_belt_keeps_its_length() -> None:
+    solved = load_exact(RING, TREAD, LOADS)
+    phi = np.linspace(0.0, np.pi, 4001)
+    x = np.concatenate([solved.even, solved.odd[:, 1:]], axis=1)
+    local = np.einsum("pid,nd->npi", exact._basis(phi), x)
+    stretch = np.hypot(0.302 + local[..., 2], local[..., 3]) / 0.302 - 1.0
+    assert np.abs(stretch).max() < 5e-4
+
+
+def test_the_belt_is_flat_on_the_road() -> None:
+    """In a long patch the middle has lost its curvature: the strain there is -y / R or more."""
+    solved = load_exact(RING, TREAD, 7500.0)
+    strain = solved.strain(-0.0033, np.array([0.0]))[0, 0]
+    assert strain == pytest.approx(0.0033 / 0.302, rel=0.06)
+
+
+def test_more_modes_and_nodes_change_little(monkeypatch: pytest.MonkeyPatch) -> None:
+    coarse = load_exact(RING, TREAD, LOADS).deflection
+    monkeypatch.setattr(exact, "N_MODES", 72)
+    monkeypatch.setattr(exact, "N_PATCH", 110)
+    for cached in (exact._quadrature, exact._basis_at_nodes):
+        cached.cache_clear()
+    fine = load_exact(RING, TREAD, LOADS).deflection
+    monkeypatch.undo()
+    for cached in (exact._quadrature, exact._basis_at_nodes):
+        cached.cache_clear()
+    np.testing.assert_allclose(coarse, fine, rtol=3e-4)
+
+
+def test_a_softer_belt_in_tension_deflects_more() -> None:
+    stiff = load_exact(RING, TREAD, LOADS).deflection
+    soft = load_exact(replace(RING, extension_stiffness=2e6), TREAD, LOADS).deflection
+    assert (soft > stiff).all()
+
+
+def test_many_points_are_solved_as_one() -> None:
+    together = load_exact(RING, TREAD, LOADS)
+    alone = [load_exact(RING, TREAD, load).deflection[0] for load in LOADS]
+    np.testing.assert_allclose(together.deflection, alone, rtol=1e-9)
+
+
+@pytest.mark.parametrize("load", [0.0, -100.0, np.nan])
+def test_a_load_that_is_none_is_refused(load: float) -> None:
+    with pytest.raises(ParameterError, match="load"):
+        load_exact(RING, TREAD, load)
+
+
+def test_a_shear_flexible_belt_is_refused() -> None:
+    with pytest.raises(ParameterError, match="shear stiffness"):
+        load_exact(replace(RING, shear_stiffness=7e4), TREAD, 4000.0)

@@ -1,0 +1,1 @@
+"""Tire parameters from campaigns, with intervals that hold the model's structural misfit."""

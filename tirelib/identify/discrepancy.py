@@ -1,0 +1,83 @@
+"""What the model's structure cannot show, as a smooth function with a prior.
+
+The ring is not the tire. Its misfit repeats from run to run, so more runs do not average it out,
+and a fit that ignores it gives intervals that are far too narrow. It is therefore part of the fit:
+a smooth function of the wheel angle in units of the half contact angle, in proportion to the run's
+strain, constant, or changing with load and with pressure. Its size has a prior; what the
+parameters can explain as well as it can widens their intervals.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.model.state import Operating
+
+REFERENCE_LOAD = 4000.0
+REFERENCE_PRESSURE = 2.0e5
+
+
+@dataclass(frozen=True, slots=True)
+class Discrepancy:
+    """Prior of the structural misfit.
+
+    Attributes
+    ----------
+    inside, outside : float, [-]
+        Standard deviation of the misfit relative to the run's rms strain, in the contact and away
+        from it: tread and road are modelled worse than the free belt.
+    knots : int
+        Smooth bumps over the angle.
+    reach : float, [-]
+        Half-width that they cover, in half contact angles.
+    by_load, by_pressure : float, [-]
+        Standard deviation of the part that goes with ln(load) and with relative pressure, relative
+        to the constant part.
+    """
+
+    inside: float = 0.08
+    outside: float = 0.02
+    knots: int = 24
+    reach: float = 5.0
+    by_load: float = 0.5
+    by_pressure: float = 0.25
+
+    def columns(
+        self, waveform: FloatArray, half_angle: FloatArray, points: Operating, phi: FloatArray
+    ) -> FloatArray:
+        """Return the misfit's shapes, each for one standard deviation of its coefficient.
+
+        Parameters
+        ----------
+        waveform : shape (n_runs, n_phi)
+        half_angle : shape (n_runs,), [rad]
+        points : Operating
+        phi : shape (n_phi,), [rad]
+
+        Returns
+        -------
+        shape (n_columns, n_runs, n_phi)
+        """
+        scaled = phi[None, :] / half_angle[:, None]
+        bumps = _bumps(scaled, self.knots, self.reach)
+        share = self.outside + (self.inside - self.outside) * np.exp(-((scaled / 1.5) ** 4))
+        size = share * np.sqrt(np.mean(waveform**2, axis=1))[:, None]
+        base = bumps * size[None]
+        base = base - base.mean(axis=2, keepdims=True)
+        load = np.log(points.load / REFERENCE_LOAD)[None, :, None]
+        pressure = (points.pressure / REFERENCE_PRESSURE - 1.0)[None, :, None]
+        return np.concatenate(
+            [base, self.by_load * base * load, self.by_pressure * 4.0 * base * pressure]
+        )
+
+
+def _bumps(scaled: FloatArray, knots: int, reach: float) -> FloatArray:
+    """Return overlapping Gaussian bumps with unit sum of squares, (knots, n_runs, n_phi)."""
+    # denser near the patch: equal steps of arcsinh
+    centre = np.sinh(np.linspace(-np.arcsinh(reach), np.arcsinh(reach), knots))
+    width = np.gradient(centre)
+    bumps = np.exp(-0.5 * ((scaled[None] - centre[:, None, None]) / width[:, None, None]) ** 2)
+    total = np.sqrt(np.sum(bumps**2, axis=0, keepdims=True))
+    peak: FloatArray = bumps / np.maximum(total, 1.0)
+    return peak

@@ -1,0 +1,84 @@
+"""An identification as JSON (``tirelib-identification/1``) and as a model file."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.campaign import Campaign
+from tirelib.identify.identify import Identification
+from tirelib.parameters import FIELDS, TireFile
+from tirelib.units import from_si
+
+FORMAT = "tirelib-identification/1"
+
+
+def identification_document(campaign: Campaign, found: Identification) -> dict[str, Any]:
+    """Return the numbers of an identification in the units of a tire file."""
+    runs, fit = found.runs, found.fit
+    return {
+        "format": FORMAT,
+        "campaign": campaign.header.name,
+        "tire": found.tire.name,
+        "axes": "iso",
+        "runs": [int(run) for run in runs.waves.run],
+        "gages": [gage + 1 for gage in runs.gages],
+        "noise_ustrain": 1e6 * runs.noise.std,
+        "rms_ustrain": 1e6 * fit.rms,
+        "strain_rms_ustrain": 1e6 * float(np.sqrt(np.mean(runs.strain**2))),
+        "parameters": [_parameter(found, k) for k in range(len(found.estimates))],
+        "correlation": found.correlation,
+        "vertical_stiffness": _vertical_stiffness(found),
+        "steps": fit.steps,
+        "provenance": dict(found.tire.extra["provenance"]),
+    }
+
+
+def _parameter(found: Identification, k: int) -> dict[str, Any]:
+    estimate = found.estimates[k]
+    dimension = FIELDS[estimate.name].dimension
+
+    def edge(value: float) -> float:
+        return float(from_si(value, estimate.unit, dimension))
+
+    low, high = sorted((edge(estimate.low), edge(estimate.high)))
+    return {
+        "name": estimate.name,
+        "meaning": FIELDS[estimate.name].meaning,
+        "value": edge(estimate.value),
+        "std": abs(edge(estimate.std)),
+        "low": low,
+        "high": high,
+        "fit_std": abs(edge(estimate.fit_std)),
+        "unit": estimate.unit,
+        "flags": list(estimate.flags),
+        "helps": estimate.helps,
+    }
+
+
+def _vertical_stiffness(found: Identification) -> dict[str, float | None]:
+    """Return the slope of load over deflection in the middle of the loads, [N/mm]."""
+    runs = found.runs
+    load = runs.waves.conditions["Fz"]
+    model = _slope(found.fit.linear.deflection, load)
+    known = np.isfinite(runs.deflection)
+    measured = _slope(runs.deflection[known], load[known]) if known.sum() >= 3 else None
+    return {"load_N": float(load.mean()), "model": model, "measured": measured}
+
+
+def _slope(deflection: FloatArray, load: FloatArray) -> float:
+    cubic = min(2, np.unique(np.round(load, -2)).size - 1)
+    fitted = np.polynomial.Polynomial.fit(load, deflection, cubic).deriv()
+    return float(1e-3 / fitted(float(load.mean())))
+
+
+def model_file(found: Identification) -> TireFile:
+    """Return the identified tire as a model without effects."""
+    extra = {
+        **found.tire.extra,
+        "model": {"ring": "large displacements", "contact": "radial"},
+        "effects": [],
+        "history": [],
+    }
+    return replace(found.tire, extra=extra)

@@ -1,0 +1,271 @@
+"""Identify a tire from a campaign: every number with an interval, and what it would take."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib import __version__
+from tirelib.arrays import FloatArray
+from tirelib.campaign import Campaign, CampaignHeader
+from tirelib.identify.campaign_data import StraightRuns, straight_runs
+from tirelib.identify.discrepancy import Discrepancy
+from tirelib.identify.structure import STRUCTURE_STD
+from tirelib.identify.waveform_fit import Prior, WaveformFit, fit_waveforms
+from tirelib.model.base import FREE, Coordinate, values_of
+from tirelib.parameters import FIELDS, Number, Tire, TireFile
+from tirelib.waveforms import Waveforms, measure_waveforms
+
+WIDEST = 0.25
+"""Relative half-width of a 95 % interval up to which a number is called identifiable."""
+TOLD = 0.6
+"""Share of the prior's deviation below which the campaign has told something."""
+LEVELS = 0.05
+"""Relative spread of a condition that counts as variation."""
+
+_LITERATURE: Mapping[str, tuple[float, float, str]] = {
+    "bending_stiffness": (2.1, 0.5, "literature, Table 6-3: 1.57 to 4 N m^2"),
+    "tread_stiffness": (7.5e7, 0.5, "literature, Table 6-3: 5.1e7 to 9.9e7 N/m^2"),
+    "mass": (3.3, 0.15, "literature, Tables 6-1, 6-2: 3.15 kg/m"),
+}
+"""Value, relative standard deviation and source of what no campaign header holds."""
+_RADIAL = (1.0, 2.4e5)
+_TANGENTIAL = (0.35, 1.1e5)
+"""Slope by pressure [m] and offset [N/m^2] of sidewall stiffnesses, about those of Table 6-3."""
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """One identified number, SI.
+
+    Attributes
+    ----------
+    name, unit : str
+        Unit of the SI value's field in a tire file.
+    value, std : float
+    low, high : float
+        95 % interval, structural misfit included; not symmetric where the surface is no parabola.
+    fit_std : float
+        What the fit alone knows.
+    flags : tuple of str
+        not_identifiable, at_boundary, not_quadratic.
+    helps : str
+        The run or test that would make it identifiable; empty when it is.
+    """
+
+    name: str
+    unit: str
+    value: float
+    std: float
+    low: float
+    high: float
+    fit_std: float
+    flags: tuple[str, ...]
+    helps: str
+
+
+@dataclass(frozen=True, slots=True)
+class Identification:
+    """What a campaign says of a tire.
+
+    Attributes
+    ----------
+    tire : TireFile
+        With provenance; what the other verbs read.
+    estimates : tuple of Estimate
+    correlation : shape (n, n)
+        Of the estimates, by the fit.
+    fit : WaveformFit
+    runs : StraightRuns
+    """
+
+    tire: TireFile
+    estimates: tuple[Estimate, ...]
+    correlation: FloatArray
+    fit: WaveformFit
+    runs: StraightRuns
+
+
+def identify(
+    campaign: Campaign,
+    tire: TireFile | None = None,
+    *,
+    waves: Waveforms | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Identification:
+    """Identify the base model from the straight runs of a campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    tire : TireFile, optional
+        Start and priors; the campaign's geometry and literature values where it is absent.
+    waves : Waveforms, optional
+        Of the campaign, when they have been read already.
+    progress : callable, optional
+        Called with a label after each run and step.
+
+    Raises
+    ------
+    CalibrationError
+        If the campaign cannot inform the model; says what is missing.
+    ConvergenceError
+        If the fit does not settle.
+    """
+    waves = waves or measure_waveforms(campaign, progress=progress)
+    runs = straight_runs(waves)
+    start = start_file(campaign.header, runs, tire)
+    fit = fit_waveforms(
+        runs.data(),
+        values_of(start.tire),
+        Prior(np.array([_prior_std(start, coordinate) for coordinate in FREE])),
+        discrepancy=Discrepancy(),
+        progress=progress,
+    )
+    estimates = tuple(_estimate(fit, k, start, runs) for k in range(len(fit.free)))
+    deviation = np.sqrt(np.diag(fit.covariance))
+    return Identification(
+        _fitted_file(start, estimates, campaign, runs, fit),
+        estimates,
+        fit.covariance / np.outer(deviation, deviation),
+        fit,
+        runs,
+    )
+
+
+def start_file(header: CampaignHeader, runs: StraightRuns, tire: TireFile | None) -> TireFile:
+    """Return start and priors: the campaign's geometry, then the given tire, then literature.
+
+    The reference pressure is the mean of the campaign. Damping, extension and shear of the belt and
+    hardening are no part of the base model and start at their plain values.
+    """
+    numbers: dict[str, Number] = {}
+    pressure = float(np.mean(runs.waves.conditions["pressure"]))
+    for name, (value, share, source) in _LITERATURE.items():
+        numbers[name] = Number(value, share * value, "literature", source)
+    for prefix, (slope, offset) in (("radial", _RADIAL), ("tangential", _TANGENTIAL)):
+        value = slope * pressure + offset
+        share = 0.4 if prefix == "radial" else 0.5
+        source = "literature, Table 6-3, at this pressure"
+        numbers[f"{prefix}_stiffness"] = Number(value, share * value, "literature", source)
+        numbers[f"{prefix}_pressure_slope"] = Number(slope, 1.0, "literature", source)
+    if tire is not None:
+        numbers |= {
+            name: number
+            for name, number in tire.numbers.items()
+            if name not in {"damping", "extension_stiffness", "shear_stiffness", "tread_hardening"}
+        }
+    geometry = header.tire
+    stated: dict[str, float | None] = {
+        "ring_radius": geometry.ring_radius,
+        "free_radius": geometry.free_radius,
+        "belt_width": geometry.belt_width,
+        "tread_thickness": geometry.tread_thickness,
+        "innerliner_offset": geometry.innerliner_offset,
+    }
+    for name, given in stated.items():
+        if given is not None and np.isfinite(given):
+            value = float(given)
+            deviation = 0.05 * abs(value) if name == "innerliner_offset" else float("nan")
+            numbers[name] = Number(value, deviation, "measured", f"{header.name}, campaign.toml")
+    if tire is not None:
+        shift = pressure - tire.tire.pressure
+        for prefix in ("radial", "tangential"):
+            old = numbers[f"{prefix}_stiffness"]
+            slope = numbers[f"{prefix}_pressure_slope"].value
+            numbers[f"{prefix}_stiffness"] = Number(
+                old.value + slope * shift, old.std, old.kind, old.source
+            )
+    numbers["pressure"] = Number(pressure, float("nan"), "measured", f"{header.name}, mean of runs")
+    return TireFile(geometry.name or header.name, numbers)
+
+
+def _prior_std(start: TireFile, coordinate: Coordinate) -> float:
+    """Return the prior's standard deviation of a coordinate, from the number's kind."""
+    number = start.numbers[coordinate.name]
+    by_kind = {"measured": 0.1, "fitted": 0.15, "literature": 0.5, "assumed": 0.7}[number.kind]
+    if coordinate.unit:
+        return (number.std if np.isfinite(number.std) else 1.0) / coordinate.unit
+    return number.std / abs(number.value) if np.isfinite(number.std) else by_kind
+
+
+def _estimate(fit: WaveformFit, k: int, start: TireFile, runs: StraightRuns) -> Estimate:
+    coordinate = fit.free[k]
+    name = coordinate.name
+    value = float(fit.values[name])
+    fit_std = coordinate.spread(value, float(np.sqrt(fit.covariance[k, k])))
+    size = abs(value) if not coordinate.unit else abs(start.numbers[name].value)
+    structure = STRUCTURE_STD[name] * size
+    low, high = (float(coordinate.moved(value, step)) for step in fit.interval[k])
+    low, high = min(low, high), max(low, high)
+    low = value - float(np.hypot(value - low, 1.96 * structure))
+    high = value + float(np.hypot(high - value, 1.96 * structure))
+    flags: list[str] = []
+    prior = coordinate.spread(start.numbers[name].value, float(fit.prior_std[k]))
+    untold = fit_std > TOLD * prior
+    wide = 0.5 * (high - low) > WIDEST * abs(value)
+    if untold or wide:
+        flags.append("not_identifiable")
+    if abs(value - start.numbers[name].value) > 2.5 * prior or _near_limit(name, value):
+        flags.append("at_boundary")
+    if not fit.quadratic[k]:
+        flags.append("not_quadratic")
+    return Estimate(
+        name, FIELDS[name].unit, value, float(np.hypot(fit_std, structure)), low, high, fit_std,
+        tuple(flags), _help(name, runs) if "not_identifiable" in flags else "",
+    )  # fmt: skip
+
+
+def _near_limit(name: str, value: float) -> bool:
+    field = FIELDS[name]
+    return value <= field.lowest * 1.001 if field.lowest > 0 else value >= field.highest * 0.999
+
+
+def _help(name: str, runs: StraightRuns) -> str:
+    """Return what would tell a number that this campaign does not."""
+    pressure = runs.waves.conditions["pressure"]
+    few = float(np.ptp(pressure)) < LEVELS * float(pressure.mean())
+    return {
+        "bending_stiffness": "a modal test with many modes, or straight runs at a small load",
+        "radial_stiffness": "runs at a small and a large load, or a sidewall test (S_v, S_theta)",
+        "radial_pressure_slope": "straight runs at pressures 40 % apart"
+        if few
+        else "straight runs at the lowest and highest allowed pressure at one load, repeated",
+        "tangential_stiffness": "a torsional sidewall test (S_theta), or runs with traction",
+        "tangential_pressure_slope": "torsional sidewall tests at two pressures",
+        "tread_stiffness": "a press test of the tread alone, or E and thickness (k_t = E b / tau)",
+        "innerliner_offset": "a cut section of the tire, or the thickness of its layers",
+    }[name]
+
+
+def _fitted_file(
+    start: TireFile,
+    estimates: tuple[Estimate, ...],
+    campaign: Campaign,
+    runs: StraightRuns,
+    fit: WaveformFit,
+) -> TireFile:
+    numbers = dict(start.numbers)
+    source = f"strain waveforms of {campaign.header.name}, {len(runs.waves)} straight runs"
+    for estimate in estimates:
+        notes: dict[str, object] = {
+            "interval_SI": [estimate.low, estimate.high],
+            "flags": list(estimate.flags),
+        }
+        if estimate.helps:
+            notes["helps"] = estimate.helps
+        numbers[estimate.name] = Number(estimate.value, estimate.std, "fitted", source, notes)
+    provenance = {
+        "method": "whole waveforms, Gauss-Newton with structural misfit",
+        "tirelib": __version__,
+        "campaign": campaign.header.name,
+        "data_sha256": campaign.content_hash(),
+        "runs": [int(run) for run in runs.waves.run],
+        "rms_microstrain": 1e6 * fit.rms,
+    }
+    return TireFile(start.name, numbers, {"provenance": provenance})
+
+
+def identified_tire(identification: Identification) -> Tire:
+    """Return the identified values alone."""
+    return identification.tire.tire

@@ -1,0 +1,115 @@
+"""What differs from run to run without anybody's will: set points, gain, angle zero, noise.
+
+The waveform of run i is m_i + sum_k b_ik t_ik + e_ik, where t_ik are the tangents of the model by
+load, pressure, gain and angle zero, b_ik is normal with the tolerance of the rig, and e is noise.
+Its covariance is noise plus rank four, so whitening costs a thin QR a run.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.campaign import Tolerance
+from tirelib.model.base import predict
+from tirelib.model.state import Operating
+from tirelib.signal import LowPass
+
+TRIAL = 1e-3
+SMALLEST_TOLERANCE = 1e-4
+
+
+@dataclass(frozen=True, slots=True)
+class Whitening:
+    """Turns residual waveforms into independent numbers of unit variance.
+
+    Attributes
+    ----------
+    basis : shape (n_runs, n_phi, 4)
+        Orthonormal, spans the tangents of each run.
+    inverse : shape (n_runs, 4, 4)
+        Inverse square root of the covariance within it.
+    noise : float, [-]
+    """
+
+    basis: FloatArray
+    inverse: FloatArray
+    noise: float
+
+    def __call__(self, residual: FloatArray) -> FloatArray:
+        """Return whitened residuals of shape (..., n_runs, n_phi)."""
+        inside = np.einsum("rnk,...rn->...rk", self.basis, residual, optimize=True)
+        outside = residual - np.einsum("rnk,...rk->...rn", self.basis, inside, optimize=True)
+        scaled = np.einsum("rkl,...rl->...rk", self.inverse, inside, optimize=True)
+        white: FloatArray = outside / self.noise + np.einsum(
+            "rnk,...rk->...rn", self.basis, scaled, optimize=True
+        )
+        return white
+
+
+def whitening(
+    waveform: FloatArray,
+    values: Mapping[str, float | FloatArray],
+    points: Operating,
+    tolerance: Tolerance,
+    angle_std: FloatArray,
+    noise: float,
+    low_pass: LowPass,
+) -> Whitening:
+    """Return the whitening at a model.
+
+    Parameters
+    ----------
+    waveform : shape (n_runs, n_phi)
+        Of the model at `values`.
+    tolerance : Tolerance
+        Relative standard deviations of load, pressure and gain.
+    angle_std : shape (n_runs,), [rad]
+        Of the angle's zero; infinite is a free shift.
+    noise : float, [-]
+        Standard deviation of a sample of a run's waveform.
+    """
+    tangent = random_tangents(waveform, values, points, low_pass)
+    scale = np.stack(
+        [
+            np.full(len(points), max(tolerance.load, SMALLEST_TOLERANCE)),
+            np.full(len(points), max(tolerance.pressure, SMALLEST_TOLERANCE)),
+            np.full(len(points), max(tolerance.gain, SMALLEST_TOLERANCE)),
+            np.minimum(angle_std, 1.0),
+        ],
+        axis=1,
+    )
+    basis, triangle = np.linalg.qr(tangent * scale[:, None, :])
+    inside = noise**2 * np.eye(tangent.shape[2]) + triangle @ triangle.swapaxes(1, 2)
+    inverse = np.linalg.inv(np.linalg.cholesky(inside))
+    return Whitening(basis, inverse, noise)
+
+
+def random_tangents(
+    waveform: FloatArray,
+    values: Mapping[str, float | FloatArray],
+    points: Operating,
+    low_pass: LowPass,
+) -> FloatArray:
+    """Return slopes by relative load, relative pressure, gain and angle, (n_runs, n_phi, 4)."""
+    n = len(points)
+    both = points.tiled(2)
+    load, pressure = both.load.copy(), both.pressure.copy()
+    load[:n] *= 1.0 + TRIAL
+    pressure[n:] *= 1.0 + TRIAL
+    moved = predict(values, replace(both, load=load, pressure=pressure), low_pass=low_pass).waveform
+    assert moved is not None  # noqa: S101 - the chain sets it
+    by_load = (moved[:n] - waveform) / TRIAL
+    by_pressure = (moved[n:] - waveform) / TRIAL
+    return np.stack([by_load, by_pressure, waveform, angle_slope(waveform)], axis=2)
+
+
+def angle_slope(waveform: FloatArray) -> FloatArray:
+    """Return the derivative by wheel angle of periodic waveforms (..., n_phi)."""
+    n = waveform.shape[-1]
+    order = 1j * np.fft.rfftfreq(n, 1.0 / n)
+    if n % 2 == 0:
+        order[-1] = 0.0
+    slope: FloatArray = np.fft.irfft(np.fft.rfft(waveform, axis=-1) * order, n=n, axis=-1)
+    return slope

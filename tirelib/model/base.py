@@ -1,0 +1,206 @@
+"""The base model and the parameters that a campaign may inform."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.contact.exact import load_exact
+from tirelib.model.chain import Changes, waveform
+from tirelib.model.state import Operating, State
+from tirelib.parameters import Tire
+from tirelib.signal import LowPass
+from tirelib.waveforms import GRID, Waveforms
+
+
+@dataclass(frozen=True, slots=True)
+class Coordinate:
+    """How a parameter moves: by a factor exp(z), or by z times a unit.
+
+    Attributes
+    ----------
+    name : str
+        Of `Tire`.
+    unit : float
+        Change for z = 1; zero means that the parameter is scaled by exp(z).
+    """
+
+    name: str
+    unit: float = 0.0
+
+    def moved(self, value: float | FloatArray, z: float | FloatArray) -> float | FloatArray:
+        """Return the parameter's value after a move."""
+        return value * np.exp(z) if self.unit == 0.0 else value + self.unit * z
+
+    def spread(self, value: float, std: float) -> float:
+        """Return a standard deviation of z as one of the value."""
+        return abs(value) * std if self.unit == 0.0 else self.unit * std
+
+
+FREE: tuple[Coordinate, ...] = (
+    Coordinate("bending_stiffness"),
+    Coordinate("radial_stiffness"),
+    Coordinate("radial_pressure_slope", 1.0),
+    Coordinate("tangential_stiffness"),
+    Coordinate("tangential_pressure_slope", 1.0),
+    Coordinate("tread_stiffness"),
+    Coordinate("innerliner_offset"),
+)
+"""Parameters of the base model that strain waveforms of a campaign may inform."""
+
+
+def values_of(tire: Tire) -> dict[str, float | FloatArray]:
+    """Return a tire's values by name."""
+    return asdict(tire)
+
+
+def move(
+    values: Mapping[str, float | FloatArray], z: FloatArray, free: tuple[Coordinate, ...] = FREE
+) -> dict[str, float | FloatArray]:
+    """Return the values after moving the free coordinates by z, shape (n_free,)."""
+    out = dict(values)
+    for coordinate, step in zip(free, z, strict=True):
+        out[coordinate.name] = coordinate.moved(values[coordinate.name], float(step))
+    return out
+
+
+def operating_points(waves: Waveforms) -> Operating:
+    """Return the conditions of a campaign's runs, as measured."""
+    c = waves.conditions
+    n = len(waves)
+    order = np.argsort(np.argsort(waves.start, kind="stable"), kind="stable") / max(n - 1, 1)
+    unknown = np.full(n, np.nan)
+    return Operating(
+        load=c["Fz"],
+        pressure=c["pressure"],
+        omega=c["omega"],
+        speed=c["speed"],
+        camber=c["camber"],
+        slip_angle=c["slip_angle"],
+        slip_ratio=c["slip_ratio"],
+        side_force=c["Fy"],
+        drive_force=c["Fx"],
+        order=order.astype(float),
+        temperature=waves.extra.get("temperature", waves.extra.get("tread_temperature", unknown)),
+    )
+
+
+def predict(
+    values: Mapping[str, float | FloatArray],
+    points: Operating,
+    changes: Changes = (),
+    *,
+    low_pass: LowPass | None = None,
+    correction: "Correction | None" = None,
+    phi: FloatArray = GRID,
+) -> State:
+    """Return the solved state of the model at operating points."""
+    state = State.of(values, points, phi)
+    if correction is None:
+        return waveform(state, changes, low_pass=low_pass)
+    state = waveform(state, [("gage", correction.change), *changes], low_pass=low_pass)
+    return state.but(deflection=state.deflection + correction.deflection)
+
+
+@dataclass(frozen=True, slots=True)
+class Correction:
+    """What large displacements add to the linear ring, at fixed parameters.
+
+    Attributes
+    ----------
+    waveform : shape (n_points, n_phi), [-]
+    deflection : shape (n_points,), [m]
+    """
+
+    waveform: FloatArray
+    deflection: FloatArray
+
+    def change(self, state: State) -> State:
+        """Add the correction to a waveform."""
+        assert state.waveform is not None  # noqa: S101 - acts at the gage stage
+        return state.but(waveform=state.waveform + self.waveform)
+
+    def tiled(self, times: int) -> "Correction":
+        """Return the correction for points repeated one after the other."""
+        return Correction(np.tile(self.waveform, (times, 1)), np.tile(self.deflection, times))
+
+
+def large_displacements(
+    values: Mapping[str, float | FloatArray],
+    points: Operating,
+    *,
+    low_pass: LowPass | None = None,
+    phi: FloatArray = GRID,
+) -> Correction:
+    """Return the exact ring less the linear one, both static and undamped, at a tire's values.
+
+    It changes slowly with the parameters, so a fit brings it up to date a few times only.
+    """
+    still = dict(values)
+    still["damping"] = 0.0
+    state = waveform(State.of(still, points, phi), low_pass=low_pass)
+    assert state.waveform is not None  # noqa: S101 - the chain sets it
+    exact = load_exact(replace(state.ring, shear_stiffness=np.inf), state.tread, points.load)
+    strain = smoothed(exact.strain(state.offset, phi), points, low_pass or LowPass())
+    return Correction(strain - state.waveform, exact.deflection - state.deflection)
+
+
+def smoothed(strain: FloatArray, points: Operating, low_pass: LowPass) -> FloatArray:
+    """Return whole-turn waveforms (n_points, n_phi) as the chain's filter gives them, mean off."""
+    n = strain.shape[1]
+    order = np.fft.rfftfreq(n, 1.0 / n)
+    if low_pass.cut_off is None:
+        sigma = np.full(len(points), low_pass.sigma(1.0))
+    else:
+        sigma = np.array([low_pass.sigma(rate / (2.0 * np.pi)) for rate in points.omega])
+    gain = np.exp(-0.5 * (sigma[:, None] * order) ** 2) * (order > 0)
+    out: FloatArray = np.fft.irfft(np.fft.rfft(strain, axis=1) * gain, n=n, axis=1)
+    return out
+
+
+@dataclass(frozen=True, slots=True)
+class Linear:
+    """The model at its parameters and its slopes by the free coordinates.
+
+    Attributes
+    ----------
+    waveform : shape (n_points, n_phi), [-]
+    deflection : shape (n_points,), [m]
+    waveform_slopes : shape (n_free, n_points, n_phi)
+    deflection_slopes : shape (n_free, n_points)
+    """
+
+    waveform: FloatArray
+    deflection: FloatArray
+    waveform_slopes: FloatArray
+    deflection_slopes: FloatArray
+
+
+def linearised(
+    values: Mapping[str, float | FloatArray],
+    points: Operating,
+    free: tuple[Coordinate, ...] = FREE,
+    changes: Changes = (),
+    *,
+    low_pass: LowPass | None = None,
+    correction: Correction | None = None,
+    step: float = 1e-4,
+) -> Linear:
+    """Return the model and its slopes: one shifted copy per free coordinate, all in one batch."""
+    n, k = len(points), len(free)
+    columns = dict(values)
+    for j, coordinate in enumerate(free):
+        z = np.zeros((k + 1, 1))
+        z[j + 1] = step
+        value = np.broadcast_to(np.asarray(values[coordinate.name], dtype=float), (n,))
+        moved = np.broadcast_to(coordinate.moved(value, z), (k + 1, n))
+        columns[coordinate.name] = np.ascontiguousarray(moved).ravel()
+    state = predict(
+        columns, points.tiled(k + 1), changes, low_pass=low_pass,
+        correction=correction.tiled(k + 1) if correction else None,
+    )  # fmt: skip
+    assert state.waveform is not None  # noqa: S101 - the chain sets it
+    waves = state.waveform.reshape(k + 1, n, -1)
+    depth = state.deflection.reshape(k + 1, n)
+    return Linear(waves[0], depth[0], (waves[1:] - waves[0]) / step, (depth[1:] - depth[0]) / step)

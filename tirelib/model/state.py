@@ -1,0 +1,173 @@
+"""What a model knows of every operating point on its way from tire to waveform.
+
+An effect takes a state and a strength and returns a changed state (`State.but`); it never changes
+its argument. All arrays have one row per operating point, SI, ISO signs.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.contact.radial import RadialContact
+from tirelib.contact.tread import Tread
+from tirelib.ring.ring import ComplexArray, Ring
+
+
+@dataclass(frozen=True, slots=True)
+class Operating:
+    """Conditions of operating points, arrays of shape (n_points,); NaN where unknown.
+
+    Attributes
+    ----------
+    load : [N]; pressure : [Pa]; omega : [rad/s]; speed : [m/s]
+    camber, slip_angle : [rad]; slip_ratio : [-]
+    side_force, drive_force : [N]
+        Fy and Fx of the tire.
+    order : [-]
+        Place in the campaign, 0 first to 1 last.
+    temperature : [K]
+    """
+
+    load: FloatArray
+    pressure: FloatArray
+    omega: FloatArray
+    speed: FloatArray
+    camber: FloatArray
+    slip_angle: FloatArray
+    slip_ratio: FloatArray
+    side_force: FloatArray
+    drive_force: FloatArray
+    order: FloatArray
+    temperature: FloatArray
+
+    def __len__(self) -> int:
+        return int(self.load.shape[0])
+
+    def tiled(self, times: int) -> "Operating":
+        """Return the points repeated one after the other."""
+        return Operating(*[np.tile(getattr(self, name), times) for name in self.__slots__])
+
+    def take(self, index: Any) -> "Operating":
+        """Return some of the points."""
+        return Operating(*[getattr(self, name)[index] for name in self.__slots__])
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """Operating points with the model's constants there, and what has been computed so far.
+
+    Attributes
+    ----------
+    conditions : Operating
+    radius, free_radius, width, thickness, offset : shape (n_points,), [m]
+        Ring radius R, free radius R0, belt width b, tread thickness h0, gage offset y < 0.
+    EI, mass, tension_pressure, k_u, k_v, damping, EA, GA, rotary_inertia, inertia_share, tension
+        Of the ring (`tirelib.ring.ring.Ring`); tension_pressure is p of the tension p b R.
+    k_t, hardening
+        Of the tread (`tirelib.contact.tread.Tread`).
+    lateral : float, [m]
+        Position of the gage (ISO, left positive).
+    deflection : shape (n_points,), [m]
+        d0 of the solution without effects; at the contact stage and later, of this one.
+    contact : RadialContact or None
+        From the contact stage on.
+    belt : shape (n_points, n_modes + 1, 3)
+        Harmonics of u, v [m] and beta [rad], from the contact stage on.
+    strain : shape (n_points, n_modes + 1)
+        Harmonics of the innerliner strain, from the strain stage on.
+    phi : shape (n_phi,), [rad]
+    waveform : shape (n_points, n_phi)
+        Filtered strain over wheel angle, at the gage stage.
+    """
+
+    conditions: Operating
+    radius: FloatArray
+    free_radius: FloatArray
+    width: FloatArray
+    thickness: FloatArray
+    offset: FloatArray
+    EI: FloatArray
+    mass: FloatArray
+    tension_pressure: FloatArray
+    k_u: FloatArray
+    k_v: FloatArray
+    damping: FloatArray
+    EA: FloatArray
+    GA: FloatArray
+    rotary_inertia: FloatArray
+    inertia_share: FloatArray
+    tension: FloatArray
+    k_t: FloatArray
+    hardening: FloatArray
+    phi: FloatArray
+    deflection: FloatArray
+    lateral: float = 0.0
+    contact: RadialContact | None = None
+    belt: ComplexArray | None = None
+    strain: ComplexArray | None = None
+    waveform: FloatArray | None = None
+
+    @classmethod
+    def of(
+        cls, values: Mapping[str, float | FloatArray], conditions: Operating, phi: FloatArray
+    ) -> "State":
+        """Return the state of a tire's values (names of `Tire`; arrays allowed) at conditions."""
+        n = len(conditions)
+
+        def column(name: str) -> FloatArray:
+            return np.broadcast_to(np.asarray(values[name], dtype=float), (n,))
+
+        above = conditions.pressure - column("pressure")
+        return cls(
+            conditions=conditions,
+            radius=column("ring_radius"),
+            free_radius=column("free_radius"),
+            width=column("belt_width"),
+            thickness=column("tread_thickness"),
+            offset=column("innerliner_offset"),
+            EI=column("bending_stiffness"),
+            mass=column("mass"),
+            tension_pressure=conditions.pressure,
+            k_u=column("radial_stiffness") + column("radial_pressure_slope") * above,
+            k_v=column("tangential_stiffness") + column("tangential_pressure_slope") * above,
+            damping=column("damping"),
+            EA=column("extension_stiffness"),
+            GA=column("shear_stiffness"),
+            rotary_inertia=column("rotary_inertia"),
+            inertia_share=np.ones(n),
+            tension=np.zeros(n),
+            k_t=column("tread_stiffness"),
+            hardening=column("tread_hardening"),
+            phi=phi,
+            deflection=np.full(n, np.nan),
+        )
+
+    def but(self, **changes: Any) -> "State":
+        """Return the state with some fields replaced."""
+        return replace(self, **changes)
+
+    @property
+    def ring(self) -> Ring:
+        """The ring of every point."""
+        return Ring(
+            radius=self.radius,
+            bending_stiffness=self.EI,
+            mass=self.mass,
+            inflation=self.tension_pressure * self.width,
+            radial_stiffness=self.k_u,
+            tangential_stiffness=self.k_v,
+            damping=self.damping,
+            extension_stiffness=self.EA,
+            shear_stiffness=self.GA,
+            rotary_inertia=self.rotary_inertia,
+            inertia_share=self.inertia_share,
+            tension=self.tension,
+        )
+
+    @property
+    def tread(self) -> Tread:
+        """The tread of every point."""
+        return Tread(self.free_radius, self.k_t, self.thickness, self.hardening)
