@@ -28,7 +28,7 @@ from tirelib.ring.ring import ComplexArray
 CHUNK = 4
 """Points that are solved together: their matrices fit into the processor's cache."""
 
-COARSE_NODES = 12
+COARSE_NODES = 20
 COARSE_TOLERANCE = 1e-3
 
 TOLERANCE = 1e-9
@@ -146,9 +146,9 @@ def solve(problem: ShearProblem, first: RadialContact, n_nodes: int) -> tuple[Ne
     coarse = Newton(problem, mesh, start(first, mesh))
     iterations = coarse.run(COARSE_TOLERANCE)
     fine_mesh = Mesh.of(n_nodes)
-    x = start(first, fine_mesh)
-    good = coarse.change < COARSE_TOLERANCE
-    if good.any():
-        x[good] = coarse.refined(fine_mesh)[good]
+    lost = ~(coarse.change < COARSE_TOLERANCE)
+    x = coarse.refined(fine_mesh)
+    if lost.any():
+        x[lost] = start(first, fine_mesh)[lost]
     fine = Newton(problem, fine_mesh, x)
     return fine, iterations + fine.run(TOLERANCE)

@@ -41,6 +41,8 @@ class ShearProblem:
 
     def take(self, index: IntArray) -> "ShearProblem":
         """Return the problem of some points."""
+        if index.size == len(self.tread):
+            return self
         given = [self.deflection, self.vertical_load, self.edges, self.torque, self.extra]
         part = [None if value is None else value[index] for value in given]
         return ShearProblem(self.at, self.tread.take(index), self.shear.take(index), *part)
