@@ -1,6 +1,6 @@
 """Laws of the strips across the width, and the numerical rig as independent truth."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cache
 
 import numpy as np
@@ -12,7 +12,7 @@ from bench.rig.tire import Condition, RigTire
 from tirelib.contact.fourier import evaluate
 from tirelib.contact.load_transfer import roll_load, strip_deflection
 from tirelib.contact.radial import load
-from tirelib.contact.strips import Layout, RoadForces, StripContact, press_strips
+from tirelib.contact.strips import SHARED, Layout, RoadForces, StripContact, press_strips
 from tirelib.contact.tread import Tread
 from tirelib.errors import ParameterError
 from tirelib.parameters import Tire
@@ -71,6 +71,12 @@ def test_even_strips_on_a_flat_crown_are_the_whole_tire() -> None:
         np.testing.assert_allclose(
             strips.displacement[:, strip], whole.displacement, rtol=1e-4, atol=1e-8
         )
+
+
+def test_every_constant_of_the_ring_is_shared_or_known_not_to_be() -> None:
+    same = {"radius", "damping", "inertia_share"}
+    assert set(SHARED) | same == {field.name for field in fields(Ring)}
+    assert not set(SHARED) & same
 
 
 def test_uneven_shares_add_up_to_the_same_tire() -> None:

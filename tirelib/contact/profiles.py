@@ -12,13 +12,13 @@ side of the middle: every end power of the edges, and a cusp in the middle, is i
 """
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 from scipy.special import betaln
 
-from tirelib.arrays import FloatArray, IntArray
+from tirelib.arrays import FloatArray
+from tirelib.contact.curves import Curve, PowerCurve, SampledCurve, stretched_rule
 from tirelib.errors import ParameterError, ShapeError
 
 CROWN_SCALE = 5000.0
@@ -27,36 +27,6 @@ NODES = 64
 FEWEST_NODES = 8
 SMALLEST_EXPONENT = 0.05
 """Below it the end power exceeds 20: all load on the middle, no contact pressure any more."""
-
-
-def _stretched_rule(count: int) -> tuple[FloatArray, FloatArray]:
-    """Return nodes and weights on (0, 1), crowded at both ends.
-
-    Gauss-Legendre in t with u = I_t(5, 5), the fifth-order smooth step: an end power u^p becomes
-    t^(5p), smooth enough for Gauss, and 1 - u is as exact at the far end as u is at the near one.
-    """
-    t, w = np.polynomial.legendre.leggauss(count)
-    t, w = 0.5 * (t + 1.0), 0.5 * w
-    u = t**5 * (126.0 - 420.0 * t + 540.0 * t**2 - 315.0 * t**3 + 70.0 * t**4)
-    return u, 630.0 * (t * (1.0 - t)) ** 4 * w
-
-
-_PIECE = _stretched_rule(40)
-
-
-class Curve(Protocol):
-    """A pressure over u, the distance from the leading edge in contact lengths (0 .. 1).
-
-    `rows` names the operating point of each u, as an index of the same shape.
-    """
-
-    def pressure(self, u: FloatArray, rows: IntArray) -> FloatArray:
-        """Return the pressure, [N/m]."""
-        ...
-
-    def cumulative(self, u: FloatArray, rows: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return the load between the leading edge and u, [N], and the integral of u over it."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,98 +89,6 @@ class PressureProfile:
         inside = (u >= 0.0) & (u <= 1.0)
         found = self.curve.pressure(np.where(inside, u, 0.0), np.broadcast_to(rows, u.shape))
         return np.where(inside, found, 0.0)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PowerCurve:
-    r"""q = q0 (1 + s xi) (1 - xi^2)^p (f + xi^2)^r over xi = 1 - 2u; one row per operating point.
-
-    The parabola (p = 1, r = 0), Eq. (28) (p = 1/n, r = 0) and Eq. (53) (p = r = 1/n_p) are cases
-    of it. All fields are arrays of shape (n_points,); `scale` is q0 per contact length, [N].
-    """
-
-    scale: FloatArray
-    length: FloatArray
-    skew: FloatArray
-    fill: FloatArray
-    edge_power: FloatArray
-    fill_power: FloatArray
-
-    def pressure(self, u: FloatArray, rows: IntArray) -> FloatArray:
-        """See `Curve`."""
-        return np.asarray(self._shape(u, rows) * self.scale[rows] / self.length[rows])
-
-    def cumulative(self, u: FloatArray, rows: IntArray) -> tuple[FloatArray, FloatArray]:
-        """See `Curve`."""
-        first = np.minimum(u, 0.5)
-        load, moment = self._piece(np.zeros_like(u), first, rows)
-        more, more_moment = self._piece(first, u, rows)
-        return load + more, moment + more_moment
-
-    def _shape(self, u: FloatArray, rows: IntArray) -> FloatArray:
-        xi = 1.0 - 2.0 * u
-        edge: FloatArray = (4.0 * u * (1.0 - u)) ** self.edge_power[rows]
-        fill: FloatArray = (self.fill[rows] + xi**2) ** self.fill_power[rows]
-        return (1.0 + self.skew[rows] * xi) * edge * fill
-
-    def _piece(
-        self, start: FloatArray, stop: FloatArray, rows: IntArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Integrate between two places on the same side of the middle."""
-        node, weight = _PIECE
-        width = (stop - start)[..., None]
-        u = start[..., None] + width * node
-        part = self._shape(u, rows[..., None]) * weight * width * self.scale[rows][..., None]
-        return part.sum(axis=-1), (part * u).sum(axis=-1)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SampledCurve:
-    """Straight lines between samples; one row per operating point.
-
-    `u` ascends from 0 to 1, shape (n_points, n_samples); `value` is the pressure there, [N/m];
-    `length` the contact length, shape (n_points,), [m].
-    """
-
-    u: FloatArray
-    value: FloatArray
-    length: FloatArray
-
-    def pressure(self, u: FloatArray, rows: IntArray) -> FloatArray:
-        """See `Curve`."""
-        left, step = self._segment(u, rows)
-        low, high = self.value[rows, left], self.value[rows, left + 1]
-        return np.asarray(low + (high - low) * (u - self.u[rows, left]) / step)
-
-    def cumulative(self, u: FloatArray, rows: IntArray) -> tuple[FloatArray, FloatArray]:
-        """See `Curve`."""
-        step = np.diff(self.u, axis=-1)
-        low, high = self.value[:, :-1], self.value[:, 1:]
-        whole, whole_moment = _trapezoid(self.u[:, :-1], step, low, high)
-        before = np.pad(np.cumsum(whole, axis=-1), ((0, 0), (1, 0)))
-        before_moment = np.pad(np.cumsum(whole_moment, axis=-1), ((0, 0), (1, 0)))
-        left, _ = self._segment(u, rows)
-        start = self.u[rows, left]
-        area, moment = _trapezoid(start, u - start, self.value[rows, left], self.pressure(u, rows))
-        load, moment = before[rows, left] + area, before_moment[rows, left] + moment
-        return load * self.length[rows], moment * self.length[rows]
-
-    def _segment(self, u: FloatArray, rows: IntArray) -> tuple[IntArray, FloatArray]:
-        """Return the segment of each u, and that segment's width."""
-        count = self.u.shape[1]
-        # All rows in one ascending list: row r lives in [2r, 2r + 1].
-        knots = (self.u + 2.0 * np.arange(self.u.shape[0])[:, None]).ravel()
-        found = np.searchsorted(knots, u + 2.0 * rows, side="right") - 1 - count * rows
-        left = np.clip(found, 0, count - 2)  # u = 1 belongs to the last segment
-        return left, self.u[rows, left + 1] - self.u[rows, left]
-
-
-def _trapezoid(
-    start: FloatArray, step: FloatArray, low: FloatArray, high: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return area and first moment of straight pieces from `start` to `start + step`."""
-    area = 0.5 * step * (low + high)
-    return area, start * area + step**2 * (low + 2.0 * high) / 6.0
 
 
 def parabola(
@@ -392,7 +270,7 @@ def _from_powers(
         raise ParameterError(
             f"nodes = {nodes}; allowed are even numbers of at least {FEWEST_NODES}"
         )
-    half_rule, half_weight = _stretched_rule(nodes // 2)
+    half_rule, half_weight = stretched_rule(nodes // 2)
     u = np.concatenate([0.5 * half_rule, 1.0 - 0.5 * half_rule[::-1]])[::-1]
     weight = np.concatenate([0.5 * half_weight, 0.5 * half_weight[::-1]])
     length = leading - trailing

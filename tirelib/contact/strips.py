@@ -20,6 +20,7 @@ a cambered road.
 """
 
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -48,6 +49,22 @@ __all__ = ["Layout", "RoadForces", "StripContact", "press_strips"]
 MAX_ITERATIONS = 40
 TOLERANCE = 1e-6
 """Of the load, relative; of the other line loads' harmonics, relative to load over radius."""
+SHARED = MappingProxyType(
+    dict.fromkeys(
+        (
+            "bending_stiffness",
+            "mass",
+            "inflation",
+            "tension",
+            "extension_stiffness",
+            "shear_stiffness",
+            "rotary_inertia",
+        ),
+        "width",
+    )
+    | dict.fromkeys(("radial_stiffness", "tangential_stiffness"), "sidewall")
+)
+"""Constants of the ring that a strip has its share of; the others are the same for all."""
 PROBE = np.linspace(-0.5, 0.5, 101)
 """Angles at which a strip is looked at to tell whether it touches the road, [rad]."""
 
@@ -61,7 +78,7 @@ def press_strips(
     camber: float | FloatArray = 0.0,
     forces: RoadForces | None = None,
     layout: Layout | None = None,
-    lateral_shear: float = np.inf,
+    lateral_shear: float | None = None,
     n_modes: int = 60,
     n_nodes: int = 24,
 ) -> StripContact:
@@ -77,8 +94,9 @@ def press_strips(
     forces : RoadForces, optional
     layout : Layout, optional
         Five equal strips if None.
-    lateral_shear : [N]
-        Shear stiffness of the belt in its own plane; infinite for Fiala's beam.
+    lateral_shear : [N], optional
+        Shear stiffness of the belt in its own plane, instead of the tire's; infinite for Fiala's
+        beam.
     n_modes, n_nodes : int
 
     Raises
@@ -108,7 +126,8 @@ def press_strips(
     whole = compliance(Ring.of(tire, p), w, n_modes).spread(target.size)
     d0 = load(whole, Tread.of(tire), target, n_nodes=n_nodes).deflection
     d0 = d0 + 0.5 * tire.crown_curvature * float(layout.width_share @ layout.lateral**2)
-    problem = _Problem(tire, layout, p, w, tilt, forces, lateral_shear, n_modes, n_nodes)
+    shear = tire.lateral_shear if lateral_shear is None else lateral_shear
+    problem = _Problem(tire, layout, p, w, tilt, forces, shear, n_modes, n_nodes)
     return _settle(problem, target, d0)
 
 
@@ -152,29 +171,23 @@ class _Problem:
         y, share, n = self.layout.lateral, self.layout.width_share, self.pressure.size
         whole = Tread.of(self.tire)
         free = float(np.asarray(whole.free_radius)) - 0.5 * self.tire.crown_curvature * y**2
-        return Tread(
-            np.tile(free, n),
-            np.tile(float(np.asarray(whole.normal_stiffness)) * share, n),
-            whole.thickness,
-            whole.hardening,
+        return replace(
+            whole,
+            free_radius=np.tile(free, n),
+            normal_stiffness=np.tile(float(np.asarray(whole.normal_stiffness)) * share, n),
         ).spread(n * y.size)
 
     def rings(self, deflection: FloatArray) -> Compliance:
         """Return the compliance of every strip at the strips' deflections, flat."""
         strips, n = len(self.layout), self.pressure.size
         ring = Ring.of(self.tire, np.repeat(self.pressure, strips), deflection)
-        width = np.tile(self.layout.width_share, n)
-        side = np.tile(self.layout.sidewall_share, n)
+        share = {
+            "width": np.tile(self.layout.width_share, n),
+            "sidewall": np.tile(self.layout.sidewall_share, n),
+        }
         ring = replace(
             ring,
-            bending_stiffness=ring.bending_stiffness * width,
-            mass=ring.mass * width,
-            inflation=ring.inflation * width,
-            extension_stiffness=ring.extension_stiffness * width,
-            shear_stiffness=ring.shear_stiffness * width,
-            rotary_inertia=ring.rotary_inertia * width,
-            radial_stiffness=ring.radial_stiffness * side,
-            tangential_stiffness=ring.tangential_stiffness * side,
+            **{name: getattr(ring, name) * share[part] for name, part in SHARED.items()},
         )
         return compliance(ring, np.repeat(self.omega, strips), self.n_modes).spread(n * strips)
 
@@ -235,6 +248,7 @@ def _advance(
     d = strip_deflection(
         state.d0, problem.layout.lateral, problem.camber, tire.crown_curvature
     ).ravel()
+    # a strip above the road has no deflection to soften its sidewall
     rings, tread = problem.rings(np.maximum(d, 0.0)), problem.tread()
     on = _touching(rings, tread, d, state.extra)
     part = press(

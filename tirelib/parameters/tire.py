@@ -73,6 +73,9 @@ FIELDS: Mapping[str, Field] = MappingProxyType(
         "lateral_stiffness": Field(
             "lateral", "N/m^2", "line_stiffness", 1e2, 1e9, "k_l, sidewall, lateral"
         ),
+        "lateral_shear": Field(
+            "lateral", "N", "force", 1e-3, _ANY, "S, shear of the belt in its own plane"
+        ),
         "roll_lever": Field(
             "lateral", "mm", "length", -0.5, 0.5, "height of the sidewalls' lateral force"
         ),
@@ -118,7 +121,8 @@ class Tire:
     tread_shear_stiffness: float = 0.0
     friction: float = 1.0
     crown_curvature: float = 0.7
-    lateral_bending: float = 1500.0
+    lateral_bending: float = 8000.0
+    lateral_shear: float = 1.2e4
     lateral_stiffness: float = 2.0e5
     roll_lever: float = 0.005
     bristle_lateral: float = 1.0e7
