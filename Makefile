@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: all demo test lint types contracts docs bench rig clean
+.PHONY: all demo test lint types contracts docs bench rig figures fem proof clean
 
 all: $(STAMP)
 
@@ -34,6 +34,18 @@ docs: $(STAMP)
 # Timed, with ratios within one run; never part of `make test`.
 bench: $(STAMP)
 	$(BIN)/python -m pytest tests/speed --benchmark-only --benchmark-columns=min,median,max,rounds
+
+# Draws the figures of the dissertation's chapters 5 and 6 from the models.
+figures: $(STAMP)
+	$(BIN)/python build/figures.py
+
+# Makes the finite-element reference data anew; needs CalculiX (Debian: calculix-ccx).
+fem: $(STAMP)
+	$(BIN)/python build/fem/run.py
+
+# Coverage of the identification's intervals on random tires of the numerical rig; an hour.
+proof: $(STAMP)
+	$(BIN)/python build/proof/run.py
 
 clean:
 	rm -rf build/out .pytest_cache .mypy_cache .ruff_cache

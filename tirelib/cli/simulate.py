@@ -1,0 +1,225 @@
+"""``tirelib simulate``: the ring model of a tire on the road."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from tirelib.arrays import FloatArray
+from tirelib.cli.common import FILE, output, write_json
+from tirelib.errors import ParameterError
+from tirelib.parameters import Tire, TireFile, read_tire
+from tirelib.report.simulation import CONTACTS, LARGEST_TURN_RATE, Simulation
+from tirelib.report.simulation import simulate as simulate_tire
+from tirelib.report.simulation_document import FORMAT, point_document, write_curves
+from tirelib.units import from_si, to_si
+
+_EXAMPLE = """\b
+Examples:
+  tirelib simulate --model table-6-1 --load 4000
+  tirelib simulate --model table-6-1 --deflection 25 --omega 59 --damping 0.04 --json s.json
+  tirelib simulate --model table-6-2-195-65r15 --load 1500,3000,4500 --pressure 2.3 --speed 65 \\
+                   --out build/out/simulate
+
+\b
+Values with commas are operating points, drawn together; an option with one value holds for all.
+Wheel angle 0 is below the axle, entry < 0 < exit; strain is positive in tension.
+"""
+
+
+def _numbers(
+    context: click.Context, option: click.Parameter, text: str | None
+) -> tuple[float, ...] | None:
+    """Return one number, or several with commas between them."""
+    if text is None:
+        return None
+    try:
+        return tuple(float(word) for word in text.split(","))
+    except ValueError:
+        raise click.BadParameter(
+            f"{text!r} is no number and no list like 1500,3000,4500; separate numbers with commas "
+            "only, without spaces", context, option,
+        ) from None  # fmt: skip
+
+
+@click.command(epilog=_EXAMPLE)
+@click.option("--model", metavar="M.toml|NAME", required=True,
+              help="Tire or model file, or the name of a tire of tirelib.")  # fmt: skip
+@click.option("--load", metavar="N", callback=_numbers, help="Vertical load Fz; or --deflection.")
+@click.option("--deflection", metavar="MM", callback=_numbers, help="Free minus loaded radius.")
+@click.option(
+    "--pressure", metavar="BAR", callback=_numbers, help="Inflation, gauge; default: tire's."
+)
+@click.option("--speed", metavar="KMH", callback=_numbers,
+              help="Free rolling; turn rate = speed / ring radius, as a belt of "
+                   "constant length rolls. Default 0.")  # fmt: skip
+@click.option("--omega", metavar="RAD_S", callback=_numbers, help="Turn rate, instead of --speed.")
+@click.option("--contact", type=click.Choice(CONTACTS), default=CONTACTS[0], show_default=True,
+              help="Tread springs: along the radius, or pressed and sheared.")  # fmt: skip
+@click.option("--damping", metavar="LAMBDA", type=float,
+              help="lambda of c_n = 2 lambda sqrt(m_n k_n); default: tire's.")  # fmt: skip
+@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write the results as JSON.")
+@click.option("--out", "folder", metavar="DIR", type=click.Path(path_type=Path, file_okay=False),
+              help="Write simulation.png, .svg, .csv (curves) and .json.")  # fmt: skip
+def simulate(
+    model: str,
+    load: tuple[float, ...] | None,
+    deflection: tuple[float, ...] | None,
+    pressure: tuple[float, ...] | None,
+    speed: tuple[float, ...] | None,
+    omega: tuple[float, ...] | None,
+    contact: str,
+    damping: float | None,
+    json_file: Path | None,
+    folder: Path | None,
+) -> None:
+    """Press the rolling ring onto the road: shape, pressure, shear, strain and strain rate."""
+    file = read_tire(model)
+    tire = file.tire if damping is None else file.tire.changed(damping=damping)
+    if speed is not None and omega is not None:
+        raise ParameterError("simulate: both --speed and --omega are given; give one of them")
+    if (load is None) == (deflection is None):
+        given = (
+            "neither --load nor --deflection" if load is None else "both --load and --deflection"
+        )
+        raise ParameterError(f"simulate: {given}; give exactly one, the other one is a result")
+    turn_rate = np.zeros(1) if omega is None else np.array(omega)
+    if speed is not None:
+        turn_rate = _turn_rate(_si(speed, "km/h", "speed"), tire)
+    done = simulate_tire(
+        tire,
+        load=None if load is None else np.array(load),
+        deflection=None if deflection is None else _si(deflection, "mm", "length"),
+        inflation=None if pressure is None else _si(pressure, "bar", "pressure"),
+        turn_rate=turn_rate,
+        contact=contact,
+    )
+    _print(file, done)
+    written = [] if json_file is None else [json_file]
+    if folder is not None:
+        written += _write(done, file.name, folder)
+    targets = [path for path in (json_file, folder and folder / "simulation.json") if path]
+    document = _document(file, model, done) if targets else {}
+    for target in targets:
+        write_json(target, document)
+    for path in written:
+        output().print(f"written: {path}")
+
+
+def _si(values: Sequence[float], unit: str, dimension: str) -> FloatArray:
+    return to_si(np.array(values, dtype=float), unit, dimension)
+
+
+def _turn_rate(speed: FloatArray, tire: Tire) -> FloatArray:
+    """Return the turn rate of a belt of constant length in free rolling."""
+    good = (speed >= 0.0) & (speed <= LARGEST_TURN_RATE * tire.ring_radius)
+    if not good.all():
+        most = from_si(LARGEST_TURN_RATE * tire.ring_radius, "km/h", "speed")
+        raise ParameterError(
+            f"simulate: --speed {from_si(float(speed[~good][0]), 'km/h', 'speed'):g} km/h; the "
+            f"model holds from 0 to {most:.0f} km/h ({LARGEST_TURN_RATE:g} rad/s) for this tire; "
+            "rolling is forward, entry first"
+        )
+    rate: FloatArray = speed / tire.ring_radius
+    return rate
+
+
+def _document(file: TireFile, model: str, done: Simulation) -> dict[str, Any]:
+    points = [point_document(done, point) for point in range(len(done))]
+    document = {
+        "format": FORMAT,
+        "model": model,
+        "tire": file.name,
+        "contact": done.contact,
+        "damping": done.tire.damping,
+        "signs": "wheel angle 0 below the axle, entry < 0 < exit; u outward, shear toward "
+                 "the exit, pressure inward, tension positive",
+        "effects_left_out": _effects(file),
+        "notes": _notes(file, done),
+        **points[0],
+    }  # fmt: skip
+    if len(points) > 1:
+        document["points"] = points
+    return document
+
+
+def _effects(file: TireFile) -> list[str]:
+    """Return the names of effects that a model has and this simulation does not."""
+    found = file.extra.get("effects", {})
+    if isinstance(found, dict):
+        return [str(name) for name in found]
+    return [str(item.get("name", item) if isinstance(item, dict) else item) for item in found]
+
+
+def _notes(file: TireFile, done: Simulation) -> list[str]:
+    """Say what a reader of the figures should know."""
+    notes = []
+    if effects := _effects(file):
+        notes.append(f"the model's effects are left out here: {', '.join(effects)}")
+    tire = done.tire
+    slopes = tire.radial_pressure_slope, tire.tangential_pressure_slope
+    if not any(slopes) and not np.allclose(done.inflation, tire.pressure, rtol=1e-9):
+        notes.append(
+            "the tire does not say how its sidewall stiffens with inflation (slopes of k_u and k_v "
+            "are 0): inflation acts through the tension of the belt only"
+        )
+    return notes
+
+
+def _write(done: Simulation, name: str, folder: Path) -> list[Path]:
+    from tirelib.report.figures.ring_simulation import figure_simulation
+    from tirelib.report.style import save
+
+    curves = folder / "simulation.csv"
+    write_curves(done, curves)
+    save(figure_simulation(done, name), folder, "simulation")
+    return [folder / f"simulation.{end}" for end in ("png", "svg")] + [
+        curves, folder / "simulation.json",
+    ]  # fmt: skip
+
+
+def _print(file: TireFile, done: Simulation) -> None:
+    """Print a column for each operating point."""
+    console = output()
+    damping = f"lambda {done.tire.damping:g}"
+    console.print(f"{file.name}, {done.contact} contact, {damping}; entry < 0 < exit")
+    for note in _notes(file, done):
+        console.print(f"note: {note}")
+    points = [point_document(done, point) for point in range(len(done))]
+    table = Table(box=SIMPLE_HEAD, show_header=False)
+    table.add_column()
+    for _ in points:
+        table.add_column(justify="right")
+    for title, read in _ROWS.items():
+        table.add_row(title, *(read(point) for point in points))
+    console.print(table)
+
+
+def _peak(kind: str, name: str, key: str) -> Any:
+    return lambda point: (
+        f"{point[kind][name][key]:.0f} at {np.rad2deg(point[kind][name]['angle_rad']):+.2f} deg"
+    )
+
+
+_ROWS: dict[str, Any] = {
+    "vertical load [N]": lambda p: f"{p['Fz_N']:.1f}",
+    "deflection [mm]": lambda p: f"{p['deflection_mm']:.3f}",
+    "inflation [bar]": lambda p: f"{p['pressure_bar']:g}",
+    "turn rate [rad/s]": lambda p: f"{p['omega_rad_s']:.4g}",
+    "speed [km/h]": lambda p: f"{p['speed_kmh']:.4g}",
+    "leading edge [rad]": lambda p: f"{p['edges_rad'][0]:+.4f}",
+    "trailing edge [rad]": lambda p: f"{p['edges_rad'][1]:+.4f}",
+    "contact length [mm]": lambda p: f"{p['contact_length_mm']:.2f}",
+    "pressure, middle [N/m]": lambda p: f"{p['q_center_N_per_m']:.0f}",
+    "pressure, largest [N/m]": lambda p: f"{p['q_max_N_per_m']:.0f}",
+    "centre of pressure [mm]": lambda p: f"{p['pressure_center_mm']:+.2f}",
+    "CP1 [microstrain]": _peak("strain_peaks", "cp1", "ustrain"),
+    "TP [microstrain]": _peak("strain_peaks", "tp", "ustrain"),
+    "CP2 [microstrain]": _peak("strain_peaks", "cp2", "ustrain"),
+    "strain rate, entry [microstrain/rad]": _peak("strain_rate_peaks", "lead", "ustrain_per_rad"),
+    "strain rate, exit [microstrain/rad]": _peak("strain_rate_peaks", "trail", "ustrain_per_rad"),
+}

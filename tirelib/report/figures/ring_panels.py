@@ -1,0 +1,117 @@
+"""Panels that the figures of the rolling ring share: curves over wheel angle, edges, names."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from tirelib.arrays import FloatArray
+from tirelib.report.simulation import MICRO, Simulation
+from tirelib.report.style import INK, label, zero_line
+from tirelib.units import from_si
+
+ANGLE = label("wheel angle from below the axle, entry < 0 < exit", "deg")
+SHORT_ANGLE = label("wheel angle, entry < 0 < exit", "deg")
+PER_DEGREE = MICRO * float(np.pi / 180.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A curve of `Simulation`: its field, factor to the plot's unit, and axis label.
+
+    A `traction` ends at the edges of the contact, which lie between the angles of the grid.
+    """
+
+    field: str
+    factor: float
+    label: str
+    traction: bool = False
+
+
+PRESSURE = Quantity("pressure", 1e-3, label("contact pressure, inward", "N/mm"), True)
+NORMAL = Quantity("normal", 1e-3, label("normal to the road, on the tire", "N/mm"), True)
+SHEAR = Quantity(
+    "shear", 1e-3, label("along the road, on the tire,\ntoward the exit > 0", "N/mm"), True
+)
+RADIAL = Quantity("u", 1e3, label("radial displacement u, outward > 0", "mm"))
+TANGENTIAL = Quantity("v", 1e3, label("tangential displacement v,\ntoward the exit > 0", "mm"))
+STRAIN = Quantity("strain", MICRO, label("strain, tension > 0", "microstrain"))
+RATE = Quantity("rate", PER_DEGREE, label("strain rate", "microstrain/deg"))
+
+
+def curve(done: Simulation, quantity: Quantity, point: int) -> tuple[FloatArray, FloatArray]:
+    """Return angles [rad] and values as drawn; a traction is zero at the contact's edges."""
+    phi, values = done.phi, quantity.factor * getattr(done, quantity.field)[point]
+    if quantity.traction:
+        place = np.searchsorted(phi, done.edges[point])
+        phi, values = np.insert(phi, place, done.edges[point]), np.insert(values, place, 0.0)
+    return phi, values
+
+
+def draw(
+    axes: Axes,
+    done: Simulation,
+    quantity: Quantity,
+    labels: Sequence[str],
+    colours: Sequence[str],
+    *,
+    within: float,
+    line: str = "-",
+    edges: bool = False,
+) -> None:
+    """Draw one curve per operating point for |phi| <= within [rad]; `edges` marks both edges."""
+    for point, (text, colour) in enumerate(zip(labels, colours, strict=True)):
+        phi, values = curve(done, quantity, point)
+        shown = np.abs(phi) <= within
+        axes.plot(np.rad2deg(phi[shown]), values[shown], line, color=colour, label=text)
+        if edges:
+            mark_edges(axes, done, point, colour)
+    zero_line(axes)
+    axes.set_xlim(-np.rad2deg(within), np.rad2deg(within))
+    axes.set_ylabel(quantity.label)
+
+
+def mark_edges(axes: Axes, done: Simulation, point: int, colour: str = INK) -> None:
+    """Draw thin vertical lines at both edges of the contact."""
+    for edge in np.rad2deg(done.edges[point]):
+        axes.axvline(edge, color=colour, linewidth=0.9, linestyle=":", zorder=1.4)
+
+
+def half_width(*several: Simulation) -> float:
+    """Return an angle that shows every contact with some room, [rad]."""
+    return 1.25 * float(max(np.abs(done.edges).max() for done in several))
+
+
+def load_labels(done: Simulation) -> list[str]:
+    """Say the loads."""
+    return [f"{load:.0f} N" for load in done.load]
+
+
+def deflection_labels(done: Simulation) -> list[str]:
+    """Say the deflections."""
+    return [f"{1e3 * d0:g} mm" for d0 in np.round(done.deflection, 7)]
+
+
+def inflation_labels(done: Simulation) -> list[str]:
+    """Say the inflation pressures."""
+    return [f"{1e-5 * p:g} bar" for p in done.inflation]
+
+
+def speed_labels(done: Simulation) -> list[str]:
+    """Say the speeds."""
+    speed = from_si(done.turn_rate * done.tire.ring_radius, "km/h", "speed")
+    return [f"{v:.0f} km/h" for v in speed]
+
+
+def point_labels(done: Simulation) -> list[str]:
+    """Say what tells the operating points apart: the load, and what else varies."""
+    parts = [load_labels(done)]
+    if np.ptp(done.inflation) > 0.0:
+        parts.append(inflation_labels(done))
+    if np.ptp(done.turn_rate) > 0.0:
+        parts.append(speed_labels(done))
+    texts = [", ".join(words) for words in zip(*parts, strict=True)]
+    if len(set(texts)) == len(texts):
+        return texts
+    return [f"{text} ({number})" for number, text in enumerate(texts, 1)]

@@ -1,0 +1,328 @@
+"""The rolling ring on the road as reports show it: shape, pressure, shear, strain and strain rate.
+
+Signs: wheel angle 0 below the axle, entry (leading edge) < 0 < exit; u outward, v and shear along
++phi (toward the exit at the road), pressure on the tire inward positive, strain positive in
+tension.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tirelib.arrays import FloatArray, IntArray
+from tirelib.contact import radial, shear
+from tirelib.contact.fourier import evaluate
+from tirelib.contact.free_boundary import ComplianceAt
+from tirelib.contact.radial import RadialContact
+from tirelib.contact.shear import ShearContact
+from tirelib.contact.tread import Tread
+from tirelib.errors import ParameterError
+from tirelib.parameters import FIELDS, Tire
+from tirelib.ring.compliance import Compliance, compliance
+from tirelib.ring.ring import ComplexArray, Ring
+from tirelib.strain.innerliner import strain_at
+from tirelib.units import from_si
+
+CONTACTS = ("radial", "shear")
+N_MODES = 200
+N_NODES = 120
+"""More than modes times half the contact angle, or the highest harmonics alias in the patch."""
+N_SHEAR_NODES = 80
+N_ANGLES = 1441
+"""A quarter of a degree."""
+LARGEST_TURN_RATE = 300.0
+"""Up to which the ring's steady rolling was checked, [rad/s]; about 320 km/h."""
+MICRO = 1e6
+
+
+@dataclass(frozen=True, slots=True)
+class Peaks:
+    """Extremes of strain and strain rate, each of shape (n_points,).
+
+    Attributes
+    ----------
+    cp1, tp, cp2 : strain of the compressive peaks before and after, and of the largest tension
+    rate_lead, rate_trail : [1/rad]
+        Largest and smallest strain rate.
+    cp1_angle, tp_angle, cp2_angle, rate_lead_angle, rate_trail_angle : [rad]
+    """
+
+    cp1: FloatArray
+    tp: FloatArray
+    cp2: FloatArray
+    rate_lead: FloatArray
+    rate_trail: FloatArray
+    cp1_angle: FloatArray
+    tp_angle: FloatArray
+    cp2_angle: FloatArray
+    rate_lead_angle: FloatArray
+    rate_trail_angle: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Simulation:
+    """The tire on the road at one or more operating points.
+
+    Attributes
+    ----------
+    tire : Tire
+    contact : str
+        radial: tread springs along the radius only; shear: tread pressed and sheared, free rolling
+        of Eq. (103), (104).
+    inflation, turn_rate, load, deflection : shape (n_points,), [Pa], [rad/s], [N], [m]
+    edges : shape (n_points, 2), [rad]
+    middle_pressure, pressure_centre : shape (n_points,), [N/m], [m]
+        Pressure at the middle of the contact; R int q sin / int q cos, negative toward the entry.
+    phi : shape (n_phi,), [rad]
+        From -pi to pi.
+    u, v : shape (n_points, n_phi), [m]
+    pressure : shape (n_points, n_phi), [N/m]
+        Inward, along the wheel's radius (radial) or the deformed belt's normal (shear).
+    normal, shear : shape (n_points, n_phi), [N/m]
+        Traction of the road on the tire along the road's normal, and along the road toward the
+        exit, per length of belt.
+    strain, rate : shape (n_points, n_phi), [-], [1/rad]
+        At the innerliner; the rate per angle (times the turn rate it is per second).
+    effective_radius, torque, sliding_onset : shape (n_points,) or None, [m], [N m], [rad]
+        R_e, moment of the road about the axle along +phi, and where sliding begins (NaN: nowhere).
+        The radial contact knows none of them.
+    """
+
+    tire: Tire
+    contact: str
+    inflation: FloatArray
+    turn_rate: FloatArray
+    load: FloatArray
+    deflection: FloatArray
+    edges: FloatArray
+    middle_pressure: FloatArray
+    pressure_centre: FloatArray
+    phi: FloatArray
+    u: FloatArray
+    v: FloatArray
+    pressure: FloatArray
+    normal: FloatArray
+    shear: FloatArray
+    strain: FloatArray
+    rate: FloatArray
+    effective_radius: FloatArray | None = None
+    torque: FloatArray | None = None
+    sliding_onset: FloatArray | None = None
+
+    def __len__(self) -> int:
+        return int(self.load.size)
+
+    @property
+    def contact_angle(self) -> FloatArray:
+        """Trailing minus leading edge, [rad], shape (n_points,)."""
+        angle: FloatArray = self.edges[:, 1] - self.edges[:, 0]
+        return angle
+
+    @property
+    def contact_length(self) -> FloatArray:
+        """Contact angle times the ring's radius: length of belt over the contact, [m]."""
+        return self.contact_angle * self.tire.ring_radius
+
+    @property
+    def largest_pressure(self) -> FloatArray:
+        """Largest pressure, by a parabola through three angles, [N/m], shape (n_points,)."""
+        return extreme(self.phi, self.pressure)[1]
+
+    @property
+    def peaks(self) -> Peaks:
+        """Extremes of strain and strain rate."""
+        middle = self.edges.mean(axis=1)[:, None]
+        before, after = self.phi <= middle, self.phi >= middle
+        cp1 = extreme(self.phi, np.where(before, -self.strain, -np.inf))
+        cp2 = extreme(self.phi, np.where(after, -self.strain, -np.inf))
+        tp, up, down = (extreme(self.phi, x) for x in (self.strain, self.rate, -self.rate))
+        return Peaks(-cp1[1], tp[1], -cp2[1], up[1], -down[1],
+                     cp1[0], tp[0], cp2[0], up[0], down[0])  # fmt: skip
+
+    def belt(self) -> tuple[FloatArray, FloatArray]:
+        """Return x (forward) and z (up) of the belt from the axle, shape (n_points, n_phi), [m]."""
+        sin, cos, r = np.sin(self.phi), np.cos(self.phi), self.tire.ring_radius + self.u
+        x: FloatArray = -r * sin - self.v * cos
+        z: FloatArray = -r * cos + self.v * sin
+        return x, z
+
+
+def simulate(
+    tire: Tire,
+    *,
+    load: float | Sequence[float] | FloatArray | None = None,
+    deflection: float | Sequence[float] | FloatArray | None = None,
+    inflation: float | Sequence[float] | FloatArray | None = None,
+    turn_rate: float | Sequence[float] | FloatArray = 0.0,
+    contact: str = "radial",
+) -> Simulation:
+    """Press the rolling tire onto the road, at one or many operating points.
+
+    Parameters
+    ----------
+    tire : Tire
+    load, deflection : scalar or shape (n_points,), [N], [m]
+        One of the two.
+    inflation : scalar or shape (n_points,), [Pa]
+        The tire's own by default.
+    turn_rate : scalar or shape (n_points,), [rad/s]
+    contact : str
+        radial or shear.
+
+    Raises
+    ------
+    ParameterError
+        If not exactly one of load and deflection is given, numbers of points differ, a value is
+        outside the model's range, or the tread is pressed through, Eq. (52).
+    ConvergenceError
+        If the contact does not settle.
+    """
+    if (load is None) == (deflection is None):
+        given = "neither load nor deflection" if load is None else "both load and deflection"
+        raise ParameterError(
+            f"simulation: {given}; the other one follows from the model; give exactly one"
+        )
+    if contact not in CONTACTS:
+        raise ParameterError(
+            f"simulation: contact {contact!r} is unknown; allowed are {', '.join(CONTACTS)}"
+        )
+    pressed = load if load is not None else deflection
+    own = tire.pressure if inflation is None else inflation
+    target, p, omega = _points(pressed, own, turn_rate)
+    _check_range("inflation pressure", p, 0.0, FIELDS["pressure"].highest, "bar", "pressure")
+    _check_range("turn rate", omega, 0.0, LARGEST_TURN_RATE, "rad/s", "angular_speed")
+    at, tread = _ring_at(tire, p, omega), Tread.of(tire)
+    if contact == "shear":
+        press_sheared = shear.load if load is not None else shear.press
+        sheared = press_sheared(at, tread, shear.Shear.of(tire), target, n_nodes=N_SHEAR_NODES)
+        _check_tread(tire, sheared.load, sheared.compression)
+        return _sheared(tire, sheared, p, omega)
+    press_radially = radial.load if load is not None else radial.press
+    pressed_radially = press_radially(at, tread, target, n_nodes=N_NODES)
+    _check_tread(tire, pressed_radially.load, pressed_radially.delta)
+    return _radial(tire, pressed_radially, p, omega)
+
+
+def extreme(phi: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return angle and value of the maximum along the last axis, by a parabola on a uniform grid.
+
+    At the ends of the grid, or beside a value that is not finite, the sample itself is returned.
+
+    Examples
+    --------
+    >>> phi = np.linspace(-1.0, 1.0, 21)
+    >>> angle, value = extreme(phi, 3.0 - (phi - 0.123) ** 2)
+    >>> round(float(angle), 6), round(float(value), 6)
+    (0.123, 3.0)
+    """
+    top: IntArray = np.argmax(values, axis=-1)
+    inner = np.clip(top, 1, phi.size - 2)[..., None]
+    left, mid, right = (np.take_along_axis(values, inner + k, axis=-1)[..., 0] for k in (-1, 0, 1))
+    fits = np.isfinite(left) & np.isfinite(mid) & np.isfinite(right) & (top == inner[..., 0])
+    left, mid, right = (np.where(fits, x, 0.0) for x in (left, mid, right))
+    bend = left - 2.0 * mid + right
+    share = np.divide(0.5 * (left - right), bend, out=np.zeros_like(mid), where=bend < 0.0)
+    best = np.take_along_axis(values, top[..., None], axis=-1)[..., 0]
+    angle: FloatArray = phi[top] + share * (phi[1] - phi[0])
+    value: FloatArray = np.where(fits, mid - 0.25 * (left - right) * share, best)
+    return angle, value
+
+
+def _points(*given: Any) -> tuple[FloatArray, ...]:
+    """Return the values of every operating point, one shape."""
+    arrays = [np.atleast_1d(np.asarray(value, dtype=float)) for value in given]
+    count = max(array.size for array in arrays)
+    for array in arrays:
+        if array.ndim > 1 or array.size not in (1, count):
+            raise ParameterError(
+                f"simulation: {array.size} values beside {count}; one value, or as many as the "
+                "longest list has, is needed"
+            )
+    return tuple(np.broadcast_to(array, (count,)).copy() for array in arrays)
+
+
+def _check_range(
+    what: str, value: FloatArray, lowest: float, highest: float, unit: str, dimension: str
+) -> None:
+    good = (value >= lowest) & (value <= highest)  # NaN is not
+    if not good.all():
+        least, most, found = (
+            from_si(x, unit, dimension) for x in (lowest, highest, float(value[~good][0]))
+        )
+        raise ParameterError(
+            f"simulation: {what} = {found:g} {unit}; the model holds from {least:g} to {most:g} "
+            f"{unit}; check value and unit"
+        )
+
+
+def _ring_at(tire: Tire, p: FloatArray, omega: FloatArray) -> Compliance | ComplianceAt:
+    """Return the ring's compliance, as a function of deflection where the sidewall softens."""
+
+    def at(deflection: FloatArray) -> Compliance:
+        return compliance(Ring.of(tire, p, deflection), omega, N_MODES)
+
+    if tire.radial_deflection_rate:
+        return at
+    return compliance(Ring.of(tire, p), omega, N_MODES)
+
+
+def _check_tread(tire: Tire, load: FloatArray, compression: FloatArray) -> None:
+    """Refuse a tread without thickness left, Eq. (52)."""
+    deepest = compression.max(axis=1)
+    if (deepest >= tire.tread_thickness).any():
+        point = int(np.argmax(deepest))
+        raise ParameterError(
+            f"simulation: point {point} at Fz = {load[point]:.0f} N presses the tread by "
+            f"{1e3 * deepest[point]:.2f} mm; its thickness is {1e3 * tire.tread_thickness:g} mm, "
+            "Eq. (52); lower the load or check the tread's stiffness"
+        )
+
+
+def _radial(tire: Tire, found: RadialContact, p: FloatArray, omega: FloatArray) -> Simulation:
+    """Evaluate a radial contact on the grid of angles."""
+    phi = np.linspace(-np.pi, np.pi, N_ANGLES)
+    q = found.pressure_at(phi)
+    middle = found.pressure_at(found.edges.mean(axis=1)[:, None])[:, 0]
+    u, v, strain, rate = _shape(tire, found.displacement, phi)
+    return Simulation(
+        tire, "radial", p, omega, found.load, found.deflection, found.edges, middle,
+        found.pressure_centre, phi, u, v, q, q * np.cos(phi), -q * np.sin(phi), strain, rate,
+    )  # fmt: skip
+
+
+def _sheared(tire: Tire, found: ShearContact, p: FloatArray, omega: FloatArray) -> Simulation:
+    """Evaluate a contact with tread shear on the grid of angles."""
+    phi = np.linspace(-np.pi, np.pi, N_ANGLES)
+    q, normal, along = _tractions(found, phi)
+    middle = _tractions(found, found.edges.mean(axis=1)[:, None])[0][:, 0]
+    u, v, strain, rate = _shape(tire, found.displacement, phi)
+    return Simulation(
+        tire, "shear", p, omega, found.load, found.deflection, found.edges, middle,
+        found.pressure_centre, phi, u, v, q, normal, along, strain, rate,
+        found.effective_radius, found.torque, found.sliding_onset,
+    )  # fmt: skip
+
+
+def _tractions(found: ShearContact, phi: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return pressure, and traction along the road's normal and along the road, zero outside."""
+    tread, inside = found.elements_at(phi), found.inside(phi)
+    sin, cos = np.sin(phi), np.cos(phi)
+    outward, along = tread.loads[..., 0], tread.loads[..., 1]
+    return (
+        np.where(inside, -tread.normal, 0.0),
+        np.where(inside, along * sin - outward * cos, 0.0),
+        np.where(inside, along * cos + outward * sin, 0.0),
+    )
+
+
+def _shape(
+    tire: Tire, displacement: ComplexArray, phi: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return u, v, strain and strain rate at the angles."""
+    u, v = (evaluate(displacement[..., i], phi) for i in (0, 1))
+    strain, rate = (
+        strain_at(displacement, tire.ring_radius, tire.innerliner_offset, phi, k) for k in (0, 1)
+    )
+    return u, v, strain, rate

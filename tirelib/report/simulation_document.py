@@ -1,0 +1,88 @@
+"""What `tirelib simulate` writes: the keys of its JSON, and the curves as CSV."""
+
+import csv
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from tirelib.arrays import FloatArray
+from tirelib.errors import FormatError
+from tirelib.report.simulation import MICRO, Simulation
+
+FORMAT = "tirelib-simulation/1"
+
+
+def point_document(done: Simulation, point: int) -> dict[str, Any]:
+    """Return the keys of one operating point as `tirelib simulate --json` has them."""
+    peaks = done.peaks
+    per_second = float(done.turn_rate[point])
+
+    def strain_peak(name: str) -> dict[str, float]:
+        value, angle = getattr(peaks, name)[point], getattr(peaks, f"{name}_angle")[point]
+        return {"ustrain": MICRO * float(value), "angle_rad": float(angle)}
+
+    def rate_peak(name: str) -> dict[str, float]:
+        value, angle = getattr(peaks, name)[point], getattr(peaks, f"{name}_angle")[point]
+        return {
+            "ustrain_per_rad": MICRO * float(value),
+            "ustrain_per_s": MICRO * per_second * float(value),
+            "angle_rad": float(angle),
+        }
+
+    return {
+        "Fz_N": float(done.load[point]),
+        "deflection_mm": 1e3 * float(done.deflection[point]),
+        "pressure_bar": 1e-5 * float(done.inflation[point]),
+        "omega_rad_s": per_second,
+        "speed_kmh": 3.6 * per_second * done.tire.ring_radius,
+        "edges_rad": [float(x) for x in done.edges[point]],
+        "contact_length_mm": 1e3 * float(done.contact_length[point]),
+        "q_center_N_per_m": float(done.middle_pressure[point]),
+        "q_max_N_per_m": float(done.largest_pressure[point]),
+        "pressure_center_mm": 1e3 * float(done.pressure_centre[point]),
+        "strain_peaks": {name: strain_peak(name) for name in ("cp1", "tp", "cp2")},
+        "strain_rate_peaks": {"lead": rate_peak("rate_lead"), "trail": rate_peak("rate_trail")},
+        "effective_radius_mm": _known(done.effective_radius, point, 1e3),
+        "torque_Nm": _known(done.torque, point, 1.0),
+        "sliding_from_rad": _known(done.sliding_onset, point, 1.0),
+    }
+
+
+def _known(values: FloatArray | None, point: int, factor: float) -> float | None:
+    return None if values is None else factor * float(values[point])
+
+
+def columns(done: Simulation) -> Mapping[str, FloatArray]:
+    """Return the curves in the units of files, each of shape (n_points, n_phi), by column name."""
+    return {
+        "u_mm": 1e3 * done.u,
+        "v_mm": 1e3 * done.v,
+        "pressure_N_per_m": done.pressure,
+        "normal_N_per_m": done.normal,
+        "shear_N_per_m": done.shear,
+        "strain_ustrain": MICRO * done.strain,
+        "strain_rate_ustrain_per_rad": MICRO * done.rate,
+    }
+
+
+def write_curves(done: Simulation, path: Path) -> None:
+    """Write the curves as CSV: a row per operating point and angle.
+
+    Raises
+    ------
+    FormatError
+        If the file cannot be written.
+    """
+    table = columns(done)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(["point", "Fz_N", "phi_rad", *table])
+            for point in range(len(done)):
+                curves = zip(done.phi, *(curve[point] for curve in table.values()), strict=True)
+                force = f"{done.load[point]:.6g}"
+                writer.writerows([point, force, *(f"{x:.9g}" for x in row)] for row in curves)
+    except OSError as error:
+        raise FormatError(f"{path}: cannot be written ({error.strerror}); choose another "
+                          "file") from None  # fmt: skip
