@@ -27,6 +27,7 @@ class UnitRow(NamedTuple):
 
 _LBF = 4.4482216152605
 _KGF = 9.80665
+_POUND = 0.45359237
 _INCH = 0.0254
 _FOOT = 0.3048
 _PSI = _LBF / _INCH**2
@@ -112,6 +113,11 @@ TABLE: tuple[UnitRow, ...] = (
     UnitRow("m/s2", "acceleration", 1.0),
     UnitRow("m/s^2", "acceleration", 1.0),
     UnitRow("g", "acceleration", 9.80665),
+    UnitRow("kg", "mass", 1.0),
+    UnitRow("g", "mass", 1e-3),  # after acceleration, which a channel in "g" is
+    UnitRow("tonne", "mass", 1e3),
+    UnitRow("lb", "mass", _POUND),
+    UnitRow("slug", "mass", _LBF / _FOOT),
     UnitRow("V", "voltage", 1.0),
     UnitRow("mV", "voltage", 1e-3),
     UnitRow("N/m", "stiffness", 1.0),

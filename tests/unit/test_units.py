@@ -97,6 +97,11 @@ ONE = {
     ("um/m", "strain"): 1e-6,
     ("uE", "strain"): 1e-6,
     ("ue", "strain"): 1e-6,
+    ("kg", "mass"): 1.0,
+    ("g", "mass"): 0.001,
+    ("tonne", "mass"): 1000.0,
+    ("lb", "mass"): 0.45359237,
+    ("slug", "mass"): 0.45359237 * 9.80665 / 0.3048,
     ("m/s2", "acceleration"): 1.0,
     ("m/s^2", "acceleration"): 1.0,
     ("g", "acceleration"): 9.80665,
@@ -201,5 +206,7 @@ def test_a_quantity_knows_its_dimension(quantity: str, dimension: str | None) ->
 
 def test_a_unit_knows_where_it_may_stand() -> None:
     assert dimensions_of_unit("%") == ("ratio", "strain")
+    assert dimensions_of_unit("g") == ("acceleration", "mass")
+    assert dimensions_of_unit("t") == ()  # a column's name, not tonnes
     assert dimensions_of_unit("parsec") == ()
     assert all(units_of(dimension) for dimension in DIMENSIONS)

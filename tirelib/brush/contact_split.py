@@ -21,12 +21,30 @@ Excess = Callable[[FloatArray, FloatArray, IntArray], FloatArray]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grid:
-    """Places at which the state is read: u from 0 (leading edge) to 1, shape (n_points, n)."""
+    """Places at which the state is read.
+
+    Attributes
+    ----------
+    profile : PressureProfile
+    row : array of int, shape (n_points,)
+        Operating point of the profile, for each of the brush.
+    u, pressure : arrays, shape (n_points, n), [-], [N/m]
+        From 0 (leading edge) to 1, and the pressure there.
+    whole : pair of arrays, shape (n_points,), [N]
+        The curve's `cumulative` over the whole contact.
+    """
 
     profile: PressureProfile
     row: IntArray
     u: FloatArray
     pressure: FloatArray
+    whole: tuple[FloatArray, FloatArray]
+
+    def take(self, keep: BoolArray) -> "Grid":
+        """Return some of the operating points."""
+        load, moment = self.whole
+        rest = self.row[keep], self.u[keep], self.pressure[keep], (load[keep], moment[keep])
+        return Grid(self.profile, *rest)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,7 +95,9 @@ def make_grid(profile: PressureProfile, row: IntArray) -> Grid:
     ends, rows = np.zeros(u.shape[0]), np.arange(u.shape[0])
     front, back = profile.curve.pressure(ends, rows), profile.curve.pressure(ends + 1.0, rows)
     u = np.column_stack([ends, u, ends + 1.0])
-    return Grid(profile, row, u[row], np.column_stack([front, pressure, back])[row])
+    load, moment = profile.curve.cumulative(ends + 1.0, rows)
+    whole = load[row], moment[row]
+    return Grid(profile, row, u[row], np.column_stack([front, pressure, back])[row], whole)
 
 
 def split(grid: Grid, excess: Excess) -> Split:

@@ -210,17 +210,25 @@ class _Brush:
 
         pieces = split(self.grid, excess)
         everywhere = np.arange(self.grid.row.size)
-        end = self._antiderivatives(state, np.ones(everywhere.size), everywhere)
-        at = self._antiderivatives(state, pieces.place, pieces.point)
+        end = self._antiderivatives(state, np.ones(everywhere.size), everywhere, self.grid.whole)
+        there = self.grid.profile.curve.cumulative(pieces.place, self.grid.row[pieces.point])
+        at = self._antiderivatives(state, pieces.place, pieces.point, there)
         zero, none = np.zeros(everywhere.size), np.zeros(pieces.point.size)
         adhesion = pieces.total(zero + 1.0, zero, pieces.place, none)
         Fx, Fy, moment = (pieces.total(*end[k], *at[k]) for k in range(3))
         return _Parts(Fx, Fy, moment, adhesion)
 
     def _antiderivatives(
-        self, state: State, u: FloatArray, point: npt.NDArray[np.int64]
+        self,
+        state: State,
+        u: FloatArray,
+        point: npt.NDArray[np.int64],
+        carried: tuple[FloatArray, FloatArray],
     ) -> tuple[tuple[FloatArray, FloatArray], ...]:
-        """Return (stick, slide) integrals of fx, fy and x fy from the leading edge to u."""
+        """Return (stick, slide) integrals of fx, fy and x fy from the leading edge to u.
+
+        `carried` is the pressure's load and moment from the leading edge to u.
+        """
         turn, bow = (part[point] for part in state)
         front, length, rolling = self.front[point], self.length[point], self.rolling[point]
         z = u * length
@@ -229,7 +237,7 @@ class _Brush:
         stick_x = self.cx[point] * self.kappa[point] * inverse * z**2 / 2.0
         stick_y = self.cy[point] * (slope * z**2 / 2.0 + bow * (front * z**2 - z**3 / 3.0))
         arm = self.cy[point] * (slope * z**3 / 3.0 + bow * (2.0 * front * z**3 / 3.0 - z**4 / 4.0))
-        load, moment = self.grid.profile.curve.cumulative(u, self.grid.row[point])
+        load, moment = carried
         along, across = (part[point] for part in self.direction(state))
         friction = self.slide[point]
         return (
@@ -262,10 +270,8 @@ class _Brush:
 
     def take(self, keep: BoolArray) -> Self:
         """Return some of the operating points."""
-        grid = self.grid
-        part = Grid(grid.profile, grid.row[keep], grid.u[keep], grid.pressure[keep])
         rest = {f.name: getattr(self, f.name)[keep] for f in fields(self) if f.name != "grid"}
-        return replace(self, grid=part, **rest)
+        return replace(self, grid=self.grid.take(keep), **rest)
 
     def belt(self, force: FloatArray, moment: FloatArray) -> State:
         """Return the shape of the belt under a force and a moment, Eq. (2)."""
@@ -283,10 +289,12 @@ class _Brush:
         """Take one Newton step, halved where it would not help; return also the new remainder."""
         scale, arm = self._scales()
         h = 1e-7
-        (a, c), (b, d) = (
-            (self.residual(force + h * scale, moment) - r) / h,
-            (self.residual(force, moment + h * arm) - r) / h,
-        )
+        minus, zero = np.full_like(force, -1.0), np.zeros_like(force)
+        (a, c), (b, d) = (minus, zero), (zero, minus)  # a rigid carcass does not answer
+        if not np.all(np.isinf(self.bend)):
+            a, c = (self.residual(force + h * scale, moment) - r) / h
+        if not np.all(np.isinf(self.yaw)):
+            b, d = (self.residual(force, moment + h * arm) - r) / h
         det = a * d - b * c
         det = np.where(np.abs(det) < 1e-12, 1.0, det)
         by_force = -(d * r[0] - b * r[1]) / det * scale

@@ -35,12 +35,10 @@ _WORDS: Mapping[str, Mapping[str, str]] = {
         "kilopascal": "kPa", "kpascal": "kPa", "kpa": "kPa", "bar": "bar", "mpa": "MPa",
         "psi": "psi",
     },
-}  # fmt: skip
-
-_MASS = {
-    "kg": 1.0, "kilogram": 1.0, "gram": 1e-3, "g": 1e-3, "tonne": 1e3,
-    "lb": 0.45359237, "pound_mass": 0.45359237, "lbm": 0.45359237,
-    "slug": 0.45359237 * 9.80665 / 0.3048,
+    "mass": {
+        "kg": "kg", "kilogram": "kg", "gram": "g", "g": "g", "tonne": "tonne", "lb": "lb",
+        "pound_mass": "lb", "lbm": "lb", "slug": "slug",
+    },
 }  # fmt: skip
 
 Powers = tuple[int, int, int, int, int, int]
@@ -75,15 +73,12 @@ POWERS: Mapping[str, Powers] = MappingProxyType(
 
 def words(base: str) -> tuple[str, ...]:
     """Return the words that a file may write for a base unit."""
-    return tuple(_MASS) if base == "mass" else tuple(_WORDS[base])
+    return tuple(_WORDS[base])
 
 
 def factor(base: str, word: str) -> float | None:
     """Return SI per unit of a base, or None for a word that nobody knows."""
-    spelling = word.strip().lower().replace(" ", "_")
-    if base == "mass":
-        return _MASS.get(spelling)
-    unit = _WORDS[base].get(spelling)
+    unit = _WORDS[base].get(word.strip().lower().replace(" ", "_"))
     return None if unit is None else to_si(1.0, unit, base)
 
 
