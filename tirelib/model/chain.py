@@ -24,8 +24,10 @@ Changes = Sequence[tuple[str, Change]]
 
 N_MODES = 60
 N_NODES = 24
-SETTLE = 2
-"""Passes that let constants follow the deflection that they cause."""
+SETTLE = 30
+"""Most passes that let constants follow the deflection that they cause."""
+SETTLED = 1e-9
+"""Change of the deflection at which they have followed, [m]."""
 
 
 def waveform(state: State, changes: Changes = (), *, low_pass: LowPass | None = None) -> State:
@@ -50,13 +52,16 @@ def waveform(state: State, changes: Changes = (), *, low_pass: LowPass | None = 
         state = state.but(deflection=_press(state).deflection)
     solved = state
     for _ in range(SETTLE if constants else 1):
-        changed = state.but(deflection=solved.deflection)
+        before = solved.deflection
+        changed = state.but(deflection=before)
         for change in constants:
             changed = change(changed)
         contact = _press(changed)
         solved = changed.but(
             contact=contact, belt=contact.displacement, deflection=contact.deflection
         )
+        if np.abs(contact.deflection - before).max() < SETTLED:
+            break
     solved = _apply(solved, changes, "contact")
     assert solved.belt is not None  # noqa: S101 - set above
     solved = solved.but(strain=strain_harmonics(solved.belt, solved.radius, solved.offset))

@@ -1,0 +1,306 @@
+"""What each effect means: limits, signs, and independent ways to the same number."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from tests.physics.test_effects import BASE, FREE_ROLLING, PLAN, TIRE, VALUES, run, tangents, wave
+from tirelib.contact.fourier import evaluate
+from tirelib.contact.radial import press
+from tirelib.contact.strips import Layout, press_strips
+from tirelib.effects import CATALOGUE
+from tirelib.model.base import linearised
+from tirelib.model.state import State
+from tirelib.ring.compliance import compliance
+from tirelib.strain.tread_traction import TreadBeam, outward_shear, tread_strain
+from tirelib.waveforms import GRID
+
+
+def at(name: str, strength: float, **given: Any) -> State:
+    return run(CATALOGUE[name].at(strength), **given)
+
+
+def changed(state: State, **given: Any) -> np.ndarray:
+    assert state.waveform is not None
+    return state.waveform - (wave(**given) if given else BASE)
+
+
+def test_sidewall_load_turns_about_twenty_millimetres() -> None:
+    at_reference = press(compliance(run().ring, PLAN.points.omega), run().tread, 0.020).load
+    points = replace(PLAN.points, load=at_reference)
+    state, base = at("sidewall_load", 0.5, points=points), run(points=points)
+    np.testing.assert_allclose(state.deflection, base.deflection, rtol=1e-6)
+    depth = run().deflection
+    softer = at("sidewall_load", 0.1).deflection > depth
+    np.testing.assert_array_equal(softer, depth > 0.020)
+
+
+def test_sidewall_pressure_departs_to_the_same_side_above_and_below_two_bar() -> None:
+    points = PLAN.points.take(np.zeros(3, dtype=int))
+    points = replace(points, pressure=np.array([1.6e5, 2.0e5, 2.4e5]))
+    ratio = at("sidewall_pressure", 0.5, points=points, lateral=0.0).k_u / TIRE.radial_stiffness
+    np.testing.assert_allclose(ratio, np.exp([0.02, 0.0, 0.02]))
+
+
+def test_damping_shifts_the_contact_forward_with_speed() -> None:
+    contact = at("sidewall_damping", 0.1).contact
+    assert contact is not None
+    middle = contact.edges.mean(axis=1)[FREE_ROLLING].reshape(5, 3, 4)
+    assert (middle < 0).all()
+    assert (np.diff(middle, axis=2) < 0).all()
+
+
+def test_a_warm_tire_is_soft_by_the_thermometer_where_there_is_one() -> None:
+    by_order = at("temperature", 0.2)
+    np.testing.assert_allclose(
+        by_order.k_u, VALUES["radial_stiffness"] * np.exp(-0.2 * PLAN.points.order)
+    )
+    warm = replace(PLAN.points, temperature=np.full(72, 293.15 + 50.0))
+    measured = at("temperature", 0.2, points=warm)
+    np.testing.assert_allclose(measured.k_u, VALUES["radial_stiffness"] * np.exp(-0.2))
+    assert (measured.deflection > by_order.deflection)[PLAN.points.order < 0.99].all()
+
+
+def test_without_inertia_the_centrifugal_tension_stiffens_the_belt() -> None:
+    bare = at("centrifugal", -1.0)
+    own = TIRE.mass * (TIRE.ring_radius * PLAN.points.omega) ** 2
+    np.testing.assert_allclose(bare.tension, own)
+    # k_n grows by rho A Omega^2 (1 - n^2)^2
+    n = np.arange(61.0)
+    k = np.real(1.0 / compliance(bare.ring, PLAN.points.omega).matrix[:, 1:, 1, 1])
+    k0 = np.real(1.0 / compliance(run().ring, PLAN.points.omega).matrix[:, 1:, 1, 1])
+    grown = TIRE.mass * PLAN.points.omega[:, None] ** 2 * (1.0 - n[1:] ** 2) ** 2
+    np.testing.assert_allclose(k - k0, grown, rtol=1e-6, atol=1e-3)
+
+
+@pytest.mark.parametrize("option", [{"GA": 1e12}, {"EA": 1e12}])
+def test_belt_tension_is_the_same_in_ring_models_that_stretch_or_shear(
+    option: dict[str, float],
+) -> None:
+    state = at("centrifugal", -0.5)
+    stiff = state.but(**{name: np.full(72, value) for name, value in option.items()})
+    plain = compliance(state.ring, PLAN.points.omega, 20).radial
+    other = compliance(stiff.ring, PLAN.points.omega, 20).radial
+    assert np.abs(plain - other).max() < 1e-5 * np.abs(plain).max()
+
+
+def test_rotary_inertia_is_bending_stiffness_lost_with_speed() -> None:
+    own = at("rotary_inertia", 1e-4)
+    lost = TIRE.bending_stiffness - 1e-4 * (TIRE.ring_radius * PLAN.points.omega) ** 2
+    less = run(("constants", lambda s: s.but(EI=lost)))
+    assert own.waveform is not None
+    assert less.waveform is not None
+    np.testing.assert_allclose(own.waveform, less.waveform, atol=1e-10)
+
+
+def test_a_belt_that_yields_is_the_tire_with_that_compliance() -> None:
+    for name, field, unit in (
+        ("belt_extension", "extension_stiffness", 1e6), ("belt_shear", "shear_stiffness", 1e3),
+    ):  # fmt: skip
+        top = CATALOGUE[name].high
+        given = {**VALUES, field: unit / top}
+        own = at(name, top).waveform
+        assert own is not None
+        np.testing.assert_allclose(own, wave(values=given), atol=1e-12)
+
+
+def test_dynamic_stiffening_follows_the_belts_speed() -> None:
+    state = at("dynamic_stiffening", 0.5)
+    np.testing.assert_allclose(
+        state.k_u / VALUES["radial_stiffness"], np.sqrt(1.0 + PLAN.points.speed / 20.0)
+    )
+    assert (state.deflection < run().deflection).all()
+
+
+def test_tread_friction_is_the_straight_beam_of_the_strips() -> None:
+    tire = TIRE.changed(tread_shear_stiffness=TIRE.tread_stiffness / 3.0, friction=1.0)
+    points = PLAN.points.take(np.array([4, 29, 52]))
+    strip = press_strips(
+        tire, points.load, pressure=points.pressure, omega=points.omega, layout=Layout.even((0.0,))
+    )
+    want = tread_strain(strip, outward_shear(strip, tire), TreadBeam.of(tire, 0.1))[:, 0]
+    with_it = at("tread_friction", 0.1, points=points, lateral=0.0).strain
+    without = run(points=points, lateral=0.0).strain
+    assert with_it is not None
+    assert without is not None
+    # two solutions of the same contact
+    np.testing.assert_allclose((with_it - without)[:, 1:], want[:, 1:], atol=1e-8)
+
+
+def test_outward_shear_lowers_the_tension_in_the_contact_more_at_high_load() -> None:
+    middle = changed(at("tread_friction", 0.05))[:60, GRID.size // 2].reshape(5, 12)
+    assert (middle < 0).all()
+    assert (np.diff(middle, axis=0) < 0).all()
+
+
+def test_a_worn_tread_is_thin_and_stiff_and_keeps_its_modulus() -> None:
+    state = at("tread_wear", 0.4)
+    assert np.allclose(state.k_t * state.thickness, TIRE.tread_stiffness * TIRE.tread_thickness)
+    np.testing.assert_allclose(
+        state.free_radius, TIRE.free_radius - 0.4 * PLAN.points.order * TIRE.tread_thickness
+    )
+
+
+def test_tread_load_turns_about_four_kilonewtons() -> None:
+    stiff = at("tread_load", 0.5).k_t / TIRE.tread_stiffness
+    np.testing.assert_allclose(stiff, np.sqrt(PLAN.points.load / 4000.0))
+
+
+def test_sliding_in_the_rear_brings_tension_near_the_trailing_edge() -> None:
+    state = at("trailing_sliding", 0.05)
+    assert state.contact is not None
+    edge = state.contact.edges[FREE_ROLLING]
+    added = changed(state)[FREE_ROLLING]
+    inside = (edge[:, :1] < GRID) & (edge[:, 1:] > GRID)
+    mean = [float(added[i][inside[i] & (edge[i].mean() < GRID)].mean()) for i in range(len(added))]
+    assert min(mean) > 0.0
+    peak = GRID[np.argmax(added, axis=1)]
+    assert (peak > edge.mean(axis=1)).all()
+
+
+def test_water_takes_load_off_the_tread_with_speed_squared_and_from_its_front() -> None:
+    state, base = at("hydroplaning", 0.2), run()
+    assert state.contact is not None
+    assert base.contact is not None
+    dynamic = 0.5 * 1000.0 * PLAN.points.speed**2 / PLAN.points.pressure
+    np.testing.assert_allclose(
+        state.contact.load, PLAN.points.load * np.exp(-0.2 * dynamic), rtol=1e-8
+    )
+    shift = (state.contact.edges - base.contact.edges)[FREE_ROLLING]
+    assert (shift[:, 0] > 0).all()
+    assert (shift[:, 0] > -shift[:, 1]).all()
+    # springs below the axle carry what the road and the water bring
+    assert state.contact.extra is not None
+    water = -np.pi * TIRE.ring_radius * state.contact.extra[:, 1, 0].real
+    np.testing.assert_allclose(water + state.contact.load, PLAN.points.load, rtol=1e-6)
+
+
+def test_texture_adds_the_mean_pressure_of_random_heights_in_the_limit_of_small_ones() -> None:
+    base = run().contact
+    assert base is not None
+    phi = np.linspace(-0.6, 0.6, 24001)
+    delta = base.compression(phi)
+    error = []
+    for sigma in (0.1e-3, 0.05e-3):
+        contact = at("roughness", (1e3 * sigma) ** 2).contact
+        assert contact is not None
+        assert contact.extra is not None
+        z = delta / sigma
+        mean = sigma * (z * norm.cdf(z) + norm.pdf(z))
+        whole = np.trapezoid(TIRE.tread_stiffness * (mean - np.maximum(delta, 0.0)), phi, axis=1)
+        # harmonic 0 of the inward loads, times the turn
+        error.append(np.abs(-2.0 * np.pi * contact.extra[:, 0, 0].real / whole - 1.0).max())
+    # the slope of delta changes within sigma: second order, beside the quadrature's error
+    assert error[0] < 0.03
+    assert error[1] < 0.4 * error[0]
+
+
+def test_camber_presses_the_side_toward_which_the_wheel_leans() -> None:
+    points = replace(PLAN.points, camber=np.full(72, np.deg2rad(2.0)))
+    small = 0.01
+    d = {}
+    for side, y in (("left", 0.06), ("right", -0.06)):
+        contact = at("camber", small, points=points, lateral=y).contact
+        assert contact is not None
+        d[side] = contact.deflection
+    axle = run(points=points).deflection
+    # the geometry of the strips, d0 - y tan(gamma), at small strength
+    np.testing.assert_allclose(d["left"] - axle, -small * 0.06 * np.tan(np.deg2rad(2.0)), rtol=1e-3)
+    np.testing.assert_allclose(d["right"] - axle, small * 0.06 * np.tan(np.deg2rad(2.0)), rtol=1e-3)
+    np.testing.assert_array_equal(at("camber", 1.0, points=points, lateral=0.06).deflection, axle)
+
+
+def test_side_force_to_the_left_loads_the_right_and_stretches_the_left() -> None:
+    points = replace(PLAN.points, side_force=np.full(72, 2000.0))
+    right = at("load_transfer", 1.0, points=points, lateral=-0.06).contact
+    left = at("load_transfer", 1.0, points=points, lateral=0.06).contact
+    assert right is not None
+    assert left is not None
+    assert (np.ptp(right.edges, axis=1) > np.ptp(left.edges, axis=1)).all()
+    roll = np.deg2rad(2.0) * 0.06
+    depth = run().deflection
+    np.testing.assert_allclose(right.deflection, depth * (1.0 + np.tanh(roll / depth)))
+    stretched = changed(
+        at("belt_bending", 0.1, points=points, lateral=0.06), points=points, lateral=0.06
+    )
+    assert (stretched[:, GRID.size // 2] > 0).all()
+
+
+def test_braking_raises_the_second_compressive_peak_and_driving_the_first() -> None:
+    peaks = {}
+    for name, force in (("brake", -1500.0), ("drive", 1500.0)):
+        points = replace(PLAN.points, drive_force=np.full(72, force))
+        waves = at("traction", 1.0, points=points).waveform
+        assert waves is not None
+        peaks[name] = -waves[:, GRID < 0].min(axis=1), -waves[:, GRID > 0].min(axis=1)
+    assert (peaks["brake"][1] > peaks["brake"][0]).all()
+    assert (peaks["drive"][1] < peaks["drive"][0]).all()
+
+
+def test_nonuniformity_is_the_first_harmonic_with_its_phase() -> None:
+    for strength, shape in (((10.0, 0.0), np.cos(GRID)), ((0.0, 10.0), np.sin(GRID))):
+        added = wave(CATALOGUE["nonuniformity"].at(strength)) - BASE
+        np.testing.assert_allclose(added, np.tile(1e-5 * shape, (72, 1)), atol=1e-15)
+
+
+def test_a_long_gage_takes_the_mean_over_its_length() -> None:
+    length = 0.02
+    strain = run().strain
+    seen = at("gage_length", (1e3 * length) ** 2).strain
+    assert strain is not None
+    assert seen is not None
+    half = 0.5 * length / TIRE.ring_radius
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    phi = np.array([-0.2, 0.0, 0.1, 0.3])
+    mean = 0.5 * sum(
+        w * evaluate(strain, phi + half * x) for x, w in zip(nodes, weights, strict=True)
+    )
+    np.testing.assert_allclose(evaluate(seen, phi), mean, atol=1e-12)
+
+
+def test_a_lagging_amplifier_obeys_its_differential_equation() -> None:
+    tau = 0.5e-3
+    strain, seen = run().strain, at("low_pass", 1e3 * tau).strain
+    assert strain is not None
+    assert seen is not None
+    rate = evaluate(seen, GRID, 1) * PLAN.points.omega[:, None]
+    np.testing.assert_allclose(
+        evaluate(seen, GRID) + tau * rate, evaluate(strain, GRID), atol=1e-12
+    )
+
+
+def test_gain_is_the_innerliner_offset_and_saturation_takes_from_large_strain_only() -> None:
+    points = PLAN.points.take(np.arange(0, 60, 7))
+    linear = linearised(VALUES, points)
+    offset = linear.waveform_slopes[6]
+    gain = (
+        wave(CATALOGUE["gage_gain"].at(1e-3), points=points, lateral=0.0) - linear.waveform
+    ) / 1e-3
+    np.testing.assert_allclose(gain, offset, atol=1e-4 * np.abs(offset).max())
+    shown = at("gage_saturation", 0.5).waveform
+    assert shown is not None
+    bent = BASE / np.sqrt(1.0 + (BASE / 5e-3) ** 2)
+    np.testing.assert_allclose(shown, bent - bent.mean(axis=1, keepdims=True))
+
+
+def test_drift_is_none_in_the_middle_of_the_campaign_and_the_angles_zero_shifts_later() -> None:
+    ratio = at("gage_drift", 0.1).waveform
+    assert ratio is not None
+    np.testing.assert_allclose(
+        ratio / BASE, np.tile((1.0 + 0.1 * (PLAN.points.order - 0.5))[:, None], (1, GRID.size))
+    )
+    later = at("angle_zero", 2.0 * float(GRID[1] - GRID[0])).waveform
+    assert later is not None
+    np.testing.assert_allclose(later, np.roll(BASE, 2, axis=1), atol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["belt_extension", "belt_shear"])
+@pytest.mark.parametrize("share", [1e-300, 1e-12, 1e-7, 1.1e-6, 1e-5])
+def test_a_nearly_rigid_belt_is_next_to_the_rigid_one(name: str, share: float) -> None:
+    effect = CATALOGUE[name]
+    change = wave(effect.at(share * effect.high)) - BASE
+    # in proportion, and a ten-thousandth of a microstrain of round-off
+    assert np.abs(change).max() < 2.0 * share * np.abs(tangents(effect)[0]).max() + 1e-10

@@ -1,0 +1,146 @@
+"""What each candidate effect would change, what the base can mimic of it, and who looks alike.
+
+All of this follows from the plan and the model, before any residual is looked at.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+
+from tirelib.arrays import FloatArray
+from tirelib.diagnose.refit import Refit
+from tirelib.effects import Effect
+from tirelib.errors import ParameterError
+from tirelib.identify.waveform_fit import Data
+from tirelib.model.base import predict
+
+TWIN_ANGLE = np.deg2rad(30.0)
+"""Signatures closer than this are called twins."""
+IN_BASE = {"belt_extension"}
+"""Effects that the base model has as a fitted parameter."""
+LEAST_SIGNAL = 3.0
+"""An effect at the end of its range that changes whitened waveforms by less is dead."""
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """One effect that the model lacks.
+
+    Attributes
+    ----------
+    effect : Effect
+    rows : shape (components, n_runs * n_phi)
+        Whitened change for a strength of one range, per component.
+    own : shape (components, n_runs * n_phi)
+        What of it the fitted coordinates cannot mimic.
+    """
+
+    effect: Effect
+    rows: FloatArray
+    own: FloatArray
+
+    @property
+    def signal(self) -> float:
+        """Norm of the own part at the end of the range."""
+        return float(np.sqrt(np.sum(self.own**2)))
+
+
+@dataclass(frozen=True, slots=True)
+class Candidates:
+    """The living candidates and why the others are dead.
+
+    Attributes
+    ----------
+    living : tuple of Candidate
+    dead : mapping of name to reason
+    angles : shape (n, n), [rad]
+        Smallest principal angle between own signatures.
+    """
+
+    living: tuple[Candidate, ...]
+    dead: dict[str, str]
+    angles: FloatArray
+
+    def twins(self, index: int) -> list[tuple[str, float]]:
+        """Return effects whose signature is near, with the angle [rad], nearest first."""
+        found = [
+            (self.living[j].effect.name, float(angle))
+            for j, angle in enumerate(self.angles[index])
+            if j != index and angle < TWIN_ANGLE
+        ]
+        return sorted(found, key=lambda pair: pair[1])
+
+
+def candidates(data: Data, model: Refit, catalogue: Sequence[Effect]) -> Candidates:
+    """Return what every effect of a catalogue would change, at the fitted model.
+
+    Effects that the model has, and those of the brush, are left out.
+    """
+    has = {effect.name for effect in model.effects}
+    nuisance = model.whiten(model.slopes).reshape(len(model.slopes), -1)
+    basis = np.linalg.qr(nuisance.T)[0]
+    living: list[Candidate] = []
+    dead: dict[str, str] = {}
+    for effect in catalogue:
+        if effect.name in has | IN_BASE or effect.hook == "brush":
+            continue
+        if effect.untestable:
+            dead[effect.name] = effect.untestable
+            continue
+        still = [name for name, least in _LATERAL.items() if _still(data, name, least)]
+        idle = [name for name in effect.varies_with if name in still]
+        if idle:
+            dead[effect.name] = f"no run has a {' or '.join(idle).replace('_', ' ')}"
+            continue
+        missing = effect.unknown(data.points)
+        if missing:
+            dead[effect.name] = f"{', '.join(missing)} is not measured in every run"
+            continue
+        try:
+            rows = _rows(data, model, effect)
+        except ParameterError as error:
+            dead[effect.name] = str(error)
+            continue
+        own = rows - (rows @ basis) @ basis.T
+        if np.sqrt(np.sum(own**2)) < LEAST_SIGNAL:
+            varies = f" (it varies with {', '.join(effect.varies_with)})" * bool(effect.varies_with)
+            dead[effect.name] = f"changes nothing that this plan could show{varies}"
+            continue
+        living.append(Candidate(effect, rows, own))
+    return Candidates(tuple(living), dead, _angles(living))
+
+
+_LATERAL = {"slip_angle": 5e-3, "camber": 5e-3, "slip_ratio": 5e-3}
+"""What straight free rolling lacks, and the least that counts, [rad], [rad], [-]."""
+
+
+def _still(data: Data, name: str, least: float) -> bool:
+    values = np.nan_to_num(getattr(data.points, name))
+    return bool(np.abs(values).max() < least)
+
+
+def _rows(data: Data, model: Refit, effect: Effect) -> FloatArray:
+    """Return the whitened change per component and range, by a small step at the model."""
+    rows = []
+    for trial in effect.trials:
+        state = predict(
+            model.values, data.points, [*model.changes, effect.at(trial)],
+            low_pass=data.low_pass, correction=model.correction,
+        )  # fmt: skip
+        assert state.waveform is not None  # noqa: S101 - the chain sets it
+        change = (state.waveform - model.waveform) * (effect.scale / effect.step)
+        rows.append(model.whiten(change).ravel())
+    return np.array(rows)
+
+
+def _angles(living: Sequence[Candidate]) -> FloatArray:
+    size = len(living)
+    spans = [linalg.orth(candidate.own.T) for candidate in living]
+    angles = np.zeros((size, size))
+    for i in range(size):
+        for j in range(i):
+            cosine = np.linalg.svd(spans[i].T @ spans[j], compute_uv=False)[0]
+            angles[i, j] = angles[j, i] = np.arccos(min(1.0, float(cosine)))
+    return angles

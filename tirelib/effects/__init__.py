@@ -1,0 +1,76 @@
+"""Physical effects: each a law of a dozen lines that changes the model's state by a strength."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from tirelib.effects import (
+    angle_zero,
+    belt_bending,
+    belt_extension,
+    belt_shear,
+    camber,
+    centrifugal,
+    dynamic_stiffening,
+    gage_drift,
+    gage_gain,
+    gage_length,
+    gage_offset,
+    gage_saturation,
+    hydroplaning,
+    load_transfer,
+    low_pass,
+    nonuniformity,
+    rotary_inertia,
+    roughness,
+    sidewall_damping,
+    sidewall_load,
+    sidewall_pressure,
+    temperature,
+    traction,
+    trailing_sliding,
+    tread_friction,
+    tread_load,
+    tread_wear,
+)
+from tirelib.effects.effect import Effect, effect
+
+__all__ = ["CATALOGUE", "Effect", "effect"]
+
+CATALOGUE: Mapping[str, Effect] = MappingProxyType(
+    {
+        # sidewall
+        "sidewall_load": sidewall_load.sidewall_load,
+        "sidewall_pressure": sidewall_pressure.sidewall_pressure,
+        "sidewall_damping": sidewall_damping.sidewall_damping,
+        "temperature": temperature.temperature,
+        # belt
+        "centrifugal": centrifugal.centrifugal,
+        "rotary_inertia": rotary_inertia.rotary_inertia,
+        "belt_extension": belt_extension.belt_extension,
+        "belt_shear": belt_shear.belt_shear,
+        "dynamic_stiffening": dynamic_stiffening.dynamic_stiffening,
+        # tread and contact
+        "tread_friction": tread_friction.tread_friction,
+        "tread_load": tread_load.tread_load,
+        "tread_wear": tread_wear.tread_wear,
+        "trailing_sliding": trailing_sliding.trailing_sliding,
+        "hydroplaning": hydroplaning.hydroplaning,
+        "roughness": roughness.roughness,
+        # lateral: gages beside the middle, slip, camber
+        "camber": camber.camber,
+        "belt_bending": belt_bending.belt_bending,
+        "load_transfer": load_transfer.load_transfer,
+        "traction": traction.traction,
+        # tire
+        "nonuniformity": nonuniformity.nonuniformity,
+        # gage
+        "gage_length": gage_length.gage_length,
+        "low_pass": low_pass.low_pass,
+        "gage_gain": gage_gain.gage_gain,
+        "gage_saturation": gage_saturation.gage_saturation,
+        "gage_offset": gage_offset.gage_offset,
+        "gage_drift": gage_drift.gage_drift,
+        "angle_zero": angle_zero.angle_zero,
+    }
+)
+"""Every effect of the library by name, in the order of the chain from sidewall to gage."""

@@ -1,0 +1,18 @@
+"""Zero of the wheel angle."""
+
+import numpy as np
+
+from tirelib.effects.effect import State, effect
+
+
+@effect(
+    "angle_zero", stage="strain", unit="rad", low=-0.03, high=0.03,
+    source="trigger mounted off the top of the wheel; gages glued off their mark",
+)  # fmt: skip
+def angle_zero(state: State, strength: float) -> State:
+    """Zero of the wheel angle beside the axle.
+
+    The whole waveform comes later by s, at every speed.
+    """
+    n = np.arange(state.strain.shape[1])
+    return state.but(strain=state.strain * np.exp(-1j * n * strength))

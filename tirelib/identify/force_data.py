@@ -1,0 +1,160 @@
+"""Forces and their conditions from campaigns: run means of steady runs, samples of sweeps."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.campaign import Campaign, Run
+from tirelib.errors import CalibrationError, ParameterError, ShapeError
+
+FORCES = ("Fy", "Fx", "Mz")
+CONDITIONS = ("load", "pressure", "slip_angle", "slip_ratio", "camber", "omega")
+FREE_ROLLING = ("free", "corner", "camber")
+"""Kinds of runs without drive or brake: their slip ratio is zero by definition."""
+_MEASURED_AS = {"load": "Fz"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ForceData:
+    """Points with forces; arrays of shape (n,), SI, ISO.
+
+    Attributes
+    ----------
+    load, pressure, slip_angle, slip_ratio, camber, omega : [N], [Pa], [rad], [-], [rad], [rad/s]
+        As measured, else the set point. Pressure and omega are NaN where unknown. The slip ratio
+        is that of the speed in the wheel's plane.
+    Fx, Fy, Mz : [N], [N], [N m]
+        NaN where not recorded.
+    block : array of int
+        Points of one run, or of one stretch of a sweep: their errors may go together.
+    """
+
+    load: FloatArray
+    pressure: FloatArray
+    slip_angle: FloatArray
+    slip_ratio: FloatArray
+    camber: FloatArray
+    omega: FloatArray
+    Fx: FloatArray
+    Fy: FloatArray
+    Mz: FloatArray
+    block: IntArray
+
+    def __post_init__(self) -> None:
+        shapes = {np.shape(getattr(self, field.name)) for field in fields(self)}
+        if len(shapes) != 1 or len(shapes.pop()) != 1:
+            raise ShapeError(
+                "force data: the fields differ in shape or have several dimensions; give each "
+                "one value per point, shape (n,)"
+            )
+        for name in ("load", "slip_angle", "slip_ratio", "camber"):
+            value = getattr(self, name)
+            good = np.isfinite(value) & ((value > 0.0) if name == "load" else True)
+            if not good.all():
+                at = int(np.flatnonzero(~good)[0])
+                raise ParameterError(
+                    f"force data: {name} = {value[at]:.6g} at point {at}, {int((~good).sum())} "
+                    f"such points; allowed are finite numbers{', > 0' * (name == 'load')}; "
+                    "leave these points out"
+                )
+
+    def __len__(self) -> int:
+        return int(self.load.size)
+
+    def take(self, index: IntArray | BoolArray) -> "ForceData":
+        """Return some of the points."""
+        return ForceData(*(getattr(self, field.name)[index] for field in fields(self)))
+
+
+def force_data(
+    campaigns: Campaign | Sequence[Campaign],
+    *,
+    every: int = 1,
+    block: float = 10.0,
+    travel_speed: bool = False,
+) -> ForceData:
+    """Read the forces of campaigns.
+
+    Steady runs give one point each, the mean of their samples; a sweep gives its samples. Points
+    without slip angle or with a load that is not positive are left out, a missing slip ratio or
+    camber counts as zero.
+
+    Parameters
+    ----------
+    campaigns : Campaign or sequence of Campaign
+    every : int
+        Of a sweep's samples, each `every`-th is taken.
+    block : float, [s]
+        Stretch of a sweep over which errors are taken to go together.
+    travel_speed : bool
+        True if the recorded slip ratio is by the speed of travel, v, and not by v cos(alpha): a
+        freely rolling wheel then reads cos(alpha) - 1. Runs of freely rolling kinds read zero
+        either way.
+
+    Raises
+    ------
+    CalibrationError
+        If there is no point at all.
+    """
+    many = [campaigns] if isinstance(campaigns, Campaign) else list(campaigns)
+    if every < 1 or not block > 0.0:
+        raise ParameterError(
+            f"force data: every = {every}, block = {block:g} s; allowed are every >= 1, block > 0"
+        )
+    parts: list[ForceData] = []
+    count = 0
+    for campaign in many:
+        for run in campaign.runs():
+            part = _sweep(run, every, block) if run.plan.kind == "sweep" else _mean(run)
+            if part is None:
+                continue
+            if run.plan.kind in FREE_ROLLING:
+                part["slip_ratio"] = np.zeros_like(part["load"])
+            elif travel_speed:
+                part["slip_ratio"] = (1.0 + part["slip_ratio"]) / np.cos(part["slip_angle"]) - 1.0
+            part["block"] = part["block"] - part["block"].min() + count
+            count = int(part["block"].max()) + 1
+            block_number = part.pop("block").astype(np.int64)
+            parts.append(ForceData(**part, block=block_number))
+    if not parts:
+        names = ", ".join(campaign.header.name for campaign in many)
+        raise CalibrationError(
+            f"{names}: no run holds a slip angle with a vertical load; forces over slip are "
+            "needed; record Fz and slip_angle"
+        )
+    return ForceData(
+        **{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(ForceData)}
+    )
+
+
+def _mean(run: Run) -> dict[str, FloatArray] | None:
+    """Return a steady run as one point, or None without load or slip angle."""
+    out = {}
+    for name in CONDITIONS + FORCES:
+        measured = run.mean(_MEASURED_AS.get(name, name))
+        out[name] = np.array([getattr(run.plan, name, np.nan) if measured is None else measured])
+    return _usable(out, np.zeros(1))
+
+
+def _sweep(run: Run, every: int, block: float) -> dict[str, FloatArray] | None:
+    """Return the samples of a sweep, or None without load or slip angle."""
+    if run.rig_time is None or run.rig_time.size == 0:
+        return None
+    size = run.rig_time.size
+    out = {}
+    for name in CONDITIONS + FORCES:
+        samples = run.rig.get(_MEASURED_AS.get(name, name))
+        given = np.full(size, getattr(run.plan, name, np.nan)) if samples is None else samples
+        out[name] = given[::every]
+    return _usable(out, np.floor((run.rig_time[::every] - run.rig_time[0]) / block))
+
+
+def _usable(part: dict[str, FloatArray], block: FloatArray) -> dict[str, FloatArray] | None:
+    for name in ("slip_ratio", "camber"):
+        part[name] = np.nan_to_num(part[name])
+    keep = np.isfinite(part["slip_angle"]) & np.isfinite(part["load"]) & (part["load"] > 0.0)
+    if not keep.any():
+        return None
+    return {name: values[keep] for name, values in {**part, "block": block}.items()}
