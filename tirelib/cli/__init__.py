@@ -9,7 +9,7 @@ import click
 from tirelib import __version__
 from tirelib.errors import TirelibError
 
-VERBS = ("campaign", "import", "features", "calibrate", "estimate", "identify", "simulate", "fmu", "rig")
+VERBS = ("campaign", "import", "features", "calibrate", "estimate", "identify", "compare", "simulate", "fmu", "rig")
 """Verbs; each is the command of that name in the module of that name (`import_` for import)."""
 
 _EXAMPLE = """\b
@@ -18,6 +18,8 @@ Examples:
   tirelib campaign check build/out/set1
   tirelib calibrate build/out/set1 --out build/out/cal.toml
   tirelib estimate build/out/set1 --calibration build/out/cal.toml
+  tirelib identify build/out/straight --out build/out/M.toml
+  tirelib simulate --model build/out/M.toml --load 4000 --speed 80 --out build/out/simulated
 
 \b
 Exit code: 0 done, 1 ran but the answer is negative, 2 bad input.
@@ -43,7 +45,7 @@ class Verbs(click.Group):
 @click.group(cls=Verbs, epilog=_EXAMPLE)
 @click.version_option(__version__, prog_name="tirelib")
 def program() -> None:
-    """Innerliner strain to vertical load, slip angle, slip ratio and lateral force."""
+    """Innerliner strain to load, slip and force, and the physics of the tire behind it."""
 
 
 def main() -> None:

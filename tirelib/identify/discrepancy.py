@@ -37,7 +37,7 @@ class Discrepancy:
     """
 
     inside: float = 0.08
-    outside: float = 0.02
+    outside: float = 0.01
     knots: int = 24
     reach: float = 5.0
     by_load: float = 0.5

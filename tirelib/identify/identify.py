@@ -27,8 +27,11 @@ _LITERATURE: Mapping[str, tuple[float, float, str]] = {
     "bending_stiffness": (2.1, 0.5, "literature, Table 6-3: 1.57 to 4 N m^2"),
     "tread_stiffness": (7.5e7, 0.5, "literature, Table 6-3: 5.1e7 to 9.9e7 N/m^2"),
     "mass": (3.3, 0.15, "literature, Tables 6-1, 6-2: 3.15 kg/m"),
+    "extension_stiffness": (3.2e6, 0.6, "assumed: steel belts, 1 to 10 MN"),
 }
 """Value, relative standard deviation and source of what no campaign header holds."""
+FITTED: tuple[Coordinate, ...] = (*FREE, Coordinate("extension_stiffness"))
+"""What is fitted: an inextensible ring would put the belt's stretch into all other numbers."""
 _RADIAL = (1.0, 2.4e5)
 _TANGENTIAL = (0.35, 1.1e5)
 """Slope by pressure [m] and offset [N/m^2] of sidewall stiffnesses, about those of Table 6-3."""
@@ -112,17 +115,8 @@ def identify(
     ConvergenceError
         If the fit does not settle.
     """
-    waves = waves or measure_waveforms(campaign, progress=progress)
-    runs = straight_runs(waves)
-    start = start_file(campaign.header, runs, tire)
-    fit = fit_waveforms(
-        runs.data(),
-        values_of(start.tire),
-        Prior(np.array([_prior_std(start, coordinate) for coordinate in FREE])),
-        discrepancy=Discrepancy(),
-        progress=progress,
-    )
-    estimates = tuple(_estimate(fit, k, start, runs) for k in range(len(fit.free)))
+    runs = straight_runs(waves or measure_waveforms(campaign, progress=progress))
+    start, fit, estimates = estimated(runs, tire, progress=progress)
     deviation = np.sqrt(np.diag(fit.covariance))
     return Identification(
         _fitted_file(start, estimates, campaign, runs, fit),
@@ -133,11 +127,34 @@ def identify(
     )
 
 
+def estimated(
+    runs: StraightRuns,
+    tire: TireFile | None = None,
+    *,
+    progress: Callable[[str], None] | None = None,
+) -> tuple[TireFile, WaveformFit, tuple[Estimate, ...]]:
+    """Return start and priors, the fit, and what it tells of every number.
+
+    Parameters and errors as in `identify`, for runs that have been read already.
+    """
+    start = start_file(runs.waves.header, runs, tire)
+    fit = fit_waveforms(
+        runs.data(),
+        values_of(start.tire),
+        Prior(np.array([_prior_std(start, coordinate) for coordinate in FITTED])),
+        free=FITTED,
+        discrepancy=Discrepancy(),
+        progress=progress,
+    )
+    return start, fit, tuple(_estimate(fit, k, start, runs) for k in range(len(fit.free)))
+
+
 def start_file(header: CampaignHeader, runs: StraightRuns, tire: TireFile | None) -> TireFile:
     """Return start and priors: the campaign's geometry, then the given tire, then literature.
 
-    The reference pressure is the mean of the campaign. Damping, extension and shear of the belt and
-    hardening are no part of the base model and start at their plain values.
+    The reference pressure is the mean of the campaign. Damping, shear of the belt and hardening are
+    no part of the base model and start at their plain values; an infinite extension stiffness of
+    the given tire is no start for a fit and gives way to the assumed one.
     """
     numbers: dict[str, Number] = {}
     pressure = float(np.mean(runs.waves.conditions["pressure"]))
@@ -153,7 +170,8 @@ def start_file(header: CampaignHeader, runs: StraightRuns, tire: TireFile | None
         numbers |= {
             name: number
             for name, number in tire.numbers.items()
-            if name not in {"damping", "extension_stiffness", "shear_stiffness", "tread_hardening"}
+            if name not in {"damping", "shear_stiffness", "tread_hardening"}
+            and np.isfinite(number.value)
         }
     geometry = header.tire
     stated: dict[str, float | None] = {
@@ -235,6 +253,7 @@ def _help(name: str, runs: StraightRuns) -> str:
         "tangential_pressure_slope": "torsional sidewall tests at two pressures",
         "tread_stiffness": "a press test of the tread alone, or E and thickness (k_t = E b / tau)",
         "innerliner_offset": "a cut section of the tire, or the thickness of its layers",
+        "extension_stiffness": "the growth of the belt with pressure, or runs at more pressures",
     }[name]
 
 

@@ -19,6 +19,7 @@ STRUCTURE_STD: Mapping[str, float] = MappingProxyType(
         "innerliner_offset": 0.08,
         "radial_pressure_slope": 0.4,
         "tangential_pressure_slope": 2.0,
+        "extension_stiffness": 0.2,
     }
 )
 """Relative standard deviation by parameter, in units of the value (slopes: of a typical slope)."""
