@@ -41,14 +41,18 @@ def identify(
     """Fit the base model to the straight runs of DIR."""
     from tirelib.identify.document import identification_document, model_file
     from tirelib.identify.identify import identify as identify_tire
+    from tirelib.identify.identify import start_file
+    from tirelib.identify.routes import follow_routes, routes_document
     from tirelib.parameters import read_tire, write_tire
 
     start = read_tire(tire_file) if tire_file is not None else None
     campaign = read_campaign(folder)
     with progress_bar("identifying") as progress:
         found = identify_tire(campaign, start, progress=progress)
-    document = identification_document(campaign, found)
-    write_tire(model_file(found), out, "tirelib-model/1")
+        first = start_file(campaign.header, found.runs, start)
+        routes = follow_routes(found.runs, first, progress=progress)
+    document = identification_document(campaign, found) | routes_document(routes)
+    write_tire(model_file(found, routes.damping), out, "tirelib-model/1")
     console = output()
     console.print(
         f"{campaign.header.name}: {len(document['runs'])} straight runs, "
@@ -67,6 +71,15 @@ def identify(
             f"  vertical stiffness at {stiffness['load_N']:.0f} N: model "
             f"{stiffness['model']:.1f}, measured {stiffness['measured']:.1f} N/mm"
         )
+    damping = routes.damping
+    if damping is not None:
+        flags = f" ({', '.join(damping.flags)})" if damping.flags else ""
+        console.print(
+            f"  damping {damping.value:.3f}, 95 % {damping.low:.3f} to {damping.high:.3f}{flags}; "
+            "not in the model: `tirelib add sidewall_damping` puts it there"
+        )
+    for reason in routes.reasons:
+        console.print(f"  {reason}")
     console.print(f"written: {out}")
     if json_file is not None:
         write_json(json_file, document)

@@ -8,6 +8,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.campaign import Campaign
 from tirelib.identify.identify import Identification
+from tirelib.identify.static_route_fit import Quantity
 from tirelib.parameters import FIELDS, TireFile
 from tirelib.units import from_si
 
@@ -73,10 +74,24 @@ def _slope(deflection: FloatArray, load: FloatArray) -> float:
     return float(1e-3 / fitted(float(load.mean())))
 
 
-def model_file(found: Identification) -> TireFile:
-    """Return the identified tire as a model without effects."""
+def model_file(found: Identification, damping: Quantity | None = None) -> TireFile:
+    """Return the identified tire as a model without effects.
+
+    The damping stands beside the model: the base has none, so that its lack can be diagnosed.
+    """
+    beside: dict[str, Any] = {}
+    if damping is not None:
+        beside["identified_damping"] = {
+            "value": damping.value,
+            "unit": "1",
+            "std": damping.std,
+            "interval": [damping.low, damping.high],
+            "flags": list(damping.flags),
+            "source": "lag of the contact's edges behind the compressive peaks over speed",
+        }
     extra = {
         **found.tire.extra,
+        **beside,
         "model": {"ring": "large displacements", "contact": "radial"},
         "effects": [],
         "history": [],
