@@ -10,6 +10,7 @@ from section import section
 from verify import even
 
 GRID = np.concatenate([np.linspace(0.0, 0.6, 121), np.linspace(0.6, np.pi, 61)[1:]])
+OUT = Path(__file__).resolve().parents[2] / "build" / "out" / "fem"
 COLUMNS = "load_N,phi_rad,strain,beam_strain,u_m,v_m,x_m,pressure_N_per_m,shear_N_per_m"
 
 
@@ -40,7 +41,11 @@ def recipe(path: Path, solver: str, results: dict[str, object], checks: dict[str
         "note": (
             "A static tire section pressed on a flat road; strains relative to the inflated, "
             "unloaded tire. Remake with `make fem`. SI; phi is the material angle, 0 at the "
-            "road's normal; half of a symmetric section."
+            "road's normal; half of a symmetric section. shear_N_per_m has the solver's sign, "
+            "that of the tire on the road: its negative is the road on the tire, positive outward. "
+            "road_reaction_N holds the road, per load: along x and up. solver_seconds is the "
+            "wall time of the job, two jobs at a time on two cores; seconds_per_load_step "
+            "shares it out by Newton iterations."
         ),
         "solver": solver,
         "tires": {name: _tire(name) for name in TARGETS},
@@ -63,6 +68,33 @@ def mesh_note(case: Case) -> dict[str, float]:
         "contact_penalty_Pa_per_m": contact.normal,
         "stick_penalty_Pa_per_m": contact.stick,
         "load_increment_N": touch.load_increment,
+        "road_reaction_N": road_reaction(OUT / f"{case.name}.dat")[-len(case.loads) :],
+        **times(OUT / case.name, len(case.loads)),
+    }
+
+
+def road_reaction(path: Path) -> list[list[float]]:
+    """Return the force that holds the road, (along x, up) per step, [N]."""
+    lines = path.read_text().splitlines()
+    found = [k for k, line in enumerate(lines) if "total force" in line and "ROAD" in line]
+    return [[float(x) for x in lines[k + 2].split()[:2]] for k in found]
+
+
+def times(job: Path, n_loads: int) -> dict[str, float]:
+    """Return the wall time of a job and of one of its load steps, [s].
+
+    The log has the time of the job; it is shared out by the Newton iterations that the status
+    file counts. Two jobs ran at a time on two cores.
+    """
+    log = job.with_suffix(".log").read_text().splitlines()
+    whole = float(next(x for x in reversed(log) if "Total CalculiX Time" in x).split(":")[1])
+    rows = [line.split() for line in job.with_suffix(".sta").read_text().splitlines()[2:]]
+    steps = np.array([int(row[0]) for row in rows])
+    iterations = np.array([int(row[3]) for row in rows])
+    loading = iterations[steps > steps.max() - n_loads].sum()
+    return {
+        "solver_seconds": whole,
+        "seconds_per_load_step": round(whole * float(loading / iterations.sum()) / n_loads, 2),
     }
 
 

@@ -1,6 +1,7 @@
 """`tirelib simulate` from the command line: contract, files, exit codes, messages."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -119,7 +120,7 @@ def test_without_out_and_json_it_only_prints(tmp_path: Path) -> None:
     done = run(*words, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert list(tmp_path.iterdir()) == []
-    for text in ("vertical load [N]", "4000.0", "leading edge [rad]", "CP1", "entry < 0 < exit"):
+    for text in ("vertical load", "4000.0", "entry", "CP1", "entry < 0 < exit"):
         assert text in done.stdout
 
 
@@ -149,6 +150,43 @@ def test_an_inflation_that_the_sidewall_does_not_know_is_noted(tmp_path: Path) -
     assert document(tmp_path, "--model", "table-6-1", "--load", 4000)["notes"] == []
 
 
+def test_a_load_that_no_tire_would_carry_is_noted_with_the_range(tmp_path: Path) -> None:
+    """20 % of the free radius of 312.5 mm; the range's own load is no longer noted."""
+    notes = document(tmp_path, "--model", "table-6-1", "--load", "4000,19000")["notes"]
+    assert len(notes) == 1
+    assert "19000 N press this tire by" in notes[0]
+    found = re.search(r"free radius \(62 mm\).*range: up to (\d+) N", notes[0])
+    assert found
+    assert 4000.0 < float(found[1]) < 19000.0
+    inside = document(tmp_path, "--model", "table-6-1", "--load", float(found[1]) - 1.0)
+    assert inside["notes"] == []
+    assert inside["deflection_mm"] == pytest.approx(62.5, abs=0.05)
+
+
+def test_a_belt_too_soft_for_the_harmonics_is_noted(tmp_path: Path) -> None:
+    path = tmp_path / "soft.toml"
+    write_tire(read_tire("table-6-1"), path)
+    place = r"(\[belt\.bending_stiffness\]\nvalue = )[\d.]+"
+    text, count = re.subn(place, r"\g<1>0.035", path.read_text())
+    assert count == 1
+    path.write_text(text)
+    notes = document(tmp_path, "--model", path, "--load", 4000)["notes"]
+    assert "too little for 1000 harmonics" in notes[0]
+
+
+def test_the_table_has_a_row_for_each_point_and_fits_a_terminal() -> None:
+    loads = [f"{500 * (1 + n)}" for n in range(12)]
+    words = ["simulate", "--model", "table-6-1", "--load", ",".join(loads), "--omega", "59"]
+    shown = CliRunner().invoke(program, words, env={"COLUMNS": "80"})
+    assert shown.exit_code == 0
+    lines = shown.output.splitlines()[1:]
+    assert max(map(len, lines)) <= 80
+    for number, load in enumerate(loads):
+        rows = [line.split() for line in lines if line.split()[:1] == [str(number)]]
+        assert len(rows) == 4
+        assert rows[0][1] == f"{load}.0"
+
+
 def test_help_has_examples() -> None:
     shown = CliRunner().invoke(program, ["simulate", "--help"])
     assert shown.exit_code == 0
@@ -167,7 +205,7 @@ WRONG = {
     "heavy": (["--load", "90000"], "90000 N"),
     "vacuum": (["--load", "4000", "--pressure", "-1"], "-1 bar; the model holds from 0"),
     "kilopascal": (["--load", "4000", "--pressure", "230"], "230 bar; the model holds"),
-    "fast": (["--load", "4000", "--speed", "500"], "--speed 500 km/h; the model holds from 0"),
+    "fast": (["--load", "4000", "--speed", "500"], "(300 rad/s times ring radius); steady"),
     "spinning": (["--load", "4000", "--omega", "400"], "400 rad/s; the model holds from 0 to 300"),
     "no speed": (["--load", "4000", "--speed", "nan"], "nan km/h"),
     "backward": (["--load", "4000", "--speed", "-50"], "--speed -50 km/h; the model holds from 0"),

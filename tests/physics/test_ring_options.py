@@ -182,6 +182,14 @@ def test_sidewall_follows_pressure_on_a_line_and_deflection_exponentially(
         (lambda: replace(RING, mass=-1.0), ["mass = -1", "> 0"]),
         (lambda: replace(RING, bending_stiffness=np.nan), ["bending_stiffness = nan"]),
         (lambda: replace(RING, damping=-0.01), ["damping = -0.01", ">= 0"]),
+        (lambda: replace(RING, radial_stiffness=np.inf), ["radial_stiffness = inf", "finite"]),
+        (lambda: replace(RING, mass=np.array([3.0, np.inf])), ["mass = inf at point 1", "finite"]),
+        (
+            lambda: replace(RING, mass=np.ones(2), damping=np.zeros(3)),
+            ["mass 2, damping 3", "same length"],
+        ),
+        (lambda: replace(RING, radius="0.3 m"), ["radius is '0.3 m'", "number"]),
+        (lambda: replace(RING, mass=np.ones((2, 2))), ["mass has shape (2, 2)"]),
         (lambda: compliance(RING, np.nan), ["turn rate", "rad/s"]),
         (lambda: compliance(RING, 59.0, 1), ["1 modes", "at least 2"]),
         (

@@ -209,6 +209,19 @@ def test_softening_tire_takes_the_smaller_deflection_and_has_a_largest_load() ->
         press_to_load(tire, 1.5 * float(curve.load[top]), nodes=101)
 
 
+@pytest.mark.parametrize("softening", [-40.0, -60.0, -100.0])
+def test_the_largest_load_of_a_softening_tire_is_named_and_carried(softening: float) -> None:
+    tire = replace(TIRE, softening=softening)
+    fine = np.linspace(5e-4, 0.078, 156)
+    peak = float(press_to_deflection(tire, fine, nodes=121).load.max())
+    found = press_to_load(tire, 0.997 * peak, nodes=121)
+    assert float(found.load) == pytest.approx(0.997 * peak, rel=1e-9)
+    with pytest.raises(ParameterError, match="point 1: load") as caught:
+        press_to_load(tire, [100.0, 1.2 * peak], nodes=121)
+    named = float(str(caught.value).split("carries 0 to ")[1].split(" N")[0])
+    assert named == pytest.approx(peak, rel=3e-3)
+
+
 def test_points_are_solved_together_as_alone() -> None:
     tire = replace(TIRE, radial_stiffness=np.array([4e5, 8e5])[:, None], exact_gap=True)
     together = press_to_load(tire, np.array([1000.0, 3000.0, 5000.0]), nodes=101)
@@ -281,7 +294,7 @@ def test_bad_conditions_are_refused() -> None:
         press_to_deflection(TIRE, np.nan)
     with pytest.raises(ParameterError, match="nodes = 100; must be odd"):
         press_to_deflection(TIRE, 0.02, nodes=100)
-    with pytest.raises(ParameterError, match=r"tread pressed by .* its thickness 0.0125 m"):
+    with pytest.raises(ParameterError, match=r"point 0 at .* N: .* its thickness 0.0125 m"):
         press_to_deflection(replace(TIRE, tread_stiffness=4e5), 0.05)
     with pytest.raises(ParameterError, match="meets the road only below"):
         road_gap(1.6, 0.02, 0.3, exact=True)

@@ -309,6 +309,12 @@ def test_bad_traces_are_refused() -> None:
         contact_deformation(np.zeros(4), -0.2, 0.2, deflection=0.02, **ROAD)
     with pytest.raises(ParameterError, match="a strain is not finite"):
         contact_deformation(np.full(9, np.nan), -0.2, 0.2, deflection=0.02, **ROAD)
+    flat = np.full((2, 9), 6.5e-3)
+    for d0, shown in ((20.0, "20 m"), (-0.02, "-0.02 m"), (np.nan, "nan m"), (0.0, "0 m")):
+        with pytest.raises(ParameterError, match=f"trace 1 has deflection = {shown}; .*metres"):
+            contact_deformation(flat, -0.2, 0.2, deflection=[0.02, d0], **ROAD)
+    with pytest.raises(ParameterError, match=r"trace 1 has a strain of 6500.*microstrain"):
+        contact_deformation(flat * [[1.0], [1e6]], -0.2, 0.2, deflection=0.02, **ROAD)
     with pytest.raises(ShapeError, match="do not fit traces"):
         contact_deformation(np.zeros((2, 9)), np.full(3, -0.2), 0.2, deflection=0.02, **ROAD)
     with pytest.raises(ParameterError, match="leading must be finite and below trailing"):

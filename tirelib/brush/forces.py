@@ -21,14 +21,16 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.brush.contact_split import Grid, make_grid, split
 from tirelib.brush.parameters import BrushParameters
 from tirelib.contact.profiles import PressureProfile
-from tirelib.errors import ParameterError, ShapeError
+from tirelib.errors import ConvergenceError, ParameterError, ShapeError
 
 MOST_ITERATIONS = 60
 MOST_HALVINGS = 8
+MOST_NAMED = 8
+"""Operating points that an error names."""
 TOLERANCE = 1e-11
 """Of the carcass balance, relative to mu Fz and mu Fz times the contact length."""
 
@@ -98,7 +100,9 @@ def brush_forces(
     Raises
     ------
     ParameterError
-        If a slip is out of range or not finite, or the balance with the carcass is not found.
+        If a slip is out of range or not finite.
+    ConvergenceError
+        If the balance with the carcass is not found; carries Fy and Mz of every operating point.
     ShapeError
         If the arguments do not broadcast.
 
@@ -262,11 +266,11 @@ class _Brush:
             left, f, m, r = left[open_], f[open_], m[open_], r[:, open_]
             brush = brush.take(open_)
             f, m, r = brush.step(f, m, r)
-        raise ParameterError(
-            f"{left.size} of {force.size} operating points have no balance with the carcass "
-            f"(remainder {float(np.abs(r).max()):.2g} of mu Fz); the carcass is too soft for the "
-            "bristles or sliding friction is below sticking friction; stiffen it"
-        )
+        open_ = np.maximum(*np.abs(r)) > TOLERANCE
+        force[left], moment[left] = f, m
+        if not open_.any():
+            return self.belt(force, moment)
+        raise _no_balance(left[open_], force, moment, float(np.abs(r).max()))
 
     def take(self, keep: BoolArray) -> Self:
         """Return some of the operating points."""
@@ -314,6 +318,20 @@ class _Brush:
     def _scales(self) -> tuple[FloatArray, FloatArray]:
         scale = np.maximum(self.stick * self.load, 1e-300)
         return scale, scale * self.length
+
+
+def _no_balance(
+    points: IntArray, force: FloatArray, moment: FloatArray, rest: float
+) -> ConvergenceError:
+    first = ", ".join(map(str, points[:MOST_NAMED])) + (", ..." if points.size > MOST_NAMED else "")
+    return ConvergenceError(
+        f"brush: {points.size} of {force.size} operating points (number {first}) have no balance "
+        f"with the carcass; {rest:.2g} of mu Fz is left, allowed is {TOLERANCE:g}. The belt is so "
+        "soft that the bristle in the middle, whose direction is that of all sliding, turns over, "
+        "or sliding friction is far below sticking friction: stiffen carcass.bend or carcass.yaw",
+        (force, moment),
+        rest,
+    )
 
 
 def _set_up(

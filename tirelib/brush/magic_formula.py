@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
 from tirelib.arrays import FloatArray
 from tirelib.errors import ParameterError
@@ -116,46 +116,16 @@ def fit_sine(
     fixed = dict(held or {})
     free = [name for name in NAMES if name not in fixed]
     slope = _check(alpha, force, fixed, free)
-    top = float(np.abs(force).max())
-    scale = {"C_alpha": slope, "D": top, "C": 1.0, "E": 1.0, "S_h": 0.01, "S_v": 0.02 * top}
-    lower = np.array([LOWEST.get(n, 0.05 if n in ("C_alpha", "D") else -np.inf) for n in free])
-    upper = np.array([HIGHEST.get(n, 50.0 if n in ("C_alpha", "D") else np.inf) for n in free])
-
-    def unpack(values: FloatArray) -> dict[str, float]:
-        return {**{n: float(v) * scale[n] for n, v in zip(free, values, strict=True)}, **fixed}
-
-    def residual(values: FloatArray) -> FloatArray:
-        return (lateral_curve(alpha, unpack(values)) - force) / top
-
-    starts = (
-        {"C_alpha": 1.2, "D": d, "C": c, "E": 0.0, "S_h": 0.0, "S_v": 0.0}
-        for d in (1.02, 1.5)
-        for c in (1.2, 1.6)
-    )
-    runs = [
-        least_squares(
-            residual, [start[n] for n in free], bounds=(lower, upper), xtol=1e-13, ftol=1e-13,
-            gtol=1e-13, max_nfev=2000,
-        )
-        for start in starts
-    ]  # fmt: skip
-    best = min(runs, key=lambda run: float(run.cost))
-    found = unpack(best.x)
+    search = _Search(alpha, force, fixed, free, slope)
+    best = search.best()
+    found, top = search.unpack(best.x), search.top
     spread = float(np.sqrt(2.0 * best.cost / (alpha.size - len(free)))) * top
     noise = spread if Fy_std is None else Fy_std
-    covariance = _covariance(
-        np.asarray(best.jac, dtype=np.float64),
-        np.array([scale[n] for n in free]),
-        free,
-        noise / top,
-    )
+    jacobian = np.asarray(best.jac, dtype=np.float64)
+    covariance = _covariance(jacobian, np.array(search.scales), free, noise / top)
     std = dict(zip(NAMES, np.sqrt(np.diag(covariance)), strict=True))
     reach = float(np.abs(force - found["S_v"]).max()) / found["D"]
     sure = bool(std["D"] <= MOST_STD * found["D"])
-    at_limit = tuple(
-        n for n, v, a, b in zip(free, best.x, lower, upper, strict=True)
-        if abs(v - a) < 1e-6 or abs(v - b) < 1e-6
-    )  # fmt: skip
     return SineFit(
         MappingProxyType({n: found[n] for n in NAMES}),
         covariance,
@@ -166,8 +136,72 @@ def fit_sine(
         reach,
         sure and reach >= LEAST_REACH,
         spread,
-        at_limit,
+        search.at_limit(best.x),
     )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Search:
+    """Least squares for the free coefficients, each divided by its typical size."""
+
+    alpha: FloatArray
+    force: FloatArray
+    held: Mapping[str, float]
+    free: list[str]
+    slope: float
+
+    @property
+    def top(self) -> float:
+        return float(np.abs(self.force).max())
+
+    @property
+    def scales(self) -> list[float]:
+        top = self.top
+        sizes = {
+            "C_alpha": self.slope,
+            "D": top,
+            "C": 1.0,
+            "E": 1.0,
+            "S_h": 0.01,
+            "S_v": 0.02 * top,
+        }
+        return [sizes[name] for name in self.free]
+
+    @property
+    def bounds(self) -> tuple[list[float], list[float]]:
+        low = [LOWEST.get(n, 0.05 if n in ("C_alpha", "D") else -np.inf) for n in self.free]
+        high = [HIGHEST.get(n, 50.0 if n in ("C_alpha", "D") else np.inf) for n in self.free]
+        return low, high
+
+    def unpack(self, values: FloatArray) -> dict[str, float]:
+        """Return all coefficients."""
+        sized = zip(self.free, values, self.scales, strict=True)
+        return {**{n: float(v) * scale for n, v, scale in sized}, **self.held}
+
+    def best(self) -> OptimizeResult:
+        """Return the best of four searches."""
+
+        def residual(values: FloatArray) -> FloatArray:
+            return (lateral_curve(self.alpha, self.unpack(values)) - self.force) / self.top
+
+        starts = (
+            {"C_alpha": 1.2, "D": d, "C": c, "E": 0.0, "S_h": 0.0, "S_v": 0.0}
+            for d in (1.02, 1.5)
+            for c in (1.2, 1.6)
+        )
+        runs = [
+            least_squares(
+                residual, [start[n] for n in self.free], bounds=self.bounds, xtol=1e-13,
+                ftol=1e-13, gtol=1e-13, max_nfev=2000,
+            )
+            for start in starts
+        ]  # fmt: skip
+        return min(runs, key=lambda run: float(run.cost))
+
+    def at_limit(self, values: FloatArray) -> tuple[str, ...]:
+        """Return the coefficients at their bounds."""
+        ends = zip(self.free, values, *self.bounds, strict=True)
+        return tuple(n for n, v, a, b in ends if abs(v - a) < 1e-6 or abs(v - b) < 1e-6)
 
 
 def _covariance(

@@ -6,11 +6,13 @@ stands where 6 has its tangent, camber itself (scaled by LGAX, LGAY, LGAZ) where
 camber shifts the curve by PHY3 alone, and trail and arm refer to the unscaled nominal load.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 
 from tirelib.arrays import FloatArray
-from tirelib.brush.mf_tire import MagicForces, MagicTire, check_inputs
+from tirelib.brush.mf_tire import Inputs, MagicForces, MagicTire, check_inputs
 from tirelib.errors import ParameterError
 
 TINY = 1e-9
@@ -35,82 +37,123 @@ def magic_forces_5(
     """
     _check(tire)
     at = check_inputs(tire, load, slip_angle, slip_ratio, camber, None)
-    c, Fz, alpha, kappa, gamma = tire.coefficients, at.Fz, at.alpha, at.kappa, at.gamma
-    nominal = c.LFZO * tire.nominal_load  # (4.E1)
-    dfz = (Fz - nominal) / nominal  # (4.E2a)
-
-    SHx = (c.PHX1 + c.PHX2 * dfz) * c.LHX  # (4.E17)
-    SVx = Fz * (c.PVX1 + c.PVX2 * dfz) * c.LVX * c.LMUX  # (4.E18)
-    kappa_x = kappa + SHx  # (4.E10)
-    Cx = c.PCX1 * c.LCX  # (4.E11)
-    mu_x = (c.PDX1 + c.PDX2 * dfz) * (1.0 - c.PDX3 * (gamma * c.LGAX) ** 2) * c.LMUX  # (4.E13)
-    Dx = mu_x * Fz  # (4.E12)
-    Ex = c.PEX1 + c.PEX2 * dfz + c.PEX3 * dfz**2
-    Ex = Ex * (1.0 - c.PEX4 * np.sign(kappa_x)) * c.LEX  # (4.E14)
-    Kx = Fz * (c.PKX1 + c.PKX2 * dfz) * np.exp(c.PKX3 * dfz) * c.LKX  # (4.E15)
-    Bx = Kx / _safe(Cx * Dx)  # (4.E16)
-    Fx = Dx * np.sin(Cx * _magic(Bx, kappa_x, Ex)) + SVx  # (4.E9)
-
-    gamma_y = gamma * c.LGAY
-    SHy = (c.PHY1 + c.PHY2 * dfz) * c.LHY + c.PHY3 * gamma_y  # (4.E27)
-    SVy_base = (c.PVY1 + c.PVY2 * dfz) * c.LVY  # (4.E29)
-    SVy = Fz * (SVy_base + (c.PVY3 + c.PVY4 * dfz) * gamma_y) * c.LMUY  # (4.E28)
-    alpha_y = alpha + SHy  # (4.E20)
-    Cy = c.PCY1 * c.LCY  # (4.E21)
-    mu_y = (c.PDY1 + c.PDY2 * dfz) * (1.0 - c.PDY3 * gamma_y**2) * c.LMUY  # (4.E23)
-    Dy = mu_y * Fz  # (4.E22)
-    Ey = (c.PEY1 + c.PEY2 * dfz) * c.LEY
-    Ey = Ey * (1.0 - (c.PEY3 + c.PEY4 * gamma_y) * np.sign(alpha_y))  # (4.E24)
-    Ky = (
-        c.PKY1
-        * nominal
-        * np.sin(2.0 * np.arctan(Fz / (c.PKY2 * nominal)))
-        * (1.0 - c.PKY3 * np.abs(gamma_y))
-        * c.LKY
-    )  # (4.E25)
-    By = Ky / _safe(Cy * Dy)  # (4.E26)
-    Fy = Dy * np.sin(Cy * _magic(By, alpha_y, Ey)) + SVy  # (4.E19)
-    trail_force, well = Fy, (Ex <= 1.0) & (Ey <= 1.0)
-
+    nominal = tire.coefficients.LFZO * tire.nominal_load  # (4.E1)
+    dfz = (at.Fz - nominal) / nominal  # (4.E2a)
+    along, across = _longitudinal(tire, at, dfz), _lateral(tire, at, dfz)
+    Fx, Fy, trail_force = along.F, across.F, across.F
+    well = (along.E <= 1.0) & (across.E <= 1.0)
     if combined:
-        Ex_a = c.REX1 + c.REX2 * dfz  # (4.E56)
-        Bx_a = c.RBX1 * np.cos(np.arctan(c.RBX2 * kappa)) * c.LXAL  # (4.E54)
-        none = np.cos(c.RCX1 * _magic(Bx_a, np.asarray(c.RHX1), Ex_a))  # (4.E52)
-        Fx = np.cos(c.RCX1 * _magic(Bx_a, alpha + c.RHX1, Ex_a)) / none * Fx  # (4.E50), (4.E51)
-        Ey_k = c.REY1 + c.REY2 * dfz  # (4.E64)
-        SHy_k = c.RHY1 + c.RHY2 * dfz  # (4.E65)
-        By_k = c.RBY1 * np.cos(np.arctan(c.RBY2 * (alpha - c.RBY3))) * c.LYKA  # (4.E62)
-        none = np.cos(c.RCY1 * _magic(By_k, SHy_k, Ey_k))  # (4.E60)
-        trail_force = np.cos(c.RCY1 * _magic(By_k, kappa + SHy_k, Ey_k)) / none * Fy  # (4.E59)
-        Dv = mu_y * Fz * (c.RVY1 + c.RVY2 * dfz + c.RVY3 * gamma)
-        Dv = Dv * np.cos(np.arctan(c.RVY4 * alpha))  # (4.E67)
-        Fy = trail_force + Dv * np.sin(c.RVY5 * np.arctan(c.RVY6 * kappa)) * c.LVYKA  # (4.E58)
-        well = well & (Ex_a <= 1.0) & (Ey_k <= 1.0)
+        Fx, E_x = _combined_x(tire, at, dfz, along.F)
+        trail_force, Fy, E_y = _combined_y(tire, at, dfz, across)
+        well = well & (E_x <= 1.0) & (E_y <= 1.0)
+    long_slip = along.K / _safe(across.K) * at.kappa if combined else np.zeros_like(at.kappa)
+    Mz, E_t = _moment(tire, at, dfz, across, long_slip, trail_force)
+    if combined:
+        c, share = tire.coefficients, Fy / tire.nominal_load
+        arm = c.SSZ1 + c.SSZ2 * share + (c.SSZ3 + c.SSZ4 * dfz) * at.gamma
+        Mz = Mz + arm * tire.radius * c.LS * Fx  # (4.E76), (4.E71)
+    well = well & (E_t <= 1.0)
+    return MagicForces(Fx, Fy, Mz, across.K, along.K, along.mu, across.mu, at.in_range, well)
 
-    gamma_z, R0 = gamma * c.LGAZ, tire.radius
-    alpha_t = alpha + c.QHZ1 + c.QHZ2 * dfz + (c.QHZ3 + c.QHZ4 * dfz) * gamma_z  # (4.E34)
-    alpha_r = alpha + SHy + SVy / _safe(Ky)  # (4.E37), (4.E38)
-    Bt = (c.QBZ1 + c.QBZ2 * dfz + c.QBZ3 * dfz**2) * c.LKY / c.LMUY
-    Bt = Bt * (1.0 + c.QBZ4 * gamma_z + c.QBZ5 * np.abs(gamma_z))  # (4.E40)
-    Dt = Fz * (c.QDZ1 + c.QDZ2 * dfz) * (R0 / tire.nominal_load) * c.LTR  # (4.E42)
-    Dt = Dt * (1.0 + c.QDZ3 * gamma_z + c.QDZ4 * gamma_z**2)  # (4.E43)
-    Et = (c.QEZ1 + c.QEZ2 * dfz + c.QEZ3 * dfz**2) * (
-        1.0 + (c.QEZ4 + c.QEZ5 * gamma_z) * (2.0 / np.pi) * np.arctan(Bt * c.QCZ1 * alpha_t)
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pure:
+    """One force under its own slip alone: force, slip stiffness, friction, curvature, B C."""
+
+    F: FloatArray
+    K: FloatArray
+    mu: FloatArray
+    E: FloatArray
+    BC: FloatArray
+    SH: FloatArray
+    SV: FloatArray
+
+
+def _longitudinal(tire: MagicTire, at: Inputs, dfz: FloatArray) -> _Pure:
+    c, Fz = tire.coefficients, at.Fz
+    SH = (c.PHX1 + c.PHX2 * dfz) * c.LHX  # (4.E17)
+    SV = Fz * (c.PVX1 + c.PVX2 * dfz) * c.LVX * c.LMUX  # (4.E18)
+    kappa_x = at.kappa + SH  # (4.E10)
+    C = c.PCX1 * c.LCX  # (4.E11)
+    mu = (c.PDX1 + c.PDX2 * dfz) * (1.0 - c.PDX3 * (at.gamma * c.LGAX) ** 2) * c.LMUX  # (4.E13)
+    D = mu * Fz  # (4.E12)
+    E = c.PEX1 + c.PEX2 * dfz + c.PEX3 * dfz**2
+    E = E * (1.0 - c.PEX4 * np.sign(kappa_x)) * c.LEX  # (4.E14)
+    K = Fz * (c.PKX1 + c.PKX2 * dfz) * np.exp(c.PKX3 * dfz) * c.LKX  # (4.E15)
+    B = K / _safe(C * D)  # (4.E16)
+    return _Pure(D * np.sin(C * _magic(B, kappa_x, E)) + SV, K, mu, E, B * C, SH, SV)  # (4.E9)
+
+
+def _lateral(tire: MagicTire, at: Inputs, dfz: FloatArray) -> _Pure:
+    c, Fz, gamma = tire.coefficients, at.Fz, at.gamma * tire.coefficients.LGAY
+    nominal = c.LFZO * tire.nominal_load  # (4.E1)
+    SH = (c.PHY1 + c.PHY2 * dfz) * c.LHY + c.PHY3 * gamma  # (4.E27)
+    SV_base = (c.PVY1 + c.PVY2 * dfz) * c.LVY  # (4.E29)
+    SV = Fz * (SV_base + (c.PVY3 + c.PVY4 * dfz) * gamma) * c.LMUY  # (4.E28)
+    alpha_y = at.alpha + SH  # (4.E20)
+    C = c.PCY1 * c.LCY  # (4.E21)
+    mu = (c.PDY1 + c.PDY2 * dfz) * (1.0 - c.PDY3 * gamma**2) * c.LMUY  # (4.E23)
+    D = mu * Fz  # (4.E22)
+    E = (c.PEY1 + c.PEY2 * dfz) * c.LEY
+    E = E * (1.0 - (c.PEY3 + c.PEY4 * gamma) * np.sign(alpha_y))  # (4.E24)
+    K = c.PKY1 * nominal * np.sin(2.0 * np.arctan(Fz / (c.PKY2 * nominal)))
+    K = K * (1.0 - c.PKY3 * np.abs(gamma)) * c.LKY  # (4.E25)
+    B = K / _safe(C * D)  # (4.E26)
+    return _Pure(D * np.sin(C * _magic(B, alpha_y, E)) + SV, K, mu, E, B * C, SH, SV)  # (4.E19)
+
+
+def _combined_x(
+    tire: MagicTire, at: Inputs, dfz: FloatArray, Fxo: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return Fx and its curvature factor."""
+    c = tire.coefficients
+    E = c.REX1 + c.REX2 * dfz  # (4.E56)
+    B = c.RBX1 * np.cos(np.arctan(c.RBX2 * at.kappa)) * c.LXAL  # (4.E54)
+    none = np.cos(c.RCX1 * _magic(B, np.asarray(c.RHX1), E))  # (4.E52)
+    weight = np.cos(c.RCX1 * _magic(B, at.alpha + c.RHX1, E)) / none
+    return np.asarray(weight * Fxo), E  # (4.E50), (4.E51)
+
+
+def _combined_y(
+    tire: MagicTire, at: Inputs, dfz: FloatArray, across: _Pure
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return Fy without and with the force that kappa brings, and the curvature factor."""
+    c, alpha, kappa = tire.coefficients, at.alpha, at.kappa
+    E = c.REY1 + c.REY2 * dfz  # (4.E64)
+    SH = c.RHY1 + c.RHY2 * dfz  # (4.E65)
+    B = c.RBY1 * np.cos(np.arctan(c.RBY2 * (alpha - c.RBY3))) * c.LYKA  # (4.E62)
+    none = np.cos(c.RCY1 * _magic(B, SH, E))  # (4.E60)
+    weighed = np.cos(c.RCY1 * _magic(B, kappa + SH, E)) / none * across.F  # (4.E59)
+    D = across.mu * at.Fz * (c.RVY1 + c.RVY2 * dfz + c.RVY3 * at.gamma)
+    D = D * np.cos(np.arctan(c.RVY4 * alpha))  # (4.E67)
+    Fy = weighed + D * np.sin(c.RVY5 * np.arctan(c.RVY6 * kappa)) * c.LVYKA  # (4.E58)
+    return weighed, Fy, E
+
+
+def _moment(
+    tire: MagicTire, at: Inputs, dfz: FloatArray, across: _Pure, long_slip: FloatArray,
+    trail_force: FloatArray,
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    """Return Mz without the arm of Fx, and its curvature factor."""
+    c, Fz, alpha, R0 = tire.coefficients, at.Fz, at.alpha, tire.radius
+    gamma = at.gamma * c.LGAZ
+    alpha_t = alpha + c.QHZ1 + c.QHZ2 * dfz + (c.QHZ3 + c.QHZ4 * dfz) * gamma  # (4.E34)
+    alpha_r = alpha + across.SH + across.SV / _safe(across.K)  # (4.E37), (4.E38)
+    B = (c.QBZ1 + c.QBZ2 * dfz + c.QBZ3 * dfz**2) * c.LKY / c.LMUY
+    B = B * (1.0 + c.QBZ4 * gamma + c.QBZ5 * np.abs(gamma))  # (4.E40)
+    D = Fz * (c.QDZ1 + c.QDZ2 * dfz) * (R0 / tire.nominal_load) * c.LTR  # (4.E42)
+    D = D * (1.0 + c.QDZ3 * gamma + c.QDZ4 * gamma**2)  # (4.E43)
+    E = (c.QEZ1 + c.QEZ2 * dfz + c.QEZ3 * dfz**2) * (
+        1.0 + (c.QEZ4 + c.QEZ5 * gamma) * (2.0 / np.pi) * np.arctan(B * c.QCZ1 * alpha_t)
     )  # (4.E44)
-    Br = c.QBZ9 * c.LKY / c.LMUY + c.QBZ10 * By * Cy  # (4.E45)
-    Dr = (c.QDZ6 + c.QDZ7 * dfz) * c.LRES + (c.QDZ8 + c.QDZ9 * dfz) * gamma_z
-    Dr = Fz * Dr * R0 * c.LMUY  # (4.E47)
-    long_slip = Kx / _safe(Ky) * kappa if combined else np.zeros_like(kappa)
+    B_r = c.QBZ9 * c.LKY / c.LMUY + c.QBZ10 * across.BC  # (4.E45)
+    D_r = (c.QDZ6 + c.QDZ7 * dfz) * c.LRES + (c.QDZ8 + c.QDZ9 * dfz) * gamma
+    D_r = Fz * D_r * R0 * c.LMUY  # (4.E47)
     t_eq = np.arctan(np.hypot(np.tan(alpha_t), long_slip)) * np.sign(alpha_t)  # (4.E77)
     r_eq = np.arctan(np.hypot(np.tan(alpha_r), long_slip)) * np.sign(alpha_r)  # (4.E78)
-    trail = Dt * np.cos(c.QCZ1 * _magic(Bt, t_eq, Et)) * np.cos(alpha)  # (4.E73)
-    residual = Dr * np.cos(np.arctan(Br * r_eq)) * np.cos(alpha)  # (4.E75)
-    Mz = -trail * trail_force + residual  # (4.E72)
-    if combined:
-        arm = c.SSZ1 + c.SSZ2 * Fy / tire.nominal_load + (c.SSZ3 + c.SSZ4 * dfz) * gamma
-        Mz = Mz + arm * R0 * c.LS * Fx  # (4.E76), (4.E71)
-    well = well & (Et <= 1.0)
-    return MagicForces(Fx, Fy, Mz, Ky, Kx, mu_x, mu_y, at.in_range, well)
+    trail = D * np.cos(c.QCZ1 * _magic(B, t_eq, E)) * np.cos(alpha)  # (4.E73)
+    residual = D_r * np.cos(np.arctan(B_r * r_eq)) * np.cos(alpha)  # (4.E75)
+    return np.asarray(-trail * trail_force + residual), E  # (4.E72)
 
 
 def _check(tire: MagicTire) -> None:

@@ -14,6 +14,12 @@ from tirelib.errors import FormatError, ParameterError, ShapeError
 
 REQUIRED = ("PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
 """Without these there is no curve at all; every other absent coefficient is neutral."""
+SECTIONS = (
+    "SCALING_COEFFICIENTS", "LONGITUDINAL_COEFFICIENTS", "LATERAL_COEFFICIENTS",
+    "ALIGNING_COEFFICIENTS", "OVERTURNING_COEFFICIENTS", "ROLLING_COEFFICIENTS",
+    "TURNSLIP_COEFFICIENTS", "VERTICAL", "STRUCTURAL",
+)  # fmt: skip
+"""Sections whose coefficients are the tire's; all others are the vendor's own."""
 _NAME = re.compile(r"([PQRS])[A-Z]{1,3}\d{1,2}|L[A-Z]{1,6}")
 
 
@@ -116,49 +122,91 @@ _LIMITS = MappingProxyType(
 def magic_tire(tire: TirFile) -> MagicTire:
     """Return the Magic Formula tire of a property file.
 
+    Coefficients come from `SECTIONS` only.
+
     Raises
     ------
     FormatError
-        Naming every missing or impossible entry.
+        Naming every missing, contradictory or impossible entry.
     """
-    values = {
-        entry.key.upper(): entry.value
-        for section in tire.sections
-        for entry in section.entries
-        if isinstance(entry.value, float) and _NAME.fullmatch(entry.key.upper())
-    }
-    problems = [f"{name} is missing; the Magic Formula needs it" for name in REQUIRED
-                if name not in values]  # fmt: skip
-    found = {}
-    for key, default in (("UNLOADED_RADIUS", None), ("FNOMIN", None), ("NOMPRES", 1.0)):
-        number = tire.number(key)
-        found[key] = default if number is None else number
+    problems: list[str] = []
+    values = _coefficients(tire, problems)
+    _check_required(tire, values, problems)
+    problems += _impossible(values)
+
+    def number(key: str) -> float | None:
+        try:
+            return tire.number(key)
+        except ParameterError as error:
+            problems.append(str(error))
+            return None
+
+    found = {key: number(key) for key in ("UNLOADED_RADIUS", "FNOMIN", "NOMPRES", "INFLPRES")}
+    for key in ("UNLOADED_RADIUS", "FNOMIN", "NOMPRES"):
         value = found[key]
-        if value is None or not value > 0.0:
-            problems.append(f"{key} = {number}; it must be given and > 0")
-    uses_pressure = any(value != 0.0 for name, value in values.items() if name[:2] == "PP")
-    if uses_pressure and tire.number("NOMPRES") is None:
+        if (value is None and key != "NOMPRES") or (value is not None and not value > 0.0):
+            problems.append(f"{key} = {value}; it must be given and > 0")
+    if found["NOMPRES"] is None and any(v != 0.0 for n, v in values.items() if n[:2] == "PP"):
         problems.append("NOMPRES is missing; the pressure coefficients PP.. refer to it")
-    if problems:
-        raise FormatError(problems)
     limits = {}
-    for name, (low, high) in _LIMITS.items():
-        ends = tire.number(low), tire.number(high)
-        if ends != (None, None):
-            low_end, high_end = ends
-            limits[name] = (
-                -np.inf if low_end is None else low_end,
-                np.inf if high_end is None else high_end,
-            )
+    for name, keys in _LIMITS.items():
+        low, high = (number(key) for key in keys)
+        if (low, high) != (None, None):
+            limits[name] = (-np.inf if low is None else low, np.inf if high is None else high)
+    if problems:
+        raise FormatError([f"{tire.where}: {problem}" for problem in problems])
     return MagicTire(
         tire.fit_type,
         Coefficients(values),
         float(found["UNLOADED_RADIUS"] or 0.0),
         float(found["FNOMIN"] or 0.0),
-        tire.number("NOMPRES"),
-        tire.number("INFLPRES"),
+        found["NOMPRES"],
+        found["INFLPRES"],
         MappingProxyType(limits),
     )
+
+
+def _coefficients(tire: TirFile, problems: list[str]) -> dict[str, float]:
+    """Return the coefficients of the sections that hold the tire's."""
+    found: dict[str, tuple[str, float]] = {}
+    for section in tire.sections:
+        if section.name.upper() not in SECTIONS:
+            continue
+        for entry in section.entries:
+            key = entry.key.upper()
+            if not isinstance(entry.value, float) or not _NAME.fullmatch(key):
+                continue
+            place, value = found.setdefault(key, (section.name, entry.value))
+            if value != entry.value:
+                problems.append(
+                    f"{key} = {value:g} in [{place}] but {entry.value:g} in [{section.name}]; one "
+                    "value is needed; remove the other"
+                )
+    return {key: value for key, (_, value) in found.items()}
+
+
+def _check_required(tire: TirFile, values: Mapping[str, float], problems: list[str]) -> None:
+    for name in REQUIRED:
+        if name in values:
+            continue
+        elsewhere = ", ".join(f"[{section}]" for section, _ in tire.places(name))
+        hint = f"; what {elsewhere} has is not read, [..._COEFFICIENTS] is" if elsewhere else ""
+        problems.append(f"{name} is missing; the Magic Formula needs it{hint}")
+
+
+def _impossible(values: Mapping[str, float]) -> list[str]:
+    """Return what is wrong with coefficients that the formula divides by."""
+    problems = [
+        f"{name} = {values[name]:g}; the formula divides by it; it must be > 0, 1 is neutral"
+        for name in ("LFZO", "LMUY")
+        if not values.get(name, 1.0) > 0.0
+    ]
+    if values.get("PKY2") == 0.0:
+        problems.append(
+            "PKY2 = 0; the cornering stiffness is largest at PKY2 times the nominal load; it must "
+            "not be zero"
+        )
+    return problems
 
 
 def check_inputs(
@@ -176,6 +224,8 @@ def check_inputs(
     ParameterError, ShapeError
         If an input is out of what the formula can take, or shapes do not broadcast.
     """
+    if problems := _impossible(tire.coefficients.values):
+        raise ParameterError("Magic Formula: " + "; ".join(problems))
     given = {"load": load, "slip_angle": slip_angle, "slip_ratio": slip_ratio, "camber": camber}
     nominal = tire.nominal_pressure
     if pressure is None:

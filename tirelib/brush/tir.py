@@ -24,6 +24,8 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
 _KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_.\-/]*")
 _SECTION = re.compile(r"\[([^\[\]]+)\]\s*(?:[!$](.*))?")
 _COEFFICIENT = re.compile(r"[PQRS][A-Z]{1,3}\d{1,2}|L[A-Z]{1,6}")
+_NO_TEXT = re.compile(r"[\x00-\x08\x0e-\x19\x1b-\x1f]")
+"""Control characters beside white space and the end mark of old systems."""
 
 Value = float | str | None
 
@@ -73,12 +75,15 @@ class TirFile:
     factors : mapping
         SI per file unit for length, force, angle, mass, time and pressure. A file without a unit
         of pressure means force per length squared, Pa in metres and newtons.
+    where : str
+        Name for error messages.
     """
 
     sections: tuple[TirSection, ...]
     preamble: tuple[TirLine, ...] = ()
     fit_type: int = 61
     factors: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(BASES, 1.0))
+    where: str = field(default="tir", compare=False)
 
     def get(self, key: str, section: str | None = None) -> Value:
         """Return a value as the file has it; None where it is absent or empty. Case is ignored.
@@ -93,23 +98,47 @@ class TirFile:
                     return entry.value
         return None
 
+    def places(self, key: str) -> tuple[tuple[str, Value], ...]:
+        """Return (section, value) wherever the key is not empty; [UNITS] holds words, not data."""
+        return tuple(
+            (part.name, entry.value)
+            for part in self.sections
+            if part.name.upper() != "UNITS"
+            for entry in part.entries
+            if entry.key.upper() == key.upper() and entry.value is not None
+        )
+
     def number(self, key: str) -> float | None:
         """Return a number in SI, None where it is absent or empty.
 
         Raises
         ------
         ParameterError
-            If the value is text.
+            If the value is text, or several sections have different ones.
         """
-        value = self.get(key)
+        found = self.places(key)
+        if not found:
+            return None
+        value = found[0][1]
+        for section, other in found[1:]:
+            if other != value:
+                raise ParameterError(
+                    f"{key} = {value!r} in [{found[0][0]}] but {other!r} in [{section}]; one value "
+                    "is needed; remove the other"
+                )
         if isinstance(value, str):
             raise ParameterError(f"{key} = {value!r} is text; a number is needed; correct the file")
         return None if value is None else value * scale_of(key.upper(), self.factors)
 
 
 def read_tir(path: str | Path) -> TirFile:
-    """Read a .tir file; arguments, result and errors as `parse_tir`."""
-    data = Path(path).read_bytes()
+    """Read a .tir file; result and errors as `parse_tir`, which also tells that it is no file."""
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise FormatError(
+            f"{path}: cannot be read ({error.strerror}); give the path of a .tir file"
+        ) from None
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -130,7 +159,8 @@ def parse_tir(text: str, where: str = "tir") -> TirFile:
     ------
     FormatError
         With every fault: lines that are neither entry, comment nor table, keys twice in a section,
-        unknown or missing units, text where a number is needed, an unknown FITTYP.
+        unknown or missing units, text where a number is needed, an unknown FITTYP. What is no
+        text, or has no section at all, is one fault.
 
     Examples
     --------
@@ -141,13 +171,23 @@ def parse_tir(text: str, where: str = "tir") -> TirFile:
     (61, 4500.0)
     """
     problems: list[str] = []
+    if _NO_TEXT.search(text):
+        raise FormatError(
+            f"{where}: control characters, as in binary data or UTF-16; a .tir file is text in "
+            "UTF-8 or latin-1; convert it or give another file"
+        )
     preamble, sections = _structure(text, problems)
+    if not sections:
+        raise FormatError(
+            f"{where}: no [SECTION] in {len(text.splitlines())} lines; this is no .tir file; give "
+            "another one"
+        )
     factors = _factors(sections, problems)
     _check_values(sections, problems)
     fit_type = _fit_type(TirFile(tuple(sections)), problems)
     if problems:
         raise FormatError([f"{where}: {problem}" for problem in problems])
-    return TirFile(tuple(sections), tuple(preamble), fit_type, MappingProxyType(factors))
+    return TirFile(tuple(sections), tuple(preamble), fit_type, MappingProxyType(factors), where)
 
 
 def write_tir(tire: TirFile, path: str | Path) -> None:

@@ -11,12 +11,21 @@ from rich.table import Table
 
 from tirelib.arrays import FloatArray
 from tirelib.cli.common import FILE, output, write_json
-from tirelib.errors import ParameterError
+from tirelib.errors import ConvergenceError, ParameterError
 from tirelib.parameters import Tire, TireFile, read_tire
-from tirelib.report.simulation import CONTACTS, LARGEST_TURN_RATE, Simulation
+from tirelib.report.simulation import (
+    CONTACTS,
+    LARGEST_TURN_RATE,
+    TURN_RATE_REASON,
+    Simulation,
+)
 from tirelib.report.simulation import simulate as simulate_tire
 from tirelib.report.simulation_document import FORMAT, point_document, write_curves
+from tirelib.report.simulation_series import MOST_MODES, bending_length, wanted_modes
 from tirelib.units import from_si, to_si
+
+LARGEST_DEFLECTION = 0.2
+"""Share of the free radius: half of a passenger car's sidewall, which is about 0.4 of it high."""
 
 _EXAMPLE = """\b
 Examples:
@@ -98,12 +107,13 @@ def simulate(
         turn_rate=turn_rate,
         contact=contact,
     )
-    _print(file, done)
+    notes = _notes(file, done)
+    _print(file, done, notes)
     written = [] if json_file is None else [json_file]
     if folder is not None:
         written += _write(done, file.name, folder)
     targets = [path for path in (json_file, folder and folder / "simulation.json") if path]
-    document = _document(file, model, done) if targets else {}
+    document = _document(file, model, done, notes) if targets else {}
     for target in targets:
         write_json(target, document)
     for path in written:
@@ -121,14 +131,14 @@ def _turn_rate(speed: FloatArray, tire: Tire) -> FloatArray:
         most = from_si(LARGEST_TURN_RATE * tire.ring_radius, "km/h", "speed")
         raise ParameterError(
             f"simulate: --speed {from_si(float(speed[~good][0]), 'km/h', 'speed'):g} km/h; the "
-            f"model holds from 0 to {most:.0f} km/h ({LARGEST_TURN_RATE:g} rad/s) for this tire; "
-            "rolling is forward, entry first"
+            f"model holds from 0 to {most:.0f} km/h ({LARGEST_TURN_RATE:g} rad/s times ring "
+            f"radius); {TURN_RATE_REASON}; rolling is forward, entry first"
         )
     rate: FloatArray = speed / tire.ring_radius
     return rate
 
 
-def _document(file: TireFile, model: str, done: Simulation) -> dict[str, Any]:
+def _document(file: TireFile, model: str, done: Simulation, notes: Sequence[str]) -> dict[str, Any]:
     points = [point_document(done, point) for point in range(len(done))]
     document = {
         "format": FORMAT,
@@ -139,7 +149,7 @@ def _document(file: TireFile, model: str, done: Simulation) -> dict[str, Any]:
         "signs": "wheel angle 0 below the axle, entry < 0 < exit; u outward, shear toward "
                  "the exit, pressure inward, tension positive",
         "effects_left_out": _effects(file),
-        "notes": _notes(file, done),
+        "notes": list(notes),
         **points[0],
     }  # fmt: skip
     if len(points) > 1:
@@ -167,7 +177,36 @@ def _notes(file: TireFile, done: Simulation) -> list[str]:
             "the tire does not say how its sidewall stiffens with inflation (slopes of k_u and k_v "
             "are 0): inflation acts through the tension of the belt only"
         )
-    return notes
+    if wanted_modes(tire, done.inflation) > MOST_MODES:
+        length = 1e3 * bending_length(tire, done.inflation)
+        notes.append(
+            f"the belt bends within {length:.1f} mm, too little for {MOST_MODES} harmonics: strain "
+            "rates are off by more than 0.5 %, angles of peaks by more than 1 mrad; check EI"
+        )
+    return notes + _overload(done)
+
+
+def _overload(done: Simulation) -> list[str]:
+    """Say where the tire is pressed flatter than a tire would bear, and by which load."""
+    tire = done.tire
+    largest = LARGEST_DEFLECTION * tire.free_radius
+    too_deep = np.flatnonzero(done.deflection > largest)
+    if not too_deep.size:
+        return []
+    point = int(too_deep[np.argmax(done.deflection[too_deep])])
+    note = (
+        f"{done.load[point]:.0f} N press this tire by {1e3 * done.deflection[point]:.0f} mm, more "
+        f"than {100 * LARGEST_DEFLECTION:.0f} % of its free radius ({1e3 * largest:.0f} mm): "
+        "hardly a load that it would carry"
+    )
+    try:
+        bearable = simulate_tire(
+            tire, deflection=largest, inflation=done.inflation[point],
+            turn_rate=done.turn_rate[point], contact=done.contact,
+        )  # fmt: skip
+    except (ParameterError, ConvergenceError):
+        return [note]  # the model ends before: no range to name
+    return [f"{note}; range: up to {bearable.load[0]:.0f} N at this inflation"]
 
 
 def _write(done: Simulation, name: str, folder: Path) -> list[Path]:
@@ -182,21 +221,21 @@ def _write(done: Simulation, name: str, folder: Path) -> list[Path]:
     ]  # fmt: skip
 
 
-def _print(file: TireFile, done: Simulation) -> None:
-    """Print a column for each operating point."""
+def _print(file: TireFile, done: Simulation, notes: Sequence[str]) -> None:
+    """Print a row for each operating point, in tables that fit a terminal."""
     console = output()
     damping = f"lambda {done.tire.damping:g}"
     console.print(f"{file.name}, {done.contact} contact, {damping}; entry < 0 < exit")
-    for note in _notes(file, done):
+    for note in notes:
         console.print(f"note: {note}")
     points = [point_document(done, point) for point in range(len(done))]
-    table = Table(box=SIMPLE_HEAD, show_header=False)
-    table.add_column()
-    for _ in points:
-        table.add_column(justify="right")
-    for title, read in _ROWS.items():
-        table.add_row(title, *(read(point) for point in points))
-    console.print(table)
+    for columns in _TABLES:
+        table = Table(box=SIMPLE_HEAD)
+        for title in ("point", *columns):
+            table.add_column(title.replace(" [", "\n["), justify="right")
+        for number, point in enumerate(points):
+            table.add_row(str(number), *(read(point) for read in columns.values()))
+        console.print(table)
 
 
 def _peak(kind: str, name: str, key: str) -> Any:
@@ -205,21 +244,29 @@ def _peak(kind: str, name: str, key: str) -> Any:
     )
 
 
-_ROWS: dict[str, Any] = {
-    "vertical load [N]": lambda p: f"{p['Fz_N']:.1f}",
-    "deflection [mm]": lambda p: f"{p['deflection_mm']:.3f}",
-    "inflation [bar]": lambda p: f"{p['pressure_bar']:g}",
-    "turn rate [rad/s]": lambda p: f"{p['omega_rad_s']:.4g}",
-    "speed [km/h]": lambda p: f"{p['speed_kmh']:.4g}",
-    "leading edge [rad]": lambda p: f"{p['edges_rad'][0]:+.4f}",
-    "trailing edge [rad]": lambda p: f"{p['edges_rad'][1]:+.4f}",
-    "contact length [mm]": lambda p: f"{p['contact_length_mm']:.2f}",
-    "pressure, middle [N/m]": lambda p: f"{p['q_center_N_per_m']:.0f}",
-    "pressure, largest [N/m]": lambda p: f"{p['q_max_N_per_m']:.0f}",
-    "centre of pressure [mm]": lambda p: f"{p['pressure_center_mm']:+.2f}",
-    "CP1 [microstrain]": _peak("strain_peaks", "cp1", "ustrain"),
-    "TP [microstrain]": _peak("strain_peaks", "tp", "ustrain"),
-    "CP2 [microstrain]": _peak("strain_peaks", "cp2", "ustrain"),
-    "strain rate, entry [microstrain/rad]": _peak("strain_rate_peaks", "lead", "ustrain_per_rad"),
-    "strain rate, exit [microstrain/rad]": _peak("strain_rate_peaks", "trail", "ustrain_per_rad"),
-}
+_TABLES: tuple[dict[str, Any], ...] = (
+    {
+        "vertical load [N]": lambda p: f"{p['Fz_N']:.1f}",
+        "deflection [mm]": lambda p: f"{p['deflection_mm']:.3f}",
+        "inflation [bar]": lambda p: f"{p['pressure_bar']:g}",
+        "turn rate [rad/s]": lambda p: f"{p['omega_rad_s']:.4g}",
+        "speed [km/h]": lambda p: f"{p['speed_kmh']:.4g}",
+    },
+    {
+        "entry [rad]": lambda p: f"{p['edges_rad'][0]:+.4f}",
+        "exit [rad]": lambda p: f"{p['edges_rad'][1]:+.4f}",
+        "length [mm]": lambda p: f"{p['contact_length_mm']:.2f}",
+        "q middle [N/m]": lambda p: f"{p['q_center_N_per_m']:.0f}",
+        "q largest [N/m]": lambda p: f"{p['q_max_N_per_m']:.0f}",
+        "q centre [mm]": lambda p: f"{p['pressure_center_mm']:+.2f}",
+    },
+    {
+        "CP1 [microstrain]": _peak("strain_peaks", "cp1", "ustrain"),
+        "TP [microstrain]": _peak("strain_peaks", "tp", "ustrain"),
+        "CP2 [microstrain]": _peak("strain_peaks", "cp2", "ustrain"),
+    },
+    {
+        "rate, entry [microstrain/rad]": _peak("strain_rate_peaks", "lead", "ustrain_per_rad"),
+        "rate, exit [microstrain/rad]": _peak("strain_rate_peaks", "trail", "ustrain_per_rad"),
+    },
+)

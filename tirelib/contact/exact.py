@@ -25,6 +25,8 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.contact import radial
+from tirelib.contact.checks import check_radii, check_tread, column, range_text
+from tirelib.contact.free_boundary import Constant
 from tirelib.contact.tread import Tread
 from tirelib.errors import ConvergenceError, ParameterError
 from tirelib.ring.compliance import compliance
@@ -34,12 +36,15 @@ N_MODES = 48
 PATCH = 0.6
 """Half-angle with dense integration nodes; the contact has to end within, [rad]."""
 N_PATCH, N_REST = 64, 56
+SMALLEST_ANGLE = 0.015
+"""Half contact angle below which nodes and modes do not resolve the contact, [rad]."""
 INEXTENSIBLE = 1e8
 """EA that stands for an inextensible belt, [N]: it stretches by less than 1e-4."""
 LONGEST_STEP = 0.01
 MAX_ITERATIONS = 40
 TOLERANCE = 1e-9
 CHUNK = 16
+_WHERE = "exact contact"
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +64,7 @@ class ExactContact:
         Of the contact, as material angle on the belt.
     load : shape (n_points,), [N]
     iterations : int
+    tread : Tread
     """
 
     radius: FloatArray
@@ -68,6 +74,22 @@ class ExactContact:
     half_angle: FloatArray
     load: FloatArray
     iterations: int
+    tread: Tread
+
+    def pressure_at(self, phi: FloatArray) -> FloatArray:
+        """Return the road's pressure per length of belt, [N/m], at material angles (n_phi,)."""
+        return self.tread.pressure(self.compression(phi))
+
+    def compression(self, phi: FloatArray) -> FloatArray:
+        """Return the tread's overlap with the road, [m], (n_points, n_phi); negative: clearance."""
+        x = np.concatenate([self.even, self.odd[:, 1:]], axis=1)
+        u, v, e, c = np.einsum("pid,nd->inp", _basis(phi), x)[:4]
+        r0 = np.asarray(self.tread.free_radius, dtype=float).reshape(-1, 1)
+        lean = phi - np.arctan2(c, self.radius[:, None] + e)
+        tip = (self.radius[:, None] + u) * np.cos(phi) - v * np.sin(phi)
+        depth = r0 - self.radius[:, None]
+        delta: FloatArray = tip + depth * np.cos(lean) - (r0 - self.deflection[:, None])
+        return delta
 
     def strain(self, offset: float | FloatArray, phi: FloatArray) -> FloatArray:
         """Return eps - y k / R at gages y < 0 from the neutral line, (n_points, n_phi)."""
@@ -114,7 +136,8 @@ def load_exact(ring: Ring, tread: Tread, vertical_load: float | FloatArray) -> E
     Raises
     ------
     ParameterError
-        If a load is not positive or the belt is shear-flexible.
+        If a load is not positive, too small for the nodes (`SMALLEST_ANGLE`) or more than the tire
+        carries, the tread is pressed through, or the belt is shear-flexible.
     ConvergenceError
         If Newton does not settle, or the contact outgrows the dense nodes; carries deflections.
     """
@@ -123,12 +146,10 @@ def load_exact(ring: Ring, tread: Tread, vertical_load: float | FloatArray) -> E
             "exact contact: the belt has a finite shear stiffness; give an infinite one, the exact "
             "ring is Bernoulli-Euler"
         )
-    loads = np.asarray(vertical_load, dtype=float)
-    if not (np.isfinite(loads) & (loads > 0)).all():
-        raise ParameterError(
-            f"exact contact: load {np.min(loads):g} N; finite numbers > 0 are needed"
-        )
+    n_points = max(np.size(vertical_load), np.size(ring.radius), len(tread))
+    loads = column(_WHERE, vertical_load, n_points, "load", "N", positive=True)
     constants, loads = _constants(ring, tread, loads)
+    check_radii(_WHERE, tread, constants.r[:, 0])
     still = replace(ring, damping=0.0)
     linear = radial.load(compliance(still, 0.0, N_MODES), tread, loads)
     shape = linear.displacement
@@ -143,9 +164,36 @@ def load_exact(ring: Ring, tread: Tread, vertical_load: float | FloatArray) -> E
     d0 = np.concatenate([part[1] for part in parts])
     half = np.concatenate([part[2] for part in parts])
     even, odd = x[:, : N_MODES + 1], np.pad(x[:, N_MODES + 1 :], ((0, 0), (1, 0)))
-    return ExactContact(
-        constants.r[:, 0], even, odd, d0, half, loads, max(part[3] for part in parts)
+    _check_half_angle(half, loads, linear)
+    solved = ExactContact(
+        constants.r[:, 0], even, odd, d0, half, loads, max(part[3] for part in parts), linear.tread
     )
+    check_tread(
+        _WHERE, solved.compression(_quadrature()[0][:N_PATCH]), linear.tread.thickness, loads, d0
+    )
+    return solved
+
+
+def _check_half_angle(half: FloatArray, loads: FloatArray, linear: radial.RadialContact) -> None:
+    """Refuse what the nodes and modes do not resolve, or the dense nodes do not hold."""
+    small = half < SMALLEST_ANGLE
+    if small.any():
+        point = int(np.flatnonzero(small)[0])
+        raise ParameterError(
+            f"exact contact: point {point} at {loads[point]:.4g} N touches the road over a half "
+            f"angle of {half[point]:.2g} rad; from {SMALLEST_ANGLE} rad on {N_MODES} modes resolve "
+            "it; take the linear contact for so small a load, or raise the load"
+        )
+    large = ~(half < PATCH)
+    if large.any():
+        point = int(np.flatnonzero(large)[0])
+        carries = range_text(Constant(linear.compliance), linear.tread, point, PATCH)
+        raise ConvergenceError(
+            f"exact contact: point {point} at {loads[point]:.0f} N: the contact reaches beyond "
+            f"{PATCH} rad; by the linear ring {carries}; use a smaller load",
+            half,
+            float(PATCH),
+        )
 
 
 def _constants(ring: Ring, tread: Tread, loads: FloatArray) -> tuple[_Constants, FloatArray]:
@@ -224,30 +272,25 @@ def _newton(
     if moving:
         raise ConvergenceError(
             f"exact contact: Newton still moves by {reach.max():.1e} m after {MAX_ITERATIONS} "
-            f"steps (loads up to {loads.max():.0f} N); use a smaller load or a stiffer belt",
+            f"steps, most at {loads[int(np.argmax(reach))]:.0f} N; use a smaller load or a stiffer "
+            "belt",
             d0,
             float(reach.max()),
         )
-    return x, d0, _half_angle(x, d0, k, loads), iterations
+    return x, d0, _half_angle(x, d0, k), iterations
 
 
-def _half_angle(x: FloatArray, d0: FloatArray, k: _Constants, loads: FloatArray) -> FloatArray:
-    """Return where the tread leaves the road."""
+def _half_angle(x: FloatArray, d0: FloatArray, k: _Constants) -> FloatArray:
+    """Return where the tread leaves the road; NaN where it does not before the last dense node."""
     fine = np.linspace(0.0, PATCH, 601)
     local = (x @ _basis(fine).reshape(-1, x.shape[1]).T).reshape(len(d0), -1, 6)
     delta = _overlap(local, d0[:, None], k, fine)[0]
     last = delta.shape[1] - 1 - np.argmax(delta[:, ::-1] > 0, axis=1)
-    if (last >= fine.size - 1).any():
-        raise ConvergenceError(
-            f"exact contact: at {loads[int(np.argmax(last))]:.0f} N the contact reaches beyond "
-            f"{PATCH} rad; use a smaller load",
-            d0,
-            float(PATCH),
-        )
-    rows = np.arange(len(d0))
+    beyond = last >= fine.size - 1
+    rows, last = np.arange(len(d0)), np.minimum(last, fine.size - 2)
     left, right = delta[rows, last], delta[rows, last + 1]
     angle: FloatArray = fine[last] + (fine[1] - fine[0]) * left / (left - right)
-    return angle
+    return np.where(beyond, np.nan, angle)
 
 
 def _overlap(

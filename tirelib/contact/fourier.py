@@ -27,15 +27,23 @@ def waves(phi: FloatArray, n_modes: int) -> tuple[FloatArray, FloatArray]:
 
 
 def load_harmonics(phi: FloatArray, force: FloatArray, n_modes: int) -> ComplexArray:
-    """Return F_n of point loads `force` [N/m rad] at `phi`, both (n_points, n_nodes)."""
-    out = np.empty((phi.shape[0], n_modes + 1), dtype=complex)
+    """Return F_n of point loads [N/m rad] at `phi`, (n_points, n_modes + 1) or (..., n_loads).
+
+    Parameters
+    ----------
+    phi : shape (n_points, n_nodes), [rad]
+    force : shape (n_points, n_nodes) or (n_points, n_nodes, n_loads)
+    n_modes : int
+    """
+    several = force.ndim == 3
+    rows = force.swapaxes(1, 2) if several else force[:, None, :]
+    out = np.empty((*rows.shape[:2], n_modes + 1), dtype=complex)
     for part in _blocks(phi.shape[0]):
         cos, sin = waves(phi[part], n_modes)
-        row = force[part, None, :]
-        out.real[part] = (row @ cos)[:, 0, :] / np.pi
-        out.imag[part] = (row @ sin)[:, 0, :] / -np.pi
-    out[:, 0] *= 0.5
-    return out
+        out.real[part] = rows[part] @ cos / np.pi
+        out.imag[part] = rows[part] @ sin / -np.pi
+    out[..., 0] *= 0.5
+    return out.swapaxes(1, 2) if several else out[:, 0]
 
 
 def evaluate(harmonics: ComplexArray, phi: FloatArray, derivative: int = 0) -> FloatArray:
@@ -48,6 +56,23 @@ def evaluate(harmonics: ComplexArray, phi: FloatArray, derivative: int = 0) -> F
     out = np.empty(phi.shape)
     for part in _blocks(len(phi)):
         out[part] = _evaluate(terms[part], phi[part])
+    return out
+
+
+def evaluate_fields(harmonics: ComplexArray, phi: FloatArray) -> FloatArray:
+    """Return several fields at angles (n_phi,) or (n_points, n_phi).
+
+    Parameters
+    ----------
+    harmonics : shape (n_points, n_modes + 1, n_fields)
+    phi : [rad]
+
+    Returns
+    -------
+    shape (n_points, n_phi, n_fields)
+    """
+    cos, sin = waves(phi, harmonics.shape[-2] - 1)
+    out: FloatArray = cos @ harmonics.real - sin @ harmonics.imag
     return out
 
 

@@ -1,20 +1,18 @@
 """The two edges of the contact and the deflection, found at once; see `tirelib.contact.radial`."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from tirelib.arrays import FloatArray, IntArray
+from tirelib.contact.checks import LARGEST_ANGLE, range_text
+from tirelib.contact.checks import ComplianceAt as ComplianceAt
 from tirelib.contact.patch import Nodes, PatchEquation, between
 from tirelib.contact.start import EdgeEstimate
 from tirelib.contact.tread import Tread
 from tirelib.errors import ParameterError
 from tirelib.ring.compliance import Compliance
 from tirelib.ring.ring import ComplexArray
-
-LARGEST_ANGLE = 0.75
-"""Half contact angle beyond which the linear ring has no meaning, [rad]."""
 
 N_NODES = 40
 COARSE_NODES = 16
@@ -26,8 +24,8 @@ CHUNK = 32
 TOLERANCE = 2e-5
 """Largest last shift of an edge, in half patches, and change of d0 and compression, relative.
 
-What it leaves is of second order: a shift s [rad] leaves some 20 s^2 [rad], below 1e-9, and less
-than 1e-9 of the load.
+What it leaves is of second order: a shift s [rad] leaves some 20 s^2 [rad]. Measured against 1e-11
+on six tires, 100 to 12000 N: edges within 9e-10 rad, deflection and load within 2e-10, relative.
 """
 
 _COMPRESSION_WEIGHT = 3.0
@@ -37,8 +35,6 @@ _DEFLECTION_WEIGHT = 2e4
 MAX_ITERATIONS = 40
 
 _OUTWARD = np.array([-1.0, 1.0])
-
-ComplianceAt = Callable[[FloatArray], Compliance]
 
 
 @dataclass(frozen=True)
@@ -105,7 +101,7 @@ class _State:
                 last = first + CHUNK
                 every = todo.size == n_points
                 self._advance(nodes, ring, slice(first, last) if every else todo[first:last])
-            _refuse_large(self.edges, self.d0, self.problem.vertical_load)
+            _refuse_large(self.edges, self.d0, self.problem)
             todo = np.flatnonzero(~(self.change < tolerance))
         return iterations
 
@@ -227,24 +223,25 @@ class _Secant:
         return out
 
 
-def _refuse_large(edges: FloatArray, d0: FloatArray, vertical_load: FloatArray | None) -> None:
+def _refuse_large(edges: FloatArray, d0: FloatArray, problem: Problem) -> None:
     """Refuse what the linear ring cannot describe."""
     if not np.abs(edges).max() > 1.5 * LARGEST_ANGLE:
         return
     beyond = (np.abs(edges).max(axis=1) > 1.5 * LARGEST_ANGLE) & np.isfinite(d0)
     if beyond.any():
-        point = int(np.flatnonzero(beyond)[0])
-        _raise_large(point, float(d0[point]), vertical_load)
+        refuse_point(int(np.flatnonzero(beyond)[0]), d0, problem)
 
 
-def _raise_large(point: int, d0: float, vertical_load: FloatArray | None) -> None:
+def refuse_point(point: int, d0: FloatArray, problem: Problem) -> None:
+    """Raise ParameterError with what this tire carries."""
+    load = problem.vertical_load
     given = (
-        f"deflection {1e3 * d0:.1f} mm"
-        if vertical_load is None
-        else f"load {vertical_load[point]:.0f} N"
+        f"deflection {1e3 * float(d0[point]):.1f} mm"
+        if load is None
+        else f"load {load[point]:.0f} N"
     )
     raise ParameterError(
         f"contact: point {point}: {given} is more than this tire carries within the ring's "
-        f"validity (half contact angle up to {LARGEST_ANGLE} rad); lower it or check stiffness and "
-        "pressure"
+        f"validity: {range_text(problem.at, problem.tread, point)}; lower it or check stiffness "
+        "and pressure"
     )

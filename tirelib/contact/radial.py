@@ -18,20 +18,30 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tirelib.arrays import FloatArray
+from tirelib.contact.checks import (
+    LARGEST_ANGLE,
+    ComplianceAt,
+    carried,
+    check_angle,
+    check_one_patch,
+    check_radii,
+    check_tread,
+    column,
+    one_or_each,
+)
 from tirelib.contact.fourier import evaluate, load_harmonics
 from tirelib.contact.free_boundary import (
-    LARGEST_ANGLE,
     MAX_ITERATIONS,
     N_NODES,
     TOLERANCE,
-    ComplianceAt,
     Constant,
     Problem,
     Solution,
+    refuse_point,
     solve,
 )
 from tirelib.contact.patch import Nodes, PatchEquation, place
-from tirelib.contact.tread import Tread
+from tirelib.contact.tread import Tread, numbers
 from tirelib.errors import ConvergenceError, ParameterError
 from tirelib.ring.compliance import Compliance
 from tirelib.ring.ring import ComplexArray
@@ -171,7 +181,7 @@ def press(
         If the edges do not settle or the patch splits; carries the last contact.
     """
     n_points = max(np.size(deflection), len(tread), _length(compliance))
-    d0 = _column(deflection, n_points, "deflection", "m")
+    d0 = column("contact", deflection, n_points, "deflection", "m", positive=True)
     return _solve(compliance, tread, d0, None, extra, n_nodes)
 
 
@@ -199,7 +209,7 @@ def load(
         As for `press`.
     """
     n_points = max(np.size(vertical_load), len(tread), _length(compliance))
-    target = _column(vertical_load, n_points, "vertical load", "N")
+    target = column("contact", vertical_load, n_points, "vertical load", "N", positive=True)
     return _solve(compliance, tread, None, target, extra, n_nodes)
 
 
@@ -221,6 +231,7 @@ def fit_edges(
     ParameterError
         If the edges are not in order, or outside the ring's validity.
     """
+    edges = numbers("contact", edges, "edges")
     if edges.ndim != 2 or edges.shape[1] != 2 or not (edges[:, 0] < edges[:, 1]).all():
         raise ParameterError(
             f"contact: edges of shape {edges.shape}; (n_points, 2) with leading < trailing is "
@@ -232,7 +243,10 @@ def fit_edges(
             f"{LARGEST_ANGLE} rad; check the angle's zero"
         )
     nodes = Nodes.of(n_nodes)
+    one_or_each("contact", len(compliance), len(edges), "compliance")
+    one_or_each("contact", len(tread), len(edges), "tread")
     compliance, tread = compliance.spread(len(edges)), tread.spread(len(edges))
+    check_radii("contact", tread, compliance.radius)
     problem = Problem(Constant(compliance), tread, None, None)
     delta = np.zeros((len(edges), n_nodes))
     d0 = np.zeros(len(edges))
@@ -260,17 +274,24 @@ def _solve(
     given = deflection if deflection is not None else vertical_load
     assert given is not None  # noqa: S101 - one of the two is always given
     if isinstance(compliance, Compliance):
-        _one_or_each(len(compliance), given.size, "compliance")
+        one_or_each("contact", len(compliance), given.size, "compliance")
         compliance = Constant(compliance.spread(given.size))
-    _one_or_each(len(tread), given.size, "tread")
+    else:
+        compliance = each_point(compliance, given.size)
+    one_or_each("contact", len(tread), given.size, "tread")
     problem = Problem(compliance, tread.spread(given.size), vertical_load, extra)
+    first = problem.at(np.full(given.size, 0.02) if deflection is None else deflection)
+    check_radii("contact", problem.tread, first.radius)
     if extra is not None:
-        start = np.full(given.size, 0.02) if deflection is None else deflection
-        _check_extra(extra, (given.size, problem.at(start).n_modes + 1, 3))
+        _check_extra(extra, (given.size, first.n_modes + 1, 3))
     found = solve(problem, deflection, n_nodes)
     contact, d0, change = _contact(problem, found), found.deflection, found.change
     moving = np.flatnonzero(~(change < TOLERANCE))
     if moving.size:
+        point = int(moving[0])
+        most = carried(problem.at, problem.tread, point)[0]
+        if vertical_load is not None and vertical_load[point] > most:
+            refuse_point(point, d0, problem)
         worst = float(change[moving].max())
         raise ConvergenceError(
             f"contact: {moving.size} of {d0.size} points, the first number {moving[0]} at "
@@ -280,7 +301,7 @@ def _solve(
             contact,
             worst,
         )
-    _check_complementarity(contact)
+    _check(contact, problem)
     return contact
 
 
@@ -297,40 +318,24 @@ def _length(compliance: Compliance | ComplianceAt) -> int:
     return len(compliance) if isinstance(compliance, Compliance) else 1
 
 
-def _check_complementarity(contact: RadialContact) -> None:
-    """Refuse a patch that pulls inside or is pressed outside."""
-    half = np.abs(contact.edges).max(axis=1)
-    d0 = contact.deflection
-    if (half > LARGEST_ANGLE).any():
-        point = int(np.argmax(half))
-        raise ParameterError(
-            f"contact: point {point} at d0 = {1e3 * d0[point]:.1f} mm, "
-            f"Fz = {contact.load[point]:.0f} N has a half contact angle of {half[point]:.2f} rad; "
-            f"the ring holds up to {LARGEST_ANGLE} rad; lower the load or check the stiffness"
-        )
-    pressure = contact.pressure
-    pull = -pressure.min(axis=1) / pressure.max(axis=1)
-    away = np.arccos(1.0 - d0 / contact.tread.free_radius)[:, None] * _OUTSIDE
+def each_point(at: ComplianceAt, n_points: int) -> ComplianceAt:
+    """Return the same rings with one row per point; refuse a callable with other rows."""
+
+    def rows(deflection: FloatArray) -> Compliance:
+        found = at(deflection)
+        one_or_each("contact", len(found), n_points, "ring that the callable returns")
+        return found.spread(n_points)
+
+    return rows
+
+
+def _check(contact: RadialContact, problem: Problem) -> None:
+    """Refuse what lies outside the model: range, one patch, tread."""
+    check_angle("contact", contact, problem.at, problem.tread)
+    away = np.arccos(1.0 - contact.deflection / contact.tread.free_radius)[:, None] * _OUTSIDE
     outside = np.concatenate([contact.edges[:, :1] - away, contact.edges[:, 1:] + away], axis=1)
-    press = contact.compression(outside).max(axis=1) / d0
-    wrong = (pull > 1e-6) | (press > 1e-6)
-    if wrong.any():
-        point = int(np.flatnonzero(wrong)[0])
-        raise ConvergenceError(
-            f"contact: point {point} at d0 = {1e3 * d0[point]:.2f} mm is not one patch: tension "
-            f"inside {pull[point]:.1e} of the peak, overlap outside {press[point]:.1e} of d0; "
-            "the belt lifts off or buckles: a stiffer belt or a smaller load is needed",
-            contact,
-            float(max(pull[point], press[point])),
-        )
-
-
-def _one_or_each(given: int, n_points: int, name: str) -> None:
-    if given not in (1, n_points):
-        raise ParameterError(
-            f"contact: the {name} has {given} points for {n_points} points; one value or one a "
-            "point is needed"
-        )
+    check_one_patch("contact", contact, contact.compression(outside))
+    check_tread("contact", contact.delta, contact.tread.thickness, contact.load, contact.deflection)
 
 
 def _check_extra(extra: ComplexArray, shape: tuple[int, int, int]) -> None:
@@ -339,20 +344,3 @@ def _check_extra(extra: ComplexArray, shape: tuple[int, int, int]) -> None:
             f"contact: extra has shape {extra.shape}; finite harmonics of shape {shape} (points, "
             "modes + 1, loads on u, v, beta) are needed"
         )
-
-
-def _column(value: float | FloatArray, n_points: int, name: str, unit: str) -> FloatArray:
-    """Return (n_points,) numbers > 0."""
-    array = np.asarray(value, dtype=float)
-    if array.ndim > 1 or array.size not in (1, n_points):
-        raise ParameterError(
-            f"contact: {name} has shape {array.shape} for {n_points} points; one value or one a "
-            "point is needed"
-        )
-    good = np.isfinite(array) & (array > 0)
-    if not good.all():
-        raise ParameterError(
-            f"contact: {name} = {np.atleast_1d(array)[~np.atleast_1d(good)][0]:.6g} {unit}; a "
-            "finite number > 0 is needed"
-        )
-    return np.broadcast_to(array, (n_points,)).copy()

@@ -22,11 +22,20 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.contact import radial
-from tirelib.contact.free_boundary import LARGEST_ANGLE, N_NODES, ComplianceAt, Constant
+from tirelib.contact.checks import (
+    ComplianceAt,
+    check_angle,
+    check_one_patch,
+    check_radii,
+    check_tread,
+    column,
+)
+from tirelib.contact.fourier import evaluate_fields, load_harmonics
+from tirelib.contact.free_boundary import N_NODES, Constant
 from tirelib.contact.radial import RadialContact
 from tirelib.contact.shear_law import Shear
 from tirelib.contact.shear_newton import COARSE_NODES, TOLERANCE, Newton, solve
-from tirelib.contact.shear_result import ShearContact, belt_at, load_harmonics
+from tirelib.contact.shear_result import ShearContact
 from tirelib.contact.shear_system import (
     LEAD,
     OFFSET,
@@ -35,7 +44,7 @@ from tirelib.contact.shear_system import (
     Patch,
     ShearProblem,
 )
-from tirelib.contact.tread import Tread
+from tirelib.contact.tread import Tread, numbers
 from tirelib.errors import ConvergenceError, ParameterError
 from tirelib.ring.compliance import Compliance
 from tirelib.ring.ring import ComplexArray
@@ -79,7 +88,7 @@ def press(
         If Newton's method does not settle or the patch splits; carries the last contact.
     """
     n_points = _count(compliance, tread, shear, deflection)
-    d0 = _column(deflection, n_points, "deflection", "m", positive=True)
+    d0 = column(_WHERE, deflection, n_points, "deflection", "m", positive=True)
     first = _radial(lambda: radial.press(compliance, tread, d0, extra=extra, n_nodes=COARSE_NODES))
     return _solve(compliance, tread, shear, (d0, None, None), first, torque, extra, n_nodes)
 
@@ -96,7 +105,7 @@ def load(
 ) -> ShearContact:
     """Return the contact at given vertical loads Fz, [N]; else as `press`."""
     n_points = _count(compliance, tread, shear, vertical_load)
-    target = _column(vertical_load, n_points, "vertical load", "N", positive=True)
+    target = column(_WHERE, vertical_load, n_points, "vertical load", "N", positive=True)
     first = _radial(
         lambda: radial.load(compliance, tread, target, extra=extra, n_nodes=COARSE_NODES)
     )
@@ -133,14 +142,15 @@ def fit_edges(
     ConvergenceError
         As in `press`.
     """
-    first = radial.fit_edges(compliance, tread, edges, COARSE_NODES)
-    n_points = _count(compliance, tread, shear, edges[:, 0])
-    if n_points != len(edges):
+    edges = numbers(_WHERE, edges, "edges")
+    n_points = _count(compliance, tread, shear, edges[:, 0] if edges.ndim == 2 else 0.0)
+    if edges.ndim == 2 and n_points != len(edges):
         raise ParameterError(
             f"contact with shear: edges of {len(edges)} points for {n_points} points of ring, "
             "tread or shear; give one pair of edges a point"
         )
-    given = (None, None, np.array(edges, dtype=float))
+    first = radial.fit_edges(compliance, tread, edges, COARSE_NODES)
+    given = (None, None, edges.copy())
     return _solve(compliance, tread, shear, given, first, torque, extra, n_nodes)
 
 
@@ -175,7 +185,8 @@ def friction_loads(contact: ShearContact) -> ComplexArray:
     moment = contact.belt_loads[..., 2]
     along = contact.shear_traction
     loads = np.stack([-along * np.sin(beta), along * np.cos(beta), moment], axis=-1)
-    return load_harmonics(contact.phi, contact.weights, loads, contact.compliance.n_modes)
+    weighted = contact.weights[..., None] * loads
+    return load_harmonics(contact.phi, weighted, contact.compliance.n_modes)
 
 
 def _radial(solution: Callable[[], RadialContact]) -> RadialContact:
@@ -187,6 +198,8 @@ def _radial(solution: Callable[[], RadialContact]) -> RadialContact:
             return error.iterate
         raise
 
+
+_WHERE = "contact with shear"
 
 Given = tuple[FloatArray | None, FloatArray | None, FloatArray | None]
 
@@ -203,22 +216,21 @@ def _solve(
 ) -> ShearContact:
     n_points = len(first)
     ring = first.compliance
-    thickness = np.asarray(tread.free_radius, dtype=float) - ring.radius
-    if (thickness <= 0).any():
-        raise ParameterError(
-            f"contact with shear: h_0 = free radius - ring radius = {1e3 * thickness.min():.2f} "
-            "mm; the tread must stand outside the belt; check both radii"
-        )
+    check_radii(_WHERE, tread, ring.radius)
     if isinstance(compliance, Compliance):
         compliance = Constant(compliance.spread(n_points))
-    moment = None if torque is None else _column(torque, n_points, "torque", "N m")
+    else:
+        compliance = radial.each_point(compliance, n_points)
+    moment = None if torque is None else column(_WHERE, torque, n_points, "torque", "N m")
+    if moment is not None:
+        _check_torque(moment, first, shear, given[1])
     problem = ShearProblem(
         compliance, tread.spread(n_points), shear.spread(n_points), *given, moment, extra
     )
     newton, iterations = solve(problem, first, n_nodes)
     contact = _contact(newton, iterations)
     _check_settled(newton, contact)
-    _check_one_patch(contact)
+    _check(contact, problem)
     return contact
 
 
@@ -253,7 +265,7 @@ def _contact(newton: Newton, iterations: int) -> ShearContact:
         iterations=iterations,
         residual=np.zeros(len(x)),
     )
-    rest = np.abs(belt - belt_at(contact.displacement, patch.phi))
+    rest = np.abs(belt - evaluate_fields(contact.displacement, patch.phi))
     rest[..., 2] *= patch.ring.radius[:, None]
     at_edges = np.abs(left).max(axis=1) if problem.edges is None else np.abs(left.sum(axis=1))
     return replace(contact, residual=np.maximum(rest.max(axis=(1, 2)), at_edges))
@@ -274,32 +286,38 @@ def _check_settled(newton: Newton, contact: ShearContact) -> None:
         )
 
 
-def _check_one_patch(contact: ShearContact) -> None:
-    """Refuse a patch that pulls inside or is pressed outside, or is larger than the ring allows."""
-    half = np.abs(contact.edges).max(axis=1)
-    if (half > LARGEST_ANGLE).any():
-        point = int(np.argmax(half))
-        raise ParameterError(
-            f"contact with shear: point {point} at d0 = {1e3 * contact.deflection[point]:.1f} mm, "
-            f"Fz = {contact.load[point]:.0f} N has a half contact angle of {half[point]:.2f} rad; "
-            f"the ring holds up to {LARGEST_ANGLE} rad; lower the load or check the stiffness"
-        )
+def _check(contact: ShearContact, problem: ShearProblem) -> None:
+    """Refuse what lies outside the model: range, one patch, tread."""
+    check_angle(_WHERE, contact, problem.at, problem.tread)
     if contact.edges_given:
         return
-    pull = -contact.pressure.min(axis=1) / contact.pressure.max(axis=1)
+    half = np.abs(contact.edges).max(axis=1)
     away = np.array([0.03, 0.1, 0.3, 0.8]) * half[:, None]
     outside = np.concatenate([contact.edges[:, :1] - away, contact.edges[:, 1:] + away], axis=1)
-    press_outside = contact.compression_at(outside).max(axis=1) / contact.deflection
-    wrong = (pull > 1e-6) | (press_outside > 1e-6)
-    if wrong.any():
-        point = int(np.flatnonzero(wrong)[0])
-        raise ConvergenceError(
-            f"contact with shear: point {point} at d0 = {1e3 * contact.deflection[point]:.2f} mm "
-            f"is not one patch: tension inside {pull[point]:.1e} of the peak, overlap outside "
-            f"{press_outside[point]:.1e} of d0; the belt lifts off or buckles: a stiffer belt or a "
-            "smaller load is needed",
-            contact,
-            float(max(pull[point], press_outside[point])),
+    check_one_patch(_WHERE, contact, contact.compression_at(outside))
+    thickness = contact.tread.thickness
+    check_tread(_WHERE, contact.compression, thickness, contact.load, contact.deflection)
+
+
+def _check_torque(
+    torque: FloatArray, first: RadialContact, shear: Shear, vertical_load: FloatArray | None
+) -> None:
+    """Refuse a torque that friction cannot hold; near its limit Newton decides.
+
+    The belt takes its moment on the undeformed radius, so the limit lies between mu Fz R_l and
+    mu Fz R_0; the pressure's own shift adds to it. Refused is what is beyond all of that.
+    """
+    fz = first.load if vertical_load is None else vertical_load
+    outer = np.asarray(first.tread.free_radius, dtype=float)
+    limit = np.asarray(shear.friction, dtype=float) * fz * (outer - first.deflection)
+    most = np.asarray(shear.friction, dtype=float) * fz * outer
+    beyond = np.abs(torque) > most + np.abs(fz * first.pressure_centre)
+    if beyond.any():
+        point = int(np.flatnonzero(beyond)[0])
+        raise ParameterError(
+            f"{_WHERE}: point {point}: torque = {torque[point]:.6g} N m; friction holds some "
+            f"mu Fz R_l = {limit[point]:.4g} N m at Fz = {fz[point]:.0f} N; lower the torque, or "
+            "raise load or friction"
         )
 
 
@@ -314,22 +332,3 @@ def _count(
             f"{', '.join(map(str, sizes))} points; each needs one or all the same"
         )
     return max(sizes)
-
-
-def _column(
-    value: float | FloatArray, n_points: int, name: str, unit: str, *, positive: bool = False
-) -> FloatArray:
-    """Return (n_points,) finite numbers."""
-    array = np.asarray(value, dtype=float)
-    if array.ndim > 1 or array.size not in (1, n_points):
-        raise ParameterError(
-            f"contact with shear: {name} has shape {array.shape} for {n_points} points; one value "
-            "or one a point is needed"
-        )
-    good = np.atleast_1d(np.isfinite(array) & ((array > 0) | (not positive)))
-    if not good.all():
-        raise ParameterError(
-            f"contact with shear: {name} = {np.atleast_1d(array)[~good][0]:.6g} {unit}; a finite "
-            f"number{' > 0' if positive else ''} is needed"
-        )
-    return np.broadcast_to(array, (n_points,)).copy()

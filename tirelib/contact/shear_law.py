@@ -23,7 +23,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
-from tirelib.contact.tread import Tread
+from tirelib.contact.tread import Tread, numbers
 from tirelib.errors import ParameterError
 from tirelib.parameters import Tire
 
@@ -48,7 +48,7 @@ class Shear:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            value = np.atleast_1d(np.asarray(getattr(self, field.name), dtype=float))
+            value = np.atleast_1d(numbers("tread shear", getattr(self, field.name), field.name))
             good = (value >= 0) & (np.isfinite(value) | (field.name == "friction"))
             if value.ndim > 1 or not good.all():
                 shown = f"{value[~good].flat[0]:.6g}" if not good.all() else f"{value.shape}"

@@ -8,9 +8,10 @@ grow is taken back and halved. Convergence is quadratic once no element changes 
 import numpy as np
 
 from tirelib.arrays import FloatArray, IntArray
-from tirelib.contact.free_boundary import LARGEST_ANGLE, Constant
+from tirelib.contact.checks import LARGEST_ANGLE
+from tirelib.contact.fourier import evaluate_fields, load_harmonics
+from tirelib.contact.free_boundary import Constant
 from tirelib.contact.radial import RadialContact
-from tirelib.contact.shear_result import belt_at, load_harmonics
 from tirelib.contact.shear_system import (
     HEIGHT,
     LEAD,
@@ -57,7 +58,7 @@ def start(contact: RadialContact, mesh: Mesh) -> FloatArray:
 def move(x: FloatArray, displacement: ComplexArray, mesh: Mesh) -> None:
     """Write the belt's displacement at the mesh's nodes into the unknowns."""
     phi, _ = mesh.place(x)
-    x[:, :LEAD] = belt_at(displacement, phi).reshape(len(x), -1)
+    x[:, :LEAD] = evaluate_fields(displacement, phi).reshape(len(x), -1)
 
 
 class Newton:
@@ -131,7 +132,8 @@ class Newton:
         """Return the present unknowns on another mesh."""
         ring = self.ring
         patch = Patch.of(self.problem, ring, self.mesh, self.x)
-        total = load_harmonics(patch.phi, patch.weights, patch.tread.loads, ring.n_modes)
+        weighted = patch.weights[..., None] * patch.tread.loads
+        total = load_harmonics(patch.phi, weighted, ring.n_modes)
         if self.problem.extra is not None:
             total = total + self.problem.extra
         x = np.zeros((len(self.x), 3 * mesh.xi.size + 5))

@@ -5,30 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
+from tirelib.contact.fourier import evaluate_fields, load_harmonics
 from tirelib.contact.shear_law import Elements, Rolling, Shear, elements
 from tirelib.contact.tread import Tread
 from tirelib.ring.compliance import Compliance
 from tirelib.ring.ring import ComplexArray
-
-
-def load_harmonics(
-    phi: FloatArray, weights: FloatArray, loads: FloatArray, n_modes: int
-) -> ComplexArray:
-    """Return harmonics of loads at nodes, (n_points, n_nodes, 3), (n_points, n_modes + 1, 3)."""
-    n = np.arange(n_modes + 1.0)
-    angle = n[:, None] * phi[:, None, :]
-    unit = (np.where(n == 0, 0.5, 1.0) / np.pi)[:, None]
-    weighted = weights[..., None] * loads
-    out: ComplexArray = unit * (np.cos(angle) @ weighted - 1j * (np.sin(angle) @ weighted))
-    return out
-
-
-def belt_at(displacement: ComplexArray, phi: FloatArray) -> FloatArray:
-    """Return u, v, beta at angles (n_phi,) or (n_points, n_phi), shape (n_points, n_phi, 3)."""
-    n = np.arange(displacement.shape[-2], dtype=float)
-    angle = phi[..., :, None] * n
-    out: FloatArray = np.cos(angle) @ displacement.real - np.sin(angle) @ displacement.imag
-    return out
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +34,8 @@ class ShearContact:
         -f_n, normal to the deformed belt, inward positive, per length of belt.
     shear_traction : shape (n_points, n_nodes), [N/m]
         f_t of the road on the tread along the deformed belt, positive along +phi (rearward). It is
-        directed outward, away from the patch's middle, where it has the sign of phi.
+        directed outward, away from the patch's middle, where it has the sign of phi; on a standing
+        tire that was pressed down it is larger, `docs/shear_contact.md`.
     sliding : shape (n_points, n_nodes), bool
     declination : shape (n_points, n_nodes), [rad]
         eta, of the belt's normal from the plumb line, positive toward +phi.
@@ -165,7 +147,8 @@ class ShearContact:
     @property
     def harmonics(self) -> ComplexArray:
         """Harmonics of q_u, q_v [N/m] and q_beta [N], shape (n_points, n_modes + 1, 3)."""
-        return load_harmonics(self.phi, self.weights, self.belt_loads, self.compliance.n_modes)
+        weighted = self.weights[..., None] * self.belt_loads
+        return load_harmonics(self.phi, weighted, self.compliance.n_modes)
 
     @property
     def displacement(self) -> ComplexArray:
@@ -179,7 +162,7 @@ class ShearContact:
 
         Outside the patch `height` above h_0 is clearance, and the forces have no meaning.
         """
-        belt = belt_at(self.displacement, phi)
+        belt = evaluate_fields(self.displacement, phi)
         rolling = Rolling(self.effective_radius, self.loaded_radius, self.tip_offset)
         angles = np.broadcast_to(phi, belt.shape[:-1])
         return elements(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.arrays import FloatArray, IntArray
-from tirelib.contact.free_boundary import ComplianceAt
+from tirelib.contact.checks import ComplianceAt
 from tirelib.contact.patch import Nodes
 from tirelib.contact.shear_law import Elements, Rolling, Shear, elements
 from tirelib.contact.tread import Tread
@@ -43,9 +43,16 @@ class ShearProblem:
         """Return the problem of some points."""
         if index.size == len(self.tread):
             return self
-        given = [self.deflection, self.vertical_load, self.edges, self.torque, self.extra]
-        part = [None if value is None else value[index] for value in given]
-        return ShearProblem(self.at, self.tread.take(index), self.shear.take(index), *part)
+        return ShearProblem(
+            self.at,
+            self.tread.take(index),
+            self.shear.take(index),
+            None if self.deflection is None else self.deflection[index],
+            None if self.vertical_load is None else self.vertical_load[index],
+            None if self.edges is None else self.edges[index],
+            None if self.torque is None else self.torque[index],
+            None if self.extra is None else self.extra[index],
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,6 +29,7 @@ LARGEST_DEFLECTION = 0.25
 """Of the free radius; beyond, the linear ring says nothing."""
 _CHUNK = 32
 _MARCH = 10
+_NEAR_MOST = 21
 _OUTSIDE = 128
 _PASSES = 30
 _LOAD_TOLERANCE = 1e-11
@@ -244,6 +245,7 @@ def press_to_load(
         return _press(tire, d0, nodes, max_iterations).load - wanted
 
     low, high, below, above = np.zeros(wanted.shape), np.zeros(wanted.shape), -wanted, -wanted
+    most, met_at = np.zeros(wanted.shape), np.zeros(wanted.shape)
     for step in range(1, _MARCH + 1):
         going = above < 0.0
         if not going.any():
@@ -251,12 +253,24 @@ def press_to_load(
         low, below = np.where(going, high, low), np.where(going, above, below)
         high = np.where(going, step / _MARCH * LARGEST_DEFLECTION * outer, high)
         above = excess(high)
+        larger = going & (above + wanted > most)
+        most, met_at = np.where(larger, above + wanted, most), np.where(larger, high, met_at)
+    for share in np.linspace(-1.0, 1.0, _NEAR_MOST):  # softening: the largest load lies between
+        going = above < 0.0
+        if not going.any():
+            break
+        near = met_at + share / _MARCH * LARGEST_DEFLECTION * outer
+        near = np.clip(np.where(going, near, high), 1e-6, LARGEST_DEFLECTION * outer)
+        carried = np.where(going, excess(near), above)
+        low, below = np.where(going, 0.0, low), np.where(going, -wanted, below)
+        high, above = np.where(going, near, high), carried
+        most = np.where(going, np.maximum(most, carried + wanted), most)
     if np.any(above < 0.0):
-        worst = np.argmin((above + wanted) / wanted)
-        most = np.maximum(above, below).flat[worst] + wanted.flat[worst]
+        worst = int(np.argmax(above < 0.0))
         raise ParameterError(
-            f"static contact: load = {wanted.flat[worst]:g} N; this tire carries 0 to {most:.4g} N "
-            f"up to a deflection of {high.flat[worst]:.3g} m; lower the load or raise the stiffness"
+            f"static contact: point {worst}: load = {wanted.flat[worst]:g} N; this tire carries 0 "
+            f"to {most.flat[worst]:.4g} N up to a deflection of "
+            f"{LARGEST_DEFLECTION * outer.flat[worst]:.3g} m; lower the load or raise the stiffness"
         )
     for _ in range(_LOAD_ITERATIONS):
         middle = high - above * (high - low) / (above - below)
@@ -305,10 +319,13 @@ def _check_tread(tire: StaticTire, solved: StaticContact) -> None:
     """Raise ParameterError where the tread has no thickness left (52)."""
     thickness = np.asarray(tire.free_radius) - np.asarray(tire.ring_radius)
     compression = solved.peak_pressure / np.asarray(tire.tread_stiffness)
+    compression, thickness = np.broadcast_arrays(compression, thickness)
     if np.any(compression >= thickness):
+        point = int(np.argmax(compression - thickness))
         raise ParameterError(
-            f"static contact: tread pressed by {compression.max():.3g} m; must stay below its "
-            f"thickness {thickness.min():.3g} m (52); raise tread_stiffness or lower the load"
+            f"static contact: point {point} at {solved.load.flat[point]:.4g} N: tread pressed by "
+            f"{compression.flat[point]:.3g} m; must stay below its thickness "
+            f"{thickness.flat[point]:.3g} m (52); raise tread_stiffness or lower the load"
         )
 
 

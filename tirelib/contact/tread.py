@@ -11,12 +11,24 @@ an inward pressure q = k_t delta (1 + c delta / h), c its hardening; it can only
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
 from tirelib.arrays import FloatArray, IntArray
 from tirelib.errors import ParameterError
 from tirelib.parameters import Tire
+
+
+def numbers(where: str, value: Any, name: str) -> FloatArray:
+    """Return an array of floats, or refuse what is none."""
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ParameterError(
+            f"{where}: {name} is {value!r:.60}; a number or an array of numbers in SI units is "
+            "needed; convert texts and fill gaps first"
+        ) from error
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +54,7 @@ class Tread:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            value = np.asarray(getattr(self, field.name), dtype=float)
+            value = numbers("tread", getattr(self, field.name), field.name)
             zero = field.name == "hardening"
             good = np.isfinite(value) & ((value >= 0) if zero else (value > 0))
             if not good.all():

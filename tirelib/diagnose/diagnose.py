@@ -17,6 +17,10 @@ from tirelib.identify.waveform_fit import Data
 
 ALARM = 3.0
 """Score over the ensemble's largest from which an effect is an alarm; from 1 on it is a hint."""
+HELPS = 0.97
+"""Error of the exact refit with an effect, over that without, up to which it is kept."""
+FURTHER = 6.0
+"""The same for a further effect: the law of the one before is right but roughly."""
 LEAST_SHARE = 0.25
 """Share of the left misfit that has to come back without an effect for it to matter."""
 ROUNDS = 3
@@ -127,18 +131,23 @@ def diagnose(
     named: list[str] = []
     rounds = 0
     while rounds < ROUNDS:
-        best = _leader(found, now, thresholds, suspects)
+        bar = FURTHER if named else ALARM
+        best = _leader(found, now, thresholds, suspects, bar)
         if best is None:
             break
         effect = found.living[best].effect
+        suspects.discard(effect.name)
+        rounds += 1
         try:
-            model = refit(
+            trial = refit(
                 data, model.values, [*model.effects, effect],
                 [*model.strengths, _inside(effect, now.strength[best])], progress=progress,
             )  # fmt: skip
         except TirelibError:
-            break
-        rounds += 1
+            continue
+        if trial.error > HELPS * model.error:
+            continue  # to first order only: the exact refit does not need it
+        model = trial
         named.append(effect.name)
         found = candidates(data, model, catalogue)
         now = Ranking(model, found).scores(data.strain - model.waveform)
@@ -183,12 +192,17 @@ def _alarms(found: Candidates, scores: Scores, thresholds: Mapping[str, float]) 
 
 
 def _leader(
-    found: Candidates, scores: Scores, thresholds: Mapping[str, float], suspects: set[str]
+    found: Candidates,
+    scores: Scores,
+    thresholds: Mapping[str, float],
+    suspects: set[str],
+    bar: float,
 ) -> int | None:
     """Return the index of the suspect that explains most, or None."""
     if not found.living:
         return None
     fit = _alarms(found, scores, thresholds) & np.isin(_names(found), list(suspects))
+    fit &= _ratio(found, scores, thresholds) >= bar
     if not fit.any():
         return None
     return int(np.argmax(np.where(fit, scores.share, -np.inf)))

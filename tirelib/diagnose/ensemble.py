@@ -28,7 +28,7 @@ MEMBERS = 100
 REFERENCE_LOAD = 4000.0
 MISFIT = Discrepancy(inside=0.01, outside=0.005)
 BACK_STEPS = 3
-TRACTION = {"trailing_sliding": 0.3, "tread_friction": 0.05}
+TRACTION = {"trailing_sliding": 0.3, "tread_friction": 0.03}
 """Share of the range by which the traction of a rolling tire may differ from the ring's."""
 TIMING = 6e-5
 """Common delay between trigger and gages that a rig may have, [s]."""

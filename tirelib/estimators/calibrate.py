@@ -17,6 +17,7 @@ from tirelib.errors import CalibrationError
 from tirelib.estimators import basis
 from tirelib.estimators.chain import AngleModel, Chain
 from tirelib.estimators.fit import Fit, fit_best, levels_of, mean_by
+from tirelib.estimators.floor import with_floor
 from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.polynomial import Polynomial
 from tirelib.estimators.ranges import with_ranges
@@ -125,7 +126,7 @@ def calibrate_chain(
         force=force,
         angle=angle,
     )
-    return with_ranges(_with_floor(chain, regressors, unit, rows), values, truth), links
+    return with_ranges(with_floor(chain, regressors, unit, rows), values, truth), links
 
 
 def measured(observations: Observations, rows: BoolArray) -> BoolArray:
@@ -360,42 +361,3 @@ def _flatness(angle: FloatArray, utilisation: FloatArray) -> FloatArray:
 def _keep(links: Links, quantity: str, fit: Fit, held_out: FloatArray) -> None:
     links.held_out[quantity] = held_out
     links.candidates[quantity] = fit.candidates
-
-
-def _with_floor(
-    chain: Chain, regressors: dict[str, FloatArray], unit: IntArray, rows: BoolArray
-) -> Chain:
-    """Add what a single turn scatters about the mean of its run."""
-    estimates, radius = chain.predict(regressors)
-
-    def scatter(value: FloatArray) -> float:
-        good = rows & np.isfinite(value)
-        if not good.any():
-            return 0.0
-        count = np.bincount(unit[good])
-        mean = np.bincount(unit[good], weights=value[good]) / np.maximum(count, 1)
-        freedom = good.sum() - (count > 0).sum()
-        rest = value[good] - mean[unit[good]]
-        return float(np.sqrt((rest**2).sum() / freedom)) if freedom > 0 else 0.0
-
-    def floored(model: Polynomial | None, value: FloatArray) -> Polynomial | None:
-        return None if model is None else replace(model, floor=scatter(value))
-
-    none = np.full(radius.shape, np.nan)
-    angle = chain.angle
-    if angle is not None:
-        load = estimates["Fz"].value if "Fz" in estimates else chain.mean_load
-        angle = replace(
-            angle, blur=float(np.hypot(angle.blur, scatter(estimates["Fy"].value / load)))
-        )
-    turning = radius
-    if "kappa" in estimates:
-        with np.errstate(invalid="ignore", divide="ignore"):
-            turning = estimates["kappa"].value * regressors["speed"] / regressors["omega"]
-    return replace(
-        chain,
-        load=floored(chain.load, estimates["Fz"].value if "Fz" in estimates else none),
-        radius=floored(chain.radius, turning),
-        force=floored(chain.force, estimates["Fy"].value if "Fy" in estimates else none),
-        angle=angle,
-    )

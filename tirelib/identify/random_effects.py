@@ -94,14 +94,17 @@ def random_tangents(
 ) -> FloatArray:
     """Return slopes by relative load, relative pressure, gain and angle, (n_runs, n_phi, 4)."""
     n = len(points)
-    both = points.tiled(2)
-    load, pressure = both.load.copy(), both.pressure.copy()
-    load[:n] *= 1.0 + TRIAL
-    pressure[n:] *= 1.0 + TRIAL
-    moved = predict(values, replace(both, load=load, pressure=pressure), low_pass=low_pass).waveform
-    assert moved is not None  # noqa: S101 - the chain sets it
-    by_load = (moved[:n] - waveform) / TRIAL
-    by_pressure = (moved[n:] - waveform) / TRIAL
+    # differences of one and the same model: the linear ring, without effects
+    three = points.tiled(3)
+    load, pressure = three.load.copy(), three.pressure.copy()
+    load[n : 2 * n] *= 1.0 + TRIAL
+    pressure[2 * n :] *= 1.0 + TRIAL
+    waves = predict(
+        values, replace(three, load=load, pressure=pressure), low_pass=low_pass
+    ).waveform
+    assert waves is not None  # noqa: S101 - the chain sets it
+    by_load = (waves[n : 2 * n] - waves[:n]) / TRIAL
+    by_pressure = (waves[2 * n :] - waves[:n]) / TRIAL
     return np.stack([by_load, by_pressure, waveform, angle_slope(waveform)], axis=2)
 
 

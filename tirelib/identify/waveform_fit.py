@@ -7,7 +7,7 @@ leave open.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import linalg
@@ -21,7 +21,9 @@ from tirelib.model.base import (
     FREE,
     Coordinate,
     Correction,
+    CorrectionSlopes,
     Linear,
+    correction_slopes,
     large_displacements,
     linearised,
     move,
@@ -35,8 +37,12 @@ from tirelib.waveforms import GRID
 MAX_STEPS = 30
 LONGEST_STEP = 0.5
 TOLERANCE = 1e-4
-OUTER = 3
-"""Times the whitening and the misfit's shapes are brought up to the parameters."""
+OUTER = 10
+"""Most times that correction, whitening and the misfit's shapes are brought up to the values."""
+SETTLED = 0.01
+"""Move by such an update, in standard deviations, below which it is the last."""
+NEAR = 0.1
+"""Move of a coordinate below which the correction keeps its slopes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,13 +165,14 @@ def fit_waveforms(
     solver = _Solver(data, start, prior, free, changes, discrepancy, exact)
     steps = 0
     for outer in range(OUTER):
-        solver.refresh()
+        solver.refresh(slopes=outer > 0)
+        before = solver.z
         for _ in range(MAX_STEPS):
             steps += 1
             moved = solver.step()
             if progress is not None:
                 progress(f"error {solver.error:.2f}")
-            if moved < (0.02 if outer < OUTER - 1 else TOLERANCE):
+            if moved < (0.02 if outer == 0 else TOLERANCE):
                 break
         else:
             raise ConvergenceError(
@@ -174,6 +181,17 @@ def fit_waveforms(
                 solver.values,
                 moved,
             )
+        moved = solver.distance(before)
+        if outer > 0 and moved < SETTLED:
+            break
+    else:
+        raise ConvergenceError(
+            f"waveform fit: after {OUTER} updates of the large displacements the parameters still "
+            f"move by {moved:.2e} standard deviations; fix parameters that the campaign cannot "
+            "inform, or start nearer",
+            solver.values,
+            moved,
+        )
     return solver.result(steps)
 
 
@@ -196,22 +214,41 @@ class _Solver:
         self.start = dict(start)
         self.values = dict(start)
         self.exact = exact
-        self.correction: Correction | None = None
+        self.corrected: tuple[FloatArray, Correction, CorrectionSlopes] | None = None
         self.linear = self._linearise(self.z)
+        self.slopes_at: FloatArray | None = None
         self.damping = 1e-3
-        self.refresh()
 
     def _linearise(self, z: FloatArray) -> Linear:
-        return linearised(
+        linear = linearised(
             move(self.start, z, self.free), self.data.points, self.free, self.changes,
-            low_pass=self.data.low_pass, correction=self.correction,
+            low_pass=self.data.low_pass, correction=self._correction(z[None]),
         )  # fmt: skip
+        if self.corrected is None:
+            return linear
+        slopes = self.corrected[2]
+        return replace(
+            linear,
+            waveform_slopes=linear.waveform_slopes + slopes.waveform,
+            deflection_slopes=linear.deflection_slopes + slopes.deflection,
+        )
 
-    def refresh(self) -> None:
-        """Bring whitening and misfit shapes up to the present parameters."""
+    def _correction(self, z: FloatArray) -> Correction | None:
+        """Return the correction at coordinates (n_moves, n_free), one after the other."""
+        if self.corrected is None:
+            return None
+        at, correction, slopes = self.corrected
+        return slopes.moved(correction, z - at)
+
+    def refresh(self, *, slopes: bool = True) -> None:
+        """Bring correction, whitening and misfit shapes up to the present parameters.
+
+        Far from the solution the correction is better held than followed along its slopes.
+        """
         data = self.data
         if self.exact:
-            self.correction = large_displacements(self.values, data.points, low_pass=data.low_pass)
+            fresh = large_displacements(self.values, data.points, low_pass=data.low_pass)
+            self.corrected = (self.z, fresh, self._slopes(fresh) if slopes else self._none(fresh))
             self.linear = self._linearise(self.z)
         self.whiten = whitening(
             self.linear.waveform, self.values, data.points, data.tolerance, data.angle_std,
@@ -227,6 +264,20 @@ class _Solver:
         self.white_shapes = flat
         inner = flat @ flat.T + np.eye(len(flat))
         self.inner = linalg.cho_factor(inner) if len(flat) else None
+
+    def _none(self, fresh: Correction) -> CorrectionSlopes:
+        shape = (len(self.free), *fresh.waveform.shape)
+        return CorrectionSlopes(np.zeros(shape), np.zeros(shape[:2]))
+
+    def _slopes(self, fresh: Correction) -> CorrectionSlopes:
+        """Return the correction's slopes; those at hand while the parameters are near."""
+        if self.slopes_at is not None and np.abs(self.z - self.slopes_at).max() < NEAR:
+            assert self.corrected is not None  # noqa: S101 - set with the slopes
+            return self.corrected[2]
+        self.slopes_at = self.z
+        return correction_slopes(
+            self.values, self.data.points, self.free, fresh, low_pass=self.data.low_pass
+        )
 
     def _project(self, white: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return misfit coefficients that serve rows of whitened residuals best."""
@@ -287,6 +338,11 @@ class _Solver:
             self.damping *= 10.0
         self.damping = 1e-3
         return 0.0
+
+    def distance(self, before: FloatArray) -> float:
+        """Return how far the coordinates are from others, in standard deviations."""
+        normal, _, _ = self._normal(self.linear)
+        return float(np.abs((self.z - before) / self._scale(normal)).max())
 
     def _normal_at(self, linear: Linear, z: FloatArray) -> float:
         before = self.z
@@ -353,7 +409,7 @@ class _Solver:
             state = predict(
                 columns, self.data.points.tiled(count), self.changes,
                 low_pass=self.data.low_pass,
-                correction=self.correction.tiled(count) if self.correction else None,
+                correction=self._correction(points),
             )  # fmt: skip
         except TirelibError:
             return np.full(count, np.inf)

@@ -126,6 +126,26 @@ class Correction:
         return Correction(np.tile(self.waveform, (times, 1)), np.tile(self.deflection, times))
 
 
+@dataclass(frozen=True, slots=True)
+class CorrectionSlopes:
+    """How a correction changes with the free coordinates.
+
+    Attributes
+    ----------
+    waveform : shape (n_free, n_points, n_phi)
+    deflection : shape (n_free, n_points)
+    """
+
+    waveform: FloatArray
+    deflection: FloatArray
+
+    def moved(self, correction: Correction, dz: FloatArray) -> Correction:
+        """Return the correction after moves dz of shape (n_moves, n_free), one after the other."""
+        wave = correction.waveform + np.tensordot(dz, self.waveform, axes=1)
+        depth = correction.deflection + dz @ self.deflection
+        return Correction(wave.reshape(-1, wave.shape[-1]), depth.ravel())
+
+
 def large_displacements(
     values: Mapping[str, float | FloatArray],
     points: Operating,
@@ -157,6 +177,33 @@ def smoothed(strain: FloatArray, points: Operating, low_pass: LowPass) -> FloatA
     gain = np.exp(-0.5 * (sigma[:, None] * order) ** 2) * (order > 0)
     out: FloatArray = np.fft.irfft(np.fft.rfft(strain, axis=1) * gain, n=n, axis=1)
     return out
+
+
+def correction_slopes(
+    values: Mapping[str, float | FloatArray],
+    points: Operating,
+    free: tuple[Coordinate, ...],
+    correction: Correction,
+    *,
+    low_pass: LowPass | None = None,
+    step: float = 1e-3,
+) -> CorrectionSlopes:
+    """Return the slopes of `large_displacements` at a tire's values.
+
+    They are no small matter: the strain's slope by k_v is twice that of the linear ring.
+    """
+    n, k = len(points), len(free)
+    columns = dict(values)
+    for j, coordinate in enumerate(free):
+        z = np.zeros(k)
+        z[j] = step
+        columns[coordinate.name] = np.repeat(
+            np.asarray(coordinate.moved(values[coordinate.name], z)), n
+        )
+    moved = large_displacements(columns, points.tiled(k), low_pass=low_pass)
+    wave = moved.waveform.reshape(k, n, -1) - correction.waveform
+    depth = moved.deflection.reshape(k, n) - correction.deflection
+    return CorrectionSlopes(wave / step, depth / step)
 
 
 @dataclass(frozen=True, slots=True)

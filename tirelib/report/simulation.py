@@ -13,27 +13,35 @@ import numpy as np
 
 from tirelib.arrays import FloatArray, IntArray
 from tirelib.contact import radial, shear
-from tirelib.contact.fourier import evaluate
 from tirelib.contact.free_boundary import ComplianceAt
 from tirelib.contact.radial import RadialContact
 from tirelib.contact.shear import ShearContact
 from tirelib.contact.tread import Tread
 from tirelib.errors import ParameterError
 from tirelib.parameters import FIELDS, Tire
+from tirelib.report.simulation_series import (
+    FINE,
+    N_SERIES,
+    fine_grid,
+    long_series,
+    modes,
+    nodes,
+    on_grid,
+)
 from tirelib.ring.compliance import Compliance, compliance
 from tirelib.ring.ring import ComplexArray, Ring
-from tirelib.strain.innerliner import strain_at
+from tirelib.strain.innerliner import strain_harmonics
 from tirelib.units import from_si
 
 CONTACTS = ("radial", "shear")
-N_MODES = 200
-N_NODES = 120
-"""More than modes times half the contact angle, or the highest harmonics alias in the patch."""
 N_SHEAR_NODES = 80
 N_ANGLES = 1441
 """A quarter of a degree."""
 LARGEST_TURN_RATE = 300.0
-"""Up to which the ring's steady rolling was checked, [rad/s]; about 320 km/h."""
+"""Up to which the ring's steady rolling was checked, for every tire, [rad/s]."""
+TURN_RATE_REASON = (
+    "steady rolling was checked up to there for every tire alike; the tire itself may end earlier"
+)
 MICRO = 1e6
 
 
@@ -88,6 +96,9 @@ class Simulation:
     effective_radius, torque, sliding_onset : shape (n_points,) or None, [m], [N m], [rad]
         R_e, moment of the road about the axle along +phi, and where sliding begins (NaN: nowhere).
         The radial contact knows none of them.
+    fine_peaks : Peaks or None
+        Extremes between the angles of `phi`, where they are known: the strain rate has a kink where
+        the tread begins to slide.
     """
 
     tire: Tire
@@ -110,6 +121,7 @@ class Simulation:
     effective_radius: FloatArray | None = None
     torque: FloatArray | None = None
     sliding_onset: FloatArray | None = None
+    fine_peaks: Peaks | None = None
 
     def __len__(self) -> int:
         return int(self.load.size)
@@ -133,13 +145,9 @@ class Simulation:
     @property
     def peaks(self) -> Peaks:
         """Extremes of strain and strain rate."""
-        middle = self.edges.mean(axis=1)[:, None]
-        before, after = self.phi <= middle, self.phi >= middle
-        cp1 = extreme(self.phi, np.where(before, -self.strain, -np.inf))
-        cp2 = extreme(self.phi, np.where(after, -self.strain, -np.inf))
-        tp, up, down = (extreme(self.phi, x) for x in (self.strain, self.rate, -self.rate))
-        return Peaks(-cp1[1], tp[1], -cp2[1], up[1], -down[1],
-                     cp1[0], tp[0], cp2[0], up[0], down[0])  # fmt: skip
+        if self.fine_peaks is not None:
+            return self.fine_peaks
+        return find_peaks(self.phi, self.strain, self.rate, self.edges)
 
     def belt(self) -> tuple[FloatArray, FloatArray]:
         """Return x (forward) and z (up) of the belt from the axle, shape (n_points, n_phi), [m]."""
@@ -191,16 +199,17 @@ def simulate(
     pressed = load if load is not None else deflection
     own = tire.pressure if inflation is None else inflation
     target, p, omega = _points(pressed, own, turn_rate)
-    _check_range("inflation pressure", p, 0.0, FIELDS["pressure"].highest, "bar", "pressure")
-    _check_range("turn rate", omega, 0.0, LARGEST_TURN_RATE, "rad/s", "angular_speed")
-    at, tread = _ring_at(tire, p, omega), Tread.of(tire)
+    _check_range("inflation pressure", p, FIELDS["pressure"].highest, "bar", "pressure")
+    check_turn_rate(omega)
+    n_modes, tread = modes(tire, p), Tread.of(tire)
+    at = _ring_at(tire, p, omega, n_modes)
     if contact == "shear":
         press_sheared = shear.load if load is not None else shear.press
         sheared = press_sheared(at, tread, shear.Shear.of(tire), target, n_nodes=N_SHEAR_NODES)
         _check_tread(tire, sheared.load, sheared.compression)
         return _sheared(tire, sheared, p, omega)
     press_radially = radial.load if load is not None else radial.press
-    pressed_radially = press_radially(at, tread, target, n_nodes=N_NODES)
+    pressed_radially = press_radially(at, tread, target, n_nodes=nodes(n_modes))
     _check_tread(tire, pressed_radially.load, pressed_radially.delta)
     return _radial(tire, pressed_radially, p, omega)
 
@@ -230,6 +239,17 @@ def extreme(phi: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray
     return angle, value
 
 
+def find_peaks(phi: FloatArray, strain: FloatArray, rate: FloatArray, edges: FloatArray) -> Peaks:
+    """Return the extremes of strain and strain rate, (n_points, n_phi), on a uniform grid."""
+    middle = edges.mean(axis=1)[:, None]
+    before, after = phi <= middle, phi >= middle
+    cp1 = extreme(phi, np.where(before, -strain, -np.inf))
+    cp2 = extreme(phi, np.where(after, -strain, -np.inf))
+    tp, up, down = (extreme(phi, x) for x in (strain, rate, -rate))
+    return Peaks(-cp1[1], tp[1], -cp2[1], up[1], -down[1],
+                 cp1[0], tp[0], cp2[0], up[0], down[0])  # fmt: skip
+
+
 def _points(*given: Any) -> tuple[FloatArray, ...]:
     """Return the values of every operating point, one shape."""
     arrays = [np.atleast_1d(np.asarray(value, dtype=float)) for value in given]
@@ -243,29 +263,41 @@ def _points(*given: Any) -> tuple[FloatArray, ...]:
     return tuple(np.broadcast_to(array, (count,)).copy() for array in arrays)
 
 
+def check_turn_rate(turn_rate: FloatArray) -> None:
+    """Refuse turn rates, [rad/s], that the model was not checked for.
+
+    Raises
+    ------
+    ParameterError
+    """
+    _check_range("turn rate", turn_rate, LARGEST_TURN_RATE, "rad/s", "angular_speed",
+                 TURN_RATE_REASON)  # fmt: skip
+
+
 def _check_range(
-    what: str, value: FloatArray, lowest: float, highest: float, unit: str, dimension: str
-) -> None:
-    good = (value >= lowest) & (value <= highest)  # NaN is not
+    what: str, value: FloatArray, highest: float, unit: str, dimension: str,
+    reason: str = "check value and unit",
+) -> None:  # fmt: skip
+    good = (value >= 0.0) & (value <= highest)  # NaN is not
     if not good.all():
-        least, most, found = (
-            from_si(x, unit, dimension) for x in (lowest, highest, float(value[~good][0]))
-        )
+        most, found = (from_si(x, unit, dimension) for x in (highest, float(value[~good][0])))
         raise ParameterError(
-            f"simulation: {what} = {found:g} {unit}; the model holds from {least:g} to {most:g} "
-            f"{unit}; check value and unit"
+            f"simulation: {what} = {found:g} {unit}; the model holds from 0 to {most:g} {unit}; "
+            f"{reason}"
         )
 
 
-def _ring_at(tire: Tire, p: FloatArray, omega: FloatArray) -> Compliance | ComplianceAt:
+def _ring_at(
+    tire: Tire, p: FloatArray, omega: FloatArray, n_modes: int
+) -> Compliance | ComplianceAt:
     """Return the ring's compliance, as a function of deflection where the sidewall softens."""
 
     def at(deflection: FloatArray) -> Compliance:
-        return compliance(Ring.of(tire, p, deflection), omega, N_MODES)
+        return compliance(Ring.of(tire, p, deflection), omega, n_modes)
 
     if tire.radial_deflection_rate:
         return at
-    return compliance(Ring.of(tire, p), omega, N_MODES)
+    return compliance(Ring.of(tire, p), omega, n_modes)
 
 
 def _check_tread(tire: Tire, load: FloatArray, compression: FloatArray) -> None:
@@ -285,10 +317,11 @@ def _radial(tire: Tire, found: RadialContact, p: FloatArray, omega: FloatArray) 
     phi = np.linspace(-np.pi, np.pi, N_ANGLES)
     q = found.pressure_at(phi)
     middle = found.pressure_at(found.edges.mean(axis=1)[:, None])[:, 0]
-    u, v, strain, rate = _shape(tire, found.displacement, phi)
+    u, v, strain, rate, peaks = _shape(tire, found.displacement, found.edges)
     return Simulation(
         tire, "radial", p, omega, found.load, found.deflection, found.edges, middle,
         found.pressure_centre, phi, u, v, q, q * np.cos(phi), -q * np.sin(phi), strain, rate,
+        fine_peaks=peaks,
     )  # fmt: skip
 
 
@@ -297,11 +330,12 @@ def _sheared(tire: Tire, found: ShearContact, p: FloatArray, omega: FloatArray) 
     phi = np.linspace(-np.pi, np.pi, N_ANGLES)
     q, normal, along = _tractions(found, phi)
     middle = _tractions(found, found.edges.mean(axis=1)[:, None])[0][:, 0]
-    u, v, strain, rate = _shape(tire, found.displacement, phi)
+    ring = compliance(Ring.of(tire, p, found.deflection), omega, N_SERIES)
+    u, v, strain, rate, peaks = _shape(tire, long_series(found, ring, N_ANGLES), found.edges)
     return Simulation(
         tire, "shear", p, omega, found.load, found.deflection, found.edges, middle,
         found.pressure_centre, phi, u, v, q, normal, along, strain, rate,
-        found.effective_radius, found.torque, found.sliding_onset,
+        found.effective_radius, found.torque, found.sliding_onset, peaks,
     )  # fmt: skip
 
 
@@ -318,11 +352,13 @@ def _tractions(found: ShearContact, phi: FloatArray) -> tuple[FloatArray, FloatA
 
 
 def _shape(
-    tire: Tire, displacement: ComplexArray, phi: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return u, v, strain and strain rate at the angles."""
-    u, v = (evaluate(displacement[..., i], phi) for i in (0, 1))
-    strain, rate = (
-        strain_at(displacement, tire.ring_radius, tire.innerliner_offset, phi, k) for k in (0, 1)
-    )
-    return u, v, strain, rate
+    tire: Tire, displacement: ComplexArray, edges: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, Peaks]:
+    """Return u, v, strain and strain rate at the angles, and the peaks between them."""
+    wave = strain_harmonics(displacement, tire.ring_radius, tire.innerliner_offset)
+    slope = wave * 1j * np.arange(wave.shape[-1])
+    waves = (displacement[..., 0], displacement[..., 1], wave, slope)
+    u, v, strain_fine, rate_fine = (on_grid(x, FINE * (N_ANGLES - 1)) for x in waves)
+    peaks = find_peaks(fine_grid(N_ANGLES), strain_fine, rate_fine, edges)
+    u, v, strain, rate = (x[:, ::FINE].copy() for x in (u, v, strain_fine, rate_fine))
+    return u, v, strain, rate, peaks

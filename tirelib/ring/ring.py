@@ -71,8 +71,17 @@ class Ring:
     tension: float | FloatArray = 0.0
 
     def __post_init__(self) -> None:
+        sizes = {}
         for field in fields(self):
-            value = np.asarray(getattr(self, field.name), dtype=float)
+            value = _numbers(field.name, getattr(self, field.name))
+            sizes[field.name] = value.size
+            if field.name not in _INFINITE and np.isinf(value).any():
+                point = int(np.argmax(np.isinf(value)))
+                raise ParameterError(
+                    f"ring: {field.name} = {value.flat[point]:g} at point {point}; a finite number "
+                    f"is needed (only {' and '.join(sorted(_INFINITE))} may be infinite); check "
+                    "the tire's value"
+                )
             lowest = value.min() if value.size else np.nan
             positive = field.name in _POSITIVE
             negative = lowest < 0 and field.name not in _SIGNED
@@ -82,6 +91,13 @@ class Ring:
                     f"ring: {field.name} = {worst:.6g}; a number {'>' if positive else '>='} 0 is "
                     "needed; check the tire's value and its dependence on pressure and deflection"
                 )
+        many = {name: size for name, size in sizes.items() if size != 1}
+        if len(set(many.values())) > 1:
+            listed = ", ".join(f"{name} {size}" for name, size in many.items())
+            raise ParameterError(
+                f"ring: fields for different numbers of points ({listed}); one value for all or "
+                "one a point is needed; give every field the same length"
+            )
 
     @classmethod
     def of(
@@ -136,6 +152,24 @@ _POSITIVE = frozenset(
     {"radius", "bending_stiffness", "mass", "extension_stiffness", "shear_stiffness"}
 ) | {"radial_stiffness"}
 _SIGNED = frozenset({"tension"})
+_INFINITE = frozenset({"extension_stiffness", "shear_stiffness"})
+
+
+def _numbers(name: str, value: object) -> FloatArray:
+    """Return an array of floats with one axis at most, or refuse what is none."""
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ParameterError(
+            f"ring: {name} is {value!r:.60}; a number or an array of numbers in SI units is "
+            "needed; convert texts and fill gaps first"
+        ) from error
+    if array.ndim > 1:
+        raise ParameterError(
+            f"ring: {name} has shape {array.shape}; one value or one a point is needed; flatten "
+            "the operating points"
+        )
+    return array
 
 
 def modal_stiffness(ring: Ring, omega: float | FloatArray, n_modes: int) -> ComplexArray:

@@ -13,7 +13,7 @@ the same code, so they agree.
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,10 +23,10 @@ from tirelib.flags import TurnFlag
 from tirelib.signal.contacts import Contact, ContactFinder
 from tirelib.signal.lowpass import LowPass, half_width, smooth_to_angle
 from tirelib.signal.quality import UNUSABLE, inspect
-from tirelib.traces import Conditions, StrainTrace
+from tirelib.signal.turn import PHI, Turn, Turns, stack_turns
 
-PHI = np.linspace(-1.0, 0.8, 361)
-"""Wheel-angle grid of a turn, [rad]; zero is the middle of the centre gage's pulse."""
+__all__ = ["PHI", "Turn", "TurnCutter", "Turns", "cut_turns", "stack_turns"]
+
 AFTER = np.deg2rad(20.0)
 """How far beyond the end of the pulse a turn is looked at, [rad]."""
 OFFSET_HALF_WIDTH = 0.5
@@ -40,61 +40,6 @@ DRIFT_SHARE = 0.05
 LONGEST_TURN = 3.0
 """A turn that lasts longer is standstill, [s]."""
 _HELD = ("speed", "pressure", "camber")
-
-
-@dataclass(frozen=True, slots=True)
-class Turn:
-    """One turn; arrays over gages and wheel angle. NaN where the flags say why.
-
-    `time` is the middle of the contact pulse, [s since the start]; `ready` is when the last sample
-    that the turn needs was taken, [s].
-    """
-
-    time: float
-    ready: float
-    period: float
-    pulse: float
-    axis_shift: float
-    speed: float
-    pressure: float
-    camber: float
-    offset: FloatArray
-    mean: FloatArray
-    strain: FloatArray
-    rate: FloatArray
-    gage_flags: IntArray
-    flags: int
-
-
-@dataclass(frozen=True, slots=True)
-class Turns:
-    """Several turns of one wheel.
-
-    Attributes
-    ----------
-    trace : StrainTrace
-    time, ready, period : shape (n,), [s]
-    offset : shape (n, n_gages), [-]
-        Strain opposite the contact: hoop strain of inflation and speed, and the gage's zero.
-    mean : shape (n, n_gages), [-]
-        Mean strain of the preceding turn, less the offset.
-    gage_flags : shape (n, n_gages); flags : shape (n,)
-        `TurnFlag` bits.
-    rate_hz : float, [Hz]
-    """
-
-    trace: StrainTrace
-    time: FloatArray
-    ready: FloatArray
-    period: FloatArray
-    offset: FloatArray
-    mean: FloatArray
-    gage_flags: IntArray
-    flags: IntArray
-    rate_hz: float
-
-    def __len__(self) -> int:
-        return int(self.time.shape[0])
 
 
 class TurnCutter:
@@ -386,40 +331,3 @@ def cut_turns(
     cutter = TurnCutter(lateral, rate, low_pass)
     turns = cutter.push(strain, speed=speed, pressure=pressure, camber=camber, trigger=trigger)
     return stack_turns(turns, cutter.lateral, rate)
-
-
-def stack_turns(turns: Sequence[Turn], lateral: FloatArray, rate: float) -> Turns:
-    """Stack single turns along a new first axis."""
-    gages = lateral.size
-
-    def column(name: str) -> FloatArray:
-        return np.array([getattr(turn, name) for turn in turns], dtype=np.float64)
-
-    def rows(name: str, *shape: int) -> FloatArray:
-        return column(name).reshape(len(turns), *shape)
-
-    trace = StrainTrace(
-        phi=PHI,
-        strain=rows("strain", gages, PHI.size),
-        rate=rows("rate", gages, PHI.size),
-        pulse=column("pulse"),
-        lateral=lateral,
-        axis_shift=column("axis_shift"),
-        conditions=Conditions(
-            omega=2.0 * np.pi / column("period"),
-            speed=column("speed"),
-            pressure=column("pressure"),
-            camber=column("camber"),
-        ),
-    )
-    return Turns(
-        trace=trace,
-        time=column("time"),
-        ready=column("ready"),
-        period=column("period"),
-        offset=rows("offset", gages),
-        mean=rows("mean", gages),
-        gage_flags=rows("gage_flags", gages).astype(np.int64),
-        flags=column("flags").astype(np.int64),
-        rate_hz=rate,
-    )

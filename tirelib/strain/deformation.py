@@ -23,11 +23,13 @@ import numpy.typing as npt
 from scipy.linalg import solve_banded
 
 from tirelib.arrays import FloatArray
-from tirelib.contact.static import road_gap
+from tirelib.contact.static import LARGEST_DEFLECTION, road_gap
 from tirelib.errors import ParameterError, ShapeError
 
 SMALLEST_EIGENVALUE = 0.05
 """Of u + u'' on the arc; an error of the strain grows by its inverse."""
+LARGEST_STRAIN = 0.1
+"""Of an innerliner; more is microstrain or percent taken for strain."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,6 +214,7 @@ def contact_deformation(
             f"contact deformation: edges or deflection do not fit traces of shape {eps.shape}; "
             f"give one number or shape {lead}"
         ) from error
+    _check_sizes(eps, d0, free_radius)
     angle = arc_nodes(edges[0], edges[1], n)
     condition = arc_condition(edges[1] - edges[0], n)
     borders = road_gap(angle[..., [0, -1]], d0[..., None], free_radius, exact=exact_gap)
@@ -378,6 +381,26 @@ def _turn_spectrum(where: str, samples: FloatArray) -> npt.NDArray[np.complex128
     if not np.isfinite(samples).all():
         raise ParameterError(f"{where}: a sample is not finite; fill or drop the turn")
     return np.fft.rfft(samples)
+
+
+def _check_sizes(strain: FloatArray, deflection: FloatArray, free_radius: float) -> None:
+    """Raise ParameterError where a deflection or a strain has another unit or sign."""
+    good = (deflection > 0.0) & (deflection <= LARGEST_DEFLECTION * free_radius)
+    if not good.all():
+        worst = deflection[~good].flat[0]
+        raise ParameterError(
+            f"contact deformation: trace {int(np.argmin(good))} has deflection = {worst:g} m; "
+            f"above 0 and up to {LARGEST_DEFLECTION * free_radius:g} m, a quarter of the free "
+            "radius, is needed; it is free minus loaded radius, in metres"
+        )
+    inner = np.abs(strain[..., 1:-1])
+    if inner.size and inner.max() > LARGEST_STRAIN:
+        trace = int(np.argmax(inner.max(axis=-1)))
+        raise ParameterError(
+            f"contact deformation: trace {trace} has a strain of {inner.max():g}; up to "
+            f"{LARGEST_STRAIN} in size is allowed; give it as a fraction, not in percent or "
+            "microstrain"
+        )
 
 
 def _check_geometry(ring_radius: float, free_radius: float, liner_offset: float) -> None:

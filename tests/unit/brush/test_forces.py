@@ -9,7 +9,7 @@ from tirelib.brush.forces import brush_distribution, brush_forces
 from tirelib.brush.parabola import aligning_moment, bristle_stiffness, lateral_force, sliding_angle
 from tirelib.brush.parameters import BrushParameters, Carcass
 from tirelib.contact.profiles import convex_concave, parabola, power_law, sampled
-from tirelib.errors import ParameterError, ShapeError
+from tirelib.errors import ConvergenceError, ParameterError, ShapeError
 
 MU, LOAD, A, STIFFNESS = 0.9, 4000.0, 0.06, 6e4
 CPY = STIFFNESS / (2 * A**2)
@@ -312,3 +312,20 @@ def test_bad_parameters_are_refused() -> None:
         brush_forces(PARABOLA, PLAIN, 0.0, curvature=np.inf)
     with pytest.raises(ShapeError, match="do not broadcast"):
         brush_forces(PARABOLA, PLAIN, np.zeros(2), np.zeros(3))
+
+
+def test_a_belt_too_soft_for_any_balance_is_told_with_numbers() -> None:
+    """At 3 deg the middle bristle turns over before the forces agree; at 0.5 and 10 deg not.
+
+    What is left of the equations is no rounding: 1 % of mu Fz and more.
+    """
+    soft = BrushParameters(
+        lateral_stiffness=8e6, friction=0.9, carcass=Carcass(lateral=1e5, yaw=8e3, bend=200.0)
+    )
+    profile = parabola(4000.0, -0.06, 0.06)
+    assert np.isfinite(brush_forces(profile, soft, np.radians([0.5, 10.0, 60.0])).Fy).all()
+    with pytest.raises(ConvergenceError, match=r"1 of 3 .*\(number 1\).*carcass\.bend") as caught:
+        brush_forces(profile, soft, np.radians([0.5, 3.0, 10.0]))
+    force, moment = caught.value.iterate
+    assert force.shape == moment.shape == (3,)
+    assert 0.01 < caught.value.residual < 1.0

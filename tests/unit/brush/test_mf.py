@@ -1,12 +1,14 @@
 """Magic Formula 6.1 and 5.2: each law isolates a group of equations. All numbers are invented."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tirelib.brush.mf import magic_forces
 from tirelib.brush.mf6 import magic_forces_6
 from tirelib.brush.mf52 import magic_forces_5
-from tirelib.brush.mf_tire import MagicTire, magic_tire
+from tirelib.brush.mf_tire import Coefficients, MagicTire, magic_tire
 from tirelib.brush.tir import parse_tir
 from tirelib.errors import FormatError, ParameterError, ShapeError
 
@@ -30,7 +32,7 @@ FZMIN=200
 FZMAX=9000
 [SLIP_ANGLE_RANGE]
 ALPMIN=-0.3
-[ALL_COEFFICIENTS]
+[LATERAL_COEFFICIENTS]
 """
 PLAIN = {
     "PCX1": 1.6, "PDX1": 1.1, "PDX2": -0.1, "PEX1": -0.4, "PEX2": 0.2, "PEX3": 0.1, "PKX1": 22.0,
@@ -267,3 +269,39 @@ def test_bad_inputs_are_refused() -> None:
         magic_forces(PURE, 4000.0, 0.1, camber=np.nan)
     with pytest.raises(ShapeError, match="do not broadcast"):
         magic_forces(PURE, [1.0, 2.0], [0.1, 0.1, 0.1])
+
+
+BASE = HEAD.format(fit=61) + "".join(f"{key}={value!r}\n" for key, value in PLAIN.items())
+
+
+def test_only_the_tires_own_sections_feed_the_model() -> None:
+    """A vendor's section that comes later has its own numbers under the same names."""
+    vendor = magic_tire(parse_tir(BASE + "[VENDOR_WET]\nPDY1 = -0.4\nPKY1 = -5\nRBX3 = 7\n"))
+    assert dict(vendor.coefficients.values) == dict(magic_tire(parse_tir(BASE)).coefficients.values)
+
+
+def test_contradictions_are_refused_with_both_places() -> None:
+    text = BASE + "[ALIGNING_COEFFICIENTS]\nPDY1 = 0.4\nPCY1 = 1.35\n[OTHER]\nFNOMIN = 1\n"
+    with pytest.raises(FormatError) as caught:
+        magic_tire(parse_tir(text, where="x.tir"))
+    first, second = caught.value.problems[:2]
+    assert "PDY1 = 1 in [LATERAL_COEFFICIENTS] but 0.4 in [ALIGNING_COEFFICIENTS]" in first
+    assert "FNOMIN = 4000.0 in [VERTICAL] but 1.0 in [OTHER]" in second
+    assert all(problem.startswith("x.tir: ") for problem in caught.value.problems)
+
+
+def test_a_required_coefficient_in_a_strange_section_is_found_for_the_reader() -> None:
+    text = BASE.replace("PDY1=1.0\n", "") + "[LATERAL_COEFFICIENTS_WET]\nPDY1 = 0.4\n"
+    with pytest.raises(FormatError, match=r"PDY1 is missing.*\[LATERAL_COEFFICIENTS_WET\]"):
+        magic_tire(parse_tir(text))
+
+
+@pytest.mark.parametrize("fit", [52, 61])
+@pytest.mark.parametrize(("name", "value"), [("LFZO", 0.0), ("PKY2", 0.0), ("LMUY", 0.0)])
+def test_what_the_formula_divides_by_is_not_zero(name: str, value: float, fit: int) -> None:
+    with pytest.raises(FormatError, match=f"{name} = 0"):
+        tire({**PLAIN, name: value}, fit)
+    sound = tire(PLAIN, fit)
+    broken = replace(sound, coefficients=Coefficients({**PLAIN, name: value}))
+    with pytest.raises(ParameterError, match=f"{name} = 0"):
+        magic_forces(broken, 4000.0, 0.05)

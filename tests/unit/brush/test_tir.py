@@ -215,3 +215,46 @@ def test_what_cannot_be_written_is_refused() -> None:
 def test_text_is_no_number() -> None:
     with pytest.raises(ParameterError, match="CODE = 'XL' is text"):
         parse_tir(TEXT).number("CODE")
+
+
+def test_units_are_words_and_no_data() -> None:
+    """[UNITS] MASS = 'kg' stands before [INERTIA] MASS."""
+    assert parse_tir(TEXT + "[INERTIA]\nMASS=9.3\n").number("MASS") == 9.3
+    assert parse_tir(TEXT).number("MASS") is None
+
+
+def test_two_different_numbers_are_refused_with_both_places() -> None:
+    tire = parse_tir(TEXT + "[VENDOR_Y]\nFNOMIN = 5000\n")
+    assert tire.places("fnomin") == (("VERTICAL", 4100.0), ("VENDOR_Y", 5000.0))
+    with pytest.raises(ParameterError, match=r"4100.0 in \[VERTICAL\] but 5000.0 in \[VENDOR_Y\]"):
+        tire.number("FNOMIN")
+    assert parse_tir(TEXT + "[VENDOR_Y]\nFNOMIN = 4100\n").number("FNOMIN") == 4100.0
+
+
+@pytest.mark.parametrize("place", ["nowhere.tir", "."])
+def test_what_is_no_file_is_told(place: str, tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match=f"{place}: cannot be read"):
+        read_tir(f"{tmp_path}/{place}")
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        TEXT.encode("utf-16"),
+        TEXT.encode("utf-16-le"),
+        bytes(range(256)) * 40,
+        TEXT.encode() + b"\x00\x01 more\n\x02\n",
+        b"time,load\n0.0,4000\n0.1,4010\n",
+        b"",
+    ],
+)
+def test_what_is_no_tir_file_is_told_once(data: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "a.tir"
+    path.write_bytes(data)
+    with pytest.raises(FormatError, match=r"a\.tir: .*give another") as caught:
+        read_tir(path)
+    assert len(caught.value.problems) == 1
+
+
+def test_an_end_mark_of_old_systems_is_accepted_after_a_comment() -> None:
+    assert parse_tir(TEXT + "! end \x1a").fit_type == 61

@@ -68,9 +68,11 @@ def test_load_and_deflection_are_each_others_inverse(contact: str) -> None:
 @CONTACTS
 def test_strain_rate_is_the_slope_of_strain_and_the_belt_keeps_its_length(contact: str) -> None:
     done = simulate(TIRE, load=4000.0, turn_rate=59.0, contact=contact)
-    slope = np.gradient(done.strain[0], done.phi)
-    np.testing.assert_allclose(done.rate[0, 1:-1], slope[1:-1],
-                               atol=5e-3 * np.abs(done.rate).max())  # fmt: skip
+    # the rate has kinks, so it is summed up: by the trapezoidal rule, h^2/8 of each kink's bend
+    step = done.phi[1] - done.phi[0]
+    summed = np.cumsum(0.5 * step * (done.rate[0, 1:] + done.rate[0, :-1]))
+    np.testing.assert_allclose(summed, done.strain[0, 1:] - done.strain[0, 0],
+                               atol=3e-3 * np.ptp(done.strain))  # fmt: skip
     stretch = done.u[0] + np.gradient(done.v[0], done.phi)
     np.testing.assert_allclose(stretch[1:-1], 0.0, atol=2e-3 * np.abs(done.u).max())
 
@@ -162,7 +164,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "vacuum": ({"load": 4000.0, "inflation": -1e4}, "-0.1 bar; the model holds from 0 to 20"),
     "kilopascal": ({"load": 4000.0, "inflation": 132e5}, "132 bar; the model holds from 0 to 20"),
     "backward": ({"load": 4000.0, "turn_rate": -1.0}, "-1 rad/s; the model holds from 0 to 300"),
-    "fast": ({"load": 4000.0, "turn_rate": 301.0}, "301 rad/s"),
+    "fast": ({"load": 4000.0, "turn_rate": 301.0}, "0 to 300 rad/s; steady rolling was checked up"),
     "no number": ({"load": 4000.0, "turn_rate": np.nan}, "nan rad/s"),
     "heavy": ({"load": 1e5}, "100000 N"),
     "deep": ({"deflection": 0.29}, "290"),
@@ -179,7 +181,7 @@ def test_what_the_model_cannot_say_is_refused(case: str) -> None:
 
 def test_a_tread_that_is_pressed_through_is_refused() -> None:
     soft = TIRE.changed(tread_stiffness=1.0e6)
-    with pytest.raises(ParameterError, match=r"thickness is 12\.5 mm"):
+    with pytest.raises(ParameterError, match=r"thickness (is )?12\.5 mm"):
         simulate(soft, load=5000.0)
 
 

@@ -1,0 +1,194 @@
+"""`tirelib diagnose` and `tirelib add`: keys, files, exit codes, messages."""
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+from tests.unit.diagnose.planted import EFFECT, STRENGTH, added, model_file, waves
+from tirelib.cli import program
+from tirelib.errors import TirelibError
+from tirelib.parameters import read_tire, write_tire
+from tirelib.waveforms import Waveforms
+
+MINE = """
+from tirelib.effects import effect
+
+@effect("mine", stage="tread", unit="{unit}", low=0.0, high=1.0, varies_with=("load",),
+        source="test")
+def law(state, strength):
+    "Stiffer tread with load."
+    return state.but(k_t=state.k_t * (1.0 + strength * state.conditions.load / 4e3)){end}
+"""
+
+
+class Folder:
+    """Stands in for a campaign's files; the waveforms are the model's own."""
+
+    def __init__(self, measured: Waveforms) -> None:
+        self.measured, self.header = measured, measured.header
+
+    def content_hash(self) -> str:
+        return "hash"
+
+
+def use(patch: pytest.MonkeyPatch, measured: Waveforms) -> None:
+    for verb in ("diagnose", "add"):
+        patch.setattr(f"tirelib.cli.{verb}.read_campaign", lambda path: Folder(measured))
+    patch.setattr("tirelib.waveforms.measure_waveforms", lambda c, progress: c.measured)
+
+
+def call(*words: object) -> Result:
+    return CliRunner().invoke(program, list(map(str, words)))
+
+
+def refused(*words: object) -> str:
+    found = call(*words)
+    assert isinstance(found.exception, TirelibError), found.output
+    return str(found.exception)
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("models") / "M.toml"
+    write_tire(model_file(), path, "tirelib-model/1")
+    return path
+
+
+@pytest.fixture(scope="module")
+def planted(model: Path) -> Any:
+    with pytest.MonkeyPatch.context() as patch:
+        use(patch, waves(EFFECT, STRENGTH))
+        out, target = model.parent / "report", model.parent / "D.json"
+        found = call("diagnose", "anywhere", "--model", model, "--members", 8, "--out", out,
+                     "--json", target)  # fmt: skip
+    assert found.exit_code == 0, found.output
+    return SimpleNamespace(told=json.loads(target.read_text()), out=out, said=found.output)
+
+
+def test_the_contracts_keys_are_there(planted: Any) -> None:
+    told = planted.told
+    assert told["format"] == "tirelib-diagnosis/1"
+    assert told["quantity"] == "strain"
+    assert {"noise", "floor", "error_before", "verdict", "named", "candidates", "dead",
+            "unexplained", "next_test"} <= set(told)  # fmt: skip
+    assert set(told["unexplained"]) >= {"where", "scaling"}
+    for entry in told["candidates"]:
+        assert set(entry) >= {
+            "effect", "rank", "score", "threshold", "level", "strength", "std", "in_range",
+            "error_after", "heldout_error_after", "twins", "power",
+        }  # fmt: skip
+    assert [entry["rank"] for entry in told["candidates"]] == list(
+        range(1, len(told["candidates"]) + 1)
+    )
+
+
+def test_the_planted_effect_is_named_with_errors_that_fall(planted: Any) -> None:
+    told = planted.told
+    assert told["verdict"] in ("named", "form_inadequate")
+    assert told["named"] == [EFFECT]
+    first = told["candidates"][0]
+    assert first["effect"] == EFFECT
+    assert first["level"] == "alarm"
+    assert first["score"] >= 3.0 * first["threshold"]
+    assert first["error_after"] == told["error_after"] < 0.5 * told["error_before"]
+    assert first["heldout_error_after"] < told["heldout_error_before"]
+    assert all(entry["heldout_error_after"] is None for entry in told["candidates"][1:])
+
+
+def test_dead_effects_are_names_with_reasons(planted: Any) -> None:
+    told = planted.told
+    assert told["dead_reasons"]["camber"] == "no run has a camber"
+    assert told["dead"] == list(told["dead_reasons"])
+    assert not set(told["dead"]) & {entry["effect"] for entry in told["candidates"]}
+
+
+def test_the_report_is_one_page_and_the_same_in_words(planted: Any) -> None:
+    page = (planted.out / "diagnosis.html").read_text()
+    words = (planted.out / "diagnosis.md").read_text()
+    assert json.loads((planted.out / "diagnosis.json").read_text()) == planted.told
+    assert 'src="http' not in page
+    for plot in ("scores", "residual-before", "residual-after"):
+        assert f'id="plot-{plot}"' in page
+    for text in (EFFECT, "Dead effects", "no run has a camber"):
+        assert text in page
+        assert text in words
+    assert not (planted.out / "index.html").exists()
+
+
+def test_the_named_effect_is_added_and_no_longer_a_candidate(
+    model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    use(monkeypatch, waves(EFFECT, STRENGTH))
+    monkeypatch.setattr("tirelib.extend.extension.add_effect", lambda *_, **__: added()[0])
+    second, target = tmp_path / "M2.toml", tmp_path / "A.json"
+    found = call("add", EFFECT, "--model", model, "--data", "anywhere", "--out", second,
+                 "--json", target)  # fmt: skip
+    assert found.exit_code == 0, found.output
+    told = json.loads(target.read_text())
+    assert told["format"] == "tirelib-extension/1"
+    assert told["error_after"] < 0.5 * told["error_before"]
+    assert told["heldout_error_after"] < told["heldout_error_before"]
+    assert read_tire(second).extra["effects"][0]["strength"] == told["strength"]
+    again = call("diagnose", "x", "--model", second, "--members", 8, "--json", tmp_path / "D.json")
+    assert again.exit_code == 0, again.output
+    after = json.loads((tmp_path / "D.json").read_text())
+    assert after["has"] == [EFFECT]
+    assert EFFECT not in {entry["effect"] for entry in after["candidates"]}
+    # wide priors about another start move the minimum by a hundredth of a whitened sample's scatter
+    factor = told["error_after"] / added()[0].after.error
+    assert after["error_before"] == pytest.approx(told["error_after"], abs=0.01 * factor)
+    assert after["named"] == []
+
+
+def test_without_repeats_nothing_is_named_and_the_noise_is_null(
+    model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    use(monkeypatch, waves(EFFECT, STRENGTH, 0))
+    target = tmp_path / "D.json"
+    found = call("diagnose", "anywhere", "--model", model, "--members", 4, "--json", target)
+    assert found.exit_code == 0, found.output
+    told = json.loads(target.read_text())
+    assert told["noise"] is None
+    assert told["error_unit"] == "ustrain"
+    assert (told["verdict"], told["named"]) == ("none", [])
+    assert {entry["level"] for entry in told["candidates"]} <= {"hint", "quiet"}
+    assert "no runs were repeated" in found.output
+
+
+def test_bad_input_is_told(model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    use(monkeypatch, waves())
+    diagnose = ("diagnose", "x", "--model", model)
+    add = ("--model", model, "--out", tmp_path / "M2.toml")
+    assert "not available" in refused(*diagnose, "--quantity", "Fy")
+    assert "not available" in refused("add", EFFECT, *add, "--data", "x", "--quantity", "Mz")
+    assert "did you mean sidewall_load" in refused("add", "sidewal_load", *add, "--data", "x")
+    assert "--data is missing" in refused("add", EFFECT, *add)
+    assert "EFFECT is missing" in refused("add", *add, "--data", "x")
+    assert "nothing to undo" in refused("add", "--undo", *add)
+    assert "neither" in refused("add", EFFECT, "--undo", *add)
+    assert "has no effect" in refused("add", EFFECT, "--remove", *add, "--data", "x")
+    assert not (tmp_path / "M2.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("unit", "end", "says"), [("1", "\n  oops(", "not Python"), ("furlong", "", "furlong")]
+)
+def test_a_faulty_file_of_effects_is_told(
+    model: Path, tmp_path: Path, unit: str, end: str, says: str
+) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(MINE.format(unit=unit, end=end))
+    assert says in refused("diagnose", "x", "--model", model, "--effects", file)
+
+
+def test_a_campaign_with_too_few_runs_gets_no_verdict(
+    model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    use(monkeypatch, waves().take(waves().run < 3))
+    target = tmp_path / "D.json"
+    assert "at least 4" in refused("diagnose", "x", "--model", model, "--json", target)
+    assert not target.exists()

@@ -1,0 +1,155 @@
+"""`tirelib identify` end to end: a few runs of the numerical rig, files, exit codes, messages."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from bench.rig.campaign import run_plan
+from bench.rig.plans import Plan
+from bench.rig.tire import TIRES, Condition
+from tests.chain.test_command_line import run
+from tests.synthetic import synthetic_run, write
+from tirelib.campaign import read_campaign
+from tirelib.cli import program
+from tirelib.parameters import read_tire
+
+TIRE = TIRES["reference"]
+CONDITIONS = ((3000.0, 1.7e5), (6500.0, 1.7e5), (3000.0, 2.5e5), (6500.0, 2.5e5))
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("rig") / "four"
+    runs = tuple(Condition(load, pressure, 18.0) for load, pressure in CONDITIONS)
+    run_plan(Plan("four", "four straight runs", runs), TIRE, folder, seed=7, jobs=1)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def files(campaign: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("out")
+    out = {"model": folder / "M.toml", "json": folder / "I.json"}
+    found = CliRunner().invoke(
+        program, ["identify", str(campaign), "--out", str(out["model"]), "--json", str(out["json"])]
+    )
+    assert found.exit_code == 0, found.output
+    assert "4 straight runs, 5 gages averaged" in found.output
+    return out
+
+
+@pytest.fixture(scope="module")
+def document(files: dict[str, Path]) -> dict[str, Any]:
+    return dict(json.loads(files["json"].read_text()))
+
+
+def test_true_values_lie_in_the_intervals(document: dict[str, Any]) -> None:
+    mean = float(np.mean([pressure for _, pressure in CONDITIONS]))
+    true = {
+        "bending_stiffness": TIRE.bending,
+        "radial_stiffness": TIRE.radial_stiffness(mean),
+        "tangential_stiffness": TIRE.tangential_stiffness(mean),
+        "tread_stiffness": TIRE.tread_normal * TIRE.belt_width,
+        "innerliner_offset": 1e3 * TIRE.innerliner_offset,
+        "radial_pressure_slope": 1e5 * TIRE.sidewall_radial,
+        "tangential_pressure_slope": 1e5 * TIRE.sidewall_tangential,
+        "extension_stiffness": TIRE.extension,
+    }
+    assert {p["name"] for p in document["parameters"]} == set(true)
+    for entry in document["parameters"]:
+        assert entry["low"] <= true[entry["name"]] <= entry["high"], entry
+
+
+def test_the_strain_is_explained(document: dict[str, Any]) -> None:
+    assert document["rms_ustrain"] < 0.06 * document["strain_rms_ustrain"]
+    stiffness = document["vertical_stiffness"]
+    assert stiffness["model"] == pytest.approx(stiffness["measured"], rel=0.05)
+
+
+def test_the_document_says_what_was_done(document: dict[str, Any], campaign: Path) -> None:
+    assert document["format"] == "tirelib-identification/1"
+    assert document["campaign"] == "rig-four"
+    assert document["axes"] == "iso"
+    assert document["runs"] == [0, 1, 2, 3]
+    assert document["gages"] == [1, 2, 3, 4, 5]
+    assert document["noise_ustrain"] is None, "nothing was repeated"
+    matrix = np.array(document["correlation"])
+    assert matrix.shape == (8, 8)
+    assert np.diag(matrix) == pytest.approx(1.0)
+    assert document["provenance"]["data_sha256"] == read_campaign(campaign).content_hash()
+    keys = {"name", "meaning", "value", "std", "low", "high", "fit_std", "unit", "flags", "helps"}
+    for entry in document["parameters"]:
+        assert set(entry) == keys
+        assert entry["low"] < entry["value"] < entry["high"]
+        assert bool(entry["helps"]) == ("not_identifiable" in entry["flags"])
+
+
+def test_the_model_is_a_tire_with_provenance(
+    files: dict[str, Path], document: dict[str, Any]
+) -> None:
+    read = read_tire(files["model"])
+    assert read.extra["provenance"]["data_sha256"] == document["provenance"]["data_sha256"]
+    by_name = {p["name"]: p for p in document["parameters"]}
+    assert read.tire.bending_stiffness == pytest.approx(by_name["bending_stiffness"]["value"])
+    assert 1e3 * read.tire.innerliner_offset == pytest.approx(by_name["innerliner_offset"]["value"])
+    assert read.numbers["tread_stiffness"].kind == "fitted"
+    assert read.extra["effects"] == []
+
+
+def test_simulate_takes_the_model(files: dict[str, Path], tmp_path: Path) -> None:
+    target = tmp_path / "S.json"
+    found = CliRunner().invoke(
+        program,
+        ["simulate", "--model", str(files["model"]), "--load", "4000", "--json", str(target)],
+    )
+    assert found.exit_code == 0, found.output
+    simulated = json.loads(target.read_text())
+    assert simulated["Fz_N"] == pytest.approx(4000.0)
+    assert 10.0 < simulated["deflection_mm"] < 40.0
+
+
+def test_a_tire_may_be_given_as_start(campaign: Path, tmp_path: Path) -> None:
+    found = CliRunner().invoke(
+        program,
+        ["identify", str(campaign), "--tire", "table-6-1", "--out", str(tmp_path / "M.toml")],
+    )
+    assert found.exit_code == 0, found.output
+    assert (tmp_path / "M.toml").exists()
+
+
+def test_no_strain_is_an_error_of_two(tmp_path: Path) -> None:
+    runs = [replace(synthetic_run(i), strain=None, trigger=None) for i in range(4)]
+    folder = write(tmp_path / "c", runs)
+    done = run("identify", folder, "--out", tmp_path / "M.toml")
+    assert done.returncode == 2
+    assert "holds no strain" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "M.toml").exists()
+
+
+def test_a_sweep_alone_is_an_error_of_two(tmp_path: Path) -> None:
+    folder = write(tmp_path / "c", [synthetic_run(0, kind="sweep")])
+    done = run("identify", folder, "--out", tmp_path / "M.toml")
+    assert done.returncode == 2
+    assert "is a sweep" in done.stderr
+
+
+def test_a_tire_that_is_not_there_is_an_error_of_two(campaign: Path, tmp_path: Path) -> None:
+    done = run("identify", campaign, "--tire", "none-such", "--out", tmp_path / "M.toml")
+    assert done.returncode == 2
+    assert "none-such" in done.stderr
+
+
+def test_nothing_identified_is_one(
+    campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tirelib.identify.identify.WIDEST", 1e-6)
+    found = CliRunner().invoke(
+        program, ["identify", str(campaign), "--out", str(tmp_path / "M.toml")]
+    )
+    assert found.exit_code == 1, found.output
+    assert (tmp_path / "M.toml").exists(), "the numbers are written with their flags"

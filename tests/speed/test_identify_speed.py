@@ -1,0 +1,64 @@
+"""Cost of an identification. Goals on two cores: 19 runs under 5 s, 60 runs under 30 s.
+
+Run by `make bench`. Runs are made by the model; reading a campaign is not part of it.
+"""
+
+from time import perf_counter
+
+import numpy as np
+import pytest
+
+from tests.unit.identify.model_waves import TIRE, made_waves
+from tirelib.identify.campaign_data import StraightRuns, straight_runs
+from tirelib.identify.discrepancy import Discrepancy
+from tirelib.identify.identify import FITTED, estimated
+from tirelib.identify.waveform_fit import Prior, fit_waveforms
+from tirelib.model.base import FREE, values_of
+
+pytestmark = pytest.mark.speed
+GOALS = {19: 5.0, 60: 30.0}
+
+
+def campaign(count: int) -> StraightRuns:
+    loads = tuple(np.linspace(2000.0, 7500.0, (count - 1) // 3))
+    waves = made_waves(loads=loads, repeats=count - 3 * len(loads))
+    assert len(waves) == count
+    return straight_runs(waves)
+
+
+def least(work: object, rounds: int = 2) -> float:
+    times = []
+    for _ in range(rounds):
+        start = perf_counter()
+        work()  # type: ignore[operator]
+        times.append(perf_counter() - start)
+    return min(times)
+
+
+def test_identification_time_and_its_growth_with_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    times = {}
+    for count in (7, 19, 60):
+        runs = campaign(count)
+        times[count] = least(lambda runs=runs: estimated(runs))
+    power = np.log(times[60] / times[19]) / np.log(60.0 / 19.0)
+    with capsys.disabled():
+        print({n: f"{t:.2f} s" for n, t in times.items()}, f"grows with runs^{power:.2f}")  # noqa: T201 - the measurement
+    for count, goal in GOALS.items():
+        assert times[count] < goal
+    assert power < 1.5, "the cost per run must not grow"
+
+
+def test_growth_with_free_parameters(capsys: pytest.CaptureFixture[str]) -> None:
+    runs = campaign(19)
+    times = {}
+    for free in (FREE[:1], FREE[:4], FITTED):
+        prior = Prior(np.full(len(free), 0.5))
+        data = runs.data()
+
+        def work(free=free, prior=prior, data=data) -> None:  # type: ignore[no-untyped-def]
+            fit_waveforms(data, values_of(TIRE), prior, free=free, discrepancy=Discrepancy())
+
+        times[len(free)] = least(work)
+    with capsys.disabled():
+        print({n: f"{t:.2f} s" for n, t in times.items()}, "by free parameters")  # noqa: T201 - the measurement
+    assert times[8] < 12.0 * times[1]

@@ -1,0 +1,119 @@
+"""Waveforms that a model itself has made, with set-point errors, noise and planted differences."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from tests.synthetic import header
+from tirelib.arrays import FloatArray
+from tirelib.model.base import Operating, large_displacements, predict, smoothed, values_of
+from tirelib.parameters import TireFile, read_tire
+from tirelib.signal import LowPass
+from tirelib.waveforms import CONDITIONS, GRID, Waveforms
+
+TOLERANCE = (0.005, 0.002, 0.003)
+"""Load, pressure and gain, as in the header."""
+ANGLE = 5e-4
+Condition = tuple[float, float, float]
+
+
+def model_file() -> TireFile:
+    return read_tire("table-6-2-195-65r15")
+
+
+def plan() -> list[Condition]:
+    """Five loads, two pressures, two speeds, and eight repeats."""
+    grid = [
+        (load, pressure, speed)
+        for load in (1500.0, 2700.0, 3900.0, 5100.0, 6300.0)
+        for pressure in (1.9e5, 2.3e5)
+        for speed in (10.0, 25.0)
+    ]
+    return grid + grid[1:17:2]
+
+
+def points_of(conditions: Sequence[Condition]) -> Operating:
+    load, pressure, speed = np.array(conditions).T
+    n = load.size
+    nothing, unknown = np.zeros(n), np.full(n, np.nan)
+    return Operating(
+        load=load, pressure=pressure, omega=speed / 0.302, speed=speed, camber=nothing,
+        slip_angle=nothing, slip_ratio=nothing, side_force=nothing, drive_force=nothing,
+        order=np.linspace(0.0, 1.0, n), temperature=unknown,
+    )  # fmt: skip
+
+
+def waveforms(
+    conditions: Sequence[Condition] | None = None,
+    *,
+    noise: float = 3e-6,
+    spread: float = 1.0,
+    plant: Callable[[FloatArray, FloatArray], FloatArray] | None = None,
+    seed: int = 0,
+) -> Waveforms:
+    """Return what the model shows at set points that are off by `spread` tolerances.
+
+    `plant(load, phi)` is added to every gage, shape (n_runs, n_phi).
+    """
+    rng = np.random.default_rng(seed)
+    conditions = plan() if conditions is None else list(conditions)
+    nominal = points_of(conditions)
+    n = len(nominal)
+    off = spread * rng.standard_normal((4, n))
+    load = nominal.load * (1.0 + TOLERANCE[0] * off[0])
+    pressure = nominal.pressure * (1.0 + TOLERANCE[1] * off[1])
+    true = points_of(list(zip(load, pressure, nominal.speed, strict=True)))
+    low_pass = LowPass()
+    values = values_of(model_file().tire)
+    shown, depth = [], np.zeros(n)
+    for place in (0.0, ANGLE):
+        phi = GRID - place
+        correction = large_displacements(values, true, low_pass=low_pass, phi=phi)
+        state = predict(values, true, low_pass=low_pass, correction=correction, phi=phi)
+        assert state.waveform is not None
+        shown.append(state.waveform)
+        depth = state.deflection
+    slope = (shown[1] - shown[0]) / ANGLE
+    strain = shown[0] * (1.0 + TOLERANCE[2] * off[2])[:, None] - ANGLE * off[3][:, None] * slope
+    if plant is not None:
+        strain = strain + plant(nominal.load, GRID)
+    gages = strain[:, None, :] + np.zeros((1, 5, 1))
+    white = smoothed(rng.standard_normal((n, GRID.size)), true, low_pass)
+    white *= noise / np.sqrt(np.mean(white**2)) if noise else 0.0
+    gages = gages + white[:, None, :]
+    _, group = np.unique(np.array(conditions), axis=0, return_inverse=True)
+    unknown = np.full(n, np.nan)
+    given = {
+        "Fz": nominal.load, "pressure": nominal.pressure, "omega": nominal.omega,
+        "speed": nominal.speed, "slip_angle": np.zeros(n), "camber": np.zeros(n),
+        "slip_ratio": np.zeros(n),
+    }  # fmt: skip
+    return Waveforms(
+        header=header(),
+        strain=gages - gages.mean(axis=2, keepdims=True),
+        run=np.arange(n),
+        turns=np.full(n, 3),
+        scatter=np.full(n, noise),
+        angle_std=np.full(n, ANGLE),
+        start=np.arange(n) * 12.0,
+        group=np.asarray(group).ravel(),
+        conditions={
+            **{name: given.get(name, unknown) for name in CONDITIONS},
+            "loaded_radius": header().tire.free_radius - depth,
+        },
+        extra={},
+        low_pass=low_pass,
+        left_out={},
+    )
+
+
+def bump(
+    start: float, stop: float, size: float, least_load: float = 0.0
+) -> Callable[[FloatArray, FloatArray], FloatArray]:
+    """Return a plateau of strain over some angles, above some load, for `plant`."""
+
+    def plant(load: FloatArray, phi: FloatArray) -> FloatArray:
+        inside = (phi >= start) & (phi < stop)
+        return np.asarray(size * np.outer(load >= least_load, inside))
+
+    return plant

@@ -1,0 +1,69 @@
+"""Small campaigns that the model itself makes, with an effect planted."""
+
+from functools import cache
+
+import numpy as np
+
+from tests.synthetic import LATERAL
+from tests.unit.identify.model_waves import TIRE, made_waves
+from tirelib.compare.model import model_of
+from tirelib.effects import CATALOGUE
+from tirelib.extend.extension import Extension, add_effect
+from tirelib.extend.model_file import extended_file
+from tirelib.identify.campaign_data import StraightRuns, straight_runs
+from tirelib.model.base import large_displacements, operating_points, predict, values_of
+from tirelib.parameters import Number, TireFile
+from tirelib.waveforms import Waveforms
+
+LOADS = (2400.0, 4200.0, 6000.0)
+PRESSURES = (1.7e5, 2.3e5)
+EFFECT, STRENGTH = "sidewall_load", 0.3
+NOISE = 2e-6
+
+
+@cache
+def waves(effect: str = "", strength: float = 0.0, repeats: int = 2) -> Waveforms:
+    """Return runs at two speeds, free of set-point errors; the model's own, with an effect."""
+    plain = made_waves(
+        loads=LOADS, pressures=PRESSURES, repeats=repeats, noise=NOISE, random=False, radius=False
+    )
+    speed = np.where(np.arange(len(plain)) % 2, 30.0, 15.0)
+    speed[len(LOADS) * len(PRESSURES) :] = speed[:repeats]
+    fixed = dict(plain.conditions) | {"speed": speed, "omega": speed / TIRE.ring_radius}
+    fields = {name: getattr(plain, name) for name in plain.__dataclass_fields__}
+    turning = Waveforms(**(fields | {"conditions": fixed}))
+    points, values = operating_points(turning), values_of(TIRE)
+    fix = large_displacements(values, points, low_pass=turning.low_pass)
+    changes = [CATALOGUE[effect].at(strength)] if effect else []
+    wave = predict(values, points, changes, low_pass=turning.low_pass, correction=fix).waveform
+    assert wave is not None
+    random = np.random.default_rng(3)
+    strain = wave[:, None] + NOISE * random.standard_normal((len(plain), len(LATERAL), 360))
+    return Waveforms(**(fields | {"conditions": fixed, "strain": strain}))
+
+
+def runs(effect: str = "", strength: float = 0.0, repeats: int = 2) -> StraightRuns:
+    """Return the straight runs of `waves`."""
+    return straight_runs(waves(effect, strength, repeats))
+
+
+def model_file(*effects: tuple[str, float]) -> TireFile:
+    """Return a model near the truth."""
+    numbers = {
+        name: Number(float(value), 0.05 * abs(float(value)), "fitted", "test")
+        for name, value in values_of(TIRE).items()
+        if np.isfinite(value)
+    }
+    numbers["bending_stiffness"] = Number(
+        1.05 * TIRE.bending_stiffness, 0.2, "fitted", "test", {"interval_SI": [2.0, 3.0]}
+    )
+    listed = [{"effect": name, "strength": x, "unit": CATALOGUE[name].unit} for name, x in effects]
+    return TireFile("made", numbers, {"effects": listed, "history": []})
+
+
+@cache
+def added() -> tuple[Extension, TireFile]:
+    """Return the planted effect added to a model without it, and the file."""
+    file = model_file()
+    done = add_effect(runs(EFFECT, STRENGTH), model_of(file), CATALOGUE[EFFECT], members=4)
+    return done, extended_file(file, done, "hash")

@@ -1,0 +1,125 @@
+"""Random effects whiten to unit variance; noise comes out of repeats."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.unit.identify.model_waves import ANGLE_STD, TIRE, TOLERANCE, made_waves, operating
+from tirelib.identify.noise import FLOOR, noise_of
+from tirelib.identify.random_effects import angle_slope, random_tangents, whitening
+from tirelib.model.base import predict, values_of
+from tirelib.signal import LowPass
+from tirelib.waveforms import GRID, N_PHI
+
+NOISE = 1e-5
+LOADS = np.array([2500.0, 4500.0, 6500.0])
+
+
+@pytest.fixture(scope="module")
+def waveform() -> np.ndarray:
+    points = operating(LOADS, np.full(3, 2.1e5))
+    found = predict(values_of(TIRE), points, low_pass=LowPass()).waveform
+    assert found is not None
+    return found
+
+
+def simulated(waveform: np.ndarray, draws: int, angle_std: float) -> np.ndarray:
+    """Residuals with all four random effects and noise, (draws, n_runs, n_phi)."""
+    rng = np.random.default_rng(5)
+    points = operating(LOADS, np.full(3, 2.1e5))
+    tangent = random_tangents(waveform, values_of(TIRE), points, LowPass())
+    size = np.array([TOLERANCE.load, TOLERANCE.pressure, TOLERANCE.gain, angle_std])
+    part = rng.standard_normal((draws, 3, 4)) * size
+    noise = NOISE * rng.standard_normal((draws, *waveform.shape))
+    return np.asarray(np.einsum("rnk,drk->drn", tangent, part) + noise)
+
+
+def whiten(waveform: np.ndarray, residual: np.ndarray, angle_std: float) -> np.ndarray:
+    points = operating(LOADS, np.full(3, 2.1e5))
+    white = whitening(waveform, values_of(TIRE), points, TOLERANCE, np.full(3, angle_std), NOISE,
+                      LowPass())  # fmt: skip
+    return white(residual)
+
+
+def test_whitening_gives_unit_variance_on_what_the_rig_does(waveform: np.ndarray) -> None:
+    residual = simulated(waveform, 400, ANGLE_STD)
+    assert np.std(residual) > 1.5 * NOISE, "the random effects have to matter"
+    white = whiten(waveform, residual, ANGLE_STD)
+    # 432,000 numbers: their variance scatters by 0.2 %
+    assert np.mean(white**2) == pytest.approx(1.0, abs=0.01)
+    # and in the four directions of the random effects alone: 4800 numbers, 2 %
+    points = operating(LOADS, np.full(3, 2.1e5))
+    basis = np.linalg.qr(random_tangents(waveform, values_of(TIRE), points, LowPass()))[0]
+    inside = np.einsum("rnk,drn->drk", basis, white)
+    assert np.mean(inside**2) == pytest.approx(1.0, abs=0.08)
+
+
+def test_whitening_leaves_no_correlation_between_random_directions(waveform: np.ndarray) -> None:
+    white = whiten(waveform, simulated(waveform, 1500, ANGLE_STD), ANGLE_STD)
+    points = operating(LOADS, np.full(3, 2.1e5))
+    basis = np.linalg.qr(random_tangents(waveform, values_of(TIRE), points, LowPass()))[0]
+    inside = np.einsum("rnk,drn->drk", basis, white)[:, 1]
+    assert np.corrcoef(inside.T) == pytest.approx(np.eye(4), abs=0.12)  # 1/sqrt(1500) = 0.026
+
+
+def test_an_unknown_angle_zero_makes_a_shift_free(waveform: np.ndarray) -> None:
+    shift = 2e-3 * angle_slope(waveform)
+    held = whiten(waveform, shift, 1e-5)
+    free = whiten(waveform, shift, np.inf)
+    assert np.sum(free**2) < 1e-3 * np.sum(held**2)
+
+
+def test_tangents_are_derivatives(waveform: np.ndarray) -> None:
+    points = operating(LOADS, np.full(3, 2.1e5))
+    tangent = random_tangents(waveform, values_of(TIRE), points, LowPass())
+    h = 2e-4
+    for k, name in ((0, "load"), (1, "pressure")):
+        ends = [
+            predict(values_of(TIRE), replace(points, **{name: getattr(points, name) * (1.0 + s)}),
+                    low_pass=LowPass()).waveform
+            for s in (-h, h)
+        ]  # fmt: skip
+        assert ends[0] is not None
+        assert ends[1] is not None
+        slope = (ends[1] - ends[0]) / (2.0 * h)
+        # a one-sided step of 1e-3 errs by its half times the curvature
+        assert tangent[..., k] == pytest.approx(slope, abs=5e-3 * np.abs(slope).max())
+    assert tangent[..., 2] == pytest.approx(waveform)
+
+
+def test_the_slope_by_angle_is_that_of_a_series() -> None:
+    wave = 3.0 * np.cos(5.0 * GRID + 0.4) - np.sin(40.0 * GRID)
+    exact = -15.0 * np.sin(5.0 * GRID + 0.4) - 40.0 * np.cos(40.0 * GRID)
+    assert angle_slope(wave) == pytest.approx(exact, abs=1e-9)
+    assert angle_slope(np.cos(N_PHI / 2 * GRID)) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_noise_from_repeats_is_the_noise_put_in() -> None:
+    noise = 3e-5
+    waves = made_waves(noise=noise, repeats=6, seed=3)
+    centre = waves.strain[:, 2]
+    found = noise_of(waves, centre)
+    assert found.repeats == 6
+    # 6 x 357 numbers: 1.5 %; set points are taken out by their shapes
+    assert found.std == pytest.approx(noise, rel=0.06)
+    assert found.raw > 1.1 * noise, "repeats differ by set points, which are no noise"
+
+
+def test_the_mean_over_five_gages_has_less_noise() -> None:
+    waves = made_waves(noise=3e-5, repeats=6, seed=3)
+    found = noise_of(waves, waves.strain.mean(axis=1))
+    assert found.std == pytest.approx(3e-5 / np.sqrt(5.0), rel=0.1)
+
+
+def test_without_repeats_there_is_no_noise_value() -> None:
+    waves = made_waves(repeats=0)
+    found = noise_of(waves, waves.strain[:, 2])
+    assert found.repeats == 0
+    assert np.isnan(found.std)
+    assert np.isnan(found.raw)
+
+
+def test_equal_repeats_have_a_floor() -> None:
+    waves = made_waves(repeats=3, noise=0.0, random=False)
+    assert noise_of(waves, waves.strain[:, 2]).std == FLOOR

@@ -1,0 +1,146 @@
+"""The base model: coordinates, slopes, filter, correction."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.unit.identify.model_waves import TIRE, operating
+from tirelib.model.base import (
+    FREE,
+    Coordinate,
+    Correction,
+    CorrectionSlopes,
+    correction_slopes,
+    large_displacements,
+    linearised,
+    move,
+    predict,
+    smoothed,
+    values_of,
+)
+from tirelib.model.state import State
+from tirelib.signal import LowPass
+from tirelib.waveforms import GRID
+
+VALUES = values_of(TIRE)
+POINTS = operating(np.array([2500.0, 4500.0]), np.array([1.8e5, 2.4e5]))
+
+
+@given(st.floats(-1.0, 1.0), st.floats(1e-3, 1e6))
+def test_a_scaled_coordinate_stays_positive_and_turns_back(z: float, value: float) -> None:
+    scaled = Coordinate("bending_stiffness")
+    assert scaled.moved(scaled.moved(value, z), -z) == pytest.approx(value)
+    assert scaled.moved(value, z) > 0.0
+    shifted = Coordinate("radial_pressure_slope", 2.0)
+    assert shifted.moved(value, z) == pytest.approx(value + 2.0 * z)
+    assert shifted.spread(value, 0.1) == pytest.approx(0.2)
+    assert scaled.spread(value, 0.1) == pytest.approx(0.1 * value)
+
+
+def test_moving_leaves_the_rest_alone() -> None:
+    moved = move(VALUES, np.full(len(FREE), 0.1))
+    changed = {name for name in VALUES if moved[name] != VALUES[name]}
+    assert changed == {c.name for c in FREE}
+
+
+def test_slopes_agree_with_a_finer_step() -> None:
+    coarse = linearised(VALUES, POINTS, low_pass=LowPass())
+    fine = linearised(VALUES, POINTS, low_pass=LowPass(), step=1e-5)
+    assert coarse.waveform == pytest.approx(fine.waveform)
+    for k in range(len(FREE)):
+        size = np.abs(fine.waveform_slopes[k]).max()
+        # a forward difference errs by half the step times the curvature
+        assert coarse.waveform_slopes[k] == pytest.approx(fine.waveform_slopes[k], abs=2e-3 * size)
+        deep = np.abs(fine.deflection_slopes[k]).max()
+        assert coarse.deflection_slopes[k] == pytest.approx(
+            fine.deflection_slopes[k], abs=2e-3 * deep + 1e-12
+        )
+
+
+def test_strain_is_in_proportion_to_the_gages_offset() -> None:
+    linear = linearised(VALUES, POINTS)
+    k = [c.name for c in FREE].index("innerliner_offset")
+    # R / (R + y) bends the proportion by 1 %
+    assert linear.waveform_slopes[k] == pytest.approx(
+        linear.waveform, abs=0.03 * np.abs(linear.waveform).max()
+    )
+
+
+def test_pressure_slopes_act_with_the_distance_from_the_reference_pressure() -> None:
+    at = replace(POINTS, pressure=np.full(2, TIRE.pressure))
+    linear = linearised(VALUES, at)
+    for name in ("radial_pressure_slope", "tangential_pressure_slope"):
+        k = [c.name for c in FREE].index(name)
+        assert linear.waveform_slopes[k] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_corrected_model_is_the_exact_one() -> None:
+    fix = large_displacements(VALUES, POINTS)
+    plain, both = predict(VALUES, POINTS), predict(VALUES, POINTS, correction=fix)
+    assert plain.waveform is not None
+    assert both.waveform == pytest.approx(plain.waveform + fix.waveform)
+    assert both.deflection == pytest.approx(plain.deflection + fix.deflection)
+
+
+def test_the_correction_follows_its_slopes() -> None:
+    free = (Coordinate("tangential_stiffness"), Coordinate("tread_stiffness"))
+    fix = large_displacements(VALUES, POINTS)
+    slopes = correction_slopes(VALUES, POINTS, free, fix)
+    dz = np.array([0.02, -0.03])
+    there = large_displacements(move(VALUES, dz, free), POINTS)
+    told = slopes.moved(fix, dz[None])
+    change = np.abs(there.waveform - fix.waveform).max()
+    assert told.waveform == pytest.approx(there.waveform, abs=0.1 * change)
+    assert told.deflection == pytest.approx(there.deflection, rel=2e-3)
+
+
+def test_moved_corrections_stand_one_after_the_other() -> None:
+    fix = Correction(np.zeros((2, 3)), np.array([1.0, 2.0]))
+    slopes = CorrectionSlopes(np.ones((1, 2, 3)), np.ones((1, 2)))
+    out = slopes.moved(fix, np.array([[0.5], [2.0]]))
+    assert out.waveform == pytest.approx(np.repeat([[0.5], [0.5], [2.0], [2.0]], 3, axis=1))
+    assert out.deflection == pytest.approx([1.5, 2.5, 3.0, 4.0])
+    twice = fix.tiled(2)
+    assert twice.deflection.tolist() == [1.0, 2.0, 1.0, 2.0]
+
+
+@given(st.integers(1, 30), st.floats(-3.0, 3.0))
+def test_smoothing_damps_a_harmonic_as_a_gaussian(order: int, phase: float) -> None:
+    wave = np.tile(np.cos(order * GRID + phase) + 5.0, (2, 1))
+    sigma = LowPass().sigma(1.0)
+    expected = np.exp(-0.5 * (sigma * order) ** 2) * (wave - 5.0)
+    assert smoothed(wave, POINTS, LowPass()) == pytest.approx(expected, abs=1e-12)
+
+
+def test_states_change_by_copy() -> None:
+    state = State.of(VALUES, POINTS, GRID)
+    other = state.but(damping=np.ones(2))
+    assert (state.damping == 0).all()
+    assert (other.damping == 1).all()
+    above = POINTS.pressure - TIRE.pressure
+    assert state.k_u == pytest.approx(4.6e5 + 1.1 * above)
+    assert state.k_v == pytest.approx(1.9e5 + 0.4 * above)
+
+
+def test_points_are_tiled_and_taken() -> None:
+    assert POINTS.tiled(3).load.tolist() == [2500.0, 4500.0] * 3
+    assert POINTS.take([1]).load.tolist() == [4500.0]
+    assert len(POINTS.tiled(3)) == 6
+
+
+def test_changes_act_at_their_stages_in_order() -> None:
+    seen: list[str] = []
+
+    def note(name: str):  # type: ignore[no-untyped-def]
+        def change(state: State) -> State:
+            seen.append(name)
+            return state
+
+        return change
+
+    predict(VALUES, POINTS, [(s, note(s)) for s in ("gage", "strain", "contact", "constants")])
+    assert seen[0] == "constants"
+    assert seen[-3:] == ["contact", "strain", "gage"]

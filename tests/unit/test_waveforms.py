@@ -1,0 +1,98 @@
+"""Run mean waveforms of a campaign equal the closed form that made it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.synthetic import synthetic_run, waveform, write
+from tirelib.campaign import read_campaign
+from tirelib.errors import CalibrationError
+from tirelib.signal import LowPass
+from tirelib.waveforms import GRID, N_PHI, Waveforms, measure_waveforms
+
+LOADS = (2500.0, 4000.0, 5500.0)
+
+
+@pytest.fixture(scope="module")
+def waves(tmp_path_factory: pytest.TempPathFactory) -> Waveforms:
+    runs = [synthetic_run(i, load=load, kind="free") for i, load in enumerate((*LOADS, LOADS[1]))]
+    runs.append(synthetic_run(4, load=4000.0, slip_angle=0.05))
+    return measure_waveforms(read_campaign(write(tmp_path_factory.mktemp("c") / "w", runs)))
+
+
+def closed_form(load: float) -> np.ndarray:
+    """The synthetic tire at 2.3 bar behind a Gaussian low-pass, its mean over the turn removed."""
+    exact = waveform(GRID, half=0.04 + 2.6e-5 * load, dip=1e-3 + 3e-7 * load)
+    order = np.arange(N_PHI // 2 + 1)
+    gain = np.exp(-0.5 * (LowPass().sigma(1.0) * order) ** 2) * (order > 0)
+    return np.asarray(np.fft.irfft(np.fft.rfft(exact) * gain, n=N_PHI))
+
+
+def test_mean_waveforms_are_the_closed_form(waves: Waveforms) -> None:
+    for i, load in enumerate(LOADS):
+        for gage in range(5):
+            # noise of 4 ustrain is averaged; the angle's zero is known to 1 mrad
+            error = waves.strain[i, gage] - closed_form(load)
+            assert np.sqrt(np.mean(error**2)) < 0.02 * np.std(closed_form(load))
+
+
+def test_the_mean_over_the_turn_is_removed(waves: Waveforms) -> None:
+    assert waves.strain.shape == (5, 5, N_PHI)
+    assert waves.strain.mean(axis=2) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_angle_comes_from_the_trigger(waves: Waveforms) -> None:
+    """An asymmetric waveform stays asymmetric: no centring on the contact."""
+    for i, load in enumerate(LOADS):
+        exact = closed_form(load)
+        shifts = np.linspace(-0.02, 0.02, 41)
+        errors = [
+            np.sum((waves.strain[i, 2] - np.interp(GRID - s, GRID, exact, period=2 * np.pi)) ** 2)
+            for s in shifts
+        ]
+        # the trigger resolves a sample, 6 mrad; four turns average it
+        assert abs(shifts[int(np.argmin(errors))]) <= 0.004
+    assert (waves.angle_std > 0).all()
+    assert (waves.angle_std < 2e-3).all()
+
+
+def test_equal_set_points_are_a_group(waves: Waveforms) -> None:
+    assert waves.group.tolist() == [0, 1, 2, 1, 3]
+
+
+def test_conditions_are_measured_or_set(waves: Waveforms) -> None:
+    assert waves.conditions["Fz"][:3] == pytest.approx(LOADS, rel=0.01)
+    assert waves.conditions["pressure"] == pytest.approx(2.3e5, rel=0.01)
+    assert np.isnan(waves.conditions["loaded_radius"]).all()
+    assert waves.straight.tolist() == [True, True, True, True, False]
+    assert waves.start == pytest.approx(12.0 * np.arange(5))
+
+
+def test_scatter_of_turns_is_the_noise(waves: Waveforms) -> None:
+    assert (waves.scatter > 5e-7).all()
+    assert (waves.scatter < 3e-5).all()
+    assert (waves.turns >= 2).all()
+
+
+def test_taking_runs_takes_all_their_columns(waves: Waveforms) -> None:
+    some = waves.take(np.array([3, 1]))
+    assert len(some) == 2
+    assert some.run.tolist() == [3, 1]
+    assert some.conditions["Fz"] == pytest.approx(waves.conditions["Fz"][[3, 1]])
+    assert some.header is waves.header
+
+
+def test_sweeps_and_short_runs_are_left_out_with_the_reason(tmp_path: Path) -> None:
+    runs = [synthetic_run(0), synthetic_run(1, kind="sweep"), synthetic_run(2, turns=1.5)]
+    found = measure_waveforms(read_campaign(write(tmp_path / "w", runs)))
+    assert found.run.tolist() == [0]
+    assert "sweep" in found.left_out[1]
+    assert "no whole turn" in found.left_out[2]
+
+
+def test_a_campaign_of_sweeps_alone_is_refused(tmp_path: Path) -> None:
+    runs = [synthetic_run(i, kind="sweep") for i in range(3)]
+    campaign = read_campaign(write(tmp_path / "w", runs))
+    with pytest.raises(CalibrationError, match=r"synthetic: no run .*run 0: is a sweep"):
+        measure_waveforms(campaign)

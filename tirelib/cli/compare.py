@@ -1,0 +1,66 @@
+"""``tirelib compare``: where a model fails."""
+
+from pathlib import Path
+
+import click
+
+from tirelib.campaign import read_campaign
+from tirelib.cli.common import CAMPAIGN, FILE, output, progress_bar, write_json
+
+_EXAMPLE = """\b
+Examples:
+  tirelib rig --plan straight --out build/out/straight
+  tirelib identify build/out/straight --out build/out/M.toml
+  tirelib compare build/out/straight --model build/out/M.toml --out build/out/compared
+  tirelib compare build/out/set1 --model build/out/M.toml --quantity Fy --json build/out/Fy.json
+
+\b
+DIR/index.html is one file with everything in it; comparison.md and comparison.json hold the same in
+words and numbers. Errors are in units of the noise between repeated runs. Exit code 2: bad input.
+"""
+
+
+@click.command(epilog=_EXAMPLE)
+@click.argument("folder", metavar="CAMPAIGN", type=CAMPAIGN)
+@click.option("--model", metavar="M.toml|NAME", required=True,
+              help="Model or tire file, or the name of a tire of tirelib.")  # fmt: skip
+@click.option("--quantity", metavar="strain|Fy|Fx|Mz",
+              help="Default: strain where the campaign has it, else the force that fits "
+                   "worst.")  # fmt: skip
+@click.option("--out", "out", metavar="DIR", type=click.Path(path_type=Path, file_okay=False),
+              help="Write the page, comparison.md and comparison.json.")  # fmt: skip
+@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write the numbers as JSON.")
+def compare(
+    folder: Path, model: str, quantity: str | None, out: Path | None, json_file: Path | None
+) -> None:
+    """Hold a model against CAMPAIGN and say where it fails."""
+    from tirelib.compare import compare as compare_model
+    from tirelib.compare.document import comparison_document
+    from tirelib.parameters import read_tire
+
+    file = read_tire(model)
+    campaign = read_campaign(folder)
+    with progress_bar("comparing") as progress:
+        found = compare_model(campaign, file, quantity, progress=progress)
+    document = comparison_document(found)
+    console = output()
+    console.print(_answer(document))
+    for line in (*document["statements"], *document["messages"]):
+        console.print(f"  {line}")
+    targets = [path for path in (json_file, out and out / "comparison.json") if path]
+    if out is not None:
+        from tirelib.report.comparison import write_comparison
+
+        for path in write_comparison(found, out):
+            console.print(f"written: {path}")
+    for path in targets:
+        write_json(path, document)
+        console.print(f"written: {path}")
+
+
+def _answer(document: dict[str, object]) -> str:
+    unit, error, noise = document["unit"], document["error"], document["noise"]
+    numbers = f"{document['residual_rms']:.4g} of {document['measured_rms']:.4g} {unit} rms left"
+    if isinstance(error, float) and error == error:
+        numbers += f"; error {error:.2f} in units of the noise ({noise:.3g} {unit})"
+    return f"{document['campaign']}, {document['quantity']}: {document['verdict']}; {numbers}"

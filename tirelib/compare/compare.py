@@ -1,0 +1,58 @@
+"""Hold a model against a campaign."""
+
+from collections.abc import Callable
+
+from tirelib.campaign import Campaign
+from tirelib.compare.forces import ForceComparison, compare_forces
+from tirelib.compare.model import model_of
+from tirelib.compare.strain import Comparison, compare_strain
+from tirelib.errors import CalibrationError, ParameterError
+from tirelib.identify.force_data import FORCES
+from tirelib.parameters import TireFile
+from tirelib.waveforms import Waveforms, measure_waveforms
+
+QUANTITIES = ("strain", *FORCES)
+
+
+def compare(
+    campaign: Campaign,
+    file: TireFile,
+    quantity: str | None = None,
+    *,
+    waves: Waveforms | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Comparison | ForceComparison:
+    """Hold a model against one quantity of a campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    file : TireFile
+        A model or a tire.
+    quantity : str, optional
+        strain, Fy, Fx or Mz; by default strain where the campaign has it, else the force with the
+        largest lack of fit.
+    waves : Waveforms, optional
+        Of the campaign, when they have been read already.
+    progress : callable, optional
+        Called with a label after each run.
+
+    Raises
+    ------
+    ParameterError
+        If the quantity is unknown.
+    CalibrationError
+        If the campaign does not hold it, or the model cannot say it.
+    """
+    if quantity is not None and quantity not in QUANTITIES:
+        raise ParameterError(f"compare: quantity {quantity!r}; allowed are {', '.join(QUANTITIES)}")
+    has_strain = bool(campaign.header.gage_lateral)
+    if quantity == "strain" and not has_strain:
+        raise CalibrationError(
+            f"{campaign.header.name}: it has no strain gages; compare its forces: --quantity "
+            f"{', '.join(FORCES)}"
+        )
+    if quantity == "strain" or (quantity is None and has_strain):
+        waves = waves or measure_waveforms(campaign, progress=progress)
+        return compare_strain(waves, model_of(file), campaign.content_hash())
+    return compare_forces(campaign, file, quantity)

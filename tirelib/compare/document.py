@@ -1,0 +1,212 @@
+"""A comparison as JSON (``tirelib-comparison/1``): N, deg, bar, km/h, microstrain, mm."""
+
+from typing import Any
+
+import numpy as np
+
+from tirelib.compare.forces import UNITS, ForceCell, ForceComparison
+from tirelib.compare.regions import Region
+from tirelib.compare.sectors import Cell
+from tirelib.compare.sentences import UNITS as CONDITION_UNITS
+from tirelib.compare.sentences import place
+from tirelib.compare.set_points import NAMES
+from tirelib.compare.strain import Comparison
+from tirelib.compare.tracks import Track
+from tirelib.units import from_si
+
+FORMAT = "tirelib-comparison/1"
+
+
+def comparison_document(found: Comparison | ForceComparison) -> dict[str, Any]:
+    """Return a comparison's numbers; keys are the same for strain and forces."""
+    return _forces(found) if isinstance(found, ForceComparison) else _strain(found)
+
+
+def _strain(found: Comparison) -> dict[str, Any]:
+    fit, noise, floor = found.fit, found.noise, found.floor
+    runs = found.chosen.straight
+    return {
+        "format": FORMAT,
+        "campaign": found.chosen.waves.header.name,
+        "model": found.model.name,
+        "effects": [{"effect": u.effect.name, "strength": u.strength} for u in found.model.used],
+        "axes": "iso",
+        "quantity": "strain",
+        "unit": "ustrain",
+        "verdict": fit.verdict,
+        "error": fit.error,
+        "p": fit.p,
+        "noise": 1e6 * noise.std,
+        "repeats": noise.repeats,
+        "residual_rms": 1e6 * fit.rms,
+        "residual_rms_noise": fit.rms / noise.std,
+        "residual_rms_raw": 1e6 * fit.raw_rms,
+        "measured_rms": 1e6 * fit.strain_rms,
+        "floor": floor.value,
+        "floor_source": floor.source or None,
+        "smooth_floor": floor.smooth,
+        "smooth_share": floor.share,
+        "statements": list(found.sentences),
+        "regions": [_region(region, found) for region in found.regions],
+        "messages": list(found.messages),
+        "table": [_cell(cell, noise.std) for cell in found.table],
+        "set_points": _set_points(found),
+        "tracks": [_track(track, found) for track in found.tracks],
+        "gages": [_gage(found, k) for k in range(len(found.chosen.gages))],
+        "runs": [
+            {
+                "run": int(found.run[i]),
+                "counted": bool(runs[i]),
+                "rms": 1e6 * float(found.run_rms[i]),
+                "rms_noise": float(found.run_rms[i]) / noise.std,
+                "model_edges_deg": np.rad2deg(found.prediction.edges[i]),
+            }
+            for i in range(len(found.run))
+        ],
+        "ranked": dict(
+            zip(
+                ("best", "median", "worst"),
+                (int(found.run[i]) for i in found.ranked()),
+                strict=True,
+            )
+        ),
+        "sources": _sources(found),
+    }
+
+
+def edge_value(by: str, value: float) -> float:
+    """Return a condition in the unit that it is told in."""
+    unit, dimension = CONDITION_UNITS.get(by, ("", ""))
+    return float(from_si(value, unit, dimension)) if unit and np.isfinite(value) else value
+
+
+def _cell(cell: Cell, noise: float) -> dict[str, Any]:
+    return {
+        "by": cell.by,
+        "value": edge_value(cell.by, cell.value),
+        "unit": CONDITION_UNITS.get(cell.by, ("", ""))[0],
+        "sector": cell.sector,
+        "runs": cell.runs,
+        "rms": 1e6 * cell.rms,
+        "rms_noise": cell.rms / noise,
+        "mean": 1e6 * cell.mean,
+        "mean_std": 1e6 * cell.std,
+    }
+
+
+def _region(region: Region, found: Comparison) -> dict[str, Any]:
+    return {
+        "sector": place(region, found.prediction.edges),
+        "from_rad": region.start,
+        "to_rad": region.stop,
+        "by": region.by,
+        "side": region.side or None,
+        "value": edge_value(region.by, region.value),
+        "unit": CONDITION_UNITS.get(region.by, ("", ""))[0],
+        "runs": region.runs,
+        "mean": 1e6 * region.mean,
+        "mean_std": 1e6 * region.std,
+        "p": region.p,
+        "share": region.share,
+    }
+
+
+def _set_points(found: Comparison) -> list[dict[str, Any]]:
+    scaled = found.points.scaled
+    units = ("%", "%", "%", "mrad")
+    factor = (100.0, 100.0, 100.0, 1e3)
+    return [
+        {
+            "name": name,
+            "unit": units[k],
+            "tolerance": factor[k] * float(np.median(found.points.tolerance[:, k])),
+            "rms_in_tolerances": float(np.sqrt(np.mean(scaled[:, k] ** 2))),
+            "largest_in_tolerances": float(np.abs(scaled[:, k]).max()),
+            "largest_run": int(found.run[np.argmax(np.abs(scaled[:, k]))]),
+        }
+        for k, name in enumerate(NAMES)
+    ]
+
+
+def _track(track: Track, found: Comparison) -> dict[str, Any]:
+    error = (track.model - track.measured)[track.known & found.chosen.straight]
+    known = error.size > 0
+    return {
+        "name": track.name,
+        "unit": track.unit,
+        "noise": track.scale * track.noise,
+        "rms": track.scale * float(np.sqrt(np.mean(error**2))) if known else None,
+        "mean": track.scale * float(error.mean()) if known else None,
+        "runs": [int(run) for run in found.run],
+        "measured": track.scale * track.measured,
+        "model": track.scale * track.model,
+        "model_std": track.scale * track.model_std,
+    }
+
+
+def _gage(found: Comparison, k: int) -> dict[str, Any]:
+    part = found.by_gage[found.chosen.straight, k]
+    number = found.chosen.gages[k]
+    return {
+        "gage": number + 1,
+        "lateral_mm": 1e3 * found.chosen.waves.header.gage_lateral[number],
+        "rms": 1e6 * float(np.sqrt(np.mean(part**2))),
+        "rms_noise": float(np.sqrt(np.mean(part**2))) / found.noise.std,
+    }
+
+
+def _sources(found: Comparison) -> list[dict[str, str]]:
+    return [
+        {"what": used.effect.name, "title": used.effect.title, "source": used.effect.source}
+        for used in found.model.used
+    ]
+
+
+def _forces(found: ForceComparison) -> dict[str, Any]:
+    return {
+        "format": FORMAT,
+        "campaign": found.name,
+        "model": found.model,
+        "effects": [],
+        "axes": "iso",
+        "quantity": found.quantity,
+        "unit": UNITS[found.quantity],
+        "verdict": found.verdict,
+        "error": found.error,
+        "p": found.p,
+        "noise": found.noise,
+        "repeats": found.repeats,
+        "residual_rms": found.rms,
+        "residual_rms_noise": found.rms / found.noise,
+        "residual_rms_raw": found.rms,
+        "measured_rms": found.measured_rms,
+        "floor": None,
+        "floor_source": None,
+        "smooth_floor": None,
+        "smooth_share": None,
+        "statements": list(found.sentences),
+        "regions": [],
+        "messages": list(found.messages),
+        "table": [_force_cell(cell, found.noise) for cell in found.table],
+        "set_points": [],
+        "tracks": [],
+        "gages": [],
+        "runs": [],
+        "ranked": None,
+        "sources": [],
+    }
+
+
+def _force_cell(cell: ForceCell, noise: float) -> dict[str, Any]:
+    return {
+        "by": cell.by,
+        "low": edge_value(cell.by, cell.low),
+        "high": edge_value(cell.by, cell.high),
+        "unit": CONDITION_UNITS.get(cell.by, ("", ""))[0],
+        "points": cell.points,
+        "rms": cell.rms,
+        "rms_noise": cell.rms / noise,
+        "mean": cell.mean,
+        "excess": cell.excess,
+        "excess_std": cell.excess_std,
+    }

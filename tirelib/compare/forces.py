@@ -1,0 +1,369 @@
+"""A model's brush held against the forces of a campaign.
+
+Points are means over a cell of conditions within one run (or one stretch of a sweep). Points of
+different runs in the same cell are the repeats. The model is computed at the measured conditions,
+so a set point that is off moves both.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from itertools import pairwise
+
+import numpy as np
+from scipy import special
+
+from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.brush.predict import PointConditions, PointParameters, predict_forces
+from tirelib.campaign import Campaign
+from tirelib.compare.sentences import told
+from tirelib.compare.strain import verdict_of
+from tirelib.errors import CalibrationError
+from tirelib.identify.brush_fit import ANGLE_SPAN, RATIO_SPAN
+from tirelib.identify.error_bands import levels
+from tirelib.identify.force_data import FORCES, ForceData, force_data
+from tirelib.identify.ring_patch import half_lengths
+from tirelib.parameters import TireFile
+
+CELL_ANGLE, CELL_RATIO = float(np.deg2rad(0.5)), 0.01
+"""Size of a cell in slip angle and camber [rad], and in slip ratio."""
+MOST_SAMPLES = 20000
+NEEDED = ("bristle_lateral", "friction")
+SLIP_LIMITS = {"slip_angle": np.deg2rad([1.0, 2.0, 4.0, 6.0, 9.0]),
+               "slip_ratio": np.array([0.02, 0.05, 0.1, 0.2])}  # fmt: skip
+LEVEL, LEAST_SHARE, MOST = 0.01, 0.02, 6
+UNITS = {"Fy": "N", "Fx": "N", "Mz": "Nm"}
+
+
+@dataclass(frozen=True, slots=True)
+class ForceCell:
+    """Difference over a range of conditions.
+
+    Attributes
+    ----------
+    by : str
+        all, load, pressure, slip_angle, slip_ratio or camber (sizes of the slips).
+    low, high : float
+        Range, SI.
+    points : int
+    rms, mean : float
+        Of model less measured.
+    excess, excess_std : float
+        Mean of how much the model's size exceeds the measured, and its standard deviation from
+        repeats (NaN without).
+    member : shape (n,)
+    """
+
+    by: str
+    low: float
+    high: float
+    points: int
+    rms: float
+    mean: float
+    excess: float
+    excess_std: float
+    member: BoolArray
+
+
+@dataclass(frozen=True, slots=True)
+class ForceComparison:
+    """One force of a campaign against a model, SI, ISO; arrays over points.
+
+    Attributes
+    ----------
+    quantity : str
+    name : str
+        Of the campaign.
+    model : str
+    data : ForceData
+        Means over cells.
+    run : shape (n,)
+        Number of the run or stretch.
+    measured, predicted : shape (n,)
+    noise : float
+        Of a point, from repeats; NaN without.
+    repeats : int
+        Cells with more than one point.
+    error : float
+        Rms of model less measured over the noise; NaN without repeats.
+    rms, measured_rms : float
+    p : float
+    verdict : str
+    table : tuple of ForceCell
+    sentences, messages : tuple of str
+    """
+
+    quantity: str
+    name: str
+    model: str
+    data: ForceData
+    run: IntArray
+    measured: FloatArray
+    predicted: FloatArray
+    noise: float
+    repeats: int
+    error: float
+    rms: float
+    measured_rms: float
+    p: float
+    verdict: str
+    table: tuple[ForceCell, ...]
+    sentences: tuple[str, ...]
+    messages: tuple[str, ...]
+
+    @property
+    def difference(self) -> FloatArray:
+        """Model less measured."""
+        return np.asarray(self.predicted - self.measured)
+
+
+def brush_of(file: TireFile, data: ForceData) -> PointParameters:
+    """Return the brush of a model at points; its ring gives the contact length.
+
+    Raises
+    ------
+    CalibrationError
+        If the model states no brush.
+    """
+    missing = [name for name in NEEDED if name not in file.numbers]
+    if missing:
+        raise CalibrationError(
+            f"model {file.name} states no {' and no '.join(missing)}: it says nothing of forces; "
+            "identify it from a campaign with slip, or give [brush.bristle_lateral] and "
+            "[tread.friction]"
+        )
+    tire = file.tire
+    along = "bristle_longitudinal" in file.numbers
+    compliance = 1.0 / tire.carcass_stiffness if np.isfinite(tire.carcass_stiffness) else 0.0
+    return PointParameters(
+        lateral_stiffness=tire.bristle_lateral,
+        longitudinal_stiffness=tire.bristle_longitudinal if along else None,
+        friction=tire.friction,
+        half_length=half_lengths(tire, data.load, data.pressure),
+        lateral_compliance=compliance,
+    )
+
+
+def compare_forces(
+    campaign: Campaign, file: TireFile, quantity: str | None = None
+) -> ForceComparison:
+    """Hold the brush of a model against a campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    file : TireFile
+    quantity : str, optional
+        Fy, Fx or Mz; by default the one with the largest lack of fit.
+
+    Raises
+    ------
+    CalibrationError
+        If the model has no brush, or the force is not measured.
+    """
+    data = force_data(campaign)
+    data = data.take(np.arange(0, len(data), max(1, len(data) // MOST_SAMPLES)))
+    known = np.isfinite(data.pressure)
+    if not known.any():
+        raise CalibrationError(
+            f"{campaign.header.name}: the inflation pressure is unknown in every run; the ring "
+            "needs it for the contact length; record it or give it as a set point"
+        )
+    data = data.take(known)
+    parameters = brush_of(file, data)
+    at = PointConditions(data.load, data.slip_angle, data.slip_ratio, data.camber)
+    found = predict_forces(parameters, at)
+    measured = [name for name in FORCES if np.isfinite(getattr(data, name)).any()]
+    slipping = [name for name in measured if _slips(data, name)]
+    wanted = (slipping or measured) if quantity is None else [quantity]
+    if not wanted or wanted[0] not in measured:
+        raise CalibrationError(
+            f"{campaign.header.name}: {quantity or 'Fy, Fx and Mz'} is not measured; there is "
+            f"{', '.join(measured) or 'no force at all'}; choose another --quantity"
+        )
+    left_out = tuple(
+        f"the model's effect {entry.get('effect')} acts on strain or brush and is left out of "
+        "the forces"
+        for entry in file.extra.get("effects", []) if isinstance(entry, dict)
+    )  # fmt: skip
+    every = [_compare(campaign, file, data, getattr(found, name), name) for name in wanted]
+    best = max(every, key=_lack)
+    return ForceComparison(
+        **{f.name: getattr(best, f.name) for f in fields(best) if f.name != "messages"},
+        messages=(*best.messages, *left_out),
+    )
+
+
+def _slips(data: ForceData, name: str) -> bool:
+    """Whether the slip that a force comes from varies."""
+    if name == "Fx":
+        return bool(np.ptp(data.slip_ratio) >= RATIO_SPAN)
+    return bool(np.ptp(data.slip_angle) >= ANGLE_SPAN)
+
+
+def _lack(found: ForceComparison) -> float:
+    return found.error if np.isfinite(found.error) else found.rms / found.measured_rms
+
+
+def _compare(
+    campaign: Campaign, file: TireFile, data: ForceData, predicted: FloatArray, name: str
+) -> ForceComparison:
+    keep = np.isfinite(getattr(data, name))
+    data, predicted = data.take(keep), predicted[keep]
+    cell = _cells(data)
+    _, point = np.unique(np.stack([cell, data.block]), axis=1, return_inverse=True)
+    point = np.asarray(point).ravel()
+    data = _means(data, point)
+    model = _mean(predicted, point)
+    cell = _mean(cell.astype(float), point).astype(np.int64)
+    measured = getattr(data, name)
+    difference = model - measured
+    noise, freedom, repeats = _noise(difference, cell)
+    rms = float(np.sqrt(np.mean(difference**2)))
+    size = float(np.sqrt(np.mean(measured**2)))
+    error, p = float("nan"), float("nan")
+    if freedom:
+        error = rms / noise
+        p = float(special.fdtrc(difference.size, freedom, error**2))
+    verdict = verdict_of(rms / size, p)
+    table = _table(data, difference, measured, noise)
+    said = _sentences(name, table, freedom) if verdict == "lack_of_fit" else ()
+    return ForceComparison(
+        name, campaign.header.name, file.name, data, data.block, measured, model, noise, repeats,
+        error, rms, size, p, verdict, table, said,
+        _messages(campaign, name, data, verdict, rms / size, repeats),
+    )  # fmt: skip
+
+
+def _cells(data: ForceData) -> IntArray:
+    rows = [
+        levels(data.load), levels(data.pressure), np.round(data.slip_angle / CELL_ANGLE),
+        np.round(data.camber / CELL_ANGLE), np.round(data.slip_ratio / CELL_RATIO),
+    ]  # fmt: skip
+    _, number = np.unique(np.stack(rows), axis=1, return_inverse=True)
+    return np.asarray(number, dtype=np.int64).ravel()
+
+
+def _mean(values: FloatArray, point: IntArray) -> FloatArray:
+    return np.asarray(np.bincount(point, values) / np.bincount(point))
+
+
+def _means(data: ForceData, point: IntArray) -> ForceData:
+    """Return means over points; a force that is partly unknown at one is unknown there."""
+    out = {f.name: _mean(getattr(data, f.name).astype(float), point) for f in fields(data)}
+    block = np.round(out.pop("block")).astype(np.int64)
+    return ForceData(**out, block=block)
+
+
+def _noise(difference: FloatArray, cell: IntArray) -> tuple[float, int, int]:
+    """Return noise of a point, degrees of freedom and repeated cells."""
+    count = np.bincount(cell)
+    used = np.maximum(count, 1)
+    mean = np.bincount(cell, difference) / used
+    freedom = int(np.maximum(count - 1, 0).sum())
+    square = float(np.sum((difference - mean[cell]) ** 2))
+    noise = float(np.sqrt(square / freedom)) if freedom else float("nan")
+    return noise, freedom, int((count > 1).sum())
+
+
+def _table(
+    data: ForceData, difference: FloatArray, measured: FloatArray, noise: float
+) -> tuple[ForceCell, ...]:
+    every = np.ones(len(data), dtype=np.bool_)
+    groups: list[tuple[str, float, float, BoolArray]] = [("all", np.nan, np.nan, every)]
+    for by in ("load", "pressure"):
+        level = levels(getattr(data, by))
+        for k in range(int(level.max()) + 1 if level.max() > 0 else 0):
+            part = getattr(data, by)[level == k]
+            groups.append((by, float(part.min()), float(part.max()), level == k))
+    for by, limits in SLIP_LIMITS.items():
+        size = np.abs(getattr(data, by))
+        if np.ptp(getattr(data, by)) < limits[0]:
+            continue
+        ends = [0.0, *limits.tolist(), np.inf]
+        slack = 0.1 * limits[0]
+        for low, high in pairwise(ends):
+            inside = (size >= low - slack * (low > 0)) & (size < high - slack)
+            groups.append((by, low, min(high, float(size.max())), inside))
+    if np.ptp(data.camber) > CELL_ANGLE:
+        for step in np.unique(np.round(np.abs(data.camber) / CELL_ANGLE)):
+            inside = np.round(np.abs(data.camber) / CELL_ANGLE) == step
+            groups.append(("camber", step * CELL_ANGLE, step * CELL_ANGLE, inside))
+    excess = np.abs(measured + difference) - np.abs(measured)
+    out = []
+    for by, low, high, member in groups:
+        n = int(member.sum())
+        if n:
+            d = difference[member]
+            out.append(
+                ForceCell(by, low, high, n, float(np.sqrt(np.mean(d**2))), float(d.mean()),
+                          float(excess[member].mean()), noise / np.sqrt(n), member)
+            )  # fmt: skip
+    return tuple(out)
+
+
+def _sentences(name: str, table: Sequence[ForceCell], freedom: int) -> tuple[str, ...]:
+    """Say the cells, and pairs of a slip cell with a load or pressure cell, that stand out."""
+    parts = [cell for cell in table if cell.by != "all"]
+    ranked = sorted(parts, key=lambda cell: -cell.points * cell.excess**2)
+    total = table[0].points * table[0].rms ** 2
+    out: list[str] = []
+    for cell in ranked:
+        t = abs(cell.excess) / cell.excess_std if cell.excess_std > 0 else 0.0
+        p = 2.0 * special.stdtr(freedom, -t) * len(parts)
+        if p < LEVEL and cell.points * cell.excess**2 > LEAST_SHARE * total and len(out) < MOST:
+            out.append(_say(name, cell))
+    return tuple(out)
+
+
+def _say(name: str, cell: ForceCell) -> str:
+    kind = {"slip_angle": "slip angle", "slip_ratio": "slip ratio"}.get(cell.by, cell.by)
+    size = "large" if cell.excess > 0.0 else "small"
+    sign = ", either sign, " if cell.by in SLIP_LIMITS else ", "
+    return (
+        f"At {kind} {range_of(cell)}{sign}the model's {name} is {_short(abs(cell.excess))} "
+        f"{UNITS[name]} too {size} in size (95 % \N{PLUS-MINUS SIGN} "
+        f"{_short(1.96 * cell.excess_std)}, {cell.points} points)."
+    )
+
+
+def range_of(cell: ForceCell) -> str:
+    """Say the range of a cell: levels of load and pressure by their middle."""
+    if cell.by == "all":
+        return ""
+    if cell.by in ("load", "pressure") and cell.high < 1.1 * cell.low:
+        step = 50.0 if cell.by == "load" else 5e3
+        return told(cell.by, step * round(0.5 * (cell.low + cell.high) / step))
+    grain = float(np.deg2rad(0.1)) if cell.by in ("slip_angle", "camber") else 0.001
+    if cell.by in ("load", "pressure"):
+        grain = 1.0
+    low, high = (told(cell.by, grain * round(value / grain)) for value in (cell.low, cell.high))
+    return low if low == high else f"{low} to {high}"
+
+
+def _short(value: float) -> str:
+    return f"{value:,.0f}" if value >= 100.0 else f"{value:.2g}"
+
+
+def _messages(
+    campaign: Campaign, name: str, data: ForceData, verdict: str, share: float, repeats: int
+) -> tuple[str, ...]:
+    where = campaign.header.name
+    out = []
+    if verdict == "does_not_fit":
+        out.append(
+            f"The model does not fit at all: it leaves {100 * share:.0f} % of the measured {name}. "
+            "Where it fails says nothing then; identify it from this campaign first, or look for "
+            "a wrong unit, sign or tire."
+        )
+    if not repeats:
+        out.append(
+            f"{where} repeats no condition (cells of 0.5 deg in slip angle and camber and 0.01 in "
+            f"slip ratio): the noise is unknown, so errors stand in {UNITS[name]} and nothing is "
+            "said on whether they are more than noise. Repeat three conditions or more."
+        )
+    if not _slips(data, name):
+        slip = "slip ratio" if name == "Fx" else "slip angle"
+        out.append(
+            f"{where} holds one {slip} only: {name} says nothing of the brush. Add runs with slip."
+        )
+    return tuple(out)

@@ -1,0 +1,225 @@
+"""A model file as something that predicts the waveforms of runs."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.effects import CATALOGUE, Effect
+from tirelib.errors import CalibrationError, FormatError, ParameterError, TirelibError
+from tirelib.model.base import Correction, large_displacements, predict, values_of
+from tirelib.model.chain import Changes
+from tirelib.model.state import Operating, State
+from tirelib.parameters import TireFile
+from tirelib.signal import LowPass
+from tirelib.waveforms import N_PHI
+
+TRIAL = 1e-3
+"""Relative step by which slopes by load and pressure are taken."""
+RINGS = ("large displacements", "linear")
+
+
+@dataclass(frozen=True, slots=True)
+class UsedEffect:
+    """An effect that a model has, with its strength in the effect's unit."""
+
+    effect: Effect
+    strength: float | tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """A tire with its effects.
+
+    Attributes
+    ----------
+    name : str
+    values : mapping
+        Of `Tire`, SI.
+    used : tuple of UsedEffect
+    large : bool
+        Whether the correction for large displacements belongs to it.
+    history : tuple of mapping
+        What was added to the model and what the error did.
+    provenance : mapping
+    sources : mapping of str to str
+        Where each number of the tire comes from.
+    """
+
+    name: str
+    values: Mapping[str, float | FloatArray]
+    used: tuple[UsedEffect, ...]
+    large: bool
+    history: tuple[Mapping[str, Any], ...]
+    provenance: Mapping[str, Any]
+    sources: Mapping[str, str]
+
+    @property
+    def changes(self) -> Changes:
+        """What the effects change in the chain from tire to waveform."""
+        pairs = [used.effect.at(used.strength) for used in self.used]
+        return [(stage, change) for stage, change in pairs if stage != "brush"]
+
+    @property
+    def across(self) -> bool:
+        """Whether the gages differ by their lateral position."""
+        return any("lateral" in used.effect.varies_with for used in self.used)
+
+
+def model_of(file: TireFile, effects: Mapping[str, Effect] = CATALOGUE) -> Model:
+    """Return the model of a file; a plain tire file is a model without effects.
+
+    Raises
+    ------
+    FormatError
+        If an effect is unknown, without strength, or the kind of ring is; with every fault.
+    """
+    faults: list[str] = []
+    used = []
+    entries = file.extra.get("effects", [])
+    if not isinstance(entries, list):
+        raise FormatError(f"{file.name}: effects is no list; write [[effects]] tables")
+    for i, entry in enumerate(entries):
+        try:
+            used.append(_used(entry, effects))
+        except ParameterError as error:
+            faults.append(f"{file.name}, effects[{i}]: {error}")
+    kind = file.extra.get("model", {}).get("ring", RINGS[0])
+    if kind not in RINGS:
+        faults.append(f"{file.name}, model.ring = {kind!r}; allowed are {', '.join(RINGS)}")
+    if faults:
+        raise FormatError(faults)
+    return Model(
+        file.name,
+        values_of(file.tire),
+        tuple(used),
+        kind == RINGS[0],
+        tuple(item for item in file.extra.get("history", []) if isinstance(item, dict)),
+        dict(file.extra.get("provenance", {})),
+        {name: f"{number.kind}: {number.source}" for name, number in file.numbers.items()},
+    )
+
+
+def _used(entry: object, effects: Mapping[str, Effect]) -> UsedEffect:
+    if not isinstance(entry, dict) or "effect" not in entry or "strength" not in entry:
+        raise ParameterError(f"{entry!r}; a table with effect and strength is needed")
+    name = str(entry["effect"])
+    if name not in effects:
+        raise ParameterError(
+            f"effect {name!r} is not known; known are {', '.join(effects)}; load the file that "
+            "defines it, or correct the name"
+        )
+    effect = effects[name]
+    given = entry["strength"]
+    numbers = given if isinstance(given, list) else [given]
+    if not all(isinstance(x, int | float) and np.isfinite(x) for x in numbers):
+        raise ParameterError(f"strength {given!r} of {name}; a finite number is needed")
+    if len(numbers) != effect.components:
+        raise ParameterError(
+            f"strength {given!r} of {name}; {effect.components} number(s) are needed"
+        )
+    strength = tuple(float(x) for x in numbers)
+    return UsedEffect(effect, strength if isinstance(given, list) else strength[0])
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """What a model says of runs.
+
+    Attributes
+    ----------
+    strain : shape (n_runs, n_phi), [-]
+        Mean over the gages, filtered as the measurement is.
+    gages : shape (n_runs, n_gages, n_phi), [-]
+        Of each gage; equal for all gages where no effect tells them apart.
+    by_load, by_pressure : shape (n_runs, n_phi), [-]
+        Slopes of `strain` by relative load and relative pressure.
+    deflection, deflection_by_load : shape (n_runs,), [m]
+    edges : shape (n_runs, 2), [rad]
+        Of the contact, entry < 0 < exit.
+    """
+
+    strain: FloatArray
+    gages: FloatArray
+    by_load: FloatArray
+    by_pressure: FloatArray
+    deflection: FloatArray
+    deflection_by_load: FloatArray
+    edges: FloatArray
+
+
+def predict_runs(
+    model: Model, points: Operating, lateral: Sequence[float], low_pass: LowPass
+) -> Prediction:
+    """Return what the model says at operating points, with slopes by load and pressure.
+
+    Parameters
+    ----------
+    model : Model
+    points : Operating
+    lateral : sequence of float, [m]
+        Positions of the gages that are averaged (left positive).
+    low_pass : LowPass
+        Of the measured waveforms.
+
+    Raises
+    ------
+    CalibrationError
+        If the model cannot be computed there; with the model's own message.
+    """
+    try:
+        return _predict_runs(model, points, np.asarray(lateral, dtype=float), low_pass)
+    except TirelibError as error:
+        raise CalibrationError(
+            f"model {model.name}: it has no solution at the campaign's conditions ({error}); "
+            "identify it from this campaign, or correct its numbers"
+        ) from error
+
+
+def _predict_runs(
+    model: Model, points: Operating, lateral: FloatArray, low_pass: LowPass
+) -> Prediction:
+    n = len(points)
+    places = lateral if model.across else np.zeros(1)
+    correction = None
+    if model.large:
+        correction = large_displacements(model.values, points, low_pass=low_pass)
+    three = points.tiled(3)
+    load, pressure = three.load.copy(), three.pressure.copy()
+    load[n : 2 * n] *= 1.0 + TRIAL
+    pressure[2 * n :] *= 1.0 + TRIAL
+    three = replace(three, load=load, pressure=pressure)
+    states = [_at(model, three, place, correction, low_pass) for place in places]
+    waves = []
+    for state in states:
+        assert state.waveform is not None  # noqa: S101 - the chain sets it
+        waves.append(state.waveform.reshape(3, n, N_PHI))
+    mean = np.mean(waves, axis=0)
+    gages = np.stack([wave[0] for wave in waves], axis=1)
+    depth = states[0].deflection.reshape(3, n)
+    contact = states[0].contact
+    assert contact is not None  # noqa: S101 - the chain sets it
+    return Prediction(
+        mean[0],
+        np.broadcast_to(gages, (n, lateral.size, N_PHI)),
+        (mean[1] - mean[0]) / TRIAL,
+        (mean[2] - mean[0]) / TRIAL,
+        depth[0],
+        (depth[1] - depth[0]) / TRIAL,
+        contact.edges[:n],
+    )
+
+
+def _at(
+    model: Model, points: Operating, lateral: float, correction: Correction | None, lp: LowPass
+) -> State:
+    """Return the state of three copies of the points for a gage at one place."""
+
+    def place(state: State) -> State:
+        return state.but(lateral=lateral)
+
+    changes = [("constants", place), *model.changes] if model.across else model.changes
+    several = correction.tiled(3) if correction is not None else None
+    return predict(model.values, points, changes, low_pass=lp, correction=several)

@@ -1,0 +1,98 @@
+"""Lack of fit in plain words."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.compare.regions import Region
+from tirelib.compare.sectors import SECTORS, sector_at
+from tirelib.units import from_si
+
+UNITS = {
+    "load": ("N", "force"), "pressure": ("bar", "pressure"), "speed": ("km/h", "speed"),
+    "slip_angle": ("deg", "angle"), "camber": ("deg", "angle"), "slip_ratio": ("", "ratio"),
+}  # fmt: skip
+"""Unit that each condition is told in, and its dimension."""
+_PLACES = {
+    "contact": "in the contact",
+    "entry edge": "at the entry of the contact",
+    "exit edge": "at the exit of the contact",
+    "entry flank": "before the contact",
+    "exit flank": "behind the contact",
+    "far side": "away from the contact",
+}
+
+
+def told(by: str, value: float) -> str:
+    """Say a value of a condition with its unit.
+
+    Examples
+    --------
+    >>> told("load", 4500.0), told("pressure", 1.7e5), told("slip_ratio", -0.04)
+    ('4,500 N', '1.7 bar', '-0.04')
+    """
+    unit, dimension = UNITS[by]
+    number = from_si(value, unit, dimension) if unit else value
+    text = f"{number:,.0f}" if by in ("load", "speed") else f"{round(float(number), 3):g}"
+    return f"{text} {unit}".strip()
+
+
+def place(region: Region, edges: FloatArray) -> str:
+    """Return the sector of a region's middle in `SECTORS`, by the contact of its runs."""
+    lead, trail = edges[region.member].mean(axis=0)
+    middle = 0.5 * (region.start + region.stop)
+    return SECTORS[int(sector_at(np.array([middle / (trail if middle > 0 else -lead)]))[0])]
+
+
+def amount(mean: float, measured: float) -> str:
+    """Say a difference of strain, model less measured.
+
+    Examples
+    --------
+    >>> amount(6e-4, 2e-3), amount(6e-4, -2e-3), amount(-6e-4, -2e-3)
+    ('600 microstrain too much tension', '600 microstrain too little compression', \
+'600 microstrain too much compression')
+    """
+    model = measured + mean
+    tension = model + measured > 0.0
+    more = (mean > 0.0) == tension
+    size = f"{1e6 * abs(mean):,.0f}" if abs(mean) >= 1e-5 else f"{1e6 * abs(mean):.1f}"
+    kind = "tension" if tension else "compression"
+    return f"{size} microstrain too {'much' if more else 'little'} {kind}"
+
+
+def conditions(region: Region) -> str:
+    """Say the runs of a region; empty for all.
+
+    Examples
+    --------
+    >>> nothing = np.zeros(0, dtype=bool)
+    >>> conditions(Region(0, 1, "load", "above", 4500.0, 9, 0, 0, 0, 0, 0, nothing))
+    'at 4,500 N and above'
+    """
+    if region.by == "all":
+        return ""
+    names = {"slip_angle": "slip angle ", "camber": "camber ", "slip_ratio": "slip ratio "}
+    end = "and above" if region.side == "above" else "and below"
+    return f"at {names.get(region.by, '')}{told(region.by, region.value)} {end}"
+
+
+def sentence(region: Region, edges: FloatArray) -> str:
+    """Say one region in plain words."""
+    where = _PLACES[place(region, edges)]
+    text = f"{where}, from {region.start:.2f} to {region.stop:.2f} rad, "
+    limit = conditions(region)
+    text += f"{limit}, " if limit else "in all runs, "
+    text += f"the model shows {amount(region.mean, region.measured)}"
+    text += f" (95 % \N{PLUS-MINUS SIGN} {_small(1.96e6 * region.std)}, {region.runs} runs)."
+    return text[0].upper() + text[1:]
+
+
+def sentences(regions: Sequence[Region], edges: FloatArray) -> tuple[str, ...]:
+    """Say all regions."""
+    return tuple(sentence(region, edges) for region in regions)
+
+
+def _small(value: float) -> str:
+    return f"{value:,.0f}" if value >= 10 else f"{value:.1f}"

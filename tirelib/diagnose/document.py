@@ -1,0 +1,244 @@
+"""A diagnosis with what its reader needs: floor, held-out errors, what is left; as JSON."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from tirelib.diagnose.diagnose import Diagnosis, Finding
+from tirelib.diagnose.floor import FLOOR_MEMBERS, ErrorUnit, structural_floor
+from tirelib.diagnose.held_out import Fold, folds, held_out_errors, pooled
+from tirelib.diagnose.left import Left, left_of
+from tirelib.diagnose.refit import Refit, refit
+from tirelib.errors import TirelibError
+
+FORMAT = "tirelib-diagnosis/1"
+NO_REPEATS = (
+    "no runs were repeated at equal set points, so the noise is unknown: errors are in "
+    "microstrain, no effect is named and none is more than a hint; repeat some runs"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Assessment:
+    """A diagnosis as it is told.
+
+    Attributes
+    ----------
+    diagnosis : Diagnosis
+    unit : ErrorUnit
+    verdict : str
+    named : tuple of str
+        Empty without repeats.
+    findings : tuple of Finding
+        At most hints without repeats.
+    error_before, error_after, floor : float
+        Without and with the named effects; what the structure leaves. In `unit`.
+    folds : tuple of Fold
+    held_before : tuple of float
+        One error per fold, of the model without the named effects; empty if nothing is named.
+    held_after : mapping of name to tuple of float
+        With one named effect alone.
+    left : Left
+        What no effect explains.
+    messages : tuple of str
+    """
+
+    diagnosis: Diagnosis
+    unit: ErrorUnit
+    verdict: str
+    named: tuple[str, ...]
+    findings: tuple[Finding, ...]
+    error_before: float
+    error_after: float
+    floor: float
+    folds: tuple[Fold, ...]
+    held_before: tuple[float, ...]
+    held_after: dict[str, tuple[float, ...]]
+    left: Left
+    messages: tuple[str, ...]
+
+    @property
+    def final(self) -> Refit:
+        """The model with the named effects."""
+        return self.diagnosis.final if self.named else self.diagnosis.base
+
+
+def assess(
+    found: Diagnosis,
+    *,
+    members: int = FLOOR_MEMBERS,
+    seed: int = 0,
+    progress: Callable[[str], None] | None = None,
+) -> Assessment:
+    """Return a diagnosis with floor, held-out errors and what is left.
+
+    Parameters
+    ----------
+    found : Diagnosis
+    members, seed : int
+        Of the ensemble for the floor.
+    progress : callable, optional
+    """
+    data, unit = found.data, ErrorUnit.of(found.runs, found.data)
+    verdict, named, findings, messages = found.verdict, found.named, found.findings, []
+    if not unit.known:
+        verdict, named = "none", ()
+        findings = tuple(_hint(finding) for finding in findings)
+        messages.append(NO_REPEATS)
+    final = found.final if named else found.base
+    floor = structural_floor(data, final, unit, members=members, seed=seed, progress=progress)
+    chosen = folds(data) if named else ()
+    held_before = held_out_errors(data, found.base, chosen, unit, progress=progress)
+    held_after = {
+        name: held_out_errors(data, single, chosen, unit, progress=progress)
+        for name in named
+        if (single := _with_one(found, name)) is not None
+    }
+    if named and not chosen:
+        messages.append(
+            "nothing can be held out: three loads or two pressures, and four other runs, are needed"
+        )
+    return Assessment(
+        found, unit, verdict, named, findings, unit.factor * found.base.error,
+        unit.factor * final.error, floor, chosen, held_before, held_after,
+        left_of(data, final), tuple(messages),
+    )  # fmt: skip
+
+
+def _hint(finding: Finding) -> Finding:
+    return replace(finding, level="hint") if finding.level == "alarm" else finding
+
+
+def _with_one(found: Diagnosis, name: str) -> Refit | None:
+    """Return the base model with one effect fitted, or None if that fails."""
+    added = found.final.effects[len(found.base.effects) :]
+    if [effect.name for effect in added] == [name]:
+        return found.final
+    finding = next(f for f in found.findings if f.effect.name == name)
+    effect = finding.effect
+    start = np.clip(finding.strength, 0.9 * effect.low, 0.9 * effect.high)
+    base = found.base
+    try:
+        return refit(found.data, base.values, [*base.effects, effect], [*base.strengths, start])
+    except TirelibError:
+        return None
+
+
+def diagnosis_document(told: Assessment) -> dict[str, Any]:
+    """Return the numbers as ``tirelib-diagnosis/1``; strains in microstrain, angles in deg."""
+    found, unit = told.diagnosis, told.unit
+    return {
+        "format": FORMAT,
+        "campaign": found.runs.waves.header.name,
+        "axes": "iso",
+        "quantity": "strain",
+        "unit": "ustrain",
+        "noise": 1e6 * unit.noise,
+        "repeats": found.runs.noise.repeats,
+        "error_unit": unit.name,
+        "floor": told.floor,
+        "error_before": told.error_before,
+        "error_after": told.error_after,
+        "heldout_error_before": pooled(told.held_before, told.folds),
+        "held_out": [{"condition": f.name, "runs": int(f.out.sum())} for f in told.folds],
+        "joint_error": unit.factor * found.left,
+        "joint_floor": unit.factor * found.floor,
+        "verdict": told.verdict,
+        "named": list(told.named),
+        "has": [effect.name for effect in found.base.effects],
+        "candidates": [_candidate(finding, k + 1, told) for k, finding in enumerate(told.findings)],
+        "dead": list(found.dead),
+        "dead_reasons": dict(found.dead),
+        "unexplained": _unexplained(told),
+        "next_test": next_test(told),
+        "messages": list(told.messages),
+    }
+
+
+def _candidate(finding: Finding, rank: int, told: Assessment) -> dict[str, Any]:
+    name, unit = finding.effect.name, told.unit
+    error = unit.factor * finding.error_after
+    if told.named == (name,):
+        error = told.error_after
+    return {
+        "effect": name,
+        "title": finding.effect.title,
+        "rank": rank,
+        "score": finding.score,
+        "threshold": finding.threshold,
+        "level": finding.level,
+        "strength": _plain(finding.strength),
+        "std": _plain(finding.std),
+        "unit": finding.effect.unit,
+        "range": [finding.effect.low, finding.effect.high],
+        "in_range": finding.in_range,
+        "error_after": error,
+        "heldout_error_after": pooled(told.held_after.get(name, ()), told.folds),
+        "share": finding.share,
+        "twins": [
+            {"effect": twin, "angle_deg": float(np.rad2deg(angle))} for twin, angle in finding.twins
+        ],
+        "power": finding.power,
+    }
+
+
+def _plain(strength: Sequence[float] | np.ndarray) -> float | list[float]:
+    numbers = [float(x) for x in strength]
+    return numbers[0] if len(numbers) == 1 else numbers
+
+
+def exceeds(told: Assessment) -> bool:
+    """Return whether more is left than variants of the model leave after the same joint fit."""
+    return told.diagnosis.left > told.diagnosis.floor
+
+
+def _unexplained(told: Assessment) -> dict[str, Any]:
+    left = told.left
+    plain = exceeds(told)
+    return {
+        "where": left.where if plain else None,
+        "scaling": left.scaling if plain else None,
+        "sectors": dict(left.sectors),
+        "powers": dict(left.powers),
+    }
+
+
+def next_test(told: Assessment) -> dict[str, Any]:
+    """Return what to do or to measure next, and why."""
+    by_name = {finding.effect.name: finding.effect for finding in told.findings}
+    dead = told.diagnosis.dead
+    lacking = {name: reason for name, reason in dead.items() if reason.startswith("no run has")}
+    varies = [set(by_name[name].varies_with) for name in told.named]
+    every = {name for names in varies for name in names}
+    common = {name for name in every if all(name in names for names in varies)}
+    between: list[str] = []
+    if told.verdict == "indistinguishable":
+        between = list(told.named)
+        differ = sorted(every - common) or sorted(every)
+        what = f"more levels of {_and(differ)}, to the ends that the rig allows: there " + (
+            f"{_and(between)} part" if len(between) > 1 else "it shows"
+        )
+    elif told.verdict == "form_inadequate":
+        what = (
+            f"{_and(told.named)} is needed but its law does not fit: more levels of "
+            f"{_and(sorted(every))} would show the right law"
+        )
+    elif told.verdict == "named":
+        what = f"add {told.named[0]} (`tirelib add {told.named[0]}`) and diagnose again"
+    elif told.verdict == "unknown":
+        what = (
+            f"the misfit stands {told.left.where} and {told.left.scaling}: more levels there, or "
+            "an effect of your own (--effects)"
+        )
+    elif not told.unit.known:
+        what = "repeat some runs at equal set points, best at the ends of load, pressure and speed"
+    else:
+        what = "none is needed for the effects that this plan can show"
+    return {"what": what, "between": between, "would_revive": lacking}
+
+
+def _and(names: Sequence[str]) -> str:
+    words = list(names) or ["load, pressure and speed"]
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

@@ -1,0 +1,74 @@
+"""What errors are counted in, and what error the ring's structure leaves by itself."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.diagnose.candidates import Candidates
+from tirelib.diagnose.ensemble import structural_ensemble
+from tirelib.diagnose.ranking import Ranking
+from tirelib.diagnose.refit import Refit
+from tirelib.identify.campaign_data import StraightRuns
+from tirelib.identify.waveform_fit import Data
+
+FLOOR_MEMBERS = 20
+UNKNOWN_NOISE = 3e-6
+"""Noise that variants get where no runs were repeated, [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorUnit:
+    """How whitened residuals are told.
+
+    A whitened residual is in units of noise and structural misfit together; errors are told in
+    units of the noise between repeated runs, in microstrain where there are none.
+
+    Attributes
+    ----------
+    factor : float
+        By which the rms of a whitened residual is multiplied.
+    name : str
+        noise or ustrain.
+    noise : float, [-]
+        From repeats; NaN without.
+    """
+
+    factor: float
+    name: str
+    noise: float
+
+    @classmethod
+    def of(cls, runs: StraightRuns, data: Data) -> "ErrorUnit":
+        """Return the unit that a campaign allows."""
+        noise = runs.noise.std
+        if np.isfinite(noise):
+            return cls(data.noise / noise, "noise", noise)
+        return cls(1e6 * data.noise, "ustrain", noise)
+
+    @property
+    def known(self) -> bool:
+        """Whether there are repeats."""
+        return self.name == "noise"
+
+
+def structural_floor(
+    data: Data,
+    model: Refit,
+    unit: ErrorUnit,
+    *,
+    members: int = FLOOR_MEMBERS,
+    seed: int = 0,
+    progress: Callable[[str], None] | None = None,
+) -> float:
+    """Return the error that variants of a model leave, median, in the error's unit.
+
+    The variants differ from the ring in structure and lack no effect; the base is fitted to them.
+    """
+    nothing = Candidates((), {}, np.zeros((0, 0)))
+    noise = unit.noise if unit.known else UNKNOWN_NOISE
+    left = structural_ensemble(
+        data, model, Ranking(model, nothing), noise=noise, members=members, seed=seed,
+        progress=progress,
+    ).after  # fmt: skip
+    return unit.factor * float(np.median(left)) if left.size else float("nan")

@@ -1,0 +1,362 @@
+"""The page of a comparison: one self-contained HTML file; and the same in Markdown."""
+
+import base64
+import csv
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from tirelib.compare.forces import UNITS as FORCE_UNITS
+from tirelib.compare.forces import ForceComparison, range_of
+from tirelib.compare.sectors import SECTORS, Cell
+from tirelib.compare.sentences import told
+from tirelib.compare.set_points import NAMES
+from tirelib.compare.strain import Comparison
+from tirelib.report.figures.compare_forces import force_plots
+from tirelib.report.figures.compare_heat import NAMES as CONDITIONS
+from tirelib.report.figures.compare_heat import heat_maps, unit_of
+from tirelib.report.figures.compare_plot import Plot
+from tirelib.report.figures.compare_trends import set_point_plot, track_plots, trend_plots
+from tirelib.report.figures.compare_waveforms import waveform_plots
+from tirelib.report.page import Table, number, write_page
+from tirelib.report.style import millimetres
+
+SENTENCE_NOTE = (
+    "Only what stands out is said: each statement holds against noise and set-point errors at a "
+    "chance of 1 % that any of them is false, and holds at least 2 % of the squares of the "
+    "difference. The differences are means."
+)
+RING = (
+    "Flexible ring on an elastic foundation with inner pressure and unilateral radial tread "
+    "springs, strain of the innerliner: the dissertation that this library implements, chapters "
+    "5 and 6, with the errata of its documentation.",
+    "E. Reissner, On one-dimensional finite-strain beam theory: the plane problem, Zeitschrift "
+    "f\u00fcr angewandte Mathematik und Physik 23 (1972) 795-804: the ring at large displacements.",
+)
+METHOD = (
+    "G. K. Robinson, That BLUP is a good thing: the estimation of random effects, Statistical "
+    "Science 6 (1991) 15-32: prediction of the set points' random part.",
+    "M. C. Kennedy, A. O'Hagan, Bayesian calibration of computer models, Journal of the Royal "
+    "Statistical Society B 63 (2001) 425-464: the smooth misfit behind the floor.",
+)
+BRUSH = (
+    "Brush with a parabolic pressure, Eq. (3) to (5) of the dissertation as corrected; contact "
+    "length from the ring.",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A part of the page."""
+
+    title: str
+    anchor: str
+    text: str = ""
+    tables: Sequence[Table] = ()
+    plots: Sequence[Plot] = ()
+    sources: Sequence[str] = field(default_factory=tuple)
+
+
+def answer_of(found: Comparison | ForceComparison) -> str:
+    """Say the result in a sentence."""
+    verdict = found.verdict if isinstance(found, ForceComparison) else found.fit.verdict
+    error = found.error if isinstance(found, ForceComparison) else found.fit.error
+    left = _left(found)
+    return {
+        "fits": f"The model fits: error {number(error, 3)} in units of the repeats' noise; {left}.",
+        "lack_of_fit": f"The model does not reach the noise: error {number(error, 3)} in units of "
+        f"the repeats' noise; {left}.",
+        "does_not_fit": f"The model does not fit: {left}.",
+        "noise_unknown": f"Noise unknown: {left}; whether that is more than noise cannot be said.",
+    }[verdict]
+
+
+def _left(found: Comparison | ForceComparison) -> str:
+    if isinstance(found, ForceComparison):
+        unit = FORCE_UNITS[found.quantity]
+        return (
+            f"model and measurement differ by {number(found.rms, 3)} of "
+            f"{number(found.measured_rms, 4)} {unit} rms"
+        )
+    fit = found.fit
+    return (
+        f"model and measurement differ by {1e6 * fit.rms:.0f} of {1e6 * fit.strain_rms:.0f} "
+        "microstrain rms"
+    )
+
+
+def floor_text(found: Comparison) -> str:
+    """Say what is known of the structural floor."""
+    floor, parts = found.floor, []
+    if np.isfinite(floor.value):
+        where = {
+            "history": "the last entry of the model's history",
+            "identification": "its identification from these very runs",
+        }[floor.source]
+        parts.append(f"Floor as far as known: error {number(floor.value, 3)}, by {where}.")
+    elif np.isfinite(floor.rms):
+        parts.append(
+            f"Its identification from these very runs left {1e6 * floor.rms:.0f} microstrain rms."
+        )
+    else:
+        parts.append(
+            "The model's file tells no floor for these data: it was not identified from them."
+        )
+    if np.isfinite(floor.share):
+        parts.append(
+            f"A smooth misfit of angle, load and pressure explains {100 * floor.share:.0f} % of "
+            f"what exceeds the noise; without it the error would be {number(floor.smooth, 3)}."
+        )
+    return " ".join(parts)
+
+
+def write_comparison(found: Comparison | ForceComparison, folder: Path) -> tuple[Path, Path]:
+    """Write ``index.html`` and ``comparison.md``; return their paths.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be written.
+    """
+    parts = force_parts(found) if isinstance(found, ForceComparison) else strain_parts(found)
+    title = f"Model against measurement: {found.quantity}"
+    shown = [_Shown.of(plot) for part in parts for plot in part.plots]
+    figures = "{" + ",".join(f"{json.dumps(s.name)}:{s.json}" for s in shown) + "}"
+    by_name = {s.name: s for s in shown}
+    views = [
+        {
+            "title": part.title, "anchor": part.anchor, "text": part.text, "tables": part.tables,
+            "plots": [by_name[plot.name] for plot in part.plots], "sources": part.sources,
+        }
+        for part in parts
+    ]  # fmt: skip
+    page = write_page(
+        folder, "comparison.html", title=title, sections=(), parts=views,
+        summary=summary_of(found), answer=answer_of(found), messages=found.messages,
+        sentences=found.sentences, sentence_note=SENTENCE_NOTE,
+        plotly=Markup(get_plotlyjs()),
+        figures=Markup(figures.replace("</", "<\\/")),
+    )  # fmt: skip
+    words = folder / "comparison.md"
+    words.write_text(markdown(found, parts, title), encoding="utf-8")
+    return page, words
+
+
+@dataclass(frozen=True, slots=True)
+class _Shown:
+    """A plot as the template takes it."""
+
+    name: str
+    title: str
+    caption: str
+    height: int
+    json: str
+    csv: str
+
+    @classmethod
+    def of(cls, plot: Plot) -> "_Shown":
+        text = io.StringIO()
+        writer = csv.writer(text)
+        writer.writerow(plot.columns)
+        writer.writerows(plot.rows)
+        data = base64.b64encode(text.getvalue().encode()).decode()
+        height = int(plot.figure.layout.height)
+        return cls(plot.name, plot.title, plot.caption, height, str(plot.figure.to_json()), data)
+
+
+def summary_of(found: Comparison | ForceComparison) -> str:
+    """Say what was compared."""
+    if isinstance(found, ForceComparison):
+        return f"Campaign {found.name}, model {found.model}; {found.measured.size} points."
+    chosen = found.chosen
+    lateral = ", ".join(millimetres(chosen.waves.header.gage_lateral[g]) for g in chosen.gages)
+    effects = ", ".join(u.effect.name for u in found.model.used) or "none"
+    return (
+        f"Campaign {chosen.waves.header.name}, model {found.model.name}, effects: {effects}. "
+        f"{len(found.run)} runs, {int(chosen.straight.sum())} of them counted; mean over the gages "
+        f"at y = {lateral}."
+    )
+
+
+def strain_parts(found: Comparison) -> list[Part]:
+    """Return the parts of a page on strain."""
+    maps = heat_maps(found)
+    return [
+        Part("Noise, error, floor", "noise", floor_text(found), tables=[_numbers(found)]),
+        Part(
+            "Where: angle and condition", "maps",
+            "Model less measured; set-point errors taken out. Angle 0 is below the axle, "
+            "the entry is negative.",
+            plots=maps,
+        ),
+        Part("Best, median and worst run", "waveforms", plots=waveform_plots(found)),
+        Part("Trends", "trends", plots=trend_plots(found)),
+        Part("Contact length and deflection", "tracks", plots=track_plots(found)),
+        Part("Table", "table", tables=_tables(found)),
+        Part("Set points", "points", tables=[_points(found)], plots=[set_point_plot(found)]),
+        Part("Sources", "sources", tables=_provenance(found), sources=_bibliography(found)),
+    ]  # fmt: skip
+
+
+def force_parts(found: ForceComparison) -> list[Part]:
+    """Return the parts of a page on a force."""
+    unit = FORCE_UNITS[found.quantity]
+    rows = []
+    for cell in found.table:
+        rows.append([
+            CONDITIONS.get(cell.by, "all points"), range_of(cell),
+            str(cell.points), number(cell.rms, 3), number(cell.rms / found.noise, 3),
+            number(cell.mean, 3), number(cell.excess, 3), number(1.96 * cell.excess_std, 2),
+        ])  # fmt: skip
+    table = Table(
+        "Difference, model less measured (slips by size)",
+        ["by", "range", "points", f"rms [{unit}]", "rms [noise]", f"mean [{unit}]",
+         f"size too large by [{unit}]", f"95 % \u00b1 [{unit}]"],
+        rows, texts=2,
+    )  # fmt: skip
+    noise = Table(
+        "Noise and error", ["", "value"],
+        [[f"noise of a point, from {found.repeats} repeated conditions [{unit}]",
+          number(found.noise, 3)],
+         ["error: rms difference over noise", number(found.error, 4)],
+         [f"rms difference [{unit}]", number(found.rms, 4)],
+         [f"rms measured [{unit}]", number(found.measured_rms, 4)]],
+    )  # fmt: skip
+    return [
+        Part("Noise and error", "noise", tables=[noise]),
+        Part("Where", "where", plots=force_plots(found)),
+        Part("Table", "table", tables=[table]),
+        Part("Sources", "sources", sources=BRUSH),
+    ]
+
+
+def _numbers(found: Comparison) -> Table:
+    fit, noise = found.fit, found.noise
+    rows = [
+        [f"noise of a run's waveform, from {noise.repeats} repeated set points [microstrain]",
+         number(1e6 * noise.std, 3)],
+        ["error: rms whitened difference over noise", number(fit.error, 4)],
+        ["rms difference, set points taken out [noise]", number(fit.rms / noise.std, 4)],
+        ["rms difference, set points taken out [microstrain]", number(1e6 * fit.rms, 4)],
+        ["rms difference, set points left in [microstrain]", number(1e6 * fit.raw_rms, 4)],
+        ["rms measured strain [microstrain]", number(1e6 * fit.strain_rms, 4)],
+        ["floor as far as known [noise]", number(found.floor.value, 4)],
+        ["error without a smooth misfit [noise]", number(found.floor.smooth, 4)],
+    ]  # fmt: skip
+    note = "The error counts straight, freely rolling runs." if np.isfinite(fit.error) else ""
+    return Table("Noise, error and floor", ["", "value"], rows, note=note)
+
+
+def _tables(found: Comparison) -> list[Table]:
+    """Return a table for each condition: a row per sector and level."""
+    factor, unit = unit_of(found)
+    out = []
+    names = list(dict.fromkeys(cell.by for cell in found.table))
+    for by in names:
+        cells = [cell for cell in found.table if cell.by == by]
+        cells.sort(key=lambda c: (np.nan_to_num(c.value), SECTORS.index(c.sector)))
+        rows = [_row(cell, factor) for cell in cells]
+        title = "All counted runs" if by == "all" else f"By {CONDITIONS[by]}"
+        out.append(
+            Table(
+                title,
+                ["level", "sector", "runs", f"rms [{unit}]", "rms [microstrain]",
+                 "mean [microstrain]", "95 % \u00b1 [microstrain]"],
+                rows, texts=2, folded=by != "all",
+                note="Model less measured; a positive mean is too much tension.",
+            )
+        )  # fmt: skip
+    return out
+
+
+def _row(cell: Cell, factor: float) -> list[str]:
+    level = "all" if cell.by == "all" else told(cell.by, cell.value)
+    return [
+        level, cell.sector, str(cell.runs), number(factor * cell.rms, 3), number(1e6 * cell.rms, 4),
+        number(1e6 * cell.mean, 4), number(1.96e6 * cell.std, 2),
+    ]  # fmt: skip
+
+
+def _points(found: Comparison) -> Table:
+    scaled, tolerance = found.points.scaled, found.points.tolerance
+    units = (("%", 100.0),) * 3 + (("mrad", 1e3),)
+    rows = []
+    for k, name in enumerate(NAMES):
+        unit, factor = units[k]
+        worst = int(np.argmax(np.abs(scaled[:, k])))
+        rows.append([
+            "angle zero" if name == "angle" else name,
+            f"{number(factor * float(np.median(tolerance[:, k])), 3)} {unit}",
+            number(float(np.sqrt(np.mean(scaled[:, k] ** 2))), 3),
+            number(float(scaled[worst, k]), 3), str(found.run[worst]),
+        ])  # fmt: skip
+    return Table(
+        "Random part of the set points",
+        ["set point", "tolerance (1 sigma)", "rms [tolerance]", "largest [tolerance]", "in run"],
+        rows, texts=2,
+        note="An rms far above 1 is misfit that looks like a set-point error; far below 1, the "
+             "misfit hides the set points.",
+    )  # fmt: skip
+
+
+def _provenance(found: Comparison) -> list[Table]:
+    rows = [[name, source] for name, source in found.model.sources.items()]
+    effects = [
+        [u.effect.name, u.effect.title, f"{_strength(u.strength)} {u.effect.unit}", u.effect.source]
+        for u in found.model.used
+    ]
+    out = [Table("Numbers of the tire", ["number", "kind and source"], rows, texts=2, folded=True)]
+    if effects:
+        out.insert(
+            0,
+            Table(
+                "Effects in the model", ["effect", "what", "strength", "source"], effects, texts=4
+            ),
+        )  # fmt: skip
+    return out
+
+
+def _strength(value: float | tuple[float, ...]) -> str:
+    return ", ".join(number(x, 4) for x in (value if isinstance(value, tuple) else (value,)))
+
+
+def _bibliography(found: Comparison) -> list[str]:
+    base = RING if found.model.large else RING[:1]
+    effects = [f"{u.effect.name}: {u.effect.source}" for u in found.model.used]
+    return [*effects, *base, *METHOD]
+
+
+def markdown(found: Comparison | ForceComparison, parts: Sequence[Part], title: str) -> str:
+    """Return the page's words and tables as Markdown."""
+    lines = [f"# {title}", "", summary_of(found), "", f"**{answer_of(found)}**", ""]
+    lines += [f"> {message}\n" for message in found.messages]
+    if found.sentences:
+        lines += ["## Lack of fit", "", *(f"- {text}" for text in found.sentences), "",
+                  SENTENCE_NOTE, ""]  # fmt: skip
+    for part in parts:
+        if not (part.text or part.tables or part.sources):
+            continue
+        lines += [f"## {part.title}", ""]
+        if part.text:
+            lines += [part.text, ""]
+        for table in part.tables:
+            lines += _markdown_table(table)
+        lines += [f"- {source}" for source in part.sources]
+        lines.append("")
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _markdown_table(table: Table) -> list[str]:
+    head = "| " + " | ".join(table.columns) + " |"
+    rule = "|" + "|".join("---" if k < table.texts else "---:" for k in range(len(table.columns)))
+    rows = [
+        "| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in table.rows
+    ]
+    note = [table.note, ""] if table.note else []
+    return [f"**{table.title}**", "", head, rule + "|", *rows, "", *note]

@@ -1,0 +1,168 @@
+"""Heat maps of a comparison: model less measured over wheel angle and condition."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import plotly.graph_objects as go
+
+from tirelib.arrays import FloatArray, IntArray
+from tirelib.compare.document import edge_value
+from tirelib.compare.sentences import UNITS, told
+from tirelib.compare.strain import Comparison
+from tirelib.identify.error_bands import levels
+from tirelib.report.figures.compare_plot import (
+    ANGLE_TITLE,
+    DIVERGING,
+    Plot,
+    limit_of,
+    styled_figure,
+)
+from tirelib.report.style import millimetres
+from tirelib.waveforms import GRID
+
+DEGREES = np.rad2deg(GRID)
+NAMES = {
+    "load": "load", "pressure": "inflation pressure", "speed": "speed",
+    "slip_angle": "slip angle", "camber": "camber", "slip_ratio": "slip ratio", "gage": "gage",
+}  # fmt: skip
+SIGN = "Red: the model shows too much tension (too little compression); blue: too much compression."
+
+
+def heat_maps(found: Comparison) -> list[Plot]:
+    """Return the map of every run, and one by each condition that varies and by gage."""
+    plots = [_runs(found)]
+    for factor in found.chosen.factors:
+        members = [factor.level == k for k in range(factor.values.size)]
+        rows = [(told(factor.name, v), edge_value(factor.name, v)) for v in factor.values]
+        data = np.stack([found.difference[m].mean(axis=0) for m in members])
+        count = [int(m.sum()) for m in members]
+        unit = UNITS[factor.name][0]
+        plots.append(_map(found, data, rows, count, factor.name, unit, signed=len(count)))
+    straight = found.chosen.straight
+    lateral = [1e3 * found.chosen.waves.header.gage_lateral[g] for g in found.chosen.gages]
+    if len(lateral) > 1:
+        order = np.argsort(lateral)
+        data = found.by_gage[straight].mean(axis=0)[order]
+        rows = [(f"y = {millimetres(1e-3 * lateral[k])}", lateral[k]) for k in order]
+        count = [int(straight.sum())] * len(rows)
+        plots.append(_map(found, data, rows, count, "gage", "mm", signed=len(rows)))
+    return plots
+
+
+def unit_of(found: Comparison) -> tuple[float, str]:
+    """Return factor and name of the unit of differences: noise, or microstrain without repeats."""
+    if found.noise.known:
+        return 1.0 / found.noise.std, "noise"
+    return 1e6, "microstrain"
+
+
+def _runs(found: Comparison) -> Plot:
+    c = found.chosen.waves.conditions
+    slip = np.nan_to_num(c["slip_angle"])
+    keys = (np.nan_to_num(c["slip_ratio"]), c["speed"], c["pressure"], slip)
+    load = levels(c["Fz"])
+    straight = ~found.chosen.straight
+    order = np.lexsort((*(np.round(key, 3) for key in keys), load, straight))
+    factor, unit = unit_of(found)
+    data = factor * found.difference[order]
+    labels = [
+        f"run {found.run[i]}: {c['Fz'][i]:.0f} N, {c['pressure'][i] / 1e5:.2f} bar, "
+        f"{c['speed'][i] * 3.6:.0f} km/h" + _slip(c, i) for i in order
+    ]  # fmt: skip
+    figure = _heat(data, labels, unit, list(range(len(order))))
+    ticks, texts = _load_ticks(found, order)
+    figure.update_yaxes(
+        title="runs by load, pressure and speed", tickvals=ticks, ticktext=texts,
+        showgrid=False,
+    )  # fmt: skip
+    _edges(figure, np.rad2deg(found.prediction.edges[order]), list(range(len(order))))
+    styled_figure(figure, 620, showlegend=True, legend=_LEGEND)
+    return Plot(
+        "heat-runs", "Every run: model less measured",
+        f"In units of {'the noise of the repeats' if unit == 'noise' else 'microstrain'}; set "
+        f"points taken out; colours end at the 99.5 % quantile. {SIGN} Lines: the model's contact.",
+        figure, *_table(labels, "run", data, unit),
+    )  # fmt: skip
+
+
+def _slip(c: Mapping[str, FloatArray], i: int) -> str:
+    out = ""
+    for name, unit, factor in (("slip_angle", " deg slip angle", np.rad2deg(1.0)),
+                               ("camber", " deg camber", np.rad2deg(1.0)),
+                               ("slip_ratio", " slip ratio", 1.0)):  # fmt: skip
+        value = np.nan_to_num(c[name][i]) * factor
+        if abs(value) > (0.25 if factor > 1 else 0.005):
+            out += f", {value:+.3g}{unit}"
+    return out
+
+
+def _load_ticks(found: Comparison, order: IntArray) -> tuple[list[float], list[str]]:
+    """Return a tick in the middle of the runs of each load, where there is room for it."""
+    load, straight = found.chosen.waves.conditions["Fz"], found.chosen.straight[order]
+    level = levels(load)[order]
+    ticks: list[float] = []
+    texts: list[str] = []
+    for counted in (True, False):
+        for k in range(int(level.max()) + 1):
+            where = np.flatnonzero((level == k) & (straight == counted))
+            if where.size and (not ticks or where.mean() - ticks[-1] > 0.03 * order.size):
+                ticks.append(float(where.mean()))
+                mean = 50.0 * round(float(load[order][where].mean()) / 50.0)
+                texts.append(told("load", mean) + ("" if counted else ", slip"))
+    return ticks, texts
+
+
+def _map(
+    found: Comparison, data: FloatArray, rows: list[tuple[str, float]], count: list[int],
+    name: str, unit: str, *, signed: int,
+) -> Plot:  # fmt: skip
+    factor, noise = unit_of(found)
+    values = factor * data
+    labels = [text for text, _ in rows]
+    figure = _heat(values, [f"{t} ({n} runs)" for t, n in zip(labels, count, strict=True)], noise,
+                   list(range(signed)))  # fmt: skip
+    figure.update_yaxes(
+        title=NAMES[name], tickvals=list(range(signed)), ticktext=labels, showgrid=False
+    )
+    styled_figure(figure, 200 + 34 * signed)
+    axes = " (ISO 8855)" if name in ("slip_angle", "camber", "slip_ratio", "gage") else ""
+    return Plot(
+        f"heat-{name.replace('_', '-')}", f"By {NAMES[name]}{axes}",
+        f"Mean over the runs of each level. {SIGN}", figure,
+        *_table(labels, f"{NAMES[name]}{f' [{unit}]' if unit else ''}", values, noise),
+    )  # fmt: skip
+
+
+_LEGEND = {"orientation": "h", "y": 1.08, "x": 0.0}
+
+
+def _heat(data: FloatArray, labels: list[str], unit: str, y: list[int]) -> go.Figure:
+    limit = limit_of(data)
+    text = np.broadcast_to(np.array(labels, dtype=object)[:, None], data.shape)
+    figure = go.Figure(
+        go.Heatmap(
+            z=np.round(data, 2), x=np.round(DEGREES, 3), y=y, zmin=-limit, zmax=limit,
+            colorscale=DIVERGING, customdata=None, text=None if len(y) > 12 else text,
+            hovertemplate="%{x:.0f} deg: %{z:.3g} " + unit + "<extra></extra>"
+            if len(y) > 12 else "%{text}<br>%{x:.0f} deg: %{z:.3g} " + unit + "<extra></extra>",
+            colorbar={"title": {"text": f"model less<br>measured<br>[{unit}]"}, "len": 1.0},
+        )
+    )  # fmt: skip
+    figure.update_xaxes(title=ANGLE_TITLE, range=[-180, 180], dtick=30)
+    return figure
+
+
+def _edges(figure: go.Figure, edges: FloatArray, y: list[int]) -> None:
+    for side, name in ((0, "entry of the contact (model)"), (1, "exit of the contact (model)")):
+        figure.add_scatter(
+            x=np.round(edges[:, side], 2), y=y, mode="lines", name=name, hoverinfo="skip",
+            line={"color": "#1c2530", "width": 1.2, "dash": "solid" if side else "dot"},
+        )  # fmt: skip
+
+
+def _table(
+    labels: list[str], first: str, data: FloatArray, unit: str
+) -> tuple[list[str], list[list[object]]]:
+    """Return the data: a row per angle and a column per level."""
+    rows = [[round(float(a), 3), *np.round(data[:, j], 4).tolist()] for j, a in enumerate(DEGREES)]
+    return ["wheel angle [deg]", *(f"{first} {text}: [{unit}]" for text in labels)], rows
