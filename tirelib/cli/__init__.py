@@ -9,7 +9,20 @@ import click
 from tirelib import __version__
 from tirelib.errors import TirelibError
 
-VERBS = ("campaign", "import", "features", "calibrate", "estimate", "identify", "compare", "simulate", "fmu", "rig")
+VERBS = (
+    "campaign",
+    "import",
+    "features",
+    "calibrate",
+    "estimate",
+    "identify",
+    "compare",
+    "diagnose",
+    "add",
+    "simulate",
+    "fmu",
+    "rig",
+)
 """Verbs; each is the command of that name in the module of that name (`import_` for import)."""
 
 _EXAMPLE = """\b

@@ -1,0 +1,1 @@
+"""Adding effects to a model and removing them: refit, errors before and after, history."""

@@ -1,0 +1,161 @@
+"""A model file after an effect was added or removed, and the way back."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from tirelib import __version__
+from tirelib.errors import FormatError
+from tirelib.extend.extension import Extension
+from tirelib.identify.identify import FITTED
+from tirelib.parameters import FIELDS, Number, TireFile
+from tirelib.parameters.tire import range_fault
+
+
+def extended_file(file: TireFile, done: Extension, data_hash: str) -> TireFile:
+    """Return the model file of an extension: fitted numbers, effects and a history entry.
+
+    Raises
+    ------
+    FormatError
+        If a fitted number lies where no tire's can.
+    """
+    name = done.runs.waves.header.name
+    numbers = dict(file.numbers)
+    faults = []
+    for index, coordinate in enumerate(FITTED):
+        value = float(done.after.values[coordinate.name])
+        fit_std = coordinate.spread(value, float(np.sqrt(done.after.covariance[index, index])))
+        if (fault := range_fault(coordinate.name, value)) is not None:
+            faults.append(f"{coordinate.name} after the fit: {fault}; the effect is not added")
+        elif np.isfinite(value):
+            numbers[coordinate.name] = _number(
+                file.numbers.get(coordinate.name), value, fit_std, coordinate.unit == 0.0,
+                f"strain waveforms of {name}, {len(done.runs.waves)} straight runs",
+            )  # fmt: skip
+    if faults:
+        raise FormatError(faults)
+    history = [*file.extra.get("history", []), _entry(file, done, data_hash)]
+    effects = [*_brush_effects(file, done), *_effects(file, done)]
+    return replace(
+        file, numbers=numbers, extra={**file.extra, "effects": effects, "history": history}
+    )
+
+
+def undone_file(file: TireFile) -> tuple[TireFile, Mapping[str, Any]]:
+    """Return the model file as it was before its last history entry, and that entry.
+
+    Raises
+    ------
+    FormatError
+        If there is no entry, or it does not hold what was before.
+    """
+    history = list(file.extra.get("history", []))
+    if not history:
+        raise FormatError(f"{file.name}: its history is empty; there is nothing to undo")
+    last = history.pop()
+    before = last.get("before") if isinstance(last, dict) else None
+    if not isinstance(before, dict) or not {"effects", "numbers"} <= set(before):
+        raise FormatError(
+            f"{file.name}, history[{len(history)}]: it does not hold the numbers and effects that "
+            "were before; `tirelib add --remove` takes an effect out and fits anew"
+        )
+    try:
+        old = {name: _read(table) for name, table in before["numbers"].items() if name in FIELDS}
+    except (KeyError, TypeError, ValueError) as error:
+        raise FormatError(
+            f"{file.name}, history[{len(history)}].before.numbers: {error!r}; a table with value, "
+            "kind and source for each is needed"
+        ) from error
+    fitted = {coordinate.name for coordinate in FITTED}
+    numbers = {name: number for name, number in file.numbers.items() if name not in fitted} | old
+    extra = {**file.extra, "effects": before["effects"], "history": history}
+    return replace(file, numbers=numbers, extra=extra), last
+
+
+def _number(old: Number | None, value: float, fit_std: float, factor: bool, source: str) -> Number:
+    """Return a number after a fit; what structure adds to its uncertainty is kept."""
+    if old is None:
+        return Number(value, fit_std, "fitted", source)
+    share = abs(value / old.value) if factor else 1.0
+    std = max(fit_std, share * old.std) if np.isfinite(old.std) else fit_std
+    notes = dict(old.notes)
+    interval = notes.get("interval_SI")
+    if isinstance(interval, list) and len(interval) == 2:
+        notes["interval_SI"] = [value + share * (float(end) - old.value) for end in interval]
+    return Number(value, std, "fitted", source, notes)
+
+
+def _effects(file: TireFile, done: Extension) -> list[dict[str, Any]]:
+    """Return the effects of strain with the strengths of the last fit."""
+    out = []
+    for index, effect in enumerate(done.after.effects):
+        deviation = done.after.strength_std(index)
+        out.append({
+            "effect": effect.name,
+            "strength": plain(done.after.strengths[index]),
+            "std": plain(deviation),
+            "unit": effect.unit,
+        })  # fmt: skip
+    return out
+
+
+def _brush_effects(file: TireFile, done: Extension) -> list[dict[str, Any]]:
+    """Return the file's effects that a fit to strain leaves alone."""
+    fitted = {effect.name for effect in (*done.before.effects, *done.after.effects)}
+    return [each for each in file.extra.get("effects", []) if each.get("effect") not in fitted]
+
+
+def _entry(file: TireFile, done: Extension, data_hash: str) -> dict[str, Any]:
+    header = done.runs.waves.header
+    # an error without noise is in another unit, under another name
+    suffix = "" if done.unit.known else "_ustrain"
+    errors = {
+        "error_before": done.unit.factor * done.before.error,
+        "error_after": done.unit.factor * done.after.error,
+        "floor": done.floor,
+    }
+    return {
+        "action": done.action,
+        "effect": done.effect.name,
+        "strength": plain(done.strength),
+        "std": plain(done.std),
+        "unit": done.effect.unit,
+        **{f"{name}{suffix}": value for name, value in errors.items() if np.isfinite(value)},
+        "campaign": header.name,
+        "data_sha256": data_hash,
+        "tirelib": __version__,
+        "before": {
+            "effects": list(file.extra.get("effects", [])),
+            "numbers": {
+                coordinate.name: _written(file.numbers[coordinate.name])
+                for coordinate in FITTED
+                if coordinate.name in file.numbers
+            },
+        },
+    }
+
+
+def plain(values: np.ndarray) -> float | list[float]:
+    """Return a strength as a number, or as a list if it has several components."""
+    numbers = [float(x) for x in values]
+    return numbers[0] if len(numbers) == 1 else numbers
+
+
+def _written(number: Number) -> dict[str, Any]:
+    table: dict[str, Any] = {
+        "value_SI": number.value, "kind": number.kind, "source": number.source,
+        "notes": dict(number.notes),
+    }  # fmt: skip
+    if np.isfinite(number.std):
+        table["std_SI"] = number.std
+    return table
+
+
+def _read(table: Mapping[str, Any]) -> Number:
+    return Number(
+        float(table["value_SI"]), float(table.get("std_SI", np.nan)), str(table["kind"]),
+        str(table["source"]), dict(table.get("notes", {})),
+    )  # fmt: skip

@@ -1,0 +1,274 @@
+"""The page of a diagnosis: one self-contained HTML file; and the same in Markdown."""
+
+import json
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import plotly.graph_objects as go
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from tirelib.diagnose.diagnose import ALARM, Finding
+from tirelib.diagnose.document import Assessment, exceeds, next_test
+from tirelib.diagnose.held_out import pooled
+from tirelib.diagnose.left import Left, left_of
+from tirelib.report.comparison import METHOD, RING, Part, _markdown_table, _Shown
+from tirelib.report.figures.compare_plot import (
+    ANGLE_TITLE,
+    DIVERGING,
+    Plot,
+    limit_of,
+    styled_figure,
+)
+from tirelib.report.page import Table, number, write_page
+from tirelib.report.style import BLUE, FAINT, RED
+from tirelib.waveforms import GRID
+
+TITLE = "Which effect is missing"
+METHOD_TEXT = (
+    "All effects of the catalogue are fitted at once. An effect's score is the misfit that "
+    "returns when it alone is taken out, over what the fit leaves. The threshold is the largest "
+    "score among variants of the model that differ in structure and lack no effect. From three "
+    "times it on an effect in its plausible range is an alarm, from once on a hint."
+)
+_LEVELS = {"alarm": RED, "hint": BLUE, "quiet": FAINT}
+
+
+def answer_of(told: Assessment) -> str:
+    """Say the verdict in plain words."""
+    names = ", ".join(told.named)
+    fall = (
+        f"the error falls from {number(told.error_before, 3)} to {number(told.error_after, 3)} "
+        f"(floor {number(told.floor, 3)})"
+    )
+    return {
+        "none": "No effect stands out: the error "
+        f"{number(told.error_before, 3)} (floor {number(told.floor, 3)}) is no reason to name one.",
+        "named": f"Missing: {names}. With it {fall}.",
+        "form_inadequate": f"{names} acts here, but its law has the wrong form: {fall}, and more "
+        "is left than the structure of the ring explains.",
+        "indistinguishable": f"One of {names} is missing; this campaign cannot tell which. With "
+        f"{told.named[0] if told.named else 'it'} {fall}.",
+        "unknown": "Something is missing that no effect of the catalogue explains; error "
+        f"{number(told.error_before, 3)} (floor {number(told.floor, 3)}).",
+    }[told.verdict]
+
+
+def write_diagnosis(told: Assessment, folder: Path) -> tuple[Path, Path]:
+    """Write ``diagnosis.html`` and ``diagnosis.md``; return their paths.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be written.
+    """
+    parts = parts_of(told)
+    shown = [_Shown.of(plot) for part in parts for plot in part.plots]
+    figures = "{" + ",".join(f"{json.dumps(s.name)}:{s.json}" for s in shown) + "}"
+    by_name = {s.name: s for s in shown}
+    views = [
+        {
+            "title": part.title, "anchor": part.anchor, "text": part.text, "tables": part.tables,
+            "plots": [by_name[plot.name] for plot in part.plots], "sources": part.sources,
+        }
+        for part in parts
+    ]  # fmt: skip
+    folder.mkdir(parents=True, exist_ok=True)
+    page, words = folder / "diagnosis.html", folder / "diagnosis.md"
+    # pages are written as index.html, which may be another report's in this folder
+    with tempfile.TemporaryDirectory() as aside:
+        made = write_page(
+            Path(aside), "comparison.html", title=TITLE, sections=(), parts=views,
+            summary=_summary(told), answer=answer_of(told), messages=told.messages,
+            sentences=(), sentence_note="", plotly=Markup(get_plotlyjs()),
+            figures=Markup(figures.replace("</", "<\\/")),
+        )  # fmt: skip
+        page.write_text(made.read_text(encoding="utf-8"), encoding="utf-8")
+    words.write_text(_markdown(told, parts), encoding="utf-8")
+    return page, words
+
+
+def parts_of(told: Assessment) -> list[Part]:
+    """Return the parts of the page."""
+    found = told.diagnosis
+    before = left_of(found.data, found.base)
+    plots = [_map(told, before, "before", "Without the named effects")]
+    if told.named:
+        plots.append(_map(told, told.left, "after", f"With {', '.join(told.named)}"))
+    return [
+        Part("Candidates", "candidates", METHOD_TEXT, tables=[_candidates(told)],
+             plots=[_bars(told)]),
+        Part("Error", "error", tables=[_errors(told)]),
+        Part("What is left", "left", _left_text(told), plots=plots),
+        Part("What this plan cannot show", "blind", tables=_blind(told)),
+        Part("Next", "next", _next_text(told)),
+        Part("Sources", "sources", sources=_sources(told)),
+    ]  # fmt: skip
+
+
+def _summary(told: Assessment) -> str:
+    found = told.diagnosis
+    has = ", ".join(effect.name for effect in found.base.effects) or "none"
+    return (
+        f"Campaign {found.runs.waves.header.name}, {len(found.runs.waves)} straight runs, strain. "
+        f"Effects in the model: {has}. {len(told.findings)} effects were tried."
+    )
+
+
+def _unit(told: Assessment) -> str:
+    return "noise" if told.unit.known else "microstrain"
+
+
+def _strength(values: Sequence[float] | np.ndarray) -> str:
+    return ", ".join(number(float(x), 3) for x in values)
+
+
+def _candidates(told: Assessment) -> Table:
+    unit = _unit(told)
+    rows = [
+        [
+            f.effect.name, f.level, "yes" if f.in_range else "no",
+            ", ".join(f"{twin} {np.rad2deg(angle):.0f}\u00b0" for twin, angle in f.twins),
+            number(f.score / f.threshold, 3), _strength(f.strength), _strength(f.std),
+            f.effect.unit, number(_error_after(told, f), 3),
+            number(pooled(told.held_after.get(f.effect.name, ()), told.folds), 3),
+            number(f.power, 2),
+        ]
+        for f in told.findings
+    ]  # fmt: skip
+    return Table(
+        "Effects by rank",
+        ["effect", "level", "in range", "twins (angle)", "score / threshold", "strength", "std",
+         "unit", f"error with it [{unit}]", f"held out [{unit}]", "power"],
+        rows, texts=4,
+        note="Twins: effects whose signatures are less than 30 degrees apart. Power: chance that a "
+             "third of the range would be an alarm. Errors with effects that are not named are "
+             "of first order.",
+    )  # fmt: skip
+
+
+def _error_after(told: Assessment, finding: Finding) -> float:
+    if told.named == (finding.effect.name,):
+        return told.error_after
+    return told.unit.factor * finding.error_after
+
+
+def _errors(told: Assessment) -> Table:
+    found, factor, unit = told.diagnosis, told.unit.factor, _unit(told)
+    rows = [
+        ["noise of a run's waveform, from repeats [microstrain]", number(1e6 * told.unit.noise, 3)],
+        [f"error without the named effects [{unit}]", number(told.error_before, 4)],
+        [f"error with them [{unit}]", number(told.error_after, 4)],
+        [f"floor: median error of variants that lack no effect [{unit}]", number(told.floor, 4)],
+        [f"left when all effects are fitted at once [{unit}]", number(factor * found.left, 4)],
+        [f"the same, largest of the variants [{unit}]", number(factor * found.floor, 4)],
+    ]
+    for k, fold in enumerate(told.folds):
+        after = [
+            f"{name}: {number(errors[k], 3)}" for name, errors in told.held_after.items() if errors
+        ]
+        rows.append([
+            f"highest {fold.name} left out of the fit ({int(fold.out.sum())} runs): error there "
+            f"without, and with one effect [{unit}]",
+            f"{number(told.held_before[k], 3)}; {', '.join(after)}",
+        ])  # fmt: skip
+    return Table("Errors", ["", "value"], rows)
+
+
+def _left_text(told: Assessment) -> str:
+    if not exceeds(told):
+        return "What is left is no more than variants of the model without any effect leave."
+    return f"What is left stands {told.left.where} and {told.left.scaling}."
+
+
+def _blind(told: Assessment) -> list[Table]:
+    dead = [[name, reason] for name, reason in told.diagnosis.dead.items()]
+    return [Table("Dead effects", ["effect", "why"], dead, texts=2)] if dead else []
+
+
+def _next_text(told: Assessment) -> str:
+    step = next_test(told)
+    text = f"{step['what'][0].upper()}{step['what'][1:]}."
+    revived = step["would_revive"]
+    if revived:
+        text += f" Other runs would show {', '.join(revived)}: see the dead effects."
+    return text
+
+
+def _sources(told: Assessment) -> list[str]:
+    shown = [f.effect for f in told.findings if f.level != "quiet" or f.effect.name in told.named]
+    return [*(f"{effect.name}: {effect.source}" for effect in shown), *RING, *METHOD]
+
+
+def _bars(told: Assessment) -> Plot:
+    names = [f.effect.name for f in told.findings]
+    ratio = [f.score / f.threshold for f in told.findings]
+    figure = go.Figure(
+        go.Bar(
+            x=np.round(ratio, 4), y=names, orientation="h",
+            marker={"color": [_LEVELS[f.level] for f in told.findings]},
+            hovertemplate="%{y}: %{x:.3g}<extra></extra>",
+        )
+    )  # fmt: skip
+    for at, text in ((1.0, "hint"), (ALARM, "alarm")):
+        figure.add_vline(x=at, line={"dash": "dot", "color": FAINT}, annotation_text=text)
+    figure.update_yaxes(autorange="reversed")
+    figure.update_xaxes(title="score / threshold", type="log")
+    styled_figure(figure, 160 + 22 * len(names), showlegend=False)
+    return Plot(
+        "scores", "Score over threshold",
+        "Red: alarm; blue: hint; gray: quiet. An effect beyond 3 that is no alarm lies outside its "
+        "range, or brings back too little.",
+        figure, ["effect", "score / threshold", "level"],
+        [[f.effect.name, r, f.level] for f, r in zip(told.findings, ratio, strict=True)],
+    )  # fmt: skip
+
+
+def _map(told: Assessment, left: Left, name: str, title: str) -> Plot:
+    points, run = told.diagnosis.data.points, told.diagnosis.runs.waves.run
+    order = np.lexsort((points.speed, points.pressure, np.round(points.load, -2)))
+    data = told.unit.factor * left.white[order]
+    unit = _unit(told)
+    limit = told.unit.factor * limit_of(left_of(told.diagnosis.data, told.diagnosis.base).white)
+    degrees = np.rad2deg(GRID)
+    figure = go.Figure(
+        go.Heatmap(
+            z=np.round(data, 2), x=np.round(degrees, 2), y=list(range(len(order))), zmin=-limit,
+            zmax=limit, colorscale=DIVERGING,
+            hovertemplate="%{x:.0f} deg: %{z:.3g} " + unit + "<extra></extra>",
+            colorbar={"title": {"text": f"model less<br>measured<br>[{unit}]"}},
+        )
+    )  # fmt: skip
+    figure.update_xaxes(title=ANGLE_TITLE, range=[-180, 180], dtick=30)
+    marks = list(range(0, len(order), max(1, len(order) // 10)))
+    figure.update_yaxes(
+        title="runs, by load", tickvals=marks, showgrid=False,
+        ticktext=[f"run {run[order[k]]}: {points.load[order[k]]:.0f} N" for k in marks],
+    )  # fmt: skip
+    styled_figure(figure, 480)
+    labels = [f"run {run[k]}: {points.load[k]:.0f} N [{unit}]" for k in order]
+    rows = [[round(float(a), 3), *np.round(data[:, j], 3).tolist()] for j, a in enumerate(degrees)]
+    return Plot(
+        f"residual-{name}", title,
+        "Model less measured, set-point errors weighed down as the fit does. One colour scale for "
+        "both maps. Red: the model shows too much tension; blue: too much compression.",
+        figure, ["wheel angle [deg]", *labels], rows,
+    )  # fmt: skip
+
+
+def _markdown(told: Assessment, parts: Sequence[Part]) -> str:
+    lines = [f"# {TITLE}", "", _summary(told), "", f"**{answer_of(told)}**", ""]
+    lines += [f"> {message}\n" for message in told.messages]
+    for part in parts:
+        if not (part.text or part.tables or part.sources):
+            continue
+        lines += [f"## {part.title}", ""]
+        if part.text:
+            lines += [part.text, ""]
+        for table in part.tables:
+            lines += _markdown_table(table)
+        lines += [f"- {source}" for source in part.sources]
+        lines.append("")
+    return "\n".join(lines).rstrip() + "\n"
