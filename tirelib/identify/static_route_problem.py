@@ -21,6 +21,8 @@ from tirelib.waveforms import GRID
 
 TERMS = 60
 """Harmonics of strain and of the ring's deformation."""
+SMALL = 1e-5
+"""Amplitude of a harmonic for which the deformation is asked, [m]."""
 NODES = 41
 """Of the finite differences over the contact."""
 COMPARED = 9
@@ -73,13 +75,14 @@ class StrainProblem:
         lost = wave * gain * (-self.offset / self.radius**2 * (1.0 - n**2))
         out = []
         for k, half in enumerate(self.half):
-            # linear in the strain: what the filter takes from it, with edges that stay
-            unit = np.concatenate([np.zeros((1, NODES)), lost[k].T])
+            # linear in the strain: what the filter takes from it, with edges that stay; small
+            # amplitudes, since a strain of one is refused
+            unit = np.concatenate([np.zeros((1, NODES)), SMALL * lost[k].T])
             solved = contact_deformation(
                 unit, -half, half, deflection=self.deflection[k], ring_radius=self.radius,
                 free_radius=tire.free_radius, liner_offset=self.offset,
             ).deformation  # fmt: skip
-            out.append(wave[k] + (solved[1:] - solved[0]).T)
+            out.append(wave[k] + (solved[1:] - solved[0]).T / SMALL)
         return np.stack(out)[:, pick]
 
     def _parameters(self) -> tuple[Parameter, ...]:
