@@ -59,7 +59,7 @@ class BrushForces:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BrushDistribution:
-    """Force per length over the contact, at the profile's nodes, shape (*points, n_nodes).
+    """Force per length over the contact, at the profile's nodes, shape (..., n_nodes).
 
     Attributes
     ----------

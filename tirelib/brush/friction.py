@@ -186,7 +186,7 @@ def friction_from_two_angles(
 
     Parameters
     ----------
-    Fy, slip_angle, load : array_like, shape (2, *points), [N], [rad], [N]
+    Fy, slip_angle, load : array_like, shape (2, ...), [N], [rad], [N]
         abs(slip_angle[0]) < abs(slip_angle[1]), neither zero.
     Fy_std, load_std : array_like, broadcast with Fy, [N]
     most_std : float

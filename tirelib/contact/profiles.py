@@ -35,14 +35,14 @@ class PressureProfile:
 
     Attributes
     ----------
-    x : array, shape (*points, n_nodes), [m]
+    x : array, shape (..., n_nodes), [m]
         Nodes, ascending: from the trailing to the leading edge.
-    weight : array, shape (*points, n_nodes), [m]
+    weight : array, shape (..., n_nodes), [m]
         ``sum(weight * pressure)`` is the load.
-    pressure : array, shape (*points, n_nodes), [N/m]
-    trailing, leading : arrays, shape (*points), [m]
+    pressure : array, shape (..., n_nodes), [N/m]
+    trailing, leading : arrays, shape (...), [m]
         The edges, trailing < leading.
-    load : array, shape (*points), [N]
+    load : array, shape (...), [N]
     curve : Curve
         The pressure between the nodes; its rows are the operating points in C order.
     """
@@ -62,12 +62,12 @@ class PressureProfile:
 
     @property
     def length(self) -> FloatArray:
-        """Contact length, shape (*points), [m]."""
+        """Contact length, shape (...), [m]."""
         return self.leading - self.trailing
 
     @property
     def center(self) -> FloatArray:
-        """Centre of pressure, shape (*points), [m]."""
+        """Centre of pressure, shape (...), [m]."""
         rows = np.arange(self.load.size)
         _, moment = self.curve.cumulative(np.ones(rows.size), rows)
         return self.leading - self.length * moment.reshape(self.shape) / self.load
@@ -77,11 +77,11 @@ class PressureProfile:
 
         Parameters
         ----------
-        x : array, shape (*points, n) or (n,), [m]
+        x : array, shape (..., n) or (n,), [m]
 
         Returns
         -------
-        pressure : array, shape (*points, n), [N/m]
+        pressure : array, shape (..., n), [N/m]
         """
         place = np.atleast_1d(np.asarray(x, dtype=np.float64))
         u = (self.leading[..., None] - place) / self.length[..., None]
@@ -207,11 +207,11 @@ def sampled(
 
     Parameters
     ----------
-    x : array, shape (*points, n) or (n,), [m]
+    x : array, shape (..., n) or (n,), [m]
         Strictly ascending: from the trailing to the leading edge; at least 3 samples.
-    pressure : array, shape (*points, n), [N/m]
+    pressure : array, shape (..., n), [N/m]
         Never negative, not zero everywhere.
-    load : array_like, shape (*points), [N], optional
+    load : array_like, shape (...), [N], optional
         Scales the samples to this load; by default they are taken as they are.
 
     Raises

@@ -126,8 +126,8 @@ class ShearContact:
     def sliding_onset(self) -> FloatArray:
         """Angle where the sliding that reaches the trailing edge begins, [rad]; nan without it.
 
-        Between the last sticking node and the first sliding one, where |K_Gt gamma h| - mu |f_n|
-        is zero on a straight line; the leading edge if all slides.
+        Between the last sticking node and the first sliding one, where the straight line of
+        abs(K_Gt gamma h) - mu abs(f_n) is zero; the leading edge if all slides.
         """
         behind = np.logical_and.accumulate(self.sliding[:, ::-1], axis=1)[:, ::-1]
         count, n_nodes = behind.sum(axis=1), self.phi.shape[1]

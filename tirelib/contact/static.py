@@ -105,7 +105,7 @@ class StaticContact:
     iterations : array of int
         Newton steps of the last solution.
     residual : array
-        max |q - k_t max(0, u - u_r)| over the largest pressure.
+        largest abs(q - k_t max(0, u - u_r)) over the largest pressure.
     """
 
     deflection: FloatArray
@@ -136,7 +136,7 @@ def road_gap(
     Parameters
     ----------
     angle : array, [rad]
-        From the road's normal through the axle; for the exact form |phi| < pi/2.
+        From the road's normal through the axle; for the exact form abs(phi) < pi/2.
     deflection, free_radius : array, [m]
         d0 and R0. All broadcast.
     exact : bool

@@ -13,13 +13,13 @@ from types import MappingProxyType
 STRUCTURE_STD: Mapping[str, float] = MappingProxyType(
     {
         "bending_stiffness": 0.10,
-        "radial_stiffness": 0.035,
-        "tangential_stiffness": 0.42,
-        "tread_stiffness": 0.225,
-        "innerliner_offset": 0.01,
-        "radial_pressure_slope": 0.04,
+        "radial_stiffness": 0.025,
+        "tangential_stiffness": 0.20,
+        "tread_stiffness": 0.215,
+        "innerliner_offset": 0.009,
+        "radial_pressure_slope": 0.035,
         "tangential_pressure_slope": 0.72,
-        "extension_stiffness": 0.09,
+        "extension_stiffness": 0.06,
     }
 )
 """Relative standard deviation by parameter, in units of the value (slopes: of a typical slope)."""

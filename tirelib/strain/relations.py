@@ -11,7 +11,7 @@ Three forms, each with what it leaves out:
 - `bending_strain` (33): bending alone, linear;
 - `inextensible_strain` (35): bending with v' = -u (34).
 
-Validity: |y| / R < 0.1, rotations (u' - v) / R below about 0.3 rad. With 1/r = 1/(R + y) written
+Validity: abs(y) / R < 0.1, rotations (u' - v) / R below about 0.3 rad. With 1/r = 1/(R + y) written
 out, the bending term of (32) is -(y/R^2)(u + u''), the form of (35). (32) and (33) hold v' in place
 of -u, which differs by (y/R^2)(u + v'): nothing for an inextensible belt, else a share y/R of the
 stretch.
@@ -170,7 +170,7 @@ def full_strain(
     ring_radius : array, shape (...), [m]
         R > 0.
     layer_offset : array, shape (...), [m]
-        y, |y| < R; negative at the innerliner.
+        y, abs(y) < R; negative at the innerliner.
 
     Returns
     -------
@@ -179,7 +179,7 @@ def full_strain(
     Raises
     ------
     ParameterError
-        If R is not positive or |y| >= R.
+        If R is not positive or abs(y) >= R.
     """
     R, y = _geometry(ring_radius, layer_offset)
     stretch = (shape.u + shape.v_prime) / R

@@ -16,8 +16,8 @@ so that for a beam free in rotation (k_beta = 0) M = EI beta' = h N, and at the 
           = N \left(\frac1{EA} + \frac{y\,h}{EI}\right) < 0
           \quad\text{for outward shear } (N > 0),\ EA > EI / (h |y|).
 
-Seen from the innerliner the lever is h + |y|, the same force couple taken about another line. Over
-harmonics, N_n = -R tau_n / (i n) and, with kappa = n / R,
+Seen from the innerliner the lever is h + abs(y), the same force couple taken about another line.
+Over harmonics, N_n = -R tau_n / (i n) and, with kappa = n / R,
 
 .. math:: \Delta\varepsilon_n = s\,N_n\left(\frac1{EA}
           + \frac{y\,h\,\kappa^2}{EI\kappa^2 + k_\beta}\right).
@@ -106,7 +106,7 @@ def outward_shear(contact: StripContact, tire: Tire, gathering: float | None = N
     r"""Return the tread's outward shear on each strip from a simple law, [N/m].
 
     The tread's surface is an arc of the free radius; flattened with the belt it is too long by
-    g = (R0 - R) / R, so its tips lie outside of their roots by g |x| and the road, holding them,
+    g = (R0 - R) / R, so its tips lie outside of their roots by g abs(x) and the road, holding them,
     pulls the belt's surface outward, up to friction:
 
     .. math:: \tau = \operatorname{sgn}(x)\,\min(k_{Gt}\,g\,|x|,\ \mu q), \qquad
