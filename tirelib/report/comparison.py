@@ -35,7 +35,7 @@ SENTENCE_NOTE = (
 RING = (
     "Flexible ring on an elastic foundation with inner pressure and unilateral radial tread "
     "springs, strain of the innerliner: the dissertation that this library implements, chapters "
-    "5 and 6, with the errata of its documentation.",
+    "5 and 6, with the corrections that its documentation lists.",
     "E. Reissner, On one-dimensional finite-strain beam theory: the plane problem, Zeitschrift "
     "f\u00fcr angewandte Mathematik und Physik 23 (1972) 795-804: the ring at large displacements.",
 )
