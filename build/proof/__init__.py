@@ -1,0 +1,1 @@
+"""Proof of the intervals of an identification on the numerical rig."""

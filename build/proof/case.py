@@ -1,0 +1,136 @@
+"""One tire of the proof: identified, held against the laboratory and against runs left out."""
+
+import hashlib
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.rig.tire import RigTire
+from proof.laboratory import laboratory, press
+from proof.tires import CACHE, measured
+from tirelib.arrays import BoolArray, FloatArray
+from tirelib.contact.exact import load_exact
+from tirelib.contact.tread import Tread
+from tirelib.identify.campaign_data import straight_runs
+from tirelib.identify.identify import estimated
+from tirelib.model.base import large_displacements, operating_points, predict
+from tirelib.model.state import State
+from tirelib.parameters import Tire
+from tirelib.ring.ring import Ring
+from tirelib.waveforms import GRID, Waveforms
+
+LOAD, PRESSURE = 4800.0, 2.1e5
+"""Of the press test."""
+HELD_OUT_EVERY = 4
+"""Seeds that are identified twice more without some runs, to save time."""
+
+
+def fingerprint() -> str:
+    """Return a hash of the code that a result depends on."""
+    root = Path(__file__).parents[2] / "tirelib"
+    own = Path(__file__).parent
+    names = ("identify", "waveform_fit", "discrepancy", "structure", "campaign_data", "noise",
+             "random_effects")  # fmt: skip
+    files = [root / "identify" / f"{name}.py" for name in names]
+    files += [root / "model" / f"{name}.py" for name in ("base", "chain", "state")]
+    files += [root / "contact/exact.py", own / "case.py", own / "laboratory.py", own / "tires.py"]
+    digest = hashlib.sha256()
+    for file in files:
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def case(seed: int) -> dict[str, Any]:
+    """Return the result of a seed, from the cache if neither it nor the code has changed."""
+    file = CACHE / f"case{seed}.json"
+    mark = fingerprint()
+    if file.exists():
+        stored: dict[str, Any] = json.loads(file.read_text())
+        if stored["fingerprint"] == mark:
+            return stored
+    made = _make(seed) | {"fingerprint": mark}
+    file.write_text(json.dumps(made, indent=1))
+    return made
+
+
+def _make(seed: int) -> dict[str, Any]:
+    data = measured(seed)
+    runs = straight_runs(data.waves)
+    began = time.perf_counter()
+    start, fit, estimates = estimated(runs)
+    took = time.perf_counter() - began
+    pressure = start.tire.pressure
+    found = laboratory(data.tire, pressure)
+    model = vertical_stiffness(start.tire.changed(**{e.name: e.value for e in estimates}))
+    stiffness = press(data.tire, PRESSURE, LOAD)
+    return {
+        "seed": seed,
+        "runs": len(runs.waves),
+        "seconds": took,
+        "rms_share": fit.rms / float(np.sqrt(np.mean(runs.strain**2))),
+        "parameters": {
+            e.name: {
+                "value": e.value, "low": e.low, "high": e.high, "fit_std": e.fit_std,
+                "flags": list(e.flags), "laboratory": found.values[e.name],
+                "definition": definition(data.tire, pressure)[e.name],
+            }
+            for e in estimates
+        },
+        "modal": found.modal,
+        "vertical_stiffness": {"model": model, "laboratory": stiffness},
+        "held_out": held_out(data.waves) if seed % HELD_OUT_EVERY == 0 else None,
+    }  # fmt: skip
+
+
+def definition(tire: RigTire, pressure: float) -> dict[str, float]:
+    """Return the constants of a rig tire by the ring's names."""
+    return {
+        "bending_stiffness": tire.bending,
+        "radial_stiffness": tire.radial_stiffness(pressure),
+        "radial_pressure_slope": tire.sidewall_radial,
+        "tangential_stiffness": tire.tangential_stiffness(pressure),
+        "tangential_pressure_slope": tire.sidewall_tangential,
+        "tread_stiffness": tire.tread_normal * tire.belt_width,
+        "innerliner_offset": tire.innerliner_offset,
+        "extension_stiffness": tire.extension,
+    }
+
+
+def vertical_stiffness(tire: Tire) -> float:
+    """Return the slope of load over deflection of a model at the press test, [N/m]."""
+    above = PRESSURE - tire.pressure
+    at = tire.changed(
+        pressure=PRESSURE,
+        radial_stiffness=tire.radial_stiffness + tire.radial_pressure_slope * above,
+        tangential_stiffness=tire.tangential_stiffness + tire.tangential_pressure_slope * above,
+    )
+    loads = LOAD * np.array([0.99, 1.01])
+    depth = load_exact(Ring.of(at, np.full(2, PRESSURE), 0.0), Tread.of(at), loads).deflection
+    return float(np.diff(loads)[0] / np.diff(depth)[0])
+
+
+def held_out(waves: Waveforms) -> dict[str, float]:
+    """Return the strain error of runs left out, relative to that of the fitted ones."""
+    load, pressure = waves.conditions["Fz"], waves.conditions["pressure"]
+    sets = {
+        "load 150 %": np.isclose(load, 1.5 * LOAD, rtol=0.05),
+        "pressure 2.5 bar": np.isclose(pressure, 2.5e5, rtol=0.03),
+    }
+    return {name: _ratio(waves, out) for name, out in sets.items()}
+
+
+def _ratio(waves: Waveforms, out: BoolArray) -> float:
+    kept = straight_runs(waves.take(~out))
+    _, fit, _ = estimated(kept)
+    rest = straight_runs(waves.take(~out | out))
+    points = operating_points(rest.waves)
+    fix = large_displacements(fit.values, points, low_pass=rest.waves.low_pass)
+    state: State = predict(fit.values, points, low_pass=rest.waves.low_pass, correction=fix,
+                           phi=GRID)  # fmt: skip
+    assert state.waveform is not None  # noqa: S101 - the chain sets it
+    error = np.mean((state.waveform - rest.strain) ** 2, axis=1)
+    share: FloatArray = error / np.mean(rest.strain**2, axis=1)
+    return float(np.sqrt(share[out].mean() / share[~out].mean()))
