@@ -61,6 +61,7 @@ class FmuArchive:
                 "ASCII letters is needed; set TMPDIR"
             )
         try:
+            # zipfile raises NotImplementedError for a compression that it does not know
             with zipfile.ZipFile(io.BytesIO(self.content)) as archive:
                 archive.extractall(folder.name)
         except (zipfile.BadZipFile, OSError, EOFError, ValueError, NotImplementedError) as error:
@@ -95,7 +96,7 @@ def read_fmu(path: Path) -> FmuArchive:
             f"{path}: it cannot be read ({error.strerror}); an FMU of `tirelib fmu build` is "
             "needed; check the path"
         ) from None
-    except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:
+    except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:  # unknown compression
         raise FmuError(
             f"{path}: it is no FMU ({error}); a zip archive is needed; build it with "
             "`tirelib fmu build`"

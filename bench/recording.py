@@ -92,6 +92,7 @@ class Recorder:
             return
         try:
             self._writer.add_metadata("end", {"reason": reason})
+            # mcap leaves this one method without annotations
             self._writer.finish()  # type: ignore[no-untyped-call]
             self._file.close()
         except OSError as error:

@@ -172,7 +172,7 @@ def cornering_runs(seed: int = 0, **options: float) -> list[Run]:
     """Five loads times seven slip angles."""
     conditions = [(load, angle) for load in LOADS for angle in ANGLES]
     return [
-        synthetic_run(i, load=load, slip_angle=angle, seed=seed, **options)  # type: ignore[arg-type]
+        synthetic_run(i, load=load, slip_angle=angle, seed=seed, **options)
         for i, (load, angle) in enumerate(conditions)
     ]
 

@@ -130,7 +130,6 @@ def _ratio(waves: Waveforms, out: BoolArray) -> float:
     fix = large_displacements(fit.values, points, low_pass=rest.waves.low_pass)
     state: State = predict(fit.values, points, low_pass=rest.waves.low_pass, correction=fix,
                            phi=GRID)  # fmt: skip
-    assert state.waveform is not None  # noqa: S101 - the chain sets it
-    error = np.mean((state.waveform - rest.strain) ** 2, axis=1)
+    error = np.mean((state.wave - rest.strain) ** 2, axis=1)
     share: FloatArray = error / np.mean(rest.strain**2, axis=1)
     return float(np.sqrt(share[out].mean() / share[~out].mean()))

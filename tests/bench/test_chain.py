@@ -133,7 +133,7 @@ def test_the_last_turn_comes_with_its_last_sample(calibration: Calibration, scri
     assert sum(turn.run == 1 for turn in both) == len(turns)
 
 
-def _shortened(run, length):  # type: ignore[no-untyped-def]
+def _shortened(run, length):
     from dataclasses import replace
 
     return replace(run, strain=run.strain[:, :length], trigger=None)

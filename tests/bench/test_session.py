@@ -63,7 +63,7 @@ def wire() -> list[bytes]:
 
 def session(reads: Sequence[bytes | Exception | None], **options: object) -> Session:
     chain = Chain(Counter(), Device(), Conditions.constant())
-    return Session(Scripted(reads), chain, **options)  # type: ignore[arg-type]
+    return Session(Scripted(reads), chain, **options)
 
 
 @pytest.mark.parametrize(
@@ -100,7 +100,7 @@ def test_bytes_are_recorded_before_they_are_decoded(tmp_path: Path) -> None:
     """Whatever the decoder does with them, damaged or not, they stand in the file."""
     noise = [bytes(range(256)), b"\0\0\0", b"\xff" * 5000]
     running = session([*noise, None])
-    running._chain.push = lambda data: 1 / 0  # type: ignore[method-assign,assignment,return-value]
+    running._chain.push = lambda data: 1 / 0
     recorder = Recorder(tmp_path / "a.mcap", RecordingHeader({}), Conditions.constant())
     running._recorder = recorder
     with recorder, pytest.raises(ZeroDivisionError):

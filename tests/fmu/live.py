@@ -42,7 +42,7 @@ def strain_of(load: float, tilt: float, *, seed: int = 0, turns: float = 3.4, sp
 
 def make_run(number: int, load: float, tilt: float, **options: float) -> Run:
     """One run, with rig quantities at 100 Hz that do not start with a frame."""
-    strain, trigger = strain_of(load, tilt, seed=number, **options)  # type: ignore[arg-type]
+    strain, trigger = strain_of(load, tilt, seed=number, **options)
     times = np.arange(0.0037, strain.shape[1] / RATE, 0.01) - 0.01
     angle = -0.3 * tilt
     random = np.random.default_rng(number)

@@ -42,4 +42,4 @@ def ring(damping: float = 0.0, belt: str = "inextensible", omega: float = OMEGA)
 def contact(d0: float, damping: float = 0.0, mu: float = 0.65, **option: float) -> ShearContact:
     law = Shear(option.pop("stiffness", 2.5e7), mu)
     n_nodes = int(option.pop("n_nodes", 40))
-    return shear.press(ring(damping), TREAD, law, d0, n_nodes=n_nodes, **option)  # type: ignore[arg-type]
+    return shear.press(ring(damping), TREAD, law, d0, n_nodes=n_nodes, **option)

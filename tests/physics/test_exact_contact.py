@@ -128,7 +128,7 @@ def test_what_is_no_number_or_out_of_range_is_refused_with_its_point() -> None:
     with pytest.raises(ParameterError, match="load = -1 N at point 1"):
         load_exact(RING, TREAD, np.array([3000.0, -1.0]))
     with pytest.raises(ParameterError, match="load is 'heavy'"):
-        load_exact(RING, TREAD, "heavy")  # type: ignore[arg-type]
+        load_exact(RING, TREAD, "heavy")
     with pytest.raises(ParameterError, match=r"point 1 at 5 N .* half angle of 0.0\d+ rad"):
         load_exact(RING, TREAD, np.array([3000.0, 5.0]))
     thin = replace(TREAD, thickness=3e-4)

@@ -70,7 +70,7 @@ def read(trace: StrainTrace) -> Features:
 def features(
     fy: list[float] | float = 0.0, fx: list[float] | float = 0.0, **options: object
 ) -> Features:
-    c = contact(fy, fx, **options)  # type: ignore[arg-type]
+    c = contact(fy, fx, **options)
     return read(gage_trace(c, TIRE.innerliner_offset, low_pass=LowPass()))
 
 
@@ -213,7 +213,7 @@ def test_bad_input_is_refused() -> None:
     with pytest.raises(ParameterError, match="offset"):
         gage_trace(c, 0.002)
     with pytest.raises(ParameterError, match="reference"):
-        gage_trace(c, -0.003, reference="none")  # type: ignore[arg-type]
+        gage_trace(c, -0.003, reference="none")
     with pytest.raises(ShapeError, match="tread's strain"):
         gage_trace(c, -0.003, tread=np.zeros((1, 2, 3), dtype=complex))
     still = press_strips(TIRE, 4800.0)

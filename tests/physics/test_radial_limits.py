@@ -219,7 +219,7 @@ def _softening(deflection: np.ndarray) -> Compliance:
 )
 def test_bad_input_is_named(make: object, parts: list[str]) -> None:
     with pytest.raises(ParameterError) as caught:
-        make()  # type: ignore[operator]
+        make()
     for part in parts:
         assert part in str(caught.value)
 

@@ -204,6 +204,6 @@ def test_sidewall_follows_pressure_on_a_line_and_deflection_exponentially(
 )
 def test_what_no_ring_can_be_is_refused(make: object, parts: list[str]) -> None:
     with pytest.raises(ParameterError) as caught:
-        make()  # type: ignore[operator]
+        make()
     for part in parts:
         assert part in str(caught.value)

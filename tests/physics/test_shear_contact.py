@@ -240,7 +240,7 @@ def test_damping_moves_the_pressure_to_the_entry() -> None:
 @pytest.mark.parametrize("torque", [None, 0.0])
 def test_effective_radius_lies_between_loaded_and_free_radius(torque: float | None) -> None:
     for d0 in DEFLECTIONS:
-        c = contact(d0, 0.04, torque=torque)  # type: ignore[arg-type]
+        c = contact(d0, 0.04, torque=torque)
         assert c.loaded_radius[0] < c.effective_radius[0] < R + H0
         assert c.loaded_radius[0] == pytest.approx(R + H0 - d0, abs=1e-12)
 
@@ -261,7 +261,7 @@ def test_the_power_of_the_road_is_spent_in_belt_and_wheel(torque: float | None) 
     The linear ring has its moment on the undeformed radius, and (81) has no moment of f_n on the
     sheared tip; both are added here. What the last element still holds is lost behind the patch.
     """
-    c = contact(0.035, 0.09, np.inf, torque=torque)  # type: ignore[arg-type]
+    c = contact(0.035, 0.09, np.inf, torque=torque)
     if torque is not None:
         assert c.torque[0] == pytest.approx(torque, abs=1e-8)
     w, n = c.weights[0], np.arange(61.0)

@@ -354,7 +354,7 @@ def test_friction_loads_are_the_belt_loads_without_the_pressure() -> None:
 )
 def test_bad_input_is_refused_by_name(call: object, message: str) -> None:
     with pytest.raises(ParameterError, match=message):
-        call()  # type: ignore[operator]
+        call()
 
 
 def test_a_belt_that_lifts_off_is_not_one_patch() -> None:

@@ -55,7 +55,7 @@ def on_road(
         omega=59.0,
         forces=RoadForces(along.astype(float), side.astype(float)),
         lateral_shear=SHEAR,
-        **options,  # type: ignore[arg-type]
+        **options,
     )
 
 

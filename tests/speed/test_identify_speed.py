@@ -30,7 +30,7 @@ def least(work: object, rounds: int = 2) -> float:
     times = []
     for _ in range(rounds):
         start = perf_counter()
-        work()  # type: ignore[operator]
+        work()
         times.append(perf_counter() - start)
     return min(times)
 
@@ -55,7 +55,7 @@ def test_growth_with_free_parameters(capsys: pytest.CaptureFixture[str]) -> None
         prior = Prior(np.full(len(free), 0.5))
         data = runs.data()
 
-        def work(free=free, prior=prior, data=data) -> None:  # type: ignore[no-untyped-def]
+        def work(free=free, prior=prior, data=data) -> None:
             fit_waveforms(data, values_of(TIRE), prior, free=free, discrepancy=Discrepancy())
 
         times[len(free)] = least(work)

@@ -194,8 +194,7 @@ def _predict_runs(
     states = [_at(model, three, place, correction, low_pass) for place in places]
     waves = []
     for state in states:
-        assert state.waveform is not None  # noqa: S101 - the chain sets it
-        waves.append(state.waveform.reshape(3, n, N_PHI))
+        waves.append(state.wave.reshape(3, n, N_PHI))
     mean = np.mean(waves, axis=0)
     gages = np.stack([wave[0] for wave in waves], axis=1)
     depth = states[0].deflection.reshape(3, n)

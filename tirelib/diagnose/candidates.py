@@ -129,8 +129,7 @@ def _rows(data: Data, model: Refit, effect: Effect) -> FloatArray:
             model.values, data.points, [*model.changes, effect.at(trial)],
             low_pass=data.low_pass, correction=model.correction,
         )  # fmt: skip
-        assert state.waveform is not None  # noqa: S101 - the chain sets it
-        change = (state.waveform - model.waveform) * (effect.scale / effect.step)
+        change = (state.wave - model.waveform) * (effect.scale / effect.step)
         rows.append(model.whiten(change).ravel())
     return np.array(rows)
 

@@ -130,8 +130,7 @@ def _variant(
         values, really, [*model.changes, *rolling], low_pass=data.low_pass,
         correction=model.correction,
     )  # fmt: skip
-    wave = state.waveform
-    assert wave is not None  # noqa: S101 - the chain sets it
+    wave = state.wave
     wave = wave + np.tensordot(random.standard_normal(len(misfit)), misfit, axes=1)
     wave = wave + random.uniform(0.0, 20e-6) * np.cos(GRID - random.uniform(-np.pi, np.pi))
     wave = wave * (1.0 + tolerance.gain * random.standard_normal(n))[:, None]
@@ -156,6 +155,5 @@ def _refitted(
             move(model.values, z, FITTED), data.points, model.changes, low_pass=data.low_pass,
             correction=model.correction,
         )  # fmt: skip
-        assert state.waveform is not None  # noqa: S101 - the chain sets it
-        fitted = state.waveform
+        fitted = state.wave
     return fitted

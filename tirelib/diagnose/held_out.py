@@ -96,8 +96,7 @@ def error_on(data: Data, model: Refit) -> float:
     correction = large_displacements(model.values, points, low_pass=data.low_pass)
     wave = predict(
         model.values, points, model.changes, low_pass=data.low_pass, correction=correction
-    ).waveform
-    assert wave is not None  # noqa: S101 - the chain sets it
+    ).wave
     whiten = whitening(
         wave, model.values, points, data.tolerance, data.angle_std, data.noise, data.low_pass
     )

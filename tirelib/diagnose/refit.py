@@ -189,8 +189,7 @@ class _Fitter:
             values, self.data.points, changes_of(self.effects, self.strengths(z)),
             low_pass=self.data.low_pass, correction=self.correction,
         )  # fmt: skip
-        assert state.waveform is not None  # noqa: S101 - the chain sets it
-        return state.waveform
+        return state.wave
 
     def _cost(self, waveform: FloatArray, z: FloatArray) -> float:
         rest = self.whiten(self.data.strain - waveform)

@@ -241,9 +241,8 @@ def model_edges(
     contact needs.
     """
     state = predict(values, points, low_pass=low_pass, correction=correction)
-    assert state.waveform is not None  # noqa: S101 - the chain sets it
     assert state.contact is not None  # noqa: S101
-    reading = read_edges(state.waveform, low_pass=low_pass)
+    reading = read_edges(state.wave, low_pass=low_pass)
     return ModelEdges(state.contact.edges, reading, state.deflection)
 
 

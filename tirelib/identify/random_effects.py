@@ -99,10 +99,7 @@ def random_tangents(
     load, pressure = three.load.copy(), three.pressure.copy()
     load[n : 2 * n] *= 1.0 + TRIAL
     pressure[2 * n :] *= 1.0 + TRIAL
-    waves = predict(
-        values, replace(three, load=load, pressure=pressure), low_pass=low_pass
-    ).waveform
-    assert waves is not None  # noqa: S101 - the chain sets it
+    waves = predict(values, replace(three, load=load, pressure=pressure), low_pass=low_pass).wave
     by_load = (waves[n : 2 * n] - waves[:n]) / TRIAL
     by_pressure = (waves[2 * n :] - waves[:n]) / TRIAL
     return np.stack([by_load, by_pressure, waveform, angle_slope(waveform)], axis=2)

@@ -413,8 +413,7 @@ class _Solver:
             )  # fmt: skip
         except TirelibError:
             return np.full(count, np.inf)
-        assert state.waveform is not None  # noqa: S101 - the chain sets it
-        waves = state.waveform.reshape(count, n, -1)
+        waves = state.wave.reshape(count, n, -1)
         depth = state.deflection.reshape(count, n)
         return np.array([self._cost(waves[i], depth[i], points[i]) for i in range(count)])
 

@@ -118,8 +118,7 @@ class Correction:
 
     def change(self, state: State) -> State:
         """Add the correction to a waveform."""
-        assert state.waveform is not None  # noqa: S101 - acts at the gage stage
-        return state.but(waveform=state.waveform + self.waveform)
+        return state.but(waveform=state.wave + self.waveform)
 
     def tiled(self, times: int) -> "Correction":
         """Return the correction for points repeated one after the other."""
@@ -160,10 +159,9 @@ def large_displacements(
     still = dict(values)
     still["damping"] = 0.0
     state = waveform(State.of(still, points, phi), low_pass=low_pass)
-    assert state.waveform is not None  # noqa: S101 - the chain sets it
     exact = load_exact(replace(state.ring, shear_stiffness=np.inf), state.tread, points.load)
     strain = smoothed(exact.strain(state.offset, phi), points, low_pass or LowPass())
-    return Correction(strain - state.waveform, exact.deflection - state.deflection)
+    return Correction(strain - state.wave, exact.deflection - state.deflection)
 
 
 def smoothed(strain: FloatArray, points: Operating, low_pass: LowPass) -> FloatArray:
@@ -247,7 +245,6 @@ def linearised(
         columns, points.tiled(k + 1), changes, low_pass=low_pass,
         correction=correction.tiled(k + 1) if correction else None,
     )  # fmt: skip
-    assert state.waveform is not None  # noqa: S101 - the chain sets it
-    waves = state.waveform.reshape(k + 1, n, -1)
+    waves = state.wave.reshape(k + 1, n, -1)
     depth = state.deflection.reshape(k + 1, n)
     return Linear(waves[0], depth[0], (waves[1:] - waves[0]) / step, (depth[1:] - depth[0]) / step)

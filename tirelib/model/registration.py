@@ -198,8 +198,7 @@ class _Bench:
     def waveform(self, *changes: tuple[str, Change]) -> FloatArray:
         """Return the waveform with changes."""
         state = predict(self.values, self.plan.points, self.plan.changes(*changes))
-        assert state.waveform is not None  # noqa: S101 - the chain sets it
-        return state.waveform
+        return state.wave
 
     def tangents(self, effect: Effect) -> FloatArray:
         """Return derivatives at zero times the end of the range, (components, points x angles)."""
@@ -313,8 +312,7 @@ def _recover(effect: Effect, component: int, data: FloatArray, bench: _Bench) ->
         change = effect.at(effect.along(component, strength))
         linear = linearised(values, bench.plan.points, FREE, bench.plan.changes(change))
         trial = effect.at(effect.along(component, strength + effect.step))
-        moved = predict(values, bench.plan.points, bench.plan.changes(trial)).waveform
-        assert moved is not None  # noqa: S101 - the chain sets it
+        moved = predict(values, bench.plan.points, bench.plan.changes(trial)).wave
         slope = (moved - linear.waveform) / effect.step
         columns = np.stack([*linear.waveform_slopes, slope]).reshape(len(FREE) + 1, -1)
         norm = np.linalg.norm(columns, axis=1)

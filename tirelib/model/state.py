@@ -13,6 +13,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.contact.radial import RadialContact
 from tirelib.contact.tread import Tread
+from tirelib.errors import ParameterError
 from tirelib.ring.ring import ComplexArray, Ring
 
 
@@ -148,6 +149,21 @@ class State:
     def but(self, **changes: Any) -> "State":
         """Return the state with some fields replaced."""
         return replace(self, **changes)
+
+    @property
+    def wave(self) -> FloatArray:
+        """The waveform of a state that the chain has brought to the gage stage.
+
+        Raises
+        ------
+        ParameterError
+            If it has not.
+        """
+        if self.waveform is None:
+            raise ParameterError(
+                "state: it holds no waveform yet; solve it with `tirelib.model.chain.waveform`"
+            )
+        return self.waveform
 
     @property
     def ring(self) -> Ring:

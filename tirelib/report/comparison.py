@@ -126,7 +126,7 @@ def write_comparison(found: Comparison | ForceComparison, folder: Path) -> tuple
     """
     parts = force_parts(found) if isinstance(found, ForceComparison) else strain_parts(found)
     title = f"Model against measurement: {found.quantity}"
-    shown = [_Shown.of(plot) for part in parts for plot in part.plots]
+    shown = [Shown.of(plot) for part in parts for plot in part.plots]
     figures = "{" + ",".join(f"{json.dumps(s.name)}:{s.json}" for s in shown) + "}"
     by_name = {s.name: s for s in shown}
     views = [
@@ -149,7 +149,7 @@ def write_comparison(found: Comparison | ForceComparison, folder: Path) -> tuple
 
 
 @dataclass(frozen=True, slots=True)
-class _Shown:
+class Shown:
     """A plot as the template takes it."""
 
     name: str
@@ -160,7 +160,8 @@ class _Shown:
     csv: str
 
     @classmethod
-    def of(cls, plot: Plot) -> "_Shown":
+    def of(cls, plot: Plot) -> "Shown":
+        """Return the plot with its data ready for the page."""
         text = io.StringIO()
         writer = csv.writer(text)
         writer.writerow(plot.columns)
@@ -339,6 +340,12 @@ def markdown(found: Comparison | ForceComparison, parts: Sequence[Part], title: 
     if found.sentences:
         lines += ["## Lack of fit", "", *(f"- {text}" for text in found.sentences), "",
                   SENTENCE_NOTE, ""]  # fmt: skip
+    return "\n".join([*lines, *markdown_parts(parts)]).rstrip() + "\n"
+
+
+def markdown_parts(parts: Sequence[Part]) -> list[str]:
+    """Return words, tables and sources of a page's parts as lines of Markdown."""
+    lines: list[str] = []
     for part in parts:
         if not (part.text or part.tables or part.sources):
             continue
@@ -346,13 +353,14 @@ def markdown(found: Comparison | ForceComparison, parts: Sequence[Part], title: 
         if part.text:
             lines += [part.text, ""]
         for table in part.tables:
-            lines += _markdown_table(table)
+            lines += markdown_table(table)
         lines += [f"- {source}" for source in part.sources]
         lines.append("")
-    return "\n".join(lines).rstrip() + "\n"
+    return lines
 
 
-def _markdown_table(table: Table) -> list[str]:
+def markdown_table(table: Table) -> list[str]:
+    """Return a table as lines of Markdown."""
     head = "| " + " | ".join(table.columns) + " |"
     rule = "|" + "|".join("---" if k < table.texts else "---:" for k in range(len(table.columns)))
     rows = [

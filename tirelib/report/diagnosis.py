@@ -14,7 +14,7 @@ from tirelib.diagnose.diagnose import ALARM, Finding
 from tirelib.diagnose.document import Assessment, exceeds, next_test
 from tirelib.diagnose.held_out import pooled
 from tirelib.diagnose.left import Left, left_of
-from tirelib.report.comparison import METHOD, RING, Part, _markdown_table, _Shown
+from tirelib.report.comparison import METHOD, RING, Part, Shown, markdown_parts
 from tirelib.report.figures.compare_plot import (
     ANGLE_TITLE,
     DIVERGING,
@@ -65,7 +65,7 @@ def write_diagnosis(told: Assessment, folder: Path) -> tuple[Path, Path]:
         If the folder cannot be written.
     """
     parts = parts_of(told)
-    shown = [_Shown.of(plot) for part in parts for plot in part.plots]
+    shown = [Shown.of(plot) for part in parts for plot in part.plots]
     figures = "{" + ",".join(f"{json.dumps(s.name)}:{s.json}" for s in shown) + "}"
     by_name = {s.name: s for s in shown}
     views = [
@@ -261,14 +261,4 @@ def _map(told: Assessment, left: Left, name: str, title: str) -> Plot:
 def _markdown(told: Assessment, parts: Sequence[Part]) -> str:
     lines = [f"# {TITLE}", "", _summary(told), "", f"**{answer_of(told)}**", ""]
     lines += [f"> {message}\n" for message in told.messages]
-    for part in parts:
-        if not (part.text or part.tables or part.sources):
-            continue
-        lines += [f"## {part.title}", ""]
-        if part.text:
-            lines += [part.text, ""]
-        for table in part.tables:
-            lines += _markdown_table(table)
-        lines += [f"- {source}" for source in part.sources]
-        lines.append("")
-    return "\n".join(lines).rstrip() + "\n"
+    return "\n".join([*lines, *markdown_parts(parts)]).rstrip() + "\n"

@@ -33,11 +33,11 @@ IN_REPORT = {"Fz": 1.0, "alpha": 1.0, "kappa": 100.0, "Fy": 1.0}
 class LiveFiles:
     """What the steps of the demonstration wrote.
 
-    `library`, `fmu`, `live` and `replay` are JSON of estimates; `conditions` is the emulator's
-    sidecar, `device` says what a count of the line is.
+    `direct` (by the library itself), `fmu`, `live` and `replay` are JSON of estimates;
+    `conditions` is the emulator's sidecar, `device` says what a count of the line is.
     """
 
-    library: Path
+    direct: Path
     fmu: Path
     live: Path
     replay: Path
@@ -60,7 +60,7 @@ def agreements(files: LiveFiles, rounding: float) -> list[Agreement]:
 
     The last must agree only where the line rounded nothing.
     """
-    library, live = read_turns(files.library), read_turns(files.live)
+    library, live = read_turns(files.direct), read_turns(files.live)
     return [
         agreement("library \N{MINUS SIGN} FMU", library, read_turns(files.fmu), TOLERANCE),
         agreement("live \N{MINUS SIGN} replay", live, read_turns(files.replay), 0.0),

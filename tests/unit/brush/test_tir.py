@@ -83,8 +83,7 @@ values = st.one_of(st.none(), st.floats(allow_nan=False, allow_infinity=False), 
 @given(table=st.dictionaries(keys, st.tuples(values, words_of_text), max_size=12))
 def test_any_value_survives_the_round_trip(table: dict[str, tuple[object, str]]) -> None:
     entries = tuple(
-        TirEntry("V_" + key, value, comment.rstrip())  # type: ignore[arg-type]
-        for key, (value, comment) in table.items()
+        TirEntry("V_" + key, value, comment.rstrip()) for key, (value, comment) in table.items()
     )
     base = parse_tir("[UNITS]\n" + UNITS + "[MODEL]\nFITTYP=52\n")
     tire = TirFile(

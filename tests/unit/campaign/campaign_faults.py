@@ -27,10 +27,7 @@ def channel(which: str, **new: object) -> Callable[[Group], Group]:
     """Return a change of a group that edits one channel."""
 
     def apply(group: Group) -> Group:
-        edited = [
-            replace(c, **new) if c.name == which else c  # type: ignore[arg-type]
-            for c in group.channels
-        ]
+        edited = [replace(c, **new) if c.name == which else c for c in group.channels]
         return replace(group, channels=tuple(edited))
 
     return apply
@@ -38,6 +35,6 @@ def channel(which: str, **new: object) -> Callable[[Group], Group]:
 
 def put(gage: int, where: object, value: float) -> Callable[[FloatArray], None]:
     def apply(strain: FloatArray) -> None:
-        strain[gage, where] = value  # type: ignore[index]
+        strain[gage, where] = value
 
     return apply

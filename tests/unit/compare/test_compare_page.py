@@ -59,7 +59,7 @@ def found() -> Comparison:
 @pytest.fixture(scope="module")
 def page(found: Comparison, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
     files = write_comparison(found, tmp_path_factory.mktemp("page"))
-    return tuple(file.read_text(encoding="utf-8") for file in files)  # type: ignore[return-value]
+    return tuple(file.read_text(encoding="utf-8") for file in files)
 
 
 def test_the_page_loads_nothing_and_has_plotly_once(page: tuple[str, str]) -> None:

@@ -20,7 +20,7 @@ from tirelib.observations import Observations, measure_run, observe, same_tire
 
 
 def features_of(**options: float) -> Features:
-    run = synthetic_run(0, **options)  # type: ignore[arg-type]
+    run = synthetic_run(0, **options)
     return measure_run(run, header())[0]
 
 

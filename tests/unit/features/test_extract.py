@@ -17,7 +17,7 @@ from tirelib.signal import cut_turns
 
 
 def features_of(*, speed: float = 18.0, **options: float) -> Features:
-    strain, trigger, _ = record(speed=speed, **options)  # type: ignore[arg-type]
+    strain, trigger, _ = record(speed=speed, **options)
     return extract_features(cut_turns(strain, RATE, LATERAL, speed=speed, trigger=trigger))
 
 

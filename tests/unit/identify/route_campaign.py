@@ -107,4 +107,4 @@ def turned(strain: FloatArray, shift: FloatArray) -> FloatArray:
 
 def runs(of: Tire, conditions: Sequence[Condition], **options: float) -> StraightRuns:
     """Return the straight runs of `waves`."""
-    return straight_runs(waves(of, conditions, **options))  # type: ignore[arg-type]
+    return straight_runs(waves(of, conditions, **options))

@@ -41,11 +41,11 @@ START = tire_file(
 
 
 @pytest.fixture(scope="module")
-def found():  # type: ignore[no-untyped-def]
+def found():
     return dynamic_route(runs(TRUE, SERIES), START)
 
 
-def test_known_stiffness_lies_within_the_stated_intervals(found) -> None:  # type: ignore[no-untyped-def]
+def test_known_stiffness_lies_within_the_stated_intervals(found) -> None:
     for p in found.pressures:
         for side in ("radial", "tangential"):
             q = found.quantity(f"{side}_stiffness at {p / 1e5:.2f} bar")
@@ -61,7 +61,7 @@ def test_known_stiffness_lies_within_the_stated_intervals(found) -> None:  # typ
     )
 
 
-def test_predicted_vertical_stiffness_is_that_of_the_rig(found) -> None:  # type: ignore[no-untyped-def]
+def test_predicted_vertical_stiffness_is_that_of_the_rig(found) -> None:
     assert found.vertical is not None
     assert len(found.vertical.pressure) == 3
     assert np.abs(found.vertical.error).max() < 0.05
@@ -69,7 +69,7 @@ def test_predicted_vertical_stiffness_is_that_of_the_rig(found) -> None:  # type
     assert (np.diff(found.vertical.predicted) > 0).all()
 
 
-def test_corrected_edges_remove_the_load_error_at_small_loads(found) -> None:  # type: ignore[no-untyped-def]
+def test_corrected_edges_remove_the_load_error_at_small_loads(found) -> None:
     # Fig. 6-21: as printed the error is large at the smallest loads
     assert found.as_printed is not None
     small = found.loads.measured < 2000.0
@@ -126,7 +126,7 @@ def test_pressure_levels_follow_the_measured_pressures() -> None:
 
 @pytest.mark.parametrize("law", ["sidewall", "modal"])
 @pytest.mark.parametrize("damping", [0.03, 0.07, 0.12])
-def test_damping_comes_back_from_both_readings(law, damping) -> None:  # type: ignore[no-untyped-def]
+def test_damping_comes_back_from_both_readings(law, damping) -> None:
     ratio = damping if law == "sidewall" else 0.4 * damping
     data = runs(TRUE, SPEEDS, damping=ratio, law=law, angle_std=5e-4)
     found = fit_damping(data, data.strain, values_of(TRUE), {"mass": 0.05}, law=law, delay_std=0.02)
@@ -178,9 +178,9 @@ def test_the_two_laws_agree_without_damping_and_at_rest() -> None:
     ring = Ring.of(TRUE, TRUE.pressure)
     plain = compliance(replace(ring, damping=0.0), 80.0, 60).matrix
     for law in ("sidewall", "modal"):
-        none = damped_compliance(ring, 80.0, 0.0, law).matrix  # type: ignore[arg-type]
+        none = damped_compliance(ring, 80.0, 0.0, law).matrix
         np.testing.assert_allclose(none, plain, rtol=1e-9, atol=1e-22)
-        still = damped_compliance(ring, 0.0, 0.1, law).matrix  # type: ignore[arg-type]
+        still = damped_compliance(ring, 0.0, 0.1, law).matrix
         np.testing.assert_allclose(still, plain, rtol=1e-9, atol=1e-22)
 
 
@@ -199,7 +199,7 @@ def test_sidewall_dashpots_take_the_power_of_their_motion() -> None:
 
 def test_an_unknown_law_is_refused() -> None:
     with pytest.raises(ParameterError, match="'sidewall' and 'modal'"):
-        damped_compliance(Ring.of(TRUE, 2e5), 50.0, 0.05, "viscous")  # type: ignore[arg-type]
+        damped_compliance(Ring.of(TRUE, 2e5), 50.0, 0.05, "viscous")
 
 
 def test_rim_tests_are_predicted_with_the_corrected_equation() -> None:
@@ -233,7 +233,7 @@ def test_vertical_slopes_regress_the_load_on_the_deflection() -> None:
 
 
 @pytest.mark.parametrize("model", ["radial", "sheared"])
-def test_dynamic_pressure_carries_the_load(model) -> None:  # type: ignore[no-untyped-def]
+def test_dynamic_pressure_carries_the_load(model) -> None:
     values = asdict(TRUE.changed(damping=0.06, radial_deflection_rate=-3.0))
     loads = np.array([2000.0, 4000.0, 6000.0])
     found = dynamic_pressure(values, loads, 2.1e5, 80.0, model=model)
@@ -253,12 +253,12 @@ def test_the_deflection_rate_softens_the_pressed_tire() -> None:
 
 def test_dynamic_pressure_names_its_models() -> None:
     with pytest.raises(ParameterError, match="'radial' and 'sheared'"):
-        dynamic_pressure(asdict(TRUE), 5000.0, 2.1e5, 50.0, model="flat")  # type: ignore[arg-type]
+        dynamic_pressure(asdict(TRUE), 5000.0, 2.1e5, 50.0, model="flat")
     with pytest.raises(ParameterError, match="load > 0"):
         dynamic_pressure(asdict(TRUE), -1.0, 2.1e5, 50.0)
 
 
-def test_the_numerical_rig_s_damping_and_stiffness_come_back(tmp_path) -> None:  # type: ignore[no-untyped-def]
+def test_the_numerical_rig_s_damping_and_stiffness_come_back(tmp_path) -> None:
     """Against an independent tire: geometrically exact, five strips, friction."""
     truth = RigTire(sidewall_damping=0.07)
     points = ((2400.0, 20.0), (4800.0, 20.0), (7200.0, 20.0), (4800.0, 110.0))

@@ -29,7 +29,7 @@ WIDE = Prior(np.array([1.0, 1.0, 3.0, 1.0, 3.0, 1.0, 1.0, 1.0]))
 
 
 def data(seed: int = 0, **options: object) -> Data:
-    waves = made_waves(noise=NOISE, seed=seed, **options)  # type: ignore[arg-type]
+    waves = made_waves(noise=NOISE, seed=seed, **options)
     # noise of the mean over five gages; no structure in what the model made
     return replace(straight_runs(waves).data(), noise=NOISE / np.sqrt(5.0))
 

@@ -134,7 +134,7 @@ def test_points_are_tiled_and_taken() -> None:
 def test_changes_act_at_their_stages_in_order() -> None:
     seen: list[str] = []
 
-    def note(name: str):  # type: ignore[no-untyped-def]
+    def note(name: str):
         def change(state: State) -> State:
             seen.append(name)
             return state

@@ -152,7 +152,7 @@ def test_nothing_leaves_the_figure_and_titles_do_not_meet(
     drawn: dict[str, Figure], name: str
 ) -> None:
     figure = drawn[name]
-    renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+    renderer = figure.canvas.get_renderer()
     page = figure.bbox.padded(1.0)
     for legend in figure.legends:
         box = legend.get_window_extent()
@@ -160,7 +160,7 @@ def test_nothing_leaves_the_figure_and_titles_do_not_meet(
         assert box.x1 <= page.x1
     boxes = []
     for axes in figure.axes:
-        title = axes._left_title  # type: ignore[attr-defined]
+        title = axes._left_title
         if title.get_text():
             boxes.append(title.get_window_extent(renderer))
     for i, box in enumerate(boxes):

@@ -46,7 +46,7 @@ def documents(library: Document) -> dict[str, Document]:
     live = as_live(library)
     truth = {"Fz": 4500.0, "alpha": -1.0, "kappa": 0.01, "Fy": 900.0}
     made = {
-        "library": library,
+        "direct": library,
         "fmu": library,
         "live": live,
         "replay": live,
@@ -79,7 +79,7 @@ def test_equal_documents_have_no_fault(
     assert find_faults(files, campaign) == []
     table = live_table(files, read_line(files, campaign))
     assert table.title == "Library = FMU = bench"
-    compared = sum(t["Fz"] is not None for t in documents["library"]["turns"])
+    compared = sum(t["Fz"] is not None for t in documents["direct"]["turns"])
     live = sum(t["Fz"] is not None for t in documents["live"]["turns"])
     assert row(table.rows, "vertical load Fz") == [
         "vertical load Fz", "N", str(compared), "0", "0", str(live), "0", str(live), "0", "0",
@@ -95,7 +95,7 @@ def test_the_table_tells_the_largest_difference_of_each_pair(
     files, campaign = written(tmp_path, documents), world.campaigns["set1"]
     table = live_table(files, read_line(files, campaign))
     load, force = row(table.rows, "vertical load Fz"), row(table.rows, "lateral force Fy")
-    largest = max(abs(t["Fz"]) for t in documents["library"]["turns"] if t["Fz"] is not None)
+    largest = max(abs(t["Fz"]) for t in documents["direct"]["turns"] if t["Fz"] is not None)
     assert float(load[3]) == pytest.approx(2.5e-8, rel=0.05)  # two digits
     assert float(load[4]) == pytest.approx(2.5e-8 / largest, rel=0.05)
     assert (load[6], load[8]) == ("0", "0")

@@ -125,7 +125,7 @@ def test_the_legend_is_complete_distinct_and_clear_of_all_else(
     drawn: dict[str, Figure], name: str
 ) -> None:
     figure = drawn[name]
-    renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+    renderer = figure.canvas.get_renderer()
     assert len(figure.legends) == 1
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
     assert len(texts) >= 2
@@ -141,7 +141,7 @@ def test_the_legend_is_complete_distinct_and_clear_of_all_else(
 @pytest.mark.parametrize("name", DRAW)
 def test_axes_with_their_labels_and_titles_do_not_meet(drawn: dict[str, Figure], name: str) -> None:
     figure = drawn[name]
-    renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+    renderer = figure.canvas.get_renderer()
     # tight boxes carry up to two pixels of margin
     boxes = [axes.get_tightbbox(renderer).padded(-2.0) for axes in figure.axes]
     page = figure.bbox.padded(1.0)

@@ -15,7 +15,7 @@ from tirelib.signal import LowPass, Turn, TurnCutter, Turns, cut_turns
 
 
 def turns_of(strain: np.ndarray, **options: object) -> Turns:
-    return cut_turns(strain, RATE, LATERAL, **{"speed": 18.0, **options})  # type: ignore[arg-type]
+    return cut_turns(strain, RATE, LATERAL, **{"speed": 18.0, **options})
 
 
 def has(turns: Turns, flag: TurnFlag, turn: int, gage: int | None = None) -> bool:

@@ -30,7 +30,7 @@ def stream() -> StreamEstimator:
 
 
 def played(strain: np.ndarray, **conditions: object) -> list[TurnEstimate]:
-    return stream().push(strain, **{**HELD, **conditions})  # type: ignore[arg-type]
+    return stream().push(strain, **{**HELD, **conditions})
 
 
 def assert_row(turn: TurnEstimate, features: Features, estimates: Estimates, row: int) -> None:
