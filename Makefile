@@ -18,8 +18,9 @@ $(STAMP): pyproject.toml .ci/constraints.txt
 demo: $(STAMP)
 	$(BIN)/python build/demo.py
 
+# One process a core, a file to each; the array libraries keep to one thread in each.
 test: lint
-	$(BIN)/python -m pytest
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses=auto --dist=loadfile
 
 lint: $(STAMP)
 	$(BIN)/ruff check
@@ -33,7 +34,7 @@ docs: $(STAMP)
 
 # Timed, with ratios within one run; never part of `make test`.
 bench: $(STAMP)
-	$(BIN)/python -m pytest tests/speed --benchmark-only --benchmark-columns=min,median,max,rounds
+	$(BIN)/python -m pytest tests/speed -m speed --benchmark-columns=min,median,max,rounds
 
 # Draws the figures of the dissertation's chapters 5 and 6 from the models.
 figures: $(STAMP)
