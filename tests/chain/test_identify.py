@@ -15,7 +15,7 @@ from bench.rig.tire import TIRES, Condition
 from tests.chain.test_command_line import run
 from tests.synthetic import synthetic_run, write
 from tirelib.campaign import read_campaign
-from tirelib.cli import program
+from tirelib.cli import main, program
 from tirelib.parameters import read_tire
 
 TIRE = TIRES["reference"]
@@ -47,9 +47,11 @@ def document(files: dict[str, Path]) -> dict[str, Any]:
     return dict(json.loads(files["json"].read_text()))
 
 
-def test_true_values_lie_in_the_intervals(document: dict[str, Any]) -> None:
+@pytest.fixture(scope="module")
+def true() -> dict[str, float]:
+    """The rig tire's constants at the mean pressure, in the units of the document."""
     mean = float(np.mean([pressure for _, pressure in CONDITIONS]))
-    true = {
+    return {
         "bending_stiffness": TIRE.bending,
         "radial_stiffness": TIRE.radial_stiffness(mean),
         "tangential_stiffness": TIRE.tangential_stiffness(mean),
@@ -59,13 +61,35 @@ def test_true_values_lie_in_the_intervals(document: dict[str, Any]) -> None:
         "tangential_pressure_slope": 1e5 * TIRE.sidewall_tangential,
         "extension_stiffness": TIRE.extension,
     }
+
+
+def test_true_values_lie_in_the_intervals(document: dict[str, Any], true: dict[str, float]) -> None:
     assert {p["name"] for p in document["parameters"]} == set(true)
     for entry in document["parameters"]:
         assert entry["low"] <= true[entry["name"]] <= entry["high"], entry
 
 
+def test_what_strain_tells_is_near_the_truth(
+    document: dict[str, Any], true: dict[str, float]
+) -> None:
+    """Intervals may be wide; the values themselves are much nearer than those."""
+    entries = {entry["name"]: entry for entry in document["parameters"]}
+    assert not entries["radial_stiffness"]["flags"]
+    near = {
+        "bending_stiffness": 0.2, "radial_stiffness": 0.05, "innerliner_offset": 0.02,
+        "extension_stiffness": 0.25, "radial_pressure_slope": 0.15,
+    }  # fmt: skip
+    for name, share in near.items():
+        assert entries[name]["value"] == pytest.approx(true[name], rel=share), name
+        assert "at_boundary" not in entries[name]["flags"], name
+        half = 0.5 * (entries[name]["high"] - entries[name]["low"])
+        # the fit's part is what four runs can tell, and not a rounded-up guess
+        assert 0.0 < entries[name]["fit_std"] < half / 1.96
+
+
 def test_the_strain_is_explained(document: dict[str, Any]) -> None:
-    assert document["rms_ustrain"] < 0.06 * document["strain_rms_ustrain"]
+    # a ring leaves 2 % of this tire's strain; one without large displacements 7 %
+    assert document["rms_ustrain"] < 0.03 * document["strain_rms_ustrain"]
     stiffness = document["vertical_stiffness"]
     assert stiffness["model"] == pytest.approx(stiffness["measured"], rel=0.05)
 
@@ -112,15 +136,6 @@ def test_simulate_takes_the_model(files: dict[str, Path], tmp_path: Path) -> Non
     assert 10.0 < simulated["deflection_mm"] < 40.0
 
 
-def test_a_tire_may_be_given_as_start(campaign: Path, tmp_path: Path) -> None:
-    found = CliRunner().invoke(
-        program,
-        ["identify", str(campaign), "--tire", "table-6-1", "--out", str(tmp_path / "M.toml")],
-    )
-    assert found.exit_code == 0, found.output
-    assert (tmp_path / "M.toml").exists()
-
-
 def test_no_strain_is_an_error_of_two(tmp_path: Path) -> None:
     runs = [replace(synthetic_run(i), strain=None, trigger=None) for i in range(4)]
     folder = write(tmp_path / "c", runs)
@@ -131,25 +146,51 @@ def test_no_strain_is_an_error_of_two(tmp_path: Path) -> None:
     assert not (tmp_path / "M.toml").exists()
 
 
-def test_a_sweep_alone_is_an_error_of_two(tmp_path: Path) -> None:
+def refused(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *words: object
+) -> str:
+    """Return what a call in this process says when it ends with 2."""
+    monkeypatch.setattr("sys.argv", ["tirelib", *map(str, words)])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    return capsys.readouterr().err
+
+
+def test_a_sweep_alone_is_an_error_of_two(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     folder = write(tmp_path / "c", [synthetic_run(0, kind="sweep")])
-    done = run("identify", folder, "--out", tmp_path / "M.toml")
-    assert done.returncode == 2
-    assert "is a sweep" in done.stderr
+    assert "is a sweep" in refused(
+        monkeypatch, capsys, "identify", folder, "--out", tmp_path / "M.toml"
+    )
 
 
-def test_a_tire_that_is_not_there_is_an_error_of_two(campaign: Path, tmp_path: Path) -> None:
-    done = run("identify", campaign, "--tire", "none-such", "--out", tmp_path / "M.toml")
-    assert done.returncode == 2
-    assert "none-such" in done.stderr
+def test_a_tire_that_is_not_there_is_an_error_of_two(
+    campaign: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert "none-such" in refused(
+        monkeypatch, capsys,
+        "identify", campaign, "--tire", "none-such", "--out", tmp_path / "M.toml",
+    )  # fmt: skip
 
 
-def test_nothing_identified_is_one(
-    campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_tire_may_be_given_as_start_and_nothing_identified_is_one(
+    campaign: Path, document: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tirelib.identify.identify.WIDEST", 1e-6)
+    out = tmp_path / "M.toml"
     found = CliRunner().invoke(
-        program, ["identify", str(campaign), "--out", str(tmp_path / "M.toml")]
+        program, ["identify", str(campaign), "--tire", "table-6-1", "--out", str(out)]
     )
     assert found.exit_code == 1, found.output
-    assert (tmp_path / "M.toml").exists(), "the numbers are written with their flags"
+    assert "would help" in found.output
+    numbers = read_tire(out).numbers  # written with their flags
+    plain = {entry["name"]: entry for entry in document["parameters"]}
+    assert numbers["radial_stiffness"].value == pytest.approx(
+        plain["radial_stiffness"]["value"], rel=0.02
+    )
+    assert all("not_identifiable" in numbers[name].notes["flags"] for name in plain)

@@ -7,7 +7,9 @@ import pytest
 from scipy.integrate import simpson
 
 from tirelib.contact import exact, radial
+from tirelib.contact import exact_energy as energy
 from tirelib.contact.exact import load_exact
+from tirelib.contact.exact_slopes import NAMES, exact_slopes
 from tirelib.contact.tread import Tread
 from tirelib.errors import ConvergenceError, ParameterError
 from tirelib.ring.compliance import compliance
@@ -28,7 +30,7 @@ PHI = np.linspace(-np.pi, np.pi, 720, endpoint=False)
 
 def test_a_small_load_gives_the_linear_ring() -> None:
     """The difference falls with the load: it is of second order in the displacement."""
-    still = compliance(RING, 0.0, exact.N_MODES)
+    still = compliance(RING, 0.0, energy.N_MODES)
     errors = []
     for load in (100.0, 300.0, 900.0):
         linear = radial.load(still, TREAD, load).deflection[0]
@@ -38,7 +40,7 @@ def test_a_small_load_gives_the_linear_ring() -> None:
 
 
 def test_a_large_load_does_not() -> None:
-    still = compliance(RING, 0.0, exact.N_MODES)
+    still = compliance(RING, 0.0, energy.N_MODES)
     linear = radial.load(still, TREAD, 7500.0).deflection[0]
     assert load_exact(RING, TREAD, 7500.0).deflection[0] > 1.05 * linear
 
@@ -55,7 +57,7 @@ def test_the_load_is_the_slope_of_the_energy() -> None:
 def _energy(solved: exact.ExactContact) -> np.ndarray:
     """Return the stored energy, integrated over angle on a fine grid, [J]."""
     phi = np.linspace(0.0, np.pi, 20001)
-    basis = exact._basis(phi)
+    basis = energy.basis(phi)
     x = np.concatenate([solved.even, solved.odd[:, 1:]], axis=1)
     u, v, e, c, da, dc = np.moveaxis(np.einsum("pid,nd->npi", basis, x), -1, 0)
     r, pb = 0.302, 2.1e5 * 0.165
@@ -81,7 +83,7 @@ def test_the_inextensible_belt_keeps_its_length() -> None:
     solved = load_exact(RING, TREAD, LOADS)
     phi = np.linspace(0.0, np.pi, 4001)
     x = np.concatenate([solved.even, solved.odd[:, 1:]], axis=1)
-    local = np.einsum("pid,nd->npi", exact._basis(phi), x)
+    local = np.einsum("pid,nd->npi", energy.basis(phi), x)
     stretch = np.hypot(0.302 + local[..., 2], local[..., 3]) / 0.302 - 1.0
     assert np.abs(stretch).max() < 5e-4
 
@@ -95,13 +97,13 @@ def test_the_belt_is_flat_on_the_road() -> None:
 
 def test_more_modes_and_nodes_change_little(monkeypatch: pytest.MonkeyPatch) -> None:
     coarse = load_exact(RING, TREAD, LOADS).deflection
-    monkeypatch.setattr(exact, "N_MODES", 72)
-    monkeypatch.setattr(exact, "N_PATCH", 110)
-    for cached in (exact._quadrature, exact._basis_at_nodes):
+    monkeypatch.setattr(energy, "N_MODES", 72)
+    monkeypatch.setattr(energy, "N_PATCH", 110)
+    for cached in (energy.quadrature, energy.basis_at_nodes, energy.fine):
         cached.cache_clear()
     fine = load_exact(RING, TREAD, LOADS).deflection
     monkeypatch.undo()
-    for cached in (exact._quadrature, exact._basis_at_nodes):
+    for cached in (energy.quadrature, energy.basis_at_nodes, energy.fine):
         cached.cache_clear()
     np.testing.assert_allclose(coarse, fine, rtol=3e-4)
 
@@ -145,13 +147,13 @@ def test_twenty_newton_are_still_resolved(monkeypatch: pytest.MonkeyPatch) -> No
     middle = np.zeros(1)
     coarse = load_exact(RING, TREAD, 20.0)
     for name, value in (("N_MODES", 96), ("N_PATCH", 128), ("N_REST", 120)):
-        monkeypatch.setattr(exact, name, value)
-    for cached in (exact._quadrature, exact._basis_at_nodes):
+        monkeypatch.setattr(energy, name, value)
+    for cached in (energy.quadrature, energy.basis_at_nodes, energy.fine):
         cached.cache_clear()
     fine = load_exact(RING, TREAD, 20.0)
     found = fine.deflection, fine.half_angle, fine.pressure_at(middle)[:, 0]
     monkeypatch.undo()
-    for cached in (exact._quadrature, exact._basis_at_nodes):
+    for cached in (energy.quadrature, energy.basis_at_nodes, energy.fine):
         cached.cache_clear()
     was = coarse.deflection, coarse.half_angle, coarse.pressure_at(middle)[:, 0]
     for one, other, most in zip(was, found, (2e-3, 6e-3, 1.5e-2), strict=True):
@@ -173,3 +175,90 @@ def test_the_pressure_carries_the_load() -> None:
 def test_a_shear_flexible_belt_is_refused() -> None:
     with pytest.raises(ParameterError, match="shear stiffness"):
         load_exact(replace(RING, shear_stiffness=7e4), TREAD, 4000.0)
+
+
+def test_the_energys_slope_is_its_difference() -> None:
+    """And the Newton matrix that of the slope: both by differences in random directions."""
+    rng = np.random.default_rng(1)
+    solved = load_exact(replace(RING, extension_stiffness=4e6), TREAD, LOADS[[0, 3]])
+    x, d0, k = solved.coefficients, solved.deflection, solved.constants
+    step = rng.standard_normal(x.shape) / (1.0 + np.arange(x.shape[1]) % 49) ** 2
+    h = 1e-7
+    ends = [energy.residual(x + s * h * step, d0 + s * h, k) for s in (-1.0, 1.0)]
+    found = (energy.jacobian(x, d0, k) @ np.c_[step, np.ones(2)][..., None])[..., 0]
+    expected = (ends[1] - ends[0]) / (2.0 * h)
+    np.testing.assert_allclose(found, expected, atol=1e-5 * np.abs(expected).max())
+
+
+SOFT = replace(RING, extension_stiffness=4e6)
+MOVED = {
+    "ea": ("extension_stiffness", 4e6), "ei": ("bending_stiffness", 1.8),
+    "pb": ("inflation", 2.1e5 * 0.165), "ku": ("radial_stiffness", 4.5e5),
+    "kv": ("tangential_stiffness", 1.6e5), "kt": ("normal_stiffness", 8.5e7),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_slopes_are_differences(name: str) -> None:
+    """Of deflection and strain; the step is so small that no node enters or leaves the contact."""
+    solved = load_exact(SOFT, TREAD, LOADS)
+    h, offset, phi = 1e-6, np.full(LOADS.size, -0.0033), PHI[::8]
+    directions = np.zeros((1, LOADS.size, len(NAMES)))
+    size = LOADS if name == "load" else np.full(LOADS.size, MOVED[name][1])
+    directions[0, :, NAMES.index(name)] = size
+    found = exact_slopes(solved, directions)
+    ends = []
+    for factor in (1.0 - h, 1.0 + h):
+        ring, tread, load = SOFT, TREAD, LOADS
+        if name == "load":
+            load = LOADS * factor
+        elif name == "kt":
+            tread = replace(TREAD, normal_stiffness=8.5e7 * factor)
+        else:
+            ring = replace(SOFT, **{MOVED[name][0]: MOVED[name][1] * factor})
+        ends.append(load_exact(ring, tread, load, start=solved))
+    depth = (ends[1].deflection - ends[0].deflection) / (2.0 * h)
+    np.testing.assert_allclose(found.deflection[0], depth, rtol=1e-4, atol=1e-8)
+    strain = (ends[1].strain(-0.0033, phi) - ends[0].strain(-0.0033, phi)) / (2.0 * h)
+    slope = found.strain(solved, offset, np.zeros((1, LOADS.size)), phi)[0]
+    np.testing.assert_allclose(slope, strain, atol=1e-4 * np.abs(strain).max())
+
+
+def test_strain_goes_with_the_offset_as_its_slope_says() -> None:
+    solved = load_exact(RING, TREAD, LOADS[:2])
+    none = np.zeros((1, 2, len(NAMES)))
+    slope = exact_slopes(solved, none).strain(
+        solved, np.full(2, -0.0033), np.full((1, 2), 1e-4), PHI
+    )[0]
+    change = solved.strain(-0.0032, PHI) - solved.strain(-0.0033, PHI)
+    np.testing.assert_allclose(slope, change, atol=1e-12)
+
+
+def test_an_inextensible_belt_does_not_move_with_its_extension_stiffness() -> None:
+    solved = load_exact(RING, TREAD, LOADS[:2])
+    directions = np.zeros((1, 2, len(NAMES)))
+    directions[..., 0] = 1e8
+    assert (exact_slopes(solved, directions).deflection == 0.0).all()
+
+
+def test_a_solution_nearby_is_a_start_that_changes_nothing() -> None:
+    """By itself, and moved along the slopes with the matrix of the old solution."""
+    near = load_exact(RING, TREAD, LOADS)
+    loads = 1.05 * LOADS
+    directions = np.zeros((1, LOADS.size, len(NAMES)))
+    directions[0, :, -1] = LOADS
+    moved = exact_slopes(near, directions).moved(near, np.array([0.05]))
+    cold = load_exact(RING, TREAD, loads)
+    assert np.abs(moved.deflection / cold.deflection - 1.0).max() < 2e-3
+    for start in (near, moved):
+        warm = load_exact(RING, TREAD, loads, start=start)
+        np.testing.assert_allclose(warm.deflection, cold.deflection, atol=2e-9)
+        np.testing.assert_allclose(warm.strain(-0.003, PHI), cold.strain(-0.003, PHI), atol=1e-8)
+
+
+def test_starts_and_directions_for_other_points_are_refused() -> None:
+    solved = load_exact(RING, TREAD, LOADS[:2])
+    with pytest.raises(ParameterError, match="2 points for 3 loads"):
+        load_exact(RING, TREAD, LOADS[:3], start=solved)
+    with pytest.raises(ParameterError, match=r"shape \(1, 3, 7\)"):
+        exact_slopes(solved, np.zeros((1, 3, 7)))

@@ -1,9 +1,11 @@
 """Cost of an identification. Goals on two cores: 19 runs under 5 s, 60 runs under 30 s.
 
-Run by `make bench`. Runs are made by the model; reading a campaign is not part of it.
+Run by `make bench`. Runs are made by the model; reading a campaign is not part of it. Times are of
+the processor, so that other work on the machine does not count. A fit of 60 runs takes some 2.5 s,
+one of 66 runs of the rig 3 s; advice on what to measure next is in it.
 """
 
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 import pytest
@@ -13,10 +15,11 @@ from tirelib.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.identify import FITTED, estimated
 from tirelib.identify.waveform_fit import Prior, fit_waveforms
-from tirelib.model.base import FREE, values_of
+from tirelib.model.base import FREE, large_displacements, values_of
 
 pytestmark = pytest.mark.speed
-GOALS = {19: 5.0, 60: 30.0}
+GOALS = {19: 3.0, 60: 10.0}
+"""A third of what is allowed: a slower fit is a regression."""
 
 
 def campaign(count: int) -> StraightRuns:
@@ -29,9 +32,9 @@ def campaign(count: int) -> StraightRuns:
 def least(work: object, rounds: int = 2) -> float:
     times = []
     for _ in range(rounds):
-        start = perf_counter()
+        start = process_time()
         work()
-        times.append(perf_counter() - start)
+        times.append(process_time() - start)
     return min(times)
 
 
@@ -62,3 +65,16 @@ def test_growth_with_free_parameters(capsys: pytest.CaptureFixture[str]) -> None
     with capsys.disabled():
         print({n: f"{t:.2f} s" for n, t in times.items()}, "by free parameters")  # noqa: T201 - the measurement
     assert times[8] < 12.0 * times[1]
+
+
+def test_a_correction_from_a_solution_nearby(capsys: pytest.CaptureFixture[str]) -> None:
+    """What a refit of a diagnosis pays for large displacements, anew and from the last one."""
+    points = campaign(60).data().points
+    values = values_of(TIRE)
+    before = large_displacements(values, points)
+    near = {**values, "tangential_stiffness": 1.02 * TIRE.tangential_stiffness}
+    anew = least(lambda: large_displacements(near, points))
+    again = least(lambda: large_displacements(near, points, start=before))
+    with capsys.disabled():
+        print(f"correction of 60 runs: {anew:.3f} s anew, {again:.3f} s from one nearby")  # noqa: T201 - the measurement
+    assert again < 0.8 * anew

@@ -1,7 +1,8 @@
 """Brush parameters from the forces of a campaign.
 
 Fy, Fx and Mz over slip angle, slip ratio, load and pressure, by least squares that give single
-outliers little weight. The channels are weighed by their own misfit, so that Mz counts beside Fy.
+outliers little weight. The channels are weighed by their own misfit, Fx and Fy together, Mz by a
+tenth: enough for the contact length, too little to bend stiffness and friction.
 Errors of points in one block (a run, or some seconds of a sweep) may go together; the standard
 deviations allow for that. They do not hold the brush's structural misfit that all blocks share.
 

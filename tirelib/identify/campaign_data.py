@@ -7,8 +7,8 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.campaign import Tolerance
 from tirelib.errors import CalibrationError
-from tirelib.identify.noise import Noise, noise_of
-from tirelib.identify.waveform_fit import Data
+from tirelib.identify.fit_cost import Data
+from tirelib.identify.noise import RepeatNoise, measured_tangents, repeat_noise
 from tirelib.model.base import operating_points
 from tirelib.waveforms import Waveforms
 
@@ -31,7 +31,7 @@ class StraightRuns:
         Mean over the gages in use: the ring is as wide as the belt, and so is this mean.
     gages : tuple of int
         Indices of the gages in use.
-    noise : Noise
+    noise : RepeatNoise
     deflection : shape (n_runs,), [m]
         Free radius less measured loaded radius; NaN where not measured.
     """
@@ -39,13 +39,13 @@ class StraightRuns:
     waves: Waveforms
     strain: FloatArray
     gages: tuple[int, ...]
-    noise: Noise
+    noise: RepeatNoise
     deflection: FloatArray
 
     def data(self, *, with_deflection: bool = True) -> Data:
         """Return the runs as data of a fit."""
         typical = float(np.sqrt(np.mean(self.strain**2)))
-        noise = 0.0 if np.isnan(self.noise.std) else self.noise.std
+        noise = self.noise.std if self.noise.known else 0.0
         return Data(
             strain=self.strain,
             points=operating_points(self.waves),
@@ -96,7 +96,8 @@ def straight_runs(waves: Waveforms) -> StraightRuns:
             f"{1e3 * radius:.1f} mm; it has to be smaller, by less than 30 %; correct "
             "tire.free_radius_m or the channel"
         )
-    return StraightRuns(chosen, strain, gages, noise_of(chosen, strain), deflection)
+    noise = repeat_noise(strain, chosen.group, measured_tangents(chosen, strain))
+    return StraightRuns(chosen, strain, gages, noise, deflection)
 
 
 def working_gages(waves: Waveforms) -> tuple[int, ...]:

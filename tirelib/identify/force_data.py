@@ -1,7 +1,7 @@
 """Forces and their conditions from campaigns: run means of steady runs, samples of sweeps."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
@@ -14,6 +14,9 @@ CONDITIONS = ("load", "pressure", "slip_angle", "slip_ratio", "camber", "omega")
 FREE_ROLLING = ("free", "corner", "camber")
 """Kinds of runs without drive or brake: their slip ratio is zero by definition."""
 _MEASURED_AS = {"load": "Fz"}
+TEMPERATURES = ("tread_temperature", "temperature", "tire_temperature")
+"""Channels that tell the tread's temperature; the first that was recorded counts."""
+_UNKNOWN: FloatArray = np.empty(0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,6 +32,8 @@ class ForceData:
         NaN where not recorded.
     block : array of int
         Points of one run, or of one stretch of a sweep: their errors may go together.
+    speed, temperature, time : [m/s], [K], [s]
+        Of the road, of the tread, and since the campaign began; NaN where unknown.
     """
 
     load: FloatArray
@@ -41,9 +46,15 @@ class ForceData:
     Fy: FloatArray
     Mz: FloatArray
     block: IntArray
+    speed: FloatArray = field(default_factory=lambda: _UNKNOWN)
+    temperature: FloatArray = field(default_factory=lambda: _UNKNOWN)
+    time: FloatArray = field(default_factory=lambda: _UNKNOWN)
 
     def __post_init__(self) -> None:
-        shapes = {np.shape(getattr(self, field.name)) for field in fields(self)}
+        for name in ("speed", "temperature", "time"):
+            if getattr(self, name) is _UNKNOWN:
+                object.__setattr__(self, name, np.full(np.shape(self.load), np.nan))
+        shapes = {np.shape(getattr(self, f.name)) for f in fields(self)}
         if len(shapes) != 1 or len(shapes.pop()) != 1:
             raise ShapeError(
                 "force data: the fields differ in shape or have several dimensions; give each "
@@ -65,7 +76,7 @@ class ForceData:
 
     def take(self, index: IntArray | BoolArray) -> "ForceData":
         """Return some of the points."""
-        return ForceData(*(getattr(self, field.name)[index] for field in fields(self)))
+        return ForceData(*(getattr(self, f.name)[index] for f in fields(self)))
 
 
 def force_data(
@@ -135,6 +146,8 @@ def _mean(run: Run) -> dict[str, FloatArray] | None:
     for name in CONDITIONS + FORCES:
         measured = run.mean(_MEASURED_AS.get(name, name))
         out[name] = np.array([getattr(run.plan, name, np.nan) if measured is None else measured])
+    out |= {name: np.array([value.mean()]) for name, value in _further(run, 1).items()}
+    out["time"] = np.array([np.nan if run.plan.start is None else run.plan.start])
     return _usable(out, np.zeros(1))
 
 
@@ -148,7 +161,19 @@ def _sweep(run: Run, every: int, block: float) -> dict[str, FloatArray] | None:
         samples = run.rig.get(_MEASURED_AS.get(name, name))
         given = np.full(size, getattr(run.plan, name, np.nan)) if samples is None else samples
         out[name] = given[::every]
+    out |= {name: value[::every] for name, value in _further(run, size).items()}
+    out["time"] = (run.plan.start or 0.0) + run.rig_time[::every] - run.rig_time[0]
     return _usable(out, np.floor((run.rig_time[::every] - run.rig_time[0]) / block))
+
+
+def _further(run: Run, size: int) -> dict[str, FloatArray]:
+    """Return speed and tread temperature, of the length `size` where they were not recorded."""
+    out = {"speed": run.rig.get("speed", np.full(size, run.plan.speed))}
+    known = [run.rig[name] for name in TEMPERATURES if name in run.rig]
+    out["temperature"] = known[0] if known else np.full(size, np.nan)
+    return {
+        name: np.full(size, np.nan) if value.size == 0 else value for name, value in out.items()
+    }
 
 
 def _usable(part: dict[str, FloatArray], block: FloatArray) -> dict[str, FloatArray] | None:

@@ -1,7 +1,7 @@
 """Identify a tire from a campaign: every number with an interval, and what it would take."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from tirelib.arrays import FloatArray
 from tirelib.campaign import Campaign, CampaignHeader
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.identify.discrepancy import Discrepancy
+from tirelib.identify.next_run import NextRun, next_run
 from tirelib.identify.structure import STRUCTURE_STD
 from tirelib.identify.waveform_fit import Prior, WaveformFit, fit_waveforms
 from tirelib.model.base import FREE, Coordinate, values_of
@@ -20,8 +21,6 @@ WIDEST = 0.25
 """Relative half-width of a 95 % interval up to which a number is called identifiable."""
 TOLD = 0.6
 """Share of the prior's deviation below which the campaign has told something."""
-LEVELS = 0.05
-"""Relative spread of a condition that counts as variation."""
 
 _LITERATURE: Mapping[str, tuple[float, float, str]] = {
     "bending_stiffness": (2.1, 0.5, "literature, Table 6-3: 1.57 to 4 N m^2"),
@@ -138,15 +137,23 @@ def estimated(
     Parameters and errors as in `identify`, for runs that have been read already.
     """
     start = start_file(runs.waves.header, runs, tire)
+    discrepancy = Discrepancy()
     fit = fit_waveforms(
         runs.data(),
         values_of(start.tire),
         Prior(np.array([_prior_std(start, coordinate) for coordinate in FITTED])),
         free=FITTED,
-        discrepancy=Discrepancy(),
+        discrepancy=discrepancy,
         progress=progress,
     )
-    return start, fit, tuple(_estimate(fit, k, start, runs) for k in range(len(fit.free)))
+    estimates = [_estimate(fit, k, start) for k in range(len(fit.free))]
+    if any("not_identifiable" in e.flags for e in estimates):
+        ways = next_run(fit, _structure(start, fit), discrepancy)
+        estimates = [
+            replace(e, helps=_help(e, fit, k, ways)) if "not_identifiable" in e.flags else e
+            for k, e in enumerate(estimates)
+        ]
+    return start, fit, tuple(estimates)
 
 
 def start_file(header: CampaignHeader, runs: StraightRuns, tire: TireFile | None) -> TireFile:
@@ -207,13 +214,22 @@ def _prior_std(start: TireFile, coordinate: Coordinate) -> float:
     return number.std / abs(number.value) if np.isfinite(number.std) else by_kind
 
 
-def _estimate(fit: WaveformFit, k: int, start: TireFile, runs: StraightRuns) -> Estimate:
+def _structure(start: TireFile, fit: WaveformFit) -> FloatArray:
+    """Return the structural standard deviation of every coordinate."""
+    return np.array(
+        [
+            STRUCTURE_STD[c.name] * (abs(start.numbers[c.name].value) / c.unit if c.unit else 1.0)
+            for c in fit.free
+        ]
+    )
+
+
+def _estimate(fit: WaveformFit, k: int, start: TireFile) -> Estimate:
     coordinate = fit.free[k]
     name = coordinate.name
     value = float(fit.values[name])
     fit_std = coordinate.spread(value, float(np.sqrt(fit.covariance[k, k])))
-    size = abs(value) if not coordinate.unit else abs(start.numbers[name].value)
-    structure = STRUCTURE_STD[name] * size
+    structure = coordinate.spread(value, float(_structure(start, fit)[k]))
     low, high = (float(coordinate.moved(value, step)) for step in fit.interval[k])
     low, high = min(low, high), max(low, high)
     low = value - float(np.hypot(value - low, 1.96 * structure))
@@ -230,31 +246,34 @@ def _estimate(fit: WaveformFit, k: int, start: TireFile, runs: StraightRuns) -> 
         flags.append("not_quadratic")
     return Estimate(
         name, FIELDS[name].unit, value, float(np.hypot(fit_std, structure)), low, high, fit_std,
-        tuple(flags), _help(name, runs) if "not_identifiable" in flags else "",
+        tuple(flags), "",
     )  # fmt: skip
+
+
+def _help(estimate: Estimate, fit: WaveformFit, k: int, ways: NextRun) -> str:
+    """Return what would tell a number best, with the half-widths that are predicted."""
+    coordinate = fit.free[k]
+
+    def percent(half: float) -> float:
+        return 100.0 * coordinate.spread(estimate.value, half) / abs(estimate.value)
+
+    now = percent(float(ways.half_width[k]))
+    best = ways.best(k)
+    if best is None:
+        return f"nothing that was weighed: half of the 95 % interval stays at {now:.0f} %"
+    then = percent(best.half_width)
+    said = f"{best.words}: half of the 95 % interval from {now:.0f} to {then:.0f} %"
+    if then > 100.0 * WIDEST:
+        said += ", still too wide"
+    run = ways.best_run(k)
+    if run is None:
+        return f"{said}; no runs within 20 % of the campaign's range help"
+    return said if run == best else f"{said}; {run.words}: {percent(run.half_width):.0f} %"
 
 
 def _near_limit(name: str, value: float) -> bool:
     field = FIELDS[name]
     return value <= field.lowest * 1.001 if field.lowest > 0 else value >= field.highest * 0.999
-
-
-def _help(name: str, runs: StraightRuns) -> str:
-    """Return what would tell a number that this campaign does not."""
-    pressure = runs.waves.conditions["pressure"]
-    few = float(np.ptp(pressure)) < LEVELS * float(pressure.mean())
-    return {
-        "bending_stiffness": "a modal test with many modes, or straight runs at a small load",
-        "radial_stiffness": "runs at a small and a large load, or a sidewall test (S_v, S_theta)",
-        "radial_pressure_slope": "straight runs at pressures 40 % apart"
-        if few
-        else "straight runs at the lowest and highest allowed pressure at one load, repeated",
-        "tangential_stiffness": "a torsional sidewall test (S_theta), or runs with traction",
-        "tangential_pressure_slope": "torsional sidewall tests at two pressures",
-        "tread_stiffness": "a press test of the tread alone, or E and thickness (k_t = E b / tau)",
-        "innerliner_offset": "a cut section of the tire, or the thickness of its layers",
-        "extension_stiffness": "the growth of the belt with pressure, or runs at more pressures",
-    }[name]
 
 
 def _fitted_file(

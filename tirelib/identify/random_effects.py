@@ -57,7 +57,7 @@ def whitening(
     noise: float,
     low_pass: LowPass,
 ) -> Whitening:
-    """Return the whitening at a model.
+    """Return the whitening at a model, with set points that act as on the linear ring.
 
     Parameters
     ----------
@@ -71,19 +71,35 @@ def whitening(
         Standard deviation of a sample of a run's waveform.
     """
     tangent = random_tangents(waveform, values, points, low_pass)
-    scale = np.stack(
-        [
-            np.full(len(points), max(tolerance.load, SMALLEST_TOLERANCE)),
-            np.full(len(points), max(tolerance.pressure, SMALLEST_TOLERANCE)),
-            np.full(len(points), max(tolerance.gain, SMALLEST_TOLERANCE)),
-            np.minimum(angle_std, 1.0),
-        ],
-        axis=1,
-    )
-    basis, triangle = np.linalg.qr(tangent * scale[:, None, :])
-    inside = noise**2 * np.eye(tangent.shape[2]) + triangle @ triangle.swapaxes(1, 2)
-    inverse = np.linalg.inv(np.linalg.cholesky(inside))
-    return Whitening(basis, inverse, noise)
+    return whitening_of(tangent, scales(tolerance, angle_std), noise)
+
+
+def whitening_of(tangent: FloatArray, scale: FloatArray, noise: float) -> Whitening:
+    """Return the whitening by noise and set points at a model's tangents.
+
+    Parameters
+    ----------
+    tangent : shape (n_runs, n_phi, 4 or more), [-]
+        By load, pressure, gain and angle; what comes after them is left out.
+    scale : shape (n_runs, 4)
+        Standard deviations of the four.
+    noise : float, [-]
+    """
+    basis, triangle = np.linalg.qr(tangent[..., :4] * scale[:, None, :])
+    inside = noise**2 * np.eye(4) + triangle @ triangle.swapaxes(1, 2)
+    return Whitening(basis, np.linalg.inv(np.linalg.cholesky(inside)), noise)
+
+
+def scales(tolerance: Tolerance, angle_std: FloatArray) -> FloatArray:
+    """Return the standard deviations of load, pressure, gain and angle, shape (n_runs, 4)."""
+    relative = [tolerance.load, tolerance.pressure, tolerance.gain]
+    rows = [np.full(angle_std.size, max(value, SMALLEST_TOLERANCE)) for value in relative]
+    return np.stack([*rows, np.minimum(angle_std, 1.0)], axis=1)
+
+
+def tangents(waveform: FloatArray, by_load: FloatArray, by_pressure: FloatArray) -> FloatArray:
+    """Return slopes by relative load, relative pressure, gain and angle, (n_runs, n_phi, 4)."""
+    return np.stack([by_load, by_pressure, waveform, angle_slope(waveform)], axis=2)
 
 
 def random_tangents(
@@ -92,7 +108,7 @@ def random_tangents(
     points: Operating,
     low_pass: LowPass,
 ) -> FloatArray:
-    """Return slopes by relative load, relative pressure, gain and angle, (n_runs, n_phi, 4)."""
+    """Return the slopes of `tangents`, those by load and pressure of the linear ring."""
     n = len(points)
     # differences of one and the same model: the linear ring, without effects
     three = points.tiled(3)
@@ -102,7 +118,7 @@ def random_tangents(
     waves = predict(values, replace(three, load=load, pressure=pressure), low_pass=low_pass).wave
     by_load = (waves[n : 2 * n] - waves[:n]) / TRIAL
     by_pressure = (waves[2 * n :] - waves[:n]) / TRIAL
-    return np.stack([by_load, by_pressure, waveform, angle_slope(waveform)], axis=2)
+    return tangents(waveform, by_load, by_pressure)
 
 
 def angle_slope(waveform: FloatArray) -> FloatArray:

@@ -1,81 +1,39 @@
 """All runs at once: the base model's parameters from whole strain waveforms.
 
-Gauss-Newton on whitened residuals (`random_effects`), with the structural misfit as part of the fit
-(`discrepancy`), priors from the tire file, and the measured loaded radius where the rig has it. The
-interval of a parameter therefore holds what noise, set points, structure and the other parameters
-leave open.
+Gauss-Newton on the cost of `fit_cost`: residuals whitened by noise and set points
+(`random_effects`), the structural misfit as part of the fit (`discrepancy`), priors from the tire
+file, and the measured loaded radius where the rig has it. The interval of a parameter therefore
+holds what noise, set points, structure and the other parameters leave open.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import linalg
 
 from tirelib.arrays import BoolArray, FloatArray
-from tirelib.campaign import Tolerance
 from tirelib.errors import ConvergenceError, TirelibError
 from tirelib.identify.discrepancy import Discrepancy
-from tirelib.identify.random_effects import Whitening, whitening
-from tirelib.model.base import (
-    FREE,
-    Coordinate,
-    Correction,
-    CorrectionSlopes,
-    Linear,
-    correction_slopes,
-    large_displacements,
-    linearised,
-    move,
-    predict,
-)
+from tirelib.identify.fit_cost import Cost, Data
+from tirelib.identify.random_effects import Whitening
+from tirelib.model.base import FREE, Coordinate, Linear, move
 from tirelib.model.chain import Changes
-from tirelib.model.state import Operating
-from tirelib.signal import LowPass
-from tirelib.waveforms import GRID
+from tirelib.model.whole import Whole, WholeSlopes, solve_whole, whole_slopes
 
-MAX_STEPS = 30
+__all__ = ["Data", "Prior", "Solver", "WaveformFit", "fit_waveforms"]
+
+MAX_STEPS = 60
 LONGEST_STEP = 0.5
-TOLERANCE = 1e-4
-OUTER = 10
-"""Most times that correction, whitening and the misfit's shapes are brought up to the values."""
 SETTLED = 0.01
-"""Move by such an update, in standard deviations, below which it is the last."""
-NEAR = 0.1
-"""Move of a coordinate below which the correction keeps its slopes."""
-
-
-@dataclass(frozen=True, slots=True)
-class Data:
-    """What is fitted: the waveforms of one gage and, where measured, the deflections.
-
-    Attributes
-    ----------
-    strain : shape (n_runs, n_phi), [-]
-    points : Operating
-    angle_std : shape (n_runs,), [rad]
-    tolerance : Tolerance
-    noise : float, [-]
-    low_pass : LowPass
-    deflection : shape (n_runs,), [m]
-        Free radius less measured loaded radius; NaN where not measured.
-    deflection_std : float, [m]
-        Random part of it.
-    """
-
-    strain: FloatArray
-    points: Operating
-    angle_std: FloatArray
-    tolerance: Tolerance
-    noise: float
-    low_pass: LowPass
-    deflection: FloatArray
-    deflection_std: float = 1e-4
-
-    @property
-    def with_deflection(self) -> bool:
-        """Whether enough deflections are known."""
-        return int(np.isfinite(self.deflection).sum()) >= 3
+"""Gauss-Newton step, in standard deviations, below which the fit has settled."""
+NEAR = 1.0
+"""The same, below which whitening and the misfit's shapes are kept: they hardly change any more."""
+LEAST_FALL = 1e-3
+"""Fall of the cost below which a step is the last: the bottom may have an edge, where an
+integration node of the contact meets its end."""
+LARGEST_DAMPING = 1e8
+PROBE = 2.0
+"""Distance along a ridge at which the surface is compared with its parabola, in deviations."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +70,8 @@ class WaveformFit:
     rms : float, [-]
         Rms of the plain residual of the model alone.
     steps : int
+    cost : Cost
+        About the solution.
     """
 
     values: Mapping[str, float | FloatArray]
@@ -126,6 +86,7 @@ class WaveformFit:
     error: float
     rms: float
     steps: int
+    cost: Cost
     notes: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -154,6 +115,8 @@ def fit_waveforms(
         Effects that the model has.
     discrepancy : Discrepancy or None
         None leaves the structural misfit out: smallest residual, intervals of noise alone.
+    exact : bool
+        False leaves large displacements out.
     progress : callable, optional
         Called with a label after each step.
 
@@ -162,41 +125,25 @@ def fit_waveforms(
     ConvergenceError
         If the steps do not settle; carries the last values.
     """
-    solver = _Solver(data, start, prior, free, changes, discrepancy, exact)
-    steps = 0
-    for outer in range(OUTER):
-        solver.refresh(slopes=outer > 0)
-        before = solver.z
-        for _ in range(MAX_STEPS):
-            steps += 1
-            moved = solver.step()
-            if progress is not None:
-                progress(f"error {solver.error:.2f}")
-            if moved < (0.02 if outer == 0 else TOLERANCE):
-                break
-        else:
-            raise ConvergenceError(
-                f"waveform fit: after {steps} steps the parameters still move by {moved:.2e} "
-                "(relative); fix parameters that the campaign cannot inform, or start nearer",
-                solver.values,
-                moved,
-            )
-        moved = solver.distance(before)
-        if outer > 0 and moved < SETTLED:
-            break
-    else:
-        raise ConvergenceError(
-            f"waveform fit: after {OUTER} updates of the large displacements the parameters still "
-            f"move by {moved:.2e} standard deviations; fix parameters that the campaign cannot "
-            "inform, or start nearer",
-            solver.values,
-            moved,
-        )
-    return solver.result(steps)
+    solver = Solver(data, start, prior, free, changes, discrepancy, exact)
+    moved = np.inf
+    for steps in range(1, MAX_STEPS + 1):
+        solver.refresh(renew=moved > NEAR)
+        moved = solver.step()
+        if progress is not None:
+            progress(f"error {solver.cost.error(solver.model):.2f}")
+        if moved < SETTLED:
+            return solver.result(steps)
+    raise ConvergenceError(
+        f"waveform fit: after {MAX_STEPS} steps the parameters still move by {moved:.2g} standard "
+        "deviations; fix parameters that the campaign cannot inform, or start nearer",
+        solver.values,
+        moved,
+    )
 
 
-class _Solver:
-    """Levenberg-Marquardt over parameters, with misfit coefficients eliminated linearly."""
+class Solver:
+    """Levenberg-Marquardt over the free coordinates z; the cost follows the solution."""
 
     def __init__(
         self,
@@ -209,220 +156,118 @@ class _Solver:
         exact: bool,
     ) -> None:
         self.data, self.prior, self.free, self.changes = data, prior, free, changes
-        self.discrepancy = discrepancy
-        self.z = np.zeros(len(free))
+        self.discrepancy, self.exact = discrepancy, exact
         self.start = dict(start)
-        self.values = dict(start)
-        self.exact = exact
-        self.corrected: tuple[FloatArray, Correction, CorrectionSlopes] | None = None
-        self.linear = self._linearise(self.z)
-        self.slopes_at: FloatArray | None = None
+        self.z = np.zeros(len(free))
         self.damping = 1e-3
-
-    def _linearise(self, z: FloatArray) -> Linear:
-        linear = linearised(
-            move(self.start, z, self.free), self.data.points, self.free, self.changes,
-            low_pass=self.data.low_pass, correction=self._correction(z[None]),
-        )  # fmt: skip
-        if self.corrected is None:
-            return linear
-        slopes = self.corrected[2]
-        return replace(
-            linear,
-            waveform_slopes=linear.waveform_slopes + slopes.waveform,
-            deflection_slopes=linear.deflection_slopes + slopes.deflection,
-        )
-
-    def _correction(self, z: FloatArray) -> Correction | None:
-        """Return the correction at coordinates (n_moves, n_free), one after the other."""
-        if self.corrected is None:
-            return None
-        at, correction, slopes = self.corrected
-        return slopes.moved(correction, z - at)
-
-    def refresh(self, *, slopes: bool = True) -> None:
-        """Bring correction, whitening and misfit shapes up to the present parameters.
-
-        Far from the solution the correction is better held than followed along its slopes.
-        """
-        data = self.data
-        if self.exact:
-            fresh = large_displacements(self.values, data.points, low_pass=data.low_pass)
-            self.corrected = (self.z, fresh, self._slopes(fresh) if slopes else self._none(fresh))
-            self.linear = self._linearise(self.z)
-        self.whiten = whitening(
-            self.linear.waveform, self.values, data.points, data.tolerance, data.angle_std,
-            data.noise, data.low_pass,
-        )  # fmt: skip
-        self.shapes = np.zeros((0, *data.strain.shape))
-        if self.discrepancy is not None:
-            half = np.sqrt(2.0 * self.linear.deflection / float(np.max(self.start["free_radius"])))
-            self.shapes = self.discrepancy.columns(
-                self.linear.waveform, 0.6 * half, data.points, GRID
-            )
-        flat = self.whiten(self.shapes).reshape(len(self.shapes), data.strain.size)
-        self.white_shapes = flat
-        inner = flat @ flat.T + np.eye(len(flat))
-        self.inner = linalg.cho_factor(inner) if len(flat) else None
-
-    def _none(self, fresh: Correction) -> CorrectionSlopes:
-        shape = (len(self.free), *fresh.waveform.shape)
-        return CorrectionSlopes(np.zeros(shape), np.zeros(shape[:2]))
-
-    def _slopes(self, fresh: Correction) -> CorrectionSlopes:
-        """Return the correction's slopes; those at hand while the parameters are near."""
-        if self.slopes_at is not None and np.abs(self.z - self.slopes_at).max() < NEAR:
-            assert self.corrected is not None  # noqa: S101 - set with the slopes
-            return self.corrected[2]
-        self.slopes_at = self.z
-        return correction_slopes(
-            self.values, self.data.points, self.free, fresh, low_pass=self.data.low_pass
-        )
-
-    def _project(self, white: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return misfit coefficients that serve rows of whitened residuals best."""
-        if self.inner is None:
-            return np.zeros((len(white), 0)), white
-        return linalg.cho_solve(self.inner, self.white_shapes @ white.T).T, white
-
-    def _normal(self, linear: Linear) -> tuple[FloatArray, FloatArray, float]:
-        """Return normal matrix, gradient and cost with the misfit eliminated."""
-        rows = self.whiten(linear.waveform_slopes).reshape(len(self.free), -1)
-        rest = self.whiten(self.data.strain - linear.waveform).reshape(1, -1)
-        every = np.concatenate([rows, rest])
-        gram = every @ every.T
-        if self.inner is not None:
-            cross = self.white_shapes @ every.T
-            gram = gram - cross.T @ linalg.cho_solve(self.inner, cross)
-        gram = gram + self._deflection_gram(linear)
-        weight = 1.0 / self.prior.std**2
-        normal = gram[:-1, :-1] + np.diag(weight)
-        gradient = gram[:-1, -1] - weight * self.z
-        return normal, gradient, float(gram[-1, -1] + np.sum(weight * self.z**2))
-
-    def _deflection_gram(self, linear: Linear) -> FloatArray:
-        """Return the part of measured deflections; their zero is free to half a millimetre."""
-        size = len(linear.waveform_slopes) + 1
-        if not self.data.with_deflection:
-            return np.zeros((size, size))
-        known = np.isfinite(self.data.deflection)
-        rest = (self.data.deflection - linear.deflection)[known]
-        rows = np.concatenate([linear.deflection_slopes[:, known], rest[None]])
-        # random part, a common zero, and a structural part in proportion to the deflection
-        depth = linear.deflection[known]
-        speed = np.nan_to_num(self.data.points.speed[known]) / 30.0
-        common = np.stack([np.full(depth.size, 5e-4), 0.03 * depth, 5e-4 * speed**2])
-        covariance = self.data.deflection_std**2 * np.eye(depth.size) + common.T @ common
-        white = linalg.solve_triangular(
-            linalg.cholesky(covariance, lower=True), rows.T, lower=True
-        ).T
-        gram: FloatArray = white @ white.T
-        return gram
-
-    def step(self) -> float:
-        """Take one step that lowers the cost; return its length."""
-        normal, gradient, cost = self._normal(self.linear)
-        while self.damping < 1e8:
-            damped = normal + self.damping * np.diag(np.diag(normal))
-            dz = np.clip(np.linalg.solve(damped, gradient), -LONGEST_STEP, LONGEST_STEP)
-            try:
-                linear = self._linearise(self.z + dz)
-            except TirelibError:
-                self.damping = max(10.0 * self.damping, 1e-2)
-                continue
-            if self._normal_at(linear, self.z + dz) <= cost * (1.0 + 1e-12):
-                self.z = self.z + dz
-                self.linear, self.values = linear, move(self.start, self.z, self.free)
-                self.damping = max(self.damping / 10.0, 1e-9)
-                return float(np.abs(dz / self._scale(normal)).max())
-            self.damping *= 10.0
-        self.damping = 1e-3
-        return 0.0
-
-    def distance(self, before: FloatArray) -> float:
-        """Return how far the coordinates are from others, in standard deviations."""
-        normal, _, _ = self._normal(self.linear)
-        return float(np.abs((self.z - before) / self._scale(normal)).max())
-
-    def _normal_at(self, linear: Linear, z: FloatArray) -> float:
-        before = self.z
-        self.z = z
-        try:
-            return self._normal(linear)[2]
-        finally:
-            self.z = before
-
-    def _scale(self, normal: FloatArray) -> FloatArray:
-        """Return a change of each coordinate that matters: its standard deviation, at most 1."""
-        deviation: FloatArray = np.minimum(np.sqrt(np.diag(np.linalg.inv(normal))) + 1e-6, 1.0)
-        return deviation
+        self.slopes: WholeSlopes | None = None
+        self.model = self.at(self.z)
 
     @property
-    def error(self) -> float:
-        """Rms of the whitened residual of the model alone."""
-        rest = self.whiten(self.data.strain - self.linear.waveform)
-        return float(np.sqrt(np.mean(rest**2)))
+    def values(self) -> dict[str, float | FloatArray]:
+        """The tire's values at z."""
+        return move(self.start, self.z, self.free)
+
+    def at(self, z: FloatArray) -> Whole:
+        """Return the model at coordinates, from the solution at hand where there is one."""
+        start = None
+        if self.slopes is not None:
+            start = self.slopes.start(self.model, z - self.z)
+        return solve_whole(
+            move(self.start, z, self.free), self.data.points, self.changes,
+            low_pass=self.data.low_pass, start=start, exact=self.exact,
+        )  # fmt: skip
+
+    def refresh(self, *, renew: bool = True) -> None:
+        """Bring the slopes up to the present solution, and if asked for the cost as well."""
+        self.slopes = whole_slopes(
+            self.model, self.values, self.data.points, self.free, self.changes,
+            low_pass=self.data.low_pass,
+        )  # fmt: skip
+        if renew:
+            radius = float(np.max(self.start["free_radius"]))
+            self.cost = Cost.about(
+                self.data, self.prior.std, self.discrepancy, radius, self.model, self.slopes
+            )
+        self.normal, self.gradient, self.height = self.cost.normal(self.model, self.slopes, self.z)
+
+    def step(self) -> float:
+        """Take one step that lowers the cost.
+
+        Returns
+        -------
+        Largest component of the Gauss-Newton step, in standard deviations; zero at the bottom.
+
+        Raises
+        ------
+        TirelibError
+            If the model has no solution anywhere near.
+        """
+        deviation = np.minimum(np.sqrt(np.diag(np.linalg.inv(self.normal))) + 1e-6, 1.0)
+        wanted = np.linalg.solve(self.normal, self.gradient)
+        far = float(np.abs(wanted / deviation).max())
+        if far < SETTLED:
+            return far
+        refused: TirelibError | None = None
+        while self.damping < LARGEST_DAMPING:
+            damped = self.normal + self.damping * np.diag(np.diag(self.normal))
+            dz = np.linalg.solve(damped, self.gradient)
+            dz = dz * min(1.0, LONGEST_STEP / max(float(np.abs(dz).max()), 1e-300))
+            try:
+                model = self.at(self.z + dz)
+            except TirelibError as error:
+                refused = error
+                self.damping = max(10.0 * self.damping, 1e-2)
+                continue
+            refused = None
+            fall = self.height - self.cost.value(model, self.z + dz)
+            if fall >= 0.0:
+                self.z, self.model = self.z + dz, model
+                self.damping = max(self.damping / 10.0, 1e-9)
+                return far if fall > LEAST_FALL else 0.0
+            self.damping *= 10.0
+        if refused is not None:
+            raise refused
+        return 0.0  # no way down: the bottom to rounding
 
     def result(self, steps: int) -> WaveformFit:
         """Return what was found."""
-        normal, _, _ = self._normal(self.linear)
-        covariance = np.asarray(np.linalg.inv(normal), dtype=np.float64)
-        interval, quadratic = self._ridges(covariance)
-        rest = self.data.strain - self.linear.waveform
-        misfit: FloatArray = np.zeros(rest.shape)
-        if self.inner is not None:
-            weights, _ = self._project(self.whiten(rest).reshape(1, -1))
-            misfit = np.tensordot(weights[0], self.shapes, axes=1)
+        self.refresh(renew=False)
+        assert self.slopes is not None  # noqa: S101 - set by refresh
+        k = len(self.free)
+        covariance = np.asarray(np.linalg.inv(self.normal), dtype=np.float64)
+        interval, quadratic = self.ridges(covariance)
+        rest = self.data.strain - self.model.waveform
+        linear = Linear(
+            self.model.waveform, self.model.deflection, self.slopes.waveform[:k],
+            self.slopes.deflection[:k],
+        )  # fmt: skip
         return WaveformFit(
-            self.values, self.free, covariance, self.prior.std, self.linear, self.whiten, misfit,
-            interval, quadratic, self.error, float(np.sqrt(np.mean(rest**2))), steps,
+            self.values, self.free, covariance, self.prior.std, linear, self.cost.whiten,
+            self.cost.misfit(self.model), interval, quadratic, self.cost.error(self.model),
+            float(np.sqrt(np.mean(rest**2))), steps, self.cost,
         )  # fmt: skip
 
-    def _ridges(self, covariance: FloatArray) -> tuple[FloatArray, BoolArray]:
+    def rise(self, dz: FloatArray) -> float:
+        """Return how much higher the cost is after a move; infinite where the model fails."""
+        try:
+            model = self.at(self.z + dz)
+        except TirelibError:
+            return float("inf")
+        return self.cost.value(model, self.z + dz) - self.height
+
+    def ridges(self, covariance: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Return 95 % intervals along the ridges, and where the surface is quadratic."""
         size = len(self.free)
-        best = self._cost(self.linear.waveform, self.linear.deflection, self.z)
-        steps = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
         interval = np.zeros((size, 2))
         quadratic = np.ones(size, dtype=bool)
         for k in range(size):
-            deviation = np.sqrt(covariance[k, k])
-            path = steps[:, None] * covariance[:, k] / deviation
-            rise = self._costs(self.z + path) - best
-            root = np.sign(steps) * np.sqrt(np.maximum(rise, 0.0))
-            around = np.concatenate([root[:3], [0.0], root[3:]])
-            at = np.concatenate([steps[:3], [0.0], steps[3:]])
-            grows = bool((np.diff(around) > 0).all())
-            ends = np.interp([-1.96, 1.96], around, at) if grows else np.array([-3.0, 3.0])
-            interval[k] = deviation * ends
-            quadratic[k] = grows and bool((np.abs(around[[1, 5]] - [-2.0, 2.0]) < 0.3).all())
+            deviation = float(np.sqrt(covariance[k, k]))
+            ridge = covariance[:, k] / deviation
+            for side, sign in enumerate((-1.0, 1.0)):
+                root = np.sqrt(max(self.rise(sign * PROBE * ridge), 0.0))
+                # a side that hardly rises is open to three deviations at least
+                reach = 1.96 * PROBE / max(root, 1.96 * PROBE / 3.0)
+                interval[k, side] = sign * deviation * reach
+                quadratic[k] &= bool(abs(root - PROBE) < 0.3)
         return interval, quadratic
-
-    def _costs(self, points: FloatArray) -> FloatArray:
-        """Return the cost at several coordinates, in one batch; infinite where the model fails."""
-        n, count = len(self.data.points), len(points)
-        columns = dict(self.start)
-        for j, coordinate in enumerate(self.free):
-            moved = coordinate.moved(self.start[coordinate.name], points[:, j])
-            columns[coordinate.name] = np.repeat(np.asarray(moved), n)
-        try:
-            state = predict(
-                columns, self.data.points.tiled(count), self.changes,
-                low_pass=self.data.low_pass,
-                correction=self._correction(points),
-            )  # fmt: skip
-        except TirelibError:
-            return np.full(count, np.inf)
-        waves = state.wave.reshape(count, n, -1)
-        depth = state.deflection.reshape(count, n)
-        return np.array([self._cost(waves[i], depth[i], points[i]) for i in range(count)])
-
-    def _cost(self, waveform: FloatArray, deflection: FloatArray, z: FloatArray) -> float:
-        empty = np.zeros((0, *waveform.shape))
-        linear = Linear(waveform, deflection, empty, np.zeros((0, deflection.size)))
-        rest = self.whiten(self.data.strain - waveform).reshape(1, -1)
-        cost = float(np.sum(rest**2) + np.sum((z / self.prior.std) ** 2))
-        if self.inner is not None:
-            cross = self.white_shapes @ rest[0]
-            cost -= float(cross @ linalg.cho_solve(self.inner, cross))
-        return cost + float(self._deflection_gram(linear)[-1, -1])

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.contact.exact import load_exact
+from tirelib.contact.exact import ExactContact, load_exact
 from tirelib.model.chain import Changes, waveform
 from tirelib.model.state import Operating, State
 from tirelib.parameters import Tire
@@ -111,10 +111,13 @@ class Correction:
     ----------
     waveform : shape (n_points, n_phi), [-]
     deflection : shape (n_points,), [m]
+    contact : ExactContact or None
+        The solution behind it: a start for one nearby, and for slopes.
     """
 
     waveform: FloatArray
     deflection: FloatArray
+    contact: ExactContact | None = None
 
     def change(self, state: State) -> State:
         """Add the correction to a waveform."""
@@ -125,83 +128,41 @@ class Correction:
         return Correction(np.tile(self.waveform, (times, 1)), np.tile(self.deflection, times))
 
 
-@dataclass(frozen=True, slots=True)
-class CorrectionSlopes:
-    """How a correction changes with the free coordinates.
-
-    Attributes
-    ----------
-    waveform : shape (n_free, n_points, n_phi)
-    deflection : shape (n_free, n_points)
-    """
-
-    waveform: FloatArray
-    deflection: FloatArray
-
-    def moved(self, correction: Correction, dz: FloatArray) -> Correction:
-        """Return the correction after moves dz of shape (n_moves, n_free), one after the other."""
-        wave = correction.waveform + np.tensordot(dz, self.waveform, axes=1)
-        depth = correction.deflection + dz @ self.deflection
-        return Correction(wave.reshape(-1, wave.shape[-1]), depth.ravel())
-
-
 def large_displacements(
     values: Mapping[str, float | FloatArray],
     points: Operating,
     *,
     low_pass: LowPass | None = None,
     phi: FloatArray = GRID,
+    start: Correction | None = None,
 ) -> Correction:
     """Return the exact ring less the linear one, both static and undamped, at a tire's values.
 
-    It changes slowly with the parameters, so a fit brings it up to date a few times only.
+    It changes slowly with the parameters, so a fit brings it up to date a few times only; one
+    nearby for the same points as `start` saves most of the time and changes nothing else.
     """
     still = dict(values)
     still["damping"] = 0.0
     state = waveform(State.of(still, points, phi), low_pass=low_pass)
-    exact = load_exact(replace(state.ring, shear_stiffness=np.inf), state.tread, points.load)
+    exact = load_exact(
+        replace(state.ring, shear_stiffness=np.inf), state.tread, points.load,
+        start=start.contact if start else None,
+    )  # fmt: skip
     strain = smoothed(exact.strain(state.offset, phi), points, low_pass or LowPass())
-    return Correction(strain - state.wave, exact.deflection - state.deflection)
+    return Correction(strain - state.wave, exact.deflection - state.deflection, exact)
 
 
 def smoothed(strain: FloatArray, points: Operating, low_pass: LowPass) -> FloatArray:
-    """Return whole-turn waveforms (n_points, n_phi) as the chain's filter gives them, mean off."""
-    n = strain.shape[1]
+    """Return whole-turn waveforms (..., n_points, n_phi) as the filter gives them, mean off."""
+    n = strain.shape[-1]
     order = np.fft.rfftfreq(n, 1.0 / n)
     if low_pass.cut_off is None:
         sigma = np.full(len(points), low_pass.sigma(1.0))
     else:
         sigma = np.array([low_pass.sigma(rate / (2.0 * np.pi)) for rate in points.omega])
     gain = np.exp(-0.5 * (sigma[:, None] * order) ** 2) * (order > 0)
-    out: FloatArray = np.fft.irfft(np.fft.rfft(strain, axis=1) * gain, n=n, axis=1)
+    out: FloatArray = np.fft.irfft(np.fft.rfft(strain) * gain, n=n)
     return out
-
-
-def correction_slopes(
-    values: Mapping[str, float | FloatArray],
-    points: Operating,
-    free: tuple[Coordinate, ...],
-    correction: Correction,
-    *,
-    low_pass: LowPass | None = None,
-    step: float = 1e-3,
-) -> CorrectionSlopes:
-    """Return the slopes of `large_displacements` at a tire's values.
-
-    They are no small matter: the strain's slope by k_v is twice that of the linear ring.
-    """
-    n, k = len(points), len(free)
-    columns = dict(values)
-    for j, coordinate in enumerate(free):
-        z = np.zeros(k)
-        z[j] = step
-        columns[coordinate.name] = np.repeat(
-            np.asarray(coordinate.moved(values[coordinate.name], z)), n
-        )
-    moved = large_displacements(columns, points.tiled(k), low_pass=low_pass)
-    wave = moved.waveform.reshape(k, n, -1) - correction.waveform
-    depth = moved.deflection.reshape(k, n) - correction.deflection
-    return CorrectionSlopes(wave / step, depth / step)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,15 @@
 """The numbers of a tire: values with unit, uncertainty, kind and source."""
 
-from tirelib.parameters.tire import FIELDS, Tire
+from tirelib.parameters.tire import FIELDS, NUMBERS, Tire
 from tirelib.parameters.tire_file import Number, TireFile, find_tire, read_tire, write_tire
 
-__all__ = ["FIELDS", "Number", "Tire", "TireFile", "find_tire", "read_tire", "write_tire"]
+__all__ = [
+    "FIELDS",
+    "NUMBERS",
+    "Number",
+    "Tire",
+    "TireFile",
+    "find_tire",
+    "read_tire",
+    "write_tire",
+]

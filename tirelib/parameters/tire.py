@@ -84,7 +84,32 @@ FIELDS: Mapping[str, Field] = MappingProxyType(
         "carcass_stiffness": Field("brush", "N/m", "stiffness", 1e2, _ANY, "lateral, whole tire"),
     }
 )
-"""Every parameter, in the order of a tire file."""
+"""Every parameter of `Tire`, in the order of a tire file."""
+
+BRUSH_FIELDS: Mapping[str, Field] = MappingProxyType(
+    {
+        "half_length": Field(
+            "brush", "mm", "length", 0.005, 0.5, "a0, half the contact; absent: the ring gives it"
+        ),
+        "load_power": Field("brush", "1", "ratio", -0.5, 1.5, "n of a = a0 (Fz/Fz0)^n (p/p0)^m"),
+        "pressure_power": Field("brush", "1", "ratio", -2.0, 1.0, "m of the same law"),
+        "reference_load": Field("brush", "N", "force", 1.0, 1e6, "Fz0 of the same law"),
+        "reference_pressure": Field("brush", "bar", "pressure", 1e3, 2e6, "p0 of the same law"),
+        "camber_thrust": Field("brush", "1", "ratio", -2.0, 2.0, "slip angle worth of camber"),
+        "slip_angle_offset": Field("brush", "deg", "angle", -0.05, 0.05, "added to the slip angle"),
+        "slip_ratio_offset": Field("brush", "1", "ratio", -0.05, 0.05, "added to the slip ratio"),
+        "Fx_offset": Field("brush", "N", "force", -2e3, 2e3, "added to Fx"),
+        "Fy_offset": Field("brush", "N", "force", -2e3, 2e3, "added to Fy"),
+        "Mz_offset": Field("brush", "Nm", "moment", -200.0, 200.0, "added to Mz"),
+        "yaw_compliance": Field(
+            "brush", "deg/Nm", "compliance", 0.0, 5e-4, "turn of the contact under Mz; 0 is rigid"
+        ),
+    }
+)
+"""Numbers of a tire file that only the brush has; `tirelib.identify.brush_model` reads them."""
+
+NUMBERS: Mapping[str, Field] = MappingProxyType({**FIELDS, **BRUSH_FIELDS})
+"""Every number that a tire file may hold."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,14 +185,14 @@ class Tire:
 
 def unknown_name(name: str) -> str:
     """Return the message for a parameter that no tire has."""
-    near = get_close_matches(name, FIELDS, n=2)
-    hint = f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(FIELDS)}"
+    near = get_close_matches(name, NUMBERS, n=2)
+    hint = f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(NUMBERS)}"
     return f"tire parameter {name!r} is unknown; {hint}"
 
 
 def range_fault(name: str, value: float) -> str | None:
     """Return what is wrong with a value, or None."""
-    field = FIELDS[name]
+    field = NUMBERS[name]
     if not isinstance(value, int | float) or math.isnan(value):
         return f"{name} = {value!r} is not a number; give it in {field.unit} ({field.meaning})"
     if not field.lowest <= value <= field.highest or (

@@ -10,7 +10,14 @@ from types import MappingProxyType
 from typing import Any
 
 from tirelib.errors import FormatError, ParameterError, UnitError
-from tirelib.parameters.tire import FIELDS, Field, Tire, range_fault, unknown_name
+from tirelib.parameters.tire import (
+    FIELDS,
+    NUMBERS,
+    Field,
+    Tire,
+    range_fault,
+    unknown_name,
+)
 from tirelib.units import from_si, to_si, units_of
 
 FORMAT = "tirelib-tire/1"
@@ -22,7 +29,11 @@ REQUIRED = (
     "tread_stiffness",
 )  # fmt: skip
 
-_GROUPS = tuple(dict.fromkeys(entry.group for entry in FIELDS.values()))
+BRUSH_NEEDS = ("bristle_lateral", "friction")
+"""Without these a file states no brush."""
+_RING = tuple(name for name in REQUIRED if FIELDS[name].group in ("belt", "sidewall", "tread"))
+"""A file that states one of these states a ring."""
+_GROUPS = tuple(dict.fromkeys(entry.group for entry in NUMBERS.values()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +62,8 @@ class Number:
 class TireFile:
     """A tire with what is known about each of its numbers.
 
+    A file may state a ring, a brush, or both.
+
     Attributes
     ----------
     name : str
@@ -65,9 +78,26 @@ class TireFile:
     extra: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
     @property
+    def missing(self) -> tuple[str, ...]:
+        """Names of the numbers that a ring needs and the file does not state."""
+        return tuple(name for name in REQUIRED if name not in self.numbers)
+
+    @property
     def tire(self) -> Tire:
-        """The values alone."""
-        return Tire(**{name: number.value for name, number in self.numbers.items()})
+        """The values alone, as the ring needs them.
+
+        Raises
+        ------
+        ParameterError
+            If numbers of the ring are missing; with their names.
+        """
+        if self.missing:
+            names = ", ".join(f"[{FIELDS[name].group}.{name}]" for name in self.missing)
+            raise ParameterError(
+                f"{self.name}: the file states no complete ring, {names} missing; identify the "
+                "tire from a campaign with strain in straight runs, or add these numbers"
+            )
+        return Tire(**{k: number.value for k, number in self.numbers.items() if k in FIELDS})
 
 
 def models_folder() -> Path:
@@ -120,9 +150,9 @@ def read_tire(name: str | Path) -> TireFile:
             f"{' and '.join(map(repr, FORMATS))}; give a tire or model file"
         )
     numbers, faults = _numbers(document)
-    if not faults:
+    if not faults and all(key in numbers for key in REQUIRED):
         try:
-            Tire(**{key: number.value for key, number in numbers.items()})
+            Tire(**{key: number.value for key, number in numbers.items() if key in FIELDS})
         except ParameterError as error:
             faults.append(str(error).removeprefix("tire: "))
     if faults:
@@ -137,8 +167,8 @@ def _numbers(document: Mapping[str, Any]) -> tuple[dict[str, Number], list[str]]
     faults: list[str] = []
     for name in document:
         near = get_close_matches(name, _GROUPS, n=1, cutoff=0.75)
-        if name in FIELDS:
-            faults.append(f"{name} stands at the top; move it to [{FIELDS[name].group}]")
+        if name in NUMBERS:
+            faults.append(f"{name} stands at the top; move it to [{NUMBERS[name].group}]")
         elif near and name not in _GROUPS:
             faults.append(f"[{name}] is no table of a tire; did you mean [{near[0]}]?")
     for group in _GROUPS:
@@ -147,9 +177,9 @@ def _numbers(document: Mapping[str, Any]) -> tuple[dict[str, Number], list[str]]
             faults.append(f"[{group}] is no table; write [{group}.name] with value and unit")
             continue
         for name, entry in table.items():
-            if name not in FIELDS or FIELDS[name].group != group:
+            if name not in NUMBERS or NUMBERS[name].group != group:
                 right = (
-                    f"stands in [{FIELDS[name].group}]" if name in FIELDS else unknown_name(name)
+                    f"stands in [{NUMBERS[name].group}]" if name in NUMBERS else unknown_name(name)
                 )
                 faults.append(f"[{group}.{name}]: {right}")
                 continue
@@ -158,11 +188,25 @@ def _numbers(document: Mapping[str, Any]) -> tuple[dict[str, Number], list[str]]
             except (ParameterError, UnitError) as error:
                 faults.append(f"[{group}.{name}]: {error}")
     faults += [
-        f"[{FIELDS[name].group}.{name}] is missing ({FIELDS[name].meaning}); add value and unit"
+        f"[{NUMBERS[name].group}.{name}] is missing ({NUMBERS[name].meaning}); add value and unit"
         for name in REQUIRED
-        if name not in _table(document, FIELDS[name].group)
+        if name not in _table(document, NUMBERS[name].group) and not _brush_alone(document)
     ]
+    faults += [
+        f"[brush.{name}] is missing: the half length of the contact goes with it "
+        f"({NUMBERS[name].meaning}); add value and unit"
+        for name, because in (("reference_load", "load_power"),
+                              ("reference_pressure", "pressure_power"))
+        if because in numbers and numbers[because].value != 0.0
+        and name not in _table(document, "brush")
+    ]  # fmt: skip
     return numbers, faults
+
+
+def _brush_alone(document: Mapping[str, Any]) -> bool:
+    """Whether a file states a brush and nothing of a ring but geometry."""
+    every = {name for group in _GROUPS for name in _table(document, group)}
+    return every.issuperset(BRUSH_NEEDS) and every.isdisjoint(_RING)
 
 
 def _table(document: Mapping[str, Any], group: str) -> Mapping[str, Any]:
@@ -181,7 +225,7 @@ def _number(name: str, entry: Any) -> Number:
     kind = entry.get("kind", "assumed")
     if kind not in KINDS:
         raise ParameterError(f"kind = {kind!r}; allowed are {', '.join(KINDS)}")
-    dimension = FIELDS[name].dimension
+    dimension = NUMBERS[name].dimension
     unit = str(entry["unit"])
     si = to_si(float(value), unit, dimension) if math.isfinite(value) else float(value)
     spread = to_si(float(std), unit, dimension) if math.isfinite(std) else math.nan
@@ -192,11 +236,11 @@ def _number(name: str, entry: Any) -> Number:
 
 
 def write_tire(file: TireFile, path: str | Path, file_format: str = FORMAT) -> None:
-    """Write a tire; numbers go to the units of `FIELDS` and keep all their digits."""
+    """Write a tire; numbers go to the units of `NUMBERS` and keep all their digits."""
     import tomli_w
 
     document: dict[str, Any] = {"format": file_format, "name": file.name}
-    for name, entry in FIELDS.items():
+    for name, entry in NUMBERS.items():
         number = file.numbers.get(name)
         if number is None:
             continue

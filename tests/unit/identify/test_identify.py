@@ -1,6 +1,7 @@
 """Starts, priors, intervals and flags of an identification, on what the model itself made."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -48,14 +49,26 @@ def test_wide_numbers_are_flagged_with_help(estimates: dict[str, Estimate]) -> N
             assert "not_identifiable" in e.flags
         assert bool(e.helps) == ("not_identifiable" in e.flags)
     assert not estimates["radial_stiffness"].flags
-    assert "S_theta" in estimates["tangential_stiffness"].helps
+    assert estimates["tangential_stiffness"].helps.startswith("a torsional sidewall test (S_theta")
+    assert estimates["tread_stiffness"].helps.startswith("a press test of the tread alone")
+    slope = estimates["tangential_pressure_slope"].helps
+    assert slope.startswith("torsional sidewall tests (S_theta to 3%) at 1.4 and 3.0 bar")
+
+
+def test_the_help_tells_the_widths_now_and_then(estimates: dict[str, Estimate]) -> None:
+    e = estimates["tangential_stiffness"]
+    now, then = re.findall(r"interval from (\d+) to (\d+) %", e.helps)[0]
+    assert int(now) == pytest.approx(100.0 * 0.5 * (e.high - e.low) / e.value, abs=1.0)
+    # S_theta is in proportion to k_v, so its 3 % are those of k_v
+    assert int(then) == pytest.approx(196.0 * 0.03, abs=1.0)
 
 
 def test_one_pressure_tells_no_slopes() -> None:
     found = {e.name: e for e in estimated(straight_runs(made_waves(pressures=(2.1e5,))))[2]}
     slope = found["radial_pressure_slope"]
     assert "not_identifiable" in slope.flags
-    assert slope.helps == "straight runs at pressures 40 % apart"
+    assert "straight run" in slope.helps
+    assert re.search("1.7 bar|2.5 bar", slope.helps), "a pressure that the campaign lacks"
     assert "not_identifiable" in found["tangential_pressure_slope"].flags
 
 

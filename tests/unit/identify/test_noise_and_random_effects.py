@@ -6,11 +6,23 @@ import numpy as np
 import pytest
 
 from tests.unit.identify.model_waves import ANGLE_STD, TIRE, TOLERANCE, made_waves, operating
-from tirelib.identify.noise import FLOOR, noise_of
-from tirelib.identify.random_effects import angle_slope, random_tangents, whitening
+from tirelib.identify.noise import (
+    LEAST_NOISE,
+    RepeatNoise,
+    independent,
+    measured_tangents,
+    repeat_noise,
+)
+from tirelib.identify.random_effects import (
+    angle_slope,
+    random_tangents,
+    scales,
+    whitening,
+    whitening_of,
+)
 from tirelib.model.base import predict, values_of
 from tirelib.signal import LowPass
-from tirelib.waveforms import GRID, N_PHI
+from tirelib.waveforms import GRID, N_PHI, Waveforms
 
 NOISE = 1e-5
 LOADS = np.array([2500.0, 4500.0, 6500.0])
@@ -95,15 +107,80 @@ def test_the_slope_by_angle_is_that_of_a_series() -> None:
     assert angle_slope(np.cos(N_PHI / 2 * GRID)) == pytest.approx(0.0, abs=1e-9)
 
 
+def test_the_whitening_at_a_models_tangents_is_the_same(waveform: np.ndarray) -> None:
+    points = operating(LOADS, np.full(3, 2.1e5))
+    tangent = random_tangents(waveform, values_of(TIRE), points, LowPass())
+    zero = np.concatenate([tangent, np.ones((3, N_PHI, 1))], axis=2)
+    scale = scales(TOLERANCE, np.array([ANGLE_STD, ANGLE_STD, np.inf]))
+    assert scale[:, :3] == pytest.approx(
+        np.tile([TOLERANCE.load, TOLERANCE.pressure, TOLERANCE.gain], (3, 1))
+    )
+    assert scale[:, 3].tolist() == [ANGLE_STD, ANGLE_STD, 1.0]
+    residual = simulated(waveform, 1, ANGLE_STD)
+    found = whitening_of(zero, scales(TOLERANCE, np.full(3, ANGLE_STD)), NOISE)(residual)
+    assert found == pytest.approx(whiten(waveform, residual, ANGLE_STD))
+
+
+def noise_of(waves: Waveforms, strain: np.ndarray) -> RepeatNoise:
+    return repeat_noise(strain, waves.group, measured_tangents(waves, strain))
+
+
 def test_noise_from_repeats_is_the_noise_put_in() -> None:
     noise = 3e-5
     waves = made_waves(noise=noise, repeats=6, seed=3)
     centre = waves.strain[:, 2]
     found = noise_of(waves, centre)
     assert found.repeats == 6
-    # 6 x 357 numbers: 1.5 %; set points are taken out by their shapes
+    # 6 x 356 numbers: 1.5 %; set points are taken out by their shapes
     assert found.std == pytest.approx(noise, rel=0.06)
-    assert found.raw > 1.1 * noise, "repeats differ by set points, which are no noise"
+    raw = repeat_noise(centre, waves.group, np.zeros((*centre.shape, 0)))
+    assert raw.std > 1.1 * noise, "repeats differ by set points, which are no noise"
+    flat = np.full(N_PHI, 1.0 / N_PHI)[None]
+    assert found.variance(np.eye(N_PHI)[:1]) == pytest.approx(found.std**2)
+    assert found.variance(flat) == pytest.approx(0.0, abs=1e-20), "waveforms have no mean"
+
+
+def test_every_set_point_is_taken_out_of_the_repeats() -> None:
+    """Without noise repeats differ by load, pressure, gain and angle alone: next to nothing left.
+
+    Slopes between neighbours are secants, which leaves some tenths of the differences.
+    """
+    waves = made_waves(noise=0.0, repeats=6, seed=3)
+    centre = waves.strain[:, 2]
+    raw = repeat_noise(centre, waves.group, np.zeros((*centre.shape, 0)))
+    tangent = measured_tangents(waves, centre)
+    assert noise_of(waves, centre).std < 0.12 * raw.std
+    for k in (0, 1):
+        without = np.delete(tangent, k, axis=2)
+        assert repeat_noise(centre, waves.group, without).std > 1.5 * noise_of(waves, centre).std
+
+
+def test_measured_tangents_are_those_of_the_model() -> None:
+    waves = made_waves(noise=0.0, repeats=0, random=False)
+    found = measured_tangents(waves, waves.strain[:, 2])
+    points = operating(waves.conditions["Fz"], waves.conditions["pressure"])
+    model = random_tangents(waves.strain[:, 2], values_of(TIRE), points, LowPass())
+    for k in (0, 1):
+        cosine = np.sum(found[..., k] * model[..., k], axis=1) / (
+            np.linalg.norm(found[..., k], axis=1) * np.linalg.norm(model[..., k], axis=1)
+        )
+        # secants over a third of the load, and the linear ring; a wrong sign gives -1
+        assert (cosine > 0.8).all(), k
+        assert np.median(cosine) > 0.9
+        size = np.linalg.norm(found[..., k]) / np.linalg.norm(model[..., k])
+        assert size == pytest.approx(1.0, abs=0.25)
+
+
+def test_a_condition_that_is_not_known_shows_no_slope() -> None:
+    waves = made_waves(noise=0.0, repeats=1, random=False, loads=LOADS_FEW)
+    lost = waves.conditions["pressure"] * np.nan
+    bare = replace(waves, conditions={**waves.conditions, "pressure": lost})
+    tangent = measured_tangents(bare, bare.strain[:, 2])
+    assert (tangent[..., 1] == 0.0).all()
+    assert np.isfinite(repeat_noise(bare.strain[:, 2], bare.group, tangent).std)
+
+
+LOADS_FEW = (2400.0, 6000.0)
 
 
 def test_the_mean_over_five_gages_has_less_noise() -> None:
@@ -113,13 +190,19 @@ def test_the_mean_over_five_gages_has_less_noise() -> None:
 
 
 def test_without_repeats_there_is_no_noise_value() -> None:
-    waves = made_waves(repeats=0)
+    waves = made_waves(repeats=0, loads=LOADS_FEW)
     found = noise_of(waves, waves.strain[:, 2])
     assert found.repeats == 0
+    assert not found.known
     assert np.isnan(found.std)
-    assert np.isnan(found.raw)
 
 
 def test_equal_repeats_have_a_floor() -> None:
-    waves = made_waves(repeats=3, noise=0.0, random=False)
-    assert noise_of(waves, waves.strain[:, 2]).std == FLOOR
+    waves = made_waves(repeats=3, noise=0.0, random=False, loads=LOADS_FEW)
+    assert noise_of(waves, waves.strain[:, 2]).std == LEAST_NOISE
+
+
+def test_white_noise_has_as_many_independent_samples_as_orders() -> None:
+    white = np.random.default_rng(0).standard_normal((400, N_PHI))
+    assert independent(white) == pytest.approx(N_PHI, rel=0.05)
+    assert independent(np.zeros((2, N_PHI))) == N_PHI

@@ -1,0 +1,92 @@
+"""The whole model is the chain with its correction, and its slopes are its differences."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.unit.identify.model_waves import TIRE, operating
+from tirelib.arrays import FloatArray
+from tirelib.errors import ParameterError
+from tirelib.identify.identify import FITTED
+from tirelib.model.base import Coordinate, large_displacements, move, predict, values_of
+from tirelib.model.chain import Changes
+from tirelib.model.state import State
+from tirelib.model.whole import solve_whole, whole_slopes
+
+VALUES = values_of(TIRE)
+POINTS = operating(np.array([2500.0, 4500.0, 6500.0]), np.array([1.8e5, 2.1e5, 2.4e5]))
+
+
+def softer(state: State) -> State:
+    return state.but(k_u=0.9 * state.k_u)
+
+
+CASES: dict[str, tuple[Mapping[str, float | FloatArray], Changes]] = {
+    "plain": (VALUES, ()),
+    "damped": ({**VALUES, "damping": 0.05}, ()),
+    "with an effect": (VALUES, [("constants", softer)]),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_it_is_the_chain_with_its_correction(case: str) -> None:
+    values, changes = CASES[case]
+    fix = large_displacements(values, POINTS)
+    state = predict(values, POINTS, changes, correction=fix)
+    found = solve_whole(values, POINTS, changes)
+    # an effect sees the corrected deflection or not: none of these looks at it
+    assert found.waveform == pytest.approx(state.wave, abs=1e-10)
+    assert found.deflection == pytest.approx(state.deflection, abs=1e-12)
+
+
+def test_without_large_displacements_it_is_the_chain() -> None:
+    found = solve_whole(VALUES, POINTS, exact=False)
+    assert found.contact is None
+    assert found.waveform == pytest.approx(predict(VALUES, POINTS).wave, abs=1e-15)
+
+
+@pytest.mark.parametrize(("case", "exact"), [(c, True) for c in CASES] + [("damped", False)])
+def test_slopes_are_differences(case: str, exact: bool) -> None:
+    values, changes = CASES[case]
+    found = solve_whole(values, POINTS, changes, exact=exact)
+    slopes = whole_slopes(found, values, POINTS, FITTED, changes)
+    h = 1e-5
+    for k in range(len(FITTED) + 2):
+        ends = []
+        for step in (-h, h):
+            z = np.zeros(len(FITTED))
+            at = POINTS
+            if k < len(FITTED):
+                z[k] = step
+            else:
+                name = ("load", "pressure")[k - len(FITTED)]
+                at = replace(POINTS, **{name: getattr(POINTS, name) * (1.0 + step)})
+            ends.append(
+                solve_whole(move(values, z, FITTED), at, changes, start=found.contact, exact=exact)
+            )
+        wave = (ends[1].waveform - ends[0].waveform) / (2.0 * h)
+        depth = (ends[1].deflection - ends[0].deflection) / (2.0 * h)
+        # the linear part's one-sided step of 1e-4; where it plays no part, a thousandth of that
+        close = 3e-3 if case != "plain" or not exact else 1e-5
+        assert slopes.waveform[k] == pytest.approx(wave, abs=close * np.abs(wave).max() + 1e-9)
+        assert slopes.deflection[k] == pytest.approx(depth, abs=close * np.abs(depth).max() + 1e-9)
+
+
+def test_a_start_along_the_slopes_is_near() -> None:
+    found = solve_whole(VALUES, POINTS)
+    slopes = whole_slopes(found, VALUES, POINTS, FITTED)
+    dz = np.array([0.05, -0.04, 0.1, 0.05, 0.1, -0.05, 0.02, 0.1])
+    start = slopes.start(found, dz)
+    there = solve_whole(move(VALUES, dz, FITTED), POINTS)
+    assert start is not None
+    moved = np.abs(there.deflection - found.deflection)
+    assert (np.abs(start.deflection - there.deflection) < 0.1 * moved).all()
+
+
+def test_a_coordinate_that_moves_the_geometry_is_refused() -> None:
+    found = solve_whole(VALUES, POINTS)
+    free = (Coordinate("bending_stiffness"), Coordinate("ring_radius"))
+    with pytest.raises(ParameterError, match="ring_radius moves the ring's radius"):
+        whole_slopes(found, VALUES, POINTS, free)

@@ -1,0 +1,204 @@
+"""Identify the brush of a tire from the forces of a campaign."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from tirelib.campaign import Campaign
+from tirelib.errors import TirelibError
+from tirelib.identify.brush_advice import advice
+from tirelib.identify.brush_estimates import (
+    BrushEstimate,
+    SlipStiffness,
+    estimates_of,
+    slip_stiffness,
+    with_help,
+)
+from tirelib.identify.brush_fit import ANGLE_SPAN, BrushFit, fit_brush
+from tirelib.identify.brush_model import stored_number
+from tirelib.identify.brush_study import study_of
+from tirelib.identify.force_data import ForceData, force_data
+from tirelib.identify.force_notes import force_notes
+from tirelib.identify.lateral_force import MOST_POINTS, PressureComparison, compare_pressures
+from tirelib.parameters import Number, Tire
+
+MOST_SAMPLES = 50000
+"""A longer sweep is thinned evenly: its samples are closer than its errors are independent."""
+MOST_COMPARED = 300
+"""Points for the ring's pressure against the parabola; each has its own pressure profile."""
+_STILL = 0.01
+"""Slip ratio up to which a point rolls freely."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ForceIdentification:
+    """What the forces of a campaign say of a tire.
+
+    Attributes
+    ----------
+    fit : BrushFit
+    estimates : tuple of BrushEstimate
+    stiffness : tuple of SlipStiffness
+        By load and pressure.
+    comparison : PressureComparison or None
+        Lateral force by the ring's pressure against the parabola; without a ring none.
+    notes : tuple of str
+        What was left out or assumed, and why.
+    numbers : mapping of str to Number
+        As a tire file holds them.
+    """
+
+    fit: BrushFit
+    estimates: tuple[BrushEstimate, ...]
+    stiffness: tuple[SlipStiffness, ...]
+    comparison: PressureComparison | None
+    notes: tuple[str, ...]
+    numbers: Mapping[str, Number]
+
+
+def identify_forces(
+    campaign: Campaign,
+    ring: Tire | None = None,
+    *,
+    progress: Callable[[str], None] | None = None,
+) -> ForceIdentification:
+    """Fit the brush to the forces of a campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    ring : Tire, optional
+        Gives the contact length; without it Mz does, or it is assumed and flagged.
+    progress : callable, optional
+        Called with a label at each step.
+
+    Raises
+    ------
+    CalibrationError
+        If slips, loads or forces do not suffice; with what is missing.
+    """
+    tell = progress or (lambda label: None)
+    tell("reading forces")
+    data = force_data(campaign)
+    notes = list(force_notes(campaign))
+    if len(data) > MOST_SAMPLES:
+        step = -(-len(data) // MOST_SAMPLES)
+        notes.append(f"{len(data)} samples: each {step}. is used, {-(-len(data) // step)} in all")
+        data = data.take(np.arange(0, len(data), step))
+    if ring is not None:
+        data, ring = _with_pressure(data, ring, notes)
+    tell("fitting the brush")
+    fit = fit_brush(data, tire=ring)
+    tell("intervals of the brush")
+    study = study_of(fit, data)
+    estimates = estimates_of(study, free_radius=campaign.header.tire.free_radius)
+    if any("not_identifiable" in each.flags for each in estimates):
+        helps = advice(study)
+        estimates = tuple(
+            with_help(each, helps[each.name]) if "not_identifiable" in each.flags else each
+            for each in estimates
+        )
+    notes += _remarks(fit, estimates, data)
+    stiffness = slip_stiffness(study)
+    comparison = None
+    if ring is not None:
+        tell("ring pressure against the parabola")
+        comparison = _compared(data, ring, notes)
+    return ForceIdentification(
+        fit, estimates, stiffness, comparison, tuple(notes),
+        MappingProxyType(_numbers(campaign, fit, estimates, len(data))),
+    )  # fmt: skip
+
+
+def _with_pressure(data: ForceData, ring: Tire, notes: list[str]) -> tuple[ForceData, Tire | None]:
+    """Return the points whose pressure is known, or all of them without the ring."""
+    known = np.isfinite(data.pressure)
+    if not known.any():
+        notes.append(
+            "the inflation pressure is known nowhere: the ring cannot give the contact length; "
+            "record the pressure, or give it as a set point"
+        )
+        return data, None
+    if not known.all():
+        notes.append(
+            f"{int((~known).sum())} of {known.size} points have no inflation pressure; left out, "
+            "since the ring needs it"
+        )
+        data = data.take(known)
+    return data, ring
+
+
+def _remarks(fit: BrushFit, estimates: tuple[BrushEstimate, ...], data: ForceData) -> list[str]:
+    """Return what a reader should know of this fit."""
+    out = []
+    angles = np.unique(np.round(np.abs(np.rad2deg(data.slip_angle)), 1))
+    if "Fy" in fit.rmse and "Fx" not in fit.rmse and angles[angles > 0.3].size < 2:
+        out.append(
+            "one size of slip angle only: cornering stiffness and friction cannot be told apart; "
+            "add a small and a large slip angle"
+        )
+    if fit.held.get("load_power", (0.0, ""))[1] == "one load only":
+        out.append(
+            f"one load only, {fit.reference.load:.0f} N: how the contact length follows the load "
+            "is not told and taken as constant; do not use this brush at other loads"
+        )
+    if "half_length" in fit.held and fit.tire is None:
+        out.append(
+            "the contact length is assumed, since neither Mz nor a ring tells it: the product "
+            "c_py a^2, that is the cornering stiffness, is told, c_py alone is not"
+        )
+    if any("beyond_geometry" in each.flags for each in estimates):
+        out.append(
+            "half_length is longer than any contact of this tire: Mz is larger than a brush on a "
+            "rigid carcass explains. Forces do not depend on it; take it as no contact length"
+        )
+    if not np.isfinite(data.pressure).any():
+        out.append("the inflation pressure is unknown: the brush holds at the one of the test")
+    return out
+
+
+def _compared(data: ForceData, ring: Tire, notes: list[str]) -> PressureComparison | None:
+    usable = np.isfinite(data.Fy) & (np.abs(data.slip_ratio) <= _STILL)
+    chosen = np.flatnonzero(usable)
+    if not chosen.size or np.ptp(data.slip_angle[chosen]) < ANGLE_SPAN:
+        notes.append(
+            "ring pressure against parabola: no freely rolling runs over slip angle with Fy"
+        )
+        return None
+    limit = min(MOST_COMPARED, MOST_POINTS)
+    if chosen.size > limit:
+        chosen = chosen[:: -(-chosen.size // limit)]
+    try:
+        return compare_pressures(data.take(chosen), ring)
+    except TirelibError as error:
+        notes.append(f"ring pressure against parabola: {error}")
+        return None
+
+
+def _numbers(
+    campaign: Campaign, fit: BrushFit, estimates: tuple[BrushEstimate, ...], points: int
+) -> dict[str, Number]:
+    """Return the brush as numbers of a tire file."""
+    source = f"forces of {campaign.header.name}, {' and '.join(fit.rmse)} at {points} points"
+    pairs = []
+    for each in estimates:
+        notes: dict[str, object] = {
+            "interval_SI": [each.low, each.high], "flags": list(each.flags),
+        }  # fmt: skip
+        if each.helps:
+            notes["helps"] = each.helps
+        pairs.append(stored_number(each.name, each.value, each.std, "fitted", source, notes))
+    for name, (value, why) in fit.held.items():
+        if name == "half_length" and fit.tire is not None:
+            continue
+        pairs.append(stored_number(name, value, float("nan"), "assumed", f"not fitted: {why}"))
+    numbers = dict(pairs)
+    mean = f"median of the points of {campaign.header.name}"
+    numbers["reference_load"] = Number(fit.reference.load, float("nan"), "measured", mean)
+    if np.isfinite(fit.reference.pressure):
+        numbers["reference_pressure"] = Number(
+            fit.reference.pressure, float("nan"), "measured", mean
+        )
+    return numbers

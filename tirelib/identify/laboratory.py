@@ -1,0 +1,133 @@
+"""Laboratory tests that would tell a ring's numbers, as linear observations about a fitted tire.
+
+Each test measures logarithms (or the offset's) with a stated accuracy; its rows are their slopes
+by the fit's coordinates. A press test sees what the fitted ring does on the road; the others
+measure a number by its definition, and so also what the ring's structure has put into it.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.model.base import Coordinate
+from tirelib.parameters import Tire
+from tirelib.ring.frequencies import natural_frequency, rim_stiffness
+
+SIDEWALL, MODAL, MASS, TREAD, GROWTH, SECTION = 0.03, 0.01, 0.03, 0.05, 0.05, 0.01
+"""Relative accuracy (one standard deviation) of the tests; MASS is what a modal test takes."""
+ORDERS = np.arange(1, 9)
+STEP = 1e-5
+
+
+@dataclass(frozen=True, slots=True)
+class Test:
+    """One test.
+
+    Attributes
+    ----------
+    words : str
+        What to do, with the accuracy that is assumed.
+    rows : shape (n_measured, n_free)
+        Slopes of the measured logarithms by the free coordinates.
+    covariance : shape (n_measured, n_measured)
+        Of the errors of measurement.
+    by_definition : bool
+        Whether it measures the numbers themselves rather than what the fitted ring does.
+    """
+
+    words: str
+    rows: FloatArray
+    covariance: FloatArray
+    by_definition: bool
+
+
+def laboratory_tests(
+    values: Mapping[str, float | FloatArray],
+    free: tuple[Coordinate, ...],
+    pressures: tuple[float, float],
+) -> tuple[Test, ...]:
+    """Return the tests at the tire's pressure, those of the sidewall also at two others.
+
+    Parameters
+    ----------
+    values : mapping
+        Of the fitted tire.
+    free : tuple of Coordinate
+    pressures : (float, float), [Pa]
+        The lowest and the highest that can be set.
+    """
+    at = float(np.max(values["pressure"]))
+    bars = " and ".join(f"{1e-5 * p:.1f}" for p in pressures)
+
+    def rows(measure: Callable[[Tire], Sequence[float] | FloatArray]) -> FloatArray:
+        return _slopes(measure, values, free)
+
+    def turn(*at: float) -> Callable[[Tire], FloatArray]:
+        return lambda tire: np.log(np.array([_rim(tire, p)[1] for p in at]))
+
+    def rim(*at: float) -> Callable[[Tire], FloatArray]:
+        return lambda tire: np.log(np.array([_rim(tire, p) for p in at])).ravel()
+
+    def modes(tire: Tire) -> FloatArray:
+        return np.asarray(np.log(natural_frequency(
+            ORDERS, ring_radius=tire.ring_radius, bending_stiffness=tire.bending_stiffness,
+            radial_stiffness=tire.radial_stiffness, tangential_stiffness=tire.tangential_stiffness,
+            inflation=at * tire.belt_width, mass=tire.mass,
+        )))  # fmt: skip
+
+    weighed = np.full((ORDERS.size, ORDERS.size), (0.5 * MASS) ** 2)
+    return (
+        Test(f"a torsional sidewall test (S_theta to {SIDEWALL:.0%})", rows(turn(at)),
+             _independent(1, SIDEWALL), True),
+        Test(f"torsional sidewall tests (S_theta to {SIDEWALL:.0%}) at {bars} bar",
+             rows(turn(*pressures)), _independent(2, SIDEWALL), True),
+        Test(f"sidewall tests (S_v, S_theta to {SIDEWALL:.0%})", rows(rim(at)),
+             _independent(2, SIDEWALL), True),
+        Test(f"sidewall tests (S_v, S_theta to {SIDEWALL:.0%}) at {bars} bar",
+             rows(rim(*pressures)), _independent(4, SIDEWALL), True),
+        Test(f"a modal test (orders 1 to 8 to {MODAL:.0%}, mass to {MASS:.0%})", rows(modes),
+             _independent(ORDERS.size, MODAL) + weighed, True),
+        Test(f"a press test of the tread alone (k_t to {TREAD:.0%})",
+             rows(lambda tire: [np.log(tire.tread_stiffness)]), _independent(1, TREAD), True),
+        Test(f"the growth of the belt with pressure (EA to {GROWTH:.0%})",
+             rows(lambda tire: [np.log(tire.extension_stiffness)]), _independent(1, GROWTH), True),
+        Test(f"a cut section (gage offset to {SECTION:.0%})",
+             rows(lambda tire: [np.log(-tire.innerliner_offset)]), _independent(1, SECTION), True),
+    )  # fmt: skip
+
+
+def _independent(size: int, accuracy: float) -> FloatArray:
+    return np.asarray(accuracy**2 * np.eye(size))
+
+
+def _rim(tire: Tire, pressure: float) -> tuple[float, float]:
+    """Return S_v, S_theta of Eq. (112) at a pressure."""
+    above = pressure - tire.pressure
+    shift, turn = rim_stiffness(
+        tire.ring_radius,
+        tire.radial_stiffness + tire.radial_pressure_slope * above,
+        tire.tangential_stiffness + tire.tangential_pressure_slope * above,
+    )
+    return float(shift), float(turn)
+
+
+def _slopes(
+    measure: Callable[[Tire], Sequence[float] | FloatArray],
+    values: Mapping[str, float | FloatArray],
+    free: tuple[Coordinate, ...],
+) -> FloatArray:
+    """Return central differences of a measure by the free coordinates, (n_measured, n_free)."""
+    tire = Tire(**{name: float(np.max(value)) for name, value in values.items()})
+    columns = []
+    for coordinate in free:
+        value = float(np.max(values[coordinate.name]))
+        ends = [
+            np.asarray(
+                measure(tire.changed(**{coordinate.name: float(coordinate.moved(value, z))}))
+            )
+            for z in (-STEP, STEP)
+        ]
+        columns.append((ends[1] - ends[0]) / (2.0 * STEP))
+    return np.stack(columns, axis=1)
