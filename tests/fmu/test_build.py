@@ -7,14 +7,18 @@ import zipfile
 from pathlib import Path
 from xml.etree import ElementTree as Xml
 
+import numpy as np
 import pytest
 from fmpy import extract, read_model_description
 from fmpy.validation import validate_fmu
 
 from tests.fmu import live
 from tirelib.errors import FormatError, ParameterError
-from tirelib.fmu.build import build_fmu, embedded_calibration, slave_file
+from tirelib.flags import TurnFlag
+from tirelib.fmu.build import build_fmu, embedded_calibration, source_file
 from tirelib.fmu.bundle import collect, content_hash, renamed
+from tirelib.fmu.run import LoadedFmu
+from tirelib.stream.estimator import RATES
 from tirelib.units import TABLE
 
 GIVEN = {"1": "ratio", "N": "force", "rad": "angle", "m": "length", "m/s": "speed",
@@ -75,6 +79,66 @@ def test_all_outputs_are_unknown_at_the_start_and_depend_on_nothing_then() -> No
     assert {unknown.get("dependencies") for unknown in unknowns} == {""}
 
 
+def test_every_real_has_a_type_a_nominal_and_limits_that_hold_the_start() -> None:
+    description = read_model_description(str(live.fmu_file(10)))
+    types = {kind.name: kind for kind in description.typeDefinitions}
+    for v in description.modelVariables:
+        if v.type != "Real":
+            continue
+        assert v.declaredType is not None, v.name
+        assert types[v.declaredType.name].unit == v.unit
+        assert float(v.nominal) > 0.0
+        if v.name != "kappa":
+            assert v.min is not None, v.name
+        for limit, sign in ((v.min, 1.0), (v.max, -1.0)):
+            start = float(v.start) if v.start is not None else float("nan")
+            assert limit is None or not sign * start < sign * float(limit), v.name
+        assert v.description
+    limits = {v.name: (v.min, v.max) for v in description.modelVariables}
+    assert limits["flags"] == ("0", str(2 * max(TurnFlag) - 1))
+    assert [float(x) for x in limits["sample_rate"]] == list(RATES)
+
+
+def test_it_brings_icon_page_licences_and_default_experiment() -> None:
+    with zipfile.ZipFile(live.fmu_file(10)) as archive:
+        names = set(archive.namelist())
+        assert archive.read("model.png")[:8] == b"\x89PNG\r\n\x1a\n"
+        page = archive.read("documentation/index.html").decode()
+        licenses = [archive.read(f"documentation/licenses/{n}.txt").decode()
+                    for n in ("license", "pythonfmu")]  # fmt: skip
+        description = Xml.fromstring(archive.read("modelDescription.xml"))
+    assert {"resources/settings.json", "resources/calibration.toml"} <= names
+    for text in ("<svg", "Accuracy", "cross-validated", "12.3 N", "Limits", "alpha_std",
+                 "live tire", "Calibrated range", description.get("version")):  # fmt: skip
+        assert text in page, text
+    assert "{version}" not in page
+    Xml.fromstring(page.split("\n", 1)[1].replace('<meta charset="utf-8">', ""))
+    assert all("MIT License" in text or "Permission is hereby granted" in text for text in licenses)
+    assert description.get("description")
+    assert description.get("license") == "MIT"
+    experiment = description.find("DefaultExperiment")
+    assert experiment is not None
+    assert float(experiment.get("stepSize", "0")) == 10 / live.RATE
+
+
+def test_a_fmu_loaded_in_this_process_does_not_disturb_its_own_rebuild(tmp_path: Path) -> None:
+    with LoadedFmu(live.fmu_file(10)) as fmu:
+        fmu.start(live.RATE)
+        twin = build_fmu(live.calibration_file(), tmp_path / "twin.fmu", samples_per_step=10,
+                         sample_rate=live.RATE)  # fmt: skip
+        assert twin.read_bytes() == live.fmu_file(10).read_bytes()
+        fmu.step(np.zeros((5, 10)), np.array([18.0, 2.3e5, 0.0]))
+
+
+def test_a_place_that_cannot_be_written_is_told_before_the_work(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    done: list[str] = []
+    for place in (tmp_path / "file" / "x.fmu", tmp_path):
+        with pytest.raises(FormatError, match="cannot be written"):
+            build_fmu(live.calibration_file(), place, progress=done.append)
+    assert done == []
+
+
 def test_same_calibration_same_bytes(tmp_path: Path) -> None:
     twin = build_fmu(
         live.calibration_file(), tmp_path / "twin.fmu", samples_per_step=10, sample_rate=live.RATE
@@ -95,7 +159,7 @@ def test_the_embedded_calibration_is_the_one_given() -> None:
 
 
 def test_the_bundle_is_named_by_its_content_and_holds_the_core_only() -> None:
-    sources = collect(slave_file())
+    sources = collect(source_file("strain_tire.py"))
     assert "signal/turns.py" in sources
     assert "stream/estimator.py" in sources
     for absent in ("features/table.py", "observations.py", "estimators/fit.py", "cli/fmu.py"):
@@ -137,7 +201,7 @@ module = import_module(open({resources!r} + "/slavemodule.txt").read())
 slave = module.StrainTire(instance_name="alone", resources={resources!r})
 slave.exit_initialization_mode()
 for step in range(5):
-    slave.set_real([3, 4, 5, 6, 7], [1e-3] * 5)
+    slave.set_real([slave.reference[f'strain_{{g}}'] for g in range(1, 6)], [1e-3] * 5)
     done = slave.do_step(step * 2e-4, 2e-4)
 print(json.dumps([done, sorted({{name.split(".")[0] for name in sys.modules}})]))
 """

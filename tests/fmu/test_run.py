@@ -1,6 +1,7 @@
 """A campaign played to the FMU gives the document of `tirelib estimate`."""
 
 import json
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -94,7 +95,7 @@ def test_a_file_that_is_no_fmu_is_refused(tmp_path: Path) -> None:
 
 def test_the_example_of_the_documentation_runs(capsys: pytest.CaptureFixture[str]) -> None:
     page = Path(__file__).parents[2] / "docs" / "fmu.md"
-    code = page.read_text().split("```python\n")[1].split("```")[0]
+    code = page.read_text().split("```python\n")[2].split("```")[0]
     code = code.replace('"StrainTire.fmu", 1e4', f'"{live.fmu_file(10)}", {live.RATE}')
     assert len(code.splitlines()) <= 22
     strain, _ = live.strain_of(4e3, 0.0)
@@ -103,6 +104,25 @@ def test_the_example_of_the_documentation_runs(capsys: pytest.CaptureFixture[str
     load, std, age = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert load == pytest.approx(4e3, abs=6 * std)
     assert age > 0.0
+
+
+def test_the_checking_script_of_the_documentation_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = Path(__file__).parents[2] / "docs" / "fmu.md"
+    code = page.read_text().split("```python\n")[1].split("```")[0]
+    assert len([line for line in code.splitlines() if line.strip()]) <= 22
+    monkeypatch.chdir(tmp_path)
+    altered = tmp_path / "altered.fmu"
+    with zipfile.ZipFile(live.fmu_file(10)) as old, zipfile.ZipFile(altered, "w") as new:
+        for name in old.namelist():
+            data = old.read(name)
+            new.writestr(
+                name, data.replace(b",131072,", b",131073,") if "_ref.csv" in name else data
+            )
+    for file, wanted in ((live.fmu_file(10), "[]"), (altered, "['flags']")):
+        exec(code.replace("sys.argv[1]", repr(str(file))), {})
+        assert capsys.readouterr().out.endswith(f"problems: [] differ: {wanted}\n")
 
 
 @pytest.mark.shared

@@ -1,23 +1,35 @@
-"""``tirelib fmu``: the estimator as an FMU; build it, and play a campaign to it."""
+"""``tirelib fmu``: the estimator as an FMU; build it, check it, play a campaign to it."""
 
 from pathlib import Path
+from typing import Any
 
 import click
 
 from tirelib.campaign import read_campaign
 from tirelib.cli.common import CAMPAIGN, FILE, output, progress_bar, write_json
 from tirelib.cli.estimate import print_document
+from tirelib.errors import FormatError
 from tirelib.estimators.result import estimate_document
 from tirelib.fmu.build import DEFAULT_RATE, build_fmu, embedded_calibration
+from tirelib.fmu.check import check_fmu
 from tirelib.fmu.run import LoadedFmu, play_campaign
 
+_GROUP = """\b
+Examples:
+  tirelib fmu build --calibration cal.toml --out StrainTire.fmu --samples-per-step 10
+  tirelib fmu check StrainTire.fmu --out build/out/fmu_check
+  tirelib fmu run StrainTire.fmu data/another-day --json f.json
+"""
 _BUILD = """\b
-Example:
+Examples:
   tirelib fmu build --calibration build/out/cal.toml --out build/out/StrainTire.fmu
+  tirelib fmu build --calibration cal.toml --out X.fmu --samples-per-step 10      # 1 ms at 10 kHz
+  tirelib fmu build --calibration cal.toml --out X.fmu --samples-per-step 32 --buffered
 
 \b
 FMI 2.0 co-simulation, one wheel. Needs CPython with numpy and scipy where it runs; the rest is
-inside. The communication step is samples per step over sample rate.
+inside. The communication step is samples per step over sample rate; with --buffered it is free,
+and the input `samples` says how many samples of the frame are new. Estimates are the same.
 """
 _RUN = """\b
 Example:
@@ -26,11 +38,22 @@ Example:
 \b
 JSON: as `tirelib estimate`. Exit code 1: not one turn is valid.
 """
+_CHECK = """\b
+Examples:
+  tirelib fmu check build/out/StrainTire.fmu
+  tirelib fmu check Foreign.fmu --reference cross-check/Foreign --json check.json --out report
+
+\b
+Runs the code inside, in a process of its own. Reference signals are looked for in
+resources/reference of the FMU (X_in.csv, X_ref.csv, X_ref.opt). An FMU of another tool that holds
+none is validated and run for a few steps.
+Exit code 0: all passed; 1: something failed; 2: the file is no FMU.
+"""
 
 
-@click.group()
+@click.group(epilog=_GROUP)
 def fmu() -> None:
-    """Export the estimator as an FMU, and run it."""
+    """Export the estimator as an FMU, check it, and run it."""
 
 
 @fmu.command(epilog=_BUILD)
@@ -41,15 +64,26 @@ def fmu() -> None:
               help="Samples of every gage that one communication step brings.")  # fmt: skip
 @click.option("--sample-rate", metavar="HZ", type=float, default=DEFAULT_RATE, show_default=True,
               help="Start value of the parameter of that name.")  # fmt: skip
-def build(calibration: Path, out: Path, samples_per_step: int, sample_rate: float) -> None:
+@click.option("--buffered", is_flag=True,
+              help="Steps of any length, with up to K samples each.")  # fmt: skip
+def build(
+    calibration: Path, out: Path, samples_per_step: int, sample_rate: float, buffered: bool
+) -> None:
     """Write StrainTire.fmu with a calibration inside."""
-    path = build_fmu(calibration, out, samples_per_step=samples_per_step, sample_rate=sample_rate)
+    with progress_bar("building", 3) as progress:
+        path = build_fmu(
+            calibration, out, samples_per_step=samples_per_step, sample_rate=sample_rate,
+            buffered=buffered, progress=progress,
+        )  # fmt: skip
     loaded = embedded_calibration(path)
     gages = ", ".join(f"{1e3 * y:+g}" for y in loaded.lateral)
+    step = 1e3 * samples_per_step / sample_rate
     console = output()
     console.print(f"tire {loaded.tire}, gages at {gages} mm (ISO 8855)")
-    console.print(f"communication step {1e3 * samples_per_step / sample_rate:g} ms")
+    free = f"of any length, up to {samples_per_step} samples"
+    console.print(f"communication step {free if buffered else f'{step:g} ms'}")
     console.print(f"written: {path} ({path.stat().st_size / 1e3:.0f} kB)")
+    console.print(f"next: tirelib fmu check {path}")
 
 
 @fmu.command(epilog=_RUN)
@@ -68,3 +102,53 @@ def run(context: click.Context, file: Path, folder: Path, json_file: Path | None
         write_json(json_file, document)
         output().print(f"written: {json_file}")
     context.exit(0 if valid else 1)
+
+
+@fmu.command(epilog=_CHECK)
+@click.argument("file", metavar="X.fmu", type=FILE)
+@click.option("--reference", metavar="DIR", type=CAMPAIGN,
+              help="Reference signals, where the FMU holds none.")  # fmt: skip
+@click.option("--out", metavar="REPORT", type=CAMPAIGN, help="Folder for the page.")
+@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write the result as JSON.")
+@click.pass_context
+def check(
+    context: click.Context, file: Path, reference: Path | None, out: Path | None,
+    json_file: Path | None,
+) -> None:  # fmt: skip
+    """Validate X.fmu, play its reference signals, compare with what they expect."""
+    with progress_bar("checking", 3) as progress:
+        document = check_fmu(file, reference=reference, progress=progress)
+    _print_check(document)
+    if json_file is not None:
+        kept = {name: part for name, part in document.items() if name not in ("curves", "units")}
+        write_json(json_file, kept)
+        output().print(f"written: {json_file}")
+    if out is not None:
+        from tirelib.report.fmu_check import write_check
+
+        try:
+            page = write_check(document, out)
+        except OSError as error:
+            raise FormatError(f"{out}: cannot be written ({error.strerror}); choose another "
+                              "folder") from None  # fmt: skip
+        output().print(f"written: {page}")
+    context.exit(0 if document["passed"] else 1)
+
+
+def _print_check(document: dict[str, Any]) -> None:
+    from tirelib.report.fmu_check import verdict
+
+    console = output()
+    for part in document["parts"]:
+        word = "passed" if part["passed"] else "FAILED"
+        console.print(f"{word}  {part['name']}: {part['detail']}")
+    for row in document["variables"]:
+        if not row["passed"]:
+            found = row["largest_difference"]
+            size = "a number is missing" if found is None else f"{found:.3g} {row['unit']}"
+            console.print(
+                f"        {row['name']}: {size} at {row['time']:g} s; {row['allowed']:.3g} allowed"
+            )
+    for message in document["messages"]:
+        console.print(f"        log: {message}")
+    console.print(verdict(document))

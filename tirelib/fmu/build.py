@@ -1,31 +1,31 @@
-"""Build ``StrainTire.fmu`` from a calibration. Same calibration and code, same bytes."""
+"""Build an FMU from a slave of ``fmu_src``. Same input and code, same bytes."""
 
 import json
+import re
 import shutil
 import sys
 import tempfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
+from types import ModuleType
 from uuid import UUID, uuid5
 
 from tirelib import __version__
-from tirelib.errors import FormatError, ParameterError
+from tirelib.errors import FormatError
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.fmu.bundle import collect, content_hash, renamed, write_package
-from tirelib.fmu.describe import described, page, repack
-from tirelib.fmu.variables import inputs, outputs, parameters
-from tirelib.stream.estimator import RATES
+from tirelib.fmu.describe import described, repack
+from tirelib.fmu.spec import SlaveSpec
 
-MODEL = "StrainTire"
-MOST_SAMPLES = 256
-"""Largest frame: a turn must be longer than a frame, or its estimate would be overwritten."""
-DEFAULT_RATE = 1e4
 _NAMESPACE = UUID("5b1f6a2e-3c7d-5e84-9a10-7469726c6962")
 _OPTIONS = {"canGetAndSetFMUstate": True, "canSerializeFMUstate": True}
+_FOREIGN = re.compile(r"^(\s*(?:from|import)\s+)pythonfmu(?=[.\s])", re.MULTILINE)
+_MODULE = re.compile(r"^import (\S+\.pythonfmu)$", re.MULTILINE)
+DEFAULT_RATE = 1e4
 
 
 def build_fmu(
@@ -34,8 +34,10 @@ def build_fmu(
     *,
     samples_per_step: int = 1,
     sample_rate: float = DEFAULT_RATE,
+    buffered: bool = False,
+    progress: Callable[[str], None] | None = None,
 ) -> Path:
-    """Write an FMI 2.0 co-simulation FMU that estimates with a calibration.
+    """Write ``StrainTire.fmu``: an FMI 2.0 co-simulation unit that estimates with a calibration.
 
     Parameters
     ----------
@@ -44,9 +46,14 @@ def build_fmu(
     out : path
         The FMU to write.
     samples_per_step : int
-        Samples of every gage that one communication step brings.
+        Samples of every gage that one communication step brings, or at most brings.
     sample_rate : float, [Hz]
         Start value of the parameter of that name.
+    buffered : bool
+        Whether an input says how many samples of a frame are new, so that communication steps may
+        have any length.
+    progress : callable, optional
+        Called with what was done.
 
     Raises
     ------
@@ -55,56 +62,95 @@ def build_fmu(
     FormatError
         If the calibration cannot be read, or the FMU cannot be written.
     """
-    if not 1 <= samples_per_step <= MOST_SAMPLES:
-        raise ParameterError(
-            f"samples per step = {samples_per_step}; allowed are 1 .. {MOST_SAMPLES}; a frame must "
-            "be shorter than a turn of the wheel"
-        )
-    low, high = RATES
-    if not low <= sample_rate <= high:
-        raise ParameterError(
-            f"sample rate = {sample_rate} Hz; allowed are {low:g} .. {high:g} Hz; give the rate of "
-            "the gages"
-        )
-    loaded = read_calibration(calibration)
-    text = Path(calibration).read_text(encoding="utf-8")
-    slave = slave_file()
+    from tirelib.fmu.strain_spec import strain_tire  # it describes itself with this module's help
+
+    _check_writable(Path(out))
+    spec = strain_tire(
+        calibration, samples_per_step=samples_per_step, sample_rate=sample_rate, buffered=buffered
+    )
+    return export(spec, out, progress)
+
+
+def export(spec: SlaveSpec, out: str | Path, progress: Callable[[str], None] | None = None) -> Path:
+    """Write the FMU of a slave.
+
+    Every module inside is named by version and content, pythonfmu's included, so that FMUs of
+    several versions can live in one process.
+
+    Raises
+    ------
+    FormatError
+        If pythonfmu is not installed, or the FMU cannot be written.
+    """
+    tell = progress or (lambda _: None)
+    target = Path(out)
+    _check_writable(target)
+    slave = source_file(spec.script)
+    text = slave.read_text(encoding="utf-8")
     sources = collect(slave)
-    settings: dict[str, int | float | str] = {
-        "samples_per_step": samples_per_step,
-        "sample_rate": sample_rate,
-    }
+    settings = {**spec.settings, "description": spec.description, "step_size": spec.step_size}
     digest = content_hash(
         {
             **sources,
-            "slave": slave.read_text(encoding="utf-8"),
-            "calibration": text,
+            "slave": text,
             "settings": json.dumps(settings),
             "pythonfmu": _pythonfmu(),
+            **{f"resources/{k}": v.hex() for k, v in spec.resources.items()},
+            **{f"documentation/{k}": v.hex() for k, v in spec.documentation.items()},
+            "icon": spec.icon.hex(),
         }
     )
-    guid = str(uuid5(_NAMESPACE, digest))
-    settings |= {"guid": f"{{{guid}}}", "version": f"{__version__}+{digest}"}
-    package = f"tirelib_{digest}"
-    target = Path(out)
+    settings["guid"] = f"{{{uuid5(_NAMESPACE, digest)}}}"
+    settings["version"] = f"{__version__}+{digest}"
+    suffix = f"{re.sub(r'[^0-9a-zA-Z]', '_', __version__)}_{digest}"
+    package = f"tirelib_{suffix}"
+    tell("modules collected")
     with tempfile.TemporaryDirectory(prefix="tirelib_fmu_") as name:
         folder = Path(name)
-        script = folder / f"strain_tire_{digest}.py"
-        script.write_text(renamed(slave.read_text(encoding="utf-8"), package), encoding="utf-8")
-        (folder / "calibration.toml").write_text(text, encoding="utf-8")
-        (folder / "settings.json").write_text(json.dumps(settings, indent=1), encoding="utf-8")
-        content = [
-            write_package(folder, sources, package),
-            folder / "calibration.toml",
-            folder / "settings.json",
-        ]
-        raw = _export(script, folder / "raw" / f"{MODEL}.fmu", content)
-        try:
-            repack(raw, target, _additions(raw, loaded, settings))
-        except OSError as error:
-            raise FormatError(f"{target}: cannot be written ({error.strerror}); choose another "
-                              "file") from None  # fmt: skip
+        script = folder / f"{slave.stem}_{suffix}.py"
+        script.write_text(renamed(text, package), encoding="utf-8")
+        content = [write_package(folder, sources, package)]
+        for path, data in {
+            **spec.resources, "settings.json": json.dumps(settings, indent=1).encode()
+        }.items():  # fmt: skip
+            place = folder / path
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_bytes(data)
+            top = folder / Path(path).parts[0]
+            content += [top] if top not in content else []
+        raw = _export(script, folder / "raw" / f"{spec.model}.fmu", content, suffix)
+        tell("exported by pythonfmu")
+        files = _own_pythonfmu(_unzipped(raw), script.name, package)
+    files |= {
+        "modelDescription.xml": described(files["modelDescription.xml"], spec.table),
+        "model.png": spec.icon,
+        **_licenses(),
+    }
+    for path, data in spec.documentation.items():
+        filled = data.replace(b"{version}", str(settings["version"]).encode())
+        files[f"documentation/{path}"] = filled
+    try:
+        repack(files, target)
+    except OSError as error:
+        raise _unwritable(target, error) from None
+    tell("described and packed")
     return target
+
+
+def _check_writable(target: Path) -> None:
+    """Refuse a file that cannot be written before the work is done, not after."""
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=target.parent):
+            pass
+        if target.is_dir():
+            raise IsADirectoryError(21, "is a folder")
+    except OSError as error:
+        raise _unwritable(target, error) from None
+
+
+def _unwritable(target: Path, error: OSError) -> FormatError:
+    return FormatError(f"{target}: cannot be written ({error.strerror}); choose another file")
 
 
 def _pythonfmu() -> str:
@@ -117,72 +163,89 @@ def _pythonfmu() -> str:
         ) from None
 
 
-def slave_file() -> Path:
-    """Return the slave's source: beside the package in a checkout, inside it when installed."""
+def source_file(name: str) -> Path:
+    """Return a file of ``fmu_src``: beside the package in a checkout, inside it when installed.
+
+    Raises
+    ------
+    FormatError
+        If it is in neither.
+    """
     package = Path(__file__).parents[1]
     for folder in (package.parent / "fmu_src", package / "fmu_src"):
-        if (folder / "strain_tire.py").is_file():
-            return folder / "strain_tire.py"
+        if (folder / name).is_file():
+            return folder / name
     raise FormatError(
-        f"{package.parent}: holds no fmu_src/strain_tire.py, the source of the FMU; install "
-        "tirelib from its repository or its wheel"
+        f"{package.parent}: holds no fmu_src/{name}, a source of the FMU; install tirelib from its "
+        "repository or its wheel"
     )
 
 
-def _export(script: Path, target: Path, content: list[Path]) -> Path:
+def _export(script: Path, target: Path, content: list[Path], suffix: str) -> Path:
     """Let pythonfmu write the FMU."""
     from pythonfmu import FmuBuilder
 
     target.parent.mkdir()
-    with _imports_undone():
+    with _imports_undone(suffix):
         FmuBuilder.build_FMU(script, dest=target, project_files=content, **_OPTIONS)
     return target
 
 
 @contextmanager
-def _imports_undone() -> Iterator[None]:
-    """Forget what the builder imports and where it looked: it runs the slave in this process."""
-    path, modules, bytecode = list(sys.path), set(sys.modules), sys.dont_write_bytecode
+def _imports_undone(suffix: str) -> Iterator[None]:
+    """Forget what the builder imports and where it looked: it runs the slave in this process.
+
+    Modules of the same FMU, loaded here by an importer, stand aside meanwhile.
+    """
+    path, bytecode = list(sys.path), sys.dont_write_bytecode
+    loaded = _take_out(suffix)
     sys.dont_write_bytecode = True
     try:
         yield
     finally:
         sys.dont_write_bytecode = bytecode
         sys.path[:] = path
-        for name in set(sys.modules) - modules:
-            if name.startswith(("tirelib_", "strain_tire_")):
-                del sys.modules[name]
+        _take_out(suffix)
+        sys.modules.update(loaded)
 
 
-def _additions(
-    raw: Path, calibration: Calibration, settings: dict[str, int | float | str]
-) -> dict[str, bytes]:
-    """Return the files that pythonfmu does not write, or not well."""
-    samples, rate = int(settings["samples_per_step"]), float(settings["sample_rate"])
-    table = [
-        *parameters(rate, RATES),
-        *inputs(calibration.lateral, samples),
-        *outputs(calibration.lateral),
-    ]
-    facts = {
-        "tire": calibration.tire,
-        "gages": ", ".join(f"{1e3 * y:+g}" for y in calibration.lateral) + " mm, ISO 8855",
-        "samples per step": str(samples),
-        "sample rate": f"{rate:g} Hz (parameter)",
-        "axis systems": "iso (default), sae, adapted_sae (parameter)",
-        "needs": "CPython 3.11 or newer with numpy and scipy; linux64 or win64",
-        "version": str(settings["version"]),
-    }
+def _take_out(suffix: str) -> dict[str, ModuleType]:
+    """Remove the modules of an FMU from this process and return them."""
+    names = [name for name in sys.modules if name.split(".")[0].endswith(suffix)]
+    return {name: sys.modules.pop(name) for name in names}
+
+
+def _unzipped(raw: Path) -> dict[str, bytes]:
     with zipfile.ZipFile(raw) as archive:
-        description = archive.read("modelDescription.xml")
-    files = {
-        "modelDescription.xml": described(description, table),
-        "documentation/index.html": page(MODEL, facts, table).encode(),
-    }
-    license_file = slave_file().parents[1] / "LICENSE"
-    if license_file.is_file():
-        files["documentation/licenses/license.txt"] = license_file.read_bytes()
-    return files
+        return {name: archive.read(name) for name in archive.namelist() if name[-1] != "/"}
+
+
+def _own_pythonfmu(files: Mapping[str, bytes], script: str, package: str) -> dict[str, bytes]:
+    """Move pythonfmu's modules into the FMU's own package, where no other version can be met."""
+    moved = {}
+    for name, data in files.items():
+        if name == f"resources/{script}":
+            text = _FOREIGN.sub(rf"\g<1>{package}.pythonfmu", data.decode())
+            moved[name] = _MODULE.sub(r"import \1 as pythonfmu", text).encode()
+        else:
+            place = name.replace("resources/pythonfmu/", f"resources/{package}/pythonfmu/", 1)
+            moved[place] = data
+    return moved
+
+
+def _licenses() -> dict[str, bytes]:
+    """Return the licences of all that is inside."""
+    own = Path(__file__).parents[2] / "LICENSE"
+    texts = {"license.txt": own.read_bytes() if own.is_file() else _installed_license("tirelib")}
+    texts["pythonfmu.txt"] = _installed_license("pythonfmu")
+    return {f"documentation/licenses/{name}": text for name, text in texts.items() if text}
+
+
+def _installed_license(package: str) -> bytes:
+    for file in metadata.files(package) or []:
+        if file.name.upper().startswith("LICENSE"):
+            return Path(str(file.locate())).read_bytes()
+    return b""
 
 
 def embedded_calibration(fmu: str | Path) -> Calibration:

@@ -1,9 +1,8 @@
-"""What pythonfmu leaves out of ``modelDescription.xml``: units, limits, unknowns at the start.
+"""What pythonfmu leaves out of ``modelDescription.xml``: units, types, limits, unknowns at start.
 
-Also the page that a user of the FMU sees first, and a zip whose bytes depend on its content alone.
+Also a zip whose bytes depend on its content alone.
 """
 
-import html
 import math
 import zipfile
 from collections.abc import Mapping, Sequence
@@ -24,6 +23,19 @@ UNITS: Mapping[str, tuple[dict[str, str], dict[str, float]]] = {
     "Hz": ({"s": "-1"}, {"kHz": 1e-3}),
 }
 """Exponents of the base units, and factors of the display units, of every unit in use."""
+TYPES: Mapping[str, tuple[str, str | None, str]] = {
+    "Strain": ("1", "ustrain", "strain, positive in tension"),
+    "Force": ("N", "kN", "force"),
+    "Angle": ("rad", "deg", "angle"),
+    "Ratio": ("1", None, "number without unit"),
+    "Length": ("m", "mm", "length"),
+    "Speed": ("m/s", "km/h", "speed of travel"),
+    "Pressure": ("Pa", "bar", "pressure above that of the air"),
+    "TurnRate": ("rad/s", "rpm", "turn rate"),
+    "Time": ("s", "ms", "time"),
+    "Frequency": ("Hz", "kHz", "frequency"),
+}
+"""Unit, display unit and meaning of every declared type."""
 EPOCH = (2000, 1, 1, 0, 0, 0)
 """Time of every file in the zip, so that the same content has the same bytes."""
 
@@ -45,7 +57,8 @@ def described(source: bytes, table: Sequence[Variable]) -> bytes:
     structure = root.find("ModelStructure")
     if simulation is None or scalars is None or structure is None:
         raise ValueError("pythonfmu wrote no CoSimulation, ModelVariables or ModelStructure")
-    root.insert(list(root).index(simulation) + 1, _unit_definitions())
+    place = list(root).index(simulation) + 1
+    root[place:place] = [_unit_definitions(), _type_definitions()]
     unknown = Xml.SubElement(structure, "InitialUnknowns")
     for number, (scalar, variable) in enumerate(zip(scalars, table, strict=True), start=1):
         _describe(scalar, variable)
@@ -66,7 +79,10 @@ def _describe(scalar: Xml.Element, variable: Variable) -> None:
         kind.set("start", "NaN")
     if variable.causality == "output":
         kind.attrib.pop("start", None)
+    if variable.type is not None and TYPES[variable.type][0] != variable.unit:
+        raise ValueError(f"{variable.name}: type {variable.type} is not in {variable.unit}")
     optional = {
+        "declaredType": variable.type,
         "unit": variable.unit,
         "displayUnit": variable.display,
         "min": variable.low,
@@ -88,39 +104,21 @@ def _unit_definitions() -> Xml.Element:
     return definitions
 
 
-def page(title: str, facts: Mapping[str, str], table: Sequence[Variable]) -> str:
-    """Return ``documentation/index.html``: what the FMU holds and what its variables mean."""
-    rows = "\n".join(
-        "<tr>"
-        + "".join(
-            f"<td>{html.escape(text)}</td>"
-            for text in (v.name, v.causality, v.kind, v.unit or "", v.display or "", v.description)
-        )
-        + "</tr>"
-        for v in table
-    )
-    given = "\n".join(
-        f"<dt>{html.escape(name)}</dt><dd>{html.escape(text)}</dd>" for name, text in facts.items()
-    )
-    head = "".join(
-        f"<th>{name}</th>" for name in ("name", "causality", "type", "unit", "shown in", "meaning")
-    )
-    return (
-        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
-        "</head><body>\n"
-        f"<h1>{title}</h1>\n<dl>\n{given}\n</dl>\n<table>\n<tr>{head}</tr>\n{rows}\n</table>\n"
-        "</body></html>\n"
-    )
+def _type_definitions() -> Xml.Element:
+    definitions = Xml.Element("TypeDefinitions")
+    for name, (unit, display, meaning) in TYPES.items():
+        kind = Xml.SubElement(definitions, "SimpleType", {"name": name, "description": meaning})
+        real = Xml.SubElement(kind, "Real", {"quantity": name, "unit": unit})
+        if display is not None:
+            real.set("displayUnit", display)
+    return definitions
 
 
-def repack(source: Path, target: Path, replaced: Mapping[str, bytes]) -> None:
-    """Write a zip again, sorted, compressed and without times, with some files replaced or added.
+def repack(files: Mapping[str, bytes], target: Path) -> None:
+    """Write a zip: sorted, compressed, without times, so that the same content has the same bytes.
 
     The model description comes first, where importers look for it.
     """
-    with zipfile.ZipFile(source) as archive:
-        files = {name: archive.read(name) for name in archive.namelist()}
-    files |= replaced
     target.parent.mkdir(parents=True, exist_ok=True)
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
         for name in sorted(files, key=lambda name: (name != "modelDescription.xml", name)):

@@ -67,6 +67,7 @@ class LoadedFmu:
                 f"{path}: cannot be instantiated: {'; '.join(self.messages) or error}"
             ) from None
         self._frame = self._buffer(*strains, *CONDITIONS)
+        self.buffered = "samples" in self.references
 
     def __enter__(self) -> "LoadedFmu":
         return self
@@ -135,6 +136,8 @@ class LoadedFmu:
         view[-conditions.size :] = conditions
         self.slave.fmi2SetReal(self.slave.component, references, size, values)
         n = frame.shape[1]
+        if self.buffered:
+            self.slave.setInteger([self.references["samples"]], [n])
         self.slave.doStep(self.count / self.rate, n / self.rate)
         self.count += n
 

@@ -4,8 +4,13 @@ import math
 from dataclasses import dataclass
 
 from tirelib.estimators.chain import QUANTITIES
+from tirelib.flags import TurnFlag
 
 NAN = math.nan
+RIGHT = 0.5 * math.pi
+TYPE = {"Fz": "Force", "alpha": "Angle", "kappa": "Ratio", "Fy": "Force"}
+LIMITS = {"Fz": (-1e5, 1e5), "alpha": (-RIGHT, RIGHT), "kappa": (None, None), "Fy": (-1e5, 1e5)}
+"""A number outside says that the wiring is wrong; nothing is clamped to them."""
 UNITS = {"Fz": "N", "alpha": "rad", "kappa": "1", "Fy": "N"}
 DISPLAY = {"Fz": None, "alpha": "deg", "kappa": "%", "Fy": None}
 MEANING = {"Fz": "vertical load", "alpha": "slip angle", "kappa": "slip ratio",
@@ -17,7 +22,8 @@ class Variable:
     """One scalar variable.
 
     `kind` is ``Real``, ``Integer``, ``Boolean`` or ``String``; `causality` ``parameter``, ``input``
-    or ``output``. Only a Real has units; its value is in `unit`, tools may show `display`.
+    or ``output``. Only a Real has units; its value is in `unit`, tools may show `display`. `type`
+    names the declared type (`tirelib.fmu.describe.TYPES`) that a unit belongs to.
     """
 
     name: str
@@ -30,23 +36,34 @@ class Variable:
     nominal: float | None = None
     low: float | None = None
     high: float | None = None
+    type: str | None = None
 
 
 def parameters(sample_rate: float, limits: tuple[float, float]) -> list[Variable]:
     """Return the parameters, fixed after initialisation."""
     return [
         Variable("sample_rate", "Real", "parameter", "sample rate of the gages", sample_rate,
-                 "Hz", low=limits[0], high=limits[1]),
+                 "Hz", "kHz", 1e4, *limits, type="Frequency"),
+        Variable("filter_order", "Real", "parameter",
+                 "cut-off of the low-pass, cycles per turn: a check that the calibration was made "
+                 "with this one; 0: whatever it was made with", 0.0, "1", None, 10.0, 0.0, 1e3,
+                 type="Ratio"),
         Variable("axes", "String", "parameter",
                  "axis system of outputs and gage order: iso, sae or adapted_sae", "iso"),
         Variable("calibration", "String", "parameter",
-                 "path of another calibration of the same gage layout; empty: the embedded one",
-                 ""),
+                 "path of another calibration of the same tire and gage layout; empty: the "
+                 "embedded one", ""),
+        Variable("tire", "String", "parameter",
+                 "name of the tire on the wheel, which the calibration must be of; empty: the "
+                 "embedded calibration's", ""),
     ]  # fmt: skip
 
 
-def inputs(lateral: tuple[float, ...], samples: int) -> list[Variable]:
-    """Return the inputs: strain sample by sample, oldest first, then the conditions."""
+def inputs(lateral: tuple[float, ...], samples: int, *, buffered: bool = False) -> list[Variable]:
+    """Return the inputs: strain sample by sample, oldest first, then the conditions.
+
+    `buffered` adds ``samples``, which says how many of the frame are new.
+    """
     table = []
     for sample in range(1, samples + 1):
         for gage, y in enumerate(lateral, start=1):
@@ -54,20 +71,29 @@ def inputs(lateral: tuple[float, ...], samples: int) -> list[Variable]:
             which = "" if samples == 1 else f", sample {sample} of {samples}, oldest first"
             text = f"raw strain at lateral position {1e3 * y:+g} mm of the chosen axes{which}"
             table.append(
-                Variable(name, "Real", "input", f"{text}; NaN: missing", 0.0, "1", "ustrain", 1e-3)
-            )
-    return [
-        *table,
-        Variable("speed", "Real", "input", "travel speed; NaN: unknown", NAN, "m/s", "km/h", 10.0),
+                Variable(name, "Real", "input", f"{text}; NaN: missing", 0.0, "1", "ustrain", 1e-3,
+                         -1.0, 1.0, type="Strain")
+            )  # fmt: skip
+    table += [
+        Variable("speed", "Real", "input", "travel speed; NaN: unknown", NAN, "m/s", "km/h", 10.0,
+                 -150.0, 150.0, type="Speed"),
         Variable("pressure", "Real", "input", "inflation pressure (gauge); NaN: unknown", NAN,
-                 "Pa", "bar", 1e5),
-        Variable("camber", "Real", "input", "camber angle; NaN: unknown", NAN, "rad", "deg", 0.1),
+                 "Pa", "bar", 1e5, 0.0, 2e6, type="Pressure"),
+        Variable("camber", "Real", "input", "camber angle; NaN: unknown", NAN, "rad", "deg", 0.1,
+                 -RIGHT, RIGHT, type="Angle"),
         Variable("omega", "Real", "input",
                  "measured turn rate, for the watchdog only (zero: standing); NaN: unknown", NAN,
-                 "rad/s", "rpm", 10.0),
+                 "rad/s", "rpm", 10.0, -1e3, 1e3, type="TurnRate"),
         Variable("frame_valid", "Boolean", "input",
                  "false: the frame was lost or damaged, its samples are missing", True),
     ]  # fmt: skip
+    if buffered:
+        table.append(
+            Variable("samples", "Integer", "input",
+                     "how many samples of the frame are new, oldest first; the step may have any "
+                     "length", 0, low=0, high=samples)
+        )  # fmt: skip
+    return table
 
 
 def outputs(lateral: tuple[float, ...]) -> list[Variable]:
@@ -75,31 +101,34 @@ def outputs(lateral: tuple[float, ...]) -> list[Variable]:
     nominal = {"Fz": 1e3, "alpha": 0.1, "kappa": 0.1, "Fy": 1e3}
     table = [
         Variable(q, "Real", "output", f"{MEANING[q]}; NaN: not to be had", NAN, UNITS[q],
-                 DISPLAY[q], nominal[q])
+                 DISPLAY[q], nominal[q], *LIMITS[q], type=TYPE[q])
         for q in QUANTITIES
     ]  # fmt: skip
     table += [
         Variable(f"{q}_std", "Real", "output", f"standard deviation of {q}", NAN, UNITS[q],
-                 DISPLAY[q], 0.01 * nominal[q])
+                 DISPLAY[q], 0.01 * nominal[q], 0.0, type=TYPE[q])
         for q in QUANTITIES
     ]  # fmt: skip
     table += [
         Variable(f"contact_length_{gage}", "Real", "output",
                  f"contact length at lateral position {1e3 * y:+g} mm of the chosen axes", NAN,
-                 "m", "mm", 0.1)
+                 "m", "mm", 0.1, 0.0, 1.0, type="Length")
         for gage, y in enumerate(lateral, start=1)
     ]  # fmt: skip
     return [
         *table,
         Variable("rolling_radius", "Real", "output", "effective rolling radius", NAN, "m", "mm",
-                 0.3),
+                 0.3, 0.0, 2.0, type="Length"),
         Variable("turn_rate", "Real", "output", "turn rate from the strain's contacts", NAN,
-                 "rad/s", "rpm", 10.0),
+                 "rad/s", "rpm", 10.0, 0.0, type="TurnRate"),
         Variable("contact_time", "Real", "output",
-                 "middle of the contact, since the start of the first sample", NAN, "s", "ms", 1.0),
-        Variable("age", "Real", "output", "time since the estimate was made", NAN, "s", "ms", 0.1),
-        Variable("turn", "Integer", "output", "number of contacts since the start", 0),
-        Variable("flags", "Integer", "output", "sum of flag bits (tirelib.flags.TurnFlag)", 1),
+                 "middle of the contact, since the start of the first sample", NAN, "s", "ms", 1.0,
+                 0.0, type="Time"),
+        Variable("age", "Real", "output", "time since the estimate was made", NAN, "s", "ms", 0.1,
+                 0.0, type="Time"),
+        Variable("turn", "Integer", "output", "number of contacts since the start", 0, low=0),
+        Variable("flags", "Integer", "output", "sum of flag bits, named in status", 1, low=0,
+                 high=2 * max(TurnFlag) - 1),
         Variable("valid", "Boolean", "output",
                  "every calibrated quantity may be used now", False),
         *(
@@ -107,6 +136,7 @@ def outputs(lateral: tuple[float, ...]) -> list[Variable]:
             for q in QUANTITIES
         ),
         Variable("rolling", "String", "output", "free, braking, driving or unknown", "unknown"),
-        Variable("status", "String", "output", "names of the flags and notes, by semicolons",
+        Variable("status", "String", "output",
+                 "names of flags and notes, by semicolons; the cause of a fault or refused step",
                  "first_turn"),
     ]  # fmt: skip

@@ -6,12 +6,15 @@ from typing import Any
 
 import numpy as np
 
+from tirelib.arrays import FloatArray
 from tirelib.axes import sign
 from tirelib.errors import ParameterError
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.estimators.chain import QUANTITIES
 from tirelib.flags import TurnFlag, flag_names
+from tirelib.fmu.refusals import FAULT, StepError, told
+from tirelib.signal.turns import LONGEST_TURN
 from tirelib.stream.estimator import StreamEstimator, TurnEstimate
 
 _AXIS_NAME = {"Fz": "Fz", "alpha": "slip_angle", "kappa": "slip_ratio", "Fy": "Fy"}
@@ -44,6 +47,7 @@ class Wheel:
     ) -> None:
         self._sign = [sign(_AXIS_NAME[quantity], axes) for quantity in QUANTITIES]
         self._order = _gage_order(calibration.lateral, sign("lateral", axes), axes)
+        self._mirrored = self._order != sorted(self._order)
         self._estimator = StreamEstimator(calibration, rate)
         self.rate = float(rate)
         self.samples = samples
@@ -51,6 +55,7 @@ class Wheel:
         self._offset = 0.0  # time at which the estimator was started anew, after a fault
         self._turns = 0  # turns before that
         self._fault = False
+        self._cause = ""  # of the last fault
         self._held: tuple[tuple[float, ...], tuple[Any, ...]] | None = None
 
     def samples_in(self, step: float) -> int:
@@ -58,19 +63,34 @@ class Wheel:
 
         Raises
         ------
-        ParameterError
-            If it is no whole number.
+        StepError
+            If it is no whole number, or more than the longest turn holds.
         """
         exact = step * self.rate
         whole = round(exact) if math.isfinite(exact) else 0
         if whole < 1 or abs(exact - whole) > STEP_TOLERANCE:
-            raise ParameterError(
+            raise StepError(
                 f"communication step = {step} s is {exact:g} samples at {self.rate:g} Hz; a whole "
                 f"number of samples is needed; step by {self.samples / self.rate:g} s"
             )
+        self._check_length(step)
         return whole
 
-    def step(self, frame: list[float], step: float, valid: bool, *conditions: float) -> bool:
+    def _check_length(self, step: float) -> None:
+        if not 0.0 < step <= LONGEST_TURN:
+            raise StepError(
+                f"communication step = {step} s; allowed is above 0 and up to {LONGEST_TURN:g} s, "
+                f"the longest turn; step by {self.samples / self.rate:g} s"
+            )
+
+    def step(
+        self,
+        frame: list[float],
+        step: float,
+        valid: bool,
+        *conditions: float,
+        count: int | None = None,
+    ) -> bool:
         """Take a frame and go on by one communication step; tell whether more than age changed.
 
         A step of fewer samples than the frame takes the first of them; in a longer one the samples
@@ -84,39 +104,72 @@ class Wheel:
         valid : bool
             False when the frame was lost; its samples are missing then.
         *conditions : float
-            Speed, pressure, camber, omega; NaN where unknown.
+            Speed, pressure, camber, omega; NaN, like infinity, where unknown.
+        count : int, optional
+            How many samples of the frame are new, whatever the step: time is counted in samples. A
+            step without any lets the estimate age.
+
+        Raises
+        ------
+        StepError
+            If the step or the count is not allowed; nothing has changed.
         """
-        n = self.samples_in(step)
-        strain = np.full((self._estimator.gages, n), np.nan)
-        if valid:
-            taken = min(n, self.samples)
-            rows = np.array(frame).reshape(self.samples, -1)[:taken, self._order]
-            strain[:, :taken] = rows.T
-        speed, pressure, camber, omega = conditions
-        turns = self._estimator.push(
-            strain, speed=speed, pressure=pressure, camber=camber, omega=omega
-        )
-        if turns:
-            self._fault, self._held = False, None
+        n = self.samples_in(step) if count is None else self._counted(step, count)
+        if n:
+            strain = self._strain(frame, n, valid)
+            speed, pressure, camber, omega = conditions
+            turns = self._estimator.push(
+                strain,
+                speed=speed if math.isfinite(speed) else math.nan,
+                pressure=pressure if math.isfinite(pressure) else math.nan,
+                camber=camber if math.isfinite(camber) else math.nan,
+                omega=omega,
+            )
+            if turns:
+                self._fault, self._held = False, None
+        else:
+            self._estimator.wait(step)
         now = (self._estimator.turns, self._estimator.stale)
         changed = now != self._seen
         self._seen = now
         return changed
 
-    def fault(self) -> None:
+    def _strain(self, frame: list[float], n: int, valid: bool) -> FloatArray:
+        """Return the next n samples, shape (n_gages, n); those that did not come are NaN."""
+        taken = min(n, self.samples) if valid else 0
+        rows: FloatArray = np.array(frame).reshape(self.samples, -1)[:taken].T
+        if self._mirrored:
+            rows = rows[self._order]
+        if taken == n:
+            return rows
+        strain = np.full((self._estimator.gages, n), np.nan)
+        strain[:, :taken] = rows
+        return strain
+
+    def _counted(self, step: float, count: int) -> int:
+        """Return how many samples are new in a buffered frame."""
+        self._check_length(step)
+        if not 0 <= count <= self.samples:
+            raise StepError(
+                f"samples = {count}; allowed are 0 .. {self.samples}, the frame's length; set how "
+                "many samples of the frame are new"
+            )
+        return count
+
+    def fault(self, cause: str) -> None:
         """Hold the last values as invalid and start the estimator anew, after an error."""
         values, texts = self.outputs()
         self._offset += self._estimator.time
         self._turns += self._estimator.turns
         self._estimator.reset()
-        self._seen, self._fault = None, True
+        self._seen, self._fault, self._cause = None, True, cause
         self._held = (values, texts)
 
     @property
     def age(self) -> float:
         """Time since the estimate was made, [s]; NaN before the first."""
         if self._held is not None:
-            return self._held[0][-1] + self._estimator.time
+            return self._held[0][-1] + self._estimator.elapsed
         return self._estimator.age
 
     def outputs(self) -> tuple[tuple[float, ...], tuple[Any, ...]]:
@@ -161,7 +214,8 @@ class Wheel:
         if self._estimator.stale:
             flags |= int(TurnFlag.NO_CONTACT)
         none_valid = (False,) * (1 + len(QUANTITIES))
-        status = ";".join(flag_names(flags))
+        names = [name for name in flag_names(flags) if name != FAULT]
+        status = ";".join((*names, told(FAULT, self._cause)))
         return (*values[:-1], self.age), (others[0], flags, *none_valid, others[-2], status)
 
     def state(self) -> dict[str, Any]:
@@ -172,6 +226,7 @@ class Wheel:
             "offset": self._offset,
             "turns": self._turns,
             "fault": self._fault,
+            "cause": self._cause,
             "held": None if self._held is None else [_hex(self._held[0]), list(self._held[1])],
         }
 
@@ -179,28 +234,52 @@ class Wheel:
         """Take up a state of a wheel with the same parameters."""
         self._estimator.restore(state["estimator"])
         self._offset, self._turns = state["offset"], state["turns"]
-        self._fault, self._seen = state["fault"], None
+        self._fault, self._cause, self._seen = state["fault"], state["cause"], None
         held = state["held"]
         self._held = None if held is None else (_unhex(held[0]), tuple(held[1]))
 
 
-def load_wheel(embedded: Path, override: str, rate: float, samples: int, axes: str) -> Wheel:
+def load_wheel(
+    embedded: Path,
+    override: str,
+    rate: float,
+    samples: int,
+    axes: str,
+    *,
+    tire: str = "",
+    order: float = 0.0,
+) -> Wheel:
     """Return a wheel with the embedded calibration, or with another of the same gage layout.
+
+    Parameters
+    ----------
+    embedded : path
+    override : str
+        Path of the other calibration; empty: none.
+    tire : str
+        Name of the tire, which the calibration must be of; empty: the embedded calibration's.
+    order : float, [cycles per turn]
+        Cut-off of the low-pass that the calibration must have been made with; 0: any.
 
     Raises
     ------
     FormatError
         If a calibration cannot be read.
     CalibrationError
-        If the other calibration is of another gage layout.
+        If the calibration is of another tire or gage layout.
     ParameterError
         If a parameter is out of range.
     """
-    calibration = read_calibration(embedded)
-    if override:
-        other = read_calibration(override)
-        other.check_layout(other.tire, calibration.lateral, "StrainTire.fmu")
-        calibration = other
+    own = read_calibration(embedded)
+    calibration = read_calibration(override) if override else own
+    where = f"StrainTire.fmu: {override or 'the embedded calibration'}"
+    calibration.check_layout(tire or own.tire, own.lateral, where)
+    if not (order == 0.0 or math.isclose(order, calibration.order, rel_tol=1e-6)):
+        raise ParameterError(
+            f"filter_order = {order:g}; the calibration was made with {calibration.order:g} cycles "
+            "per turn, another low-pass would bias it; set 0, or calibrate anew with "
+            "`tirelib calibrate --order`"
+        )
     return Wheel(calibration, rate, samples, axes)
 
 

@@ -16,13 +16,13 @@ from tirelib.signal.lowpass import LowPass
 from tirelib.signal.turns import LONGEST_TURN, Turn, TurnCutter, stack_turns
 from tirelib.stream.snapshot import from_plain, restore_cutter, snapshot_cutter, to_plain
 
-STATE_FORMAT = "tirelib-stream-state/1"
+STATE_FORMAT = "tirelib-stream-state/2"
 WATCHDOG_TURNS = 2.0
 """Turns after the middle of the last contact at which an estimate ceases to be valid."""
 STANDSTILL = 0.05
 """Turn rate below which a wheel whose rate is measured counts as standing, [rad/s]."""
-RATES = (100.0, 1e6)
-"""Sample rates that are taken, [Hz]."""
+RATES = (100.0, 1e5)
+"""Sample rates that are taken, [Hz]; an estimator holds 12 s of samples."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +137,7 @@ class StreamEstimator:
         self._latest: TurnEstimate | None = None
         self._deadline = LONGEST_TURN * self.rate
         self._standing = -1  # number of the last sample at which the wheel stood
+        self._idle = 0.0  # time without samples since the last ones, [s]
 
     def push(
         self,
@@ -170,8 +171,18 @@ class StreamEstimator:
             frame, speed=speed, pressure=pressure, camber=camber, trigger=trigger
         )
         self._watch(omega, frame.shape[1])
+        if frame.shape[1]:
+            self._idle = 0.0
         self._count += frame.shape[1]
         return [self._estimate(turn) for turn in turns] if turns else []
+
+    def wait(self, time: float) -> None:
+        """Let time [s] go by in which no samples came; they may still come later.
+
+        The estimate ages and its watchdog runs, but the signal is not cut: the next sample follows
+        the last.
+        """
+        self._idle += time
 
     def _watch(self, omega: FloatArray | float, n: int) -> None:
         """Note the last sample at which the wheel stood."""
@@ -206,14 +217,21 @@ class StreamEstimator:
         return self._count / self.rate
 
     @property
+    def elapsed(self) -> float:
+        """Time taken by the samples so far, and that waited for since the last, [s]."""
+        return self.time + self._idle
+
+    @property
     def age(self) -> float:
         """Time since the last estimate was made, [s]; NaN before the first."""
-        return math.nan if self._latest is None else self.time - self._latest.ready
+        if self._latest is None:
+            return math.nan
+        return self.elapsed - self._latest.ready
 
     @property
     def stale(self) -> bool:
         """Whether contacts have stayed away for too long, or the wheel stands."""
-        if self._count > self._deadline:
+        if self._count + self._idle * self.rate > self._deadline:
             return True
         ready = -1.0 if self._latest is None else self._latest.ready * self.rate
         return self._standing >= 0 and self._standing + 1 > ready
@@ -246,6 +264,7 @@ class StreamEstimator:
             "turns": self._turns,
             "deadline": self._deadline,
             "standing": self._standing,
+            "idle": self._idle.hex(),
             "latest": to_plain(self._latest),
             "cutter": snapshot_cutter(self._cutter),
         }
@@ -273,4 +292,5 @@ class StreamEstimator:
         restore_cutter(self._cutter, state["cutter"])
         self._count, self._turns = state["count"], state["turns"]
         self._deadline, self._standing = state["deadline"], state["standing"]
+        self._idle = float.fromhex(state["idle"])
         self._latest = from_plain(state["latest"])

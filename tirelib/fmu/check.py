@@ -1,0 +1,293 @@
+"""Check an FMU: validate it, play its reference signals, compare with what they expect.
+
+The FMU runs in a process of its own (`tirelib.fmu.trial`), so that a broken one is a result and not
+the end. Nothing is unpacked before the archive has been looked at.
+"""
+
+import hashlib
+import importlib.util
+import json
+import math
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from collections.abc import Callable, Mapping
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tirelib import __version__
+from tirelib.errors import FormatError
+from tirelib.fmu.reference import FOLDER, TOLERANCE
+
+FORMAT = "tirelib-fmu-check/1"
+LARGEST = 2_000_000_000
+"""Bytes that an FMU may unpack to."""
+MOST_FILES = 20_000
+TIME_LIMIT = 180.0
+"""Seconds for one FMU."""
+_PARTS = ("archive", "validation", "run", "reference")
+
+
+def check_fmu(
+    file: str | Path,
+    *,
+    reference: str | Path | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> dict[str, Any]:
+    """Check an FMU and return the document of ``tirelib fmu check --json``.
+
+    Parameters
+    ----------
+    file : path
+        An FMU of this library, or any FMI 1.0 to 3.0 FMU. **Its code is run.**
+    reference : path, optional
+        Folder with ``X_in.csv``, ``X_ref.csv`` and ``X_ref.opt`` for an FMU that holds none.
+    progress : callable, optional
+        Called with the name of each part that is done.
+
+    Returns
+    -------
+    dict
+        ``passed``; ``parts``, each with ``name``, ``passed`` and ``detail``; ``compared``, whether
+        there were reference signals; ``variables``: largest difference of each.
+
+    Raises
+    ------
+    FormatError
+        If the file is no FMU at all, or the reference folder holds no signals.
+    """
+    path = Path(file)
+    names = _archive(path)
+    if importlib.util.find_spec("fmpy") is None:
+        raise FormatError("fmu check: fmpy is not installed; it runs the FMU; "
+                          "`pip install tirelib[fmu]`")  # fmt: skip
+    own = "resources/settings.json" in names and "resources/slavemodule.txt" in names
+    document: dict[str, Any] = {
+        "format": FORMAT,
+        "file": path.name,
+        "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+        "size": path.stat().st_size,
+        "made_by_tirelib": own,
+        "environment": _environment(),
+        "facts": {},
+        "parts": [],
+        "compared": False,
+        "tolerance": None,
+        "variables": [],
+        "messages": [],
+    }
+    tell = progress or (lambda _: None)
+    fault = _damage(path)
+    _add(document, "archive", not fault, fault or f"{len(names)} files, undamaged")
+    tell("archive")
+    if not fault:
+        with tempfile.TemporaryDirectory(prefix="tirelib_check_") as name:
+            folder = Path(name)
+            if reference is not None:
+                _take_reference(Path(reference), folder / FOLDER)
+            _try(path, folder, document)
+            tell("run")
+            _compare(path, folder, document, names)
+            tell("reference")
+    document["passed"] = all(part["passed"] for part in document["parts"])
+    return document
+
+
+def _add(document: dict[str, Any], name: str, passed: bool, detail: str) -> None:
+    document["parts"].append({"name": name, "passed": passed, "detail": detail})
+
+
+def _environment() -> dict[str, str]:
+    found = {"python": platform.python_version(), "platform": platform.platform(),
+             "tirelib": __version__}  # fmt: skip
+    for package in ("numpy", "scipy", "fmpy", "pythonfmu"):
+        try:
+            found[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            found[package] = "not installed"
+    return found
+
+
+def _archive(path: Path) -> list[str]:
+    """Return the names inside; refuse what is no FMU."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = archive.namelist()
+    except OSError as error:
+        raise FormatError(f"{path}: cannot be read ({error.strerror}); give an FMU") from None
+    except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:
+        raise FormatError(
+            f"{path}: is no FMU ({error}); an FMU is a zip archive; build one with "
+            "`tirelib fmu build`"
+        ) from None
+    if "modelDescription.xml" not in names:
+        raise FormatError(
+            f"{path}: is no FMU (a zip archive without modelDescription.xml); build one with "
+            "`tirelib fmu build`"
+        )
+    return names
+
+
+def _damage(path: Path) -> str:
+    """Say why an archive must not be unpacked; empty if it may."""
+    with zipfile.ZipFile(path) as archive:
+        entries = archive.infolist()
+        size = sum(entry.file_size for entry in entries)
+        if len(entries) > MOST_FILES or size > LARGEST:
+            return (
+                f"it would unpack to {len(entries)} files and {size / 1e6:.0f} MB; allowed are "
+                f"{MOST_FILES} and {LARGEST / 1e6:.0f} MB"
+            )
+        for entry in entries:
+            parts = entry.filename.replace("\\", "/").split("/")
+            if ".." in parts or parts[0] == "" or ":" in parts[0] or "\\" in entry.filename:
+                return f"{entry.filename!r} would be written outside the folder of the FMU"
+        if len({entry.filename for entry in entries}) != len(entries):
+            return "a name stands in the archive twice"
+        try:
+            broken = archive.testzip()
+        except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError, EOFError,
+                ValueError) as error:  # fmt: skip
+            return f"a file in the archive cannot be read: {error}"
+        except Exception as error:  # zlib.error and what other compressions raise
+            return f"a file in the archive is damaged: {error}"
+    return f"{broken} in the archive is damaged (checksum)" if broken else ""
+
+
+def _take_reference(source: Path, target: Path) -> None:
+    if not source.is_dir() or not list(source.glob("*_ref.opt")):
+        raise FormatError(
+            f"{source}: holds no reference signals (X_in.csv, X_ref.csv, X_ref.opt); give a folder "
+            "in the FMI cross-check layout"
+        )
+    shutil.copytree(source, target)
+
+
+def _try(path: Path, folder: Path, document: dict[str, Any]) -> None:
+    """Run the trial in its own process and take over what it found."""
+    command = [sys.executable, "-m", "tirelib.fmu.trial", str(path.resolve()), str(folder)]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[2]),
+                   os.environ.get("PYTHONPATH", "")]).rstrip(os.pathsep)}  # fmt: skip
+    end = ""
+    try:
+        told = subprocess.run(
+            command, capture_output=True, timeout=TIME_LIMIT, check=False, cwd=folder,
+            env=environment,
+        )  # fmt: skip
+        if told.returncode < 0:
+            end = f"its process died of signal {-told.returncode}"
+        elif told.returncode:
+            last = told.stderr.decode("utf-8", "replace").strip().splitlines()[-1:]
+            end = f"its process ended with code {told.returncode}: {' '.join(last)}"
+    except subprocess.TimeoutExpired:
+        end = f"it did not end within {TIME_LIMIT:g} s"
+    found: dict[str, Any] = {}
+    if (folder / "trial.json").is_file():
+        found = json.loads((folder / "trial.json").read_text())
+    document["facts"] = {**found.get("facts", {}), "platforms": found.get("platforms", [])}
+    document["units"] = found.get("units", {})
+    document["messages"] = found.get("messages", [])
+    document["parts"] += found.get("parts", [])
+    if end:
+        done = {part["name"] for part in document["parts"]}
+        name = next((name for name in _PARTS if name not in done), "end")
+        _add(document, name, False, end)
+
+
+def _compare(path: Path, folder: Path, document: dict[str, Any], names: list[str]) -> None:
+    """Compare the reference run with what was expected."""
+    model = document["facts"].get("modelName")
+    passed = {part["name"]: part["passed"] for part in document["parts"]}
+    place = f"resources/{FOLDER}/{model}_ref"
+    if (folder / FOLDER).is_dir():
+        place = ""
+        expected = folder / FOLDER / f"{model}_ref.csv"
+        text = expected.read_text() if expected.is_file() else None
+    else:
+        text = None
+        if f"{place}.csv" in names:
+            with zipfile.ZipFile(path) as archive:
+                text = archive.read(f"{place}.csv").decode("utf-8", "replace")
+    if text is None:
+        if document["made_by_tirelib"] and model is not None:
+            _add(document, "reference", False, "the reference signals that `tirelib fmu build` "
+                 "puts inside are missing; build the FMU anew")  # fmt: skip
+        return
+    if not passed.get("run") or not (folder / "result.csv").is_file():
+        _add(document, "reference", False, "not compared: the run failed")
+        return
+    try:
+        head, wanted = _table(text)
+        shown, given = _table((folder / "result.csv").read_text())
+        document["tolerance"] = _tolerance(path, folder, f"{place}.opt", model)
+        document["variables"] = _differences(head, wanted, shown, given, document)
+    except (ValueError, KeyError, IndexError) as error:
+        _add(document, "reference", False, f"the reference signals cannot be read: {error}")
+        return
+    document["compared"] = True
+    document["curves"] = _curves(head, wanted, shown, given)
+    bad = [row["name"] for row in document["variables"] if not row["passed"]]
+    rows = document["variables"]
+    _add(document, "reference", not bad, f"{', '.join(bad[:8])} differ from what is expected"
+         if bad else f"{len(rows)} outputs at {len(wanted)} points as expected")  # fmt: skip
+
+
+def _table(text: str) -> tuple[list[str], Any]:
+    lines = text.splitlines()
+    head = [name.strip().strip('"') for name in lines[0].split(",")]
+    rows = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:] if line])
+    return head, rows.reshape(-1, len(head))
+
+
+def _tolerance(path: Path, folder: Path, name: str, model: Any) -> float:
+    from tirelib.fmu.trial import read_options
+
+    file = folder / FOLDER / f"{model}_ref.opt"
+    if not file.is_file():
+        with zipfile.ZipFile(path) as archive:
+            file = folder / "ref.opt"
+            file.write_bytes(archive.read(name))
+    return float(read_options(file).get("RelTol", TOLERANCE))
+
+
+def _differences(
+    head: list[str], wanted: Any, shown: list[str], given: Any, document: Mapping[str, Any]
+) -> list[dict[str, Any]]:
+    """Return a row for each expected output; a NaN must meet a NaN."""
+    if given.shape[0] != wanted.shape[0]:
+        raise ValueError(f"{wanted.shape[0]} points are expected, {given.shape[0]} were reached")
+    rows = []
+    for column, name in enumerate(head[1:], start=1):
+        a, b = wanted[:, column], given[:, shown.index(name)]
+        apart = np.where(np.isnan(a) & np.isnan(b), 0.0, np.abs(a - b))
+        apart = np.where(np.isnan(apart), math.inf, apart)
+        size = float(np.nanmax(np.abs(a), initial=0.0))
+        worst = int(apart.argmax())
+        limit = document["tolerance"] * size
+        rows.append({
+            "name": name,
+            "unit": document["units"].get(name, ""),
+            "largest_difference": None if math.isinf(apart[worst]) else float(apart[worst]),
+            "allowed": limit,
+            "magnitude": size,
+            "time": float(wanted[worst, 0]),
+            "passed": bool(apart[worst] <= limit),
+        })  # fmt: skip
+    return rows
+
+
+def _curves(head: list[str], wanted: Any, shown: list[str], given: Any) -> dict[str, Any]:
+    """Return the course of a few outputs, for the page."""
+    chosen = [name for name in head[1:] if not name.endswith(("valid", "_std"))][:4]
+    return {
+        "time": wanted[:, 0].tolist(),
+        "expected": {name: wanted[:, head.index(name)].tolist() for name in chosen},
+        "seen": {name: given[:, shown.index(name)].tolist() for name in chosen},
+    }

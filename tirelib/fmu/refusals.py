@@ -1,0 +1,23 @@
+"""How a slave says that it could not do a step: an error class and the words of ``status``."""
+
+from tirelib.errors import ParameterError
+
+STEP_REFUSED = "step_refused"
+"""Word of ``status`` after a communication step that was not done."""
+FAULT = "fault"
+"""Word of ``status`` after an unexpected error; the name of `TurnFlag.FAULT`."""
+
+
+class StepError(ParameterError):
+    """A communication step that cannot be done; time does not go on."""
+
+
+def told(word: str, cause: str) -> str:
+    """Return a word of the status with its cause, without the semicolon that parts words.
+
+    Examples
+    --------
+    >>> told(FAULT, "ZeroDivisionError: a; b")
+    'fault: ZeroDivisionError: a, b'
+    """
+    return f"{word}: {cause.replace(';', ',')}"

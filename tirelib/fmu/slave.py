@@ -1,0 +1,340 @@
+"""What every slave shares: variables by reference, guarded calls, refused steps, exact states.
+
+A slave that pythonfmu exports derives from `GuardedSlave` first and from ``Fmi2Slave`` second::
+
+    class StrainTire(GuardedSlave, Fmi2Slave):
+        fmi = pythonfmu
+        ...
+
+and gives `table`, `started` and `advance`. This module knows pythonfmu only through `fmi`, so that
+it can be checked and used where pythonfmu is not installed.
+"""
+
+import ctypes
+import functools
+import json
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any, ClassVar, Protocol
+
+from tirelib.errors import FormatError, ParameterError
+from tirelib.fmu.journal import Journal
+from tirelib.fmu.refusals import STEP_REFUSED, StepError, told
+from tirelib.fmu.variables import Variable
+
+
+class Model(Protocol):
+    """What a slave steps: it gives its output values and its state."""
+
+    def outputs(self) -> tuple[Sequence[float], Sequence[Any]]:
+        """Return the values of the Real outputs and of the others, in the table's order."""
+
+    def fault(self, cause: str) -> None:
+        """Hold the last values as invalid and start anew, after an error."""
+
+    def state(self) -> dict[str, Any]:
+        """Return everything that is remembered, as JSON knows it."""
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Take up a state."""
+
+
+def guarded(method: Callable[..., Any]) -> Callable[..., Any]:
+    """Let an error reach the importer as an FMI error, with its cause in the log.
+
+    On every exception pythonfmu 0.7.0 gives up a reference to the class, to the instance and to its
+    log, and goes on using them: a reset or a free that followed would touch freed memory. Each gets
+    one more reference here, so that the importer lives.
+    """
+
+    @functools.wraps(method)
+    def call(self: Any, *args: Any) -> Any:
+        try:
+            return method(self, *args)
+        except Exception as error:
+            self.complain(_cause(error))
+            for kept in (type(self), self, self.log_queue):
+                ctypes.pythonapi.Py_IncRef(ctypes.py_object(kept))
+            raise
+
+    return call
+
+
+def _cause(error: Exception) -> str:
+    text = str(error)
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+class GuardedSlave:
+    """Reals live in one list by value reference, so that a frame is one slice of it.
+
+    The folder of resources holds ``settings.json`` with ``guid``, ``version``, ``description`` and
+    ``step_size`` [s], written by `tirelib.fmu.build.export`, and whatever the slave needs.
+    """
+
+    fmi: ClassVar[Any]
+    """The module pythonfmu."""
+    log: Callable[..., None]
+    register_variable: Callable[..., None]
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self.journal = Journal()
+        self.folder = Path(kwargs["resources"])
+        _once_in_path(str(kwargs["resources"]))
+        self.settings = json.loads((self.folder / "settings.json").read_text(encoding="utf-8"))
+        self.guid = self.settings["guid"]
+        self.version = self.settings["version"]
+        self.description = self.settings["description"]
+        self.author, self.license = "The tirelib developers", "MIT"
+        self.default_experiment = self.fmi.default_experiment.DefaultExperiment(
+            start_time=0.0, stop_time=1.0, step_size=self.settings["step_size"]
+        )
+        self._variables = table = self.table()
+        self.reference = {v.name: number for number, v in enumerate(table)}
+        self.real: list[Any] = [v.start if v.kind == "Real" else None for v in table]
+        self.other: dict[str, Any] = {v.name: v.start for v in table if v.kind != "Real"}
+        for variable in table:
+            self.register_variable(self._scalar(variable))
+        self._fixed = self._of(table, "parameter")
+        self._inputs = self._of(table, "input")
+        self._allow(self._inputs | self._fixed)
+        self._get_last: list[int] | None = None
+        self._get_place: slice | None = None
+        given = [v for v in table if v.causality == "output"]
+        reals = [self.reference[v.name] for v in given if v.kind == "Real"]
+        self._results = slice(reals[0], reals[-1] + 1)
+        self._names = [v.name for v in given if v.kind != "Real"]
+        self._truths = [v.name for v in given if v.kind == "Boolean"]
+        self.model: Any = None
+        self._phase = "instantiated"
+        self._refused = False
+
+    def _allow(self, references: frozenset[int]) -> None:
+        """Let these be set from now on."""
+        self._settable = references
+        self._set_last: list[int] | None = None
+        self._set_place: slice | None = None
+
+    def _of(self, table: Iterable[Variable], causality: str) -> frozenset[int]:
+        return frozenset(self.reference[v.name] for v in table if v.causality == causality)
+
+    def table(self) -> list[Variable]:
+        """Return the variables: parameters, inputs, outputs; outputs with all Reals first."""
+        raise NotImplementedError
+
+    def started(self) -> Model:
+        """Return a new model with the parameters as they are set now."""
+        raise NotImplementedError
+
+    def advance(self, step: float) -> bool:
+        """Go on by a step [s]; tell whether the outputs have to be written anew.
+
+        Raises
+        ------
+        StepError
+            If the step cannot be done; nothing may have changed.
+        """
+        raise NotImplementedError
+
+    def _scalar(self, variable: Variable) -> Any:
+        """Return the variable as pythonfmu declares it.
+
+        Its own getters would hold on to this instance: a freed one would then wait for the garbage
+        collector, with all its memory.
+        """
+        name, fixed = variable.name, variable.causality == "parameter"
+        variability = self.fmi.Fmi2Variability
+        options: dict[str, Any] = {
+            "causality": self.fmi.Fmi2Causality[variable.causality],
+            "variability": variability.fixed if fixed else variability.discrete,
+            "description": variable.description,
+            "getter": _unread,
+        }
+        return getattr(self.fmi, variable.kind)(name, **options)
+
+    def _check(self, references: Iterable[int]) -> None:
+        """Refuse to set an output, or a parameter that is fixed by now."""
+        if not self._settable.issuperset(references):
+            names = [self._variables[r].name for r in references if r not in self._settable]
+            raise ParameterError(
+                f"{', '.join(names)}: cannot be set now; inputs may be set at any time, parameters "
+                "before initialisation, outputs never"
+            )
+
+    def _named(self, vrs: Iterable[int], kind: str) -> list[Variable]:
+        found = [self._variables[reference] for reference in vrs]
+        for variable in found:
+            if variable.kind != kind:
+                raise TypeError(f"{variable.name} is not of type {kind}")
+        return found
+
+    def _read(self, vrs: Iterable[int], kind: str) -> list[Any]:
+        return [self.other[variable.name] for variable in self._named(vrs, kind)]
+
+    def _write(self, vrs: Sequence[int], values: Iterable[Any], kind: str) -> None:
+        found = self._named(vrs, kind)
+        self._check(vrs)
+        self.other.update(zip((variable.name for variable in found), values, strict=True))
+
+    @guarded
+    def get_integer(self, vrs: list[int]) -> list[int]:
+        """Return Integers by value reference."""
+        return self._read(vrs, "Integer")
+
+    @guarded
+    def get_boolean(self, vrs: list[int]) -> list[bool]:
+        """Return Booleans by value reference."""
+        return self._read(vrs, "Boolean")
+
+    @guarded
+    def get_string(self, vrs: list[int]) -> list[str]:
+        """Return Strings by value reference."""
+        return self._read(vrs, "String")
+
+    @guarded
+    def set_integer(self, vrs: list[int], values: list[int]) -> None:
+        """Set Integers by value reference."""
+        self._write(vrs, values, "Integer")
+
+    @guarded
+    def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
+        """Set Booleans by value reference."""
+        self._write(vrs, values, "Boolean")
+
+    @guarded
+    def set_string(self, vrs: list[int], values: list[str]) -> None:
+        """Set Strings by value reference."""
+        self._write(vrs, values, "String")
+
+    @guarded
+    def set_real(self, vrs: list[int], values: list[float]) -> None:
+        """Set Reals by value reference; a frame, set again and again, is one slice."""
+        if vrs != self._set_last:
+            self._named(vrs, "Real")
+            self._check(vrs)
+            self._set_last, self._set_place = vrs, _place(vrs)
+        if self._set_place is not None and len(values) == len(vrs):
+            self.real[self._set_place] = values
+            return
+        for reference, value in zip(vrs, values, strict=True):
+            self.real[reference] = value
+
+    @guarded
+    def get_real(self, vrs: list[int]) -> list[float]:
+        """Return Reals by value reference."""
+        if vrs != self._get_last:
+            self._named(vrs, "Real")
+            self._get_last, self._get_place = vrs, _place(vrs)
+        if self._get_place is not None:
+            return self.real[self._get_place]
+        return [self.real[reference] for reference in vrs]
+
+    @guarded
+    def exit_initialization_mode(self) -> None:
+        """Take up the parameters."""
+        self.model = self.started()
+        self._allow(self._inputs)
+        self._phase = "stepping"
+        self.publish()
+
+    def terminate(self) -> None:
+        """Take no further steps; the outputs stay."""
+        self._phase = "terminated"
+
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        """Do a step. A refused one is discarded; an error holds the last values as invalid."""
+        if self._phase != "stepping":
+            return self._refuse(_PHASES[self._phase])
+        try:
+            changed = self.advance(step_size)
+        except StepError as error:
+            return self._refuse(str(error))
+        except Exception as error:  # nothing may reach the importer
+            cause = _cause(error)
+            self.complain(cause)
+            self.model.fault(cause)
+            changed = True
+        if changed or self._refused:
+            self.publish()
+        return True
+
+    def publish(self) -> None:
+        """Write the outputs."""
+        values, others = self.model.outputs()
+        self.real[self._results] = values
+        self.other.update(zip(self._names, others, strict=True))
+        self._refused = False
+
+    def _refuse(self, cause: str) -> bool:
+        """Log why, and let nothing be valid until a step is done: time stands still."""
+        self.complain(cause)
+        self._refused = True
+        self.other.update(dict.fromkeys(self._truths, False))
+        if "status" in self.other:
+            self.other["status"] = told(STEP_REFUSED, cause)
+        return False
+
+    def complain(self, cause: str) -> None:
+        """Log an error, unless its like was logged."""
+        line = self.journal.line(cause)
+        if line is not None:
+            self.log(line, self.fmi.enums.Fmi2Status.error)
+
+    @guarded
+    def _get_fmu_state(self) -> dict[str, Any]:
+        return {
+            "real": [None if value is None else float(value).hex() for value in self.real],
+            "other": dict(self.other),
+            "phase": self._phase,
+            "refused": self._refused,
+            "model": None if self.model is None else self.model.state(),
+        }
+
+    @guarded
+    def _set_fmu_state(self, state: dict[str, Any]) -> None:
+        if "real" not in state or len(state["real"]) != len(self.real):
+            raise FormatError("the bytes are no state of this FMU; save it anew")
+        self.real[:] = [None if value is None else float.fromhex(value) for value in state["real"]]
+        self.other.update(state["other"])
+        self._allow(self._inputs | self._fixed)
+        self.model, self._phase = None, "instantiated"
+        if state["model"] is not None:
+            model = self.started()
+            model.restore(state["model"])
+            self._allow(self._inputs)
+            self.model = model
+        self._phase, self._refused = state["phase"], state["refused"]
+
+    @staticmethod
+    def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
+        try:
+            content = json.loads(state)
+        except ValueError:
+            return {}
+        return content if isinstance(content, dict) else {}
+
+
+_PHASES = {
+    "instantiated": "the FMU is not initialised; call exitInitializationMode first",
+    "terminated": "the FMU is terminated; reset it and initialise it again",
+}
+
+
+def _unread() -> None:
+    """Stand in for a getter: values are read by reference, from the slave."""
+
+
+def _once_in_path(folder: str) -> None:
+    """Undo that every instance of pythonfmu 0.7.0 puts its folder on the path again."""
+    while sys.path.count(folder) > 1:
+        sys.path.remove(folder)
+
+
+def _place(references: list[int]) -> slice | None:
+    """Return the slice that references are, if they are one."""
+    if not references:
+        return None
+    found = slice(references[0], references[0] + len(references))
+    return found if references == list(range(found.start, found.stop)) else None

@@ -1,0 +1,44 @@
+"""What `tirelib.fmu.build.export` needs to know of a slave to make an FMU of it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from tirelib.fmu.variables import Variable
+
+
+@dataclass(frozen=True, slots=True)
+class SlaveSpec:
+    """One FMU to be made.
+
+    Attributes
+    ----------
+    model : str
+        Name of the model and of the slave's class, such as ``StrainTire``.
+    script : str
+        File in ``fmu_src`` that holds the class, such as ``strain_tire.py``.
+    description : str
+        One line for the model description.
+    table : sequence of Variable
+        What the slave's `table` returns.
+    step_size : float, [s]
+        Communication step of the default experiment.
+    settings : mapping
+        Becomes part of ``resources/settings.json``.
+    resources : mapping of str to bytes
+        Further files of ``resources``, by path.
+    documentation : mapping of str to bytes
+        Files of ``documentation``, by path; ``index.html`` among them. ``{version}`` in it is
+        replaced.
+    icon : bytes
+        PNG shown by tools.
+    """
+
+    model: str
+    script: str
+    description: str
+    table: Sequence[Variable]
+    step_size: float
+    settings: Mapping[str, int | float | str | bool]
+    resources: Mapping[str, bytes] = field(repr=False)
+    documentation: Mapping[str, bytes] = field(repr=False)
+    icon: bytes = field(repr=False)

@@ -1,0 +1,186 @@
+"""What ``StrainTire.fmu`` consists of: a calibration, the slave, reference signals, its page."""
+
+import math
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from tirelib.errors import ParameterError
+from tirelib.estimators.calibration import Calibration
+from tirelib.estimators.calibration_file import read_calibration
+from tirelib.flags import INVALIDATING, TurnFlag
+from tirelib.fmu.build import source_file
+from tirelib.fmu.handbook import html_table, page
+from tirelib.fmu.reference import FOLDER
+from tirelib.fmu.spec import SlaveSpec
+from tirelib.fmu.strain_reference import strain_reference
+from tirelib.fmu.variables import Variable, inputs, outputs, parameters
+from tirelib.stream.estimator import RATES
+
+MODEL = "StrainTire"
+DESCRIPTION = "Load, slip angle, slip ratio and lateral force from innerliner strain"
+MOST_SAMPLES = 256
+"""Largest frame: a turn must be longer than a frame, or its estimate would be overwritten."""
+_SHOWN = {"Fz": ("N", 1.0), "alpha": ("deg", 180.0 / math.pi), "kappa": ("%", 100.0),
+          "Fy": ("N", 1.0)}  # fmt: skip
+
+
+def strain_tire(
+    calibration: str | Path, *, samples_per_step: int, sample_rate: float, buffered: bool
+) -> SlaveSpec:
+    """Return what `tirelib.fmu.build.export` needs; see `tirelib.fmu.build.build_fmu`.
+
+    Raises
+    ------
+    ParameterError
+        If a number is out of range.
+    FormatError
+        If the calibration cannot be read.
+    """
+    if not 1 <= samples_per_step <= MOST_SAMPLES:
+        raise ParameterError(
+            f"samples per step = {samples_per_step}; allowed are 1 .. {MOST_SAMPLES}; a frame must "
+            "be shorter than a turn of the wheel"
+        )
+    low, high = RATES
+    if not low <= sample_rate <= high:
+        raise ParameterError(
+            f"sample rate = {sample_rate} Hz; allowed are {low:g} .. {high:g} Hz; give the rate of "
+            "the gages"
+        )
+    loaded = read_calibration(calibration)
+    text = Path(calibration).read_text(encoding="utf-8")
+    table = [
+        *parameters(sample_rate, RATES),
+        *inputs(loaded.lateral, samples_per_step, buffered=buffered),
+        *outputs(loaded.lateral),
+    ]
+    reference = strain_reference(loaded, sample_rate, samples_per_step, buffered=buffered)
+    document = tomllib.loads(text)
+    settings: dict[str, int | float | str | bool] = {
+        "samples_per_step": samples_per_step,
+        "sample_rate": sample_rate,
+        "buffered": buffered,
+    }
+    return SlaveSpec(
+        model=MODEL,
+        script="strain_tire.py",
+        description=DESCRIPTION,
+        table=table,
+        step_size=samples_per_step / sample_rate,
+        settings=settings,
+        resources={
+            "calibration.toml": text.encode(),
+            **{f"{FOLDER}/{name}": data for name, data in reference.files(MODEL).items()},
+        },
+        documentation={"index.html": _page(loaded, document, table, settings).encode()},
+        icon=source_file("strain_tire.png").read_bytes(),
+    )
+
+
+def _page(
+    calibration: Calibration,
+    document: Mapping[str, Any],
+    table: list[Variable],
+    settings: Mapping[str, Any],
+) -> str:
+    samples, rate = settings["samples_per_step"], settings["sample_rate"]
+    lead = (
+        "Estimates of one wheel, after every turn, from the strain of gages on the innerliner: "
+        "vertical load, slip angle, slip ratio and lateral force, each with its standard deviation."
+    )
+    facts = {
+        "tire": calibration.tire,
+        "gages": ", ".join(f"{1e3 * y:+g}" for y in calibration.lateral) + " mm, ISO 8855",
+        "samples per step": f"up to {samples} (input samples)" if settings["buffered"]
+        else str(samples),
+        "sample rate": f"{rate:g} Hz (parameter sample_rate)",
+        "communication step": f"{1e3 * samples / rate:g} ms",
+        "low-pass": f"{calibration.order:g} cycles per turn"
+        if calibration.cut_off is None else f"{calibration.cut_off:g} Hz",
+        "axis systems": "iso (default), sae, adapted_sae (parameter axes)",
+        "needs": "CPython 3.11 or newer with numpy and scipy; linux64 or win64",
+        "version": "{version}",
+        "licences": "documentation/licenses: MIT, tirelib and pythonfmu",
+    }  # fmt: skip
+    drawing = source_file("conventions.svg").read_text(encoding="utf-8")
+    sections = {
+        "Conventions": f"{drawing}\n{_CONVENTIONS}",
+        "Steps and frames": _BUFFERED if settings["buffered"] else _FRAMES,
+        "Accuracy": _accuracy(document),
+        "Calibrated range": _ranges(calibration),
+        "Flags": _flags(),
+        "Limits": _LIMITS,
+        "Check": _CHECK,
+    }
+    return page(MODEL, lead, facts, table, sections)
+
+
+def _accuracy(document: Mapping[str, Any]) -> str:
+    rows = []
+    for quantity, known in document.get("statistics", {}).items():
+        error, unit = known.get("cross_validated_rmse"), str(known.get("unit", "")).strip("1")
+        if error is None:
+            continue
+        fit = known.get("r2")
+        rows.append((
+            quantity, f"{error:.3g} {unit}", "" if fit is None else f"{fit:.5f}",
+            f"{known.get('n', '')}", f"{known.get('conditions', '')}",
+        ))  # fmt: skip
+    data = ", ".join(str(part.get("name", "")) for part in document.get("data", []))
+    if not rows:
+        return "<p>The calibration holds no statistics.</p>"
+    head = ("quantity", "cross-validated error (rms)", "R2", "runs", "conditions")
+    return (
+        f"{html_table(head, rows)}\n<p>Of the calibration, made on: {_plain(data)}. In use, every "
+        "estimate carries its own standard deviation; steady parts of a manoeuvre only: an "
+        "estimate is one turn of the wheel.</p>"
+    )
+
+
+def _plain(text: str) -> str:
+    return text.replace("&", "&amp;").replace("<", "&lt;")
+
+
+def _ranges(calibration: Calibration) -> str:
+    rows = []
+    for quantity, guards in calibration.chains[-1].guards.items():
+        for known in guards:
+            if known.name == quantity:
+                unit, factor = _SHOWN[quantity]
+                rows.append((quantity, f"{factor * known.low:.4g}", f"{factor * known.high:.4g}",
+                             unit))  # fmt: skip
+    head = ("quantity", "from", "to", "unit")
+    return f"{html_table(head, rows)}\n<p>Outside, the quantity is not valid (out_of_range).</p>"
+
+
+def _flags() -> str:
+    rows = [
+        (str(int(flag)), (flag.name or "").lower(), "no" if flag & INVALIDATING else "with care")
+        for flag in TurnFlag
+    ]
+    return html_table(("bit", "name in status", "estimate usable"), rows)
+
+
+_CONVENTIONS = """<p>All values are SI. Positive slip angle gives negative lateral force (ISO 8855).
+With <code>axes</code> = sae the signs of Fz, alpha and Fy turn, with adapted_sae that of Fy; in
+both, y points to the right, so <code>strain_1</code> is the gage on the other side.</p>"""
+_FRAMES = """<p>A communication step brings a frame of samples, oldest first. A shorter step takes
+the first samples of the frame, in a longer one the samples after it are missing. A step that is no
+whole number of samples is discarded. Estimates are the same for every frame length.</p>"""
+_BUFFERED = """<p>The input <code>samples</code> says how many samples of the frame are new, oldest
+first; the step may have any length, time is counted in samples. A step with none lets the estimate
+age, and after two turns' time nothing is valid. Estimates are the same however samples are
+packed.</p>"""
+_LIMITS = """<ul>
+<li>An estimate is made once per turn, 20 degrees of wheel angle and half the filter after the
+trailing edge; <code>age</code> counts from there.</li>
+<li>The first turn after a start or a gap is never valid.</li>
+<li>Forward rolling on a flat road; a turn shorter than 3 s.</li>
+<li>The slip ratio needs <code>speed</code>; a calibration with pressure or camber needs those.</li>
+<li>Without contacts for two turns <code>valid</code> drops and the last values are held.</li>
+<li>The path of the unpacked FMU may hold spaces, but no percent-encoded character else.</li>
+</ul>"""
+_CHECK = """<p><code>resources/reference</code> holds input and expected output in the FMI
+cross-check layout; <code>tirelib fmu check X.fmu</code> plays and compares them.</p>"""

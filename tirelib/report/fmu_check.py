@@ -1,0 +1,130 @@
+"""The page of ``tirelib fmu check``: what was tried, what came out, where it differs."""
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tirelib.report.page import Drawing, Section, Table, draw_all, number, write_page
+from tirelib.report.style import BLUE, ORANGE, new_figure, styled
+
+Document = Mapping[str, Any]
+_TITLES = {
+    "archive": "archive", "validation": "validation", "description": "description",
+    "run": "run", "reference": "reference signals", "end": "end of the process",
+}  # fmt: skip
+
+
+def verdict(document: Document) -> str:
+    """Say the result in a sentence."""
+    failed = [_TITLES.get(part["name"], part["name"]) for part in document["parts"]
+              if not part["passed"]]  # fmt: skip
+    if failed:
+        return f"Failed: {', '.join(failed)}."
+    if document["compared"]:
+        return "Passed: it validates, runs, and gives what its reference signals expect."
+    return "Passed as far as it goes: it validates and runs; it holds no reference signals."
+
+
+def write_check(document: Document, folder: Path) -> Path:
+    """Write ``index.html`` and its figures.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be written.
+    """
+    facts = document["facts"]
+    name = facts.get("modelName") or document["file"]
+    drawings = []
+    curves = document.get("curves")
+    if curves:
+        drawings.append(
+            Drawing("outputs", "Outputs and what is expected of them",
+                    "Broad: expected by the reference signals inside; thin: what this FMU gave "
+                    "here. SI units.", partial(_draw, curves, document["units"]))
+        )  # fmt: skip
+    pictures = draw_all(folder, drawings)
+    sections = [
+        Section("What was tried", "parts", tables=[_parts(document)]),
+        Section("The FMU", "facts", tables=[_facts(document)]),
+    ]
+    if document["variables"]:
+        sections.insert(1, Section("Against the reference", "reference",
+                                   tables=[_variables(document)], pictures=pictures))  # fmt: skip
+    if document["messages"]:
+        rows = [[message] for message in document["messages"]]
+        sections.append(
+            Section("What the FMU logged", "log", tables=[Table("Log", ["message"], rows)])
+        )
+    return write_page(
+        folder, "fmu_check.html", title=f"Check of {name}", verdict=verdict(document),
+        lead=f"File {document['file']}, {document['size'] / 1e3:.0f} kB.", sections=sections,
+    )  # fmt: skip
+
+
+def _parts(document: Document) -> Table:
+    rows = [
+        [_TITLES.get(p["name"], p["name"]), "passed" if p["passed"] else "FAILED", p["detail"]]
+        for p in document["parts"]
+    ]
+    return Table("Parts of the check", ["part", "result", "detail"], rows, texts=3)
+
+
+def _facts(document: Document) -> Table:
+    facts, known = document["facts"], document["environment"]
+    rows = [
+        ["model", str(facts.get("modelName") or "unknown")],
+        ["description", str(facts.get("description") or "")],
+        ["FMI version", str(facts.get("fmiVersion") or "unknown")],
+        ["version", str(facts.get("version") or "")],
+        ["made with", str(facts.get("generationTool") or "unknown")],
+        ["platforms", ", ".join(facts.get("platforms", [])) or "unknown"],
+        ["GUID", str(facts.get("guid") or "")],
+        ["SHA-256 of the file", document["sha256"]],
+        ["checked with", ", ".join(f"{name} {version}" for name, version in known.items())],
+    ]
+    return Table("File and environment", ["", ""], rows, texts=2)
+
+
+def _variables(document: Document) -> Table:
+    rows = [
+        [
+            row["name"], row["unit"], "as expected" if row["passed"] else "DIFFERS",
+            number(_known(row["largest_difference"]), 2), number(row["allowed"], 2),
+            number(row["magnitude"]), number(row["time"]),
+        ]
+        for row in document["variables"]
+    ]  # fmt: skip
+    return Table(
+        "Largest difference of every output",
+        ["output", "unit", "result", "difference", "allowed", "magnitude", "at [s]"],
+        rows, texts=3,
+        note=f"Allowed: {document['tolerance']:g} of the largest magnitude of the output. A dash: "
+        "a number where none is expected, or the other way round.",
+    )  # fmt: skip
+
+
+def _known(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+@styled
+def _draw(curves: Mapping[str, Any], units: Mapping[str, str]) -> Figure:
+    names: Sequence[str] = list(curves["expected"])
+    figure = new_figure(8.0, 1.7 * len(names) + 0.6)
+    panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+    times = np.asarray(curves["time"])
+    for panel, name in zip(panels, names, strict=True):
+        panel.plot(times, curves["expected"][name], color=ORANGE, lw=4.5, label="expected")
+        panel.plot(times, curves["seen"][name], color=BLUE, lw=1.2, label="this FMU")
+        panel.ticklabel_format(useOffset=False)
+        unit = units.get(name, "")
+        panel.set_ylabel(f"{name} [{unit}]" if unit not in ("", "1") else name)
+    panels[-1].set_xlabel("time [s]")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
+    return figure
