@@ -6,16 +6,19 @@ where a condition changes, so that it changes at its sample, and at the end of a
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 
-from bench.conditions import ROUNDING, UNKNOWN, Condition, Conditions
-from bench.decoder import LineCounts, SerialDecoder
+from bench.clock import ClockFit
+from bench.conditions import ROUNDING, UNKNOWN, Condition, Conditions, Held, Measured
+from bench.decoder import SerialDecoder
 from bench.device import Device
-from bench.frames import GAGES
+from bench.frames import GAGES, Frames
+from bench.line_counts import LineCounts
+from bench.protocols import Decoder
 from bench.timeline import Samples, Timeline, TimelineCounts
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.flags import TurnFlag
@@ -60,6 +63,7 @@ class Turn:
         `TurnFlag` bits of the estimator and of the line.
     saturated : tuple of int
         Saturated samples of each gage since the turn before.
+    wheel : int
     """
 
     run: int
@@ -71,6 +75,7 @@ class Turn:
     texts: Mapping[str, str]
     flags: int
     saturated: tuple[int, ...]
+    wheel: int = 0
 
     @property
     def valid(self) -> bool:
@@ -106,6 +111,15 @@ class Chain:
     conditions : Conditions
     wheel : int, optional
         By default that of the first frame.
+    decoder : Decoder, optional
+        Of the line; by default that of SERIAL v1. Several wheels on one line share it.
+
+    Attributes
+    ----------
+    clock : ClockFit
+        The wheel's clock against the host's.
+    watch : callable, optional
+        Called with each block of samples before it is stepped; for a live page.
     """
 
     def __init__(
@@ -114,12 +128,15 @@ class Chain:
         device: Device,
         conditions: Conditions,
         wheel: int | None = None,
+        decoder: Decoder | None = None,
     ) -> None:
-        self.line: SerialDecoder = SerialDecoder()
+        self.line: Decoder = SerialDecoder() if decoder is None else decoder
+        self.clock = ClockFit()
+        self.watch: Callable[[Samples], None] | None = None
         self.timeline = Timeline(device, wheel)
         self.steps = 0
         self._estimator = estimator
-        self._conditions = conditions
+        self._conditions = Held(conditions)
         self._segment: _Segment | None = None
         self._first_us: int | None = None
 
@@ -128,16 +145,36 @@ class Chain:
         """What was seen and lost so far."""
         return self.line.counts, self.timeline.counts
 
-    def push(self, data: bytes) -> list[Turn]:
-        """Take bytes and return the turns that they end."""
+    def push(self, data: bytes, arrival: int = 0) -> list[Turn]:
+        """Take bytes that came at a moment [ns, monotonic] and return the turns that they end."""
+        return self.take(self.line.push(data, arrival), arrival)
+
+    def take(self, items: Iterable[Frames | Measured], arrival: int = 0) -> list[Turn]:
+        """Take decoded frames, of this wheel or of several, and return the turns that they end."""
         turns: list[Turn] = []
-        for frames in self.line.push(data):
-            for block in self.timeline.push(frames):
+        newest: int | None = None
+        for item in items:
+            if isinstance(item, Measured):
+                self._tell(item)
+                continue
+            for block in self.timeline.push(item):
+                if self.watch is not None:
+                    self.watch(block)
                 if block.reset:
                     turns += self.finish()
                     self._begin(block)
+                    self.clock.restart()
                 turns += self._take(block)
+                newest = block.end_us
+        if newest is not None and arrival:
+            self.clock.push(newest, arrival)
         return turns
+
+    def _tell(self, measured: Measured) -> None:
+        """Let a condition hold from the next sample on."""
+        self._conditions.tell(self.timeline.end_us, measured)
+        if self._segment is not None:
+            self._segment.until = -1.0
 
     def finish(self) -> list[Turn]:
         """Step what is left, in a shorter step, and close the segment."""
@@ -215,6 +252,7 @@ class Chain:
             texts=texts,
             flags=int(outputs["flags"]) | (int(TurnFlag.SATURATED) if any(saturated) else 0),
             saturated=saturated,
+            wheel=self.timeline.wheel or 0,
         )
 
     @staticmethod

@@ -26,6 +26,8 @@ TRUTH = {"Fz": ("N", "force"), "alpha": ("deg", "angle"), "kappa": ("1", "ratio"
          "Fy": ("N", "force")}  # fmt: skip
 ROUNDING = 0.6
 """Device time is a whole number of microseconds; a condition this close has begun, [us]."""
+LONGEST_MEMORY = 256
+"""Changes of what a bus tells that are remembered; the chain is a few samples behind, no more."""
 UNKNOWN = (math.nan, math.nan, math.nan)
 
 Condition = tuple[float, float, float]
@@ -45,12 +47,15 @@ class RunMark:
         The run's own clock at that sample.
     truth : dict of float, SI
         What the rig measured in the run, mean: Fz, alpha, kappa, Fy; NaN where absent.
+    plan : dict of float or str, SI
+        The run's kind and set points, where a campaign was played.
     """
 
     run: int
     t_us: int
     start_time: float
     truth: dict[str, float] = field(default_factory=dict)
+    plan: dict[str, float | str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,12 +71,15 @@ class Conditions:
         In order of device time; empty if nothing is known of runs.
     loop_us : int
         After this time everything repeats; 0 for never.
+    campaign : dict or None
+        ``campaign.toml`` of the campaign that is played, in ISO axes; for an export.
     """
 
     t_us: tuple[int, ...]
     values: tuple[Condition, ...]
     runs: tuple[RunMark, ...] = ()
     loop_us: int = 0
+    campaign: dict[str, Any] | None = None
 
     @classmethod
     def constant(
@@ -109,6 +117,61 @@ class Conditions:
         return t_us % self.loop_us if self.loop_us else t_us
 
 
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """A condition that a bus told, between two frames of strain.
+
+    Attributes
+    ----------
+    name : str
+        ``speed``, ``pressure`` or ``camber``.
+    value : float, SI
+    """
+
+    name: str
+    value: float
+
+
+class Held:
+    """Conditions with what a bus told on top, held until it tells otherwise.
+
+    Same questions as `Conditions`; what is no longer asked for is forgotten.
+    """
+
+    def __init__(self, base: Conditions) -> None:
+        self.runs = base.runs
+        self._base = base
+        self._told: list[tuple[int, int, float]] = []  # t_us, index of the condition, value
+
+    def tell(self, t_us: int, measured: Measured) -> None:
+        """Note what holds from a device time on."""
+        index = list(QUANTITIES).index(measured.name)
+        last = next((value for _, i, value in reversed(self._told) if i == index), None)
+        if last != measured.value:
+            self._told.append((t_us, index, measured.value))
+        if len(self._told) > LONGEST_MEMORY:
+            held = {i: (t, i, value) for t, i, value in self._told[: -LONGEST_MEMORY // 2]}
+            self._told = [*held.values(), *self._told[-LONGEST_MEMORY // 2 :]]
+
+    def at(self, t_us: float) -> Condition:
+        """Return what holds at a device time."""
+        values = list(self._base.at(t_us))
+        for moment, index, value in self._told:
+            if moment > t_us + ROUNDING:
+                break
+            values[index] = value
+        return values[0], values[1], values[2]
+
+    def next_change(self, t_us: float) -> float:
+        """Return the device time of the next change after `t_us`; infinite if none is known."""
+        ahead = (moment for moment, _, _ in self._told if moment > t_us + ROUNDING)
+        return min(next(ahead, math.inf), self._base.next_change(t_us))
+
+    def run_at(self, t_us: float) -> tuple[RunMark, int] | None:
+        """Return the run that is played at a device time, and the device time it began."""
+        return self._base.run_at(t_us)
+
+
 def conditions_document(conditions: Conditions) -> dict[str, Any]:
     """Return conditions as a sidecar holds them."""
     columns: dict[str, Any] = {}
@@ -122,6 +185,7 @@ def conditions_document(conditions: Conditions) -> dict[str, Any]:
         "format": FORMAT,
         "axes": "iso",
         "loop_us": conditions.loop_us,
+        "campaign": conditions.campaign,
         "t_us": list(conditions.t_us),
         **columns,
         "runs": [
@@ -132,6 +196,7 @@ def conditions_document(conditions: Conditions) -> dict[str, Any]:
                 "truth": {
                     name: from_si(x, *TRUTH[name]) for name, x in mark.truth.items() if x == x
                 },
+                "plan_si": {name: x for name, x in mark.plan.items() if x == x},
             }
             for mark in conditions.runs
         ],
@@ -158,6 +223,7 @@ def parse_conditions(document: Any, where: str) -> Conditions:
         values = tuple(zip(*columns, strict=True))
         runs = tuple(_mark(entry) for entry in document["runs"])
         loop = int(document["loop_us"])
+        campaign = None if document.get("campaign") is None else dict(document["campaign"])
     except (KeyError, TypeError, ValueError) as error:
         raise DeviceError(
             f"{where}: {type(error).__name__} {error}; t_us, speed, pressure, camber, runs and "
@@ -168,7 +234,7 @@ def parse_conditions(document: Any, where: str) -> Conditions:
             f"{where}: {len(times)} times for {len(values)} conditions; as many are needed, at "
             "least one, in order of time; write it anew with `tirebench emulate`"
         )
-    return Conditions(times, values, runs, loop)
+    return Conditions(times, values, runs, loop, campaign)
 
 
 def read_conditions(path: Path) -> Conditions:
@@ -195,4 +261,8 @@ def _mark(entry: dict[str, Any]) -> RunMark:
     truth = {
         name: float(to_si(float(x), *TRUTH[name])) for name, x in entry.get("truth", {}).items()
     }
-    return RunMark(int(entry["run"]), int(entry["t_us"]), float(entry["start_s"]), truth)
+    plan = {
+        str(name): x if isinstance(x, str) else float(x)
+        for name, x in entry.get("plan_si", {}).items()
+    }
+    return RunMark(int(entry["run"]), int(entry["t_us"]), float(entry["start_s"]), truth, plan)

@@ -1,4 +1,4 @@
-"""Bytes of a serial line to frames: cut at the delimiter, undo COBS, check CRC-32, in bulk.
+"""Bytes of a serial line to frames of SERIAL v1: cut, undo COBS, check CRC-32, in bulk.
 
 A damaged frame is counted and dropped, and the next delimiter starts afresh, so one fault costs one
 frame (two if it destroys a delimiter). What comes out depends on the bytes alone, never on how they
@@ -6,7 +6,6 @@ are cut into reads: a replay decodes to the same frames and the same counts.
 """
 
 import zlib
-from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
@@ -21,42 +20,12 @@ from bench.frames import (
     frame_size,
     layout,
 )
+from bench.line_counts import LineCounts
 
 _COUNT_AT = 10  # offset of `n` in the header
 _PERIOD_AT = 8  # offset of `period` in the header
 SHORTEST_PERIOD = 50
 """Sample period, in ticks of 0.1 us, below which a header is taken as damaged (200 kHz)."""
-
-
-@dataclass(slots=True)
-class LineCounts:
-    """What a line has shown so far, in frames unless said otherwise.
-
-    Attributes
-    ----------
-    bytes : int
-        Bytes taken.
-    ok : int
-        Frames with a good CRC.
-    crc : int
-        Frames whose CRC is wrong.
-    framing : int
-        Pieces that are no frame: COBS broken, too short, too long, or of another length than they
-        say.
-    unknown : int
-        Good frames of a type that is not known here.
-    """
-
-    bytes: int = 0
-    ok: int = 0
-    crc: int = 0
-    framing: int = 0
-    unknown: int = 0
-
-    @property
-    def bad(self) -> int:
-        """Frames that were damaged."""
-        return self.crc + self.framing
 
 
 class SerialDecoder:
@@ -72,7 +41,7 @@ class SerialDecoder:
         self._too_long = False
         self._joined = False
 
-    def push(self, data: bytes) -> list[Frames]:
+    def push(self, data: bytes, arrival: int = 0) -> list[Frames]:
         """Return the frames that `data` completes, in batches of equal length, in order."""
         self.counts.bytes += len(data)
         *pieces, self._tail = (self._tail + data).split(b"\0")
@@ -87,6 +56,10 @@ class SerialDecoder:
         if len(self._tail) > LONGEST_ON_WIRE:
             self._tail, self._too_long = b"", True
         return [_batch(list(group), size) for size, group in groupby(bodies, len)]
+
+    def interrupt(self) -> None:
+        """Forget a half frame: the line was broken, and is joined anew."""
+        self._tail, self._too_long, self._joined = b"", False, False
 
     def _take(self, piece: bytes, bodies: list[bytes]) -> None:
         """Check one piece between delimiters; a good one joins `bodies`."""

@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from bench.errors import DeviceError
-from bench.frames import GAGES, HIGHEST, LOWEST, FrameFlag, Int16Array, IntArray
+from bench.frames import GAGES, HIGHEST, LOWEST, CountArray, FrameFlag, Int16Array, IntArray
 from tirelib.arrays import BoolArray, FloatArray
 
 FORMAT = "tirebench-device/1"
@@ -54,21 +54,26 @@ class Device:
         Counts at strain zero.
     lateral : tuple of 5 float, or None, [m]
         Gage positions, ISO; None where the file does not say.
+    lowest, highest : int
+        Counts at the ends of the range, which mean saturation.
     """
 
     name: str = "default"
     scale: float = 0.02 / 32768
     zero: tuple[float, ...] = (0.0,) * GAGES
     lateral: tuple[float, ...] | None = None
+    lowest: int = LOWEST
+    highest: int = HIGHEST
 
-    def strain(self, counts: Int16Array, flags: IntArray) -> tuple[FloatArray, BoolArray]:
+    def strain(self, counts: CountArray, flags: IntArray) -> tuple[FloatArray, BoolArray]:
         """Return the strain of frames, shape (m * n, 5), and where a gage was saturated.
 
-        A saturated sample is NaN. Saturation is marked in band by +32767 and -32768. If a frame's
-        flag names a gage and none of its samples is marked, all of them are taken as saturated.
+        A saturated sample is NaN. Saturation is marked in band by the ends of the range. If a
+        frame's flag names a gage and none of its samples is marked, all of them are taken as
+        saturated.
         """
         m, n = counts.shape[:2]
-        saturated = (counts == HIGHEST) | (counts == LOWEST)
+        saturated = (counts == self.highest) | (counts == self.lowest)
         if (flags & int(FrameFlag.SATURATED)).any():
             named = (flags[:, None] & _GAGE_BITS) != 0
             saturated |= (named & ~saturated.any(axis=1))[:, None, :]

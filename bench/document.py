@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from bench.chain import Turn
+from bench.chain import Chain, Turn
 from bench.conditions import RunMark
-from bench.decoder import LineCounts
 from bench.frames import GAGES
+from bench.line_counts import LineCounts
 from bench.timeline import TimelineCounts
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.result import EDGE_UNIT, FORMAT, VARIED
@@ -29,10 +29,12 @@ def document(
     counts: tuple[LineCounts, TimelineCounts],
     source: Mapping[str, Any],
     calibration: Calibration | None = None,
+    wheels: Mapping[int, Chain] | None = None,
 ) -> dict[str, Any]:
     """Return summary, turns, what the line lost, and where all came from.
 
     `calibration` is that of the FMU, where it is known: a quantity that it lacks has no summary.
+    `wheels` adds the counters and the clock of each wheel.
     """
     truth = {mark.run: mark.truth for mark in runs}
     chain = None if calibration is None else calibration.chains[-1]
@@ -46,6 +48,7 @@ def document(
         },
         "turns": [turn_document(turn) for turn in turns],
         "line": line_document(*counts),
+        "wheels": {wheel: wheel_document(chain) for wheel, chain in (wheels or {}).items()},
         "source": dict(source),
     }
 
@@ -58,6 +61,9 @@ def line_document(line: LineCounts, timeline: TimelineCounts) -> dict[str, Any]:
         "crc_bad": line.crc,
         "framing_bad": line.framing,
         "unknown_type": line.unknown,
+        "unplaced_samples": line.unplaced,
+        "overruns": line.overruns,
+        "reconnects": line.reconnects,
         "gaps": timeline.gaps,
         "lost_frames": timeline.lost_frames,
         "lost_samples": timeline.lost_samples,
@@ -71,11 +77,25 @@ def line_document(line: LineCounts, timeline: TimelineCounts) -> dict[str, Any]:
     }
 
 
+def wheel_document(chain: Chain) -> dict[str, Any]:
+    """Return the losses of one wheel, those of its line included, and its clock.
+
+    A damaged frame does not say whose it was: what the line counts, all its wheels show.
+    """
+    clock = chain.clock
+    return {
+        **line_document(*chain.counts),
+        "clock_drift_ppm": _number(clock.drift_ppm),
+        "clock_residual_us": _number(1e6 * clock.residual),
+    }
+
+
 def turn_document(turn: Turn) -> dict[str, Any]:
     """Return one turn in the units of the document."""
     outputs = turn.outputs
     entry: dict[str, Any] = {
         "run": turn.run,
+        "wheel": turn.wheel,
         "t": _number(turn.t),
         "ready": _number(turn.ready),
     }

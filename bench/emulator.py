@@ -1,50 +1,74 @@
-"""The wheel transmitter's stand-in: runs of a campaign as SERIAL v1 frames with device time.
+"""What an emulator plays: records of wheels on one device clock, encoded piece by piece.
 
-Runs follow each other on one device clock. The first frames of each run carry the time-reset flag,
-because the wheel does not turn on from one run to the next.
+Runs of a campaign follow each other. The first frames of each carry the time-reset flag, because
+the wheel does not turn on from one run to the next.
 """
 
 import time
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, Protocol
 
 import numpy as np
 
+from bench.can_batch import CanBatch
 from bench.conditions import UNKNOWN, Condition, Conditions, RunMark
 from bench.device import Device
 from bench.errors import DeviceError
 from bench.faults import Faults
-from bench.frames import GAGES, SAMPLES, TICK, FrameFlag, Int16Array, encode, strain_frames
-from tirelib.campaign import Run
+from bench.frames import GAGES, SAMPLES, TICK
+from bench.protocols import CAN, SERIAL, SLCAN
+from bench.protocols.slcan import encode as slcan_lines
+from bench.transmitter import ANNOUNCED, WHOLE, Record, Sent, SerialTransmitter, Transmitter
+from tirelib.arrays import FloatArray
+from tirelib.campaign import CampaignHeader, Run
+from tirelib.campaign.header import header_document
 
 PAUSE = 0.1
 """Device time between two runs, [s]."""
-ANNOUNCED = 8
-"""Frames of a run that carry the time-reset flag; a receiver acts on the first that it gets."""
 BURST = 0.002
 """Frames are sent this often, [s]."""
+PIECE = 50 * WHOLE
+"""Samples that are encoded at once: 0.24 s at 10 kHz."""
 TRUTH = {"Fz": "Fz", "alpha": "slip_angle", "kappa": "slip_ratio", "Fy": "Fy"}
 
 
 @dataclass(frozen=True, slots=True)
-class Script:
-    """What the emulator plays in one pass.
+class Tape:
+    """Records of one pass, all wheels.
 
     Attributes
     ----------
-    due : tuple of float, [s]
-        When each frame is complete, on the device clock.
-    frames : tuple of bytes
-        As sent, faults included; empty for a lost one.
+    records : tuple of Record
+        In order of device time; several wheels side by side.
     conditions : Conditions
         Of one pass, with the runs and their truth.
     duration : float, [s]
     """
 
+    records: tuple[Record, ...]
+    conditions: Conditions
+    duration: float
+
+
+@dataclass(frozen=True, slots=True)
+class Script:
+    """Frames ready to be sent.
+
+    Attributes
+    ----------
+    due : tuple of float, [s]
+        When each frame is complete, on the host's clock from the start.
+    frames : tuple
+        As sent, faults included: bytes, empty for a lost one, or lists of CAN frames.
+    conditions : Conditions
+    duration : float, [s]
+    """
+
     due: tuple[float, ...]
-    frames: tuple[bytes, ...]
+    frames: tuple[Any, ...]
     conditions: Conditions
     duration: float
 
@@ -52,8 +76,8 @@ class Script:
 class Sink(Protocol):
     """Where frames go."""
 
-    def send(self, data: bytes) -> bool:
-        """Take bytes; False if nobody listens.
+    def send(self, frames: Sequence[Any]) -> bool:
+        """Take frames; False if nobody listens.
 
         Raises
         ------
@@ -62,44 +86,133 @@ class Sink(Protocol):
         """
 
 
-def write_script(
-    runs: Sequence[Run], device: Device, faults: Faults, *, wheel: int = 0, turn: int = 0
-) -> Script:
-    """Turn runs into frames with faults.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-        With strain of five gages.
-    turn : int
-        Pass of a loop: sequence and device time go on from the passes before.
+def record_tape(
+    runs: Sequence[Run],
+    device: Device,
+    faults: Faults,
+    wheels: Sequence[int] = (0,),
+    header: CampaignHeader | None = None,
+) -> Tape:
+    """Return runs one after the other, the same for each wheel.
 
     Raises
     ------
     DeviceError
         If a run has no strain of five gages, or a rate that a frame cannot say.
     """
-    wire: list[bytes] = []
-    due: list[float] = []
+    records: list[Record] = []
     marks, times, values = [], [], []
-    periods = [_period(run) for run in runs]
-    length = sum(_duration(run, p) + PAUSE for run, p in zip(runs, periods, strict=True))
-    seconds, seq = turn * length, 0
-    if turn:
-        seq = turn * sum(-(-_samples(run) // SAMPLES) for run in runs)
-    for run, period in zip(runs, periods, strict=True):
+    seconds = 0.0
+    for run in runs:
+        period = _period(run)
         start = round(seconds * 1e6)
-        marks.append(RunMark(run.plan.run, start, run.start_time, _truth(run)))
+        marks.append(RunMark(run.plan.run, start, run.start_time, _truth(run), _plan(run)))
         for moment, value in _conditions(run):
             times.append(start + round((moment - run.start_time) * 1e6))
             values.append(value)
-        frames, ends = _frames(run, period, device, faults, wheel, seq, start)
-        seq += len(frames)
-        wire.extend(faults.wire(frames))
-        due.extend(seconds + ends)
-        seconds += _duration(run, period) + PAUSE
-    conditions = Conditions(tuple(times), tuple(values), tuple(marks))
-    return Script(tuple(due), tuple(wire), conditions, length)
+        counts, marked = device.counts(np.asarray(run.strain).T)
+        for wheel in wheels:
+            struck, bits = faults.gages(counts, period * TICK, device.scale)
+            bits = (bits | (marked << np.arange(GAGES)).sum(axis=1)).astype(np.int16)
+            records.append(Record(wheel, start, period, struck, bits))
+        seconds += _samples(run) * period * TICK + PAUSE
+    campaign = None if header is None else header_document(replace(header, axes="iso"))
+    conditions = Conditions(tuple(times), tuple(values), tuple(marks), campaign=campaign)
+    return Tape(tuple(records), conditions, seconds)
+
+
+class Player:
+    """Encodes a tape piece by piece for one kind of line, pass after pass.
+
+    Parameters
+    ----------
+    make : callable
+        Gives a transmitter; each wheel has its own.
+    line : str
+        ``serial-v1``, ``slcan`` or ``can``: what a frame becomes.
+    faults : Faults
+    """
+
+    def __init__(self, make: Callable[[], Transmitter], line: str, faults: Faults) -> None:
+        self._make = make
+        self._line = line
+        self._faults = faults
+        self._wheels: dict[int, Transmitter] = {}
+        self._restarted = 0.0
+
+    def pieces(self, tape: Tape, turn: int = 0) -> Iterator[Script]:
+        """Yield the frames of a pass in pieces, in order of time."""
+        shift = round(turn * tape.duration * 1e6)
+        begins = sorted({record.start_us for record in tape.records})
+        for begin in begins:
+            side = [record for record in tape.records if record.start_us == begin]
+            moved = [replace(record, start_us=begin + shift) for record in side]
+            length = max(len(record.counts) for record in moved)
+            cuts = [*range(0, length, PIECE), length]
+            for first, last in pairwise(cuts):
+                sent = [
+                    self._transmitter(record.wheel, first, record).send(
+                        record, first, min(last, len(record.counts))
+                    )
+                    for record in moved
+                    if first < len(record.counts)
+                ]
+                yield self._script(sent, tape)
+
+    def _transmitter(self, wheel: int, first: int, record: Record) -> Transmitter:
+        """Return the transmitter of a wheel, restarted where that fault was asked for."""
+        if wheel not in self._wheels:
+            self._wheels[wheel] = self._make()
+        now = 1e-6 * float(record.times(np.array([first]))[0])
+        if now - self._restarted >= self._faults.reset:
+            self._restarted = now
+            self._faults.done["reset"] += 1
+            for other in self._wheels.values():
+                other.restart()
+        return self._wheels[wheel]
+
+    def _script(self, sent: Sequence[Sent], tape: Tape) -> Script:
+        due = np.concatenate([one.due for one in sent]) / (1.0 + self._faults.drift)
+        frames = [frame for one in sent for frame in self._wire(one.frames)]
+        order = np.argsort(due, kind="stable")
+        frames, due = [frames[row] for row in order.tolist()], due[order]
+        if self._line == CAN:
+            struck: list[Any] = self._faults.bus(frames, due)
+        else:
+            struck = self._faults.wire(frames, due)
+        return Script(tuple(due.tolist()), tuple(struck), tape.conditions, tape.duration)
+
+    def _wire(self, frames: "Sequence[bytes] | CanBatch") -> Sequence[Any]:
+        """Return each frame as the line carries it."""
+        if not isinstance(frames, CanBatch):
+            return frames
+        if self._line == SLCAN:
+            return slcan_lines(frames)
+        from bench.links.can_bus import message_of
+
+        return [message_of(frames, row) for row in range(len(frames))]
+
+
+def write_script(
+    runs: Sequence[Run], device: Device, faults: Faults, *, wheel: int = 0, turn: int = 0
+) -> Script:
+    """Turn runs into frames of SERIAL v1 with faults, all at once.
+
+    Parameters
+    ----------
+    turn : int
+        Pass of a loop: number and device time go on from the passes before.
+    """
+    tape = record_tape(runs, device, faults, (wheel,))
+    before = turn * sum(-(-_samples(run) // SAMPLES) for run in runs)
+    player = Player(lambda: SerialTransmitter(before), SERIAL, faults)
+    pieces = list(player.pieces(tape, turn))
+    return Script(
+        tuple(due for piece in pieces for due in piece.due),
+        tuple(frame for piece in pieces for frame in piece.frames),
+        tape.conditions,
+        tape.duration,
+    )
 
 
 @dataclass(slots=True)
@@ -130,7 +243,7 @@ def play(script: Script, sink: Sink, tally: Tally, *, start: float, speedup: flo
         `send` may block while the reader is behind.
     tally : Tally
     start : float, [s]
-        Moment on `time.monotonic` that is device time zero.
+        Moment on `time.monotonic` that is time zero.
     speedup : float
     """
     first = 0
@@ -141,39 +254,10 @@ def play(script: Script, sink: Sink, tally: Tally, *, start: float, speedup: flo
         now = (time.monotonic() - start) * speedup
         stop = max(bisect_right(script.due, now), first + 1)
         tally.late = max(tally.late, now / speedup - script.due[first] / speedup - BURST)
-        heard = sink.send(b"".join(script.frames[first:stop]))
+        heard = sink.send(script.frames[first:stop])
         tally.sent += stop - first
         tally.unheard += 0 if heard else stop - first
         first = stop
-
-
-def _frames(
-    run: Run, period: int, device: Device, faults: Faults, wheel: int, seq: int, start: int
-) -> tuple[list[bytes], np.ndarray[tuple[int], np.dtype[np.float64]]]:
-    """Frames of one run, and the end of each [s] from the run's start."""
-    strain = np.asarray(run.strain).T
-    counts, marked = device.counts(strain)
-    counts, bits = faults.gages(counts)
-    bits = bits | (marked << np.arange(GAGES)).sum(axis=1)
-    whole = len(counts) // SAMPLES * SAMPLES
-    wire: list[bytes] = []
-    for part in (slice(0, whole), slice(whole, None)):
-        if len(counts[part]):
-            wire += _encoded(counts[part], bits[part], period, wheel, seq + len(wire),
-                             start + round(part.start * period / 10), len(wire))  # fmt: skip
-    ends = np.minimum(SAMPLES * (1 + np.arange(len(wire))), len(counts)) * period * TICK
-    return wire, ends
-
-
-def _encoded(
-    counts: Int16Array, bits: Int16Array, period: int, wheel: int, seq: int, t_us: int, before: int
-) -> list[bytes]:
-    samples = min(SAMPLES, len(counts))
-    flags = np.bitwise_or.reduce(bits.reshape(-1, samples), axis=1).astype(np.int64)
-    flags[: max(0, ANNOUNCED - before)] |= int(FrameFlag.TIME_RESET)
-    return encode(
-        strain_frames(counts, period=period, wheel=wheel, seq=seq, t_us=t_us, flags=flags.tolist())
-    )
 
 
 def _period(run: Run) -> int:
@@ -196,13 +280,9 @@ def _samples(run: Run) -> int:
     return 0 if run.strain is None else int(run.strain.shape[1])
 
 
-def _duration(run: Run, period: int) -> float:
-    return _samples(run) * period * TICK
-
-
 def _conditions(run: Run) -> Iterator[tuple[float, Condition]]:
     """Yield time [s, the run's clock] and conditions wherever the rig measured them."""
-    times = run.rig_time if run.rig_time is not None else np.array([run.start_time])
+    times: FloatArray = run.rig_time if run.rig_time is not None else np.array([run.start_time])
     columns = [run.rig.get(name) for name in ("speed", "pressure", "camber")]
     first = int(np.searchsorted(times, run.start_time, side="right")) - 1
     if first < 0:
@@ -215,6 +295,15 @@ def _conditions(run: Run) -> Iterator[tuple[float, Condition]]:
         yield max(float(times[index]), run.start_time), (speed, pressure, camber)
 
 
+def _plan(run: Run) -> dict[str, float | str]:
+    names = ("kind", "load", "pressure", "speed", "slip_angle", "camber", "slip_ratio")
+    return {name: getattr(run.plan, name) for name in names}
+
+
 def _truth(run: Run) -> dict[str, float]:
     means = {name: run.mean(quantity) for name, quantity in TRUTH.items()}
     return {name: value for name, value in means.items() if value is not None}
+
+
+__all__ = ["ANNOUNCED", "Player", "Script", "Sink", "Tally", "Tape", "play", "record_tape",
+           "write_script"]  # fmt: skip

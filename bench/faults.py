@@ -1,35 +1,51 @@
 """Faults on request: what goes wrong between a gage and the receiver.
 
-``NAME[=VALUE]``; a rate is per frame (``nan``: per sample).
+``NAME[=VALUE]``; a rate is per frame (``nan``: per sample, ``fades``: per second).
 
-============  ==================================================  =======
-name          does                                                default
-============  ==================================================  =======
-``flips``     flips one bit of a frame on the wire                0.01
-``cuts``      removes 1 to 8 bytes of a frame                     0.01
-``inserts``   puts 1 to 39 random bytes into a frame              0.01
-``lost``      leaves a frame out                                  0.01
-``dup``       sends a frame twice                                 0.01
-``nan``       marks lone samples of all gages as unusable         0.001
-``saturate``  the gage of this number clips in the contact        1
-``dead``      the gage of this number stands still                1
-============  ==================================================  =======
+============  ==========================================================  =======
+name          does                                                        default
+============  ==========================================================  =======
+``flips``     flips one bit of a frame on the wire                        0.01
+``cuts``      removes 1 to 8 bytes of a frame                             0.01
+``inserts``   puts 1 to 39 random bytes into a frame                      0.01
+``lost``      leaves a frame out                                          0.01
+``dup``       sends a frame twice                                         0.01
+``nan``       marks lone samples of all gages as unusable                 0.001
+``fades``     the radio is gone for 0.05 to 0.5 s                         0.2
+``saturate``  the gage of this number clips in the contact                1
+``dead``      the gage of this number stands still                        1
+``hum``       60 Hz on all gages, amplitude in microstrain                20
+``drift``     the device's clock is fast by so many ppm                   50
+``reset``     the device restarts after so many seconds, again and again  5
+============  ==========================================================  =======
 """
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from bench.errors import DeviceError
 from bench.frames import GAGES, HIGHEST, LOWEST, Int16Array
+from tirelib.arrays import FloatArray
 
 RATES = {"flips": 0.01, "cuts": 0.01, "inserts": 0.01, "lost": 0.01, "dup": 0.01, "nan": 0.001}
 """Faults that strike at random, and how often by default."""
 GAGE_FAULTS = ("saturate", "dead")
 """Faults of one gage, given by its number."""
+SIZES = {"fades": (0.2, 0.0, 10.0, "a number of fades a second"),
+         "hum": (20.0, 0.0, 5000.0, "an amplitude in microstrain"),
+         "drift": (50.0, -5000.0, 5000.0, "ppm"),
+         "reset": (5.0, 0.1, 1e6, "a time in seconds")}  # fmt: skip
+"""Faults with a size: default, lowest, highest, what it is."""
+TEXT_FAULTS = ("flips", "cuts", "inserts")
+"""Faults of bytes; a bus with a checksum of its own shows none of them."""
 CLIP = 0.6
 """A clipped gage shows this share of the swing between its lowest and highest strain."""
+SHORTEST_FADE, LONGEST_FADE = 0.05, 0.5
+HUM = 60.0
+"""Frequency, [Hz]."""
 
 
 def parse_faults(texts: Iterable[str]) -> dict[str, float]:
@@ -49,24 +65,32 @@ def parse_faults(texts: Iterable[str]) -> dict[str, float]:
     problems = []
     for text in texts:
         name, _, given = text.partition("=")
-        if name not in RATES and name not in GAGE_FAULTS:
+        if name not in RATES and name not in GAGE_FAULTS and name not in SIZES:
             problems.append(f"--fault {text}: {name!r} is not known; allowed are "
-                            f"{', '.join((*RATES, *GAGE_FAULTS))}; name one of them")  # fmt: skip
+                            f"{', '.join((*RATES, *GAGE_FAULTS, *SIZES))}; name one of "
+                            "them")  # fmt: skip
             continue
-        low, high = (0.0, 1.0) if name in RATES else (1, GAGES)
+        usual, low, high, what = _range(name)
         try:
-            value = float(given) if given else RATES.get(name, 1.0)
+            value = float(given) if given else usual
         except ValueError:
             value = float("nan")
         if not low <= value <= high or (name in GAGE_FAULTS and value != int(value)):
-            what = "a rate per frame" if name in RATES else "the number of a gage"
-            problems.append(f"--fault {text}: {given!r} is not {what}; {low} .. {high} is allowed; "
-                            "correct it")  # fmt: skip
+            problems.append(f"--fault {text}: {given!r} is not {what}; {low:g} .. {high:g} is "
+                            "allowed; correct it")  # fmt: skip
             continue
         faults[name] = value
     if problems:
         raise DeviceError(problems)
     return faults
+
+
+def _range(name: str) -> tuple[float, float, float, str]:
+    if name in RATES:
+        return RATES[name], 0.0, 1.0, "a rate per frame"
+    if name in GAGE_FAULTS:
+        return 1.0, 1.0, float(GAGES), "the number of a gage"
+    return SIZES[name]
 
 
 class Faults:
@@ -82,11 +106,40 @@ class Faults:
         self.done: Counter[str] = Counter()
         self._rates = dict(rates)
         self._rng = np.random.default_rng(seed)
+        self._fade = (0.0, 0.0)  # begin and end of the next one, [s]
+        if "fades" in self._rates:
+            self._next_fade(0.0)
 
-    def gages(self, counts: Int16Array) -> tuple[Int16Array, Int16Array]:
-        """Return counts of shape (n, 5) after gage faults, and the flag bits of each sample."""
+    @property
+    def drift(self) -> float:
+        """How much the device's clock is fast, relative."""
+        return 1e-6 * self._rates.get("drift", 0.0)
+
+    @property
+    def reset(self) -> float:
+        """Time between two restarts of the device, [s]; infinite without."""
+        return self._rates.get("reset", float("inf"))
+
+    def gages(
+        self, counts: Int16Array, period: float = 1e-4, per_count: float = 0.02 / 32768
+    ) -> tuple[Int16Array, Int16Array]:
+        """Return counts of shape (n, 5) after gage faults, and the flag bits of each sample.
+
+        Parameters
+        ----------
+        period : float, [s]
+        per_count : float
+            Strain of a count.
+        """
         counts = counts.copy()
         bits = np.zeros(len(counts), np.int16)
+        if "hum" in self._rates:
+            time = period * np.arange(len(counts))
+            hum = 1e-6 * self._rates["hum"] / per_count * np.sin(2.0 * np.pi * HUM * time)
+            sound = (counts != HIGHEST) & (counts != LOWEST)
+            moved = np.clip(np.rint(counts + hum[:, None]), LOWEST, HIGHEST).astype(np.int16)
+            counts = np.where(sound, moved, counts)
+            self.done["hum"] += len(counts)
         if "dead" in self._rates:
             gage = int(self._rates["dead"]) - 1
             counts[:, gage] = counts[0, gage]
@@ -105,12 +158,42 @@ class Faults:
             self.done["nan"] += int(hit.sum())
         return counts, bits
 
-    def wire(self, frames: Iterable[bytes]) -> list[bytes]:
+    def wire(self, frames: Iterable[bytes], due: "FloatArray | None" = None) -> list[bytes]:
         """Return frames after faults on the wire; a lost one is empty, so that time goes on."""
-        return [self._strike(frame) for frame in frames]
+        struck = [self._strike(frame) for frame in frames]
+        return struck if due is None else self._faded(struck, due, b"")
+
+    def bus(self, frames: Sequence[Any], due: FloatArray) -> list[list[Any]]:
+        """Return for each frame of a bus what is sent in its place: it, nothing, or it twice."""
+        sent: list[list[Any]] = [[frame] for frame in frames]
+        for name, times in (("lost", 0), ("dup", 2)):
+            rate = self._rates.get(name)
+            if rate is not None:
+                for row in np.flatnonzero(self._rng.random(len(sent)) < rate).tolist():
+                    if sent[row]:
+                        sent[row] = sent[row][:1] * times
+                        self.done[name] += 1
+        return self._faded(sent, due, [])
+
+    def _faded(self, frames: list[Any], due: FloatArray, nothing: Any) -> list[Any]:
+        if "fades" not in self._rates:
+            return frames
+        kept = list(frames)
+        for row, moment in enumerate(due.tolist()):
+            while moment > self._fade[1]:
+                self._next_fade(self._fade[1])
+            if moment >= self._fade[0]:
+                kept[row] = nothing
+                self.done["fades"] += 1
+        return kept
+
+    def _next_fade(self, after: float) -> None:
+        rate = max(self._rates["fades"], 1e-9)
+        begin = after + float(self._rng.exponential(1.0 / rate))
+        self._fade = (begin, begin + float(self._rng.uniform(SHORTEST_FADE, LONGEST_FADE)))
 
     def _strike(self, frame: bytes) -> bytes:
-        for name in ("lost", "dup", "flips", "cuts", "inserts"):
+        for name in ("lost", "dup", *TEXT_FAULTS):
             rate = self._rates.get(name)
             if rate is None or self._rng.random() >= rate:
                 continue

@@ -47,6 +47,8 @@ LONGEST_ON_WIRE = LONGEST + LONGEST // 254 + 1
 
 Int16Array = npt.NDArray[np.int16]
 IntArray = npt.NDArray[np.int64]
+CountArray = npt.NDArray[np.int16] | npt.NDArray[np.int32]
+"""Counts: sixteen bits of our transmitter, up to 32 of another make."""
 
 
 class FrameFlag(IntFlag):
@@ -66,7 +68,7 @@ class Frames:
     ----------
     wheel, seq, t_us, period, flags, rssi, temperature : int arrays
         As the header has them, `period` in ticks of 0.1 us.
-    counts : int16 array, shape (m, n, 5)
+    counts : int16 or int32 array, shape (m, n, 5)
     """
 
     wheel: IntArray
@@ -76,7 +78,7 @@ class Frames:
     flags: IntArray
     rssi: IntArray
     temperature: IntArray
-    counts: Int16Array
+    counts: CountArray
 
     def __len__(self) -> int:
         return int(self.seq.shape[0])

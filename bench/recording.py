@@ -8,7 +8,9 @@ that take a stream (and PlotJuggler, Foxglove) open it; a file without its end d
 part            encoding             content
 ==============  ===================  ============================================================
 metadata        ``tirebench``        format, settings (JSON), start on both clocks, device file
-``/serial``     ``serial-v1``        bytes of one read; log time is UTC, publish time monotonic
+``/serial``     ``serial-v1``        bytes of one read; log time is UTC, publish time monotonic;
+                                     ``/slcan`` and ``/can`` on another kind of line
+``/events``     ``json``             the port went away or came back; markers
 ``/conditions`` ``json``             conditions as a sidecar holds them (``tirebench-conditions/1``)
 metadata        ``end``              why the run ended
 ==============  ===================  ============================================================
@@ -28,9 +30,11 @@ from mcap.writer import CompressionType, Writer
 
 from bench.conditions import Conditions, conditions_document, parse_conditions
 from bench.errors import DeviceError, RecordingError
+from bench.links import BACK, LOST, Read
+from bench.protocols import SERIAL
 
 FORMAT = "tirebench-recording/1"
-RAW, CONDITIONS = "/serial", "/conditions"
+CONDITIONS, EVENTS = "/conditions", "/events"
 LARGEST_RECORD = 64 * 2**20
 """A longer record is damage, not data, [bytes]."""
 
@@ -66,15 +70,30 @@ class Recorder:
         self._writer = Writer(self._file, use_chunking=False, compression=CompressionType.NONE)
         self._writer.start("tirebench", FORMAT)
         self._writer.add_metadata("tirebench", header.as_text())
-        self._raw = self._writer.register_channel(RAW, "serial-v1", 0)
+        topic = raw_topic(header.encoding)
+        self._raw = self._writer.register_channel(topic, header.encoding, 0)
+        self._events = self._writer.register_channel(EVENTS, "json", 0)
         channel = self._writer.register_channel(CONDITIONS, "json", 0)
-        self._number = 0
+        self._number = self.bytes = 0
         text = json.dumps(conditions_document(conditions)).encode()
         self._message(channel, text, time.monotonic_ns())
 
     def raw(self, data: bytes, arrival: int) -> None:
         """Write the bytes of one read; `arrival` is `time.monotonic_ns`."""
         self._message(self._raw, data, arrival)
+        self.bytes += len(data)
+
+    def read(self, read: Read) -> None:
+        """Write one read: its bytes and what happened to the port."""
+        if read.event:
+            self._message(self._events, json.dumps({"event": read.event}).encode(), read.arrival)
+        if read.data:
+            self.raw(read.data, read.arrival)
+
+    def marker(self, text: str) -> None:
+        """Write a marker of the user at this moment."""
+        event = json.dumps({"event": "marker", "text": text}).encode()
+        self._message(self._events, event, time.monotonic_ns())
 
     def _message(self, channel: int, data: bytes, arrival: int) -> None:
         self._number += 1
@@ -117,6 +136,8 @@ class RecordingHeader:
         Text of the device file; empty for the default device.
     fmu : str
         SHA-256 of the FMU file, hex.
+    protocol : dict
+        What the bytes are: `bench.protocols.plan.ProtocolPlan.as_header`.
     wall_ns, monotonic_ns : int
         The start on both clocks.
     """
@@ -124,8 +145,14 @@ class RecordingHeader:
     settings: dict[str, Any]
     device: str = ""
     fmu: str = ""
+    protocol: dict[str, Any] = field(default_factory=dict)
     wall_ns: int = field(default_factory=time.time_ns)
     monotonic_ns: int = field(default_factory=time.monotonic_ns)
+
+    @property
+    def encoding(self) -> str:
+        """What the bytes of a read are, see `bench.protocols`."""
+        return str(self.protocol.get("encoding", SERIAL))
 
     def as_text(self) -> dict[str, str]:
         """Return the header as MCAP metadata."""
@@ -134,6 +161,7 @@ class RecordingHeader:
             "settings": json.dumps(self.settings),
             "device": self.device,
             "fmu_sha256": self.fmu,
+            "protocol": json.dumps(self.protocol),
             "wall_ns": str(self.wall_ns),
             "monotonic_ns": str(self.monotonic_ns),
         }
@@ -190,9 +218,21 @@ class Recording:
 
     def raw(self) -> Iterator[tuple[int, bytes]]:
         """Yield arrival [ns, monotonic] and bytes of each read, in order; once."""
+        for read in self.reads():
+            if read.data:
+                yield read.arrival, read.data
+
+    def reads(self) -> Iterator[Read]:
+        """Yield every read in order, those included that tell of a lost port; once."""
+        raw = raw_topic(self.header.encoding)
         for record in self._sound():
-            if isinstance(record, Message) and self._topics.get(record.channel_id) == RAW:
-                yield record.publish_time, record.data
+            if not isinstance(record, Message):
+                continue
+            topic = self._topics.get(record.channel_id)
+            if topic == raw:
+                yield Read(record.publish_time, record.data)
+            elif topic == EVENTS and (event := _event(record.data)) in (LOST, BACK):
+                yield Read(record.publish_time, b"", event)
 
     def close(self) -> None:
         """Close the file."""
@@ -224,6 +264,7 @@ class Recording:
                 settings=dict(json.loads(text["settings"])),
                 device=text["device"],
                 fmu=text["fmu_sha256"],
+                protocol=dict(json.loads(text.get("protocol", "{}"))),
                 wall_ns=int(text["wall_ns"]),
                 monotonic_ns=int(text["monotonic_ns"]),
             )
@@ -241,6 +282,19 @@ class Recording:
                 f"{self.path}: the conditions are damaged ({error}); JSON is needed; "
                 "take another recording"
             ) from None
+
+
+def raw_topic(encoding: str) -> str:
+    """Return the topic of the raw bytes of an encoding."""
+    return f"/{encoding.partition('-')[0]}"
+
+
+def _event(data: bytes) -> str:
+    """Return what an event says; empty if it is damaged."""
+    try:
+        return str(json.loads(data)["event"])
+    except (ValueError, KeyError, TypeError):
+        return ""
 
 
 def _unwritable(path: Path, error: OSError) -> RecordingError:

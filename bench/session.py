@@ -5,11 +5,12 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from bench.chain import Chain, Turn
+from bench.chain import Turn
 from bench.deadline import Deadline
 from bench.errors import UnpluggedError
-from bench.links import Link
+from bench.links import BACK, Link, Read
 from bench.recording import Recorder
+from bench.wheels import Wheels
 
 WAIT = 0.2
 """The longest wait for bytes before the screen is looked after, [s]."""
@@ -65,7 +66,8 @@ class Session:
     Parameters
     ----------
     link : Link
-    chain : Chain
+    wheels : Wheels
+        The decoder and a chain for each wheel.
     recorder : Recorder, optional
         Gets every byte before it is decoded.
     limits : Limits
@@ -78,7 +80,7 @@ class Session:
     def __init__(
         self,
         link: Link,
-        chain: Chain,
+        wheels: Wheels,
         *,
         recorder: Recorder | None = None,
         limits: Limits | None = None,
@@ -87,12 +89,14 @@ class Session:
     ) -> None:
         self.outcome = Outcome()
         self._link = link
-        self._chain = chain
+        self._wheels = wheels
         self._recorder = recorder
         self._limits = limits or Limits()
         self._keep = keep
         self._watch = watch
         self._stopped = False
+        self._overruns: int | None = None
+        self._next_look = 0.0
 
     def stop(self) -> None:
         """Ask the session to end; safe in a signal handler."""
@@ -120,12 +124,11 @@ class Session:
                     break
                 if read is None:
                     break
-                arrival, data = read
-                last_byte = time.monotonic() if data else last_byte
-                self._take(arrival, data)
+                last_byte = time.monotonic() if read.data else last_byte
+                self._take(read)
                 continue
             break
-        self._note(self._chain.finish())
+        self._note(self._wheels.finish())
         return outcome
 
     def _silent(self, last_byte: float | None) -> bool:
@@ -134,16 +137,28 @@ class Session:
             return False
         return time.monotonic() - last_byte > limit
 
-    def _take(self, arrival: int, data: bytes) -> None:
-        if not data:
+    def _take(self, read: Read) -> None:
+        if self._recorder is not None and (read.data or read.event):
+            self._recorder.read(read)
+        if read.event == BACK:
+            self._wheels.interrupt()
+        if not read.data:
             self._note([])
             return
-        if self._recorder is not None:
-            self._recorder.raw(data, arrival)
-        turns = self._chain.push(data)
-        if turns:
-            self.outcome.latency.append(1e-9 * (time.monotonic_ns() - arrival))
+        turns = self._wheels.push(read.data, read.arrival)
+        self._wheels.line.counts.overruns += self._new_overruns()
+        if turns and self._link.live:
+            self.outcome.latency.append(1e-9 * (time.monotonic_ns() - read.arrival))
         self._note(turns)
+
+    def _new_overruns(self) -> int:
+        """Return the overruns of the port since it was last asked, once a second."""
+        now = time.monotonic()
+        if now < self._next_look:
+            return 0
+        self._next_look = now + 1.0
+        seen, self._overruns = self._overruns, self._link.overruns()
+        return 0 if seen is None else self._overruns - seen
 
     def _note(self, turns: list[Turn]) -> None:
         self.outcome.count += len(turns)

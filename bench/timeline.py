@@ -53,6 +53,17 @@ class TimelineCounts:
     low_battery: int = 0
     radio_loss: int = 0
 
+    def __add__(self, other: "TimelineCounts") -> "TimelineCounts":
+        """Return the counts of two wheels together."""
+        total = TimelineCounts()
+        for name in TimelineCounts.__slots__:
+            one, two = getattr(self, name), getattr(other, name)
+            both = (
+                [a + b for a, b in zip(one, two, strict=True)] if name == "saturated" else one + two
+            )
+            setattr(total, name, both)
+        return total
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples:
@@ -84,6 +95,11 @@ class Samples:
     strain: FloatArray
     lost: BoolArray
     saturated: BoolArray
+
+    @property
+    def end_us(self) -> int:
+        """Device time of the sample that follows, [us]."""
+        return self.t_us + round(1e6 * self.period * len(self.strain))
 
 
 class Timeline:
@@ -186,6 +202,11 @@ class Timeline:
         self._segment += 1
         self._start = 0
         return self._block(frame, why)
+
+    @property
+    def end_us(self) -> int:
+        """Unwrapped device time of the sample that comes next, [us]."""
+        return self._time + self._frame_time
 
     @property
     def _frame_time(self) -> int:

@@ -1,7 +1,9 @@
-"""``tirebench emulate``: a rig record behind a pseudo-terminal, as a plugged-in wheel."""
+"""``tirebench emulate``: wheels behind a pseudo-terminal or on a bus, as if plugged in."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -10,36 +12,62 @@ from bench.cli.stop import on_stop
 from bench.conditions import Conditions, conditions_document
 from bench.deadline import Deadline
 from bench.device import Device, read_device
-from bench.emulator import Script, Tally, play, write_script
-from bench.errors import DeviceError, UnpluggedError
+from bench.emulator import Player, Script, Tally, Tape, play, record_tape
+from bench.errors import UnpluggedError
 from bench.faults import Faults, parse_faults
-from bench.links.pseudo import PseudoTerminal
-from tirelib.campaign import Campaign, Run, read_campaign
+from bench.protocols import CAN, SERIAL, SLCAN
+from bench.sinks import BusSink, TerminalSink, open_bus
+from bench.transmitter import FORMATS, transmitter
+from tirelib.campaign import read_campaign
 from tirelib.cli.common import FILE, write_json
 
 LINGER = 10.0
 """After the end, the reader gets this long to close the port, [s]."""
 
+AHEAD = 60.0
+"""A first pass up to this is encoded before the port appears, [s of a wheel]."""
+
 _EXAMPLE = """\b
-Example:
+Examples:
   tirebench emulate --campaign build/out/set1 --run 3 --run 7 --port-file port --conditions c.json
   tirebench run --port $(cat port) --conditions c.json --fmu StrainTire.fmu --silence 1
+  tirebench emulate --manoeuvre lane_change.toml --format RAW16 --wheel 0 --wheel 1 --truth t.csv
+  tirebench emulate --campaign build/out/set1 --link port --unplug 3 --replug 0.5 --loop
+  tirebench emulate --recording a.mcap --bus can:socketcan:vcan0
 
 \b
-It prints the port and waits until a reader opens it. --fault NAME[=VALUE], several allowed: flips,
-cuts, inserts, lost, dup (rate per frame), nan (rate per sample), saturate, dead (number of a gage).
+It prints the port and waits until a reader opens it. Format serial is SERIAL v1 on a serial port;
+RAW16, RAW12 and RAW12C are CAN frames: on a bus with --bus, else as slcan on a serial port.
+A recording is played as it is, bad frames included.
+--fault NAME[=VALUE], several allowed: flips, cuts, inserts, lost, dup (rate per frame), nan (rate
+per sample), fades (per second), saturate, dead (number of a gage), hum (microstrain), drift (ppm),
+reset (s). A bus shows no flips, cuts and inserts: its frames have a checksum.
 Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
 """
 
 
 @click.command(epilog=_EXAMPLE)
-@click.option("--campaign", "folder", metavar="DIR", required=True,
-              type=click.Path(path_type=Path), help="A campaign with strain.")  # fmt: skip
+@click.option("--campaign", "folder", metavar="DIR", type=click.Path(path_type=Path),
+              help="Play runs of a campaign with strain.")  # fmt: skip
 @click.option("--run", "numbers", metavar="N", type=int, multiple=True,
               help="Run to play, several in the order given.  [default: the first]")  # fmt: skip
 @click.option("--all", "everything", is_flag=True, help="Play all runs.")
+@click.option("--manoeuvre", "manoeuvre_file", metavar="M", type=FILE,
+              help="Play a manoeuvre on the numerical rig (TOML or CSV).")  # fmt: skip
+@click.option("--recording", metavar="R.mcap", type=FILE, help="Play a recording.")
+@click.option("--rate", default=10_000.0, show_default=True, metavar="HZ",
+              type=click.FloatRange(153.0, 50_000.0),
+              help="Of the gages in a manoeuvre.")  # fmt: skip
+@click.option("--truth", "truth_file", metavar="T.csv", type=FILE,
+              help="Write the rig's forces along a manoeuvre.")  # fmt: skip
+@click.option("--format", "kind", default="serial", show_default=True,
+              type=click.Choice(FORMATS), help="What the wheel sends.")  # fmt: skip
+@click.option("--bus", metavar="can:IF:CHANNEL", help="Send on a bus of python-can.")
+@click.option("--link", metavar="PATH", type=FILE,
+              help="Name for the port that stays when it is plugged in again.")  # fmt: skip
 @click.option("--device", "device_file", metavar="D.toml", type=FILE, help="Scale and zero.")
-@click.option("--wheel", default=0, show_default=True, type=click.IntRange(0, 255))
+@click.option("--wheel", "wheels", multiple=True, default=(0,), show_default=True,
+              type=click.IntRange(0, 255), help="Number of a wheel, up to four.")  # fmt: skip
 @click.option("--port-file", metavar="F", type=FILE, help="Write the port's path into this file.")
 @click.option("--conditions", "sidecar", metavar="F.json", type=FILE,
               help="Write speed, pressure, camber and the rig's truth.")  # fmt: skip
@@ -53,15 +81,24 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
               help="How long to wait for a reader.")  # fmt: skip
 @click.option("--unplug", metavar="S", type=float,
               help="Pull the cable after this time.")  # fmt: skip
+@click.option("--replug", metavar="S", type=click.FloatRange(min=0.0),
+              help="Plug it in again after so long, and so on; with --link.")  # fmt: skip
 @click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write what was sent.")
 @click.pass_context
 def emulate(
     context: click.Context,
-    folder: Path,
+    folder: Path | None,
     numbers: tuple[int, ...],
     everything: bool,
+    manoeuvre_file: Path | None,
+    recording: Path | None,
+    rate: float,
+    truth_file: Path | None,
+    kind: str,
+    bus: str | None,
+    link: Path | None,
     device_file: Path | None,
-    wheel: int,
+    wheels: tuple[int, ...],
     port_file: Path | None,
     sidecar: Path | None,
     loop: bool,
@@ -70,71 +107,133 @@ def emulate(
     seed: int,
     patience: float,
     unplug: float | None,
+    replug: float | None,
     json_file: Path | None,
 ) -> None:
-    """Play runs of a campaign as SERIAL v1 frames, at their pace, with faults on request."""
+    """Play a campaign, a manoeuvre or a recording as wheels that send, with faults on request."""
+    if [folder, manoeuvre_file, recording].count(None) != 2:
+        raise click.UsageError("just one of --campaign, --manoeuvre and --recording is needed")
+    if replug is not None and (link is None or unplug is None):
+        raise click.UsageError("--replug needs --unplug, and --link for a name that stays")
+    if bus is not None and kind == "serial" and recording is None:
+        raise click.UsageError("--bus carries CAN frames: --format RAW16, RAW12 or RAW12C")
+    if len(set(wheels)) != len(wheels) or len(wheels) > 4:
+        raise click.UsageError("--wheel: one to four different numbers are allowed")
     faults = Faults(parse_faults(fault_texts), seed)
     device = Device() if device_file is None else read_device(device_file)
-    campaign = read_campaign(folder)
-    device.check_layout(campaign.header.gage_lateral, str(folder))
-    runs = _runs(campaign, numbers, everything)
-    script = write_script(runs, device, faults, wheel=wheel)
-    port, tally = PseudoTerminal(), Tally()
-    try:
-        if sidecar is not None:
-            write_json(sidecar, _sidecar(script, loop))
-        click.echo(port.path)
+    tape: Tape | None = None
+    runs: list[int] = []
+    if folder is not None:
+        tape, runs = _campaign(folder, numbers, everything, device, faults, wheels)
+    elif manoeuvre_file is not None:
+        tape = _manoeuvre(manoeuvre_file, device, faults, wheels, rate, seed, truth_file)
+    line = CAN if bus is not None else SERIAL if kind == "serial" else SLCAN
+    sink: TerminalSink | BusSink
+    sink = TerminalSink(link, unplug, replug) if bus is None else open_bus(bus, fd=kind != "RAW12C")
+    tally, player = Tally(), Player(transmitter(kind), line, faults)
+    short = tape is not None and tape.duration * len(wheels) <= AHEAD
+    ready = list(player.pieces(tape)) if tape is not None and short else []
+    with closing(sink):
+        if sidecar is not None and tape is not None:
+            write_json(sidecar, _sidecar(tape, loop))
+        click.echo(sink.path)
         if port_file is not None:
-            _announce(port_file, port.path)
-        with on_stop(_interrupt):
-            port.wait_for_reader(Deadline.after(patience))
-            cable = _Cable(port, unplug)
-            start, turn = time.monotonic(), 0
-            while True:
-                play(script, cable, tally, start=start, speedup=speedup)
-                turn += 1
-                if not loop:
-                    break
-                script = write_script(runs, device, faults, wheel=wheel, turn=turn)
-            port.drain(Deadline.after(LINGER))
-            port.wait_for_leave(Deadline.after(LINGER))
-    except (KeyboardInterrupt, UnpluggedError) as error:
-        click.echo(str(error) or "stopped", err=True)
-    finally:
-        port.close()
-    click.echo(f"{tally.sent} frames in {len(runs)} runs, {tally.unheard} of them unheard, "
-               f"at most {1e3 * tally.late:.1f} ms late")  # fmt: skip
-    for name, count in faults.done.items():
-        click.echo(f"  {count:6d} {name}")
+            _announce(port_file, sink.path)
+        try:
+            with on_stop(_interrupt):
+                sink.wait_for_reader(Deadline.after(patience))
+                start, turn = time.monotonic(), 0
+                while True:
+                    shift = 0.0
+                    pieces: Iterable[Script] = ready if not turn else ()
+                    if not pieces:
+                        pieces = player.pieces(tape, turn) if tape else _recorded(recording)
+                    for piece in pieces:
+                        play(piece, sink, tally, start=start, speedup=speedup)
+                        shift = piece.due[-1] if piece.due else shift
+                    turn += 1
+                    if not loop:
+                        break
+                    if tape is None:
+                        start += shift / speedup
+                sink.end(LINGER)
+        except (KeyboardInterrupt, UnpluggedError) as error:
+            click.echo(str(error) or "stopped", err=True)
+    _summary(tally, len(runs), faults, sink)
     if json_file is not None:
         write_json(json_file, {
-            "format": "tirebench-emulation/1", "runs": [run.plan.run for run in runs],
+            "format": "tirebench-emulation/1", "runs": runs,
             "frames": tally.sent, "unheard": tally.unheard, "late_s": tally.late,
-            "faults": dict(faults.done),
+            "faults": dict(faults.done), "unplugged": getattr(sink, "unplugged", 0),
         })  # fmt: skip
-    context.exit(1 if tally.unheard else 0)
+    context.exit(1 if tally.unheard and replug is None else 0)
 
 
 def _interrupt() -> None:
     raise KeyboardInterrupt
 
 
-def _runs(campaign: Campaign, numbers: Sequence[int], everything: bool) -> list[Run]:
-    plans = {plan.run: plan for plan in campaign.plans}
-    chosen = list(plans) if everything else list(numbers) or list(plans)[:1]
-    unknown = [str(number) for number in chosen if number not in plans]
-    if unknown or not chosen:
-        raise DeviceError(
-            f"{campaign.path}: run {', '.join(unknown) or 'none'}; its runs are "
-            f"{', '.join(str(number) for number in plans) or 'none'}; choose among them"
-        )
-    return [campaign.load(plans[number]) for number in chosen]
+def _campaign(
+    folder: Path,
+    numbers: tuple[int, ...],
+    everything: bool,
+    device: Device,
+    faults: Faults,
+    wheels: tuple[int, ...],
+) -> tuple[Tape, list[int]]:
+    from bench.sources import campaign_runs
+
+    campaign = read_campaign(folder)
+    device.check_layout(campaign.header.gage_lateral, str(folder))
+    runs = campaign_runs(campaign, numbers, everything)
+    tape = record_tape(runs, device, faults, wheels, campaign.header)
+    return tape, [run.plan.run for run in runs]
 
 
-def _sidecar(script: Script, loop: bool) -> dict[str, object]:
-    known = script.conditions
-    length = round(1e6 * script.duration) if loop else 0
-    return conditions_document(Conditions(known.t_us, known.values, known.runs, length))
+def _manoeuvre(
+    file: Path,
+    device: Device,
+    faults: Faults,
+    wheels: tuple[int, ...],
+    rate: float,
+    seed: int,
+    truth_file: Path | None,
+) -> Tape:
+    from bench.manoeuvre import read_manoeuvre
+    from bench.sources import manoeuvre_tape, write_truth
+
+    manoeuvre = read_manoeuvre(file)
+    device.check_layout(manoeuvre.tire.lateral.tolist(), str(file))
+    click.echo("solving the rig along the manoeuvre ...", err=True)
+    tape, motions = manoeuvre_tape(manoeuvre, device, faults, wheels, rate=rate, seed=seed)
+    if truth_file is not None:
+        write_truth(truth_file, motions)
+    return tape
+
+
+def _recorded(recording: Path | None) -> Iterator[Script]:
+    from bench.recording import Recording
+    from bench.sources import recording_pieces
+
+    if recording is None:
+        return
+    with closing(Recording(recording)) as opened:
+        yield from recording_pieces(opened)
+
+
+def _summary(tally: Tally, runs: int, faults: Faults, sink: TerminalSink | BusSink) -> None:
+    click.echo(f"{tally.sent} frames in {runs} runs, {tally.unheard} of them unheard, "
+               f"at most {1e3 * tally.late:.1f} ms late")  # fmt: skip
+    for name, count in faults.done.items():
+        click.echo(f"  {count:6d} {name}")
+    if isinstance(sink, TerminalSink) and sink.unplugged:
+        click.echo(f"  {sink.unplugged:6d} unplugged")
+
+
+def _sidecar(tape: Tape, loop: bool) -> dict[str, object]:
+    known: Conditions = tape.conditions
+    length = round(1e6 * tape.duration) if loop else 0
+    return conditions_document(replace(known, loop_us=length))
 
 
 def _announce(port_file: Path, path: str) -> None:
@@ -143,17 +242,3 @@ def _announce(port_file: Path, path: str) -> None:
     part = port_file.with_name(port_file.name + ".part")
     part.write_text(path + "\n", encoding="utf-8")
     part.replace(port_file)
-
-
-class _Cable:
-    """A port whose cable is pulled at a moment; whatever is sent then is unheard."""
-
-    def __init__(self, port: PseudoTerminal, unplug: float | None) -> None:
-        self._port = port
-        self._end = Deadline.never() if unplug is None else Deadline.after(unplug)
-
-    def send(self, data: bytes) -> bool:
-        if self._end.expired:
-            self._port.close()
-            raise UnpluggedError(f"{self._port.path}: the cable was pulled, as asked for")
-        return self._port.send(data)

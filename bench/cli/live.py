@@ -12,8 +12,9 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from bench.chain import Chain, Turn
+from bench.chain import Turn
 from bench.document import QUANTITIES, flags, line_document, quantity_valid
+from bench.wheels import Wheels
 
 ROWS = 20
 """Turns that the live table holds."""
@@ -21,8 +22,9 @@ REFRESH = 0.25
 """Time between two drawings, [s]."""
 FORMATS = {"Fz": (".0f", "N"), "alpha": (".2f", "deg"), "kappa": (".4f", ""), "Fy": (".0f", "N")}
 UNITS = [f"{name} [{unit}]" if unit else name for name, (_, unit) in FORMATS.items()]
-HEADINGS = ("run", "t [s]", *UNITS, "valid", "flags")
-LOSSES = ("crc_bad", "framing_bad", "lost_frames", "duplicates", "out_of_order", "resets")
+HEADINGS = ("wheel", "run", "t [s]", *UNITS, "valid", "flags")
+LOSSES = ("crc_bad", "framing_bad", "lost_frames", "duplicates", "out_of_order", "resets",
+          "unplaced_samples", "overruns", "reconnects")  # fmt: skip
 
 
 class Screen:
@@ -31,14 +33,14 @@ class Screen:
     Parameters
     ----------
     console : Console
-    chain : Chain
+    wheels : Wheels
         Whose counters are shown.
     title : str
     """
 
-    def __init__(self, console: Console, chain: Chain, title: str) -> None:
+    def __init__(self, console: Console, wheels: Wheels, title: str) -> None:
         self._console = console
-        self._chain = chain
+        self._wheels = wheels
         self._title = title
         self._turns: deque[Turn] = deque(maxlen=ROWS)
         self._live = Live(console=console, auto_refresh=False) if console.is_terminal else None
@@ -77,12 +79,12 @@ class Screen:
             table.add_column(Text(heading), justify="left" if heading == "flags" else "right")
         for turn in self._turns:
             table.add_row(*_cells(turn), style=None if turn.valid else "dim")
-        return Group(table, Text(counters(self._chain)))
+        return Group(table, Text(counters(self._wheels)))
 
 
-def counters(chain: Chain) -> str:
+def counters(wheels: Wheels) -> str:
     """Return the state of the line in one line; what is zero is left out but for the frames."""
-    counts = line_document(*chain.counts)
+    counts = line_document(*wheels.counts)
     parts = [f"{counts['frames']} frames"]
     parts += [f"{counts[name]} {name}" for name in LOSSES if counts[name]]
     saturated = {f"gage {i}": n for i, n in enumerate(counts["saturated_samples"], 1) if n}
@@ -91,7 +93,7 @@ def counters(chain: Chain) -> str:
 
 
 def _cells(turn: Turn) -> tuple[str, ...]:
-    cells = [str(turn.run), f"{turn.ready if math.isnan(turn.t) else turn.t:.3f}"]
+    cells = [str(turn.wheel), str(turn.run), f"{turn.ready if math.isnan(turn.t) else turn.t:.3f}"]
     for name, (_, factor) in QUANTITIES.items():
         value = turn.outputs[name] * factor
         std = turn.outputs.get(f"{name}_std", math.nan) * factor
@@ -102,5 +104,5 @@ def _cells(turn: Turn) -> tuple[str, ...]:
 
 
 def _plain_row(cells: Sequence[str]) -> str:
-    widths = (4, 9, 15, 15, 17, 15, 5, 0)
+    widths = (5, 4, 9, 15, 15, 17, 15, 5, 0)
     return "  ".join(f"{cell:>{width}}" for cell, width in zip(cells, widths, strict=True))

@@ -1,11 +1,33 @@
 """Where bytes come from: one protocol, a child for each kind of line.
 
-A reader asks for bytes with a deadline that is handed down; nothing below it waits longer.
+A reader asks for bytes with a deadline that is handed down; nothing below it waits longer. No link
+transmits unless it is asked to.
 """
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from bench.deadline import Deadline
+
+
+class Read(NamedTuple):
+    """What came.
+
+    Attributes
+    ----------
+    arrival : int, [ns]
+        Monotonic.
+    data : bytes
+        Empty if nothing came.
+    event : str
+        ``lost`` or ``back`` when the port went away or came back; else empty.
+    """
+
+    arrival: int
+    data: bytes
+    event: str = ""
+
+
+LOST, BACK = "lost", "back"
 
 
 class Link(Protocol):
@@ -17,13 +39,16 @@ class Link(Protocol):
         For messages: the port or the file.
     live : bool
         Whether time passes at the other end. A replay is not live.
+    encoding : str
+        What the bytes are, see `bench.protocols`.
     """
 
     name: str
     live: bool
+    encoding: str
 
-    def receive(self, deadline: Deadline) -> tuple[int, bytes] | None:
-        """Return arrival [ns, monotonic] and what has come, empty at the deadline.
+    def receive(self, deadline: Deadline) -> Read | None:
+        """Return what has come, empty at the deadline.
 
         None means that nothing will come any more.
 
@@ -36,5 +61,8 @@ class Link(Protocol):
     def close(self) -> None:
         """Give the port back; calling twice does no harm."""
 
+    def overruns(self) -> int:
+        """Return how often a buffer below was full, as far as the system tells."""
 
-__all__ = ["Link"]
+
+__all__ = ["BACK", "LOST", "Link", "Read"]

@@ -7,6 +7,7 @@ import select
 import termios
 import time
 import tty
+from pathlib import Path
 
 from bench.deadline import Deadline
 from bench.errors import LinkError, LinkTimeoutError
@@ -23,9 +24,15 @@ class PseudoTerminal:
     ----------
     path : str
         What a reader opens.
+
+    Parameters
+    ----------
+    link : Path, optional
+        A symbolic link to keep on the port, as udev keeps one by the name of an adapter: it stays
+        the same when the port is plugged in again.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, link: Path | None = None) -> None:
         try:
             self._master, slave = os.openpty()
         except OSError as error:
@@ -39,6 +46,12 @@ class PseudoTerminal:
         os.set_blocking(self._master, False)
         self._poll = select.poll()
         self._poll.register(self._master, select.POLLOUT)
+        self._link = link
+        if link is not None:
+            part = link.with_name(link.name + ".part")
+            part.unlink(missing_ok=True)
+            part.symlink_to(self.path)
+            part.replace(link)
 
     @property
     def listened(self) -> bool:
@@ -65,6 +78,7 @@ class PseudoTerminal:
     def send(self, data: bytes) -> bool:
         """Write all bytes, waiting while the reader is behind; False if nobody reads."""
         view = memoryview(data)
+        self.discard()
         while len(view):
             if not self.listened:
                 return False
@@ -100,5 +114,15 @@ class PseudoTerminal:
     def close(self) -> None:
         """Pull the cable: a reader that still has the port open loses it."""
         if self._master >= 0:
+            if self._link is not None:
+                self._link.unlink(missing_ok=True)
             os.close(self._master)
             self._master = -1
+
+    def discard(self) -> None:
+        """Throw away what a reader has written: commands to an adapter."""
+        try:
+            while os.read(self._master, 4096):
+                pass
+        except OSError:  # nothing more, or nobody there
+            return

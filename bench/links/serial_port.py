@@ -1,5 +1,7 @@
 """A serial port, by pyserial: opened exclusively, read in bulk."""
 
+import struct
+import sys
 import time
 from collections.abc import Iterator
 
@@ -8,11 +10,18 @@ from serial.tools import list_ports
 
 from bench.deadline import Deadline
 from bench.errors import LinkError, UnpluggedError
+from bench.links import Read
+from bench.protocols import SERIAL
 
 BAUD = 2_000_000
 """Default rate; 16 samples a frame at 10 kHz need 1.13 Mbaud."""
 GATHER = 0.004
 """After the first byte, wait this long for more: fewer and larger batches cost less, [s]."""
+_TIOCGICOUNT = 0x545D
+"""Linux: the counters of a UART."""
+_COUNTERS = struct.Struct("20i")
+_OVERRUNS = (7, 10)
+"""Places of `overrun` and `buf_overrun` in ``struct serial_icounter_struct``."""
 
 
 class SerialLink:
@@ -36,9 +45,10 @@ class SerialLink:
 
     def __init__(self, port: str, baud: int = BAUD, gather: float = GATHER) -> None:
         self.name = port
+        self.encoding = SERIAL
         self._gather = gather
         try:
-            self._port = serial.Serial(port, baud, timeout=0.0, exclusive=True)
+            self._port = serial.Serial(port, baud, timeout=0.0, exclusive=True, write_timeout=1.0)
         except (serial.SerialException, OSError, ValueError) as error:
             known = ", ".join(entry.split()[0] for entry in ports()) or "none"
             raise LinkError(
@@ -47,28 +57,57 @@ class SerialLink:
                 "rights (group dialout)"
             ) from None
 
-    def receive(self, deadline: Deadline) -> tuple[int, bytes] | None:
+    def receive(self, deadline: Deadline) -> Read | None:
         """Return what has come by the deadline, at once when there is something."""
         try:
             self._port.timeout = min(deadline.remaining, 1.0)
             first = self._port.read(max(1, self._port.in_waiting))
             arrival = time.monotonic_ns()
             if not first:
-                return arrival, b""
+                return Read(arrival, b"")
             if self._gather:
-                time.sleep(self._gather)
+                time.sleep(min(self._gather, deadline.remaining))
             self._port.timeout = 0.0
-            return arrival, bytes(first + self._port.read(self._port.in_waiting))
+            return Read(arrival, bytes(first + self._port.read(self._port.in_waiting)))
         except (OSError, serial.SerialException, TypeError) as error:
             # in_waiting raises OSError, read SerialException; TypeError: closed by another thread
-            raise UnpluggedError(
-                f"{self.name}: the port went away ({error}); a steady connection is needed; "
-                "check cable and receiver, then start again"
-            ) from None
+            raise self._gone(error) from None
+
+    def send(self, data: bytes) -> None:
+        """Write bytes: commands to an adapter.
+
+        Raises
+        ------
+        UnpluggedError
+            If the port went away.
+        """
+        try:
+            self._port.write(data)
+        except (OSError, serial.SerialException, TypeError) as error:
+            raise self._gone(error) from None
 
     def close(self) -> None:
         """Close the port."""
         self._port.close()
+
+    def overruns(self) -> int:
+        """Return how often the UART or its buffer was full; 0 where the system does not tell."""
+        if sys.platform != "linux":
+            return 0
+        import fcntl
+
+        try:
+            answer = fcntl.ioctl(self._port.fileno(), _TIOCGICOUNT, bytes(_COUNTERS.size))
+        except (OSError, serial.SerialException, TypeError):  # a pseudo-terminal has no counters
+            return 0
+        counters = _COUNTERS.unpack(answer)
+        return sum(counters[place] for place in _OVERRUNS)
+
+    def _gone(self, error: Exception) -> UnpluggedError:
+        return UnpluggedError(
+            f"{self.name}: the port went away ({error}); a steady connection is needed; "
+            "check cable and receiver, then start again"
+        )
 
 
 def ports() -> Iterator[str]:

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from pythonfmu import FmuBuilder
 
+from bench.fmu_archive import read_fmu
+from bench.trust import remember
 from tests.bench.campaigns import write_tiny_campaign
 from tests.synthetic import cornering_runs, write
 from tirelib.campaign import read_campaign
@@ -39,10 +41,21 @@ def build_toy(folder: Path, samples: int) -> Path:
     return folder / f"ToyTire{samples}.fmu"
 
 
+@pytest.fixture(scope="session", autouse=True)
+def own_trust_list(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Keep away from the user's list of trusted FMUs, here and in processes that are started."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CONFIG_HOME", str(tmp_path_factory.mktemp("config")))
+        yield
+
+
 @pytest.fixture(scope="session")
-def toy_fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
+def toy_fmus(tmp_path_factory: pytest.TempPathFactory, own_trust_list: None) -> dict[int, Path]:
     folder = tmp_path_factory.mktemp("toys")
-    return {samples: build_toy(folder, samples) for samples in (1, 10, 16)}
+    toys = {samples: build_toy(folder, samples) for samples in (1, 10, 16)}
+    for toy in toys.values():
+        remember(read_fmu(toy))
+    return toys
 
 
 @pytest.fixture

@@ -12,7 +12,9 @@ from click.testing import CliRunner
 
 from bench.cli import program
 from bench.errors import BenchError
+from bench.fmu_archive import read_fmu
 from bench.recording import Recording
+from bench.trust import remember
 from tests.bench.conftest import Spawn
 from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration import Calibration
@@ -28,10 +30,13 @@ PATIENCE = 30.0
 def fmus(calibration: Calibration, tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
     folder = tmp_path_factory.mktemp("fmus")
     write_calibration(calibration, folder / "cal.toml")
-    return {
+    built = {
         k: build_fmu(folder / "cal.toml", folder / f"StrainTire{k}.fmu", samples_per_step=k)
         for k in (1, 10, 16)
     }
+    for fmu in built.values():
+        remember(read_fmu(fmu))
+    return built
 
 
 def port_of(file: Path) -> str:
@@ -84,7 +89,7 @@ def test_library_live_and_replay_give_the_same_estimates(
     port = port_of(tmp_path / "port")
     live = spawn("run", "--port", port, "--fmu", fmus[16], "--conditions", tmp_path / "c.json",
                  "--record", tmp_path / "a.mcap", "--json", tmp_path / "live.json",
-                 "--silence", 0.5, "--no-page")  # fmt: skip
+                 "--silence", 1.5, "--no-page")  # fmt: skip
     code, out, _ = finish(live)
     assert code == 0
     assert finish(emulator)[0] == 0
@@ -121,7 +126,7 @@ def test_every_fault_is_counted_and_none_passes_for_a_number(
     port = port_of(tmp_path / "port")
     live = spawn("run", "--port", port, "--fmu", fmus[16], "--speed", 64.8, "--pressure", 2.3,
                  "--camber", 0, "--record", tmp_path / "a.mcap", "--json", tmp_path / "live.json",
-                 "--silence", 0.5)  # fmt: skip
+                 "--silence", 1.5)  # fmt: skip
     finish(live)
     finish(emulator)
     sent, seen = result(tmp_path / "e.json"), result(tmp_path / "live.json")
@@ -148,7 +153,7 @@ def test_an_unplugged_cable_is_told_and_the_recording_kept(
     port = port_of(tmp_path / "port")
     code, out, _ = finish(
         spawn("run", "--port", port, "--fmu", toy_fmus[16], "--speed", 65, "--record",
-              tmp_path / "a.mcap", "--json", tmp_path / "live.json")
+              tmp_path / "a.mcap", "--json", tmp_path / "live.json", "--reconnect", 0)
     )  # fmt: skip
     assert code == 1
     assert f"unplugged: {port}: the port went away" in out

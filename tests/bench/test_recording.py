@@ -54,7 +54,7 @@ def test_a_replay_gives_the_same_reads_and_then_ends(tmp_path: Path) -> None:
     write(tmp_path / "a.mcap")
     link = ReplayLink(tmp_path / "a.mcap")
     reads = [link.receive(Deadline.never()) for _ in range(4)]
-    assert [read[1] for read in reads[:3] if read] == READS
+    assert [read.data for read in reads[:3] if read] == READS
     assert reads[3] is None
     link.close()
 

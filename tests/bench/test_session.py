@@ -9,12 +9,15 @@ import pytest
 from bench.chain import Chain, Outputs, Turn
 from bench.conditions import Condition, Conditions
 from bench.deadline import Deadline
+from bench.decoder import SerialDecoder
 from bench.device import Device
 from bench.emulator import write_script
 from bench.errors import UnpluggedError
 from bench.faults import Faults
+from bench.links import Read
 from bench.recording import Recorder, Recording, RecordingHeader
 from bench.session import Limits, Session
+from bench.wheels import Wheels
 from tests.bench.campaigns import tiny_runs
 from tirelib.arrays import FloatArray
 
@@ -38,22 +41,25 @@ class Counter:
 class Scripted:
     """A link that gives prepared reads; None ends it, an exception is raised."""
 
-    name, live = "scripted", True
+    name, live, encoding = "scripted", True, "serial-v1"
 
     def __init__(self, reads: Sequence[bytes | Exception | None]) -> None:
         self._reads = list(reads)
 
-    def receive(self, deadline: Deadline) -> tuple[int, bytes] | None:
+    def receive(self, deadline: Deadline) -> Read | None:
         if not self._reads:
             time.sleep(min(deadline.remaining, 0.01))
-            return time.monotonic_ns(), b""
+            return Read(time.monotonic_ns(), b"")
         read = self._reads.pop(0)
         if isinstance(read, Exception):
             raise read
-        return None if read is None else (time.monotonic_ns(), read)
+        return None if read is None else Read(time.monotonic_ns(), read)
 
     def close(self) -> None:
         pass
+
+    def overruns(self) -> int:
+        return 0
 
 
 @pytest.fixture(scope="module")
@@ -62,8 +68,8 @@ def wire() -> list[bytes]:
 
 
 def session(reads: Sequence[bytes | Exception | None], **options: object) -> Session:
-    chain = Chain(Counter(), Device(), Conditions.constant())
-    return Session(Scripted(reads), chain, **options)
+    wheels = Wheels(SerialDecoder(), lambda _: Counter(), {}, Conditions.constant())
+    return Session(Scripted(reads), wheels, **options)
 
 
 @pytest.mark.parametrize(
@@ -72,7 +78,7 @@ def session(reads: Sequence[bytes | Exception | None], **options: object) -> Ses
         (Limits(), [None], "end"),
         (Limits(turns=2), [], "turns"),
         (Limits(silence=0.05), [], "silence"),
-        (Limits(duration=0.1), [], "duration"),
+        (Limits(duration=2.0), [], "duration"),
         (Limits(), [UnpluggedError("gone")], "unplugged"),
     ],
 )
@@ -100,7 +106,7 @@ def test_bytes_are_recorded_before_they_are_decoded(tmp_path: Path) -> None:
     """Whatever the decoder does with them, damaged or not, they stand in the file."""
     noise = [bytes(range(256)), b"\0\0\0", b"\xff" * 5000]
     running = session([*noise, None])
-    running._chain.push = lambda data: 1 / 0
+    running._wheels.push = lambda data, arrival: 1 / 0
     recorder = Recorder(tmp_path / "a.mcap", RecordingHeader({}), Conditions.constant())
     running._recorder = recorder
     with recorder, pytest.raises(ZeroDivisionError):

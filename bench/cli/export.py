@@ -1,0 +1,113 @@
+"""``tirebench export``: a recording as a campaign, CSV, Parquet, or a CAN log."""
+
+import tempfile
+from contextlib import closing
+from pathlib import Path
+
+import click
+import tomli_w
+
+from bench.cli.options import devices_of, devices_of_text
+from bench.errors import RecordingError
+from bench.export import (
+    CAN_LOGS,
+    segments,
+    write_campaign_of,
+    write_can_log,
+    write_table,
+)
+from bench.protocols.plan import ProtocolPlan
+from bench.recording import Recording
+from tirelib.campaign import CampaignHeader
+from tirelib.campaign.header import parse_header
+from tirelib.cli.common import FILE, write_json
+
+TABLES = (".csv", ".parquet")
+
+_EXAMPLE = """\b
+Examples:
+  tirebench export live.mcap --out build/out/live             # campaign folder with MDF4
+  tirebench export live.mcap --out build/out/live --like build/out/set1
+  tirebench export live.mcap --out live.parquet
+  tirebench export bus.mcap --out bus.blf                     # or .asc, .log
+
+\b
+A campaign holds one wheel. Tire and gages come from the recording where a campaign was played, else
+from the campaign that --like names. Without told set points its runs are sweeps.
+Exit code: 0 done, 1 the recording breaks off (what is there is written), 2 bad input.
+"""
+
+
+@click.command(epilog=_EXAMPLE)
+@click.argument("recording", metavar="RECORDING", type=FILE)
+@click.option("--out", metavar="DIR|FILE", required=True, type=click.Path(path_type=Path),
+              help="A new folder for a campaign; a file by its ending.")  # fmt: skip
+@click.option("--like", metavar="DIR", type=click.Path(path_type=Path),
+              help="Campaign whose tire and gages hold here.")  # fmt: skip
+@click.option("--wheel", type=click.IntRange(0, 255), help="[default: the first that was heard]")
+@click.option("--device", "device_texts", metavar="[WHEEL=]D.toml", multiple=True,
+              help="Instead of the recording's device file.")  # fmt: skip
+@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write what was written.")
+@click.pass_context
+def export(
+    context: click.Context,
+    recording: Path,
+    out: Path,
+    like: Path | None,
+    wheel: int | None,
+    device_texts: tuple[str, ...],
+    json_file: Path | None,
+) -> None:
+    """Write a recording as a campaign (MDF4), CSV, Parquet, or a CAN log (BLF, ASC, log)."""
+    suffix = out.suffix.lower()
+    if suffix and suffix not in (*TABLES, *CAN_LOGS):
+        raise click.UsageError(
+            f"--out {out}: {', '.join((*TABLES, *CAN_LOGS))} are known, and a folder without "
+            "ending for a campaign"
+        )
+    if out.exists():
+        raise RecordingError(f"{out}: it exists; nothing is overwritten; name another place")
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with closing(Recording(recording)) as opened:
+        header = opened.header
+        plan = ProtocolPlan.of_header(header.protocol, str(recording))
+        devices = devices_of(device_texts)[0] or devices_of_text(header.device, str(recording))
+        if suffix in CAN_LOGS:
+            count, what = write_can_log(opened, out), "frames"
+        elif suffix in TABLES:
+            found = segments(opened, plan, devices, wheel)
+            count, what = write_table(found, opened.conditions, out), "samples"
+        else:
+            campaign = _header(opened, like)
+            every = list(segments(opened, plan, devices, wheel))
+            chosen = every[0].wheel if every and wheel is None else wheel
+            mine = [segment for segment in every if segment.wheel == chosen]
+            count, what = write_campaign_of(opened, mine, out, campaign), "runs"
+        damage = getattr(opened, "damage", "") if opened.complete is False else ""
+    click.echo(f"{count} {what} in {out}")
+    if damage:
+        click.echo(f"note: the recording breaks off ({damage})")
+    if json_file is not None:
+        write_json(json_file, {"format": "tirebench-export/1", "out": str(out), what: count,
+                               "complete": not damage})  # fmt: skip
+    context.exit(1 if damage else 0)
+
+
+def _header(recording: Recording, like: Path | None) -> CampaignHeader:
+    """Return tire and gages, from the campaign that is named or from the recording."""
+    campaign = recording.conditions.campaign
+    if like is None and campaign is None:
+        raise RecordingError(
+            f"{recording.path}: it does not say tire and gages; a campaign that has them is "
+            "needed; name it with --like DIR"
+        )
+    if like is not None:
+        header, problems = parse_header(like)
+    else:
+        with tempfile.TemporaryDirectory() as name:
+            text = tomli_w.dumps(campaign or {})
+            (Path(name) / "campaign.toml").write_text(text, encoding="utf-8")
+            header, problems = parse_header(Path(name))
+    if header is None:
+        raise RecordingError("\n".join(str(problem) for problem in problems))
+    return header

@@ -1,0 +1,115 @@
+"""Options that several verbs share: the port, the protocol, the wheels."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from bench.device import Device, read_device
+from bench.errors import DeviceError
+from bench.links import Link
+from bench.links.opening import BITRATE, PortPlan
+from bench.protocols.plan import RATE, ProtocolPlan
+from tirelib.cli.common import FILE
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+WHEEL_MARK = "# wheel "
+PORTS = """\b
+Ports: /dev/ttyUSB0 or COM3 (SERIAL v1), slcan:/dev/ttyACM0 (CAN adapter with slcan, read in bulk),
+can:INTERFACE:CHANNEL (python-can: can:socketcan:can0, can:virtual:test, can:pcan:PCAN_USBBUS1).
+"""
+
+_PORT_OPTIONS = (
+    click.option("--baud", default=2_000_000, show_default=True, type=click.IntRange(min=1200),
+                 help="Of a serial port."),
+    click.option("--bitrate", default=BITRATE, show_default=True, type=click.IntRange(min=1000),
+                 help="Of a CAN bus."),
+    click.option("--data-bitrate", type=click.IntRange(min=1000),
+                 help="Of the data in CAN FD.  [default: classic CAN]"),
+    click.option("--bus-option", "bus_options", metavar="KEY=VALUE", multiple=True,
+                 help="More for python-can."),
+    click.option("--rate", default=RATE, show_default=True, metavar="HZ",
+                 type=click.FloatRange(153.0, 200_000.0),
+                 help="Sample rate of the gages on CAN; SERIAL v1 says its own."),
+    click.option("--map", "map_file", metavar="M.toml", type=FILE,
+                 help="Signals of another make's transmitter, from its DBC or listed."),
+    click.option("--reconnect", default=60.0, show_default=True, metavar="S",
+                 type=click.FloatRange(min=0.0),
+                 help="How long a port may be away before the run ends."),
+)  # fmt: skip
+
+
+def port_options(command: Command) -> Command:
+    """Add the options of a port to a command."""
+    for option in reversed(_PORT_OPTIONS):
+        command = option(command)
+    return command
+
+
+def protocol_of(port: PortPlan, rate: float, map_file: Path | None) -> ProtocolPlan:
+    """Return what is on a port.
+
+    Raises
+    ------
+    DeviceError
+        If a map is given for a line that has none.
+    """
+    from bench.protocols import SERIAL
+    from bench.protocols.user_map import read_map
+
+    if map_file is not None and port.encoding == SERIAL:
+        raise DeviceError(
+            f"--map {map_file} with --port {port.port}: a map is for CAN frames; "
+            "slcan:... or can:... is needed; leave it out, or name such a port"
+        )
+    user = None if map_file is None else read_map(map_file)
+    return ProtocolPlan(port.encoding, rate if user is None else user.rate, user)
+
+
+def opened(port: PortPlan, patience: float) -> Link:
+    """Open a port that comes back by itself."""
+    from bench.links.reconnecting import ReconnectingLink
+
+    return ReconnectingLink(port.open, patience)
+
+
+def devices_of(texts: Sequence[str]) -> tuple[dict[int | None, Device], str]:
+    """Return the device of each wheel from ``D.toml`` or ``WHEEL=D.toml``, and all texts as one.
+
+    The text has a line ``# wheel N`` before each file but that for all wheels.
+
+    Raises
+    ------
+    DeviceError
+        With the faults of a file.
+    """
+    devices: dict[int | None, Device] = {}
+    parts = []
+    for given in texts:
+        number, _, rest = given.partition("=")
+        wheel = int(number) if rest and number.isdecimal() else None
+        path = Path(given if wheel is None else rest)
+        if wheel in devices:
+            raise DeviceError(
+                f"--device {given}: a device of {'all wheels' if wheel is None else wheel} is "
+                "there already; one a wheel is allowed; leave one out"
+            )
+        devices[wheel] = read_device(path)
+        text = path.read_text(encoding="utf-8")
+        parts.append(text if wheel is None else f"{WHEEL_MARK}{wheel}\n{text}")
+    return devices, "\0".join(parts)
+
+
+def devices_of_text(text: str, where: str) -> dict[int | None, Device]:
+    """Return the devices of a recording's header; the inverse of `devices_of`."""
+    from bench.device import parse_device
+
+    devices: dict[int | None, Device] = {}
+    for part in text.split("\0") if text else []:
+        first, _, rest = part.partition("\n")
+        own = first.startswith(WHEEL_MARK)
+        wheel = int(first.removeprefix(WHEEL_MARK)) if own else None
+        devices[wheel] = parse_device(rest if own else part, f"{where}: device file")
+    return devices

@@ -1,0 +1,128 @@
+"""Options of the live page, and what is said of it."""
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+from rich.console import Console
+
+from bench.chain import Turn
+from bench.device import Device
+from bench.links import Link
+from bench.page.commands import Switch
+from bench.page.feed import About, WatchedLink
+from bench.page.live import LOOPBACK, LivePage, PageChoice
+from bench.wheels import Wheels
+from tirelib.estimators.calibration import Calibration
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+NEEDED = ("starlette", "uvicorn", "websockets")
+
+_OPTIONS = (
+    click.option("--page/--no-page", default=None,
+                 help="Live page in the browser.  [default: yes, but for a replay without --pace]"),
+    click.option("--host", default=LOOPBACK, show_default=True, metavar="ADDRESS",
+                 help="Address of the page."),
+    click.option("--network", is_flag=True,
+                 help="Allow a --host that other machines can reach; not encrypted."),
+    click.option("--page-port", default=0, type=click.IntRange(0, 65535), metavar="N",
+                 help="Port of the page.  [default: a free one]"),
+    click.option("--tui", is_flag=True, help="The same in this terminal."),
+)  # fmt: skip
+
+
+def page_options(command: Command) -> Command:
+    """Add the options of the page to a command."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+def page_choice(
+    page: bool | None, host: str, network: bool, page_port: int, tui: bool, *, paced: bool
+) -> PageChoice:
+    """Return what is to be shown.
+
+    Raises
+    ------
+    DeviceError
+        If the host is not allowed.
+    """
+    wanted = (paced and not tui) if page is None else page
+    return PageChoice(wanted, tui, host, page_port, network).checked()
+
+
+class Shown:
+    """The page of a run, or nothing when none is wanted; a context manager.
+
+    Parameters
+    ----------
+    choice : PageChoice
+    console : Console
+        Gets the address, and a warning when others can reach it.
+    """
+
+    def __init__(self, choice: PageChoice, console: Console) -> None:
+        self._choice = choice
+        self._console = console
+        self._stack = ExitStack()
+        self._page: LivePage | None = None
+        self.quiet = choice.terminal and console.is_terminal
+
+    def watched(self, link: Link) -> Link:
+        """Return the link that the session is to read."""
+        self._link = WatchedLink(link)
+        return self._link
+
+    def open(
+        self,
+        wheels: Wheels,
+        fmu: Path,
+        calibration: Calibration | None,
+        devices: Mapping[int | None, Device],
+        switch: Switch | None,
+    ) -> None:
+        """Start what is to be shown and say where it is."""
+        choice, console = self._choice, self._console
+        missing = [name for name in NEEDED if find_spec(name) is None]
+        if choice.page and missing:
+            console.print(f"no live page: {', '.join(missing)} missing; pip install tirelib[bench]")
+            choice = PageChoice(False, choice.terminal)
+        if not (choice.page or choice.terminal):
+            return
+        lateral = next((d.lateral for d in devices.values() if d.lateral), None)
+        about = About(self._link.name, fmu.name)
+        if calibration is not None:
+            about = About(self._link.name, fmu.name, calibration.tire, calibration.lateral)
+        elif lateral is not None:
+            about = About(self._link.name, fmu.name, "", lateral)
+        page = LivePage(choice, wheels, self._link, about, switch)
+        self._page = self._stack.enter_context(page)
+        if choice.open_to_others:
+            console.print(
+                f"warning: the page is open to the network at {choice.host}, not encrypted; "
+                "whoever has its address can record and set markers", style="bold red",
+                soft_wrap=True,
+            )  # fmt: skip
+        if page.url:
+            console.print(f"live page: {page.url}", soft_wrap=True, markup=False, highlight=False)
+
+    def watch(self, turns: Sequence[Turn], messages: Sequence[str]) -> None:
+        """Show what a read has brought; called after each read."""
+        if self._page is not None:
+            self._page.watch(turns, messages)
+
+    def end(self, reason: str) -> None:
+        """Say that the run has ended."""
+        if self._page is not None:
+            self._page.end(reason)
+
+    def __enter__(self) -> "Shown":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()

@@ -1,0 +1,105 @@
+"""``tirebench record``: raw bytes of a port to a file, without an estimator."""
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import click
+
+from bench.chain import Outputs
+from bench.cli.live import counters
+from bench.cli.options import PORTS, devices_of, opened, port_options, protocol_of
+from bench.cli.stop import on_stop
+from bench.conditions import Condition, Conditions, read_conditions
+from bench.document import line_document, wheel_document
+from bench.links.opening import PortPlan
+from bench.recording import Recorder, RecordingHeader
+from bench.session import Limits, Session
+from bench.wheels import Wheels
+from tirelib.arrays import FloatArray
+from tirelib.cli.common import FILE, write_json
+
+_EXAMPLE = f"""\b
+Examples:
+  tirebench record --port /dev/ttyUSB0 --out a.mcap --duration 600
+  tirebench record --port can:socketcan:can0 --rate 5000 --out bus.mcap
+
+{PORTS}
+\b
+Every read is written as it came, bad frames included, before it is decoded.
+Exit code: 0 done, 1 the port went away or not one good frame came, 2 bad input.
+"""
+
+
+class Idle:
+    """An estimator that estimates nothing: frames are only counted."""
+
+    samples = 1 << 16
+
+    def start(self, period: float) -> None:
+        """Forget nothing."""
+
+    def step(self, strain: FloatArray, conditions: Condition, valid: bool) -> Outputs | None:
+        """Return nothing."""
+
+
+@click.command(epilog=_EXAMPLE)
+@click.option("--port", metavar="PORT", required=True, help="Port to read; see below.")
+@click.option("--out", metavar="FILE.mcap", type=FILE, required=True, help="A new file.")
+@click.option("--conditions", "sidecar", metavar="F.json", type=FILE,
+              help="Speed, pressure and camber over time.")  # fmt: skip
+@click.option("--device", "device_texts", metavar="[WHEEL=]D.toml", multiple=True,
+              help="Scale and zero of the gages, kept in the recording.")  # fmt: skip
+@port_options
+@click.option("--duration", metavar="S", type=click.FloatRange(min=0.0), help="End after this.")
+@click.option("--silence", metavar="S", type=click.FloatRange(min=0.0),
+              help="End when nothing came for so long.")  # fmt: skip
+@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write the counters.")
+@click.pass_context
+def record(
+    context: click.Context,
+    port: str,
+    out: Path,
+    sidecar: Path | None,
+    device_texts: tuple[str, ...],
+    baud: int,
+    bitrate: int,
+    data_bitrate: int | None,
+    bus_options: tuple[str, ...],
+    rate: float,
+    map_file: Path | None,
+    reconnect: float,
+    duration: float | None,
+    silence: float | None,
+    json_file: Path | None,
+) -> None:
+    """Record the raw bytes of a port; Ctrl-C ends in good order."""
+    plan = PortPlan(port, baud, bitrate, data_bitrate, bus_options)
+    protocol = protocol_of(plan, rate, map_file)
+    devices, text = devices_of(device_texts)
+    conditions = Conditions.constant() if sidecar is None else read_conditions(sidecar)
+    settings: dict[str, Any] = {"port": port, "baud": baud, "bitrate": bitrate,
+                                "data_bitrate": data_bitrate}  # fmt: skip
+    header = RecordingHeader(settings, text, "", protocol.as_header())
+    with ExitStack() as stack:
+        link = opened(plan, reconnect)
+        stack.callback(link.close)
+        recorder = stack.enter_context(Recorder(out, header, conditions))
+        wheels = Wheels(protocol.decoder(), lambda _: Idle(), devices or {None: protocol.device},
+                        conditions)  # fmt: skip
+        session = Session(link, wheels, recorder=recorder, limits=Limits(duration, silence))
+        click.echo(f"{link.name} -> {out}")
+        with on_stop(session.stop):
+            outcome = session.run()
+        recorder.close(outcome.reason)
+    if outcome.message:
+        click.echo(f"unplugged: {outcome.message}")
+    click.echo(f"ended: {outcome.reason}; {recorder.bytes} bytes; {counters(wheels)}")
+    if json_file is not None:
+        write_json(json_file, {
+            "format": "tirebench-record/1", "ended": outcome.reason, "bytes": recorder.bytes,
+            "line": line_document(*wheels.counts),
+            "wheels": {n: wheel_document(chain) for n, chain in wheels.chains.items()},
+        })  # fmt: skip
+    good = wheels.counts[0].ok > 0 and outcome.reason != "unplugged"
+    context.exit(0 if good else 1)

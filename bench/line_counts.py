@@ -1,0 +1,43 @@
+"""What a line has shown and lost."""
+
+from dataclasses import dataclass
+
+
+@dataclass(slots=True)
+class LineCounts:
+    """What a line has shown so far, in frames unless said otherwise.
+
+    Attributes
+    ----------
+    bytes : int
+        Bytes taken.
+    ok : int
+        Good frames of a transmitter.
+    crc : int
+        Frames whose CRC is wrong.
+    framing : int
+        Pieces that are no frame: broken code, too short, too long, or of another length than they
+        say.
+    unknown : int
+        Good frames that nobody here knows: of another type, or another node on the bus.
+    unplaced : int
+        Samples of RAW12C that no SYNC frame puts in time; they are dropped.
+    overruns : int
+        Times that a buffer on the way was full, as far as the receiver tells.
+    reconnects : int
+        Times that the port went away and came back.
+    """
+
+    bytes: int = 0
+    ok: int = 0
+    crc: int = 0
+    framing: int = 0
+    unknown: int = 0
+    unplaced: int = 0
+    overruns: int = 0
+    reconnects: int = 0
+
+    @property
+    def bad(self) -> int:
+        """Frames that were damaged."""
+        return self.crc + self.framing

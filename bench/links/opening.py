@@ -1,0 +1,106 @@
+"""A port as it is typed, and the link that it names.
+
+===========================  ==========================================================
+typed                        link
+===========================  ==========================================================
+``/dev/ttyUSB0``, ``COM3``   SERIAL v1 on a serial port
+``slcan:/dev/ttyACM0``       CAN adapter with slcan, our own bulk reader
+``can:INTERFACE:CHANNEL``    python-can: ``can:socketcan:can0``, ``can:virtual:test``, ...
+===========================  ==========================================================
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from bench.errors import DeviceError
+from bench.links import Link
+from bench.protocols import CAN, SERIAL, SLCAN
+
+BITRATE = 500_000
+
+
+@dataclass(frozen=True, slots=True)
+class PortPlan:
+    """A port and how it is opened.
+
+    Attributes
+    ----------
+    port : str
+        As typed.
+    baud : int
+        Of a serial line.
+    bitrate : int
+        Of a CAN bus.
+    data_bitrate : int or None
+        None for classic CAN.
+    options : tuple of str
+        ``KEY=VALUE`` for python-can.
+    """
+
+    port: str
+    baud: int = 2_000_000
+    bitrate: int = BITRATE
+    data_bitrate: int | None = None
+    options: tuple[str, ...] = ()
+
+    @property
+    def encoding(self) -> str:
+        """What its bytes are, see `bench.protocols`."""
+        return {"slcan": SLCAN, "can": CAN}.get(self.port.partition(":")[0], SERIAL)
+
+    def open(self, *, transmit: bool = False) -> Link:
+        """Return the open link.
+
+        Raises
+        ------
+        LinkError
+            If it cannot be opened.
+        DeviceError
+            If what was typed names no port.
+        """
+        kind, _, rest = self.port.partition(":")
+        if self.encoding == SLCAN:
+            from bench.links.slcan_port import SlcanLink
+
+            return SlcanLink(rest, self.bitrate, self.data_bitrate, transmit=transmit)
+        if self.encoding == CAN:
+            from bench.links.can_bus import CanLink
+
+            interface, _, channel = rest.partition(":")
+            if not interface or not channel:
+                raise DeviceError(
+                    f"--port {self.port}: no channel; {kind}:INTERFACE:CHANNEL is needed, such as "
+                    "can:socketcan:can0; write it so"
+                )
+            return CanLink(
+                interface, channel, self.bitrate, self.data_bitrate, bus_options(self.options),
+                transmit=transmit,
+            )  # fmt: skip
+        from bench.links.serial_port import SerialLink
+
+        return SerialLink(self.port, self.baud)
+
+
+def bus_options(texts: Sequence[str]) -> dict[str, Any]:
+    """Return python-can's arguments from ``KEY=VALUE``; whole numbers become numbers.
+
+    Raises
+    ------
+    DeviceError
+        With every text that is none.
+
+    Examples
+    --------
+    >>> bus_options(["host=127.0.0.1", "port=29536"])
+    {'host': '127.0.0.1', 'port': 29536}
+    """
+    faults = [
+        f"--bus-option {text}: there is no '='; KEY=VALUE is needed; write it so"
+        for text in texts
+        if "=" not in text
+    ]
+    if faults:
+        raise DeviceError(faults)
+    pairs = (text.partition("=")[::2] for text in texts)
+    return {key: int(value) if value.isdecimal() else value for key, value in pairs}

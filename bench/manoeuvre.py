@@ -1,0 +1,277 @@
+"""A manoeuvre on the numerical rig: load, slip angle, slip ratio and speed over time, to strain.
+
+``tirebench-manoeuvre/1`` as TOML::
+
+    format = "tirebench-manoeuvre/1"
+    tire   = "reference"
+    [[point]]                      # held on straight lines from one point to the next
+    t_s = 0.0
+    load_N = 4000.0
+    slip_angle_deg = 0.0
+    speed_kmh = 65.0
+    slip_ratio = -0.02             # left out: the wheel rolls freely
+    pressure_bar = 2.3             # left out: 2.3
+    camber_deg = 0.0               # left out: 0
+    wheel = 1                      # left out: for every wheel without points of its own
+
+or as CSV with those columns. The rig is solved at the points and between them wherever a condition
+moves by more than `STEPS`; strain between two solutions is a straight line at each wheel angle. The
+rig is steady at each of them: transients of the tire (relaxation) are not in it.
+"""
+
+import csv
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.errors import DeviceError
+from bench.rig.measure import Chain, gages
+from bench.rig.observe import forces, trace
+from bench.rig.solve import State, solve
+from bench.rig.tire import TIRES, Condition, RigTire
+from tirelib.arrays import FloatArray
+from tirelib.units import to_si
+
+FORMAT = "tirebench-manoeuvre/1"
+COLUMNS: Mapping[str, tuple[str, str, str]] = {
+    "load_N": ("load", "N", "force"),
+    "slip_angle_deg": ("slip_angle", "deg", "angle"),
+    "speed_kmh": ("speed", "km/h", "speed"),
+    "slip_ratio": ("slip_ratio", "1", "ratio"),
+    "pressure_bar": ("pressure", "bar", "pressure"),
+    "camber_deg": ("camber", "deg", "angle"),
+}
+"""Column, condition, unit and dimension."""
+REQUIRED = ("t_s", "load_N", "speed_kmh")
+USUAL = {"slip_angle": 0.0, "camber": 0.0, "pressure": 2.3e5}
+STEPS = {"load": 400.0, "slip_angle": 0.01, "slip_ratio": 0.01, "speed": 3.0, "pressure": 2e4,
+         "camber": 0.02}  # fmt: skip
+"""Farthest that two solutions lie apart, SI."""
+MOST_SOLUTIONS = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """Conditions at a time of the manoeuvre, [s]."""
+
+    time: float
+    condition: Condition
+
+
+@dataclass(frozen=True, slots=True)
+class Manoeuvre:
+    """Points in order of time, for each wheel; ``None`` is the key for all others."""
+
+    tire: RigTire
+    points: Mapping[int | None, tuple[Point, ...]]
+
+    def of_wheel(self, wheel: int) -> tuple[Point, ...]:
+        """Return the points of a wheel.
+
+        Raises
+        ------
+        DeviceError
+            If there are none.
+        """
+        points = self.points.get(wheel, self.points.get(None))
+        if points is None:
+            known = ", ".join(str(number) for number in self.points)
+            raise DeviceError(
+                f"wheel {wheel}: the manoeuvre has no points for it; it has those of {known}; "
+                "add some, or leave out the column wheel"
+            )
+        return points
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """What a wheel shows along a manoeuvre, at the rig's solutions.
+
+    Attributes
+    ----------
+    time : array, shape (k,), [s]
+    omega : array, shape (k,), [rad/s]
+    strain : array, shape (k, n, 5)
+        On an even grid of n wheel angles from -pi.
+    conditions : tuple of k Condition
+    truth : mapping of name to array, shape (k,), SI
+        Fz, alpha, kappa, Fy, Fx.
+    """
+
+    time: FloatArray
+    omega: FloatArray
+    strain: FloatArray
+    conditions: tuple[Condition, ...]
+    truth: Mapping[str, FloatArray]
+
+
+def read_manoeuvre(path: Path) -> Manoeuvre:
+    """Read a manoeuvre, TOML or CSV by the file's ending.
+
+    Raises
+    ------
+    DeviceError
+        With every fault of the file.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        if path.suffix.lower() == ".csv":
+            rows: list[dict[str, Any]] = list(csv.DictReader(text.splitlines()))
+            tire = "reference"
+        else:
+            document = tomllib.loads(text)
+            if document.get("format") != FORMAT:
+                raise DeviceError(
+                    f"{path}: format = {document.get('format')!r}; {FORMAT!r} is understood here; "
+                    "correct it"
+                )
+            rows, tire = list(document.get("point", [])), str(document.get("tire", "reference"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, TypeError) as error:
+        raise DeviceError(
+            f"{path}: it cannot be read ({error}); a manoeuvre is TOML or CSV in UTF-8; check "
+            "path and line"
+        ) from None
+    if tire not in TIRES:
+        raise DeviceError(f"{path}: tire = {tire!r}; {', '.join(TIRES)} are known; choose one")
+    return Manoeuvre(TIRES[tire], _points(rows, str(path)))
+
+
+def _points(rows: Sequence[dict[str, Any]], where: str) -> dict[int | None, tuple[Point, ...]]:
+    faults: list[str] = []
+    points: dict[int | None, list[Point]] = {}
+    for number, row in enumerate(rows, start=1):
+        here = f"{where}: point {number}"
+        given = {k: v for k, v in row.items() if v not in (None, "")}
+        for key in sorted(set(given) - {*COLUMNS, "t_s", "wheel"}):
+            faults.append(f"{here}: {key} is not known; t_s, wheel, {', '.join(COLUMNS)} are; "
+                          "correct the spelling")  # fmt: skip
+        for key in REQUIRED:
+            if key not in given:
+                faults.append(f"{here}: {key} is missing; a number is needed; write it")
+        try:
+            values = {k: float(v) for k, v in given.items() if k in COLUMNS or k == "t_s"}
+            wheel = int(given["wheel"]) if "wheel" in given else None
+        except (TypeError, ValueError) as error:
+            faults.append(f"{here}: {error}; numbers are needed; correct it")
+            continue
+        if any(not math.isfinite(x) for x in values.values()) or faults:
+            faults.append(f"{here}: {given}; finite numbers are needed; correct it")
+            continue
+        si = {name: float(to_si(values[key], unit, dimension))
+              for key, (name, unit, dimension) in COLUMNS.items() if key in values}  # fmt: skip
+        points.setdefault(wheel, []).append(Point(values["t_s"], Condition(**{**USUAL, **si})))
+    for wheel, own in points.items():
+        times = [point.time for point in own]
+        if len(own) < 2 or times[0] != 0.0 or any(b <= a for a, b in pairwise(times)):
+            faults.append(f"{where}: times {times[:5]} of wheel {wheel}; at least two are needed, "
+                          "growing from 0; correct them")  # fmt: skip
+        free = {point.condition.slip_ratio is None for point in own}
+        if len(free) > 1:
+            faults.append(f"{where}: slip_ratio of wheel {wheel} is given at some points only; all "
+                          "or none; complete it")  # fmt: skip
+    if not rows:
+        faults.append(f"{where}: there is no point; two at least are needed; write them")
+    if faults:
+        raise DeviceError(faults)
+    return {wheel: tuple(own) for wheel, own in points.items()}
+
+
+def nodes(points: Sequence[Point]) -> tuple[Point, ...]:
+    """Return the points and as many between them as `STEPS` asks for.
+
+    Raises
+    ------
+    DeviceError
+        If there are too many to be solved.
+    """
+    dense: list[Point] = [points[0]]
+    for a, b in pairwise(points):
+        moves = [
+            abs((getattr(b.condition, n) or 0.0) - (getattr(a.condition, n) or 0.0)) / step
+            for n, step in STEPS.items()
+        ]
+        parts = max(1, math.ceil(max(moves)))
+        dense += [_between(a, b, part / parts) for part in range(1, parts + 1)]
+    if len(dense) > MOST_SOLUTIONS:
+        raise DeviceError(
+            f"manoeuvre: {len(dense)} solutions of the rig; {MOST_SOLUTIONS} are allowed (0.7 s "
+            "each); move less, or more slowly"
+        )
+    return tuple(dense)
+
+
+def _between(a: Point, b: Point, share: float) -> Point:
+    names = [n for n in STEPS if getattr(a.condition, n) is not None]
+    mixed = {
+        n: (1.0 - share) * getattr(a.condition, n) + share * getattr(b.condition, n) for n in names
+    }
+    time = (1.0 - share) * a.time + share * b.time
+    return Point(time, replace(a.condition, **mixed))
+
+
+class Rig:
+    """Solves conditions of one tire; what was solved once is remembered."""
+
+    def __init__(self, tire: RigTire, points: int = 3600) -> None:
+        self._tire = tire
+        self._points = points
+        self._known: dict[Condition, tuple[FloatArray, float, dict[str, float]]] = {}
+        self._last: State | None = None
+
+    def motion(self, path: Sequence[Point]) -> Motion:
+        """Return what a wheel shows at each node of its path."""
+        shown = [self._show(point.condition) for point in path]
+        return Motion(
+            time=np.array([point.time for point in path]),
+            omega=np.array([omega for _, omega, _ in shown]),
+            strain=np.stack([strain for strain, _, _ in shown]),
+            conditions=tuple(point.condition for point in path),
+            truth={name: np.array([t[name] for _, _, t in shown]) for name in shown[0][2]},
+        )
+
+    def _show(self, condition: Condition) -> tuple[FloatArray, float, dict[str, float]]:
+        if condition not in self._known:
+            state = solve(self._tire, condition, self._last)
+            self._last = state
+            force = forces(state)
+            kappa = state.omega * state.free_radius / condition.speed - 1.0
+            truth = {"Fz": force.fz, "alpha": condition.slip_angle, "kappa": kappa,
+                     "Fy": force.fy, "Fx": force.fx}  # fmt: skip
+            strain = np.asarray(trace(state, self._points).strain)
+            self._known[condition] = (strain, state.omega, truth)
+        return self._known[condition]
+
+
+def waveform(
+    motion: Motion, tire: RigTire, rate: float, *, seed: int = 0, chain: Chain | None = None
+) -> FloatArray:
+    """Return strain over time as the gages give it, shape (n, 5).
+
+    The angle is the integral of the wheel's speed; gain, offset and noise are those of the rig's
+    measuring chain.
+    """
+    chain = chain or Chain()
+    n = int(motion.time[-1] * rate) + 1
+    time = np.arange(n) / rate
+    omega = np.interp(time, motion.time, motion.omega)
+    steps = 0.5 * (omega[1:] + omega[:-1]) / rate
+    phi = -np.pi + np.concatenate(([0.0], np.cumsum(steps)))
+    size = motion.strain.shape[1]
+    angle = (phi + np.pi) / (2.0 * np.pi) * size
+    place = np.interp(time, motion.time, np.arange(len(motion.time)))
+    k = np.minimum(place.astype(np.int64), len(motion.time) - 2)
+    low = np.floor(angle).astype(np.int64)
+    share, part = (place - k)[:, None], (angle - low)[:, None]
+    a, b = low % size, (low + 1) % size
+    before = (1.0 - part) * motion.strain[k, a] + part * motion.strain[k, b]
+    after = (1.0 - part) * motion.strain[k + 1, a] + part * motion.strain[k + 1, b]
+    strain = (1.0 - share) * before + share * after
+    sensors = gages(tire, chain)
+    noise = chain.gage_noise * np.random.default_rng([seed, 3]).standard_normal(strain.shape)
+    return np.asarray(strain * sensors.gain + sensors.offset + noise)

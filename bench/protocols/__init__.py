@@ -1,0 +1,49 @@
+"""What bytes mean: decoders from what a link brings to `bench.frames.Frames`.
+
+======================  =====================================================================
+encoding                bytes of a read
+======================  =====================================================================
+``serial-v1``           a serial line with SERIAL v1 frames
+``slcan``               text lines of a CAN adapter on a serial line
+``can``                 packed CAN frames, see `bench.can_batch`
+======================  =====================================================================
+
+What comes out depends on the bytes and their arrival alone, never on how they are cut into reads.
+"""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from bench.conditions import Measured
+from bench.frames import Frames
+from bench.line_counts import LineCounts
+
+SERIAL, SLCAN, CAN = "serial-v1", "slcan", "can"
+ENCODINGS = (SERIAL, SLCAN, CAN)
+
+
+class Decoder(Protocol):
+    """Bytes to frames.
+
+    Attributes
+    ----------
+    counts : LineCounts
+        What was seen and lost on the line.
+    """
+
+    counts: LineCounts
+
+    def push(self, data: bytes, arrival: int = 0) -> "Sequence[Frames | Measured]":
+        """Return the frames that `data` completes, in order, and conditions told between them.
+
+        Parameters
+        ----------
+        arrival : int, [ns]
+            Monotonic; resolves counters and clocks that wrap soon.
+        """
+
+    def interrupt(self) -> None:
+        """Forget a half frame: the line was broken here."""
+
+
+__all__ = ["CAN", "ENCODINGS", "SERIAL", "SLCAN", "Decoder"]

@@ -1,0 +1,42 @@
+"""What the frames of a CAN bus mean: one protocol, a child for each kind of transmitter."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from bench.can_batch import CanBatch, unpack
+from bench.conditions import Measured
+from bench.frames import Frames
+from bench.line_counts import LineCounts
+
+
+class FrameDecoder(Protocol):
+    """CAN frames to strain frames: `bench.protocols.wheel_can`, or a user's own transmitter."""
+
+    def push(self, batch: CanBatch, arrival: int) -> Sequence[Frames | Measured]:
+        """Return the strain frames of a batch, those of each wheel in order."""
+
+    def interrupt(self) -> None:
+        """Forget what waits for more: the line was broken here."""
+
+
+class PackedDecoder:
+    """Packed CAN frames to strain frames; see `bench.protocols.Decoder`."""
+
+    def __init__(self, frames: FrameDecoder, counts: LineCounts) -> None:
+        self.counts = counts
+        self._frames = frames
+
+    def push(self, data: bytes, arrival: int = 0) -> Sequence[Frames | Measured]:
+        """Return the frames of one packed batch; what is no batch is counted."""
+        if not data:
+            return []
+        self.counts.bytes += len(data)
+        batch = unpack(data)
+        if batch is None:
+            self.counts.framing += 1
+            return []
+        return self._frames.push(batch, arrival) if len(batch) else []
+
+    def interrupt(self) -> None:
+        """Forget what waits for more."""
+        self._frames.interrupt()

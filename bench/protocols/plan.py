@@ -1,0 +1,93 @@
+"""Which decoder a line needs, and how a recording remembers it."""
+
+import hashlib
+from dataclasses import dataclass
+from typing import Any
+
+from bench.decoder import SerialDecoder
+from bench.device import Device
+from bench.errors import RecordingError
+from bench.line_counts import LineCounts
+from bench.protocols import ENCODINGS, SERIAL, SLCAN, Decoder
+from bench.protocols.dbc import FILES, database
+from bench.protocols.frame_decoder import FrameDecoder, PackedDecoder
+from bench.protocols.slcan import SlcanDecoder
+from bench.protocols.user_can import UserCan
+from bench.protocols.user_map import UserMap, parse_map
+from bench.protocols.wheel_can import WheelCan
+
+RATE = 10_000.0
+"""Default sample rate, [Hz]; frames of SERIAL v1 say their own."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProtocolPlan:
+    """What is on a line.
+
+    Attributes
+    ----------
+    encoding : str
+        Of the bytes, see `bench.protocols`.
+    rate : float, [Hz]
+        Of the gages, where the frames do not say it.
+    user_map : UserMap or None
+        Of another make's transmitter.
+    """
+
+    encoding: str = SERIAL
+    rate: float = RATE
+    user_map: UserMap | None = None
+
+    def decoder(self) -> Decoder:
+        """Return a fresh decoder."""
+        if self.encoding == SERIAL:
+            return SerialDecoder()
+        counts = LineCounts()
+        frames: FrameDecoder
+        if self.user_map is None:
+            frames = WheelCan(self.rate, counts)
+        else:
+            frames = UserCan(self.user_map, counts)
+        if self.encoding == SLCAN:
+            return SlcanDecoder(frames, counts)
+        return PackedDecoder(frames, counts)
+
+    @property
+    def device(self) -> Device:
+        """What a count means where no device file says it."""
+        return Device() if self.user_map is None else self.user_map.device
+
+    def as_header(self) -> dict[str, Any]:
+        """Return the plan as the header of a recording holds it."""
+        user = "" if self.user_map is None else self.user_map.text
+        return {
+            "encoding": self.encoding,
+            "rate_hz": self.rate,
+            "map": user,
+            "dbc_sha256": dbc_hash(user.partition("\0")[2]),
+        }
+
+    @classmethod
+    def of_header(cls, header: dict[str, Any], where: str) -> "ProtocolPlan":
+        """Return the plan that a header holds; SERIAL v1 where it holds none.
+
+        Raises
+        ------
+        RecordingError
+            If it names an encoding that is not known here.
+        """
+        encoding = header.get("encoding", SERIAL)
+        if encoding not in ENCODINGS:
+            raise RecordingError(
+                f"{where}: its bytes are {encoding!r}; {', '.join(ENCODINGS)} are understood here; "
+                "take a newer program"
+            )
+        text, _, dbc = str(header.get("map", "")).partition("\0")
+        user = parse_map(text, dbc, where) if text else None
+        return cls(encoding, float(header.get("rate_hz", RATE)), user)
+
+
+def dbc_hash(user: str = "") -> str:
+    """Return the SHA-256 of the DBC that the frames follow: a user's, or the published ones."""
+    text = user or "".join(database(kinds) for kinds in FILES.values())
+    return hashlib.sha256(text.encode()).hexdigest()

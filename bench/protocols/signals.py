@@ -1,0 +1,81 @@
+"""A signal in the data bytes of a CAN frame, taken out of whole batches at once. Pure."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bench.can_batch import ByteArray
+from bench.frames import IntArray
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """One signal of a frame.
+
+    Attributes
+    ----------
+    name : str
+    start, length : int
+        Bits, as a DBC counts them.
+    signed : bool
+    factor : float
+    unit : str
+    big_endian : bool
+    offset : float
+    comment : str
+    """
+
+    name: str
+    start: int
+    length: int
+    signed: bool = False
+    factor: float = 1.0
+    unit: str = ""
+    big_endian: bool = False
+    offset: float = 0.0
+    comment: str = ""
+
+    @property
+    def line(self) -> str:
+        """The signal as a DBC says it."""
+        bounds = [f"{self.offset + self.factor * raw:.10g}" for raw in self.bounds]
+        return (
+            f" SG_ {self.name} : {self.start}|{self.length}@{int(not self.big_endian)}"
+            f"{'-' if self.signed else '+'} ({self.factor:.10g},{self.offset:.10g}) "
+            f'[{bounds[0]}|{bounds[1]}] "{self.unit}" Vector__XXX'
+        )
+
+    @property
+    def bounds(self) -> tuple[int, int]:
+        """Lowest and highest raw value."""
+        low = -(1 << (self.length - 1)) if self.signed else 0
+        return low, (1 << (self.length - int(self.signed))) - 1
+
+    @property
+    def places(self) -> IntArray:
+        """Its bits in the frame, least significant first; bit p is bit p % 8 of byte p // 8."""
+        if not self.big_endian:
+            return np.arange(self.start, self.start + self.length)
+        # a DBC counts a big-endian signal from its most significant bit, within bytes downwards
+        first = 8 * (self.start // 8) + 7 - self.start % 8
+        along = np.arange(first + self.length - 1, first - 1, -1)
+        return np.asarray(8 * (along // 8) + 7 - along % 8)
+
+
+def raw_values(data: ByteArray, signals: "tuple[Signal, ...] | list[Signal]") -> IntArray:
+    """Return the raw values of signals, shape (m, number of signals); data of shape (m, n).
+
+    Examples
+    --------
+    >>> data = np.array([[0x12, 0xF4]], np.uint8)
+    >>> raw_values(data, [Signal("a", 8, 4), Signal("b", 12, 4, True)]).tolist()
+    [[4, -1]]
+    """
+    bits = np.unpackbits(data, axis=1, bitorder="little")
+    values = np.empty((len(data), len(signals)), np.int64)
+    for column, signal in enumerate(signals):
+        weights = np.int64(1) << np.arange(signal.length, dtype=np.int64)
+        if signal.signed:
+            weights[-1] = -weights[-1]
+        values[:, column] = bits[:, signal.places] @ weights
+    return values

@@ -1,0 +1,324 @@
+"""A transmitter of another make: a map of its signals (``tirebench-map/1``), no code.
+
+::
+
+    format  = "tirebench-map/1"
+    dbc     = "wheel.dbc"         # beside this file; or [[message]] tables, see below
+    rate_hz = 2000                # of the gages
+    strain_unit = "ustrain"       # of the signals; left out: counts, a device file says the rest
+
+    [[wheel]]
+    wheel     = 0
+    message   = "WHEEL_FL"
+    samples   = [["g1", "g2", "g3", "g4", "g5"]]   # oldest first; gages as in the calibration
+    counter   = "count"           # counts messages; this, or time, or both
+    time      = "stamp"           # device time of the first sample
+    time_unit = "us"              # of the signal's value
+
+    [speed]                       # optional: travel speed from the bus
+    message = "ABS"
+    signal  = "v_ref"
+    unit    = "km/h"
+
+    [[message]]                   # without a DBC
+    name = "WHEEL_FL"
+    id   = 0x210                  # extended = true for 29 bits
+    length = 8
+    signals = [{ name = "g1", start = 4, length = 12, signed = true, order = "little" }, ...]
+"""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from bench.device import Device
+from bench.errors import DeviceError
+from bench.frames import GAGES
+from bench.protocols.signals import Signal
+from tirelib.errors import TirelibError
+from tirelib.units import to_si
+
+FORMAT = "tirebench-map/1"
+LONGEST_SIGNAL = 32
+SHORTEST_WRAP = 0.1
+"""A counter that wraps sooner needs a time beside it, or a gap could not be seen, [s]."""
+_KEYS = {"format", "dbc", "rate_hz", "strain_unit", "wheel", "speed", "message", "name"}
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A frame and its signals by name."""
+
+    name: str
+    identifier: int
+    extended: bool
+    length: int
+    signals: Mapping[str, Signal]
+
+
+@dataclass(frozen=True, slots=True)
+class WheelMap:
+    """Where a wheel's strain is.
+
+    Attributes
+    ----------
+    wheel : int
+    message : Message
+    strain : tuple of Signal
+        Samples x 5, oldest sample first.
+    counter, time : Signal or None
+    tick : float, [s]
+        Step of `time`.
+    """
+
+    wheel: int
+    message: Message
+    strain: tuple[Signal, ...]
+    counter: Signal | None
+    time: Signal | None
+    tick: float
+
+    @property
+    def samples(self) -> int:
+        """Samples in a frame."""
+        return len(self.strain) // GAGES
+
+
+@dataclass(frozen=True, slots=True)
+class UserMap:
+    """What a map says.
+
+    Attributes
+    ----------
+    rate : float, [Hz]
+    wheels : tuple of WheelMap
+    device : Device
+        Scale and zero, where the map says a unit of strain; else those of counts.
+    speed : (Message, Signal, unit) or None
+    text : str
+        Of the file, DBC included, for the header of a recording.
+    """
+
+    rate: float
+    wheels: tuple[WheelMap, ...]
+    device: Device
+    speed: tuple[Message, Signal, str] | None
+    text: str
+
+
+def read_map(path: Path) -> UserMap:
+    """Read a map and its DBC.
+
+    Raises
+    ------
+    DeviceError
+        With every fault of the file.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        document = tomllib.loads(text)
+        dbc = ""
+        if "dbc" in document:
+            dbc = (path.parent / str(document["dbc"])).read_text(encoding="cp1252")
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise DeviceError(
+            f"{path}: it cannot be read ({error}); a map is TOML in UTF-8, its DBC stands beside "
+            "it; check path and line"
+        ) from None
+    return parse_map(text, dbc, str(path))
+
+
+def parse_map(text: str, dbc: str, where: str) -> UserMap:
+    """Return what the texts of a map and its DBC say; errors as `read_map`."""
+    document = tomllib.loads(text)
+    if document.get("format") != FORMAT:
+        raise DeviceError(
+            f"{where}: format = {document.get('format')!r}; {FORMAT!r} is understood here; "
+            "correct it, or take a program of that version"
+        )
+    return _Reader(document, where).read(text if not dbc else f"{text}\0{dbc}", dbc)
+
+
+class _Reader:
+    """Collects every fault of a map before it raises."""
+
+    def __init__(self, document: dict[str, Any], where: str) -> None:
+        self.document = document
+        self.where = where
+        self.faults = [
+            f"{where}: {key} is not known; allowed are {', '.join(sorted(_KEYS))}; correct it"
+            for key in sorted(set(document) - _KEYS)
+        ]
+
+    def fault(self, what: str, given: object, allowed: str, remedy: str = "correct it") -> None:
+        self.faults.append(f"{self.where}: {what} = {given!r}; {allowed}; {remedy}")
+
+    def read(self, text: str, dbc: str) -> UserMap:
+        messages = self._of_dbc(dbc) if dbc else self._of_tables()
+        rate = self.document.get("rate_hz")
+        if not isinstance(rate, int | float) or isinstance(rate, bool) or not 153 <= rate <= 2e5:
+            self.fault("rate_hz", rate, "153 .. 200000 Hz is needed")
+            rate = 1e3
+        tables = self.document.get("wheel", [])
+        tables = tables if isinstance(tables, list) else []
+        wheels = [w for table in tables if (w := self._wheel(table, messages, float(rate)))]
+        if not tables:
+            self.fault("wheel", tables, "at least one table [[wheel]] is needed", "write it")
+        if len({w.wheel for w in wheels}) < len(wheels):
+            self.fault("wheel", [w.wheel for w in wheels], "each number may come once")
+        device = self._device(wheels)
+        speed = self._speed(messages)
+        if self.faults:
+            raise DeviceError(self.faults)
+        return UserMap(float(rate), tuple(wheels), device, speed, text)
+
+    def _of_dbc(self, dbc: str) -> dict[str, Message]:
+        import cantools  # late: it takes a while, and few need it
+
+        try:
+            database: Any = cantools.database.load_string(dbc, "dbc")
+        except Exception as error:  # cantools raises its own, textparser's and bare ones
+            self.fault("dbc", str(error)[:200], "a sound DBC is needed")
+            return {}
+        messages = {}
+        for m in database.messages:
+            signals = {
+                s.name: Signal(
+                    s.name, s.start, s.length, s.is_signed, float(s.scale), s.unit or "",
+                    s.byte_order == "big_endian", float(s.offset),
+                )
+                for s in m.signals
+                if not s.is_float and not s.multiplexer_ids
+            }  # fmt: skip
+            messages[m.name] = Message(m.name, m.frame_id, m.is_extended_frame, m.length, signals)
+        return messages
+
+    def _of_tables(self) -> dict[str, Message]:
+        messages = {}
+        for table in self.document.get("message", []):
+            try:
+                signals = {s["name"]: _signal(s) for s in table["signals"]}
+                message = Message(
+                    str(table["name"]), int(table["id"]), bool(table.get("extended", False)),
+                    int(table["length"]), signals,
+                )  # fmt: skip
+            except (KeyError, TypeError, ValueError, AttributeError) as error:
+                self.fault("message", table, f"name, id, length and signals are needed ({error!r})")
+                continue
+            messages[message.name] = message
+        return messages
+
+    def _wheel(
+        self, table: dict[str, Any], messages: Mapping[str, Message], rate: float
+    ) -> WheelMap | None:
+        before = len(self.faults)
+        what = f"wheel {table.get('wheel')!r}"
+        message = self._message(f"{what}: message", table.get("message"), messages)
+        rows = table.get("samples", [])
+        if not rows or not all(isinstance(r, list) and len(r) == GAGES for r in rows):
+            self.fault(f"{what}: samples", rows, f"lists of {GAGES} signals are needed, a list a "
+                       "sample")  # fmt: skip
+            return None
+        if message is None:
+            return None
+        strain = [self._signal(what, name, message) for row in rows for name in row]
+        counter = self._optional(what, table, "counter", message)
+        time = self._optional(what, table, "time", message)
+        tick = 1.0
+        if time is not None:
+            tick = self._seconds(what, table.get("time_unit"), time)
+        elif counter is None:
+            self.fault(what, sorted(table), "counter or time is needed: else no loss can be seen",
+                       "name one")  # fmt: skip
+        elif (wrap := 2**counter.length * len(rows) / rate) < SHORTEST_WRAP:
+            self.fault(f"{what}: counter", counter.name, f"it wraps after {1e3 * wrap:.0f} ms, "
+                       f"{1e3 * SHORTEST_WRAP:.0f} ms are needed without a time, or a gap could "
+                       "not be seen", "name a time too")  # fmt: skip
+        number = table.get("wheel")
+        if not isinstance(number, int) or not 0 <= number <= 255:
+            self.fault("wheel", number, "0 .. 255 is needed")
+        if len(self.faults) > before:
+            return None
+        known = tuple(signal for signal in strain if signal is not None)
+        return WheelMap(int(number or 0), message, known, counter, time, tick)
+
+    def _message(self, what: str, name: Any, messages: Mapping[str, Message]) -> Message | None:
+        message = messages.get(str(name))
+        if message is None:
+            self.fault(what, name, f"known are {', '.join(sorted(messages)) or 'none'}")
+        return message
+
+    def _signal(self, what: str, name: Any, message: Message) -> Signal | None:
+        signal = message.signals.get(str(name))
+        if signal is None:
+            self.fault(f"{what}: signal", name, f"{message.name} has the integer signals "
+                       f"{', '.join(message.signals) or 'none'} (not multiplexed)")  # fmt: skip
+            return None
+        places = signal.places
+        if not 1 <= signal.length <= LONGEST_SIGNAL or not (
+            places.min() >= 0 and places.max() < 8 * message.length
+        ):
+            self.fault(f"{what}: signal", name, f"1 to {LONGEST_SIGNAL} bits inside the "
+                       f"{message.length} bytes of {message.name} are allowed")  # fmt: skip
+            return None
+        return signal
+
+    def _optional(
+        self, what: str, table: dict[str, Any], key: str, message: Message
+    ) -> Signal | None:
+        return self._signal(what, table[key], message) if key in table else None
+
+    def _seconds(self, what: str, unit: Any, time: Signal) -> float:
+        try:
+            return time.factor * float(to_si(1.0, str(unit), "time"))
+        except TirelibError as error:
+            self.fault(f"{what}: time_unit", unit, f"a unit of time is needed ({error})")
+            return 1.0
+
+    def _device(self, wheels: list[WheelMap]) -> Device:
+        """Scale, zero and ends of the range, from the signals."""
+        strain = [signal for wheel in wheels for signal in wheel.strain]
+        kinds = {(s.length, s.signed, s.factor) for s in strain}
+        if len(kinds) > 1:
+            self.fault("samples", sorted(kinds), "all gages need one length, sign and factor")
+        if len(kinds) != 1:
+            return Device()
+        low, high = strain[0].bounds
+        unit = self.document.get("strain_unit")
+        if unit is None:
+            return Device(lowest=low, highest=high)
+        try:
+            step = strain[0].factor * float(to_si(1.0, str(unit), "strain"))
+        except TirelibError as error:
+            self.fault("strain_unit", unit, f"a unit of strain is needed ({error})")
+            return Device()
+        zero = tuple(-s.offset / s.factor for s in strain[:GAGES])
+        return Device("map", step, zero, lowest=low, highest=high)
+
+    def _speed(self, messages: Mapping[str, Message]) -> tuple[Message, Signal, str] | None:
+        table = self.document.get("speed")
+        if table is None:
+            return None
+        message = self._message("speed: message", table.get("message"), messages)
+        if message is None:
+            return None
+        signal = self._signal("speed", table.get("signal"), message)
+        unit = str(table.get("unit"))
+        try:
+            to_si(1.0, unit, "speed")
+        except TirelibError as error:
+            self.fault("speed: unit", unit, f"a unit of speed is needed ({error})")
+        return None if signal is None else (message, signal, unit)
+
+
+def _signal(table: dict[str, Any]) -> Signal:
+    order = table.get("order", "little")
+    if order not in ("little", "big"):
+        raise ValueError(f"order = {order!r}; little or big")
+    return Signal(
+        str(table["name"]), int(table["start"]), int(table["length"]),
+        bool(table.get("signed", False)), float(table.get("factor", 1.0)), "", order == "big",
+        float(table.get("offset", 0.0)),
+    )  # fmt: skip

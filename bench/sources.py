@@ -1,0 +1,145 @@
+"""What an emulator can play: runs of a campaign, a manoeuvre on the rig, a recording as it is."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.can_batch import unpack
+from bench.conditions import Conditions, RunMark
+from bench.device import Device
+from bench.emulator import Script, Tape
+from bench.errors import DeviceError
+from bench.faults import Faults
+from bench.frames import GAGES, TICK
+from bench.manoeuvre import Manoeuvre, Motion, Rig, nodes, waveform
+from bench.protocols import CAN
+from bench.recording import Recording
+from bench.transmitter import Record
+from tirelib.campaign import Campaign, Run
+
+CONDITION_STEP = 0.01
+"""Speed, pressure and camber of a manoeuvre are told this often, [s]."""
+READS = 256
+"""Reads of a recording that are played as one piece."""
+
+
+def campaign_runs(campaign: Campaign, numbers: Sequence[int], everything: bool) -> list[Run]:
+    """Return the runs that were asked for, by default the first.
+
+    Raises
+    ------
+    DeviceError
+        If there is none of a number.
+    """
+    plans = {plan.run: plan for plan in campaign.plans}
+    chosen = list(plans) if everything else list(numbers) or list(plans)[:1]
+    unknown = [str(number) for number in chosen if number not in plans]
+    if unknown or not chosen:
+        raise DeviceError(
+            f"{campaign.path}: run {', '.join(unknown) or 'none'}; its runs are "
+            f"{', '.join(str(number) for number in plans) or 'none'}; choose among them"
+        )
+    return [campaign.load(plans[number]) for number in chosen]
+
+
+def manoeuvre_tape(
+    manoeuvre: Manoeuvre,
+    device: Device,
+    faults: Faults,
+    wheels: Sequence[int],
+    *,
+    rate: float,
+    seed: int = 0,
+) -> tuple[Tape, dict[int, Motion]]:
+    """Solve the rig along a manoeuvre and return what the wheels send, and the truth of each.
+
+    All of it is solved and put into counts beforehand, so that playing costs little.
+    """
+    rig = Rig(manoeuvre.tire)
+    period = round(1.0 / (rate * TICK))
+    records, motions = [], {}
+    for wheel in wheels:
+        path = nodes(manoeuvre.of_wheel(wheel))
+        motion = rig.motion(path)
+        strain = waveform(motion, manoeuvre.tire, 1.0 / (period * TICK), seed=seed + wheel)
+        counts, marked = device.counts(strain)
+        struck, bits = faults.gages(counts, period * TICK, device.scale)
+        bits = (bits | (marked << np.arange(GAGES)).sum(axis=1)).astype(np.int16)
+        records.append(Record(wheel, 0, period, struck, bits))
+        motions[wheel] = motion
+    duration = max(len(record.counts) for record in records) * period * TICK
+    return Tape(tuple(records), _conditions(motions[wheels[0]]), duration + 0.1), motions
+
+
+def _conditions(motion: Motion) -> Conditions:
+    time = np.arange(0.0, motion.time[-1], CONDITION_STEP)
+    columns = [
+        np.interp(time, motion.time, [getattr(c, name) for c in motion.conditions]).tolist()
+        for name in ("speed", "pressure", "camber")
+    ]
+    values = tuple(zip(*columns, strict=True))
+    steady = len(set(motion.conditions)) == 1
+    truth = {name: float(values[0]) for name, values in motion.truth.items() if name != "Fx"}
+    mark = RunMark(1, 0, 0.0, truth if steady else {})
+    return Conditions(tuple(np.rint(1e6 * time).astype(int).tolist()), values, (mark,))
+
+
+def truth_rows(motions: Mapping[int, Motion]) -> Iterator[dict[str, float]]:
+    """Yield what the rig's contact gave, a row for each solution; units are in the names."""
+    degrees = 180.0 / np.pi
+    for wheel, motion in motions.items():
+        for row, moment in enumerate(motion.time.tolist()):
+            truth = {name: float(values[row]) for name, values in motion.truth.items()}
+            condition = motion.conditions[row]
+            yield {
+                "wheel": wheel, "t_s": moment, "Fz_N": truth["Fz"], "Fy_N": truth["Fy"],
+                "Fx_N": truth["Fx"], "alpha_deg": truth["alpha"] * degrees,
+                "kappa": truth["kappa"], "speed_kmh": 3.6 * condition.speed,
+                "pressure_bar": 1e-5 * condition.pressure,
+                "omega_rad_s": float(motion.omega[row]),
+            }  # fmt: skip
+
+
+def recording_pieces(recording: Recording) -> Iterator[Script]:
+    """Yield the reads of a recording in pieces at their recorded times, bad frames included."""
+    start: int | None = None
+    due: list[float] = []
+    frames: list[Any] = []
+    packed = recording.header.encoding == CAN
+    for arrival, data in recording.raw():
+        start = arrival if start is None else start
+        due.append(1e-9 * (arrival - start))
+        frames.append(_messages(data) if packed else data)
+        if len(due) == READS:
+            yield Script(tuple(due), tuple(frames), recording.conditions, 0.0)
+            due, frames = [], []
+    if due:
+        yield Script(tuple(due), tuple(frames), recording.conditions, 0.0)
+
+
+def _messages(data: bytes) -> list[Any]:
+    from bench.links.can_bus import message_of
+
+    batch = unpack(data)
+    return [] if batch is None else [message_of(batch, row) for row in range(len(batch))]
+
+
+def write_truth(path: Path, motions: Mapping[int, Motion]) -> None:
+    """Write `truth_rows` as CSV.
+
+    Raises
+    ------
+    DeviceError
+        If the file cannot be written.
+    """
+    rows = list(truth_rows(motions))
+    lines = [",".join(rows[0]), *(",".join(f"{x:.9g}" for x in row.values()) for row in rows)]
+    try:
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise DeviceError(
+            f"{path}: it cannot be written ({error.strerror}); a file in a folder that is there is "
+            "needed; choose another"
+        ) from None

@@ -1,0 +1,65 @@
+"""Programs as a user starts them: slcan behind a port, several wheels, a cable in and out."""
+
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+from tests.bench.conftest import Spawn
+from tests.bench.test_live import PATIENCE, finish, port_of
+
+
+def result(path: Path) -> dict[str, Any]:
+    return dict(json.loads(path.read_text()))
+
+
+def test_two_wheels_over_slcan_are_estimated_recorded_replayed_and_exported(
+    spawn: Spawn, campaign: Path, toy_fmus: dict[int, Path], tmp_path: Path
+) -> None:
+    emulator = spawn("emulate", "--campaign", campaign, "--run", 2, "--format", "RAW16",
+                     "--wheel", 0, "--wheel", 2, "--port-file", tmp_path / "port",
+                     "--conditions", tmp_path / "c.json",
+                     "--json", tmp_path / "e.json")  # fmt: skip
+    port = port_of(tmp_path / "port")
+    live = spawn("run", "--port", f"slcan:{port}", "--data-bitrate", 5_000_000, "--fmu",
+                 toy_fmus[16], "--conditions", tmp_path / "c.json", "--record",
+                 tmp_path / "a.mcap", "--json", tmp_path / "live.json",
+                 "--silence", 1.5)  # fmt: skip
+    code, out, _ = finish(live)
+    assert code == 0, out
+    assert finish(emulator)[0] == 0
+    seen = result(tmp_path / "live.json")
+    assert {turn["wheel"] for turn in seen["turns"]} == {0, 2}
+    one, two = ([t["Fz"] for t in seen["turns"] if t["wheel"] == n] for n in (0, 2))
+    assert one == two
+    assert len(one) >= 5
+    line = seen["line"]
+    assert line["frames"] == result(tmp_path / "e.json")["frames"]
+    assert line["lost_samples"] == line["framing_bad"] == line["unknown_type"] == 0
+    code, out, _ = finish(spawn("replay", tmp_path / "a.mcap", "--fmu", toy_fmus[16], "--pace", 2,
+                                "--json", tmp_path / "again.json"))  # fmt: skip
+    assert code == 0, out
+    again = result(tmp_path / "again.json")
+    assert (again["turns"], again["wheels"]) == (seen["turns"], seen["wheels"])
+
+
+def test_a_cable_in_and_out_loses_what_was_sent_meanwhile_and_no_more(
+    spawn: Spawn, campaign: Path, tmp_path: Path
+) -> None:
+    emulator = spawn("emulate", "--campaign", campaign, "--all", "--loop", "--link",
+                     tmp_path / "port", "--unplug", 0.7, "--replug", 0.3, "--json",
+                     tmp_path / "e.json")  # fmt: skip
+    end = time.monotonic() + PATIENCE
+    while not (tmp_path / "port").is_symlink() and time.monotonic() < end:
+        time.sleep(0.02)
+    live = spawn("record", "--port", tmp_path / "port", "--out", tmp_path / "a.mcap", "--duration",
+                 5, "--json", tmp_path / "r.json")  # fmt: skip
+    code, out, _ = finish(live)
+    assert code == 0, out
+    emulator.terminate()
+    finish(emulator)
+    seen = result(tmp_path / "r.json")
+    assert seen["line"]["reconnects"] >= 2
+    assert seen["line"]["gaps"] + seen["line"]["resets"] >= seen["line"]["reconnects"]
+    assert seen["line"]["crc_bad"] + seen["line"]["framing_bad"] <= 2 * seen["line"]["reconnects"]
+    assert seen["line"]["frames"] > 600

@@ -1,0 +1,245 @@
+"""Links keep their deadline, give all that came, and come back when the cable does."""
+
+import os
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import can
+import numpy as np
+import pytest
+
+from bench.can_batch import CanBatch, same_kind, unpack
+from bench.deadline import Deadline
+from bench.errors import DeviceError, LinkError, UnpluggedError
+from bench.line_counts import LineCounts
+from bench.links import BACK, LOST, Link, Read
+from bench.links.can_bus import CanLink, message_of
+from bench.links.opening import PortPlan
+from bench.links.pseudo import PseudoTerminal
+from bench.links.reconnecting import LONGEST_WAIT, ReconnectingLink
+from bench.links.serial_port import SerialLink
+from bench.links.slcan_port import SlcanLink
+from bench.protocols.slcan import SlcanDecoder, encode
+from tests.bench.test_slcan import Keep, keys, some_frames
+
+PATIENCE = 10.0
+
+
+@pytest.fixture
+def terminal() -> Iterator[PseudoTerminal]:
+    port = PseudoTerminal()
+    yield port
+    port.close()
+
+
+def fd_frames(count: int) -> CanBatch:
+    rng = np.random.default_rng(1)
+    return same_kind(0x120 + np.arange(count) % 4, rng.integers(0, 256, (count, 64), np.uint8),
+                     fd=True)  # fmt: skip
+
+
+def gathered(link: Link, until: Callable[[bytes], bool]) -> bytes:
+    data, end = b"", Deadline.after(PATIENCE)
+    while not until(data) and not end.expired:
+        read = link.receive(end.sooner(0.2))
+        data += read.data if read else b""
+    return data
+
+
+def test_a_deadline_is_kept_where_nothing_comes(terminal: PseudoTerminal) -> None:
+    serial = SerialLink(terminal.path)
+    bus = CanLink("virtual", "deadline")
+    for link in (serial, bus):
+        start = time.monotonic()
+        read = link.receive(Deadline.after(0.1))
+        assert read is not None
+        assert read.data == b""
+        assert 0.05 < time.monotonic() - start < 2.0
+        link.close()
+
+
+def test_a_serial_port_is_opened_once(terminal: PseudoTerminal) -> None:
+    link = SerialLink(terminal.path)
+    with pytest.raises(LinkError, match=r"the port cannot be opened"):
+        SerialLink(terminal.path)
+    link.close()
+
+
+def test_an_adapter_is_opened_to_listen_and_its_lines_are_read(terminal: PseudoTerminal) -> None:
+    link = SlcanLink(terminal.path, 1_000_000, 5_000_000)
+    assert os.read(terminal._master, 100) == b"\r\rC\rS8\rY5\rM1\rO\r"
+    sent = some_frames(300, 2)
+    threading.Thread(target=terminal.send, args=(b"\r" + b"".join(encode(sent)),)).start()
+    data = gathered(link, lambda d: d.count(b"\r") > 300)
+    assert keys(SlcanDecoder(Keep(), LineCounts()).frames_of(data)) == keys(sent)
+    link.close()
+
+
+@pytest.mark.parametrize(("rates", "transmit", "opening"), [
+    ((500_000, None), False, b"\r\rC\rS6\rL\r"), ((500_000, None), True, b"\r\rC\rS6\rO\r"),
+    ((500_000, 2_000_000), True, b"\r\rC\rS6\rY2\rM0\rO\r"),
+])  # fmt: skip
+def test_transmission_must_be_asked_for(
+    terminal: PseudoTerminal, rates: tuple[int, int | None], transmit: bool, opening: bytes
+) -> None:
+    link = SlcanLink(terminal.path, *rates, transmit=transmit)
+    assert os.read(terminal._master, 100) == opening
+    link.close()
+    bus = CanLink("virtual", "silent")
+    with pytest.raises(LinkError, match=r"it was opened to listen"):
+        bus.send(fd_frames(1))
+    bus.close()
+
+
+def test_a_rate_that_slcan_does_not_know_is_refused(terminal: PseudoTerminal) -> None:
+    with pytest.raises(DeviceError, match=r"bit rate 8000000; slcan knows 2000000, 5000000"):
+        SlcanLink(terminal.path, 1_000_000, 8_000_000)
+
+
+def test_frames_of_a_virtual_bus_arrive_packed_and_in_order() -> None:
+    link = PortPlan("can:virtual:order", data_bitrate=2_000_000).open()
+    sender = can.Bus(interface="virtual", channel="order", protocol=can.CanProtocol.CAN_FD)
+    sent = fd_frames(200)
+    for row in range(200):
+        sender.send(message_of(sent, row))
+    sender.send(can.Message(arbitration_id=1, is_error_frame=True))
+    seen: list[CanBatch] = []
+    end = Deadline.after(PATIENCE)
+    while sum(map(len, seen)) < 200 and not end.expired:
+        read = link.receive(end)
+        if read is not None and (batch := unpack(read.data)) is not None:
+            seen.append(batch)
+    np.testing.assert_array_equal(np.concatenate([b.data for b in seen]), sent.data)
+    np.testing.assert_array_equal(np.concatenate([b.identifier for b in seen]), sent.identifier)
+    sender.shutdown()
+    link.close()
+
+
+def serve(server: socket.socket, frames: list[tuple[int, bytes]]) -> None:
+    """A socketcand server that knows just enough, and then hangs up."""
+    connection, _ = server.accept()
+    with connection:
+        connection.sendall(b"< hi >")
+        for answer in (b"< ok >", b"< ok >"):
+            connection.recv(200)
+            connection.sendall(answer)
+        for identifier, data in frames:
+            line = f"< frame {identifier:X} 1.000000 {data.hex().upper()} >"
+            connection.sendall(line.encode())
+        time.sleep(0.3)
+
+
+def test_a_socketcand_server_is_read_and_its_end_is_told() -> None:
+    frames = [(0x120 + i % 4, bytes([i] * 8)) for i in range(40)]
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        thread = threading.Thread(target=serve, args=(server, frames))
+        thread.start()
+        options = ("host=127.0.0.1", f"port={server.getsockname()[1]}")
+        link = PortPlan("can:socketcand:can0", options=options).open()
+        seen: list[tuple[int, bytes]] = []
+        end = Deadline.after(PATIENCE)
+        while len(seen) < 40 and not end.expired:
+            read = link.receive(end)
+            batch = None if read is None else unpack(read.data)
+            if batch is not None:
+                seen += [(int(i), d.tobytes()) for i, d in zip(batch.identifier, batch.data[:, :8],
+                                                               strict=True)]  # fmt: skip
+        assert seen == frames
+        thread.join()
+        with pytest.raises(UnpluggedError, match=r"the bus went away .*hung up"):
+            events_of(link, PATIENCE, BACK)
+        link.close()
+
+
+@pytest.mark.skipif(not hasattr(socket, "AF_CAN"), reason="this system has no AF_CAN")
+def test_a_missing_can_interface_is_told() -> None:
+    with pytest.raises(LinkError, match=r"can:socketcan:none9: the bus cannot be opened"):
+        PortPlan("can:socketcan:none9").open()
+
+
+@pytest.mark.parametrize(("typed", "message"), [
+    ("can:nonsense:0", r"interfaces are .*socketcan"), ("can:virtual", r"no channel"),
+    ("slcan:/dev/none", r"the port cannot be opened"), ("/dev/none", r"the port cannot be opened"),
+])  # fmt: skip
+def test_a_port_that_is_none_says_so(typed: str, message: str) -> None:
+    with pytest.raises((LinkError, DeviceError), match=message):
+        PortPlan(typed).open()
+
+
+def events_of(link: Link, seconds: float, until: str) -> tuple[list[str], bytes]:
+    events, data, end = [], b"", Deadline.after(seconds)
+    while not end.expired and until not in events:
+        read = link.receive(end.sooner(0.1))
+        if read is None:
+            break
+        events += [read.event] if read.event else []
+        data += read.data
+    return events, data
+
+
+def test_a_cable_that_is_pulled_and_plugged_in_comes_back_soon(tmp_path: Path) -> None:
+    name = tmp_path / "port"
+    port = PseudoTerminal(name)
+    link = ReconnectingLink(lambda: SerialLink(str(name)), PATIENCE)
+    for cycle in range(3):
+        port.send(b"before")
+        assert gathered(link, lambda d: b"before" in d) == b"before"
+        port.close()
+        assert events_of(link, 2.0, LOST)[0] == [LOST]
+        assert events_of(link, 0.15 * cycle, BACK)[0] == []
+        port = PseudoTerminal(name)
+        start = time.monotonic()
+        assert events_of(link, PATIENCE, BACK)[0] == [BACK]
+        assert time.monotonic() - start < LONGEST_WAIT
+    link.close()
+    port.close()
+
+
+def test_a_port_that_stays_away_ends_with_its_loss(tmp_path: Path) -> None:
+    name = tmp_path / "port"
+    port = PseudoTerminal(name)
+    link = ReconnectingLink(lambda: SerialLink(str(name)), 0.3)
+    port.close()
+    with pytest.raises(UnpluggedError, match=r"the port went away"):
+        events_of(link, PATIENCE, BACK)
+    link.close()
+
+
+class Failing:
+    """A link that cannot be opened a few times."""
+
+    name, live, encoding = "bus", True, "can"
+
+    def __init__(self, failures: int) -> None:
+        self.left, self.opened = failures, []
+
+    def open(self) -> "Failing":
+        self.opened.append(time.monotonic())
+        if len(self.opened) > 1 and self.left:
+            self.left -= 1
+            raise LinkError("still away")
+        return self
+
+    def receive(self, deadline: Deadline) -> Read | None:
+        if len(self.opened) == 1:
+            raise UnpluggedError("gone")
+        return Read(0, b"x")
+
+    def close(self) -> None:
+        pass
+
+    def overruns(self) -> int:
+        return 3
+
+
+def test_attempts_lie_farther_and_farther_apart() -> None:
+    failing = Failing(3)
+    link = ReconnectingLink(failing.open, PATIENCE)
+    assert events_of(link, PATIENCE, BACK)[0] == [LOST, BACK]
+    waits = np.diff(failing.opened)
+    np.testing.assert_allclose(waits[1:], [0.2, 0.4, 0.8], atol=0.15)  # a busy machine is late
+    assert link.overruns() == 6
+    link.close()

@@ -1,0 +1,64 @@
+"""An unknown FMU does not run; ours and those that the user trusts do."""
+
+import shutil
+import zipfile
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from bench.cli import program
+from bench.errors import FmuError
+from bench.fmu_archive import read_fmu
+from bench.trust import check_trust, how_known, trust_list
+from tests.bench.conftest import build_toy
+from tirelib.estimators.calibration import Calibration
+from tirelib.estimators.calibration_file import write_calibration
+from tirelib.fmu.build import build_fmu
+
+
+@pytest.fixture(scope="module")
+def ours(calibration: Calibration, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("ours")
+    write_calibration(calibration, folder / "cal.toml")
+    return build_fmu(folder / "cal.toml", folder / "x.fmu", samples_per_step=4)
+
+
+def test_what_this_tirelib_builds_is_known(ours: Path) -> None:
+    assert how_known(read_fmu(ours)) == "as this tirelib builds it"
+
+
+def altered(fmu: Path, out: Path, name: str, data: bytes) -> Path:
+    """Return a copy with one file changed or added."""
+    with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(out, "w") as target:
+        for entry in source.infolist():
+            if entry.filename != name:
+                target.writestr(entry, source.read(entry))
+        target.writestr(name, data)
+    return out
+
+
+@pytest.mark.parametrize("name", [
+    "binaries/linux64/StrainTire.so", "resources/slavemodule.txt", "resources/evil.py",
+    "resources/settings.json", "resources/calibration.toml", "modelDescription.xml",
+])  # fmt: skip
+def test_a_changed_copy_of_ours_is_unknown(ours: Path, tmp_path: Path, name: str) -> None:
+    copy = altered(ours, tmp_path / "y.fmu", name, b"{}")
+    assert how_known(read_fmu(copy)) is None
+    with pytest.raises(FmuError, match=r"sha256 [0-9a-f]{64} is unknown; .*--trust once"):
+        check_trust(read_fmu(copy), trust=False)
+
+
+def test_a_foreign_fmu_runs_only_when_trusted_and_is_then_remembered(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    toy = build_toy(tmp_path, 3)
+    words = ["run", "--replay", str(tmp_path / "none.mcap"), "--fmu", str(toy)]
+    refused = CliRunner().invoke(program, words)
+    assert isinstance(refused.exception, FmuError)
+    assert "is unknown" in str(refused.exception)
+    archive = read_fmu(toy)
+    assert check_trust(archive, trust=True) == "trusted from now on, by --trust"
+    assert how_known(read_fmu(shutil.copy(toy, tmp_path / "z.fmu"))) is not None
+    assert archive.sha256 in trust_list().read_text()

@@ -1,0 +1,183 @@
+"""Another make's transmitter: its DBC or a list of signals is enough."""
+
+from pathlib import Path
+
+import cantools
+import numpy as np
+import pytest
+
+from bench.can_batch import joined, same_kind
+from bench.chain import Chain, Outputs
+from bench.conditions import Condition, Conditions, Held, Measured
+from bench.errors import DeviceError
+from bench.protocols import CAN
+from bench.protocols.plan import ProtocolPlan
+from bench.protocols.user_can import UserCan
+from bench.protocols.user_map import parse_map, read_map
+from bench.timeline import Timeline
+from tirelib.arrays import FloatArray
+
+DBC = """VERSION ""
+BU_: W
+BO_ 529 WHEEL_FL: 12 W
+ SG_ g1 : 7|16@0- (0.5,10) [0|0] "ustrain" W
+ SG_ g2 : 23|16@0- (0.5,10) [0|0] "ustrain" W
+ SG_ g3 : 39|16@0- (0.5,10) [0|0] "ustrain" W
+ SG_ g4 : 55|16@0- (0.5,10) [0|0] "ustrain" W
+ SG_ g5 : 71|16@0- (0.5,10) [0|0] "ustrain" W
+ SG_ stamp : 80|8@1+ (1,0) [0|0] "ms" W
+ SG_ count : 88|8@1+ (1,0) [0|0] "" W
+BO_ 700 ABS: 8 W
+ SG_ v_ref : 0|16@1+ (0.01,0) [0|0] "km/h" W
+"""
+MAP = """
+format = "tirebench-map/1"
+dbc = "wheel.dbc"
+rate_hz = 1000
+strain_unit = "ustrain"
+[[wheel]]
+wheel = 2
+message = "WHEEL_FL"
+samples = [["g1", "g2", "g3", "g4", "g5"]]
+counter = "count"
+time = "stamp"
+time_unit = "ms"
+[speed]
+message = "ABS"
+signal = "v_ref"
+unit = "km/h"
+"""
+LISTED = """
+format = "tirebench-map/1"
+rate_hz = 2000
+[[wheel]]
+wheel = 0
+message = "A"
+samples = [["a", "b", "c", "d", "e"]]
+counter = "n"
+[[message]]
+name = "A"
+id = 0x210
+length = 8
+signals = [
+  { name = "a", start = 0, length = 10 }, { name = "b", start = 10, length = 10 },
+  { name = "c", start = 20, length = 10 }, { name = "d", start = 30, length = 10 },
+  { name = "e", start = 40, length = 10 }, { name = "n", start = 52, length = 12 },
+]
+"""
+
+
+def physical(count: int) -> np.ndarray:
+    """Strain in microstrain, in steps of the signal."""
+    return 0.5 * (np.arange(count)[:, None] * 7 % 4001 - 2000 + np.arange(5)) + 10.0
+
+
+def frames_of(values: np.ndarray) -> np.ndarray:
+    message = cantools.database.load_string(DBC, "dbc").get_message_by_name("WHEEL_FL")
+    rows = []
+    for i, row in enumerate(values):
+        signals = {f"g{g + 1}": row[g] for g in range(5)}
+        rows.append(message.encode({**signals, "stamp": i % 256, "count": i % 256}))
+    return np.frombuffer(b"".join(rows), np.uint8).reshape(-1, 12)
+
+
+def test_a_dbc_and_a_map_are_enough(tmp_path: Path) -> None:
+    (tmp_path / "wheel.dbc").write_text(DBC)
+    (tmp_path / "m.toml").write_text(MAP)
+    plan = ProtocolPlan(CAN, 1000.0, read_map(tmp_path / "m.toml"))
+    again = ProtocolPlan.of_header(plan.as_header(), "x")  # as a recording keeps it
+    sent = physical(600)
+    for which in (plan, again):
+        decoder = UserCan(which.user_map, which.decoder().counts)
+        timeline = Timeline(which.device, 2)
+        batch = same_kind(529, frames_of(sent), fd=True)
+        items = [i for rows in np.array_split(np.arange(600), 5)
+                 for i in decoder.push(batch.take(rows), int(rows[-1]) * 1_000_000)]  # fmt: skip
+        blocks = [b for item in items for b in timeline.push(item)]
+        strain = np.concatenate([b.strain for b in blocks])
+        np.testing.assert_allclose(1e6 * strain, sent, atol=1e-9)
+        assert timeline.counts.gaps == 0
+
+
+def test_signals_may_be_listed_without_a_dbc() -> None:
+    user = parse_map(LISTED, "", "m.toml")
+    assert user.wheels[0].strain[1].start == 10
+    counts = np.arange(50)[:, None] + np.arange(5)
+    words = [sum(int(c) << (10 * g) for g, c in enumerate(row)) | i << 52
+             for i, row in enumerate(counts)]  # fmt: skip
+    data = np.frombuffer(b"".join(w.to_bytes(8, "little") for w in words), np.uint8).reshape(-1, 8)
+    frames = UserCan(user, ProtocolPlan(CAN, 2e3, user).decoder().counts).push(
+        same_kind(0x210, data, fd=False), 0
+    )
+    np.testing.assert_array_equal(frames[0].counts[:, 0], counts)
+    assert frames[0].t_us.tolist()[:3] == [0, 500, 1000]
+
+
+class Speeds:
+    """An estimator that notes the speed of every sample."""
+
+    samples = 16
+
+    def __init__(self) -> None:
+        self.seen: list[float] = []
+
+    def start(self, period: float) -> None:
+        pass
+
+    def step(self, strain: FloatArray, conditions: Condition, valid: bool) -> Outputs | None:
+        self.seen += [conditions[0]] * len(strain)
+        return None
+
+
+@pytest.mark.parametrize("reads", [1, 3, 50])
+def test_a_speed_on_the_bus_holds_from_the_sample_after_it(reads: int) -> None:
+    user = parse_map(MAP, DBC, "m.toml")
+    strain = same_kind(529, frames_of(physical(100)), fd=True)
+    speed = np.zeros((2, 8), np.uint8)
+    speed[:, :2] = np.array([3600, 7200], "<u2").view(np.uint8).reshape(2, 2)
+    told = same_kind(700, speed, fd=True)
+    rows = np.arange(100)
+    batch = joined([strain.take(rows[:10]), told.take(rows[:1]), strain.take(rows[10:61]),
+                    told.take(rows[1:2]), strain.take(rows[61:])])  # fmt: skip
+    plan, speeds = ProtocolPlan(CAN, 1e3, user), Speeds()
+    chain = Chain(speeds, plan.device, Conditions.constant(5.0), 2)
+    decoder = UserCan(user, chain.line.counts)
+    for part in np.array_split(np.arange(102), reads):
+        chain.take(decoder.push(batch.take(part), 10**6 * int(part[-1])))
+    chain.finish()
+    assert speeds.seen == [5.0] * 10 + [10.0] * 51 + [20.0] * 39
+
+
+def test_what_is_held_is_bounded_and_the_newest_counts() -> None:
+    held = Held(Conditions.constant(1.0, 2e5, 0.0))
+    for i in range(1000):
+        held.tell(1000 * i, Measured("speed", float(i)))
+    assert held.at(999_500) == (999.0, 2e5, 0.0)
+    assert held.next_change(998_500) == 999_000
+    assert len(held._told) < 300
+
+
+@pytest.mark.parametrize(("change", "message"), [
+    (('"tirebench-map/1"', '"x/1"'), "'x/1'; 'tirebench-map/1' is understood"),
+    (("rate_hz = 1000", "rate_hz = 1"), "rate_hz = 1; 153 .. 200000 Hz"),
+    (('"g5"', '"g9"'), "signal = 'g9'; WHEEL_FL has the integer signals g1"),
+    (('"WHEEL_FL"', '"FR"'), "message = 'FR'; known are ABS, WHEEL_FL"),
+    (('time = "stamp"', ""), "time_unit|wraps after 256"),
+    (('"ms"', '"bar"'), "time_unit = 'bar'; a unit of time is needed"),
+    (('strain_unit = "ustrain"', 'strain_unit = "N"'), "a unit of strain is needed"),
+    (('unit = "km/h"', 'unit = "N"'), "a unit of speed is needed"),
+    (("[speed]", "[sped]"), "sped is not known"),
+])  # fmt: skip
+def test_a_wrong_map_says_what_is_wrong(change: tuple[str, str], message: str) -> None:
+    if change[0] == 'time = "stamp"':
+        text = MAP.replace('counter = "count"', "").replace('time = "stamp"', "")
+        message = "counter or time is needed"
+    else:
+        text = MAP.replace(*change)
+    with pytest.raises(DeviceError, match=message):
+        parse_map(text, DBC, "m.toml")
+
+
+def test_a_counter_that_wraps_too_soon_needs_a_time() -> None:
+    with pytest.raises(DeviceError, match=r"it wraps after 8 ms, 100 ms are needed"):
+        parse_map(LISTED.replace("length = 12", "length = 4"), "", "m.toml")
