@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: all demo test lint types contracts docs bench rig figures fem proof clean
+.PHONY: all demo test lint types contracts docs bench rig figures fem proof hidden faults clean
 
 all: $(STAMP)
 
@@ -47,6 +47,14 @@ fem: $(STAMP)
 # Coverage of the identification's intervals on random tires of the numerical rig; an hour.
 proof: $(STAMP)
 	$(BIN)/python build/proof/run.py
+
+# Hides effects in the rig, lets the library find them, and counts; hours, but resumable and cached.
+hidden: $(STAMP)
+	$(BIN)/python build/hidden/run.py
+
+# A million damaged frames on a serial line: none may pass, few good ones may be lost.
+faults: $(STAMP)
+	$(BIN)/python build/bench_faults.py
 
 clean:
 	rm -rf build/out .pytest_cache .mypy_cache .ruff_cache

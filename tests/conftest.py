@@ -10,6 +10,7 @@ settings.register_profile(
     "default", deadline=None, suppress_health_check=[HealthCheck.too_slow], max_examples=40
 )
 settings.load_profile("default")
+os.environ["TIRELIB_CACHE"] = "off"  # no ensemble of an earlier version, none left behind
 
 
 @pytest.fixture(scope="session")

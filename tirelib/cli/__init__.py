@@ -18,12 +18,15 @@ VERBS = (
     "identify",
     "compare",
     "diagnose",
+    "next-test",
     "add",
+    "selftest",
     "simulate",
     "fmu",
     "rig",
 )
-"""Verbs; each is the command of that name in the module of that name (`import_` for import)."""
+"""Verbs; each is the command of that name in the module of that name (`import_` for import, `_` in
+place of `-`)."""
 
 _EXAMPLE = """\b
 Examples:
@@ -50,7 +53,7 @@ class Verbs(click.Group):
         """Import and return one verb."""
         if cmd_name not in VERBS:
             return None
-        name = f"{cmd_name}_" if iskeyword(cmd_name) else cmd_name
+        name = f"{cmd_name}_" if iskeyword(cmd_name) else cmd_name.replace("-", "_")
         command = getattr(import_module(f"tirelib.cli.{name}"), name)
         return command if isinstance(command, click.Command) else None
 

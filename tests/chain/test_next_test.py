@@ -1,0 +1,166 @@
+"""`tirelib next-test` and `tirelib selftest`: keys, files, exit codes, messages."""
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+from tests.unit.diagnose.planted import EFFECT, STRENGTH, model_file, waves
+from tirelib.cli import program
+from tirelib.errors import TirelibError
+from tirelib.parameters import write_tire
+from tirelib.waveforms import Waveforms
+
+
+class Folder:
+    """Stands in for a campaign's files; the waveforms are the model's own."""
+
+    def __init__(self, measured: Waveforms) -> None:
+        self.measured, self.header = measured, measured.header
+
+
+@pytest.fixture(autouse=True)
+def campaign(monkeypatch: pytest.MonkeyPatch) -> None:
+    use(monkeypatch, waves(EFFECT, STRENGTH))
+
+
+def use(patch: pytest.MonkeyPatch, measured: Waveforms) -> None:
+    for verb in ("next_test", "selftest"):
+        patch.setattr(f"tirelib.cli.{verb}.read_campaign", lambda path: Folder(measured))
+    patch.setattr("tirelib.waveforms.measure_waveforms", lambda c, progress: c.measured)
+
+
+def call(*words: object) -> Result:
+    return CliRunner().invoke(program, list(map(str, words)))
+
+
+def refused(*words: object) -> str:
+    found = call(*words)
+    assert isinstance(found.exception, TirelibError), found.output
+    return str(found.exception)
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("models") / "M.toml"
+    write_tire(model_file(), path, "tirelib-model/1")
+    return path
+
+
+@pytest.fixture(scope="module")
+def planned(model: Path) -> Any:
+    with pytest.MonkeyPatch.context() as patch:
+        use(patch, waves(EFFECT, STRENGTH))
+        out, target = model.parent / "next", model.parent / "N.json"
+        found = call(
+            "next-test", "anywhere", "--model", model, "--suspects", f"{EFFECT}, temperature",
+            "--load-range", 2000, 6500, "--speed-range", 54, 54, "--out", out, "--json", target,
+        )  # fmt: skip
+    assert found.exit_code == 0, found.output
+    return SimpleNamespace(told=json.loads(target.read_text()), out=out, said=found.output)
+
+
+def diagnosis(folder: Path, **changes: Any) -> Path:
+    told = {
+        "format": "tirelib-diagnosis/1", "quantity": "strain", "verdict": "none", "named": [],
+        "candidates": [], "has": [],
+    }  # fmt: skip
+    file = folder / "D.json"
+    file.write_text(json.dumps(told | changes))
+    return file
+
+
+def test_the_contracts_keys_are_there(planned: Any) -> None:
+    told = planned.told
+    assert told["format"] == "tirelib-next-test/1"
+    assert told["quantity"] == "strain"
+    for entry in told["candidates"]:
+        assert set(entry) >= {
+            "load_N", "pressure_bar", "speed_kmh", "separation", "resolves_probability", "pair"
+        }  # fmt: skip
+    assert told["best"] == told["candidates"][0]
+    assert {e["effect"] for e in told["suspects"]} == {EFFECT, "temperature"}
+    assert told["envelope"]["declared"] == ["load", "speed"]
+    assert told["envelope"]["load_N"] == [2000.0, 6500.0]
+    assert all(entry["speed_kmh"] == pytest.approx(54.0) for entry in told["candidates"])
+    assert set(told["repeats"]) >= {"of_best", "limit", "separation", "wanted_separation"}
+
+
+def test_the_planted_effect_is_preferred_and_that_is_said(planned: Any) -> None:
+    (present,) = planned.told["present"]
+    assert present["better"] == EFFECT
+    assert present["resolved"]
+    assert f"the present runs tell {EFFECT} from temperature already" in planned.said
+
+
+def test_the_report_is_one_page_and_the_same_in_words(planned: Any) -> None:
+    page = (planned.out / "next_test.html").read_text()
+    words = (planned.out / "next_test.md").read_text()
+    assert json.loads((planned.out / "next_test.json").read_text()) == planned.told
+    assert 'src="http' not in page
+    for plot in (f"separation-{EFFECT}-temperature", "repeats"):
+        assert f'id="plot-{plot}"' in page
+    for text in ("Runs by rank", "widened to both sides: pressure by 15 %", "T-optimum"):
+        assert text in page
+        assert text in words
+
+
+def test_where_nothing_is_in_doubt_the_list_is_empty_and_the_exit_code_zero(
+    model: Path, tmp_path: Path
+) -> None:
+    file, target = diagnosis(tmp_path), tmp_path / "N.json"
+    found = call(
+        "next-test", "x", "--model", model, "--diagnosis", file, "--json", target,
+        "--out", tmp_path / "page",
+    )  # fmt: skip
+    assert found.exit_code == 0, found.output
+    told = json.loads(target.read_text())
+    assert told["candidates"] == []
+    assert told["verdict"] == "none"
+    assert "nothing is in doubt" in found.output
+    assert (tmp_path / "page" / "next_test.html").exists()
+
+
+def test_bad_input_is_told(model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = ("next-test", "x", "--model", model)
+    assert "strain only" in refused(*run, "--quantity", "Fy")
+    assert "both given" in refused(*run, "--suspects", "low_pass", "--diagnosis", "D.json")
+    assert "'lowpass' is not known" in refused(*run, "--suspects", "lowpass")
+    assert "load 7000 to 2000" in refused(
+        *run, "--suspects", "low_pass", "--load-range", 7000, 2000
+    )
+    (tmp_path / "D.json").write_text("{oops")
+    assert "cannot be read as JSON" in refused(*run, "--diagnosis", tmp_path / "D.json")
+    (tmp_path / "D.json").write_text("[1]")
+    assert "'tirelib-diagnosis/1' is needed" in refused(*run, "--diagnosis", tmp_path / "D.json")
+    other = diagnosis(tmp_path, has=["camber"])
+    assert "diagnose this model" in refused(*run, "--diagnosis", other)
+    force = diagnosis(tmp_path, quantity="Fy")
+    assert "strain only" in refused(*run, "--diagnosis", force)
+    test = ("selftest", "x", "--model", model)
+    assert "'oops' is not known" in refused(*test, "--effects-of", "oops")
+    assert call(*test, "--ratio", 0.9).exit_code == 2
+    use(monkeypatch, waves().take(waves().run < 3))
+    assert "at least 4" in refused(*test)
+    assert "at least 4" in refused(*run, "--suspects", "low_pass")
+
+
+def test_a_selftest_tells_chances_on_page_and_screen(model: Path, tmp_path: Path) -> None:
+    found = call(
+        "selftest", "x", "--model", model, "--effects-of", "low_pass", "--ratio", 1.1,
+        "--repeats", 2, "--members", 8, "--out", tmp_path, "--json", tmp_path / "S.json",
+    )  # fmt: skip
+    assert found.exit_code == 0, found.output
+    told = json.loads((tmp_path / "S.json").read_text())
+    assert told["format"] == "tirelib-selftest/1"
+    assert [entry["effect"] for entry in told["effects"]] == ["low_pass"]
+    assert told["effects"][0]["results"][0]["n"] == 2
+    page, words = (tmp_path / "selftest.html").read_text(), (tmp_path / "selftest.md").read_text()
+    assert 'id="plot-chance"' in page
+    for text in ("optimistic", "Dead effects", "no run has a camber"):
+        assert text in page
+        assert text in words
+        assert text in found.output or text == "Dead effects"

@@ -1,0 +1,205 @@
+"""Laws of the criterion, and a case that the advised run resolves."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.unit.planning.made import NOISE, PLANTED, STRENGTH, TWIN, case, joined, measured, planned
+from tirelib.diagnose.refit import refit
+from tirelib.effects import CATALOGUE
+from tirelib.errors import ParameterError
+from tirelib.planning.candidate_runs import Forecast, Noise
+from tirelib.planning.document import Plan, advice, plan_document
+from tirelib.planning.envelope import Envelope, operating_at
+from tirelib.planning.next_test import ENDLESS, RESOLVED, next_test, resolving
+from tirelib.planning.repeats import gains
+from tirelib.planning.rivals import correlation, try_suspects
+from tirelib.planning.suspects import given_suspects
+from tirelib.planning.variants import Track
+
+SPLIT = Noise(random=2.0, staying=1.5)
+
+
+def forecast(scale: float = 1.0) -> tuple[Forecast, np.ndarray]:
+    random = np.random.default_rng(1)
+    factor = random.standard_normal((3, 3))
+    told = Forecast(
+        random.standard_normal((2, 20)), random.standard_normal((3, 2, 20)),
+        random.standard_normal((2, 20, 4)), scale * (factor @ factor.T + np.eye(3)),
+    )  # fmt: skip
+    return told, told.wave + random.standard_normal((2, 20))
+
+
+@pytest.mark.parametrize("repeats", [1.0, 3.0])
+def test_the_separation_is_the_squared_difference_in_the_metric_of_all_that_is_unsure(
+    repeats: float,
+) -> None:
+    told, other = forecast()
+    found = told.separation(other, SPLIT, repeats)
+    for p in range(2):
+        slopes, tangents = told.slopes[:, p], told.tangents[p]
+        whole = (
+            (SPLIT.staying**2 + SPLIT.random**2 / repeats) * np.eye(20)
+            + tangents @ tangents.T / repeats
+            + slopes.T @ told.covariance @ slopes
+        )
+        difference = other[p] - told.wave[p]
+        assert found[p] == pytest.approx(difference @ np.linalg.solve(whole, difference))
+
+
+def test_who_predicts_the_same_is_not_separated_and_twice_the_difference_counts_four_times() -> (
+    None
+):
+    told, other = forecast()
+    assert told.separation(told.wave, SPLIT, 1.0) == pytest.approx(0.0)
+    twice = told.wave + 2.0 * (other - told.wave)
+    once = told.separation(other, SPLIT, 1.0)
+    assert told.separation(twice, SPLIT, 1.0) == pytest.approx(4.0 * once)
+
+
+def test_a_rival_that_knows_its_numbers_less_is_harder_to_catch() -> None:
+    sharp, other = forecast(1e-6)
+    vague, _ = forecast(100.0)
+    assert (vague.separation(other, SPLIT, 1.0) < sharp.separation(other, SPLIT, 1.0)).all()
+
+
+@given(first=st.integers(1, 30), more=st.integers(1, 30))
+def test_repeats_never_harm_and_structure_limits_them(first: int, more: int) -> None:
+    told, other = forecast()
+    few, many = (told.separation(other, SPLIT, n) for n in (first, first + more))
+    limit = told.separation(other, SPLIT, ENDLESS)
+    assert (few <= many).all()
+    assert (many <= limit).all()
+
+
+@given(gap=st.floats(-9.0, 9.0), separation=st.floats(0.01, 200.0))
+def test_the_chance_to_resolve_is_a_chance_and_blind_to_names(
+    gap: float, separation: float
+) -> None:
+    one, other = (resolving(np.array([separation]), g)[0] for g in (gap, -gap))
+    assert 0.0 <= one <= 1.0 + 1e-12
+    assert one == pytest.approx(other)
+
+
+def test_a_separation_as_large_as_the_bar_resolves_every_other_time() -> None:
+    chance = resolving(np.array([RESOLVED, 4.0 * RESOLVED, 0.0]), 0.0)
+    # the wrong rival gains the bar by chance in 1 of 1000
+    assert chance[0] == pytest.approx(0.5, abs=2e-3)
+    assert chance[1] > 0.98
+    assert chance[2] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("orders", [10, 45])
+def test_noise_of_few_waves_counts_as_much_stronger_white_noise(orders: int) -> None:
+    random = np.random.default_rng(0)
+    spectrum = np.zeros((3000, 181), dtype=complex)
+    spectrum[:, 1 : orders + 1] = random.standard_normal((3000, orders, 2)) @ [1.0, 1j]
+    # cosine and sine of so many waves are independent
+    wave = np.fft.irfft(spectrum, n=360, axis=1)
+    assert correlation(wave) == pytest.approx(np.sqrt(360.0 / (2.0 * orders)), rel=0.02)
+
+
+def test_the_planted_effect_is_no_worse_than_its_twin_and_not_far_off() -> None:
+    test = planned()
+    assert [rival.name for rival in test.trial.rivals] == [TWIN, PLANTED]
+    (pair,) = test.pairs
+    # the second is planted: that the first is worse is a negative gap
+    assert pair.gap < 0.0
+    assert pair.better == PLANTED
+    planted = test.trial.rivals[1]
+    # in a tire unlike the model: the strength is right to a half
+    assert planted.strength[0] == pytest.approx(STRENGTH, rel=0.5)
+    assert planted.in_range
+
+
+def test_runs_are_ranked_and_the_best_promises_more_than_any() -> None:
+    test = planned()
+    likely = np.round(test.probability, 3)
+    assert (np.diff(likely) <= 0.0).all()
+    assert test.score[0] > 2.0 * np.median(test.score)
+    assert len(test.points) + test.dropped == len(test.envelope.grid())
+    (pair,) = test.pairs
+    assert pair.repeats[1] == pytest.approx(pair.separation[0])
+    assert pair.limit >= max(pair.repeats.values())
+
+
+def test_the_advised_run_tells_the_planted_effect_from_its_twin() -> None:
+    made, test = case(), planned()
+    assert not test.pairs[0].resolved
+    where = operating_at(test.points[:1], made.data.points)
+    track = Track.of(
+        made.variants, made.model, made.bench, where, noise=NOISE,
+        random=np.random.default_rng(9),
+    )  # fmt: skip
+    strain = track.measured([CATALOGUE[PLANTED].at(STRENGTH)], made.bench)[0]
+    data = joined(made.data, measured(made.data, where, strain))
+    suspects = [(CATALOGUE[r.name], r.strength) for r in test.trial.rivals]
+    after = try_suspects(data, refit(data, made.base.values), suspects)
+    twin, planted = after.rivals
+    assert twin.cost - planted.cost > RESOLVED
+
+
+def test_an_effect_never_fits_worse_than_none() -> None:
+    made = case()
+    suspects = [(CATALOGUE[name], np.array([0.02])) for name in (PLANTED, "tread_wear")]
+    trial = try_suspects(made.data, made.base, suspects, with_nothing=True)
+    nothing, *others = trial.rivals
+    assert others
+    # descent to the last 0.05 of chi-square
+    assert all(rival.cost <= nothing.cost + 0.05 for rival in others)
+
+
+def test_runs_beyond_the_tires_validity_are_dropped_and_counted() -> None:
+    made = case()
+    envelope = Envelope.of(made.data.points, load=(4e3, 4e4), pressure=(2e5, 2e5), speed=(20, 20))
+    suspects = [(CATALOGUE[name], np.array([0.02])) for name in (PLANTED, "gage_drift")]
+    test = next_test(made.data, made.base, suspects, envelope, noise=NOISE)
+    assert test.dropped >= 1
+    assert len(test.points) + test.dropped == 5
+    assert np.isfinite(test.score).all()
+    hopeless = replace(envelope, load=(4e4, 5e4))
+    with pytest.raises(ParameterError, match="no solution at any of its 5 runs"):
+        next_test(made.data, made.base, suspects, hopeless, noise=NOISE)
+
+
+def test_the_document_holds_the_contracts_keys_in_engineers_units() -> None:
+    test = planned()
+    plan = Plan(given_suspects([TWIN, PLANTED], [], CATALOGUE), test, {}, 20.0, "made")
+    told = plan_document(plan)
+    assert told["format"] == "tirelib-next-test/1"
+    assert told["best"] == told["candidates"][0]
+    best = told["best"]
+    assert best["load_N"] == pytest.approx(test.points[0, 0])
+    assert best["pressure_bar"] == pytest.approx(1e-5 * test.points[0, 1])
+    assert best["speed_kmh"] == pytest.approx(3.6 * test.points[0, 2])
+    assert best["separation_std"] == pytest.approx(2.0 * np.sqrt(best["separation"]))
+    assert best["pair"] == [TWIN, PLANTED]
+    assert told["random_median"]["separation"] < best["separation"]
+    assert told["envelope"]["declared"] == []
+    assert told["envelope"]["load_N"] == pytest.approx([2250.0, 7500.0])
+    assert "measure" in advice(plan)
+
+
+def test_repeats_of_the_plan_raise_what_stands_out_up_to_a_limit() -> None:
+    made = case()
+    trial = try_suspects(
+        made.data, made.base, [(CATALOGUE[PLANTED], np.array([0.02]))], with_nothing=True
+    )
+    gap = trial.rivals[0].cost - trial.rivals[1].cost
+    by = gains(trial, Noise(random=3.0, staying=4.0))[PLANTED]
+    assert gap > 0.0
+    assert by[1] == pytest.approx(gap)
+    # a variance of 9 + 16 falls to 9 / 3 + 16, and to 16 in the end
+    assert by[3] == pytest.approx(gap * 25.0 / 19.0)
+    assert by[ENDLESS] == pytest.approx(gap * 25.0 / 16.0, rel=1e-5)
+    assert gains(planned().trial, SPLIT) == {}
+
+
+def test_without_repeats_all_noise_is_taken_as_random() -> None:
+    trial = planned().trial
+    assert Noise.of(trial, np.nan) == Noise(trial.noise, 0.0)
+    split = Noise.of(trial, 0.5 * trial.noise / trial.spread)
+    assert np.hypot(split.random, split.staying) == pytest.approx(trial.noise)

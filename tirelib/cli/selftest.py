@@ -1,0 +1,160 @@
+"""``tirelib selftest``: what a diagnosis can find at this plan and noise."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from tirelib.campaign import read_campaign
+from tirelib.cli.common import CAMPAIGN, FILE, output, progress_bar, write_json
+from tirelib.errors import ParameterError
+
+_EXAMPLE = """\b
+Examples:
+  tirelib selftest build/out/straight --model build/out/M.toml
+  tirelib selftest build/out/straight --model build/out/M.toml --repeats 20 --out build/out/self
+  tirelib selftest build/out/straight --model M.toml --effects-of sidewall_load,temperature
+  tirelib selftest build/out/straight --model M.toml --effects mine.py --ratio 1.1 --ratio 1.3
+
+\b
+The error ratio is the rms residual of the fitted model with the effect planted, over that without.
+The tires are variants of the model itself: real tires differ more, so the chances are optimistic.
+Exit code: 0 done, 2 bad input.
+"""
+
+
+@click.command(epilog=_EXAMPLE)
+@click.argument("folder", metavar="CAMPAIGN", type=CAMPAIGN)
+@click.option("--model", "model_name", metavar="M.toml|NAME", required=True,
+              help="Model that `tirelib identify` or `tirelib add` wrote.")  # fmt: skip
+@click.option("--effects", "effect_files", metavar="FILE.py", type=FILE, multiple=True,
+              help="Effects of your own; may be given again.")  # fmt: skip
+@click.option("--effects-of", "names", metavar="A,B", help="Plant these only.")
+@click.option("--ratio", "ratios", metavar="X", type=click.FloatRange(min=1.0, min_open=True),
+              multiple=True, default=(1.05, 1.2, 1.5), show_default=True,
+              help="Error with the effect over that without; may be given again.")  # fmt: skip
+@click.option("--repeats", metavar="N", type=click.IntRange(min=1), default=10, show_default=True,
+              help="Tires in which each effect is planted.")  # fmt: skip
+@click.option("--members", metavar="N", type=click.IntRange(min=4), default=100,
+              show_default=True, help="Variants that the thresholds are from.")  # fmt: skip
+@click.option("--seed", metavar="N", type=click.IntRange(min=0), default=0, show_default=True,
+              help="Of the variants.")  # fmt: skip
+@click.option("--out", "out", metavar="DIR", type=click.Path(path_type=Path, file_okay=False),
+              help="Write selftest.html, selftest.md and selftest.json.")  # fmt: skip
+@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write the numbers as JSON.")
+def selftest(
+    folder: Path,
+    model_name: str,
+    effect_files: tuple[Path, ...],
+    names: str | None,
+    ratios: tuple[float, ...],
+    repeats: int,
+    members: int,
+    seed: int,
+    out: Path | None,
+    json_file: Path | None,
+) -> None:
+    """Plant each effect at the plan and noise of CAMPAIGN and tell the chance of finding it."""
+    from tirelib.compare.model import model_of
+    from tirelib.effects.load import all_effects
+    from tirelib.identify.campaign_data import straight_runs
+    from tirelib.parameters import read_tire
+    from tirelib.planning.selftest import selftest as test_plan
+    from tirelib.planning.selftest_document import selftest_document
+    from tirelib.waveforms import measure_waveforms
+
+    catalogue = all_effects(effect_files)
+    model = model_of(read_tire(model_name), catalogue)
+    used = [each for each in model.used if each.effect.hook != "brush"]
+    only = _only(names, [each.effect.name for each in used], catalogue)
+    campaign = read_campaign(folder)
+    with progress_bar("planting") as progress:
+        runs = straight_runs(measure_waveforms(campaign, progress=progress))
+        found = test_plan(
+            runs, model.values, list(catalogue.values()),
+            effects=[each.effect for each in used],
+            strengths=[np.atleast_1d(np.asarray(each.strength, dtype=float)) for each in used],
+            only=only, ratios=tuple(dict.fromkeys(ratios)), repeats=repeats, members=members,
+            seed=seed, progress=progress,
+        )  # fmt: skip
+    document = selftest_document(found)
+    _say(document)
+    console = output()
+    targets = [path for path in (json_file, out and out / "selftest.json") if path]
+    if out is not None:
+        from tirelib.report.selftest import write_selftest
+
+        for path in write_selftest(document, out):
+            console.print(f"written: {path}")
+    for path in targets:
+        write_json(path, document)
+        console.print(f"written: {path}")
+
+
+def _only(names: str | None, has: list[str], catalogue: Any) -> list[str]:
+    """Return the effects to plant, none for all.
+
+    Raises
+    ------
+    ParameterError
+        If a name is unknown, or the model has the effect; with every fault.
+    """
+    if names is None:
+        return []
+    chosen = [name.strip() for name in names.split(",")]
+    faults = [f"{name!r} is not known" for name in chosen if name not in catalogue]
+    faults += [f"the model has {name} already" for name in chosen if name in has]
+    if faults:
+        raise ParameterError(
+            f"--effects-of: {'; '.join(faults)}; give other names, known are {', '.join(catalogue)}"
+        )
+    return chosen
+
+
+def _say(document: dict[str, Any]) -> None:
+    console = output()
+    alarms = document["false_alarms"]
+    console.print(
+        f"{document['campaign']}, strain: chance of finding a planted effect, "
+        f"{document['repeats']} tires each"
+    )
+    for entry in document["summary"]:
+        if entry["n"]:
+            console.print(
+                f"  error ratio {entry['ratio']:g}: found {100 * entry['found']:.0f} %, another "
+                f"named {100 * entry['wrong']:.0f} % ({entry['n']} plantings of "
+                f"{entry['effects']} effects)"
+            )
+    console.print(
+        f"  nothing planted: false alarm in {100 * alarms['share']:.0f} % of {alarms['n']} tires"
+    )
+    table = Table(box=SIMPLE_HEAD)
+    table.add_column("effect")
+    for ratio in document["ratios"]:
+        table.add_column(f"at {ratio:g}", justify="right")
+        table.add_column("wrong", justify="right")
+    table.add_column("end of range", justify="right")
+    table.add_column("twins")
+    for entry in document["effects"]:
+        cells: list[str] = []
+        for result in entry["results"]:
+            cells += _cells(result)
+        table.add_row(
+            entry["effect"], *cells, f"{entry['largest_ratio']:.3g}",
+            ", ".join(f"{t['effect']} {t['angle_deg']:.0f} deg" for t in entry["twins"]),
+        )  # fmt: skip
+    console.print(table)
+    for name, why in document["dead"].items():
+        console.print(f"  dead: {name}: {why}")
+    console.print(f"  {document['note']}")
+
+
+def _cells(result: dict[str, Any]) -> list[str]:
+    if not result["reachable"]:
+        return ["beyond range", "-"]
+    if not result["n"]:
+        return ["no solution", "-"]
+    return [f"{100 * result['found']:.0f} %", f"{100 * result['wrong']:.0f} %"]

@@ -1,0 +1,316 @@
+"""The next test as JSON, and in words."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tirelib.diagnose.refit import Refit, refit
+from tirelib.effects import Effect
+from tirelib.identify.waveform_fit import Data
+from tirelib.planning.envelope import LEVELS, WIDER, Envelope
+from tirelib.planning.next_test import RESOLVED, WANTED, NextTest, PairForecast, next_test
+from tirelib.planning.repeats import ENDLESS, gains
+from tirelib.planning.rivals import NOTHING
+from tirelib.planning.suspects import Suspects, suspects_of
+from tirelib.units import to_si
+
+BAR = to_si(1.0, "bar", "pressure")
+KMH = to_si(1.0, "km/h", "speed")
+FORMAT = "tirelib-next-test/1"
+PROMISING = 0.5
+"""Chance of ruling a suspect out below which a run is not advised without a warning."""
+NONE = "nothing is in doubt: no effects that this campaign leaves apart to be told"
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A next test with what it is for.
+
+    Attributes
+    ----------
+    suspects : Suspects
+    test : NextTest or None
+        None where nothing is in doubt.
+    gains : mapping
+        What repeating the plan does for weak effects (`tirelib.planning.repeats.gains`).
+    wanted : float
+        Separation asked for.
+    campaign : str
+    """
+
+    suspects: Suspects
+    test: NextTest | None
+    gains: Mapping[str, Mapping[float, float]]
+    wanted: float
+    campaign: str
+
+
+def plan_test(
+    data: Data,
+    base: Refit | None,
+    suspects: Suspects,
+    envelope: Envelope,
+    *,
+    noise: float,
+    campaign: str = "",
+    wanted: float = WANTED,
+    progress: Callable[[str], None] | None = None,
+) -> Plan:
+    """Judge the runs of an envelope for suspects.
+
+    Parameters
+    ----------
+    data : Data
+    base : Refit or None
+        The model, fitted; needed if there are suspects.
+    suspects : Suspects
+    envelope : Envelope
+    noise : float, [-]
+        Of a run's waveform, from repeats; NaN without.
+    campaign : str
+        Its name.
+    wanted : float
+        Separation for which repeats are counted.
+    progress : callable, optional
+
+    Raises
+    ------
+    ConvergenceError
+        If the model with undoubted effects cannot be fitted.
+    ParameterError
+        If no run in the envelope has a solution.
+    """
+    if not suspects.effects or base is None:
+        return Plan(suspects, None, {}, wanted, campaign)
+    if suspects.beside:
+        base = refit(
+            data, base.values, [*base.effects, *(effect for effect, _ in suspects.beside)],
+            [*base.strengths, *(strength for _, strength in suspects.beside)], progress=progress,
+        )  # fmt: skip
+    test = next_test(
+        data, base, suspects.effects, envelope, noise=noise, with_nothing=suspects.with_nothing,
+        progress=progress,
+    )  # fmt: skip
+    return Plan(suspects, test, gains(test.trial, test.noise), wanted, campaign)
+
+
+def next_test_document(
+    told: Mapping[str, Any],
+    data: Data,
+    base: Refit,
+    catalogue: Mapping[str, Effect],
+    *,
+    noise: float,
+    progress: Callable[[str], None] | None = None,
+) -> dict[str, Any]:
+    """Return the next test for a diagnosis, as ``tirelib-next-test/1``.
+
+    Parameters
+    ----------
+    told : mapping
+        The diagnosis as JSON.
+    data : Data
+    base : Refit
+        Of the diagnosis.
+    catalogue : mapping of name to Effect
+    noise : float, [-]
+        From repeats; NaN without.
+    progress : callable, optional
+
+    Raises
+    ------
+    TirelibError
+        As `plan_test`; and if the campaign tells no speed.
+    """
+    suspects = suspects_of(told, catalogue)
+    if not suspects.effects:
+        return plan_document(Plan(suspects, None, {}, WANTED, str(told.get("campaign", ""))))
+    plan = plan_test(
+        data, base, suspects, Envelope.of(data.points), noise=noise,
+        campaign=str(told.get("campaign", "")), progress=progress,
+    )  # fmt: skip
+    return plan_document(plan)
+
+
+def plan_document(plan: Plan) -> dict[str, Any]:
+    """Return a plan as ``tirelib-next-test/1``: N, bar, km/h, microstrain."""
+    test = plan.test
+    head = {
+        "format": FORMAT,
+        "campaign": plan.campaign,
+        "axes": "iso",
+        "quantity": "strain",
+        "what": advice(plan),
+        "message": advice(plan),
+        "between": list(plan.suspects.names),
+        "why": plan.suspects.why,
+    }
+    if test is None or not len(test.points):
+        left_out = dict(test.trial.left_out) if test else {}
+        return head | {
+            "suspects": [], "left_out": left_out, "present": [], "candidates": [], "best": None,
+            "random_median": None, "repeats": None, "envelope": None, "dropped": 0,
+        }  # fmt: skip
+    candidates = [_candidate(test, k) for k in range(len(test.points))]
+    return head | {
+        "suspects": [
+            {
+                "effect": rival.name, "strength": rival.strength.tolist(),
+                "chi_square": rival.cost, "in_range": rival.in_range,
+            }
+            for rival in test.trial.rivals
+        ],
+        "left_out": dict(test.trial.left_out),
+        "present": [_present(pair) for pair in test.pairs],
+        "resolved_at": RESOLVED,
+        "candidates": candidates,
+        "best": candidates[0],
+        "random_median": {
+            "separation": float(np.median(test.score)),
+            "resolves_probability": float(np.mean(test.probability)),
+        },
+        "repeats": _repeats(plan, test),
+        "envelope": _envelope(test.envelope),
+        "dropped": test.dropped,
+        "noise_ustrain": {
+            "random": 1e6 * test.noise.random, "structural": 1e6 * test.noise.staying,
+        },
+        "misfit_size": test.trial.size,
+    }  # fmt: skip
+
+
+def _candidate(test: NextTest, k: int) -> dict[str, Any]:
+    load, pressure, speed = test.points[k]
+    return {
+        "load_N": float(load),
+        "pressure_bar": float(pressure / BAR),
+        "speed_kmh": float(speed / KMH),
+        "separation": float(test.score[k]),
+        "separation_std": float(2.0 * np.sqrt(test.score[k])),
+        "resolves_probability": float(test.probability[k]),
+        "pair": list(test.pairs[test.hardest[k]].names),
+    }
+
+
+def _present(pair: PairForecast) -> dict[str, Any]:
+    return {
+        "pair": list(pair.names), "gap": pair.gap, "better": pair.better,
+        "resolved": pair.resolved, "best_run_separation": float(pair.separation[0]),
+        "best_run_probability": float(pair.probability[0]),
+    }  # fmt: skip
+
+
+def _repeats(plan: Plan, test: NextTest) -> dict[str, Any]:
+    pair = test.pairs[test.hardest[0]]
+    return {
+        "wanted_separation": plan.wanted,
+        "of_best": pair.needed(plan.wanted),
+        "limit": pair.limit,
+        "separation": {str(n): reached for n, reached in pair.repeats.items()},
+        "of_plan": {
+            name: {
+                "times": next((int(n) for n, x in by.items() if n < ENDLESS and x >= RESOLVED),
+                              None),
+                "gain_now": by[1], "gain_limit": by[ENDLESS],
+            }
+            for name, by in plan.gains.items()
+        },
+    }  # fmt: skip
+
+
+def _envelope(envelope: Envelope) -> dict[str, Any]:
+    units = {"load_N": 1.0, "pressure_bar": BAR, "speed_kmh": KMH}
+    ranges = {
+        key: [x / unit for x in getattr(envelope, key.split("_")[0])] for key, unit in units.items()
+    }
+    return {
+        **ranges, "declared": list(envelope.declared),
+        "widened_percent": {k: 100.0 * v for k, v in WIDER.items() if k not in envelope.declared},
+        "levels": dict(LEVELS),
+    }  # fmt: skip
+
+
+def run_text(point: np.ndarray) -> str:
+    """Say a run's conditions.
+
+    Examples
+    --------
+    >>> run_text(np.array([4000.0, 2.1e5, 25.0]))
+    '4000 N, 2.1 bar, 90 km/h'
+    """
+    load, pressure, speed = point
+    return f"{load:.0f} N, {pressure / BAR:.3g} bar, {speed / KMH:.0f} km/h"
+
+
+def advice(plan: Plan) -> str:
+    """Say what to measure next, and what it is worth."""
+    test = plan.test
+    if test is None:
+        return NONE
+    if not len(test.points):
+        left = "; ".join(f"{name}: {why}" for name, why in test.trial.left_out.items())
+        return f"fewer than two suspects could be fitted, so nothing can be compared ({left})"
+    sentences = [_said(pair) for pair in test.pairs if pair.resolved]
+    if test.open_pairs:
+        sentences.append(_advised(plan, test))
+    sentences += _weak(plan)
+    return "; ".join(sentences)
+
+
+def _said(pair: PairForecast) -> str:
+    worse = pair.names[1] if pair.better == pair.names[0] else pair.names[0]
+    return (
+        f"the present runs tell {pair.better} from {worse} already (chi-square {abs(pair.gap):.0f})"
+    )
+
+
+def _advised(plan: Plan, test: NextTest) -> str:
+    best, chance = test.points[0], float(test.probability[0])
+    pair = test.pairs[test.hardest[0]]
+    where = run_text(best)
+    between = " and ".join(name.replace(NOTHING, "no effect") for name in pair.names)
+    if chance < PROMISING:
+        text = (
+            f"no run in the envelope is likely to part {between}: the best, {where}, does with a "
+            f"chance of {100 * chance:.0f} %"
+        )
+    else:
+        text = (
+            f"measure {where}: it parts {between} with a chance of {100 * chance:.0f} % (any run "
+            f"of the envelope: {100 * float(test.probability.mean()):.0f} %)"
+        )
+    needed = pair.needed(plan.wanted)
+    if needed is None and pair.limit < plan.wanted:
+        text += (
+            f"; the structure of the ring limits its separation to {pair.limit:.0f}, repeats do "
+            "not help: widen the envelope"
+        )
+    elif needed is not None and needed > 1:
+        text += f"; {needed} repeats of it reach a separation of {plan.wanted:.0f}"
+    return text
+
+
+def _weak(plan: Plan) -> list[str]:
+    """Say what repeating the whole plan would do for hints."""
+    said = []
+    for name, by in plan.gains.items():
+        times = next((int(n) for n, x in by.items() if n < ENDLESS and x >= RESOLVED), None)
+        if max(by.values()) < 1.0:
+            said.append(f"the present runs show nothing of {name}, and repeats of them would not")
+        elif times == 1:
+            said.append(
+                f"{name} stands out from the noise already (chi-square {by[1]:.0f}): what keeps it "
+                "a hint is the structure of the ring, which repeats of the plan do not change"
+            )
+        elif times is not None:
+            said.append(
+                f"{times} times the present plan might show {name}, or its absence: fewer will not"
+            )
+        else:
+            said.append(
+                f"repeats of the present plan will not show {name}: structure limits its "
+                f"chi-square to {by[ENDLESS]:.0f}, {RESOLVED:.0f} are needed"
+            )
+    return said

@@ -1,0 +1,63 @@
+"""The first round of a diagnosis, as a judge of any residual."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from tirelib.arrays import FloatArray
+from tirelib.diagnose.candidates import Candidates
+from tirelib.diagnose.diagnose import ALARM, Stage, plausible
+from tirelib.diagnose.noise import noise_in, white_level
+from tirelib.diagnose.refit import Refit
+from tirelib.diagnose.stored import ensemble_of
+from tirelib.effects import Effect
+from tirelib.identify.campaign_data import StraightRuns
+from tirelib.identify.waveform_fit import Data
+
+
+@dataclass(frozen=True, slots=True)
+class FirstRound:
+    """A model's ranking with its thresholds.
+
+    Attributes
+    ----------
+    stage : Stage
+    """
+
+    stage: Stage
+
+    @classmethod
+    def of(
+        cls,
+        runs: StraightRuns,
+        data: Data,
+        base: Refit,
+        catalogue: Sequence[Effect],
+        *,
+        members: int,
+        seed: int,
+        progress: Callable[[str], None] | None = None,
+    ) -> "FirstRound":
+        """Return the ranking of a fitted model at a campaign's plan and noise.
+
+        Parameters
+        ----------
+        members, seed : int
+            Of the ensemble that the thresholds are from.
+        """
+        rests = ensemble_of(
+            data, base, noise=noise_in(runs), members=members, seed=seed, progress=progress
+        )
+        level = white_level(runs, base, data.strain)
+        return cls(Stage.of(data, base, catalogue, rests, level, {}))
+
+    @property
+    def found(self) -> Candidates:
+        """The living candidates and the dead."""
+        return self.stage.found
+
+    def first(self, rest: FloatArray) -> str:
+        """Return who comes first for a residual (n_runs, n_phi), empty without an alarm."""
+        scores = self.stage.ranking.scores(rest)
+        judged = replace(self.stage, scores=scores, in_range=plausible(self.found, scores))
+        leader = judged.leader(set(judged.names), ALARM)
+        return "" if leader is None else judged.names[leader]

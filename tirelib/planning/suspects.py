@@ -1,0 +1,145 @@
+"""Who is on trial: the effects of a diagnosis that its campaign does not tell apart."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.diagnose.candidates import IN_BASE
+from tirelib.effects import Effect
+from tirelib.errors import ParameterError
+
+MOST = 3
+"""Suspects taken at most."""
+START = 0.1
+"""Start of a strength where none is known, relative to the range."""
+
+
+@dataclass(frozen=True, slots=True)
+class Suspects:
+    """Effects on trial.
+
+    Attributes
+    ----------
+    effects : tuple of (effect, start strength)
+    beside : tuple of (effect, start strength)
+        Named effects that nobody doubts; the model needs them.
+    with_nothing : bool
+        Whether that none of them acts is possible too.
+    why : str
+        In words.
+    """
+
+    effects: tuple[tuple[Effect, FloatArray], ...]
+    beside: tuple[tuple[Effect, FloatArray], ...]
+    with_nothing: bool
+    why: str
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the suspects."""
+        return tuple(effect.name for effect, _ in self.effects)
+
+
+def suspects_of(told: Mapping[str, Any], catalogue: Mapping[str, Effect]) -> Suspects:
+    """Return the suspects of a diagnosis.
+
+    Named effects that are indistinguishable; else a named effect with its twins that are alarms or
+    hints; else, where nothing is named, the leading hints, each against nothing.
+
+    Parameters
+    ----------
+    told : mapping
+        A diagnosis as JSON, ``tirelib-diagnosis/1``.
+    catalogue : mapping of name to Effect
+
+    Raises
+    ------
+    ParameterError
+        If the diagnosis names an effect that the catalogue does not hold.
+    """
+    entries = {entry["effect"]: entry for entry in told["candidates"]}
+    named = list(told["named"])
+    alive = [
+        name for name, e in entries.items() if e["level"] in ("alarm", "hint") and e["in_range"]
+    ]
+    if told["verdict"] == "indistinguishable":
+        return _of(named[:MOST], [], entries, catalogue, False, "the campaign cannot tell which")
+    for name in named:
+        twins = [twin["effect"] for twin in entries.get(name, {}).get("twins", [])]
+        doubtful = [twin for twin in twins if twin in alive and twin not in named]
+        if doubtful:
+            others = [other for other in named if other != name]
+            why = f"{name} is named, and looks much like {' and '.join(doubtful[: MOST - 1])}"
+            chosen = [name, *doubtful][:MOST]
+            return _of(chosen, others, entries, catalogue, False, why)
+    if named or not alive:
+        return Suspects((), (), False, "nothing is in doubt")
+    why = f"no more than a hint: {', '.join(alive[:MOST])}"
+    return _of(alive[:MOST], [], entries, catalogue, True, why)
+
+
+def _of(
+    names: Sequence[str],
+    beside: Sequence[str],
+    entries: Mapping[str, Mapping[str, Any]],
+    catalogue: Mapping[str, Effect],
+    with_nothing: bool,
+    why: str,
+) -> Suspects:
+    def pair(name: str) -> tuple[Effect, FloatArray]:
+        effect = _known(name, catalogue)
+        strength = entries.get(name, {}).get("strength")
+        if strength is None:
+            return effect, np.full(effect.components, START * effect.toward)
+        return effect, np.atleast_1d(np.asarray(strength, dtype=float))
+
+    return Suspects(
+        tuple(pair(name) for name in names), tuple(pair(name) for name in beside), with_nothing,
+        why,
+    )  # fmt: skip
+
+
+def given_suspects(
+    names: Sequence[str], has: Sequence[str], catalogue: Mapping[str, Effect]
+) -> Suspects:
+    """Return suspects by name; one alone stands against nothing.
+
+    Raises
+    ------
+    ParameterError
+        If a name is unknown or given twice, the model has the effect or fits it, or it is none of
+        strain; with every fault.
+    """
+    faults = []
+    for name in dict.fromkeys(names):
+        if names.count(name) > 1:
+            faults.append(f"{name} is given {names.count(name)} times")
+        if name not in catalogue:
+            faults.append(f"{name!r} is not known")
+        elif name in has:
+            faults.append(f"the model has {name} already")
+        elif name in IN_BASE:
+            faults.append(f"the base model fits {name} as a number")
+        elif catalogue[name].hook == "brush":
+            faults.append(f"{name} acts on the brush, which strain does not show")
+        elif catalogue[name].untestable:
+            faults.append(f"{name} cannot be tested: {catalogue[name].untestable}")
+    if not names or len(names) > MOST:
+        faults.append(f"{len(names)} effects are given; 1 to {MOST} are allowed")
+    if faults:
+        raise ParameterError(
+            f"suspects: {'; '.join(faults)}; give other names, known are {', '.join(catalogue)}"
+        )
+    return _of(names, [], {}, catalogue, len(names) == 1, "given")
+
+
+def _known(name: str, catalogue: Mapping[str, Effect]) -> Effect:
+    if name not in catalogue:
+        raise ParameterError(
+            f"the diagnosis tells of {name!r}, which is not known; load the file that defines it "
+            "with --effects, or diagnose again"
+        )
+    return catalogue[name]

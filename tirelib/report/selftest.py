@@ -1,0 +1,126 @@
+"""The page of a self-test: the chance of finding each effect, and what the plan cannot show."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+
+from tirelib.report.comparison import Part
+from tirelib.report.figures.compare_plot import Plot, styled_figure
+from tirelib.report.page import DASH, Table, number
+from tirelib.report.planning_page import write_plan_page
+
+TITLE = "What this plan can find"
+
+
+def write_selftest(document: Mapping[str, Any], folder: Path) -> tuple[Path, Path]:
+    """Write ``selftest.html`` and ``selftest.md`` of a ``tirelib-selftest/1``; return the paths.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be written.
+    """
+    return write_plan_page(
+        folder, "selftest", parts_of(document), title=TITLE, summary=_summary(document),
+        answer=_answer(document), messages=[document["note"]],
+    )  # fmt: skip
+
+
+def _summary(document: Mapping[str, Any]) -> str:
+    return (
+        f"Campaign {document['campaign']}, strain; {document['repeats']} tires for each effect and "
+        f"error ratio; thresholds from {document['members']} variants, seed {document['seed']}."
+    )
+
+
+def _answer(document: Mapping[str, Any]) -> str:
+    said = [
+        f"at an error ratio of {entry['ratio']:g} a planted effect is found in "
+        f"{100 * entry['found']:.0f} % and another named in {100 * entry['wrong']:.0f} %"
+        for entry in document["summary"]
+        if entry["n"]
+    ]
+    alarms = document["false_alarms"]
+    text = "; ".join(said) or "no effect could be planted"
+    return (
+        f"{text[0].upper()}{text[1:]}. With nothing planted there is a false alarm in "
+        f"{100 * alarms['share']:.0f} % of {alarms['n']} tires."
+    )
+
+
+def parts_of(document: Mapping[str, Any]) -> list[Part]:
+    """Return the parts of the page."""
+    dead = [[name, why] for name, why in document["dead"].items()]
+    tables = [Table("Dead effects", ["effect", "why"], dead, texts=2)] if dead else []
+    return [
+        Part("Chance of finding", "chance",
+             "The error ratio is the rms residual of the fitted model with the effect, over that "
+             "without.", plots=[_map(document)] if document["effects"] else []),
+        Part("Effects", "effects", tables=[_effects(document)]),
+        Part("What this plan cannot show", "blind", tables=tables),
+    ]  # fmt: skip
+
+
+def _map(document: Mapping[str, Any]) -> Plot:
+    names = [entry["effect"] for entry in document["effects"]]
+    ratios = [f"{ratio:g}" for ratio in document["ratios"]]
+    chance = np.full((len(names), len(ratios)), np.nan)
+    words = [[""] * len(ratios) for _ in names]
+    rows = []
+    for i, entry in enumerate(document["effects"]):
+        for j, result in enumerate(entry["results"]):
+            if result["n"]:
+                chance[i, j] = 100.0 * result["found"]
+                words[i][j] = f"{chance[i, j]:.0f} %"
+            else:
+                words[i][j] = "no solution" if result["reachable"] else "beyond range"
+            rows.append([entry["effect"], *(result[key] for key in _KEYS)])
+    figure = go.Figure(
+        go.Heatmap(
+            z=chance, x=ratios, y=names, zmin=0.0, zmax=100.0, colorscale="Blues", text=words,
+            texttemplate="%{text}", hoverongaps=False,
+            hovertemplate="%{y} at %{x}: %{z:.0f} %<extra></extra>",
+            colorbar={"title": {"text": "found [%]"}},
+        )
+    )  # fmt: skip
+    figure.update_xaxes(title="error ratio", type="category", showgrid=False)
+    figure.update_yaxes(autorange="reversed", showgrid=False)
+    styled_figure(figure, 150 + 26 * len(names))
+    return Plot(
+        "chance", "Chance that the planted effect comes first",
+        "Beyond range: no plausible strength makes the error that much larger.",
+        figure, ["effect", *_KEYS], rows,
+    )  # fmt: skip
+
+
+_KEYS = ("ratio", "strength", "n", "found", "found_low", "found_high", "wrong", "ratio_reached")
+
+
+def _effects(document: Mapping[str, Any]) -> Table:
+    rows = []
+    for entry in document["effects"]:
+        twins = ", ".join(f"{t['effect']} {t['angle_deg']:.0f}\u00b0" for t in entry["twins"])
+        for result in entry["results"]:
+            some = result["n"] > 0
+            rows.append([
+                entry["effect"], ", ".join(result["named"]), twins, number(result["ratio"]),
+                number(result["strength"], 3), entry["unit"], number(result["ratio_reached"], 3),
+                _percent(result["found"]) if some else DASH,
+                f"{_percent(result['found_low'])} to {_percent(result['found_high'])}"
+                if some else DASH,
+                _percent(result["wrong"]) if some else DASH,
+                _percent(result["wrong_twin"]) if some else DASH,
+            ])  # fmt: skip
+    return Table(
+        "Effects",
+        ["effect", "named", "twins (angle)", "error ratio", "strength", "unit", "ratio reached",
+         "found [%]", "95 %", "another named [%]", "of these a twin [%]"],
+        rows, texts=3,
+    )  # fmt: skip
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f}"
