@@ -124,6 +124,18 @@ def test_the_model_is_a_tire_with_provenance(
     assert read.extra["effects"] == []
 
 
+def test_the_held_tread_is_as_stiff_as_the_tire_in_the_file(
+    files: dict[str, Path], document: dict[str, Any]
+) -> None:
+    """Corrected Eq. (112): S_v = pi R (k_u + k_v), S_theta = 2 pi R^3 k_v."""
+    tire, rim = read_tire(files["model"]).tire, document["rim_stiffness"]
+    R, k_u, k_v = tire.ring_radius, tire.radial_stiffness, tire.tangential_stiffness
+    S_v, S_theta = np.pi * R * (k_u + k_v), 2.0 * np.pi * R**3 * k_v
+    assert rim["shift_N_per_mm"] == pytest.approx(1e-3 * S_v)
+    assert rim["turn_Nm_per_deg"] == pytest.approx(S_theta * np.pi / 180.0)
+    assert rim["longitudinal_N_per_mm"] == pytest.approx(1e-3 / (1 / S_v + R**2 / S_theta))
+
+
 def test_simulate_takes_the_model(files: dict[str, Path], tmp_path: Path) -> None:
     target = tmp_path / "S.json"
     found = CliRunner().invoke(
@@ -144,6 +156,29 @@ def test_no_strain_is_an_error_of_two(tmp_path: Path) -> None:
     assert "holds no strain" in done.stderr
     assert "Traceback" not in done.stderr
     assert not (tmp_path / "M.toml").exists()
+
+
+def test_straight_runs_without_a_ring_are_an_error_of_one_beside_a_brush(tmp_path: Path) -> None:
+    """The plan asked for a ring: a brush alone is no success, and the gage is named."""
+    loads = (2500.0, 3500.0, 4500.0, 5500.0)
+    straight = [synthetic_run(i, load=load, kind="free") for i, load in enumerate(loads)]
+    dead = [replace(each, strain=np.array(each.strain)) for each in straight]
+    for each in dead:
+        assert each.strain is not None
+        each.strain[2] = 2.7e-3
+    turned = [
+        synthetic_run(10 + i, load=load, slip_angle=np.deg2rad(angle))
+        for i, (load, angle) in enumerate((f, a) for f in loads[::2] for a in (-6, -3, -1, 1, 3, 6))
+    ]
+    folder = write(tmp_path / "c", [*dead, *turned])
+    found = CliRunner().invoke(
+        program, ["identify", str(folder), "--out", str(tmp_path / "M.toml")]
+    )
+    assert found.exit_code == 1, found.output
+    assert found.stderr.startswith("Warning: the straight runs gave no ring")
+    assert "gage 3 at +0 mm hardly shows strain in 4 runs (0, 1, 2, 3)" in found.stderr
+    assert "bristle_lateral" in found.output
+    assert read_tire(tmp_path / "M.toml").numbers["friction"].kind == "fitted"
 
 
 def refused(

@@ -161,6 +161,24 @@ def test_a_given_ring_gives_the_contact_length(campaign: Path, tmp_path: Path) -
     assert file.tire.bending_stiffness == TIRE.bending_stiffness
 
 
+def test_a_given_tire_that_does_not_fit_is_said(
+    campaign: Path, alone: tuple[Path, str], tmp_path: Path
+) -> None:
+    found = call(campaign, tmp_path / "o", "--tire", str(alone[0] / "M.toml"))
+    assert "bench tire: the given tire states no complete ring" in found.output
+    ring = read_tire("table-6-1")
+    wide = replace(ring.numbers["free_radius"], value=0.33)
+    write_tire(replace(ring, numbers={**ring.numbers, "free_radius": wide}), tmp_path / "t.toml")
+    found = call(campaign, tmp_path / "o", "--tire", str(tmp_path / "t.toml"))
+    assert "free_radius is 330.0 mm in" in found.output
+    belt = replace(ring.numbers["ring_radius"], value=0.32)
+    both = {**ring.numbers, "free_radius": wide, "ring_radius": belt}
+    write_tire(replace(ring, numbers=both), tmp_path / "t.toml")
+    found = call(campaign, tmp_path / "no", "--tire", str(tmp_path / "t.toml"))
+    assert "ring_radius = 320 mm is not below free_radius = 312.5 mm" in str(found.exception)
+    assert not (tmp_path / "no" / "M.toml").exists()
+
+
 def test_an_earlier_brush_does_not_outlive_the_new_one(
     campaign: Path, alone: tuple[Path, str], tmp_path: Path
 ) -> None:

@@ -117,7 +117,7 @@ def rms(x: np.ndarray) -> float:
 
 
 def test_the_catalogue_holds_the_agreed_names_in_order() -> None:
-    assert list(CATALOGUE) == IN_ORDER
+    assert [name for name, effect in CATALOGUE.items() if effect.hook != "brush"] == IN_ORDER
     assert all(name == effect.name for name, effect in CATALOGUE.items())
 
 

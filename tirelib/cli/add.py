@@ -1,23 +1,33 @@
 """``tirelib add``: put an effect into a model, take it out, or undo the last step."""
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 from tirelib.campaign import read_campaign
 from tirelib.cli.common import CAMPAIGN, FILE, output, progress_bar, write_json
+from tirelib.cli.diagnose import QUANTITIES
 from tirelib.errors import ParameterError
+
+if TYPE_CHECKING:
+    from tirelib.campaign import Campaign
+    from tirelib.effects import Effect
+    from tirelib.parameters import TireFile
 
 _EXAMPLE = """\b
 Examples:
   tirelib add sidewall_damping --model M.toml --data build/out/straight --out M2.toml
   tirelib add sidewall_damping --remove --model M2.toml --data build/out/straight --out M3.toml
   tirelib add --undo --model M2.toml --out M1.toml
+  tirelib add friction_load --model M.toml --data build/out/cornering --out M2.toml
 
 \b
 The base model and all strengths are fitted anew. Held-out errors are on the highest load and the
-highest pressure, each left out of the fit. Exit code: 0 done, 2 bad input.
+highest pressure, each left out of the fit; of a sweep of forces, on blocks of time. An effect of
+the brush is fitted to --quantity, else to the force of the model's last such step, else to the one
+whose error it lowers most. Exit code: 0 done, 2 bad input.
 """
 FORMAT = "tirelib-model/1"
 
@@ -33,8 +43,9 @@ FORMAT = "tirelib-model/1"
 @click.option("--remove", is_flag=True, help="Take EFFECT out instead, and fit anew.")
 @click.option("--undo", is_flag=True,
               help="Go back to before the last entry of the history, to the digit.")  # fmt: skip
-@click.option("--quantity", metavar="strain", default="strain", show_default=True,
-              help="Measured quantity to fit.")  # fmt: skip
+@click.option("--quantity", metavar="strain|Fy|Fx|Mz",
+              help="Measured quantity to fit; default: strain, and for an effect of the brush the "
+                   "force of the last step, else the one that it helps most.")  # fmt: skip
 @click.option("--out", "out", metavar="M2.toml", type=FILE, required=True, help="New model file.")
 @click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write the numbers as JSON.")
 def add(
@@ -44,14 +55,15 @@ def add(
     effect_files: tuple[Path, ...],
     remove: bool,
     undo: bool,
-    quantity: str,
+    quantity: str | None,
     out: Path,
     json_file: Path | None,
 ) -> None:
     """Add EFFECT to a model, fit it to CAMPAIGN and show what the error does."""
-    from tirelib.cli.diagnose import strain_only
-
-    strain_only(quantity)
+    if quantity is not None and quantity not in QUANTITIES:
+        raise ParameterError(
+            f"--quantity {quantity}: allowed are {', '.join(QUANTITIES)}; correct the name"
+        )
     if undo:
         if effect_name is not None or remove:
             raise ParameterError("--undo takes neither EFFECT nor --remove; leave them out")
@@ -61,7 +73,7 @@ def add(
         raise ParameterError("EFFECT is missing; name an effect, or give --undo")
     if folder is None:
         raise ParameterError("--data is missing; give the campaign that the model is fitted to")
-    _change(effect_name, model_name, folder, effect_files, remove, out, json_file)
+    _change(effect_name, model_name, folder, effect_files, remove, quantity, out, json_file)
 
 
 def _undo(model_name: str, out: Path, json_file: Path | None) -> None:
@@ -89,55 +101,108 @@ def _change(
     folder: Path,
     effect_files: tuple[Path, ...],
     remove: bool,
+    quantity: str | None,
     out: Path,
     json_file: Path | None,
 ) -> None:
-    from tirelib.compare.model import model_of
     from tirelib.effects.load import all_effects
-    from tirelib.extend.document import extension_document
-    from tirelib.extend.extension import add_effect, known_effect, remove_effect
-    from tirelib.extend.model_file import extended_file
-    from tirelib.identify.campaign_data import straight_runs
+    from tirelib.extend.extension import known_effect
     from tirelib.parameters import read_tire, write_tire
-    from tirelib.waveforms import measure_waveforms
 
     catalogue = all_effects(effect_files)
     effect = known_effect(effect_name, catalogue)
     file = read_tire(model_name)
-    model = model_of(file, catalogue)
     campaign = read_campaign(folder)
-    step = remove_effect if remove else add_effect
+    of_forces = quantity not in (None, "strain") or (quantity is None and effect.hook == "brush")
     with progress_bar("fitting") as progress:
-        runs = straight_runs(measure_waveforms(campaign, progress=progress))
-        done = step(runs, model, effect, progress=progress)
-    new = extended_file(file, done, campaign.content_hash())
+        if of_forces:
+            new, document = _forces(campaign, file, effect, catalogue, quantity, remove, progress)
+        else:
+            new, document = _strain(campaign, file, effect, catalogue, remove, progress)
     write_tire(new, out, FORMAT)
-    document = extension_document(done, new)
+    _say(document, effect)
     console = output()
-    unit = "noise" if done.unit.known else "microstrain"
-    console.print(
-        f"{document['campaign']}: {done.action} {effect.name}, strength "
-        f"{_numbers(done.strength)} +- {_numbers(done.std)} {effect.unit}"
-    )
-    console.print(
-        f"  error {document['error_before']:.3g} -> {document['error_after']:.3g} [{unit}], "
-        f"floor {done.floor:.3g}"
-    )
-    for fold in document["held_out"]:
-        console.print(
-            f"  {fold['condition']} {fold['value']:.4g} {fold['unit']} left out ({fold['runs']} "
-            f"runs): error {fold['error_before']:.3g} -> {fold['error_after']:.3g}"
-        )
-    for line in (*_warnings(document["flags"], effect.low, effect.high), *document["messages"]):
-        console.print(f"  {line}")
     console.print(f"written: {out}")
     if json_file is not None:
         write_json(json_file, document)
         console.print(f"written: {json_file}")
 
 
-def _numbers(values: np.ndarray) -> str:
-    return ", ".join(f"{x:.4g}" for x in values)
+def _strain(
+    campaign: "Campaign",
+    file: "TireFile",
+    effect: "Effect",
+    catalogue: Mapping[str, "Effect"],
+    remove: bool,
+    progress: Callable[[str], None],
+) -> tuple["TireFile", dict[str, Any]]:
+    from tirelib.compare.model import model_of
+    from tirelib.extend.document import extension_document
+    from tirelib.extend.extension import add_effect, remove_effect
+    from tirelib.extend.model_file import extended_file
+    from tirelib.identify.campaign_data import straight_runs
+    from tirelib.waveforms import measure_waveforms
+
+    model = model_of(file, catalogue)
+    step = remove_effect if remove else add_effect
+    runs = straight_runs(measure_waveforms(campaign, progress=progress))
+    done = step(runs, model, effect, progress=progress)
+    new = extended_file(file, done, campaign.content_hash())
+    return new, extension_document(done, new)
+
+
+def _forces(
+    campaign: "Campaign",
+    file: "TireFile",
+    effect: "Effect",
+    catalogue: Mapping[str, "Effect"],
+    quantity: str | None,
+    remove: bool,
+    progress: Callable[[str], None],
+) -> tuple["TireFile", dict[str, Any]]:
+    from tirelib.diagnose.forces.assess import force_cases
+    from tirelib.extend.force_document import force_extended_file, force_extension_document
+    from tirelib.extend.force_extension import add_brush_effect, case_for, remove_brush_effect
+
+    case = case_for(force_cases(campaign, file, catalogue, quantity), effect)
+    step = remove_brush_effect if remove else add_brush_effect
+    done = step(case, effect, progress=progress)
+    new = force_extended_file(file, done, campaign.content_hash())
+    return new, force_extension_document(done, new)
+
+
+def _say(document: dict[str, Any], effect: "Effect") -> None:
+    console = output()
+    unit = {"ustrain": "microstrain"}.get(document["error_unit"], document["error_unit"])
+    where = "" if document["quantity"] == "strain" else f", {document['quantity']}"
+    console.print(
+        f"{document['campaign']}{where}: {document['action']} {effect.name}, strength "
+        f"{_numbers(document['strength'])} +- {_numbers(document['std'])} {effect.unit}"
+    )
+    console.print(
+        f"  error {document['error_before']:.3g} -> {document['error_after']:.3g} [{unit}], "
+        f"floor {document['floor']:.3g}"
+    )
+    for fold in document["held_out"]:
+        console.print(
+            f"  {_left_out(fold)} left out: error {fold['error_before']:.3g} -> "
+            f"{fold['error_after']:.3g}"
+        )
+    for line in (*_warnings(document["flags"], effect.low, effect.high), *document["messages"]):
+        console.print(f"  {line}")
+
+
+def _left_out(fold: dict[str, Any]) -> str:
+    size = f"({fold['runs']} runs)" if "runs" in fold else f"({fold['points']} points)"
+    if fold["condition"] == "time":
+        return f"blocks of time, part {fold['value']:.0f} {size}"
+    if fold["condition"] == "cell":
+        return f"cells of conditions, part {fold['value']:.0f} {size}"
+    return f"{fold['condition']} {fold['value']:.4g} {fold['unit']} {size}"
+
+
+def _numbers(values: float | list[float]) -> str:
+    return ", ".join(f"{x:.4g}" for x in (values if isinstance(values, list) else [values]))
 
 
 def _warnings(flags: list[str], low: float, high: float) -> list[str]:

@@ -27,21 +27,30 @@ words and numbers. Errors are in units of the noise between repeated runs. Exit 
 @click.option("--quantity", metavar="strain|Fy|Fx|Mz",
               help="Default: strain where the campaign has it, else the force that fits "
                    "worst.")  # fmt: skip
+@click.option("--effects", "effect_files", metavar="FILE.py", type=FILE, multiple=True,
+              help="Effects of your own that the model has; may be given again.")  # fmt: skip
 @click.option("--out", "out", metavar="DIR", type=click.Path(path_type=Path, file_okay=False),
               help="Write the page, comparison.md and comparison.json.")  # fmt: skip
 @click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write the numbers as JSON.")
 def compare(
-    folder: Path, model: str, quantity: str | None, out: Path | None, json_file: Path | None
+    folder: Path,
+    model: str,
+    quantity: str | None,
+    effect_files: tuple[Path, ...],
+    out: Path | None,
+    json_file: Path | None,
 ) -> None:
     """Hold a model against CAMPAIGN and say where it fails."""
     from tirelib.compare import compare as compare_model
     from tirelib.compare.document import comparison_document
+    from tirelib.effects.load import all_effects
     from tirelib.parameters import read_tire
 
+    catalogue = all_effects(effect_files)
     file = read_tire(model)
     campaign = read_campaign(folder)
     with progress_bar("comparing") as progress:
-        found = compare_model(campaign, file, quantity, progress=progress)
+        found = compare_model(campaign, file, quantity, effects=catalogue, progress=progress)
     document = comparison_document(found)
     console = output()
     console.print(_answer(document))

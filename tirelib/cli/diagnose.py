@@ -1,16 +1,21 @@
 """``tirelib diagnose``: which effect a model lacks."""
 
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from tirelib.campaign import read_campaign
+from tirelib.campaign import Campaign, CampaignHeader, read_campaign
 from tirelib.cli.common import CAMPAIGN, FILE, output, progress_bar, write_json
-from tirelib.errors import ParameterError
+from tirelib.errors import CalibrationError, ParameterError
+
+if TYPE_CHECKING:
+    from tirelib.effects import Effect
+    from tirelib.parameters import TireFile
 
 _EXAMPLE = """\b
 Examples:
@@ -18,6 +23,7 @@ Examples:
   tirelib identify build/out/straight --out build/out/M.toml
   tirelib diagnose build/out/straight --model build/out/M.toml --out build/out/diagnosed
   tirelib diagnose build/out/straight --model build/out/M.toml --effects mine.py --json D.json
+  tirelib diagnose build/out/cornering --model build/out/M.toml --quantity Fy --out build/out/Fy
 
 \b
 Verdicts: none, named, form_inadequate (right effect, wrong law), indistinguishable (several would
@@ -26,14 +32,16 @@ score is three times the largest of variants of the model without any effect; a 
 Exit code: 0 whatever the verdict, 2 bad input.
 """
 SHOWN = 8
+QUANTITIES = ("strain", "Fy", "Fx", "Mz")
 
 
 @click.command(epilog=_EXAMPLE)
 @click.argument("folder", metavar="CAMPAIGN", type=CAMPAIGN)
 @click.option("--model", "model_name", metavar="M.toml|NAME", required=True,
               help="Model that `tirelib identify` or `tirelib add` wrote.")  # fmt: skip
-@click.option("--quantity", metavar="strain", default="strain", show_default=True,
-              help="Measured quantity to explain.")  # fmt: skip
+@click.option("--quantity", metavar="strain|Fy|Fx|Mz",
+              help="Default: strain where the campaign has it, else the force that fits "
+                   "worst.")  # fmt: skip
 @click.option("--effects", "effect_files", metavar="FILE.py", type=FILE, multiple=True,
               help="Effects of your own; may be given again.")  # fmt: skip
 @click.option(
@@ -52,7 +60,7 @@ SHOWN = 8
 def diagnose(
     folder: Path,
     model_name: str,
-    quantity: str,
+    quantity: str | None,
     effect_files: tuple[Path, ...],
     members: int,
     seed: int,
@@ -60,64 +68,125 @@ def diagnose(
     json_file: Path | None,
 ) -> None:
     """Tell which physical effect the model lacks in CAMPAIGN."""
-    from tirelib.compare.model import model_of
-    from tirelib.diagnose.diagnose import diagnose as diagnose_model
-    from tirelib.diagnose.document import assess, diagnosis_document
     from tirelib.effects.load import all_effects
-    from tirelib.identify.campaign_data import straight_runs
     from tirelib.parameters import read_tire
-    from tirelib.waveforms import measure_waveforms
 
-    strain_only(quantity)
     catalogue = all_effects(effect_files)
-    model = model_of(read_tire(model_name), catalogue)
-    used = [each for each in model.used if each.effect.hook != "brush"]
+    file = read_tire(model_name)
     campaign = read_campaign(folder)
+    of_forces = explains_forces(quantity, campaign.header)
+    explain = _of_forces if of_forces else _of_strain
     with progress_bar("diagnosing") as progress:
-        runs = straight_runs(measure_waveforms(campaign, progress=progress))
-        found = diagnose_model(
-            runs, model.values, list(catalogue.values()),
-            effects=[each.effect for each in used],
-            strengths=[np.atleast_1d(np.asarray(each.strength, dtype=float)) for each in used],
-            members=members, seed=seed, progress=progress,
-        )  # fmt: skip
-        told = assess(found, seed=seed, progress=progress)
-    document = diagnosis_document(told)
+        told, document = explain(campaign, file, catalogue, quantity, members, seed, progress)
+    _say(document)
     console = output()
-    unit = "noise" if told.unit.known else "microstrain"
-    console.print(
-        f"{document['campaign']}, strain: {told.verdict}"
-        f"{': ' + ', '.join(told.named) if told.named else ''}; error {told.error_before:.3g}"
-        f"{f' -> {told.error_after:.3g}' if told.named else ''} [{unit}], floor {told.floor:.3g}"
-    )
-    for line in document["messages"]:
-        console.print(f"  {line}")
-    console.print(_table(document["candidates"][:SHOWN]))
-    console.print(f"  next: {document['next_test']['what']}")
     targets = [path for path in (json_file, out and out / "diagnosis.json") if path]
     if out is not None:
-        from tirelib.report.diagnosis import write_diagnosis
-
-        for path in write_diagnosis(told, out):
+        for path in _write(told, out, of_forces):
             console.print(f"written: {path}")
     for path in targets:
         write_json(path, document)
         console.print(f"written: {path}")
 
 
-def strain_only(quantity: str) -> None:
-    """Refuse a quantity that cannot be diagnosed.
+def explains_forces(quantity: str | None, header: CampaignHeader) -> bool:
+    """Return whether a force is to be explained, and not strain.
 
     Raises
     ------
     ParameterError
-        For any quantity but strain.
+        If there is no such quantity.
+    CalibrationError
+        If strain is asked for and not measured.
     """
-    if quantity != "strain":
+    if quantity is not None and quantity not in QUANTITIES:
         raise ParameterError(
-            f"--quantity {quantity}: not available; only strain can be diagnosed; leave the "
-            "option out, or look at forces with `tirelib compare --quantity`"
+            f"--quantity {quantity}: allowed are {', '.join(QUANTITIES)}; correct the name"
         )
+    if quantity == "strain" and not header.gage_lateral:
+        raise CalibrationError(
+            f"{header.name}: it has no strain gages; look at its forces: --quantity "
+            f"{', '.join(QUANTITIES[1:])}"
+        )
+    return quantity not in (None, "strain") or not header.gage_lateral
+
+
+def _of_strain(
+    campaign: Campaign,
+    file: "TireFile",
+    catalogue: Mapping[str, "Effect"],
+    quantity: str | None,
+    members: int,
+    seed: int,
+    progress: Callable[[str], None],
+) -> tuple[Any, dict[str, Any]]:
+    from tirelib.compare.model import model_of
+    from tirelib.diagnose.diagnose import diagnose as diagnose_model
+    from tirelib.diagnose.document import assess, diagnosis_document
+    from tirelib.identify.campaign_data import straight_runs
+    from tirelib.waveforms import measure_waveforms
+
+    model = model_of(file, catalogue)
+    used = [each for each in model.used if each.effect.hook != "brush"]
+    runs = straight_runs(measure_waveforms(campaign, progress=progress))
+    found = diagnose_model(
+        runs, model.values, list(catalogue.values()),
+        effects=[each.effect for each in used],
+        strengths=[np.atleast_1d(np.asarray(each.strength, dtype=float)) for each in used],
+        members=members, seed=seed, progress=progress,
+    )  # fmt: skip
+    told = assess(found, seed=seed, progress=progress)
+    return told, diagnosis_document(told)
+
+
+def _of_forces(
+    campaign: Campaign,
+    file: "TireFile",
+    catalogue: Mapping[str, "Effect"],
+    quantity: str | None,
+    members: int,
+    seed: int,
+    progress: Callable[[str], None],
+) -> tuple[Any, dict[str, Any]]:
+    from tirelib.diagnose.forces.assess import assess_forces, force_case
+    from tirelib.diagnose.forces.document import force_diagnosis_document
+
+    case = force_case(campaign, file, catalogue, quantity)
+    told = assess_forces(
+        case, list(catalogue.values()), members=members, seed=seed, progress=progress
+    )
+    return told, force_diagnosis_document(told)
+
+
+def _write(told: Any, out: Path, of_forces: bool) -> Sequence[Path]:
+    if of_forces:
+        from tirelib.report.force_diagnosis import write_force_diagnosis
+
+        return write_force_diagnosis(told, out)
+    from tirelib.report.diagnosis import write_diagnosis
+
+    return write_diagnosis(told, out)
+
+
+def _say(document: dict[str, Any]) -> None:
+    console = output()
+    named = document["named"]
+    unit = {"ustrain": "microstrain"}.get(document["error_unit"], document["error_unit"])
+    fall = f" -> {document['error_after']:.3g}" if named else ""
+    console.print(
+        f"{document['campaign']}, {document['quantity']}: {document['verdict']}"
+        f"{': ' + ', '.join(named) if named else ''}; error {document['error_before']:.3g}"
+        f"{fall} [{unit}], floor {document['floor']:.3g}"
+    )
+    for step in document.get("steps", []):
+        console.print(
+            f"  with {step['effect']}: error {step['error']:.3g}, held out "
+            f"{step['heldout_error']:.3g}"
+        )
+    for line in document["messages"]:
+        console.print(f"  {line}")
+    console.print(_table(document["candidates"][:SHOWN]))
+    console.print(f"  next: {document['next_test']['what']}")
 
 
 def _table(candidates: list[dict[str, Any]]) -> Table:

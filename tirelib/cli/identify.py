@@ -12,6 +12,9 @@ from rich.table import Table
 from tirelib.campaign import read_campaign
 from tirelib.cli.common import CAMPAIGN, FILE, output, progress_bar, write_json
 
+MOST_ROWS = 12
+"""Rows of the table of contact angles on the screen."""
+
 _EXAMPLE = """\b
 Examples:
   tirelib rig --plan straight --out build/out/straight
@@ -22,7 +25,7 @@ Examples:
 The ring is fitted to straight runs with strain, the brush to forces over slip; either alone will
 do. Intervals are 95 % and hold the structural misfit; "not_identifiable" marks numbers whose
 interval is wider than 25 % to either side, with the test that would tell them. Exit code 1:
-nothing could be identified.
+nothing could be identified, or no ring although the plan holds straight runs for one.
 """
 
 
@@ -53,6 +56,8 @@ def identify(
     document = whole_document(campaign, whole)
     write_tire(whole.file, out, "tirelib-model/1")
     console = output()
+    if whole.ring_failed:
+        click.echo(f"Warning: the straight runs gave {whole.ring_failed}", err=True)
     if whole.ring is not None:
         _say_ring(console, document)
     if document["brush"] is not None:
@@ -67,7 +72,8 @@ def identify(
         console.print(f"written: {json_file}")
     brush = document["brush"]
     every = [*document["parameters"], *(brush["parameters"] if brush else [])]
-    context.exit(0 if any("not_identifiable" not in entry["flags"] for entry in every) else 1)
+    told = any("not_identifiable" not in entry["flags"] for entry in every)
+    context.exit(0 if told and not whole.ring_failed else 1)
 
 
 def _say_ring(console: Console, document: dict[str, Any]) -> None:
@@ -83,14 +89,70 @@ def _say_ring(console: Console, document: dict[str, Any]) -> None:
             f"  vertical stiffness at {stiffness['load_N']:.0f} N: model "
             f"{stiffness['model']:.1f}, measured {stiffness['measured']:.1f} N/mm"
         )
-    damping = document["damping"]
-    if damping is not None:
-        flags = f" ({', '.join(damping['flags'])})" if damping["flags"] else ""
+    _say_routes(console, document["chapter_5"], document["chapter_6"])
+    if document["damping"] is not None:
+        _say_damping(console, document["damping"])
+
+
+def _say_routes(
+    console: Console, static: dict[str, Any] | None, dynamic: dict[str, Any] | None
+) -> None:
+    """Contact angles with the bias of their reading, and loads by angle (Fig. 6-12, 6-21)."""
+    if dynamic is not None:
+        table = Table(box=SIMPLE_HEAD)
+        for column in ("run", "load N", "half angle read", "bias", "corrected", "+-",
+                       "load error % as printed", "corrected"):  # fmt: skip
+            table.add_column(column, justify="right")
+        angles = {row["run"]: row for row in dynamic["contact_angles"]}
+        loads = dynamic["loads"]
+        step = -(-len(loads) // MOST_ROWS)
+        for load in loads[::step]:
+            row = angles[load["run"]]
+            half = [0.5 * (row[key][1] - row[key][0]) for key in ("read_deg", "corrected_deg")]
+            printed = load["as_printed_percent"]
+            table.add_row(
+                str(load["run"]), f"{load['measured_N']:.0f}", f"{half[0]:.2f} deg",
+                f"{row['half_bias_deg']:+.2f}", f"{half[1]:.2f}", f"{row['half_std_deg']:.2f}",
+                "" if printed is None else f"{printed:+.1f}", f"{load['corrected_percent']:+.1f}",
+            )  # fmt: skip
         console.print(
-            f"  damping {damping['value']:.3f}, 95 % {damping['low']:.3f} to "
-            f"{damping['high']:.3f}{flags}; "
-            "not in the model: `tirelib add sidewall_damping` puts it there"
+            "contact angles from strain-rate peaks, the bias of that reading, and the load that "
+            "they give" + (f" (every {step}. run; all with --json)" if step > 1 else "")
         )
+        console.print(table)
+    if static is not None:
+        names = (("bending_stiffness", "N m^2"), ("radial_stiffness", "N/m^2"))
+        found = [
+            {q["name"]: q["value"] for q in static[key]}
+            for key in ("from_strain", "from_contact_model")
+        ]
+        said = "; ".join(
+            f"{name} {found[0][name]:.3g}"
+            + (f" against {found[1][name]:.3g}" if name in found[1] else "")
+            + f" {unit}"
+            for name, unit in names
+        )
+        console.print(
+            f"  static ring without tension (chapter 5), from strain against contact model: {said}"
+        )
+
+
+def _say_damping(console: Console, damping: dict[str, Any]) -> None:
+    def words(found: dict[str, Any] | None) -> str:
+        if found is None:
+            return "none"
+        flags = f" ({', '.join(found['flags'])})" if found["flags"] else ""
+        return f"{found['value']:.3f}, 95 % {found['low']:.3f} to {found['high']:.3f}{flags}"
+
+    console.print(f"  damping of the sidewall's dashpots {words(damping)}, from strain alone")
+    readings, modal = damping["readings"], damping["modal"]
+    console.print(f"    against the trigger: {words(readings['with_angle'])}")
+    if modal is not None:
+        console.print(
+            f"    as a ratio of every mode, Eq. (107): {words(modal['without_angle'])}; `simulate "
+            "--damping` takes this one"
+        )
+    console.print("    not in the model: `tirelib add sidewall_damping` puts it there")
 
 
 def _say_brush(console: Console, document: dict[str, Any]) -> None:

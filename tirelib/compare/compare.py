@@ -1,11 +1,12 @@
 """Hold a model against a campaign."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from tirelib.campaign import Campaign
 from tirelib.compare.forces import ForceComparison, compare_forces
 from tirelib.compare.model import model_of
 from tirelib.compare.strain import Comparison, compare_strain
+from tirelib.effects import CATALOGUE, Effect
 from tirelib.errors import CalibrationError, ParameterError
 from tirelib.identify.force_data import FORCES
 from tirelib.parameters import TireFile
@@ -19,6 +20,7 @@ def compare(
     file: TireFile,
     quantity: str | None = None,
     *,
+    effects: Mapping[str, Effect] = CATALOGUE,
     waves: Waveforms | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Comparison | ForceComparison:
@@ -32,6 +34,8 @@ def compare(
     quantity : str, optional
         strain, Fy, Fx or Mz; by default strain where the campaign has it, else the force with the
         largest lack of fit.
+    effects : mapping
+        By name, as the model's file names them.
     waves : Waveforms, optional
         Of the campaign, when they have been read already.
     progress : callable, optional
@@ -54,5 +58,5 @@ def compare(
         )
     if quantity == "strain" or (quantity is None and has_strain):
         waves = waves or measure_waveforms(campaign, progress=progress)
-        return compare_strain(waves, model_of(file), campaign.content_hash())
-    return compare_forces(campaign, file, quantity)
+        return compare_strain(waves, model_of(file, effects), campaign.content_hash())
+    return compare_forces(campaign, file, quantity, effects)

@@ -167,7 +167,7 @@ def _forces(found: ForceComparison) -> dict[str, Any]:
         "format": FORMAT,
         "campaign": found.name,
         "model": found.model,
-        "effects": [],
+        "effects": [{"effect": u.effect.name, "strength": u.strength} for u in found.used],
         "axes": "iso",
         "quantity": found.quantity,
         "unit": UNITS[found.quantity],
@@ -193,7 +193,10 @@ def _forces(found: ForceComparison) -> dict[str, Any]:
         "gages": [],
         "runs": [],
         "ranked": None,
-        "sources": [],
+        "sources": [
+            {"what": used.effect.name, "title": used.effect.title, "source": used.effect.source}
+            for used in found.used
+        ],
     }
 
 

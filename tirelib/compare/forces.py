@@ -1,36 +1,39 @@
 """A model's brush held against the forces of a campaign.
 
-Points are means over a cell of conditions within one run (or one stretch of a sweep). Points of
-different runs in the same cell are the repeats. The model is computed at the measured conditions,
-so a set point that is off moves both.
+Points are runs, or passes of a sweep through a cell of conditions. Points in the same cell are the
+repeats. The model is computed at the measured conditions, so a set point that is off moves both.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from scipy import special
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
-from tirelib.brush.predict import PointConditions, PointParameters, predict_forces
+from tirelib.brush.predict import PointParameters
 from tirelib.campaign import Campaign
+from tirelib.compare.force_model import ForceBench, ForceModel, force_model_of
+from tirelib.compare.force_points import CELL_ANGLE, ForcePoints, force_points, noise_of
+from tirelib.compare.model import UsedEffect
 from tirelib.compare.sentences import told
 from tirelib.compare.strain import verdict_of
-from tirelib.errors import CalibrationError
+from tirelib.effects import CATALOGUE, Effect
+from tirelib.errors import CalibrationError, ParameterError
+from tirelib.identify import brush_model
 from tirelib.identify.brush_fit import ANGLE_SPAN, RATIO_SPAN
 from tirelib.identify.error_bands import levels
 from tirelib.identify.force_data import FORCES, ForceData, force_data
-from tirelib.identify.ring_patch import half_lengths
 from tirelib.parameters import TireFile
 
-CELL_ANGLE, CELL_RATIO = float(np.deg2rad(0.5)), 0.01
-"""Size of a cell in slip angle and camber [rad], and in slip ratio."""
-MOST_SAMPLES = 20000
-NEEDED = ("bristle_lateral", "friction")
 SLIP_LIMITS = {"slip_angle": np.deg2rad([1.0, 2.0, 4.0, 6.0, 9.0]),
                "slip_ratio": np.array([0.02, 0.05, 0.1, 0.2])}  # fmt: skip
 LEVEL, LEAST_SHARE, MOST = 0.01, 0.02, 6
+CELLS = (
+    "cells of 0.5 deg in slip angle and camber, 0.01 in slip ratio, a tenth in load, pressure and "
+    "speed, 5 K in tread temperature"
+)
 UNITS = {"Fy": "N", "Fx": "N", "Mz": "Nm"}
 
 
@@ -90,6 +93,8 @@ class ForceComparison:
     verdict : str
     table : tuple of ForceCell
     sentences, messages : tuple of str
+    used : tuple of UsedEffect
+        Effects that the model has.
     """
 
     quantity: str
@@ -109,6 +114,7 @@ class ForceComparison:
     table: tuple[ForceCell, ...]
     sentences: tuple[str, ...]
     messages: tuple[str, ...]
+    used: tuple[UsedEffect, ...] = ()
 
     @property
     def difference(self) -> FloatArray:
@@ -117,36 +123,23 @@ class ForceComparison:
 
 
 def brush_of(file: TireFile, data: ForceData) -> PointParameters:
-    """Return the brush of a model at points; its ring gives the contact length.
+    """Return the brush of a model at points, without its effects.
 
     Raises
     ------
     CalibrationError
         If the model states no brush.
     """
-    missing = [name for name in NEEDED if name not in file.numbers]
-    if missing:
-        raise CalibrationError(
-            f"model {file.name} states no {' and no '.join(missing)}: it says nothing of forces; "
-            "identify it from a campaign with slip, or give [brush.bristle_lateral] and "
-            "[tread.friction]"
-        )
-    tire = file.tire
-    along = "bristle_longitudinal" in file.numbers
-    compliance = 1.0 / tire.carcass_stiffness if np.isfinite(tire.carcass_stiffness) else 0.0
-    return PointParameters(
-        lateral_stiffness=tire.bristle_lateral,
-        longitudinal_stiffness=tire.bristle_longitudinal if along else None,
-        friction=tire.friction,
-        half_length=half_lengths(tire, data.load, data.pressure),
-        lateral_compliance=compliance,
-    )
+    return brush_model.brush_of(file).parameters(data)
 
 
 def compare_forces(
-    campaign: Campaign, file: TireFile, quantity: str | None = None
+    campaign: Campaign,
+    file: TireFile,
+    quantity: str | None = None,
+    effects: Mapping[str, Effect] = CATALOGUE,
 ) -> ForceComparison:
-    """Hold the brush of a model against a campaign.
+    """Hold the brush of a model, with its effects, against a campaign.
 
     Parameters
     ----------
@@ -154,46 +147,85 @@ def compare_forces(
     file : TireFile
     quantity : str, optional
         Fy, Fx or Mz; by default the one with the largest lack of fit.
+    effects : mapping
+        By name, as the model's file names them.
 
     Raises
     ------
     CalibrationError
         If the model has no brush, or the force is not measured.
     """
-    data = force_data(campaign)
-    data = data.take(np.arange(0, len(data), max(1, len(data) // MOST_SAMPLES)))
-    known = np.isfinite(data.pressure)
-    if not known.any():
-        raise CalibrationError(
-            f"{campaign.header.name}: the inflation pressure is unknown in every run; the ring "
-            "needs it for the contact length; record it or give it as a set point"
+    model = force_model_of(file, effects)
+    points = force_points(force_data(campaign))
+    wanted = quantities_of(campaign, points, quantity)
+    points = usable_points(campaign, model, points)
+    bench = ForceBench.of(model, points)
+    found, plain = bench.forces(model.values, model.changes), bench.forces(model.values)
+    left_out = tuple(
+        f"the model's effect {name} acts on strain and has no part in the forces"
+        for name in strain_effects(file, model)
+    )
+    every = [
+        _compare(campaign, model, points, getattr(found, name), getattr(plain, name), name)
+        for name in wanted
+    ]
+    best = max(every, key=_lack)
+    return replace(best, messages=(*best.messages, *left_out))
+
+
+def quantities_of(campaign: Campaign, points: ForcePoints, quantity: str | None) -> list[str]:
+    """Return the forces to look at: the one that is asked for, else those with slip.
+
+    Raises
+    ------
+    ParameterError
+        If the quantity is no force.
+    CalibrationError
+        If it is not measured.
+    """
+    if quantity is not None and quantity not in FORCES:
+        raise ParameterError(
+            f"--quantity {quantity}: allowed are strain, {', '.join(FORCES)}; correct the name"
         )
-    data = data.take(known)
-    parameters = brush_of(file, data)
-    at = PointConditions(data.load, data.slip_angle, data.slip_ratio, data.camber)
-    found = predict_forces(parameters, at)
+    data = points.data
     measured = [name for name in FORCES if np.isfinite(getattr(data, name)).any()]
-    slipping = [name for name in measured if _slips(data, name)]
+    slipping = [name for name in measured if slips(data, name)]
     wanted = (slipping or measured) if quantity is None else [quantity]
     if not wanted or wanted[0] not in measured:
         raise CalibrationError(
             f"{campaign.header.name}: {quantity or 'Fy, Fx and Mz'} is not measured; there is "
             f"{', '.join(measured) or 'no force at all'}; choose another --quantity"
         )
-    left_out = tuple(
-        f"the model's effect {entry.get('effect')} acts on strain or brush and is left out of "
-        "the forces"
-        for entry in file.extra.get("effects", []) if isinstance(entry, dict)
-    )  # fmt: skip
-    every = [_compare(campaign, file, data, getattr(found, name), name) for name in wanted]
-    best = max(every, key=_lack)
-    return ForceComparison(
-        **{f.name: getattr(best, f.name) for f in fields(best) if f.name != "messages"},
-        messages=(*best.messages, *left_out),
-    )
+    return wanted
 
 
-def _slips(data: ForceData, name: str) -> bool:
+def usable_points(campaign: Campaign, model: ForceModel, points: ForcePoints) -> ForcePoints:
+    """Return the points at which the model's contact is known.
+
+    Raises
+    ------
+    CalibrationError
+        If there is none.
+    """
+    if model.brush.tire is None and not model.values.get("pressure_power"):
+        return points
+    known = np.isfinite(points.data.pressure)
+    if not known.any():
+        raise CalibrationError(
+            f"{campaign.header.name}: the inflation pressure is unknown in every run; the model "
+            "needs it for the contact length; record it or give it as a set point"
+        )
+    return points.take(known)
+
+
+def strain_effects(file: TireFile, model: ForceModel) -> list[str]:
+    """Return the names of a file's effects that forces do not show."""
+    mine = {used.effect.name for used in model.used}
+    named = [entry["effect"] for entry in file.extra.get("effects", []) if isinstance(entry, dict)]
+    return [name for name in named if name not in mine]
+
+
+def slips(data: ForceData, name: str) -> bool:
     """Whether the slip that a force comes from varies."""
     if name == "Fx":
         return bool(np.ptp(data.slip_ratio) >= RATIO_SPAN)
@@ -205,19 +237,20 @@ def _lack(found: ForceComparison) -> float:
 
 
 def _compare(
-    campaign: Campaign, file: TireFile, data: ForceData, predicted: FloatArray, name: str
+    campaign: Campaign,
+    model: ForceModel,
+    points: ForcePoints,
+    predicted: FloatArray,
+    plain: FloatArray,
+    name: str,
 ) -> ForceComparison:
-    keep = np.isfinite(getattr(data, name))
-    data, predicted = data.take(keep), predicted[keep]
-    cell = _cells(data)
-    _, point = np.unique(np.stack([cell, data.block]), axis=1, return_inverse=True)
-    point = np.asarray(point).ravel()
-    data = _means(data, point)
-    model = _mean(predicted, point)
-    cell = _mean(cell.astype(float), point).astype(np.int64)
+    """Return the comparison of one force; `plain` is predicted without the model's effects."""
+    keep = np.isfinite(getattr(points.data, name))
+    points, predicted, plain = points.take(keep), predicted[keep], plain[keep]
+    data = points.data
     measured = getattr(data, name)
-    difference = model - measured
-    noise, freedom, repeats = _noise(difference, cell)
+    difference = predicted - measured
+    noise, freedom, repeats = noise_of(plain - measured, points.cell)
     rms = float(np.sqrt(np.mean(difference**2)))
     size = float(np.sqrt(np.mean(measured**2)))
     error, p = float("nan"), float("nan")
@@ -228,41 +261,10 @@ def _compare(
     table = _table(data, difference, measured, noise)
     said = _sentences(name, table, freedom) if verdict == "lack_of_fit" else ()
     return ForceComparison(
-        name, campaign.header.name, file.name, data, data.block, measured, model, noise, repeats,
-        error, rms, size, p, verdict, table, said,
-        _messages(campaign, name, data, verdict, rms / size, repeats),
+        name, campaign.header.name, model.name, data, data.block, measured, predicted, noise,
+        repeats, error, rms, size, p, verdict, table, said,
+        _messages(campaign, name, points, verdict, rms / size, repeats), model.used,
     )  # fmt: skip
-
-
-def _cells(data: ForceData) -> IntArray:
-    rows = [
-        levels(data.load), levels(data.pressure), np.round(data.slip_angle / CELL_ANGLE),
-        np.round(data.camber / CELL_ANGLE), np.round(data.slip_ratio / CELL_RATIO),
-    ]  # fmt: skip
-    _, number = np.unique(np.stack(rows), axis=1, return_inverse=True)
-    return np.asarray(number, dtype=np.int64).ravel()
-
-
-def _mean(values: FloatArray, point: IntArray) -> FloatArray:
-    return np.asarray(np.bincount(point, values) / np.bincount(point))
-
-
-def _means(data: ForceData, point: IntArray) -> ForceData:
-    """Return means over points; a force that is partly unknown at one is unknown there."""
-    out = {f.name: _mean(getattr(data, f.name).astype(float), point) for f in fields(data)}
-    block = np.round(out.pop("block")).astype(np.int64)
-    return ForceData(**out, block=block)
-
-
-def _noise(difference: FloatArray, cell: IntArray) -> tuple[float, int, int]:
-    """Return noise of a point, degrees of freedom and repeated cells."""
-    count = np.bincount(cell)
-    used = np.maximum(count, 1)
-    mean = np.bincount(cell, difference) / used
-    freedom = int(np.maximum(count - 1, 0).sum())
-    square = float(np.sum((difference - mean[cell]) ** 2))
-    noise = float(np.sqrt(square / freedom)) if freedom else float("nan")
-    return noise, freedom, int((count > 1).sum())
 
 
 def _table(
@@ -345,7 +347,7 @@ def _short(value: float) -> str:
 
 
 def _messages(
-    campaign: Campaign, name: str, data: ForceData, verdict: str, share: float, repeats: int
+    campaign: Campaign, name: str, points: ForcePoints, verdict: str, share: float, repeats: int
 ) -> tuple[str, ...]:
     where = campaign.header.name
     out = []
@@ -357,11 +359,16 @@ def _messages(
         )
     if not repeats:
         out.append(
-            f"{where} repeats no condition (cells of 0.5 deg in slip angle and camber and 0.01 in "
-            f"slip ratio): the noise is unknown, so errors stand in {UNITS[name]} and nothing is "
-            "said on whether they are more than noise. Repeat three conditions or more."
+            f"{where} repeats no condition ({CELLS}): the noise is unknown, so errors stand in "
+            f"{UNITS[name]} and nothing is said on whether they are more than noise. Repeat three "
+            "conditions or more."
         )
-    if not _slips(data, name):
+    elif points.sweep.any():
+        out.append(
+            f"Repeats are {repeats} cells of conditions ({CELLS}) that a sweep passes more than "
+            "once; the noise is that of a pass's mean."
+        )
+    if not slips(points.data, name):
         slip = "slip ratio" if name == "Fx" else "slip angle"
         out.append(
             f"{where} holds one {slip} only: {name} says nothing of the brush. Add runs with slip."

@@ -13,9 +13,9 @@ import numpy as np
 from scipy import special
 
 from tirelib.arrays import BoolArray, FloatArray
-from tirelib.compare.noise import RepeatNoise
 from tirelib.compare.runs import Factor
 from tirelib.compare.set_points import SetPoints
+from tirelib.identify.noise import RepeatNoise
 from tirelib.waveforms import GRID
 
 LEVEL = 0.01

@@ -17,15 +17,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.campaign import Tolerance
 from tirelib.compare.model import Prediction
-from tirelib.identify.random_effects import SMALLEST_TOLERANCE, Whitening, angle_slope
+from tirelib.identify import random_effects
+from tirelib.identify.noise import LEAST_NOISE, independent
 
 NAMES = ("load", "pressure", "gain", "angle")
 ROUNDS = 60
 SETTLED = 0.02
 """Relative change of V from which the set points no longer move by what can be seen."""
-LEAST_NOISE = 1e-7
 WINDOW = 9
 """Samples over which V is averaged."""
 
@@ -69,23 +68,8 @@ class SetPoints:
 def tangents(prediction: Prediction) -> FloatArray:
     """Return slopes by load, pressure, gain (relative), angle and zero, (n_runs, n_phi, 5)."""
     strain = prediction.strain
-    slope = angle_slope(strain)
-    zero = np.ones_like(strain)
-    return np.stack([prediction.by_load, prediction.by_pressure, strain, slope, zero], axis=2)
-
-
-def scales(tolerance: Tolerance, angle_std: FloatArray) -> FloatArray:
-    """Return the standard deviations of the set points, shape (n_runs, 4)."""
-    relative = [tolerance.load, tolerance.pressure, tolerance.gain]
-    rows = [np.full(angle_std.size, max(value, SMALLEST_TOLERANCE)) for value in relative]
-    return np.stack([*rows, np.minimum(angle_std, 1.0)], axis=1)
-
-
-def whitening_of(tangent: FloatArray, scale: FloatArray, noise: float) -> Whitening:
-    """Return the whitening by noise and set points at a model's tangents, the zero left out."""
-    basis, triangle = np.linalg.qr(tangent[..., :4] * scale[:, None, :])
-    inside = noise**2 * np.eye(4) + triangle @ triangle.swapaxes(1, 2)
-    return Whitening(basis, np.linalg.inv(np.linalg.cholesky(inside)), noise)
+    four = random_effects.tangents(strain, prediction.by_load, prediction.by_pressure)
+    return np.concatenate([four, np.ones_like(strain)[:, :, None]], axis=2)
 
 
 def predict_set_points(
@@ -128,19 +112,3 @@ def _averaged(values: FloatArray) -> FloatArray:
     """Return the running mean around the turn."""
     padded = np.pad(values, WINDOW // 2, mode="wrap")
     return np.convolve(padded, np.full(WINDOW, 1.0 / WINDOW), mode="valid")
-
-
-def independent(waves: FloatArray) -> float:
-    """Return how many independent samples periodic waveforms (n, n_phi) of a common spectrum have.
-
-    Examples
-    --------
-    >>> wave = np.cos(3 * np.linspace(0, 2 * np.pi, 90, endpoint=False))
-    >>> independent(wave[None])
-    2.0
-    """
-    power = np.sum(np.abs(np.fft.rfft(waves, axis=1)) ** 2, axis=0)[1:]
-    total = float(power.sum())
-    if total <= 0.0:
-        return float(waves.shape[1])
-    return float(2.0 * total**2 / np.sum(power**2))

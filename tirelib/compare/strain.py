@@ -8,20 +8,14 @@ from scipy import special
 from tirelib.arrays import FloatArray, IntArray
 from tirelib.compare.floor import Floor, floor_of
 from tirelib.compare.model import Model, Prediction, predict_runs
-from tirelib.compare.noise import RepeatNoise, repeat_noise
 from tirelib.compare.regions import SLIPS, Region, find_regions
 from tirelib.compare.runs import Chosen, choose
 from tirelib.compare.sectors import Cell, cells, sectors_of
 from tirelib.compare.sentences import sentences
-from tirelib.compare.set_points import (
-    NAMES,
-    SetPoints,
-    predict_set_points,
-    scales,
-    tangents,
-    whitening_of,
-)
+from tirelib.compare.set_points import NAMES, SetPoints, predict_set_points, tangents
 from tirelib.compare.tracks import Track, tracks
+from tirelib.identify.noise import RepeatNoise, repeat_noise
+from tirelib.identify.random_effects import scales, whitening_of
 from tirelib.model.base import operating_points
 from tirelib.waveforms import Waveforms
 

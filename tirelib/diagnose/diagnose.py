@@ -7,40 +7,55 @@ import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.diagnose.candidates import Candidates, candidates
-from tirelib.diagnose.ensemble import MEMBERS, Ensemble, structural_ensemble
-from tirelib.diagnose.ranking import Ranking, Scores
+from tirelib.diagnose.ensemble import MEMBERS
+from tirelib.diagnose.guess import Guess, guess_law
+from tirelib.diagnose.left import left_of
+from tirelib.diagnose.noise import noise_in, white_level
+from tirelib.diagnose.ranking import Ranking, Scores, limits
 from tirelib.diagnose.refit import Refit, refit
+from tirelib.diagnose.rivals import inseparable
+from tirelib.diagnose.stored import ensemble_of
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.waveform_fit import Data
 
-ALARM = 3.0
-"""Score over the ensemble's largest from which an effect is an alarm; from 1 on it is a hint."""
-HELPS = 0.97
-"""Error of the exact refit with an effect, over that without, up to which it is kept."""
-FURTHER = 6.0
+ALARM = 2.0
+"""Score over the variants' largest from which an effect is an alarm; from 1 on it is a hint."""
+FURTHER = 4.0
 """The same for a further effect: the law of the one before is right but roughly."""
-LEAST_SHARE = 0.25
-"""Share of the left misfit that has to come back without an effect for it to matter."""
 ROUNDS = 3
-FORM = 1.6
-"""Rms left after the joint fit, over the ensemble's largest, from which a law's form is doubted."""
-UNKNOWN = 1.3
-"""The same, from which an unexplained misfit is called unknown when no effect is named."""
-OUTSIDE_SHARE = 0.3
-"""Share of the left misfit from which an effect outside its range speaks for something unknown."""
+OUTSIDE = 3.0
+"""Ratio of an effect outside its range from which something unknown is there."""
+EXPLAINED = 0.4
+"""Share of the misfit beyond the variants' that named effects have to explain."""
+BEYOND = 1.5
+"""Misfit over the variants' largest from which it is more than the structure of a ring."""
 RANGE_SLACK = 2.0
 """Standard deviations by which a strength may leave its range."""
-TOP_SHARE = 0.6
-"""Score of a twin, over the leader's, from which the two cannot be told apart."""
-TWIN_REFIT = 1.05
-"""Ratio of the two refits' errors up to which they cannot be told apart."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One candidate as it stands in the end."""
+    """One candidate as it stands in the end.
+
+    Attributes
+    ----------
+    effect : Effect
+    score, threshold : float
+        Misfit that returns without it, and the largest such of the variants.
+    level : str
+        alarm, hint or quiet.
+    strength, std : shape (components,)
+    in_range : bool
+    share : float
+        Of the misfit, what this effect alone takes away.
+    twins : tuple of (name, angle [rad])
+    power : float
+        Chance that a third of the range is an alarm, by planting it in every variant.
+    error_after : float
+        Rms whitened residual with this effect alone, to first order.
+    """
 
     effect: Effect
     score: float
@@ -70,10 +85,15 @@ class Diagnosis:
     dead : mapping of name to reason
     base, final : Refit
         Without and with the named effects.
-    left, floor : float, [-]
-        Rms of the whitened residual after the joint fit, and the ensemble's largest.
+    left, floor : float
+        Misfit with the named effects, and the largest of the variants.
     rounds : int
     runs : StraightRuns
+    data : Data
+    beyond : shape (n_runs, n_phi)
+        Whitened part of model less measured that neither the model nor structure explains.
+    guess : Guess or None
+        A law for it, if it is more than variants leave and a sparse one holds.
     """
 
     verdict: str
@@ -87,6 +107,114 @@ class Diagnosis:
     rounds: int
     runs: StraightRuns
     data: Data
+    beyond: FloatArray
+    guess: Guess | None
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """A model with its candidates scored, and what the same scores do without any effect.
+
+    Attributes
+    ----------
+    model : Refit
+    found : Candidates
+    ranking : Ranking
+    scores : Scores
+    limit : shape (n_candidates,)
+        Largest score of the variants.
+    misfits : shape (n_members,)
+        Of the variants, without any effect.
+    in_range : shape (n_candidates,)
+        Whether a strength is plausible, its sign included.
+    """
+
+    model: Refit
+    found: Candidates
+    ranking: Ranking
+    scores: Scores
+    limit: FloatArray
+    misfits: FloatArray
+    in_range: BoolArray
+
+    @classmethod
+    def of(
+        cls,
+        data: Data,
+        model: Refit,
+        catalogue: Sequence[Effect],
+        rests: FloatArray,
+        noise: float,
+        least: Mapping[str, float],
+    ) -> "Stage":
+        """Return the stage of a model.
+
+        Parameters
+        ----------
+        rests : shape (n_members, n_runs * n_phi)
+            The variants' whitened residuals.
+        noise : float, [-]
+            Of a whitened sample.
+        least : mapping of name to float
+            Limits that hold already: no effect added makes one smaller.
+        """
+        found = candidates(data, model, catalogue)
+        ranking = Ranking(model, found, rests, noise)
+        scores = ranking.scores(data.strain - model.waveform)
+        members = ranking.of_members()
+        names = [candidate.effect.name for candidate in found.living]
+        bound = np.array([least.get(name, 0.0) for name in names])
+        return cls(
+            model, found, ranking, scores, np.maximum(limits(members), bound),
+            np.array([member.misfit for member in members]), plausible(found, scores),
+        )  # fmt: skip
+
+    @property
+    def names(self) -> list[str]:
+        """Of the living candidates."""
+        return [candidate.effect.name for candidate in self.found.living]
+
+    @property
+    def ratio(self) -> FloatArray:
+        """Scores over the variants' largest."""
+        ratio: FloatArray = self.scores.score / self.limit
+        return ratio
+
+    @property
+    def alarms(self) -> BoolArray:
+        """Effects in range whose scores no variant comes near."""
+        return np.asarray(self.in_range & (self.ratio >= ALARM))
+
+    def leader(self, suspects: set[str], bar: float) -> int | None:
+        """Return the index of the first suspect among the alarms from a ratio on, or None.
+
+        None as well if an effect outside its range explains more: then none inside does.
+        """
+        ratio = self.ratio
+        fit = self.alarms & (ratio >= bar) & np.isin(self.names, list(suspects))
+        if not fit.any() or self.outside > float(ratio[fit].max()):
+            return None
+        return int(np.argmax(np.where(fit, ratio, -np.inf)))
+
+    def beyond(self, waves: FloatArray) -> FloatArray:
+        """Return what neither fit nor structure explains of waves (k, n_runs, n_phi), whitened."""
+        rows = self.model.whiten(waves).reshape(len(waves), -1)
+        return self.ranking.structure.beyond(rows).reshape(waves.shape)
+
+    @property
+    def outside(self) -> float:
+        """Largest ratio of an effect outside its range."""
+        return float(np.max(np.where(self.in_range, 0.0, self.ratio), initial=0.0))
+
+
+def plausible(found: Candidates, scores: Scores) -> BoolArray:
+    """Return which strengths lie in their effects' ranges, to `RANGE_SLACK`."""
+    good = []
+    for candidate, strength, std in zip(found.living, scores.strength, scores.std, strict=True):
+        effect, slack = candidate.effect, RANGE_SLACK * std
+        inside = (strength >= effect.low - slack) & (strength <= effect.high + slack)
+        good.append(bool(inside.all()))
+    return np.array(good, dtype=bool)
 
 
 def diagnose(
@@ -116,96 +244,66 @@ def diagnose(
     """
     data = runs.data(with_deflection=False)
     base = refit(data, values, effects, strengths, progress=progress)
-    first = candidates(data, base, catalogue)
-    ranking = Ranking(base, first)
-    scores = ranking.scores(data.strain - base.waveform)
-    noise = runs.noise.std if np.isfinite(runs.noise.std) else 3e-6
-    ensemble = structural_ensemble(
-        data, base, ranking, noise=noise, members=members, seed=seed, progress=progress
-    )
-    thresholds = dict(zip(_names(first), ensemble.threshold, strict=True))
-
-    # the joint ranking sees all effects at once: who is no suspect now is none later
-    suspects = set(np.array(_names(first))[_alarms(first, scores, thresholds)])
-    model, found, now = base, first, scores
-    named: list[str] = []
-    rounds = 0
-    while rounds < ROUNDS:
-        bar = FURTHER if named else ALARM
-        best = _leader(found, now, thresholds, suspects, bar)
-        if best is None:
-            break
-        effect = found.living[best].effect
-        suspects.discard(effect.name)
-        rounds += 1
-        try:
-            trial = refit(
-                data, model.values, [*model.effects, effect],
-                [*model.strengths, _inside(effect, now.strength[best])], progress=progress,
-            )  # fmt: skip
-        except TirelibError:
-            continue
-        if trial.error > HELPS * model.error:
-            continue  # to first order only: the exact refit does not need it
-        model = trial
-        named.append(effect.name)
-        found = candidates(data, model, catalogue)
-        now = Ranking(model, found).scores(data.strain - model.waveform)
-    named = _still_needed(named, model)
-    findings = _findings(first, scores, thresholds, ensemble, named, model, data, base)
-    twins = _inseparable(findings, named, data, base)
-    verdict = _verdict(named, twins, now, ensemble, scores, first)
-    if verdict == "indistinguishable":
-        named = [named[0], *twins]
+    noise = noise_in(runs)
+    rests = ensemble_of(data, base, noise=noise, members=members, seed=seed, progress=progress)
+    level = white_level(runs, base, data.strain)
+    first = Stage.of(data, base, catalogue, rests, level, {})
+    stage, named, rounds = _rounds(data, first, catalogue, rests, level, progress)
+    named = _still_needed(named, stage.model)
+    findings = _findings(first, named, stage.model, data)
+    twins = inseparable(data, first, findings, named)
+    verdict, named = _verdict(named, twins, first, stage)
+    last = stage if named else first
+    left, floor = last.scores.misfit, float(last.misfits.max())
+    beyond = last.beyond(last.model.waveform[None] - data.strain)[0]
+    guess = None
+    if left > floor or verdict == "unknown":
+        guess = guess_law(
+            data.strain - last.model.waveform, last.model.waveform, data.points,
+            left_of(data, last.model).edges, last.beyond,
+        )  # fmt: skip
     return Diagnosis(
-        verdict, tuple(named), findings, first.dead, base, model, now.after,
-        float(ensemble.after.max()), rounds, runs, data,
+        verdict, tuple(named), findings, first.found.dead, base, last.model, left, floor, rounds,
+        runs, data, beyond, guess,
     )  # fmt: skip
 
 
-def _names(found: Candidates) -> list[str]:
-    return [candidate.effect.name for candidate in found.living]
-
-
-def _ratio(found: Candidates, scores: Scores, thresholds: Mapping[str, float]) -> FloatArray:
-    limits = np.array([thresholds.get(name, np.inf) for name in _names(found)])
-    ratio: FloatArray = scores.score / limits
-    return ratio
-
-
-def _in_range(found: Candidates, scores: Scores) -> BoolArray:
-    good = []
-    for candidate, strength, std in zip(found.living, scores.strength, scores.std, strict=True):
-        effect = candidate.effect
-        slack = RANGE_SLACK * std
-        good.append(
-            bool(((strength >= effect.low - slack) & (strength <= effect.high + slack)).all())
-        )
-    return np.array(good, dtype=bool)
-
-
-def _alarms(found: Candidates, scores: Scores, thresholds: Mapping[str, float]) -> BoolArray:
-    """Return which effects are in range, beyond the variants' scores, and matter."""
-    ratio = _ratio(found, scores, thresholds)
-    out: BoolArray = _in_range(found, scores) & (ratio >= ALARM) & (scores.share >= LEAST_SHARE)
-    return out
-
-
-def _leader(
-    found: Candidates,
-    scores: Scores,
-    thresholds: Mapping[str, float],
-    suspects: set[str],
-    bar: float,
-) -> int | None:
-    """Return the index of the suspect that explains most, or None."""
-    if not found.living:
-        return None
-    fit = _alarms(found, scores, thresholds) & np.isin(_names(found), list(suspects))
-    fit &= _ratio(found, scores, thresholds) >= bar
-    if not fit.any():
-        return None
-    return int(np.argmax(np.where(fit, scores.share, -np.inf)))
+def _rounds(
+    data: Data,
+    first: Stage,
+    catalogue: Sequence[Effect],
+    rests: FloatArray,
+    level: float,
+    progress: Callable[[str], None] | None,
+) -> tuple[Stage, list[str], int]:
+    """Add the leaders one after the other as long as the exact refit needs them."""
+    # the joint ranking sees all effects at once: who is no suspect now is none later
+    suspects = {name for name, alarm in zip(first.names, first.alarms, strict=True) if alarm}
+    least = dict(zip(first.names, first.limit, strict=True))
+    named: list[str] = []
+    stage, rounds = first, 0
+    while rounds < ROUNDS:
+        best = stage.leader(suspects, FURTHER if named else ALARM)
+        if best is None:
+            break
+        effect = stage.found.living[best].effect
+        suspects.discard(effect.name)
+        rounds += 1
+        model = stage.model
+        try:
+            trial = refit(
+                data, model.values, [*model.effects, effect],
+                [*model.strengths, _inside(effect, stage.scores.strength[best])],
+                progress=progress,
+            )  # fmt: skip
+        except TirelibError:
+            continue
+        after = Stage.of(data, trial, catalogue, rests, level, least)
+        if stage.scores.misfit - after.scores.misfit < ALARM * stage.limit[best]:
+            continue  # to first order only: the exact refit does not need it
+        stage = after
+        named.append(effect.name)
+    return stage, named, rounds
 
 
 def _inside(effect: Effect, strength: FloatArray) -> FloatArray:
@@ -226,23 +324,13 @@ def _still_needed(named: list[str], model: Refit) -> list[str]:
     return sorted(kept, key=named.index)
 
 
-def _findings(
-    found: Candidates,
-    scores: Scores,
-    thresholds: Mapping[str, float],
-    ensemble: Ensemble,
-    named: Sequence[str],
-    model: Refit,
-    data: Data,
-    base: Refit,
-) -> tuple[Finding, ...]:
-    ratio, inside = _ratio(found, scores, thresholds), _in_range(found, scores)
-    alarms = _alarms(found, scores, thresholds)
+def _findings(first: Stage, named: Sequence[str], model: Refit, data: Data) -> tuple[Finding, ...]:
+    ratio, inside, alarms, limit = first.ratio, first.in_range, first.alarms, first.limit
+    scores = first.scores
     fitted = {effect.name: k for k, effect in enumerate(model.effects)}
     rows = []
-    for i, candidate in enumerate(found.living):
+    for i, candidate in enumerate(first.found.living):
         name = candidate.effect.name
-        level = "alarm" if alarms[i] else "hint" if ratio[i] >= 1.0 else "quiet"
         strength, std = scores.strength[i], scores.std[i]
         if name in named:
             strength, std = model.strengths[fitted[name]], model.strength_std(fitted[name])
@@ -250,15 +338,15 @@ def _findings(
             Finding(
                 candidate.effect,
                 float(scores.score[i]),
-                float(thresholds[name]),
-                level,
+                float(limit[i]),
+                "alarm" if alarms[i] else "hint" if ratio[i] >= 1.0 else "quiet",
                 strength,
                 std,
                 bool(inside[i]),
-                float(scores.share[i]),
-                tuple(found.twins(i)),
-                _power(candidate.signal, scores, ensemble, i, data),
-                _error_with(candidate.own, data, base),
+                float(scores.alone[i] / scores.misfit),
+                tuple(first.found.twins(i)),
+                _power(first, i),
+                _error_with(candidate.own, data, first.model),
             )
         )
     order = {name: k for k, name in enumerate(named)}
@@ -266,13 +354,11 @@ def _findings(
     return tuple(rows)
 
 
-def _power(signal: float, scores: Scores, ensemble: Ensemble, index: int, data: Data) -> float:
-    """Return the chance that a third of the range would be an alarm, by the ensemble's spread."""
-    left = float(np.median(ensemble.after))
-    planted = (signal / 3.0) ** 2 / data.strain.size / left
-    limit = ALARM * float(ensemble.scores[:, index].max())
-    reached = planted + ensemble.scores[:, index] >= limit
-    return float(np.mean(reached))
+def _power(stage: Stage, index: int) -> float:
+    """Return in which share of the variants a third of the range would be an alarm."""
+    effect = stage.found.living[index].effect
+    third = effect.toward / effect.scale / 3.0
+    return float(np.mean(stage.ranking.planted(index, third) >= ALARM * stage.limit[index]))
 
 
 def _error_with(own: FloatArray, data: Data, base: Refit) -> float:
@@ -283,50 +369,17 @@ def _error_with(own: FloatArray, data: Data, base: Refit) -> float:
     return float(np.sqrt(np.mean(left**2)))
 
 
-def _inseparable(
-    findings: Sequence[Finding], named: Sequence[str], data: Data, base: Refit
-) -> list[str]:
-    """Return alarms that look like the leader and serve as well when they are refitted."""
-    if not named:
-        return []
-    by_name = {finding.effect.name: finding for finding in findings}
-    leader = by_name[named[0]]
-    rivals = []
-    for name, _ in leader.twins:
-        rival = by_name[name]
-        strong = rival.score / rival.threshold >= TOP_SHARE * leader.score / leader.threshold
-        if strong and rival.in_range:
-            rivals.append(rival)
-    alike = []
-    for rival in rivals[:2]:
-        try:
-            mine = refit(
-                data, base.values, [leader.effect], [_inside(leader.effect, leader.strength)]
-            )
-            other = refit(
-                data, base.values, [rival.effect], [_inside(rival.effect, rival.strength)]
-            )
-        except TirelibError:
-            continue
-        if other.error <= TWIN_REFIT * mine.error:
-            alike.append(rival.effect.name)
-    return alike
-
-
 def _verdict(
-    named: Sequence[str],
-    twins: Sequence[str],
-    last: Scores,
-    ensemble: Ensemble,
-    first: Scores,
-    found: Candidates,
-) -> str:
-    floor = float(ensemble.after.max())
-    if named:
-        if twins and len(named) == 1:
-            return "indistinguishable"
-        return "form_inadequate" if last.after > FORM * floor else "named"
-    outside = ~_in_range(found, first) & (first.share > OUTSIDE_SHARE)
-    if first.after > UNKNOWN * floor or (outside.any() and first.after > floor):
-        return "unknown"
-    return "none"
+    named: list[str], twins: Sequence[str], first: Stage, last: Stage
+) -> tuple[str, list[str]]:
+    """Return the verdict and what it names."""
+    excess = first.scores.misfit - float(np.median(first.misfits))
+    left = last.scores.misfit - float(np.median(last.misfits))
+    beyond = last.scores.misfit > BEYOND * float(last.misfits.max())
+    if not named:
+        return ("unknown" if beyond or last.outside >= OUTSIDE else "none"), []
+    if beyond and left > (1.0 - EXPLAINED) * excess:
+        return "unknown", []
+    if twins and len(named) == 1:
+        return "indistinguishable", [named[0], *twins]
+    return ("form_inadequate" if beyond else "named"), named

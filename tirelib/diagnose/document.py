@@ -8,10 +8,12 @@ import numpy as np
 
 from tirelib.diagnose.diagnose import Diagnosis, Finding
 from tirelib.diagnose.floor import FLOOR_MEMBERS, ErrorUnit, structural_floor
+from tirelib.diagnose.guess import Guess
 from tirelib.diagnose.held_out import Fold, folds, held_out_errors, pooled
-from tirelib.diagnose.left import Left, left_of
+from tirelib.diagnose.left import Left, left_of, told_powers
 from tirelib.diagnose.refit import Refit, refit
 from tirelib.errors import TirelibError
+from tirelib.identify.waveform_fit import Data
 
 FORMAT = "tirelib-diagnosis/1"
 NO_REPEATS = (
@@ -103,7 +105,7 @@ def assess(
     return Assessment(
         found, unit, verdict, named, findings, unit.factor * found.base.error,
         unit.factor * final.error, floor, chosen, held_before, held_after,
-        left_of(data, final), tuple(messages),
+        _left(found, data, final), tuple(messages),
     )  # fmt: skip
 
 
@@ -143,8 +145,8 @@ def diagnosis_document(told: Assessment) -> dict[str, Any]:
         "error_after": told.error_after,
         "heldout_error_before": pooled(told.held_before, told.folds),
         "held_out": [{"condition": f.name, "runs": int(f.out.sum())} for f in told.folds],
-        "joint_error": unit.factor * found.left,
-        "joint_floor": unit.factor * found.floor,
+        "misfit": found.left,
+        "misfit_floor": found.floor,
         "verdict": told.verdict,
         "named": list(told.named),
         "has": [effect.name for effect in found.base.effects],
@@ -189,19 +191,85 @@ def _plain(strength: Sequence[float] | np.ndarray) -> float | list[float]:
     return numbers[0] if len(numbers) == 1 else numbers
 
 
+def _left(found: Diagnosis, data: Data, final: Refit) -> Left:
+    """Return what is left; how it grows by the guessed law, where there is one."""
+    if not exceeding(found):
+        return left_of(data, final)
+    left = left_of(data, final, found.beyond)
+    if found.guess is None:
+        return left
+    powers = {**left.powers, **found.guess.powers}
+    return replace(left, powers=powers, scaling=told_powers(powers))
+
+
+def exceeding(found: Diagnosis) -> bool:
+    """Return whether more is left than variants of the model leave."""
+    return found.left > found.floor or found.verdict == "unknown"
+
+
 def exceeds(told: Assessment) -> bool:
-    """Return whether more is left than variants of the model leave after the same joint fit."""
-    return told.diagnosis.left > told.diagnosis.floor
+    """Return whether more is left than variants of the model leave."""
+    return exceeding(told.diagnosis)
 
 
 def _unexplained(told: Assessment) -> dict[str, Any]:
-    left = told.left
-    plain = exceeds(told)
+    left, guess = told.left, told.diagnosis.guess
+    if not exceeds(told):
+        return {"where": None, "scaling": None, "guess": None}
+    start, stop = np.rad2deg(left.span)
     return {
-        "where": left.where if plain else None,
-        "scaling": left.scaling if plain else None,
-        "sectors": dict(left.sectors),
-        "powers": dict(left.powers),
+        "where": {
+            "text": left.where,
+            "from_deg": float(start),
+            "to_deg": float(stop),
+            "sectors": dict(left.sectors),
+            "gages": _gages(told),
+        },
+        "scaling": {
+            "text": left.scaling,
+            **{
+                name: None
+                if power is None
+                else {"exponent": power.value, "low": power.low, "high": power.high}
+                for name, power in left.powers.items()
+            },
+        },
+        "guess": None if guess is None else _guess(guess),
+    }
+
+
+def _gages(told: Assessment) -> list[dict[str, float]]:
+    """Return the rms residual of each gage in use, in microstrain."""
+    found = told.diagnosis
+    waves = found.runs.waves
+    out = []
+    for gage in found.runs.gages:
+        rest = told.final.waveform - waves.strain[:, gage]
+        out.append(
+            {
+                "lateral_mm": 1e3 * waves.header.gage_lateral[gage],
+                "rms_ustrain": 1e6 * float(np.sqrt(np.mean(rest**2))),
+            }
+        )
+    return out
+
+
+def _guess(guess: Guess) -> dict[str, Any]:
+    return {
+        "law": guess.law,
+        "explained_held_out": guess.explained,
+        "terms": [
+            {
+                "shape": term.shape,
+                "powers": dict(term.powers),
+                "coefficient": 1e6 * term.coefficient,
+                "std": 1e6 * term.std,
+                "unit": "ustrain",
+            }
+            for term in guess.terms
+        ],
+        "note": "measured less model; a guess by sparse regression, kept on left-out conditions: "
+        "where and how it grows is often right, why is not told",
     }
 
 
@@ -229,7 +297,7 @@ def next_test(told: Assessment) -> dict[str, Any]:
         what = f"add {told.named[0]} (`tirelib add {told.named[0]}`) and diagnose again"
     elif told.verdict == "unknown":
         what = (
-            f"the misfit stands {told.left.where} and {told.left.scaling}: more levels there, or "
+            f"the misfit stands {told.left.where}; it {told.left.scaling}: more levels there, or "
             "an effect of your own (--effects)"
         )
     elif not told.unit.known:

@@ -1,19 +1,19 @@
-"""Structural variants of the user's own model, with no effect: what the scores do by themselves.
+"""Structural variants of the user's own model, with no effect: what a fit leaves by itself.
 
 A ring is not a tire, and what it lacks looks to some extent like one effect or another. So the
-scores of the data are held against those of waveforms that variants of the model make: a belt that
+residual of the data is held against those of waveforms that variants of the model make: a belt that
 stretches and shears, a tread that hardens and gains width with load, sections with inertia,
-traction that is not as assumed, a smooth misfit that goes with strain, load and pressure, run-out;
-measured at the user's plan with the rig's tolerances, delay and noise.
+traction that is not as assumed, displacements whose large part is other than computed, a smooth
+misfit that goes with strain, load and pressure, run-out; measured at the user's plan with the rig's
+tolerances, delay and noise. The base model is fitted to each as it is to the data.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.diagnose.ranking import Ranking
 from tirelib.diagnose.refit import Refit
 from tirelib.effects import CATALOGUE
 from tirelib.errors import TirelibError
@@ -21,7 +21,7 @@ from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.identify import FITTED
 from tirelib.identify.random_effects import angle_slope
 from tirelib.identify.waveform_fit import Data
-from tirelib.model.base import move, predict
+from tirelib.model.base import Correction, move, predict
 from tirelib.waveforms import GRID
 
 MEMBERS = 100
@@ -34,38 +34,28 @@ TIMING = 6e-5
 """Common delay between trigger and gages that a rig may have, [s]."""
 
 
-@dataclass(frozen=True, slots=True)
-class Ensemble:
-    """Scores of the variants.
-
-    Attributes
-    ----------
-    scores : shape (n_members, n_candidates)
-    after : shape (n_members,), [-]
-        Rms of the whitened residual after the joint fit.
-    """
-
-    scores: FloatArray
-    after: FloatArray
-
-    @property
-    def threshold(self) -> FloatArray:
-        """Largest score of the variants, per candidate."""
-        largest: FloatArray = self.scores.max(axis=0)
-        return largest
+LARGE = 0.3
+"""Relative standard deviation of the part that large displacements add."""
+ALIKE = {"gage_length": 600.0, "roughness": 0.2, "gage_saturation": 4e-3}
+"""Standard deviation, in their units, of what a tire's structure shows that looks like these
+effects: the contact's ends are sharper or smoother than the ring's, contact begins gradually across
+a crowned tread, and strain is not quite in proportion to the belt's curvature."""
+SECTIONS = 8e-5
+"""Largest inertia of the belt's sections, [kg m]: twice that of 12.5 mm of belt and tread."""
+RUN_OUT, ONCE = 1.5e-4, 5e-6
+"""Largest run-out of a tire, [m], and largest strain once per turn beside it, [-]."""
 
 
 def structural_ensemble(
     data: Data,
     model: Refit,
-    ranking: Ranking,
     *,
     noise: float,
     members: int = MEMBERS,
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
-) -> Ensemble:
-    """Return the scores of variants of a model at the plan of the data.
+) -> FloatArray:
+    """Return whitened residuals of variants of a model at the plan, (n, n_runs * n_phi).
 
     Parameters
     ----------
@@ -81,26 +71,55 @@ def structural_ensemble(
     inverse = np.asarray(np.linalg.inv(normal), dtype=np.float64)
     half = 0.6 * np.sqrt(2.0 * model.deflection / float(np.max(model.values["free_radius"])))
     misfit = MISFIT.columns(model.waveform, half, data.points, GRID)
-    scores: list[FloatArray] = []
-    after: list[float] = []
+    misfit = np.concatenate([misfit, _alike(data, model)])
+    swing = _by_load(data, model)
+    rests: list[FloatArray] = []
     attempts = 0
-    while len(scores) < members and attempts < 3 * members:
+    while len(rests) < members and attempts < 3 * members:
         attempts += 1
         try:
-            wave = _variant(data, model, misfit, noise, random)
+            wave = _variant(data, model, misfit, swing, noise, random)
             rest = np.subtract(wave, _refitted(data, model, wave, rows, inverse))
         except TirelibError:
             continue  # the draw is no tire
-        found = ranking.scores(rest)
-        scores.append(found.score)
-        after.append(found.after)
+        rests.append(model.whiten(rest).ravel())
         if progress is not None:
-            progress(f"variant {len(scores)}")
-    return Ensemble(np.array(scores), np.array(after))
+            progress(f"variant {len(rests)}")
+    return np.array(rests)
+
+
+def _by_load(data: Data, model: Refit) -> FloatArray:
+    """Return the change of the waveforms by deflection, (n_runs, n_phi), [1/m]."""
+    share = 1e-3
+    more = replace(data.points, load=data.points.load * (1.0 + share))
+    state = predict(
+        model.values, more, model.changes, low_pass=data.low_pass, correction=model.correction
+    )
+    deeper = state.deflection - model.deflection
+    slope: FloatArray = (state.wave - model.waveform) / deeper[:, None]
+    return slope
+
+
+def _alike(data: Data, model: Refit) -> FloatArray:
+    """Return what one standard deviation of `ALIKE` changes, (n, n_runs, n_phi)."""
+    rows = []
+    for name, size in ALIKE.items():
+        effect = CATALOGUE[name]
+        state = predict(
+            model.values, data.points, [*model.changes, effect.at(effect.step)],
+            low_pass=data.low_pass, correction=model.correction,
+        )  # fmt: skip
+        rows.append((state.wave - model.waveform) * (size / effect.step))
+    return np.array(rows)
 
 
 def _variant(
-    data: Data, model: Refit, misfit: FloatArray, noise: float, random: np.random.Generator
+    data: Data,
+    model: Refit,
+    misfit: FloatArray,
+    swing: FloatArray,
+    noise: float,
+    random: np.random.Generator,
 ) -> FloatArray:
     """Return the waveforms of one variant, measured."""
     points, tolerance = data.points, data.tolerance
@@ -112,10 +131,10 @@ def _variant(
         values[name] = values[name] * float(np.exp(0.1 * random.standard_normal()))
     values["shear_stiffness"] = 1e3 / random.uniform(0.001, 0.03)
     values["tread_hardening"] = random.uniform(0.0, 3.0)
-    values["rotary_inertia"] = random.uniform(0.0, 3e-4)
+    values["rotary_inertia"] = random.uniform(0.0, SECTIONS)
     values["tread_stiffness"] = values["tread_stiffness"] * (
         points.load / REFERENCE_LOAD
-    ) ** random.uniform(0.0, 0.4)
+    ) ** random.uniform(-0.1, 0.2)
     really = replace(
         points,
         load=points.load * (1.0 + tolerance.load * random.standard_normal(n)),
@@ -126,13 +145,15 @@ def _variant(
         for name, share in TRACTION.items()
         if name not in {effect.name for effect in model.effects}
     ]
-    state = predict(
-        values, really, [*model.changes, *rolling], low_pass=data.low_pass,
-        correction=model.correction,
-    )  # fmt: skip
-    wave = state.wave
+    large = 1.0 + LARGE * float(random.standard_normal())
+    correction = Correction(large * model.correction.waveform, large * model.correction.deflection)
+    wave = predict(
+        values, really, [*model.changes, *rolling], low_pass=data.low_pass, correction=correction
+    ).wave
     wave = wave + np.tensordot(random.standard_normal(len(misfit)), misfit, axes=1)
-    wave = wave + random.uniform(0.0, 20e-6) * np.cos(GRID - random.uniform(-np.pi, np.pi))
+    turn = np.cos(GRID - random.uniform(-np.pi, np.pi))
+    wave = wave + random.uniform(0.0, RUN_OUT) * turn * swing
+    wave = wave + random.uniform(0.0, ONCE) * np.cos(GRID - random.uniform(-np.pi, np.pi))
     wave = wave * (1.0 + tolerance.gain * random.standard_normal(n))[:, None]
     zero = np.minimum(data.angle_std, 0.01) * random.standard_normal(n)
     zero = zero + TIMING * random.uniform(-1.0, 1.0) * points.omega

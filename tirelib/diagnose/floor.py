@@ -5,9 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.diagnose.candidates import Candidates
 from tirelib.diagnose.ensemble import structural_ensemble
-from tirelib.diagnose.ranking import Ranking
 from tirelib.diagnose.refit import Refit
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.waveform_fit import Data
@@ -65,10 +63,9 @@ def structural_floor(
 
     The variants differ from the ring in structure and lack no effect; the base is fitted to them.
     """
-    nothing = Candidates((), {}, np.zeros((0, 0)))
     noise = unit.noise if unit.known else UNKNOWN_NOISE
-    left = structural_ensemble(
-        data, model, Ranking(model, nothing), noise=noise, members=members, seed=seed,
-        progress=progress,
-    ).after  # fmt: skip
-    return unit.factor * float(np.median(left)) if left.size else float("nan")
+    rests = structural_ensemble(
+        data, model, noise=noise, members=members, seed=seed, progress=progress
+    )
+    left = np.sqrt(np.mean(rests**2, axis=1)) if rests.size else np.array([np.nan])
+    return unit.factor * float(np.median(left))

@@ -1,7 +1,7 @@
 """Errors on runs that took no part in a fit: the highest load, and one pressure."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from tirelib.identify.campaign_data import LEAST_RUNS
 from tirelib.identify.error_bands import levels
 from tirelib.identify.random_effects import whitening
 from tirelib.identify.waveform_fit import Data
-from tirelib.model.base import large_displacements, predict
+from tirelib.model.base import Correction, large_displacements, predict
 
 LEAST_LOADS, LEAST_PRESSURES = 3, 2
 
@@ -82,18 +82,37 @@ def held_out_errors(
         try:
             trained = refit(
                 part_of(data, ~fold.out), model.values, model.effects, model.strengths,
-                progress=progress,
+                near=_near(model.correction, ~fold.out), progress=progress,
             )  # fmt: skip
-            errors.append(unit.factor * error_on(part_of(data, fold.out), trained))
+            near = _near(model.correction, fold.out)
+            errors.append(unit.factor * error_on(part_of(data, fold.out), trained, near))
         except TirelibError:
             errors.append(float("nan"))
     return tuple(errors)
 
 
-def error_on(data: Data, model: Refit) -> float:
-    """Return the rms whitened residual of a fitted model on runs, which may be others'."""
+def _near(correction: Correction, chosen: BoolArray) -> Correction | None:
+    """Return a correction of some of the runs, as a start for values nearby."""
+    contact, rows = correction.contact, np.flatnonzero(chosen)
+    if contact is None or len(contact) != chosen.size:
+        return None
+    old = contact.constants
+    constants = replace(old, **{f.name: getattr(old, f.name)[rows] for f in fields(old)})
+    per_point = ("radius", "even", "odd", "deflection", "half_angle", "load")
+    part = replace(
+        contact, **{name: getattr(contact, name)[rows] for name in per_point},
+        tread=contact.tread.take(rows), constants=constants,
+    )  # fmt: skip
+    return Correction(correction.waveform[rows], correction.deflection[rows], part)
+
+
+def error_on(data: Data, model: Refit, near: Correction | None = None) -> float:
+    """Return the rms whitened residual of a fitted model on runs, which may be others'.
+
+    `near` is a correction of these runs at values nearby; it saves time.
+    """
     points = data.points
-    correction = large_displacements(model.values, points, low_pass=data.low_pass)
+    correction = large_displacements(model.values, points, low_pass=data.low_pass, start=near)
     wave = predict(
         model.values, points, model.changes, low_pass=data.low_pass, correction=correction
     ).wave

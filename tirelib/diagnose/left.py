@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 
 from tirelib.arrays import FloatArray
 from tirelib.compare.sectors import SECTORS, sectors_of
@@ -11,9 +12,13 @@ from tirelib.diagnose.refit import Refit
 from tirelib.identify.error_bands import levels
 from tirelib.identify.waveform_fit import Data
 from tirelib.model.base import predict
+from tirelib.waveforms import GRID
 
 FLAT = 0.2
 """Power of a condition below which the residual is said not to change with it."""
+MOST = 0.7
+"""Share of the squares that the told range of angles holds."""
+CONDITIONS = ("load", "pressure", "speed", "slip_angle", "camber", "slip_ratio")
 _PLACES = {
     "contact": "in the contact",
     "entry edge": "at the entry of the contact",
@@ -22,6 +27,15 @@ _PLACES = {
     "exit flank": "behind the contact",
     "far side": "away from the contact",
 }
+
+
+@dataclass(frozen=True, slots=True)
+class Power:
+    """Power of a condition in a residual's rms, with a 95 % interval."""
+
+    value: float
+    low: float
+    high: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,60 +48,106 @@ class Left:
         Whitened residual, model less measured.
     where, scaling : str
         In words.
+    span : tuple of float, [rad]
+        Shortest range of angles with `MOST` of the squares; the second end may lie past pi.
     sectors : mapping of sector to float
         Share of the squares.
-    powers : mapping of condition to float
-        Powers of the conditions that vary with which a run's rms goes.
+    powers : mapping of condition to Power or None
+        None where the plan does not vary it.
+    edges : shape (n_runs, 2), [rad]
+        Of the contact.
     """
 
     white: FloatArray
     where: str
     scaling: str
+    span: tuple[float, float]
     sectors: Mapping[str, float]
-    powers: Mapping[str, float]
+    powers: Mapping[str, Power | None]
+    edges: FloatArray
 
 
-def left_of(data: Data, model: Refit) -> Left:
-    """Return what a fitted model leaves of the waveforms that it was fitted to."""
+def left_of(data: Data, model: Refit, beyond: FloatArray | None = None) -> Left:
+    """Return what a fitted model leaves of the waveforms that it was fitted to.
+
+    Parameters
+    ----------
+    data : Data
+    model : Refit
+    beyond : shape (n_runs, n_phi), optional
+        The part of the whitened residual that structure does not explain: place and scaling are
+        told of it; of the whole residual if it is not given.
+    """
     white = model.whiten(model.waveform - data.strain)
+    told = white if beyond is None else beyond
     state = predict(
         model.values, data.points, model.changes, low_pass=data.low_pass,
         correction=model.correction,
     )  # fmt: skip
     assert state.contact is not None  # noqa: S101 - the chain sets it
     sector = sectors_of(state.contact.edges)
-    squares = white**2
-    shares = {
-        name: float(squares[sector == k].sum() / squares.sum()) for k, name in enumerate(SECTORS)
-    }
+    squares = told**2
+    total = max(float(squares.sum()), 1e-300)
+    shares = {name: float(squares[sector == k].sum() / total) for k, name in enumerate(SECTORS)}
     first = max(shares, key=lambda name: shares[name])
+    start, stop = _span(squares.mean(axis=0))
     powers = _powers(data, np.sqrt(squares.mean(axis=1)))
-    moves = [
-        f"{'grows' if power > 0 else 'falls'} with {name} (power {power:+.1f})"
-        for name, power in powers.items()
-        if abs(power) >= FLAT
-    ]
     return Left(
         white,
-        f"{_PLACES[first]} ({100 * shares[first]:.0f} % of the squares)",
-        " and ".join(moves) or "is alike in all runs",
+        f"{_PLACES[first]} ({100 * shares[first]:.0f} % of the squares), most of it from "
+        f"{np.rad2deg(start):.0f} to {np.rad2deg(stop):.0f} deg",
+        told_powers(powers),
+        (start, stop),
         shares,
         powers,
+        state.contact.edges,
     )
 
 
-def _powers(data: Data, rms: FloatArray) -> dict[str, float]:
-    """Return the powers of load, pressure and speed that tell the runs' rms."""
-    names = [
-        name
-        for name in ("load", "pressure", "speed")
-        if np.isfinite(getattr(data.points, name)).all()
-        and (getattr(data.points, name) > 0.0).all()
-        and levels(getattr(data.points, name)).max() > 0
+def told_powers(powers: Mapping[str, Power | None]) -> str:
+    """Say powers whose interval leaves no doubt of the sign."""
+    moves = [
+        f"{'grows' if power.value > 0 else 'falls'} with {name.replace('_', ' ')} "
+        f"(power {power.value:+.1f}, {power.low:+.1f} to {power.high:+.1f})"
+        for name, power in powers.items()
+        if power is not None and abs(power.value) >= FLAT and power.low * power.high > 0.0
     ]
-    columns = [np.log(getattr(data.points, name)) for name in names]
-    if len(rms) <= len(columns) + 1:
-        return {}
+    return " and ".join(moves) or "is alike in all runs"
+
+
+def _span(squares: FloatArray) -> tuple[float, float]:
+    """Return the shortest range of the turn that holds `MOST` of some squares."""
+    n = squares.size
+    running = np.concatenate([[0.0], np.cumsum(np.tile(squares, 2))])
+    need = MOST * running[n]
+    stop = np.searchsorted(running, running[:n] + need, side="left")
+    first = int(np.argmin(stop - np.arange(n)))
+    step = float(GRID[1] - GRID[0])
+    return float(GRID[first]), float(GRID[first] + step * (stop[first] - first))
+
+
+def _powers(data: Data, rms: FloatArray) -> dict[str, Power | None]:
+    """Return the powers of the conditions that tell the runs' rms, with intervals."""
+    names = [name for name in CONDITIONS if _varies(np.asarray(getattr(data.points, name)))]
+    out: dict[str, Power | None] = dict.fromkeys(CONDITIONS)
+    free = len(rms) - len(names) - 1
+    if free < 1 or not names:
+        return out
+    columns = [np.log(np.abs(getattr(data.points, name))) for name in names]
     matrix = np.stack([np.ones(len(rms)), *columns], axis=1)
-    found = np.linalg.lstsq(matrix, np.log(np.maximum(rms, 1e-12)), rcond=None)[0]
-    return {name: float(found[k + 1]) for k, name in enumerate(names)}
+    response = np.log(np.maximum(rms, 1e-12))
+    found = np.linalg.lstsq(matrix, response, rcond=None)[0]
+    left = response - matrix @ found
+    spread = np.linalg.pinv(matrix.T @ matrix) * float(left @ left) / free
+    reach = float(stats.t.ppf(0.975, free))
+    for k, name in enumerate(names, start=1):
+        half = reach * float(np.sqrt(max(spread[k, k], 0.0)))
+        out[name] = Power(float(found[k]), float(found[k]) - half, float(found[k]) + half)
+    return out
+
+
+def _varies(values: FloatArray) -> bool:
+    """Whether a condition has levels of one sign that a power can be told of."""
+    if not np.isfinite(values).all() or (np.abs(values) < 1e-3).any():
+        return False
+    return bool(levels(np.abs(values)).max() > 0)

@@ -1,20 +1,25 @@
 """The joint ranking: all candidates together, each scored by what returns when it alone is removed.
 
-Base coordinates and the strengths of every living candidate are fitted at once to the whitened
-residual, strengths with a ridge of one range. The score of an effect is the misfit that comes back
-without it, per sample, over the rms that the whole fit leaves: between an absolute measure, which
-grows with any structural floor, and a relative one, which a floor hides.
+Strengths of every living candidate are fitted at once to the whitened residual, with a ridge of one
+range, in the metric of what a ring leaves by itself (`tirelib.diagnose.structure`). The score of an
+effect is the misfit that comes back without it. An effect with twins is scored without them in the
+fit: two that look alike would else take each other's score away.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.candidates import Candidates
 from tirelib.diagnose.refit import Refit
+from tirelib.diagnose.structure import FORM, Normal, Structure
 
-_LOOSE = 1e-8
+SMALL, LEAST = 0.3, 0.5
+"""Size of an effect in a run, over the typical one, below which its shape there is not trusted,
+and least size that another law may have there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,56 +29,148 @@ class Scores:
     Attributes
     ----------
     score : shape (n,)
-    share : shape (n,)
-        Misfit that comes back over the misfit that is left.
+        Misfit that comes back without the effect.
+    alone : shape (n,)
+        Misfit that the effect alone takes away.
     strength : tuple of array
         Per candidate, in its unit.
     std : tuple of array
-    before, after : float, [-]
-        Rms of the whitened residual before and after the joint fit.
+    misfit, after : float
+        Misfit before and after the joint fit.
     """
 
     score: FloatArray
-    share: FloatArray
+    alone: FloatArray
     strength: tuple[FloatArray, ...]
     std: tuple[FloatArray, ...]
-    before: float
+    misfit: float
     after: float
 
 
 class Ranking:
-    """The joint fit of one model and its candidates, for any residual."""
+    """The joint fit of one model and its candidates, for any residual.
 
-    def __init__(self, model: Refit, found: Candidates) -> None:
+    Parameters
+    ----------
+    model : Refit
+    found : Candidates
+    members : shape (n_members, n_runs * n_phi)
+        Whitened residuals of the structural ensemble.
+    noise : float, [-]
+        Standard deviation of a whitened sample by noise alone.
+    """
+
+    def __init__(self, model: Refit, found: Candidates, members: FloatArray, noise: float) -> None:
         self.model, self.found = model, found
-        base = model.whiten(model.slopes).reshape(len(model.slopes), -1)
-        self.rows = np.concatenate([base, *[c.rows for c in found.living]])
-        ridge = np.ones(len(self.rows))
-        ridge[: len(base)] = _LOOSE
-        self.inverse = np.linalg.inv(self.rows @ self.rows.T + np.diag(ridge))
-        first = len(base)
+        free = model.whiten(model.slopes).reshape(len(model.slopes), -1)
+        self.structure = Structure(members, noise, free, form_rows(model))
+        self.rows = np.concatenate([c.own for c in found.living]) if found.living else free[:0]
         self.slots: list[slice] = []
+        first = 0
         for candidate in found.living:
-            self.slots.append(slice(first, first + len(candidate.rows)))
-            first += len(candidate.rows)
+            self.slots.append(slice(first, first + len(candidate.own)))
+            first += len(candidate.own)
+        names = [c.effect.name for c in found.living]
+        self.twins = [[names.index(name) for name, _ in found.twins(k)] for k in range(len(names))]
 
     def scores(self, residual: FloatArray) -> Scores:
         """Return the scores for a residual of shape (n_runs, n_phi)."""
         white = self.model.whiten(residual).ravel()
-        weights = self.inverse @ (self.rows @ white)
-        rest = white - weights @ self.rows
-        left = float(rest @ rest)
-        score, share, strength, std = [], [], [], []
-        for candidate, slot in zip(self.found.living, self.slots, strict=True):
-            own = weights[slot]
-            block = self.inverse[slot, slot]
-            returned = float(own @ np.linalg.solve(block, own))
-            score.append(returned / white.size / np.sqrt(left / white.size))
-            share.append(returned / left)
-            strength.append(own * candidate.effect.scale)
-            std.append(candidate.effect.scale * np.sqrt(np.diag(block)))
-        size = white.size
+        return self._scores(self.structure.normal(self.rows, white))
+
+    @cached_property
+    def normals(self) -> list[Normal]:
+        """The members' normal equations, each by the others' structure."""
+        return self.structure.of_members(self.rows)
+
+    def of_members(self) -> tuple[Scores, ...]:
+        """Return the scores of the ensemble's members, each by the others' structure."""
+        return tuple(self._scores(normal) for normal in self.normals)
+
+    def planted(self, index: int, strength: float) -> FloatArray:
+        """Return scores of the members with one effect planted, in shares of its range."""
+        slot = self.slots[index]
+        out = []
+        for normal in self.normals:
+            column = normal.gram[:, slot.start]
+            moved = Normal(normal.gram, normal.right + strength * column, normal.square)
+            out.append(self._score(moved, index)[0])
+        return np.array(out)
+
+    def _scores(self, normal: Normal) -> Scores:
+        score, alone, strength, std = [], [], [], []
+        for index, candidate in enumerate(self.found.living):
+            returned, own, block = self._score(normal, index)
+            scale = candidate.effect.scale
+            score.append(returned)
+            alone.append(_taken(normal, self.slots[index]))
+            strength.append(own * scale)
+            std.append(scale * np.sqrt(np.diag(block)))
+        every = slice(0, len(normal.right))
         return Scores(
-            np.array(score), np.array(share), tuple(strength), tuple(std),
-            float(np.sqrt(white @ white / size)), float(np.sqrt(left / size)),
+            np.array(score), np.array(alone), tuple(strength), tuple(std), normal.square,
+            normal.square - _taken(normal, every),
         )  # fmt: skip
+
+    def _score(self, normal: Normal, index: int) -> tuple[float, FloatArray, FloatArray]:
+        """Return score, strength in ranges, and covariance of one effect, its twins left out."""
+        out = self.twins[index]
+        kept = [
+            k
+            for j, slot in enumerate(self.slots)
+            if j not in out
+            for k in range(slot.start, slot.stop)
+        ]
+        first = kept.index(self.slots[index].start)
+        own = slice(first, first + self.slots[index].stop - self.slots[index].start)
+        gram = normal.gram[np.ix_(kept, kept)]
+        inverse = np.asarray(np.linalg.inv(gram + np.eye(len(kept))), dtype=np.float64)
+        weights = (inverse @ normal.right[kept])[own]
+        block = inverse[own, own]
+        return float(weights @ np.linalg.solve(block, weights)), weights, block
+
+
+def _taken(normal: Normal, slot: slice) -> float:
+    """Return the misfit that some rows take away, with the ridge."""
+    gram, right = normal.gram[slot, slot], normal.right[slot]
+    if right.size == 0:
+        return 0.0
+    weights = np.linalg.solve(gram + np.eye(right.size), right)
+    return float(2.0 * weights @ right - weights @ gram @ weights)
+
+
+def form_rows(model: Refit) -> FloatArray:
+    """Return how a model's effects may be off from run to run, (n_effects * n_runs, n)."""
+    runs, samples = model.waveform.shape
+    rows: list[FloatArray] = []
+    first = len(model.slopes) - sum(effect.components for effect in model.effects)
+    for effect, strength in zip(model.effects, model.strengths, strict=True):
+        slopes = model.slopes[first : first + effect.components]
+        first += effect.components
+        change = model.whiten(np.tensordot(strength / effect.scale, slopes, axes=1))
+        each = np.zeros((runs, runs, samples))
+        each[np.arange(runs), np.arange(runs)] = FORM * filled(change)
+        rows.append(each.reshape(runs, -1))
+    return np.concatenate(rows) if rows else np.zeros((0, runs * samples))
+
+
+def filled(change: FloatArray) -> FloatArray:
+    """Return an effect's change per run, nowhere much smaller than it typically is.
+
+    Where the law gives little, another may give half of what it gives elsewhere, in that shape.
+    """
+    size = np.sqrt(np.sum(change**2, axis=1, keepdims=True))
+    typical = float(np.sqrt(np.mean(size**2)))
+    if typical == 0.0:
+        return change
+    shape = change / np.maximum(size, SMALL * typical)
+    trusted = size[:, 0] > SMALL * typical
+    shape[~trusted] = shape[trusted].mean(axis=0)
+    out: FloatArray = shape * np.maximum(size, LEAST * typical)
+    return out
+
+
+def limits(members: Sequence[Scores]) -> FloatArray:
+    """Return the members' largest score of each candidate."""
+    largest: FloatArray = np.max([scores.score for scores in members], axis=0)
+    return largest

@@ -90,6 +90,7 @@ def refit(
     effects: Sequence[Effect] = (),
     strengths: Sequence[FloatArray] = (),
     *,
+    near: Correction | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Refit:
     """Fit base values and strengths to the waveforms.
@@ -101,6 +102,8 @@ def refit(
         Start values of the tire.
     effects, strengths
         Effects of the model and their start strengths.
+    near : Correction, optional
+        Of the same runs at values nearby: saves time, the result is the same.
     progress : callable, optional
 
     Raises
@@ -109,7 +112,7 @@ def refit(
         If the steps do not settle; carries the last values.
     """
     start = [np.zeros(e.components) for e in effects] if not strengths else list(strengths)
-    fitter = _Fitter(data, dict(values), tuple(effects), start)
+    fitter = _Fitter(data, dict(values), tuple(effects), start, near)
     for outer in range(OUTER):
         fitter.refresh()
         for _ in range(MAX_STEPS):
@@ -138,6 +141,7 @@ class _Fitter:
         values: dict[str, float | FloatArray],
         effects: tuple[Effect, ...],
         strengths: list[FloatArray],
+        near: Correction | None = None,
     ) -> None:
         self.data, self.start, self.effects = data, values, effects
         scales = [np.full(e.components, e.scale) for e in effects]
@@ -145,7 +149,7 @@ class _Fitter:
         self.z = np.concatenate([np.zeros(len(FITTED)), *strengths]) / self.scale
         self.width = np.concatenate([WIDTH, np.full(self.z.size - len(FITTED), STRENGTH_WIDTH)])
         self.damping, self.cost = 1e-3, np.inf
-        self.correction: Correction | None = None
+        self.correction = near
 
     @property
     def values(self) -> dict[str, float | FloatArray]:
@@ -160,7 +164,9 @@ class _Fitter:
     def refresh(self) -> None:
         """Bring large displacements and whitening up to date."""
         data = self.data
-        self.correction = large_displacements(self.values, data.points, low_pass=data.low_pass)
+        self.correction = large_displacements(
+            self.values, data.points, low_pass=data.low_pass, start=self.correction
+        )
         self._linearise(self.z)
         self.whiten = whitening(
             self.waveform, self.values, data.points, data.tolerance, data.angle_std, data.noise,

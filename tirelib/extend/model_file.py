@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from tirelib import __version__
+from tirelib.diagnose.held_out import pooled
 from tirelib.errors import FormatError
 from tirelib.extend.extension import Extension
 from tirelib.identify.identify import FITTED
-from tirelib.parameters import FIELDS, Number, TireFile
+from tirelib.parameters import NUMBERS, Number, TireFile
 from tirelib.parameters.tire import range_fault
 
 
@@ -63,13 +64,14 @@ def undone_file(file: TireFile) -> tuple[TireFile, Mapping[str, Any]]:
             "were before; `tirelib add --remove` takes an effect out and fits anew"
         )
     try:
-        old = {name: _read(table) for name, table in before["numbers"].items() if name in FIELDS}
+        old = {name: _read(table) for name, table in before["numbers"].items() if name in NUMBERS}
     except (KeyError, TypeError, ValueError) as error:
         raise FormatError(
             f"{file.name}, history[{len(history)}].before.numbers: {error!r}; a table with value, "
             "kind and source for each is needed"
         ) from error
-    fitted = {coordinate.name for coordinate in FITTED}
+    # an entry says which numbers its step wrote; those of strain without it wrote the ring's
+    fitted = set(before.get("written", [coordinate.name for coordinate in FITTED]))
     numbers = {name: number for name, number in file.numbers.items() if name not in fitted} | old
     extra = {**file.extra, "effects": before["effects"], "history": history}
     return replace(file, numbers=numbers, extra=extra), last
@@ -116,6 +118,8 @@ def _entry(file: TireFile, done: Extension, data_hash: str) -> dict[str, Any]:
         "error_before": done.unit.factor * done.before.error,
         "error_after": done.unit.factor * done.after.error,
         "floor": done.floor,
+        "heldout_error_before": pooled(done.held_before, done.folds),
+        "heldout_error_after": pooled(done.held_after, done.folds),
     }
     return {
         "action": done.action,
@@ -130,7 +134,7 @@ def _entry(file: TireFile, done: Extension, data_hash: str) -> dict[str, Any]:
         "before": {
             "effects": list(file.extra.get("effects", [])),
             "numbers": {
-                coordinate.name: _written(file.numbers[coordinate.name])
+                coordinate.name: written(file.numbers[coordinate.name])
                 for coordinate in FITTED
                 if coordinate.name in file.numbers
             },
@@ -144,7 +148,8 @@ def plain(values: np.ndarray) -> float | list[float]:
     return numbers[0] if len(numbers) == 1 else numbers
 
 
-def _written(number: Number) -> dict[str, Any]:
+def written(number: Number) -> dict[str, Any]:
+    """Return a number as a history entry holds it."""
     table: dict[str, Any] = {
         "value_SI": number.value, "kind": number.kind, "source": number.source,
         "notes": dict(number.notes),

@@ -25,6 +25,8 @@ PRIOR = 1.0
 """Standard deviation of every z before any measurement."""
 LEAST_GAIN = 0.8
 """A run that leaves more of the standard deviation than this share is no advice."""
+LARGEST_ANGLE = 15.0
+"""No rig is asked for a larger slip angle, [deg]; where friction is unknown full sliding is too."""
 _ANGLES = (1.0, 2.0, 4.0, 6.0)
 _RATIOS = (0.01, 0.02, 0.05, 0.1, 0.15)
 _SHARE = 0.05
@@ -89,7 +91,7 @@ def candidates(study: Study) -> tuple[Candidate, ...]:
     side = tuple(n for n in ("Fy", "Mz") if n in fit.rmse) or ("Fy", "Mz")
     along = ("Fx",)
     slide = float(np.rad2deg(study.slide["slip_angle"]))
-    far = np.ceil(1.3 * max(slide, 3.0))
+    far = min(np.ceil(1.3 * max(slide, 3.0)), LARGEST_ANGLE)
     angles = np.array([-far, -0.8 * far, 0.8 * far, far])
     small = np.array([s * a for a in _ANGLES for s in (-1.0, 1.0)])
     ratios = np.array([s * r for r in _RATIOS for s in (-1.0, 1.0)])

@@ -21,12 +21,22 @@ from tirelib.errors import CalibrationError, ParameterError
 from tirelib.identify.brush_law import NEUTRAL, SPECS, Reference, point_parameters, predict
 from tirelib.identify.brush_problem import ASSUMED_HALF_LENGTH, Problem
 from tirelib.identify.error_bands import BandError, band_errors
+from tirelib.identify.force_checks import (
+    ANGLE_SPAN as ANGLE_SPAN,
+)
+from tirelib.identify.force_checks import (
+    RATIO_SPAN as RATIO_SPAN,
+)
+from tirelib.identify.force_checks import (
+    refuse_wrong_forces,
+    slips_vary,
+)
 from tirelib.identify.force_data import FORCES, ForceData
 from tirelib.identify.ring_patch import half_lengths
 from tirelib.parameters import Tire
 
-ANGLE_SPAN, RATIO_SPAN, LOAD_RATIO = np.deg2rad(1.0), 0.01, 1.1
-"""Least ranges of slip angle, slip ratio and load that tell anything of the law."""
+LOAD_RATIO = 1.1
+"""Least ratio of loads that tells anything of the law."""
 _START_POINTS = 4000
 
 
@@ -142,6 +152,7 @@ def fit_brush(
     """
     known = dict(held or {})
     wanted = _forces(data, forces)
+    refuse_wrong_forces(data, wanted)
     names, fixed = _choose(data, wanted, set(free), known, tire, robust)
     if not names:
         raise ParameterError("brush fit: every parameter is held; leave one free")
@@ -188,14 +199,7 @@ def fit_brush(
 
 def _forces(data: ForceData, forces: Sequence[str] | None) -> tuple[str, ...]:
     """Return the forces to fit, after a look at what the data can tell."""
-    angles, ratios = np.ptp(data.slip_angle), np.ptp(data.slip_ratio)
-    turns, brakes = angles >= ANGLE_SPAN, ratios >= RATIO_SPAN
-    if not (turns or brakes):
-        raise CalibrationError(
-            f"brush fit: slip angles span {np.rad2deg(angles):.2g} deg and slip ratios "
-            f"{ratios:.2g} over {len(data)} points; at least {np.rad2deg(ANGLE_SPAN):g} deg or "
-            f"{RATIO_SPAN:g} is needed; add runs with slip"
-        )
+    turns, brakes = slips_vary(data)
     useful = {"Fy": turns, "Fx": brakes, "Mz": turns}
     measured = {n: bool(np.isfinite(getattr(data, n)).sum() > 3) for n in FORCES}
     if forces is None:

@@ -9,14 +9,26 @@ from tirelib.campaign import Tolerance
 from tirelib.errors import CalibrationError
 from tirelib.identify.fit_cost import Data
 from tirelib.identify.noise import RepeatNoise, measured_tangents, repeat_noise
+from tirelib.identify.strain_notes import (
+    LEAST_LOAD_RATIO,
+    LEAST_RUNS,
+    MOST_STRAIN,
+    WEAK_GAGE,
+    gage_sizes,
+    named,
+    some_gage_works,
+)
 from tirelib.model.base import operating_points
-from tirelib.waveforms import Waveforms
+from tirelib.waveforms import GRID, Waveforms
 
-LEAST_RUNS = 4
-LEAST_LOAD_RATIO = 1.25
-WEAK_GAGE = 0.3
+__all__ = ["LEAST_RUNS", "StraightRuns", "straight_runs", "working_gages"]
+
 STRUCTURE = 0.016
 """White part of the structural misfit, relative to the rms strain."""
+MIDDLE = 0.05
+"""Half of the angle below the axle over which the sign of the strain is looked at, [rad]."""
+GEOMETRY_ERROR = 1e-3
+"""By which lengths of a tire may contradict each other, [m]: as a tape measure does."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +79,17 @@ def straight_runs(waves: Waveforms) -> StraightRuns:
         numbers.
     """
     name = waves.header.name
-    chosen = waves.take(waves.straight & np.isfinite(waves.conditions["Fz"]))
+    known = np.isfinite(waves.conditions["Fz"]) & np.isfinite(waves.conditions["pressure"])
+    works = some_gage_works(waves)
+    chosen = waves.take(waves.straight & known & works)
+    if len(chosen) < LEAST_RUNS and (waves.straight & ~works).any():
+        finder = int(np.argmin(np.abs(waves.header.gage_lateral)))
+        raise CalibrationError(
+            f"{name}, {named(waves.run[waves.straight & ~works])}: no gage gives a whole waveform; "
+            f"{len(chosen)} straight runs are left, at least {LEAST_RUNS} are needed; look for "
+            f"noise in gage {finder + 1} at {1e3 * waves.header.gage_lateral[finder]:+.0f} mm, "
+            "which finds the contacts, or for samples that are no numbers"
+        )
     if len(chosen) < LEAST_RUNS:
         raise CalibrationError(
             f"{name}: {len(chosen)} straight runs with strain and load; at least {LEAST_RUNS} are "
@@ -81,8 +103,11 @@ def straight_runs(waves: Waveforms) -> StraightRuns:
             f"{LEAST_LOAD_RATIO} times the smallest or more, else stiffness and tread cannot be "
             "told apart; add a run at another load"
         )
+    _refuse_geometry(chosen)
+    _refuse_conditions(chosen)
     gages = working_gages(chosen)
     strain = chosen.strain[:, gages].mean(axis=1)
+    _refuse_signs(chosen, strain)
     radius = chosen.header.tire.free_radius
     deflection = radius - chosen.conditions["loaded_radius"]
     wrong = np.flatnonzero(
@@ -108,10 +133,9 @@ def working_gages(waves: Waveforms) -> tuple[int, ...]:
     CalibrationError
         If none works; naming run and gage.
     """
-    size = np.sqrt(np.mean(waves.strain**2, axis=2))
-    typical = np.nanmedian(size, axis=1, keepdims=True)
+    size, typical = gage_sizes(waves.strain)
     good = np.isfinite(size) & (size > WEAK_GAGE * typical)
-    works = good.all(axis=0)
+    works = np.asarray(good.all(axis=0))
     lateral = np.array(waves.header.gage_lateral)
     pairs = []
     for i, y in enumerate(lateral):
@@ -127,3 +151,54 @@ def working_gages(waves: Waveforms) -> tuple[int, ...]:
             "in every run; leave out that run or mend the gage"
         )
     return tuple(pairs)
+
+
+def _refuse_geometry(waves: Waveforms) -> None:
+    """Raise where the lengths of the campaign's tire contradict each other."""
+    tire = waves.header.tire
+    if tire.tread_thickness is None or tire.ring_radius is None:
+        return
+    room = tire.free_radius - tire.ring_radius
+    if tire.tread_thickness > room + GEOMETRY_ERROR:
+        raise CalibrationError(
+            f"{waves.header.name}: tire.tread_thickness_m = {tire.tread_thickness:g} m does not "
+            f"fit between tire.ring_radius_m = {tire.ring_radius:g} m and tire.free_radius_m = "
+            f"{tire.free_radius:g} m, which leave {room:.4g} m; the tread lies outside the belt's "
+            "neutral line; correct one of the three"
+        )
+
+
+def _refuse_conditions(waves: Waveforms) -> None:
+    """Raise for the first run whose load, inflation pressure or turn rate no rolling ring has."""
+    for name, least, unit, factor, words in (
+        ("Fz", 10.0, "N", 1.0, "the sign or the unit"),
+        ("pressure", 1e4, "bar", 1e-5, "the channel or its unit"),
+        ("omega", 0.1, "rad/s", 1.0, "the channel or its unit"),
+    ):
+        value = waves.conditions[name]
+        wrong = np.flatnonzero(value < least)
+        if wrong.size:
+            raise CalibrationError(
+                f"{waves.header.name}, run {waves.run[wrong[0]]}: {name} is "
+                f"{factor * value[wrong[0]]:.4g} {unit}; at least {factor * least:g} {unit} is "
+                f"allowed for a rolling, inflated tire; correct {words}, or leave the run out"
+            )
+
+
+def _refuse_signs(waves: Waveforms, strain: FloatArray) -> None:
+    """Raise for the first run whose innerliner is torn, or not stretched in the contact."""
+    size = np.sqrt(np.mean(strain**2, axis=1))
+    huge = np.flatnonzero(size > MOST_STRAIN)
+    if huge.size:
+        raise CalibrationError(
+            f"{waves.header.name}, run {waves.run[huge[0]]}: {1e6 * size[huge[0]]:.3g} microstrain "
+            f"rms; at most {1e6 * MOST_STRAIN:.0f} is allowed; correct the unit of the gages"
+        )
+    middle = strain[:, np.abs(GRID) < MIDDLE].mean(axis=1)
+    wrong = np.flatnonzero(middle < -1.0)
+    if wrong.size:
+        raise CalibrationError(
+            f"{waves.header.name}, run {waves.run[wrong[0]]}: {1e6 * middle[wrong[0]]:.0f} "
+            "microstrain below the axle, against the mean of the turn; the belt is bent flat "
+            "there and its inside stretched, tension is positive; correct the sign of the gages"
+        )

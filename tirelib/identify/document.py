@@ -1,12 +1,13 @@
 """An identification as JSON (``tirelib-identification/1``) and as a model file."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.campaign import Campaign
+from tirelib.identify.dynamic_route_validation import rim_checks
 from tirelib.identify.identify import Identification
 from tirelib.identify.static_route_fit import Quantity
 from tirelib.parameters import FIELDS, TireFile
@@ -31,6 +32,7 @@ def identification_document(campaign: Campaign, found: Identification) -> dict[s
         "parameters": [_parameter(found, k) for k in range(len(found.estimates))],
         "correlation": found.correlation,
         "vertical_stiffness": _vertical_stiffness(found),
+        "rim_stiffness": _rim_stiffness(found),
         "steps": fit.steps,
         "provenance": dict(found.tire.extra["provenance"]),
     }
@@ -68,16 +70,33 @@ def _vertical_stiffness(found: Identification) -> dict[str, float | None]:
     return {"load_N": float(load.mean()), "model": model, "measured": measured}
 
 
+def _rim_stiffness(found: Identification) -> dict[str, float]:
+    """Return what tests of the held tread would give, Eq. (112) corrected, for comparison."""
+    tire = found.tire.tire
+    none = {"shift": 0.0, "turn": 0.0, "longitudinal": 0.0}
+    S_v, S_theta, K_x = (c.predicted for c in rim_checks(asdict(tire), tire.pressure, **none))
+    return {
+        "pressure_bar": 1e-5 * tire.pressure,
+        "shift_N_per_mm": 1e-3 * S_v,
+        "turn_Nm_per_deg": S_theta * np.pi / 180.0,
+        "longitudinal_N_per_mm": 1e-3 * K_x,
+    }
+
+
 def _slope(deflection: FloatArray, load: FloatArray) -> float:
     cubic = min(2, np.unique(np.round(load, -2)).size - 1)
     fitted = np.polynomial.Polynomial.fit(load, deflection, cubic).deriv()
     return float(1e-3 / fitted(float(load.mean())))
 
 
-def model_file(found: Identification, damping: Quantity | None = None) -> TireFile:
+def model_file(
+    found: Identification, damping: Quantity | None = None, modal: Quantity | None = None
+) -> TireFile:
     """Return the identified tire as a model without effects.
 
-    The damping stands beside the model: the base has none, so that its lack can be diagnosed.
+    The damping stands beside the model: the base has none, so that its lack can be diagnosed. The
+    number is that of dashpots beside the sidewall's springs; `modal` is the ratio of every mode
+    that shifts the contact alike, several times smaller, and the one that the models take.
     """
     beside: dict[str, Any] = {}
     if damping is not None:
@@ -87,7 +106,14 @@ def model_file(found: Identification, damping: Quantity | None = None) -> TireFi
             "std": damping.std,
             "interval": [damping.low, damping.high],
             "flags": list(damping.flags),
+            "law": "sidewall: c = 2 lambda sqrt(k rhoA)",
             "source": "lag of the contact's edges behind the compressive peaks over speed",
+        }
+    if damping is not None and modal is not None:
+        beside["identified_damping"] |= {
+            "modal_value": modal.value,
+            "modal_interval": [modal.low, modal.high],
+            "modal_law": "c_n = 2 lambda sqrt(m_n k_n), as simulate and sidewall_damping take it",
         }
     extra = {
         **found.tire.extra,

@@ -63,6 +63,11 @@ class DynamicRoute:
     vertical : VerticalStiffness or None
         Validation; None without measured loaded radii.
     damping : Damping or None
+        By the law that the options name.
+    damping_modal : Damping or None
+        The same shift by the modal law, Eq. (107), which the models of `tirelib.model` have.
+    turn_rate : float, [rad/s]
+        Of the fastest run.
     reasons : tuple of str
         Why something is missing.
     values : mapping
@@ -78,6 +83,8 @@ class DynamicRoute:
     as_printed: LoadErrors | None
     vertical: VerticalStiffness | None
     damping: Damping | None
+    damping_modal: Damping | None
+    turn_rate: float
     reasons: tuple[str, ...]
     values: Mapping[str, float]
 
@@ -124,11 +131,11 @@ def dynamic_route(
         vertical = vertical_stiffness(runs, predicted_deflection(values, problem.points))
     else:
         reasons.append("vertical stiffness: fewer than three measured loaded radii")
-    damping = None
+    damping = modal = None
+    known = runs, problem.strain, values, problem.relative_std(fit)
     try:
-        damping = fit_damping(
-            runs, problem.strain, values, problem.relative_std(fit), law=chosen.damping_law
-        )
+        damping = fit_damping(*known, law=chosen.damping_law)
+        modal = damping if chosen.damping_law == "modal" else fit_damping(*known, law="modal")
     except (CalibrationError, ConvergenceError, ParameterError) as error:
         reasons.append(f"damping: {error}")
     return DynamicRoute(
@@ -141,6 +148,8 @@ def dynamic_route(
         before,
         vertical,
         damping,
+        modal,
+        float(problem.points.omega.max()),
         tuple(reasons),
         {**per_run, **({"damping": damping.value.value} if damping else {})},
     )

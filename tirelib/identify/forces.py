@@ -6,6 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from tirelib.arrays import IntArray
 from tirelib.campaign import Campaign
 from tirelib.errors import TirelibError
 from tirelib.identify.brush_advice import advice
@@ -16,18 +17,26 @@ from tirelib.identify.brush_estimates import (
     slip_stiffness,
     with_help,
 )
-from tirelib.identify.brush_fit import ANGLE_SPAN, BrushFit, fit_brush
+from tirelib.identify.brush_fit import BrushFit, fit_brush
 from tirelib.identify.brush_model import stored_number
 from tirelib.identify.brush_study import study_of
+from tirelib.identify.force_checks import ANGLE_SPAN
 from tirelib.identify.force_data import ForceData, force_data
 from tirelib.identify.force_notes import force_notes
-from tirelib.identify.lateral_force import MOST_POINTS, PressureComparison, compare_pressures
+from tirelib.identify.lateral_force import (
+    MOST_POINTS,
+    PressureComparison,
+    cells_of_load,
+    compare_pressures,
+)
 from tirelib.parameters import Number, Tire
 
 MOST_SAMPLES = 50000
 """A longer sweep is thinned evenly: its samples are closer than its errors are independent."""
 MOST_COMPARED = 300
 """Points for the ring's pressure against the parabola; each has its own pressure profile."""
+LEAST_COMPARED = 4
+"""Points of one load and pressure from which its stiffness can be fitted and points left out."""
 _STILL = 0.01
 """Slip ratio up to which a point rolls freely."""
 
@@ -167,6 +176,9 @@ def _compared(data: ForceData, ring: Tire, notes: list[str]) -> PressureComparis
             "ring pressure against parabola: no freely rolling runs over slip angle with Fy"
         )
         return None
+    chosen = _told(data, chosen, notes)
+    if not chosen.size:
+        return None
     limit = min(MOST_COMPARED, MOST_POINTS)
     if chosen.size > limit:
         chosen = chosen[:: -(-chosen.size // limit)]
@@ -175,6 +187,23 @@ def _compared(data: ForceData, ring: Tire, notes: list[str]) -> PressureComparis
     except TirelibError as error:
         notes.append(f"ring pressure against parabola: {error}")
         return None
+
+
+def _told(data: ForceData, chosen: IntArray, notes: list[str]) -> IntArray:
+    """Return the points whose load and pressure hold enough slip angles for a stiffness."""
+    cell = cells_of_load(data.take(chosen))
+    enough = np.array([
+        np.count_nonzero(cell == k) >= LEAST_COMPARED
+        and np.ptp(data.slip_angle[chosen[cell == k]]) >= ANGLE_SPAN
+        for k in range(int(cell.max()) + 1)
+    ])[cell]  # fmt: skip
+    if not enough.all():
+        notes.append(
+            f"ring pressure against parabola: {int((~enough).sum())} of {enough.size} points are "
+            f"left out, their load and pressure hold fewer than {LEAST_COMPARED} points or less "
+            f"than {np.rad2deg(ANGLE_SPAN):.0f} deg of slip angle"
+        )
+    return np.asarray(chosen[enough])
 
 
 def _numbers(

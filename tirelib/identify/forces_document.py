@@ -11,7 +11,7 @@ from tirelib.identify.document import FORMAT, identification_document
 from tirelib.identify.error_bands import BandError
 from tirelib.identify.forces import ForceIdentification
 from tirelib.identify.lateral_force import PressureComparison
-from tirelib.identify.routes import routes_document
+from tirelib.identify.routes_document import routes_document
 from tirelib.identify.whole import Whole
 from tirelib.parameters import NUMBERS
 from tirelib.units import from_si
@@ -53,6 +53,7 @@ def _no_ring(campaign: Campaign, whole: Whole) -> dict[str, Any]:
         "parameters": [],
         "correlation": [],
         "vertical_stiffness": None,
+        "rim_stiffness": None,
         "steps": None,
         "provenance": {},
         "damping": None,

@@ -1,5 +1,6 @@
 """Identify a tire from a campaign: every number with an interval, and what it would take."""
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
@@ -8,13 +9,16 @@ import numpy as np
 from tirelib import __version__
 from tirelib.arrays import FloatArray
 from tirelib.campaign import Campaign, CampaignHeader
+from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.next_run import NextRun, next_run
+from tirelib.identify.strain_notes import gage_notes, run_notes
 from tirelib.identify.structure import STRUCTURE_STD
 from tirelib.identify.waveform_fit import Prior, WaveformFit, fit_waveforms
 from tirelib.model.base import FREE, Coordinate, values_of
 from tirelib.parameters import FIELDS, Number, Tire, TireFile
+from tirelib.units import from_si
 from tirelib.waveforms import Waveforms, measure_waveforms
 
 WIDEST = 0.25
@@ -79,6 +83,8 @@ class Identification:
         Of the estimates, by the fit.
     fit : WaveformFit
     runs : StraightRuns
+    notes : tuple of str
+        Runs and gages that were not used, and why.
     """
 
     tire: TireFile
@@ -86,6 +92,7 @@ class Identification:
     correlation: FloatArray
     fit: WaveformFit
     runs: StraightRuns
+    notes: tuple[str, ...] = ()
 
 
 def identify(
@@ -114,8 +121,13 @@ def identify(
     ConvergenceError
         If the fit does not settle.
     """
-    runs = straight_runs(waves or measure_waveforms(campaign, progress=progress))
-    start, fit, estimates = estimated(runs, tire, progress=progress)
+    waves = waves or measure_waveforms(campaign, progress=progress)
+    runs = straight_runs(waves)
+    try:
+        start, fit, estimates = estimated(runs, tire, progress=progress)
+    except TirelibError as error:
+        error.args = (_with_run(str(error), runs),)
+        raise
     deviation = np.sqrt(np.diag(fit.covariance))
     return Identification(
         _fitted_file(start, estimates, campaign, runs, fit),
@@ -123,7 +135,37 @@ def identify(
         fit.covariance / np.outer(deviation, deviation),
         fit,
         runs,
+        (
+            *run_notes(waves, campaign.plans),
+            *gage_notes(runs.waves, runs.gages),
+            *_contradictions(start, estimates),
+        ),
     )
+
+
+def _contradictions(start: TireFile, estimates: tuple[Estimate, ...]) -> tuple[str, ...]:
+    """Return a sentence for each measured number that the strain does not agree with."""
+    out = []
+    for each in estimates:
+        given = start.numbers[each.name]
+        if given.kind == "measured" and "at_boundary" in each.flags:
+            field = FIELDS[each.name]
+            value, said = (
+                from_si(v, field.unit, field.dimension) for v in (each.value, given.value)
+            )
+            out.append(
+                f"{each.name}: the strain says {value:.4g} {field.unit}, {given.source} says "
+                f"{said:.4g} {field.unit}; one of them is wrong: correct the length, or the unit "
+                "or gain of the gages"
+            )
+    return tuple(out)
+
+
+def _with_run(message: str, runs: StraightRuns) -> str:
+    """Return a message of the model with the campaign's run in place of the point's index."""
+    run = runs.waves.run
+    said = re.sub(r"point (\d+)", lambda m: f"run {run[min(int(m[1]), run.size - 1)]}", message)
+    return f"{runs.waves.header.name}: {said}"
 
 
 def estimated(

@@ -150,7 +150,7 @@ def compare_pressures(
     half = 0.5 * ring.length
     start = _start(data, half, known)
     free = tuple(name for name in start if name not in known)
-    conditions = _conditions(data)
+    conditions = cells_of_load(data)
     group = conditions if stiffness == "each" else np.zeros_like(conditions)
     folds = _parts(data, group) if group.max() == conditions.max() else conditions
     values, constants, predicted, unseen = {}, {}, {}, {}
@@ -287,7 +287,7 @@ def _check(data: ForceData) -> None:
         )
 
 
-def _conditions(data: ForceData) -> IntArray:
+def cells_of_load(data: ForceData) -> IntArray:
     """Return the number of each point's load and pressure, from 0."""
     pair = np.stack([levels(data.load), levels(data.pressure)])
     number = np.unique(pair, axis=1, return_inverse=True)[1]

@@ -1,10 +1,7 @@
 """Both routes of the dissertation beside the whole-waveform fit, as far as the campaign allows."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
 
 from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import StraightRuns
@@ -30,6 +27,12 @@ class Routes:
     static: StaticRoute | None
     dynamic: DynamicRoute | None
     reasons: tuple[str, ...]
+
+    @property
+    def modal_damping(self) -> Quantity | None:
+        """The same shift as a ratio that every harmonic has, Eq. (107)."""
+        found = self.dynamic.damping_modal if self.dynamic else None
+        return found.without_angle if found else None
 
     @property
     def damping(self) -> Quantity | None:
@@ -64,81 +67,9 @@ def follow_routes(
     if progress is not None:
         progress("route of chapter 5")
     try:
-        static = static_route(runs, start)
+        known = dynamic.values if dynamic else None
+        static = static_route(runs, start, values=known)
         reasons += [f"chapter 5: {reason}" for reason in static.reasons]
     except TirelibError as error:
         reasons.append(f"chapter 5: {error}")
     return Routes(static, dynamic, tuple(reasons))
-
-
-def routes_document(routes: Routes) -> dict[str, Any]:
-    """Return the routes as JSON holds them, SI."""
-    damping = routes.damping
-    document: dict[str, Any] = {
-        "damping": None if damping is None else {**_quantity(damping), "law": "sidewall"},
-        "chapter_5": None,
-        "chapter_6": None,
-        "reasons": list(routes.reasons),
-    }
-    if routes.static is not None:
-        lengths = routes.static.lengths
-        document["chapter_5"] = {
-            "runs": [int(run) for run in routes.static.run],
-            "from_strain": _quantities(routes.static.strain_based),
-            "from_contact_model": _quantities(routes.static.conventional),
-            "contact_length_mm": {
-                "load_N": lengths.load,
-                "read": 1e3 * lengths.read,
-                "corrected": 1e3 * lengths.corrected,
-                "contact_model": 1e3 * lengths.conventional,
-            },
-        }
-    if routes.dynamic is not None:
-        dynamic = routes.dynamic
-        document["chapter_6"] = {
-            "quantities": _quantities(dynamic.quantities),
-            "load_error_percent": {
-                "as_printed": None
-                if dynamic.as_printed is None
-                else _percent(dynamic.as_printed.estimated, dynamic.as_printed.measured),
-                "corrected": _percent(dynamic.loads.estimated, dynamic.loads.measured),
-            },
-            "vertical_stiffness": _stiffness(dynamic),
-        }
-    return document
-
-
-def _percent(estimated: Any, measured: Any) -> float:
-    return 100.0 * float(np.sqrt(np.mean((estimated / measured - 1.0) ** 2)))
-
-
-def _stiffness(dynamic: DynamicRoute) -> list[dict[str, float]]:
-    vertical = dynamic.vertical
-    if vertical is None:
-        return []
-    return [
-        {
-            "pressure_bar": 1e-5 * float(vertical.pressure[i]),
-            "speed_kmh": 3.6 * float(vertical.speed[i]),
-            "measured_N_per_mm": 1e-3 * float(vertical.measured[i]),
-            "measured_std_N_per_mm": 1e-3 * float(vertical.measured_std[i]),
-            "predicted_N_per_mm": 1e-3 * float(vertical.predicted[i]),
-        }
-        for i in range(vertical.pressure.size)
-    ]
-
-
-def _quantities(quantities: Iterable[Quantity]) -> list[dict[str, Any]]:
-    return [_quantity(quantity) for quantity in quantities]
-
-
-def _quantity(quantity: Quantity) -> dict[str, Any]:
-    return {
-        "name": quantity.name,
-        "unit": quantity.unit,
-        "value": quantity.value,
-        "std": quantity.std,
-        "low": quantity.low,
-        "high": quantity.high,
-        "flags": list(quantity.flags),
-    }

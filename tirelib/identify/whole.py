@@ -12,7 +12,11 @@ from tirelib.identify.document import model_file
 from tirelib.identify.forces import ForceIdentification, identify_forces
 from tirelib.identify.identify import Identification, identify, start_file
 from tirelib.identify.routes import Routes, follow_routes
+from tirelib.identify.strain_notes import broken_gages, ring_expected
 from tirelib.parameters import Number, Tire, TireFile
+
+ALIKE = 0.01
+"""Relative difference up to which two free radii may be one tire's."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,7 +30,9 @@ class Whole:
         Beside the ring.
     brush : ForceIdentification or None
     reasons : tuple of str
-        Why a part is absent.
+        Why a part is absent, and which runs and gages were not used.
+    ring_failed : str
+        Why there is no ring although the plan holds the runs for one; else empty.
     file : TireFile
         What the other verbs read.
     """
@@ -35,6 +41,7 @@ class Whole:
     routes: Routes | None
     brush: ForceIdentification | None
     reasons: tuple[str, ...]
+    ring_failed: str
     file: TireFile
 
 
@@ -59,17 +66,22 @@ def identify_whole(
     ------
     CalibrationError
         If the campaign informs neither; with both reasons.
+    ParameterError
+        If the given tire's geometry contradicts that of the campaign.
     """
     reasons: list[str] = []
-    known = start if start is not None and not start.missing else None
-    ring, routes = None, None
+    known = _start(campaign, start, reasons)
+    ring, routes, failed = None, None, ""
     if campaign.header.gage_lateral:
         try:
             ring = identify(campaign, known, progress=progress)
             first = start_file(campaign.header, ring.runs, known)
             routes = follow_routes(ring.runs, first, progress=progress)
+            reasons += ring.notes
         except TirelibError as error:
-            reasons.append(f"no ring: {error}")
+            why = "; ".join([f"no ring: {error}", *broken_gages(campaign)])
+            reasons.append(why)
+            failed = why if ring_expected(campaign) else ""
     else:
         reasons.append(f"no ring: {campaign.header.name} holds no strain: it declares no gages")
     tire: Tire | None = None
@@ -87,7 +99,28 @@ def identify_whole(
     if ring is None and brush is None:
         raise CalibrationError("; ".join(reasons))
     file = _file(campaign, known, ring, routes, brush)
-    return Whole(ring, routes, brush, tuple(reasons), file)
+    if not file.missing:
+        _ = file.tire  # a file that no verb could read is refused here
+    return Whole(ring, routes, brush, tuple(reasons), failed, file)
+
+
+def _start(campaign: Campaign, start: TireFile | None, reasons: list[str]) -> TireFile | None:
+    """Return the given tire if it states a ring, and say what does not fit the campaign."""
+    if start is None:
+        return None
+    if start.missing:
+        reasons.append(
+            f"{start.name}: the given tire states no complete ring ({', '.join(start.missing[:3])} "
+            "... missing): it is no start, literature values are"
+        )
+        return None
+    given, measured = start.numbers["free_radius"].value, campaign.header.tire.free_radius
+    if abs(given / measured - 1.0) > ALIKE:
+        reasons.append(
+            f"free_radius is {1e3 * given:.1f} mm in {start.name} and {1e3 * measured:.1f} mm in "
+            f"campaign.toml of {campaign.header.name}: is it the same tire? The campaign's counts"
+        )
+    return start
 
 
 def _file(
@@ -99,7 +132,8 @@ def _file(
 ) -> TireFile:
     """Return the model: the ring's file, or a file of geometry, with the brush's numbers."""
     if ring is not None:
-        base = model_file(ring, routes.damping if routes is not None else None)
+        told = (routes.damping, routes.modal_damping) if routes is not None else (None, None)
+        base = model_file(ring, *told)
     else:
         base = _without_ring(campaign, known)
     if brush is None:

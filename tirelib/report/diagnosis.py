@@ -28,10 +28,11 @@ from tirelib.waveforms import GRID
 
 TITLE = "Which effect is missing"
 METHOD_TEXT = (
-    "All effects of the catalogue are fitted at once. An effect's score is the misfit that "
-    "returns when it alone is taken out, over what the fit leaves. The threshold is the largest "
-    "score among variants of the model that differ in structure and lack no effect. From three "
-    "times it on an effect in its plausible range is an alarm, from once on a hint."
+    "All effects of the catalogue are fitted at once, in the metric of what variants of the model "
+    "that differ in structure and lack no effect leave by themselves: what structure does often "
+    "counts little. An effect's score is the misfit that returns when it alone is taken out. The "
+    "threshold is the largest score among the variants, each judged by the others. From "
+    f"{ALARM:g} times it on an effect in its plausible range is an alarm, from once on a hint."
 )
 _LEVELS = {"alarm": RED, "hint": BLUE, "quiet": FAINT}
 
@@ -156,14 +157,16 @@ def _error_after(told: Assessment, finding: Finding) -> float:
 
 
 def _errors(told: Assessment) -> Table:
-    found, factor, unit = told.diagnosis, told.unit.factor, _unit(told)
+    found, unit = told.diagnosis, _unit(told)
     rows = [
         ["noise of a run's waveform, from repeats [microstrain]", number(1e6 * told.unit.noise, 3)],
         [f"error without the named effects [{unit}]", number(told.error_before, 4)],
         [f"error with them [{unit}]", number(told.error_after, 4)],
         [f"floor: median error of variants that lack no effect [{unit}]", number(told.floor, 4)],
-        [f"left when all effects are fitted at once [{unit}]", number(factor * found.left, 4)],
-        [f"the same, largest of the variants [{unit}]", number(factor * found.floor, 4)],
+        [
+            "misfit beyond structure, over the largest of the variants",
+            number(found.left / found.floor, 3),
+        ],
     ]
     for k, fold in enumerate(told.folds):
         after = [
@@ -180,7 +183,14 @@ def _errors(told: Assessment) -> Table:
 def _left_text(told: Assessment) -> str:
     if not exceeds(told):
         return "What is left is no more than variants of the model without any effect leave."
-    return f"What is left stands {told.left.where} and {told.left.scaling}."
+    text = f"What structure does not explain stands {told.left.where}; it {told.left.scaling}."
+    guess = told.diagnosis.guess
+    if guess is not None:
+        text += (
+            f" A guess by sparse regression, measured less model: {guess.law} "
+            f"({100 * guess.explained:.0f} % of it on left-out conditions). A guess, not a law."
+        )
+    return text
 
 
 def _blind(told: Assessment) -> list[Table]:
@@ -213,14 +223,19 @@ def _bars(told: Assessment) -> Plot:
         )
     )  # fmt: skip
     for at, text in ((1.0, "hint"), (ALARM, "alarm")):
-        figure.add_vline(x=at, line={"dash": "dot", "color": FAINT}, annotation_text=text)
+        figure.add_vline(x=at, line={"dash": "dot", "color": FAINT})
+        # places of annotations on an axis of powers are powers
+        figure.add_annotation(
+            x=float(np.log10(at)), y=1.0, yref="paper", yanchor="bottom", text=text,
+            showarrow=False, xanchor="left" if at > 1.0 else "right",
+        )  # fmt: skip
     figure.update_yaxes(autorange="reversed")
     figure.update_xaxes(title="score / threshold", type="log")
     styled_figure(figure, 160 + 22 * len(names), showlegend=False)
     return Plot(
         "scores", "Score over threshold",
-        "Red: alarm; blue: hint; gray: quiet. An effect beyond 3 that is no alarm lies outside its "
-        "range, or brings back too little.",
+        f"Red: alarm; blue: hint; gray: quiet. An effect beyond {ALARM:g} that is no alarm lies "
+        "outside its range.",
         figure, ["effect", "score / threshold", "level"],
         [[f.effect.name, r, f.level] for f, r in zip(told.findings, ratio, strict=True)],
     )  # fmt: skip

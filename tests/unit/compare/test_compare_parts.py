@@ -9,10 +9,11 @@ from tests.synthetic import waveform
 from tests.unit.compare.compare_synthetic import bump, model_file, waveforms
 from tirelib.campaign import Tolerance
 from tirelib.compare.model import model_of
-from tirelib.compare.noise import RepeatNoise
-from tirelib.compare.set_points import predict_set_points, scales
+from tirelib.compare.set_points import predict_set_points
 from tirelib.compare.strain import compare_strain
 from tirelib.compare.tracks import contact_angle, pooled
+from tirelib.identify.noise import RepeatNoise
+from tirelib.identify.random_effects import scales
 from tirelib.waveforms import GRID
 
 MODEL = model_of(model_file())

@@ -33,7 +33,13 @@ def test_a_misfit_is_told_where_it_is_and_how_it_grows(fitted: tuple[Data, Refit
     left = left_of(replace(data, strain=model.waveform - size[:, None] * bump), model)
     assert left.where.startswith("away from the contact")
     assert left.sectors["far side"] == pytest.approx(1.0, abs=0.05)
-    assert left.powers["load"] == pytest.approx(2.0, abs=0.1)
+    power = left.powers["load"]
+    assert power is not None
+    assert power.value == pytest.approx(2.0, abs=0.1)
+    assert power.low < power.value < power.high
+    assert left.powers["camber"] is None
+    assert left.span[0] == pytest.approx(2.0, abs=0.06)
+    assert left.span[1] == pytest.approx(2.0, abs=0.06)
     assert "grows with load" in left.scaling
     assert "pressure" not in left.scaling
     # model less measured
@@ -129,7 +135,7 @@ def test_the_next_test_parts_two_that_look_alike_by_what_only_one_varies_with() 
         ("none", (), "none is needed"),
         ("named", ("sidewall_load",), "tirelib add sidewall_load"),
         ("form_inadequate", ("sidewall_damping",), "more levels of speed"),
-        ("unknown", (), "in the contact and grows with load"),
+        ("unknown", (), "in the contact; it grows with load"),
     ],
 )
 def test_every_verdict_has_a_next_step(verdict: str, names: tuple[str, ...], says: str) -> None:

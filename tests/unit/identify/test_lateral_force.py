@@ -15,6 +15,7 @@ from tirelib.campaign import read_campaign
 from tirelib.contact.profiles import PressureProfile
 from tirelib.errors import CalibrationError, ParameterError
 from tirelib.identify.force_data import ForceData, force_data
+from tirelib.identify.forces import _compared
 from tirelib.identify.lateral_force import KINDS, PressureBand, compare_pressures
 from tirelib.identify.ring_patch import profiles, ring_contact
 from tirelib.parameters import Tire, read_tire
@@ -110,6 +111,22 @@ def test_what_is_held_is_not_fitted() -> None:
         assert found.values[kind]["friction"] == 0.8
         np.testing.assert_array_equal(found.stiffness[kind], C)
         np.testing.assert_array_equal(found.predicted[kind], found.unseen[kind])
+
+
+def test_a_load_without_slip_angles_is_left_out_and_said() -> None:
+    """Its stiffness would be anything: no error of it may stand in the table."""
+    data = forces("ring")
+    straight = np.abs(data.slip_angle) < 1e-9
+    sparse = data.take(straight | (data.load < 3000.0))
+    notes: list[str] = []
+    found = _compared(sparse, TIRE, notes)
+    assert found is not None
+    assert found.table[0].points == 26
+    assert notes == [
+        "ring pressure against parabola: 2 of 28 points are left out, their load and pressure hold "
+        "fewer than 4 points or less than 1 deg of slip angle"
+    ]
+    assert _compared(data.take(straight | (data.slip_angle > 0.1)), TIRE, notes) is None
 
 
 def test_bias_says_overestimate() -> None:

@@ -1,0 +1,1 @@
+"""Benchmark of the diagnosis on effects that the numerical rig hides."""

@@ -1,0 +1,42 @@
+"""A real Chromium for tests: the system's, Debian's when we are root, else Playwright's own."""
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+INSTALL = 600.0
+"""Time that an installation may take, [s]."""
+
+
+def _found() -> str | None:
+    return next((path for name in NAMES if (path := shutil.which(name))), None)
+
+
+def _done(*command: str) -> bool:
+    try:
+        return subprocess.run(command, capture_output=True, timeout=INSTALL).returncode == 0
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+
+
+@contextmanager
+def chromium() -> Iterator[Any]:
+    """Give a browser of Playwright's synchronous API; skip, with the reason, if none can be had."""
+    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    path = _found()
+    if path is None and hasattr(os, "geteuid") and os.geteuid() == 0 and shutil.which("apt-get"):
+        _done("apt-get", "install", "-y", "--no-install-recommends", "chromium")
+        path = _found()
+    if path is None and not _done(sys.executable, "-m", "playwright", "install", "chromium"):
+        pytest.skip("no Chromium here, and neither apt nor Playwright could install one")
+    with api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield browser
+        browser.close()

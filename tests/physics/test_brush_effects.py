@@ -1,0 +1,269 @@
+"""Laws that every effect of the brush obeys, a user's own included, and what each of them means."""
+
+import inspect
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tirelib.brush.predict import PointConditions, PointParameters, predict_forces
+from tirelib.brush.shaped import predict_shaped
+from tirelib.effects import CATALOGUE, Effect, effect
+from tirelib.effects.load import all_effects
+from tirelib.errors import ParameterError
+from tirelib.model.brush import BrushConditions, BrushState, brush_forces, brush_state
+
+NAMES = [
+    "ring_pressure", "stiffness_load", "stiffness_pressure", "stiffness_temperature",
+    "friction_load", "friction_pressure", "friction_temperature", "friction_speed", "brush_camber",
+    "carcass", "ply_steer", "conicity", "relaxation", "combined_slip",
+]  # fmt: skip
+FORCES = ("Fx", "Fy", "Mz")
+MINE = '''
+from tirelib.effects import effect
+
+@effect("wet_road", stage="brush", unit="1", low=0.0, high=0.9, varies_with=("speed",),
+        needs=("speed",), source="example")
+def wet_road(state, strength):
+    """Friction falls with the square of the speed on a wet road."""
+    share = (state.conditions.speed / 30.0) ** 2
+    return state.but(mu=state.mu * (1.0 - strength * share / (1.0 + share)))
+'''
+
+
+def points() -> BrushConditions:
+    """Every condition varied, each with every other by chance, in both directions of rolling."""
+    rng = np.random.default_rng(3)
+    n = 120
+    return BrushConditions(
+        load=rng.uniform(1e3, 6e3, n), pressure=rng.uniform(1.5e5, 2.7e5, n),
+        slip_angle=rng.uniform(-0.15, 0.15, n), slip_ratio=rng.uniform(-0.1, 0.1, n),
+        camber=rng.uniform(-0.07, 0.07, n),
+        speed=rng.choice([-1.0, 1.0], n) * rng.uniform(5, 30, n),
+        temperature=rng.uniform(300.0, 370.0, n), slip_rate=rng.uniform(-0.2, 0.2, n),
+        order=np.linspace(0.0, 1.0, n),
+    )  # fmt: skip
+
+
+POINTS = points()
+BRUSH = PointParameters(lateral_stiffness=8e6, longitudinal_stiffness=1.1e7, friction=0.95,
+                        half_length=0.06)  # fmt: skip
+
+
+def state(at: BrushConditions = POINTS, **values: Any) -> BrushState:
+    found = brush_state(BRUSH, at, reference=(4e3, 2e5), ring_flatness=0.8)
+    return found.but(**values)
+
+
+def forces(*changes: Any, at: BrushConditions = POINTS, **values: Any) -> np.ndarray:
+    found = brush_forces(state(at, **values), changes)
+    return np.stack([getattr(found, name) for name in FORCES])
+
+
+BASE = forces()
+
+
+@pytest.fixture(scope="module")
+def every(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Effect]:
+    mine = tmp_path_factory.mktemp("mine") / "mine.py"
+    mine.write_text(MINE)
+    return {n: e for n, e in all_effects([mine]).items() if e.hook == "brush"}
+
+
+ALL = [*NAMES, "wet_road"]
+
+
+def test_the_catalogue_holds_the_agreed_names(every: dict[str, Effect]) -> None:
+    assert [name for name, e in CATALOGUE.items() if e.hook == "brush"] == NAMES
+    assert list(every) == ALL
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_effect_is_a_short_law_in_a_file_of_its_own(name: str) -> None:
+    lines, _ = inspect.getsourcelines(CATALOGUE[name].law)
+    assert len("".join(lines).split('"""')[2].strip().splitlines()) <= 15
+    assert Path(inspect.getsourcefile(CATALOGUE[name].law) or "").stem == name
+    assert CATALOGUE[name].source
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_strength_zero_is_the_base_bit_for_bit(every: dict[str, Effect], name: str) -> None:
+    np.testing.assert_array_equal(forces(every[name].at(0.0)), BASE)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_the_derivative_at_zero_exists_and_is_alive(every: dict[str, Effect], name: str) -> None:
+    e = every[name]
+    whole = forces(e.at(e.step)) - BASE
+    half = forces(e.at(0.5 * e.step)) - BASE
+    size = np.sqrt(np.mean(whole**2, axis=1)) * e.toward / e.step
+    # at the end of its range any effect moves some force by more than a load cell's error
+    assert (size > [5.0, 5.0, 0.5]).any()
+    # differences of a smooth law halve with the step, but for a thousandth of the range
+    assert np.abs(2.0 * half - whole).max() <= 0.02 * np.abs(whole).max()
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_the_whole_range_can_be_computed_and_the_argument_stays(
+    every: dict[str, Effect], name: str
+) -> None:
+    e = every[name]
+    for end in (e.low, e.high):
+        assert np.isfinite(forces(e.at(end))).all()
+    before = state()
+    copies = {f.name: np.copy(getattr(before, f.name)) for f in fields(before)
+              if isinstance(getattr(before, f.name), np.ndarray)}  # fmt: skip
+    e.at(e.step)[1](before)
+    for field, copy in copies.items():
+        np.testing.assert_array_equal(getattr(before, field), copy)
+
+
+def mirrored(at: BrushConditions) -> BrushConditions:
+    """The same wheel seen in a mirror: slip angle and camber change sign, and so does Fy."""
+    return replace(at, slip_angle=-at.slip_angle, camber=-at.camber, slip_rate=-at.slip_rate)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_only_ply_steer_and_conicity_know_left_from_right(
+    every: dict[str, Effect], name: str
+) -> None:
+    e = every[name]
+    seen = forces(e.at(0.3 * e.toward), at=mirrored(POINTS))
+    same = np.abs(seen - forces(e.at(0.3 * e.toward)) * np.array([[1.0], [-1.0], [-1.0]])).max()
+    assert (same > 1.0) if name in ("ply_steer", "conicity") else (same < 1e-6)
+
+
+def test_ply_steer_changes_side_with_the_direction_of_rolling_and_conicity_does_not() -> None:
+    straight = replace(POINTS, slip_angle=0.0 * POINTS.load, slip_ratio=0.0 * POINTS.load,
+                       camber=0.0 * POINTS.load)  # fmt: skip
+    back = replace(straight, speed=-straight.speed)
+    ply, cone = CATALOGUE["ply_steer"].at(0.2), CATALOGUE["conicity"].at(10.0)
+    np.testing.assert_allclose(forces(ply, at=back)[1], -forces(ply, at=straight)[1], rtol=1e-12)
+    np.testing.assert_array_equal(forces(cone, at=back), forces(cone, at=straight))
+    np.testing.assert_allclose(forces(cone, at=straight)[1], 0.01 * straight.load, rtol=1e-12)
+    # ISO: a positive shift of the slip angle pushes to the right
+    forward = straight.speed > 0.0
+    assert (forces(ply, at=straight)[1][forward] < 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "field", "factor"),
+    [
+        ("stiffness_load", "load", np.exp(-0.3 * (1.5 - 1.0))),
+        ("stiffness_pressure", "pressure", 1.5**0.3),
+        ("friction_load", "load", 1.5**-0.3),
+        ("friction_pressure", "pressure", 1.5**-0.3),
+    ],
+)
+def test_laws_of_load_and_pressure_change_nothing_at_the_reference(
+    name: str, field: str, factor: float
+) -> None:
+    law = CATALOGUE[name].at(0.3)[1]
+    reference = {"load": 4e3, "pressure": 2e5}[field]
+    constant = "mu" if name.startswith("friction") else "c_py"
+    for ratio, wanted in ((1.0, 1.0), (1.5, factor)):
+        at = replace(POINTS, **{field: np.full(len(POINTS), ratio * reference)})
+        found = getattr(law(state(at)), constant) / getattr(state(at), constant)
+        np.testing.assert_allclose(found, wanted, rtol=1e-12)
+
+
+def test_warmth_and_sliding_speed_lower_what_they_should() -> None:
+    warm = replace(POINTS, temperature=np.full(len(POINTS), 373.15))
+    for name, constant in (("stiffness_temperature", "c_px"), ("friction_temperature", "mu")):
+        changed = CATALOGUE[name].at(0.3)[1](state(warm))
+        np.testing.assert_allclose(
+            getattr(changed, constant) / getattr(state(warm), constant), np.exp(-0.3), rtol=1e-12
+        )
+    fast = replace(POINTS, speed=2.0 * POINTS.speed)
+    law = CATALOGUE["friction_speed"].at(0.5)[1]
+    slow_mu, fast_mu = law(state()).mu, law(state(fast)).mu
+    np.testing.assert_allclose(fast_mu / 0.95, (slow_mu / 0.95) ** 2, rtol=1e-12)
+
+
+def test_camber_is_worth_its_share_of_slip_angle() -> None:
+    small = replace(POINTS, slip_angle=0.0 * POINTS.load, slip_ratio=0.0 * POINTS.load)
+    turned = replace(small, slip_angle=0.2 * small.camber, camber=0.0 * small.camber)
+    cambered = forces(CATALOGUE["brush_camber"].at(0.2), at=small)
+    np.testing.assert_allclose(cambered, forces(at=turned), rtol=1e-12, atol=1e-9)
+
+
+def test_relaxation_does_nothing_in_steady_runs_and_lags_in_sweeps() -> None:
+    e = CATALOGUE["relaxation"].at(0.5)
+    steady = replace(POINTS, slip_rate=0.0 * POINTS.load)
+    np.testing.assert_array_equal(forces(e, at=steady), forces(at=steady))
+    late = replace(POINTS, slip_angle=POINTS.slip_angle - 0.5 / np.abs(POINTS.speed)
+                   * POINTS.slip_rate)  # fmt: skip
+    np.testing.assert_allclose(forces(e), forces(at=late), rtol=1e-9, atol=1e-6)
+
+
+def test_combined_slip_leaves_pure_cornering_and_scales_pure_braking() -> None:
+    e = CATALOGUE["combined_slip"].at(0.2)
+    corner = replace(POINTS, slip_ratio=0.0 * POINTS.load)
+    np.testing.assert_array_equal(forces(e, at=corner), forces(at=corner))
+    brake = replace(POINTS, slip_angle=0.0 * POINTS.load)
+    np.testing.assert_allclose(
+        forces(e, at=brake), forces(at=brake, mu=np.full(len(POINTS), 1.2 * 0.95)), rtol=1e-12,
+        atol=1e-9,
+    )  # fmt: skip
+
+
+def test_a_softer_carcass_lowers_the_side_force() -> None:
+    at = replace(POINTS, slip_ratio=0.0 * POINTS.load)
+    soft = forces(CATALOGUE["carcass"].at(0.01), at=at)[1]
+    assert (np.abs(soft) <= np.abs(forces(at=at)[1]) + 1e-9).all()
+
+
+def test_the_rings_pressure_is_as_strong_as_the_ring_says() -> None:
+    flat = CATALOGUE["ring_pressure"].at(1.0)[1](state())
+    np.testing.assert_array_equal(flat.flatness, 0.8)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    c=st.floats(-0.8, 2.8), angle=st.floats(-0.3, 0.3), ratio=st.floats(-0.3, 0.3),
+    load=st.floats(500.0, 9e3),
+)  # fmt: skip
+def test_a_shaped_pressure_carries_what_each_bristle_carries(
+    c: float, angle: float, ratio: float, load: float
+) -> None:
+    found = predict_shaped(BRUSH, PointConditions(load, angle, ratio), np.array([c]))
+    u = (np.arange(20000) + 0.5) / 20000.0
+    x = 1.0 - 2.0 * u
+    pressure = load / 0.12 * 6.0 * u * (1.0 - u) * (1.0 + c * x**2) / (1.0 + c / 5.0)
+    demand = np.array([1.1e7 * ratio, -8e6 * np.tan(angle)])[:, None] * 0.12 * u / (1.0 + ratio)
+    size = np.hypot(*demand)
+    slip = np.array([ratio, -np.tan(angle)])
+    slide = slip / max(np.hypot(*slip), 1e-300)
+    held = size <= 0.95 * pressure
+    force = np.where(held, demand, slide[:, None] * 0.95 * pressure)
+    # a midpoint sum over 20,000 bristles; the end of sticking lies in one of them
+    limit = 3e-4 * load
+    assert found.Fx.item() == pytest.approx(0.12 * force[0].mean(), abs=limit)
+    assert found.Fy.item() == pytest.approx(0.12 * force[1].mean(), abs=limit)
+    moment = 0.12 * (force[1] * 0.06 * x).mean()
+    assert found.Mz.item() == pytest.approx(moment, abs=0.06 * limit)
+
+
+def test_a_vanishing_flatness_is_the_parabola_and_a_wild_one_is_refused() -> None:
+    at = PointConditions(POINTS.load, POINTS.slip_angle, POINTS.slip_ratio)
+    yielding = replace(BRUSH, yaw_compliance=4e-5, lateral_compliance=3e-6, Fy_offset=20.0)
+    plain, near = predict_forces(yielding, at), predict_shaped(yielding, at, 1e-11)
+    for name in FORCES:
+        np.testing.assert_allclose(getattr(near, name), getattr(plain, name), atol=1e-6)
+    with pytest.raises(ParameterError, match="flatness = 3 of the pressure; allowed"):
+        predict_shaped(BRUSH, at, 3.0)
+
+
+def test_what_is_not_measured_is_asked_for() -> None:
+    unknown = replace(POINTS, temperature=np.full(len(POINTS), np.nan))
+    with pytest.raises(ParameterError, match="needs temperature, which is not measured"):
+        forces(CATALOGUE["friction_temperature"].at(0.1), at=unknown)
+
+
+def test_a_wrong_unit_is_refused_at_its_definition() -> None:
+    with pytest.raises(ParameterError, match="unit 'furlong'"):
+        effect("mine", stage="brush", unit="furlong", low=0, high=1)(lambda state, strength: state)

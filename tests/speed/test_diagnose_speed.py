@@ -1,0 +1,56 @@
+"""How the cost of a diagnosis grows: with the runs and with the effects no faster than they do."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from tests.unit.diagnose.planted import runs
+from tests.unit.identify.model_waves import TIRE
+from tirelib.diagnose.diagnose import diagnose
+from tirelib.effects import CATALOGUE
+from tirelib.identify.campaign_data import StraightRuns, straight_runs
+from tirelib.model.base import values_of
+
+pytestmark = pytest.mark.speed
+
+EFFECTS = [effect for effect in CATALOGUE.values() if effect.hook != "brush"]
+
+
+@pytest.fixture(autouse=True)
+def no_store(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TIRELIB_CACHE", "off")
+
+
+def cost(work: Callable[[], object]) -> float:
+    """Return the least processor time of two calls."""
+    times = []
+    for _ in range(2):
+        start = time.process_time()
+        work()
+        times.append(time.process_time() - start)
+    return min(times)
+
+
+def several(times: int) -> StraightRuns:
+    """Return the planted runs repeated."""
+    waves = runs().waves
+    index = np.tile(np.arange(len(waves)), times)
+    return straight_runs(waves.take(index))
+
+
+def test_the_cost_grows_no_faster_than_the_runs() -> None:
+    small, large = several(2), several(6)
+    values = values_of(TIRE)
+    few = cost(lambda: diagnose(small, values, EFFECTS, members=12))
+    many = cost(lambda: diagnose(large, values, EFFECTS, members=12))
+    assert many < 1.5 * 3.0 * few
+
+
+def test_the_cost_grows_no_faster_than_the_effects() -> None:
+    given, values = several(2), values_of(TIRE)
+    living = [e for e in EFFECTS if not e.untestable and "lateral" not in e.varies_with]
+    few = cost(lambda: diagnose(given, values, living[:6], members=12))
+    many = cost(lambda: diagnose(given, values, living[:18], members=12))
+    assert many < 1.5 * 3.0 * few

@@ -1,0 +1,39 @@
+"""A fit that starts at a solution nearby gives what a fit from nothing gives."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.unit.diagnose.planted import runs
+from tests.unit.identify.model_waves import TIRE
+from tirelib.diagnose import held_out, refit
+from tirelib.diagnose.floor import ErrorUnit
+from tirelib.model.base import Correction, large_displacements, values_of
+
+
+def test_a_start_nearby_is_used_and_changes_no_result(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = runs().data(with_deflection=False)
+    starts: list[Correction | None] = []
+
+    def watched(*given: Any, start: Correction | None = None, **named: Any) -> Correction:
+        starts.append(start)
+        return large_displacements(*given, start=start, **named)
+
+    def cold(*given: Any, start: Correction | None = None, **named: Any) -> Correction:
+        return large_displacements(*given, **named)
+
+    found = {}
+    for name, solve in (("near", watched), ("cold", cold)):
+        monkeypatch.setattr(refit, "large_displacements", solve)
+        monkeypatch.setattr(held_out, "large_displacements", solve)
+        model = refit.refit(data, values_of(TIRE))
+        folds = held_out.folds(data)
+        unit = ErrorUnit(1.0, "noise", 1.0)
+        found[name] = (model, held_out.held_out_errors(data, model, folds, unit))
+    # only the very first solution has nothing nearby
+    assert [start is None for start in starts] == [True] + [False] * (len(starts) - 1)
+    near, cold_one = found["near"], found["cold"]
+    # Newton's tolerance on displacements is far below a nanostrain
+    np.testing.assert_allclose(near[0].waveform, cold_one[0].waveform, atol=1e-10)
+    np.testing.assert_allclose(near[1], cold_one[1], rtol=1e-6)

@@ -1,0 +1,239 @@
+"""A diagnosis of forces as it is told: from a campaign and a model file."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tirelib.campaign import Campaign
+from tirelib.compare.force_model import ForceBench, ForceModel, force_model_of
+from tirelib.compare.force_points import ForcePoints, force_points, noise_of
+from tirelib.compare.forces import UNITS, quantities_of, slips, usable_points
+from tirelib.diagnose.forces.candidates import varies
+from tirelib.diagnose.forces.diagnose import ForceDiagnosis, ForceFinding, diagnose_force
+from tirelib.diagnose.forces.ensemble import MEMBERS
+from tirelib.diagnose.forces.fit import Problem, fit_force
+from tirelib.diagnose.forces.left import ForceLeft, left_of
+from tirelib.effects import Effect
+from tirelib.errors import CalibrationError
+from tirelib.identify.force_data import force_data
+from tirelib.parameters import TireFile
+
+MOST_POINTS = 4000
+"""Points that are fitted; of a longer sweep passes are left out evenly."""
+LEAST_POINTS = 12
+NO_FIT = 0.5
+"""Share of the measured rms that a fitted brush may leave before it does not fit at all."""
+IN_ORDER = 0.8
+"""Correlation with the order of measurement from which a condition cannot be told from drift."""
+NO_REPEATS = (
+    "no condition was repeated, so the noise is unknown: errors are in {unit}, no effect is named "
+    "and none is more than a hint; repeat some runs, or pass a sweep's conditions twice"
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ForceCase:
+    """One force of a campaign, ready to be fitted.
+
+    Attributes
+    ----------
+    name : str
+        Of the campaign.
+    model : ForceModel
+    problem : Problem
+    noise : float, [N] or [N m]
+        Of a point; NaN without repeats.
+    repeats : int
+    messages : tuple of str
+    """
+
+    name: str
+    model: ForceModel
+    problem: Problem
+    noise: float
+    repeats: int
+    messages: tuple[str, ...]
+
+    @property
+    def quantity(self) -> str:
+        """Fy, Fx or Mz."""
+        return self.problem.quantity
+
+    @property
+    def unit(self) -> str:
+        """In which errors are told: noise, N or Nm."""
+        return "noise" if np.isfinite(self.noise) else UNITS[self.quantity]
+
+    @property
+    def factor(self) -> float:
+        """By which an rms in SI becomes an error as it is told."""
+        return 1.0 / self.noise if np.isfinite(self.noise) else 1.0
+
+    @property
+    def effects(self) -> list[Effect]:
+        """Effects that the model has."""
+        return [used.effect for used in self.model.used]
+
+    @property
+    def strengths(self) -> list[np.ndarray]:
+        """Their strengths, arrays of components."""
+        return [np.atleast_1d(np.asarray(u.strength, dtype=float)) for u in self.model.used]
+
+
+def force_case(
+    campaign: Campaign, file: TireFile, effects: Mapping[str, Effect], quantity: str | None
+) -> ForceCase:
+    """Return the force of a campaign that is asked for, else the one with the largest lack of fit.
+
+    Parameters and errors as for `force_cases`.
+    """
+    return max(force_cases(campaign, file, effects, quantity), key=_lack)
+
+
+def force_cases(
+    campaign: Campaign, file: TireFile, effects: Mapping[str, Effect], quantity: str | None = None
+) -> list[ForceCase]:
+    """Return the force that is asked for, else every force to which the slips matter.
+
+    Raises
+    ------
+    CalibrationError
+        If the model has no brush, the force is not measured, or there are too few points.
+    """
+    model = force_model_of(file, effects)
+    points = force_points(force_data(campaign))
+    wanted = quantities_of(campaign, points, quantity)
+    points = usable_points(campaign, model, points)
+    return [_case(campaign.header.name, model, points, name) for name in wanted]
+
+
+def _case(name: str, model: ForceModel, points: ForcePoints, quantity: str) -> ForceCase:
+    points = points.take(np.isfinite(getattr(points.data, quantity)))
+    if len(points) < LEAST_POINTS:
+        raise CalibrationError(
+            f"{name}: {quantity} is measured at {len(points)} points; {LEAST_POINTS} are needed to "
+            "tell effects apart; add runs with other loads, pressures and slips"
+        )
+    if not slips(points.data, quantity):
+        slip = "slip ratio" if quantity == "Fx" else "slip angle"
+        raise CalibrationError(
+            f"{name}: one {slip} only, so {quantity} tells nothing of the brush; add runs with slip"
+        )
+    messages = []
+    whole = points
+    if len(points) > MOST_POINTS:
+        step = int(np.ceil(len(points) / MOST_POINTS))
+        points = points.take(np.arange(0, len(points), step))
+        messages.append(
+            f"{len(whole)} points, passes of the sweep; one in {step} is fitted ({len(points)})"
+        )
+    # of all passes, about the brush without effects: the noise is then the same at every step
+    draft = Problem.of(ForceBench.of(model, points), quantity, np.nan)
+    plain = fit_force(draft, model.values)
+    every = Problem.of(ForceBench.of(model, whole), quantity, np.nan)
+    noise, _, repeats = noise_of(every.predict(plain.values, ()) - every.measured, whole.cell)
+    return ForceCase(
+        name, model, Problem.of(draft.bench, quantity, noise), noise, repeats, tuple(messages)
+    )
+
+
+def _lack(case: ForceCase) -> float:
+    model = case.model
+    rest = case.problem.predict(model.values, model.changes) - case.problem.measured
+    rms = float(np.sqrt(np.mean(rest**2)))
+    if np.isfinite(case.noise):
+        return rms / case.noise
+    return rms / float(np.sqrt(np.mean(case.problem.measured**2)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ForceAssessment:
+    """A diagnosis as it is told.
+
+    Attributes
+    ----------
+    case : ForceCase
+    diagnosis : ForceDiagnosis
+    verdict : str
+    named : tuple of str
+        Empty without repeats.
+    findings : tuple of ForceFinding
+        At most hints without repeats.
+    left : ForceLeft
+        What no effect explains.
+    messages : tuple of str
+    """
+
+    case: ForceCase
+    diagnosis: ForceDiagnosis
+    verdict: str
+    named: tuple[str, ...]
+    findings: tuple[ForceFinding, ...]
+    left: ForceLeft
+    messages: tuple[str, ...]
+
+
+def assess_forces(
+    case: ForceCase,
+    catalogue: Sequence[Effect],
+    *,
+    members: int = MEMBERS,
+    seed: int = 0,
+    progress: Callable[[str], None] | None = None,
+) -> ForceAssessment:
+    """Return the diagnosis of a force with what its reader needs.
+
+    Parameters
+    ----------
+    case : ForceCase
+    catalogue : sequence of Effect
+    members, seed : int
+        Of the structural ensemble.
+    progress : callable, optional
+    """
+    found = diagnose_force(
+        case.problem, case.model.values, catalogue, noise=case.noise, repeats=case.repeats,
+        effects=case.effects, strengths=case.strengths, members=members, seed=seed,
+        progress=progress,
+    )  # fmt: skip
+    messages = list(case.messages)
+    verdict, named, findings = found.verdict, found.named, found.findings
+    share = found.final.error / float(np.sqrt(np.mean(case.problem.measured**2)))
+    if share > NO_FIT:
+        verdict, named = "unknown", ()
+        messages.append(
+            f"the brush does not fit at all: {100 * share:.0f} % of {case.quantity} is left after "
+            "a fit; no effect is named; look for a wrong unit, sign or tire with `tirelib compare`"
+        )
+    if not np.isfinite(case.noise):
+        verdict, named = ("none" if share <= NO_FIT else verdict), ()
+        messages.append(NO_REPEATS.format(unit=case.unit))
+    if not named:
+        findings = tuple(replace(f, level="hint") if f.level == "alarm" else f for f in findings)
+    if not findings:
+        messages.append(
+            "this campaign varies nothing with which an effect could show: see the dead effects"
+        )
+    if named and not any(fold.main for fold in found.folds):
+        messages.append("nothing can be held out: too few conditions vary")
+    messages += _in_order(case, [f.effect for f in findings if f.effect.name in named])
+    left = left_of(case.problem, found.final if named else found.base)
+    return ForceAssessment(case, found, verdict, named, findings, left, tuple(messages))
+
+
+def _in_order(case: ForceCase, effects: Sequence[Effect]) -> list[str]:
+    """Say which conditions of named effects went with the order of measurement."""
+    at = case.problem.bench.conditions
+    names = {name for effect in effects for name in effect.varies_with}
+    out = []
+    for name in sorted(names & {"load", "pressure", "camber", "temperature", "speed"}):
+        if not varies(at, name):
+            continue
+        together = float(np.corrcoef(getattr(at, name), at.order)[0, 1])
+        if abs(together) > IN_ORDER:
+            out.append(
+                f"{name} went with the order of measurement (correlation {together:.2f}): wear, "
+                "warming or drift would look like its effects; measure in another order to know"
+            )
+    return out

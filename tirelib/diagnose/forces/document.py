@@ -1,0 +1,171 @@
+"""A diagnosis of forces as JSON (``tirelib-diagnosis/1``)."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from tirelib.compare.forces import UNITS
+from tirelib.diagnose.forces.assess import ForceAssessment
+from tirelib.diagnose.forces.diagnose import ForceFinding
+from tirelib.diagnose.forces.held_out import BLOCK, ForceFold, pooled
+from tirelib.units import from_si
+
+FORMAT = "tirelib-diagnosis/1"
+CONDITION_UNITS = {"load": ("N", "force"), "pressure": ("bar", "pressure"),
+                   "camber": ("deg", "angle"), "temperature": ("degC", "temperature"),
+                   "speed": ("km/h", "speed")}  # fmt: skip
+
+
+def force_diagnosis_document(told: ForceAssessment) -> dict[str, Any]:
+    """Return the numbers; errors are in the noise of a point, in N or Nm without repeats."""
+    found, case = told.diagnosis, told.case
+    factor = case.factor
+    final = found.final if told.named else found.base
+    held_final = found.held_final if told.named else found.held_before
+    return {
+        "format": FORMAT,
+        "campaign": case.name,
+        "axes": "iso",
+        "quantity": case.quantity,
+        "unit": UNITS[case.quantity],
+        "noise": case.noise,
+        "repeats": case.repeats,
+        "points": len(case.problem),
+        "error_unit": case.unit,
+        "floor": factor * found.floor,
+        "error_before": factor * found.base.error,
+        "error_after": factor * final.error,
+        "heldout_error_before": factor * pooled(found.held_before, found.folds),
+        "heldout_error_after": factor * pooled(held_final, found.folds),
+        "held_out": [
+            fold_entry(fold, factor * old, factor * new)
+            for fold, old, new in zip(found.folds, found.held_before, held_final, strict=True)
+        ],
+        "steps": [
+            {"effect": name, "error": factor * error, "heldout_error": factor * held}
+            for name, error, held in (found.steps if told.named else ())
+        ],
+        "joint_error": factor * case.problem.scale * found.left,
+        "joint_floor": factor * case.problem.scale * found.most_left,
+        "verdict": told.verdict,
+        "named": list(told.named),
+        "has": [effect.name for effect in found.base.effects],
+        "candidates": [_candidate(finding, k + 1, told) for k, finding in enumerate(told.findings)],
+        "dead": list(found.dead),
+        "dead_reasons": dict(found.dead),
+        "unexplained": _unexplained(told),
+        "next_test": next_test(told),
+        "messages": list(told.messages),
+    }
+
+
+def fold_entry(fold: ForceFold, before: float, after: float) -> dict[str, Any]:
+    """Return a left-out part with its errors as they are told."""
+    value, unit = fold_value(fold)
+    return {
+        "condition": fold.name, "value": value, "unit": unit, "points": int(fold.out.sum()),
+        "counted": fold.main, "error_before": before, "error_after": after,
+    }  # fmt: skip
+
+
+def fold_value(fold: ForceFold) -> tuple[float, str]:
+    """Return what a left-out part has in common, with its unit; parts of time by their number."""
+    if fold.name not in CONDITION_UNITS:
+        return fold.value + 1.0, "1"
+    unit, dimension = CONDITION_UNITS[fold.name]
+    return float(from_si(fold.value, unit, dimension)), unit
+
+
+def fold_words(fold: ForceFold) -> str:
+    """Say what was left out."""
+    if fold.name == "time":
+        return f"part {fold.value + 1:.0f} of the time, blocks of {BLOCK:g} s"
+    value, unit = fold_value(fold)
+    if fold.name == "cell":
+        return f"part {value:.0f} of the cells of conditions"
+    return f"{fold.name} {value:.4g} {unit}"
+
+
+def _candidate(finding: ForceFinding, rank: int, told: ForceAssessment) -> dict[str, Any]:
+    factor = told.case.factor
+    return {
+        "effect": finding.effect.name,
+        "title": finding.effect.title,
+        "rank": rank,
+        "score": finding.score,
+        "threshold": finding.threshold,
+        "level": finding.level,
+        "strength": plain(finding.strength),
+        "std": plain(finding.std),
+        "unit": finding.effect.unit,
+        "range": [finding.effect.low, finding.effect.high],
+        "in_range": finding.in_range,
+        "error_after": factor * finding.error_after,
+        "heldout_error_after": factor * pooled(finding.held_after, told.diagnosis.folds),
+        "share": finding.share,
+        "twins": [
+            {"effect": twin, "angle_deg": float(np.rad2deg(angle))} for twin, angle in finding.twins
+        ],
+        "power": finding.power,
+    }
+
+
+def plain(strength: Sequence[float] | np.ndarray) -> float | list[float]:
+    """Return a strength as a number, or as a list if it has several components."""
+    numbers = [float(x) for x in strength]
+    return numbers[0] if len(numbers) == 1 else numbers
+
+
+def exceeds(told: ForceAssessment) -> bool:
+    """Return whether more is left than variants of the model leave after the same joint fit."""
+    return told.diagnosis.left > told.diagnosis.most_left
+
+
+def _unexplained(told: ForceAssessment) -> dict[str, Any]:
+    left, beyond = told.left, exceeds(told)
+    return {
+        "where": left.where if beyond else None,
+        "scaling": left.scaling if beyond else None,
+        "guess": left.guess if beyond else None,
+        "bands": dict(left.bands),
+        "powers": {name: {"power": p, "half_width": h} for name, (p, h) in left.powers.items()},
+    }
+
+
+def next_test(told: ForceAssessment) -> dict[str, Any]:
+    """Return what to do or to measure next, and why."""
+    dead = told.diagnosis.dead
+    lacking = {
+        name: reason
+        for name, reason in dead.items()
+        if reason.startswith("no run varies") or "not measured" in reason or "one way" in reason
+    }
+    by_name = {finding.effect.name: finding.effect for finding in told.findings}
+    varies = sorted({v for name in told.named for v in by_name[name].varies_with})
+    between: list[str] = []
+    if told.verdict == "indistinguishable":
+        between = list(told.named)
+        what = f"more levels of {_and(varies)}, to the ends that the rig allows"
+    elif told.verdict == "form_inadequate":
+        what = (
+            f"add {told.named[0]} (`tirelib add {told.named[0]}`); more is left than the shape of "
+            f"the brush explains: more levels of {_and(varies)} would show the right law"
+        )
+    elif told.verdict == "named":
+        what = f"add {told.named[0]} (`tirelib add {told.named[0]}`) and diagnose again"
+    elif told.verdict == "unknown":
+        what = (
+            f"the misfit stands {told.left.where} and {told.left.scaling}: more levels there, or "
+            "an effect of your own (--effects)"
+        )
+    elif told.case.unit != "noise":
+        what = "repeat some conditions, best at the ends of load, pressure and slip"
+    else:
+        what = "none is needed for the effects that this plan can show"
+    return {"what": what, "between": between, "would_revive": lacking}
+
+
+def _and(names: Sequence[str]) -> str:
+    words = [name.replace("_", " ") for name in names] or ["load, pressure and slip"]
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

@@ -1,0 +1,16 @@
+"""Lateral force at zero slip that does not depend on the direction of rolling."""
+
+from tirelib.effects.effect import State, effect
+
+
+@effect(
+    "conicity", stage="brush", unit="N/kN", low=-50.0, high=50.0, varies_with=("load",),
+    source="Pacejka, Tire and Vehicle Dynamics, ch. 4: conicity as a lateral force that keeps its "
+    "side",
+)  # fmt: skip
+def conicity(state: State, strength: float) -> State:
+    """Belt as a cone that pushes to one side, more with load.
+
+    Fy plus s Fz, whatever the slip and the direction of rolling.
+    """
+    return state.but(Fy_offset=state.Fy_offset + 1e-3 * strength * state.conditions.load)

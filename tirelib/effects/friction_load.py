@@ -1,0 +1,15 @@
+"""Friction over load."""
+
+from tirelib.effects.effect import State, effect
+
+
+@effect(
+    "friction_load", stage="brush", unit="1", low=-0.1, high=0.6, varies_with=("load",),
+    source="rubber friction: the true contact area grows less than the load (Schallamach)",
+)  # fmt: skip
+def friction_load(state: State, strength: float) -> State:
+    """Friction falls with load.
+
+    mu times (Fz / Fz0)^(-s); 1/3 for smooth elastic spheres on a plane.
+    """
+    return state.but(mu=state.mu * (state.conditions.load / state.reference_load) ** -strength)

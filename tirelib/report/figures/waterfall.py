@@ -1,0 +1,99 @@
+"""The error's fall, step by step: fitted and held out, with the floor."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import plotly.graph_objects as go
+
+from tirelib.report.figures.compare_plot import Plot, styled_figure
+from tirelib.report.style import BLUE, FAINT, RED
+
+
+class Step(NamedTuple):
+    """A model on the way: label, error of its fit, error on held-out points (NaN if unknown)."""
+
+    label: str
+    error: float
+    held_out: float
+
+
+def waterfall(
+    steps: Sequence[Step], unit: str, floor: float, name: str = "waterfall",
+    title: str = "The model's history",
+) -> Plot:  # fmt: skip
+    """Return bars of the error after each step.
+
+    Parameters
+    ----------
+    steps : sequence of Step
+    unit : str
+        Of the errors.
+    floor : float
+        Error that structure leaves without a missing effect; NaN if unknown.
+    name, title : str
+    """
+    labels = [f"{k}: {step.label}" if k else step.label for k, step in enumerate(steps)]
+    figure = go.Figure()
+    figure.add_bar(
+        x=labels, y=[step.error for step in steps], name="fitted", marker={"color": BLUE},
+        text=[f"{step.error:.3g}" for step in steps], textposition="outside", cliponaxis=False,
+    )  # fmt: skip
+    held = np.array([step.held_out for step in steps])
+    if np.isfinite(held).any():
+        figure.add_bar(
+            x=labels, y=[float(h) if np.isfinite(h) else None for h in held], name="held out",
+            marker={"color": RED},
+            text=[f"{h:.3g}" if np.isfinite(h) else "" for h in held], textposition="outside",
+            cliponaxis=False,
+        )  # fmt: skip
+    if np.isfinite(floor):
+        figure.add_hline(y=floor, line={"dash": "dot", "color": FAINT}, annotation_text="floor")
+    figure.update_yaxes(title=f"error [{unit}]", rangemode="tozero")
+    figure.update_xaxes(title="effect added (-: removed)")
+    styled_figure(figure, 380, barmode="group")
+    rows = [[label, step.error, step.held_out] for label, step in zip(labels, steps, strict=True)]
+    return Plot(
+        name, title,
+        "Rms error after each step, fitted anew each time; held out: on points that took no part "
+        "in the fit.",
+        figure, ["step", f"error [{unit}]", f"held-out error [{unit}]"], rows,
+    )  # fmt: skip
+
+
+def waterfall_of(history: Sequence[Mapping[str, Any]], quantity: str) -> Plot | None:
+    """Return the fall across a model's history for one quantity, or None without entries.
+
+    Entries without a quantity are of strain. Of entries in several units only those in the last
+    one's are shown.
+    """
+    entries = [e for e in history if e.get("quantity", "strain") == quantity]
+    unit = _unit_of(entries[-1]) if entries else None
+    if unit is None:
+        return None
+    suffix = "" if unit == "noise" else f"_{unit}"
+    entries = [e for e in entries if _unit_of(e) == unit]
+
+    def value(entry: Mapping[str, Any], key: str) -> float:
+        return float(entry.get(f"{key}{suffix}", np.nan))
+
+    first = Step("before", value(entries[0], "error_before"),
+                 value(entries[0], "heldout_error_before"))  # fmt: skip
+    steps = [
+        Step(
+            f"{'-' if e.get('action') == 'remove' else ''}{e.get('effect', '?')}",
+            value(e, "error_after"), value(e, "heldout_error_after"),
+        )
+        for e in entries
+    ]  # fmt: skip
+    told = {"ustrain": "microstrain"}.get(unit, unit)
+    return waterfall([first, *steps], told, value(entries[-1], "floor"), f"history-{quantity}",
+                     f"The model's history, {quantity}")  # fmt: skip
+
+
+def _unit_of(entry: Mapping[str, Any]) -> str | None:
+    """Return the unit of an entry's errors by the name under which they stand."""
+    for key in entry:
+        if key.startswith("error_after"):
+            return key.removeprefix("error_after").removeprefix("_") or "noise"
+    return None

@@ -1,0 +1,232 @@
+"""The page of a diagnosis of forces: one self-contained HTML file; and the same in Markdown."""
+
+import json
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import plotly.graph_objects as go
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from tirelib.diagnose.forces.assess import ForceAssessment
+from tirelib.diagnose.forces.document import exceeds, fold_words, next_test
+from tirelib.diagnose.forces.held_out import pooled
+from tirelib.diagnose.forces.search import ALARM
+from tirelib.report.comparison import BRUSH, Part, Shown, markdown_parts
+from tirelib.report.figures.compare_plot import Plot, styled_figure
+from tirelib.report.figures.force_left import residual_map
+from tirelib.report.figures.waterfall import Step, waterfall, waterfall_of
+from tirelib.report.page import Table, number, write_page
+from tirelib.report.style import BLUE, FAINT, RED
+
+METHOD_TEXT = (
+    "All effects of the brush are fitted at once. An effect's score is the misfit that returns "
+    "when it alone is taken out, over what the fit leaves. The threshold is the largest score "
+    "among variants of the model that differ in structure and lack no effect: another shape of "
+    "the pressure, a carcass that turns, the shape of the Magic Formula, a smooth misfit over slip "
+    "and load, drift, delay, set-point errors, noise. From three times it on an effect in its "
+    "plausible range that an exact refit needs is an alarm, from once on a hint. Named effects "
+    "stand in the order of what each alone gains on held-out points."
+)
+LEAST_SHOWN = 0.01
+"""Left end of the logarithmic scale of scores."""
+_LEVELS = {"alarm": RED, "hint": BLUE, "quiet": FAINT}
+
+
+def answer_of(told: ForceAssessment) -> str:
+    """Say the verdict in plain words."""
+    names, unit = ", ".join(told.named), told.case.unit
+    factor, found = told.case.factor, told.diagnosis
+    before, after, floor = (
+        number(factor * e, 3) for e in (found.base.error, found.final.error, found.floor)
+    )
+    fall = f"the error falls from {before} to {after} {unit} (floor {floor})"
+    return {
+        "none": f"No effect stands out: the error {before} {unit} (floor {floor}) is no reason to "
+        "name one.",
+        "named": f"Missing: {names}. With {'them' if len(told.named) > 1 else 'it'} {fall}.",
+        "form_inadequate": f"Missing: {names}: {fall}. More is left than the structure of the "
+        "brush explains, so a law has the wrong form or more is missing.",
+        "indistinguishable": f"One of {names} is missing; this campaign cannot tell which: {fall}.",
+        "unknown": "Something is missing that no effect of the catalogue explains; error "
+        f"{before} {unit} (floor {floor}).",
+    }[told.verdict]
+
+
+def write_force_diagnosis(told: ForceAssessment, folder: Path) -> tuple[Path, Path]:
+    """Write ``diagnosis.html`` and ``diagnosis.md``; return their paths.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be written.
+    """
+    parts = parts_of(told)
+    title = f"Which effect is missing: {told.case.quantity}"
+    shown = [Shown.of(plot) for part in parts for plot in part.plots]
+    figures = "{" + ",".join(f"{json.dumps(s.name)}:{s.json}" for s in shown) + "}"
+    by_name = {s.name: s for s in shown}
+    views = [
+        {
+            "title": part.title, "anchor": part.anchor, "text": part.text, "tables": part.tables,
+            "plots": [by_name[plot.name] for plot in part.plots], "sources": part.sources,
+        }
+        for part in parts
+    ]  # fmt: skip
+    folder.mkdir(parents=True, exist_ok=True)
+    page, words = folder / "diagnosis.html", folder / "diagnosis.md"
+    # pages are written as index.html, which may be another report's in this folder
+    with tempfile.TemporaryDirectory() as aside:
+        made = write_page(
+            Path(aside), "comparison.html", title=title, sections=(), parts=views,
+            summary=_summary(told), answer=answer_of(told), messages=told.messages,
+            sentences=(), sentence_note="", plotly=Markup(get_plotlyjs()),
+            figures=Markup(figures.replace("</", "<\\/")),
+        )  # fmt: skip
+        page.write_text(made.read_text(encoding="utf-8"), encoding="utf-8")
+    lines = [f"# {title}", "", _summary(told), "", f"**{answer_of(told)}**", ""]
+    lines += [f"> {message}\n" for message in told.messages]
+    text = "\n".join([*lines, *markdown_parts(parts)]).rstrip() + "\n"
+    words.write_text(text, encoding="utf-8")
+    return page, words
+
+
+def parts_of(told: ForceAssessment) -> list[Part]:
+    """Return the parts of the page."""
+    found = told.diagnosis
+    maps = [residual_map(told, found.base, "before", "Without the named effects")]
+    if told.named:
+        maps.append(residual_map(told, found.final, "after", f"With {', '.join(told.named)}"))
+    return [
+        Part("Candidates", "candidates", METHOD_TEXT, tables=[_candidates(told)],
+             plots=[_bars(told)] if told.findings else []),
+        Part("Error", "error", tables=[_errors(told)], plots=_fall(told)),
+        Part("What is left", "left", _left_text(told), plots=maps),
+        Part("What this plan cannot show", "blind", tables=_blind(told)),
+        Part("Next", "next", _next_text(told)),
+        Part("Sources", "sources", sources=_sources(told)),
+    ]  # fmt: skip
+
+
+def _summary(told: ForceAssessment) -> str:
+    case = told.case
+    has = ", ".join(effect.name for effect in case.effects) or "none"
+    return (
+        f"Campaign {case.name}, {case.quantity} at {len(case.problem)} points, axes ISO 8855. "
+        f"Effects in the model: {has}. {len(told.findings)} effects were tried, "
+        f"{len(told.diagnosis.dead)} cannot be shown by this plan."
+    )
+
+
+def _candidates(told: ForceAssessment) -> Table:
+    unit, factor, folds = told.case.unit, told.case.factor, told.diagnosis.folds
+    rows = [
+        [
+            f.effect.name, f.level, "yes" if f.in_range else "no",
+            ", ".join(f"{twin} {np.rad2deg(angle):.0f}\u00b0" for twin, angle in f.twins),
+            number(f.score / f.threshold, 3),
+            ", ".join(number(float(x), 3) for x in f.strength),
+            ", ".join(number(float(x), 2) for x in f.std),
+            f.effect.unit, number(factor * f.error_after, 3),
+            number(factor * pooled(f.held_after, folds), 3), number(f.power, 2),
+        ]
+        for f in told.findings
+    ]  # fmt: skip
+    return Table(
+        "Effects by rank",
+        ["effect", "level", "in range", "twins (angle)", "score / threshold", "strength", "std",
+         "unit", f"error with it alone [{unit}]", f"held out [{unit}]", "power"],
+        rows, texts=4,
+        note="Twins: effects whose signatures are less than 30 degrees apart. Power: chance that a "
+             "third of the range would be an alarm. Held out: for alarms only.",
+    )  # fmt: skip
+
+
+def _errors(told: ForceAssessment) -> Table:
+    found, factor, unit = told.diagnosis, told.case.factor, told.case.unit
+    scale = factor * told.case.problem.scale
+    rows = [
+        [f"noise of a point, from {told.case.repeats} repeated cells "
+         f"[{'Nm' if told.case.quantity == 'Mz' else 'N'}]", number(told.case.noise, 3)],
+        [f"error without the named effects [{unit}]", number(factor * found.base.error, 4)],
+        [f"error with them [{unit}]", number(factor * found.final.error, 4)],
+        [f"floor: median error of variants that lack no effect [{unit}]",
+         number(factor * found.floor, 4)],
+        [f"left when all effects are fitted at once [{unit}]", number(scale * found.left, 4)],
+        [f"the same, largest of the variants [{unit}]", number(scale * found.most_left, 4)],
+    ]  # fmt: skip
+    for fold, old, new in zip(found.folds, found.held_before, found.held_final, strict=True):
+        rows.append([
+            f"left out of the fit: {fold_words(fold)} ({int(fold.out.sum())} points), error there "
+            f"without and with the named effects [{unit}]",
+            f"{number(factor * old, 3)}; {number(factor * new, 3)}",
+        ])  # fmt: skip
+    return Table("Errors", ["", "value"], rows)
+
+
+def _fall(told: ForceAssessment) -> list[Plot]:
+    found, factor = told.diagnosis, told.case.factor
+    if not told.named or not found.steps:
+        return []
+    first = Step("base", factor * found.base.error, factor * pooled(found.held_before, found.folds))
+    steps = [Step(name, factor * e, factor * h) for name, e, h in found.steps]
+    history = waterfall_of(told.case.model.history, told.case.quantity)
+    plots = [waterfall([first, *steps], told.case.unit, factor * found.floor, "fall",
+                       "The named effects one after the other")]  # fmt: skip
+    if history is not None:
+        plots.append(history)
+    return plots
+
+
+def _left_text(told: ForceAssessment) -> str:
+    if not exceeds(told):
+        return "What is left is no more than variants of the model without any effect leave."
+    guess = f" A guess at its law: {told.left.guess}." if told.left.guess else ""
+    return f"What is left stands {told.left.where}; it {told.left.scaling}.{guess}"
+
+
+def _blind(told: ForceAssessment) -> list[Table]:
+    dead = [[name, reason] for name, reason in told.diagnosis.dead.items()]
+    return [Table("Dead effects", ["effect", "why"], dead, texts=2)] if dead else []
+
+
+def _next_text(told: ForceAssessment) -> str:
+    step = next_test(told)
+    text = f"{step['what'][0].upper()}{step['what'][1:]}."
+    revived = step["would_revive"]
+    if revived:
+        text += f" Other runs would show {', '.join(revived)}: see the dead effects."
+    return text
+
+
+def _sources(told: ForceAssessment) -> Sequence[str]:
+    shown = [f.effect for f in told.findings if f.level != "quiet"]
+    shown += [effect for effect in told.case.effects if effect not in shown]
+    return [*(f"{effect.name}: {effect.source}" for effect in shown), *BRUSH]
+
+
+def _bars(told: ForceAssessment) -> Plot:
+    names = [f.effect.name for f in told.findings]
+    ratio = [f.score / f.threshold for f in told.findings]
+    figure = go.Figure(
+        go.Bar(
+            x=np.maximum(np.round(ratio, 4), LEAST_SHOWN), y=names, orientation="h",
+            marker={"color": [_LEVELS[f.level] for f in told.findings]},
+            hovertemplate="%{y}: %{x:.3g}<extra></extra>",
+        )
+    )  # fmt: skip
+    for at in (1.0, ALARM):
+        figure.add_vline(x=at, line={"dash": "dot", "color": FAINT})
+    figure.update_yaxes(autorange="reversed")
+    figure.update_xaxes(title="score / threshold", type="log")
+    styled_figure(figure, 160 + 22 * len(names), showlegend=False)
+    return Plot(
+        "scores", "Score over threshold",
+        "Dotted: 1, from which an effect is a hint, and 3, from which it is an alarm. Red: alarm; "
+        "blue: hint; gray: quiet. An effect beyond 3 that is no alarm lies outside its "
+        "range, or an exact refit does as well without it.",
+        figure, ["effect", "score / threshold", "level"],
+        [[f.effect.name, r, f.level] for f, r in zip(told.findings, ratio, strict=True)],
+    )  # fmt: skip
