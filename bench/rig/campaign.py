@@ -2,7 +2,7 @@
 
 import csv
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
@@ -10,10 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.rig.hidden import hidden
 from bench.rig.measure import Chain, Recording, record, settle, slip_ratio
 from bench.rig.mesh import mesh
 from bench.rig.observe import Forces, edges, forces, trace
 from bench.rig.plans import Plan, kind, with_repeats
+from bench.rig.shown import Shown, fixed_angle
 from bench.rig.solve import State, solve
 from bench.rig.tire import Array, Condition, RigTire
 from tirelib.campaign import (
@@ -78,6 +80,8 @@ class Job:
     nominal: Condition
     seed: int
     chain: Chain
+    planted: tuple[tuple[str, float], ...] = ()
+    place: float = 0.0
 
 
 class _Worker:
@@ -94,9 +98,19 @@ def _prepare(references: tuple[State, ...]) -> None:
 def _make(job: Job) -> tuple[Recording, Truth]:
     cond = settle(job.nominal, job.chain, job.seed, job.run)
     start = min(_Worker.references, key=lambda s: abs(s.condition.load - cond.load))
-    state = solve(start.tire, cond, start)
+    tire = start.tire
+    for name, strength in job.planted:
+        tire = hidden(name).tire(tire, cond, job.place, strength)
+    lower = tire.free_radius - start.tire.free_radius
+    state = solve(tire, cond, replace(start, height=start.height + lower))
     force = forces(state)
     angle, length = edges(state)
+    seen = trace(state)
+    for name, strength in job.planted:
+        shown = Shown(
+            tire, cond, state.omega, seen, angle, state.stiffness, job.place, fixed_angle(tire)
+        )
+        seen = hidden(name).trace(shown, strength)
     truth = Truth(
         run=job.run,
         condition=cond,
@@ -108,7 +122,7 @@ def _make(job: Job) -> tuple[Recording, Truth]:
         edge=angle,
         length=length,
     )
-    return record(state, trace(state), force, job.chain, job.seed, job.run), truth
+    return record(state, seen, force, job.chain, job.seed, job.run), truth
 
 
 def references(tire: RigTire, conditions: tuple[Condition, ...]) -> tuple[State, ...]:
@@ -135,6 +149,7 @@ def run_plan(
     chain: Chain | None = None,
     axes: str = "iso",
     overwrite: bool = False,
+    planted: Mapping[str, float] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Truth]:
     """Measure a plan and write the campaign; return the truth of each run.
@@ -147,6 +162,8 @@ def run_plan(
         Number of runs repeated at the end; the plan's own number otherwise.
     axes : str
         Axis system of the files.
+    planted : mapping of name to strength, optional
+        Effects to hide in the rig (`bench.rig.hidden`).
     progress : callable, optional
         Called with the number of finished runs and of all runs.
 
@@ -166,7 +183,11 @@ def run_plan(
             f"rig: jobs = {jobs}, seed = {seed}; allowed are jobs >= 1 and seed >= 0; change them"
         )
     conditions = with_repeats(plan, plan.repeats if repeats is None else repeats)
-    tasks = [Job(i, c, seed, chain) for i, c in enumerate(conditions)]
+    effects = tuple((hidden(name).name, strength) for name, strength in (planted or {}).items())
+    tasks = [
+        Job(i, c, seed, chain, effects, i / max(len(conditions) - 1, 1))
+        for i, c in enumerate(conditions)
+    ]
     truths: list[Truth] = []
 
     def finished() -> Iterator[Run]:

@@ -48,7 +48,7 @@ def road(
     q, stiff = pressure(tire, kin.depth)
     width = tire.free_radius * tire.belt_width / N_STRIPS
     area = np.repeat(width * grid.weight[at][:, None], N_STRIPS, axis=1)
-    return Road(
+    found = Road(
         kin,
         shear,
         area,
@@ -57,6 +57,9 @@ def road(
         q=q,
         stiff=stiff,
     )
+    for law in tire.road_laws:
+        found = law(tire, cond, phi, found)
+    return found
 
 
 def wheel_torque(cond: Condition, contact: Road) -> float:

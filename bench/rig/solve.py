@@ -213,7 +213,10 @@ def _newton(
     size, slow = grid.n * FIELDS, True
     for count in range(1, MAX_STEPS + 1):
         if count == 1 or slow:
-            apply = now.factor()
+            try:
+                apply = now.factor()
+            except RuntimeError:  # singular: the tire has left the road
+                break
         step = apply(-now.residual)
         if not np.all(np.isfinite(step)):
             break

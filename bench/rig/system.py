@@ -47,12 +47,21 @@ class Balance:
     road: Road
 
     def factor(self) -> Callable[[Array], Array]:
-        """Return the solver of matrix @ x = b, for b and x in the plain order."""
-        lu = splu(self.matrix, permc_spec="NATURAL", diag_pivot_thresh=1e-3)
+        """Return the solver of matrix @ x = b, for b and x in the plain order.
+
+        Bristles that a road without friction does not hold stay undeflected: they are left out.
+        """
+        shear, order, matrix = self.road.shear, self.order, self.matrix
+        if not (shear.project.any() or shear.from_depth.any()):
+            bristles = np.zeros(len(order), dtype=bool)
+            bristles[-2 - shear.e.size : -2] = True
+            kept = np.flatnonzero(~bristles[order])
+            order, matrix = order[kept], matrix[:, kept][kept]
+        lu = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=1e-3)
 
         def apply(right: Array) -> Array:
-            out = np.empty_like(right)
-            out[self.order] = lu.solve(right[self.order])
+            out = np.zeros_like(right)
+            out[order] = lu.solve(right[order])
             return out
 
         return apply
@@ -167,6 +176,8 @@ def balance(
     omega = cond.speed * float(np.cos(cond.slip_angle)) / rolling
     z = fields_at_points(grid, control)
     inner, tangent = internal(tire, cond, omega, z)
+    for law in tire.belt_laws:
+        inner += law(tire, cond, omega, grid, z)
     contact = road(tire, cond, grid, z, height, rolling)
     add_forces(cond, grid, contact, inner, tangent)
     residual = np.zeros(lay.size)

@@ -9,11 +9,15 @@ the measurement (`bench.rig.measure`).
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tirelib.errors import ParameterError
+
+if TYPE_CHECKING:
+    from bench.rig.laws import BeltLaw, RoadLaw
 
 Array = NDArray[np.float64]
 
@@ -31,6 +35,9 @@ _MAY_BE_ZERO = frozenset(
         "transverse_bending",
         "belt_shear_coupling",
         "tread_hardening",
+        "tread_cubic",
+        "tread_roughness",
+        "road_curvature",
         "friction",
         "mass",
     }
@@ -75,10 +82,18 @@ class RigTire:
         In-plane shear stiffness of the belt between strips, G t [N/m].
     tread_normal, tread_hardening : float
         Bristle pressure q = k d (1 + c d / H), d compression, H bristle height: k [N/m^3], c [1].
+    tread_cubic : float
+        Further hardening: c_3 (d / H)^2 is added to 1 + c d / H [1].
+    tread_roughness : float
+        Half height of asperities, evenly spread: they touch before the smooth tread would [m].
+    road_curvature : float
+        Curvature of the road along the direction of travel, a drum's; zero is the flat belt [1/m].
     tread_shear_x, tread_shear_y : float
         Bristle shear stiffness per area [N/m^3].
     friction : float
         Coulomb coefficient between tread and road [1].
+    belt_laws, road_laws : tuple
+        Further laws of the belt and its sidewall, and of the road (`bench.rig.laws`).
     """
 
     name: str = "numerical tire, 215/60R16 class"
@@ -110,6 +125,11 @@ class RigTire:
     tread_shear_x: float = 1.0e8
     tread_shear_y: float = 1.0e8
     friction: float = 0.95
+    tread_cubic: float = 0.0
+    tread_roughness: float = 0.0
+    road_curvature: float = 0.0
+    belt_laws: "tuple[BeltLaw, ...]" = ()
+    road_laws: "tuple[RoadLaw, ...]" = ()
 
     def __post_init__(self) -> None:
         for f in fields(self):

@@ -1,8 +1,9 @@
 """The tread: bristles between belt and road, with Coulomb friction and convected shear.
 
 A bristle of strip i stands on the belt along the section's director; its free tip is at
-x_s = x + h n(phi + psi). Compression d = -Z_s below the road gives q = k d (1 + c d / H). A
-sticking tip is carried by the road, so that between two points of the same strip
+x_s = x + h n(phi + psi). Compression d = -Z_s below the road gives
+q = k d (1 + c d / H + c_3 (d / H)^2). A sticking tip is carried by the road, so that between two
+points of the same strip
 
     e_j = e_{j-1} - (V_x / Omega) dphi - (X_j - X_{j-1})                       (along)
     e_j = e_{j-1} - (V_x / Omega) tan(alpha) dphi - (Y_j - Y_{j-1})            (across)
@@ -73,14 +74,19 @@ def kinematics(tire: RigTire, cond: Condition, height: float, phi: Array, z: Arr
     x_grad = np.stack([-sin * one, -cos * one, -h * turn_cos, zero], axis=-1)
     zeta_grad = np.stack([-cos * one, sin * one, h * turn_sin, zero], axis=-1)
     w_grad = np.array([0.0, 0.0, 0.0, 1.0])
+    depth = -(height + across * sg + zeta * cg)
+    z_grad = sg * w_grad + cg * zeta_grad
+    if tire.road_curvature:
+        depth = depth - 0.5 * tire.road_curvature * x**2
+        z_grad = z_grad + (tire.road_curvature * x)[..., None] * x_grad
     return Kinematics(
         x=x,
         zeta=zeta,
         y=across * cg - zeta * sg,
-        depth=-(height + across * sg + zeta * cg),
+        depth=depth,
         x_grad=x_grad,
         y_grad=cg * w_grad - sg * zeta_grad,
-        z_grad=sg * w_grad + cg * zeta_grad,
+        z_grad=z_grad,
         zeta_grad=zeta_grad,
         x_bend=h * turn_sin,
         zeta_bend=h * turn_cos,
@@ -89,10 +95,19 @@ def kinematics(tire: RigTire, cond: Condition, height: float, phi: Array, z: Arr
 
 def pressure(tire: RigTire, depth: Array) -> tuple[Array, Array]:
     """Contact pressure and its derivative with compression; no tension [Pa], [Pa/m]."""
-    d = np.maximum(depth, 0.0)
+    d, touched = np.maximum(depth, 0.0), (depth > 0.0).astype(np.float64)
+    if tire.tread_roughness:
+        half = tire.tread_roughness
+        shallow = np.abs(depth) < half
+        d = np.where(shallow, (depth + half) ** 2 / (4.0 * half), d)
+        touched = np.where(shallow, (depth + half) / (2.0 * half), touched)
     harder = tire.tread_hardening / tire.tread_thickness
     q = tire.tread_normal * d * (1.0 + harder * d)
-    return q, tire.tread_normal * (1.0 + 2.0 * harder * d) * (depth > 0.0)
+    slope = tire.tread_normal * (1.0 + 2.0 * harder * d) * touched
+    if tire.tread_cubic:
+        cubic = tire.tread_normal * tire.tread_cubic / tire.tread_thickness**2
+        q, slope = q + cubic * d**3, slope + 3.0 * cubic * d**2 * touched
+    return q, slope
 
 
 def march(
@@ -121,6 +136,8 @@ def march(
     sliding = np.zeros((n, N_STRIPS), dtype=bool)
     from_depth = np.zeros((n, N_STRIPS, 2))
     previous, eye = np.zeros((N_STRIPS, 2)), np.eye(2)
+    if tire.friction == 0.0:
+        return Shear(e, project, from_depth, carry, part, delta, own, before, inside)
     for j in np.flatnonzero(inside.any(axis=1)):
         touch = inside[j]
         trial = carry[j][:, None] * previous + part[j][:, None] * delta[j]

@@ -122,6 +122,9 @@ def test_the_model_is_a_tire_with_provenance(
     assert 1e3 * read.tire.innerliner_offset == pytest.approx(by_name["innerliner_offset"]["value"])
     assert read.numbers["tread_stiffness"].kind == "fitted"
     assert read.extra["effects"] == []
+    told = read.extra["identified_correlation"]
+    assert told["names"] == list(by_name)
+    assert np.array(told["values"]) == pytest.approx(np.array(document["correlation"]))
 
 
 def test_the_held_tread_is_as_stiff_as_the_tire_in_the_file(

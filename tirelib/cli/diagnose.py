@@ -11,7 +11,7 @@ from rich.table import Table
 
 from tirelib.campaign import Campaign, CampaignHeader, read_campaign
 from tirelib.cli.common import CAMPAIGN, FILE, output, progress_bar, write_json
-from tirelib.errors import CalibrationError, ParameterError
+from tirelib.errors import CalibrationError, ParameterError, TirelibError
 
 if TYPE_CHECKING:
     from tirelib.effects import Effect
@@ -28,7 +28,7 @@ Examples:
 \b
 Verdicts: none, named, form_inadequate (right effect, wrong law), indistinguishable (several would
 do), unknown (something that no effect of the catalogue explains). An effect is an alarm when its
-score is three times the largest of variants of the model without any effect; a hint from once on.
+score is twice the largest of variants of the model without any effect; a hint from once on.
 Exit code: 0 whatever the verdict, 2 bad input.
 """
 SHOWN = 8
@@ -74,7 +74,7 @@ def diagnose(
     catalogue = all_effects(effect_files)
     file = read_tire(model_name)
     campaign = read_campaign(folder)
-    of_forces = explains_forces(quantity, campaign.header)
+    of_forces = explains_forces(quantity, campaign.header, file)
     explain = _of_forces if of_forces else _of_strain
     with progress_bar("diagnosing") as progress:
         told, document = explain(campaign, file, catalogue, quantity, members, seed, progress)
@@ -82,15 +82,17 @@ def diagnose(
     console = output()
     targets = [path for path in (json_file, out and out / "diagnosis.json") if path]
     if out is not None:
-        for path in _write(told, out, of_forces):
+        for path in _write(told, out, of_forces, file.extra.get("history", [])):
             console.print(f"written: {path}")
     for path in targets:
         write_json(path, document)
         console.print(f"written: {path}")
 
 
-def explains_forces(quantity: str | None, header: CampaignHeader) -> bool:
+def explains_forces(quantity: str | None, header: CampaignHeader, file: "TireFile") -> bool:
     """Return whether a force is to be explained, and not strain.
+
+    Strain comes first, where there is strain and the model has a ring.
 
     Raises
     ------
@@ -108,7 +110,9 @@ def explains_forces(quantity: str | None, header: CampaignHeader) -> bool:
             f"{header.name}: it has no strain gages; look at its forces: --quantity "
             f"{', '.join(QUANTITIES[1:])}"
         )
-    return quantity not in (None, "strain") or not header.gage_lateral
+    if quantity is None:
+        return not header.gage_lateral or bool(file.missing)
+    return quantity != "strain"
 
 
 def _of_strain(
@@ -124,6 +128,7 @@ def _of_strain(
     from tirelib.diagnose.diagnose import diagnose as diagnose_model
     from tirelib.diagnose.document import assess, diagnosis_document
     from tirelib.identify.campaign_data import straight_runs
+    from tirelib.planning.document import next_test_document
     from tirelib.waveforms import measure_waveforms
 
     model = model_of(file, catalogue)
@@ -136,7 +141,16 @@ def _of_strain(
         members=members, seed=seed, progress=progress,
     )  # fmt: skip
     told = assess(found, seed=seed, progress=progress)
-    return told, diagnosis_document(told)
+    document = diagnosis_document(told)
+    if document["verdict"] == "indistinguishable":
+        try:
+            document["next_test"] |= next_test_document(
+                document, found.data, found.base, catalogue, noise=runs.noise.std,
+                progress=progress,
+            )  # fmt: skip
+        except TirelibError as error:
+            document["messages"].append(f"no next test: {error}")
+    return told, document
 
 
 def _of_forces(
@@ -158,14 +172,16 @@ def _of_forces(
     return told, force_diagnosis_document(told)
 
 
-def _write(told: Any, out: Path, of_forces: bool) -> Sequence[Path]:
+def _write(
+    told: Any, out: Path, of_forces: bool, history: Sequence[Mapping[str, Any]]
+) -> Sequence[Path]:
     if of_forces:
         from tirelib.report.force_diagnosis import write_force_diagnosis
 
         return write_force_diagnosis(told, out)
     from tirelib.report.diagnosis import write_diagnosis
 
-    return write_diagnosis(told, out)
+    return write_diagnosis(told, out, history)
 
 
 def _say(document: dict[str, Any]) -> None:

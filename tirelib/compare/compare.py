@@ -13,6 +13,8 @@ from tirelib.parameters import TireFile
 from tirelib.waveforms import Waveforms, measure_waveforms
 
 QUANTITIES = ("strain", *FORCES)
+BRUSH = ("bristle_lateral", "bristle_longitudinal", "friction")
+"""Numbers that a model of the brush states."""
 
 
 def compare(
@@ -57,6 +59,25 @@ def compare(
             f"{', '.join(FORCES)}"
         )
     if quantity == "strain" or (quantity is None and has_strain):
+        _needs_ring(campaign, file)
         waves = waves or measure_waveforms(campaign, progress=progress)
         return compare_strain(waves, model_of(file, effects), campaign.content_hash())
     return compare_forces(campaign, file, quantity, effects)
+
+
+def _needs_ring(campaign: Campaign, file: TireFile) -> None:
+    """Refuse to predict strain from a file that states no ring."""
+    if not file.missing:
+        return
+    name, brush = campaign.header.name, [key for key in BRUSH if key in file.numbers]
+    lacks = f"{len(file.missing)} numbers of the ring are missing ({', '.join(file.missing)})"
+    if brush:
+        raise CalibrationError(
+            f"{file.name}: it is a model of the brush only ({', '.join(brush)}) and says nothing "
+            f"of the strain of {name}: {lacks}; compare its forces with --quantity "
+            f"{', '.join(FORCES)}, or identify the ring from straight runs with `tirelib identify`"
+        )
+    raise CalibrationError(
+        f"{file.name}: it states no complete ring, so it says nothing of the strain of {name}: "
+        f"{lacks}; identify the tire from straight runs with `tirelib identify`, or add them"
+    )

@@ -4,13 +4,16 @@ from typing import Any
 
 import numpy as np
 
+from tirelib.compare.force_curves import Curve, curves_of, ranked
 from tirelib.compare.forces import UNITS, ForceCell, ForceComparison
+from tirelib.compare.gages import Gage
 from tirelib.compare.regions import Region
 from tirelib.compare.sectors import Cell
 from tirelib.compare.sentences import UNITS as CONDITION_UNITS
 from tirelib.compare.sentences import place
 from tirelib.compare.set_points import NAMES
 from tirelib.compare.strain import Comparison
+from tirelib.compare.track_words import track_fit
 from tirelib.compare.tracks import Track
 from tirelib.units import from_si
 
@@ -52,7 +55,8 @@ def _strain(found: Comparison) -> dict[str, Any]:
         "table": [_cell(cell, noise.std) for cell in found.table],
         "set_points": _set_points(found),
         "tracks": [_track(track, found) for track in found.tracks],
-        "gages": [_gage(found, k) for k in range(len(found.chosen.gages))],
+        "gages": [_gage(gage, found) for gage in found.gages],
+        "curves": [],
         "runs": [
             {
                 "run": int(found.run[i]),
@@ -129,14 +133,16 @@ def _set_points(found: Comparison) -> list[dict[str, Any]]:
 
 
 def _track(track: Track, found: Comparison) -> dict[str, Any]:
-    error = (track.model - track.measured)[track.known & found.chosen.straight]
-    known = error.size > 0
+    fit = track_fit(track, found.chosen.straight)
     return {
         "name": track.name,
         "unit": track.unit,
         "noise": track.scale * track.noise,
-        "rms": track.scale * float(np.sqrt(np.mean(error**2))) if known else None,
-        "mean": track.scale * float(error.mean()) if known else None,
+        "rms": track.scale * fit.rms,
+        "rms_noise": fit.rms / track.noise,
+        "mean": track.scale * fit.mean,
+        "mean_std": track.scale * fit.std,
+        "rms_beside_mean": track.scale * fit.rms_beside,
         "runs": [int(run) for run in found.run],
         "measured": track.scale * track.measured,
         "model": track.scale * track.model,
@@ -144,15 +150,25 @@ def _track(track: Track, found: Comparison) -> dict[str, Any]:
     }
 
 
-def _gage(found: Comparison, k: int) -> dict[str, Any]:
-    part = found.by_gage[found.chosen.straight, k]
-    number = found.chosen.gages[k]
+def _gage(gage: Gage, found: Comparison) -> dict[str, Any]:
+    departure = gage.departure
     return {
-        "gage": number + 1,
-        "lateral_mm": 1e3 * found.chosen.waves.header.gage_lateral[number],
-        "rms": 1e6 * float(np.sqrt(np.mean(part**2))),
-        "rms_noise": float(np.sqrt(np.mean(part**2))) / found.noise.std,
-    }
+        "gage": gage.number + 1,
+        "lateral_mm": 1e3 * gage.lateral,
+        "noise": 1e6 * gage.noise.std,
+        "rms": 1e6 * gage.rms,
+        "rms_noise": gage.rms / gage.noise.std,
+        "sectors": [_cell(cell, gage.noise.std) for cell in gage.table],
+        "departure": None if departure is None else {
+            "sector": place(departure.region, found.prediction.edges),
+            "from_rad": departure.region.start,
+            "to_rad": departure.region.stop,
+            "mean": 1e6 * departure.mean,
+            "mean_std": 1e6 * departure.std,
+            "mean_of_all_gages": 1e6 * departure.of_all,
+            "p": departure.region.p,
+        },
+    }  # fmt: skip
 
 
 def _sources(found: Comparison) -> list[dict[str, str]]:
@@ -163,6 +179,8 @@ def _sources(found: Comparison) -> list[dict[str, str]]:
 
 
 def _forces(found: ForceComparison) -> dict[str, Any]:
+    curves = curves_of(found)
+    named = ranked(curves)
     return {
         "format": FORMAT,
         "campaign": found.name,
@@ -191,8 +209,9 @@ def _forces(found: ForceComparison) -> dict[str, Any]:
         "set_points": [],
         "tracks": [],
         "gages": [],
+        "curves": [_curve(curve, found) for curve in curves],
         "runs": [],
-        "ranked": None,
+        "ranked": {name: curve.words for name, curve in named.items()} or None,
         "sources": [
             {"what": used.effect.name, "title": used.effect.title, "source": used.effect.source}
             for used in found.used
@@ -212,4 +231,16 @@ def _force_cell(cell: ForceCell, noise: float) -> dict[str, Any]:
         "mean": cell.mean,
         "excess": cell.excess,
         "excess_std": cell.excess_std,
+    }
+
+
+def _curve(curve: Curve, found: ForceComparison) -> dict[str, Any]:
+    return {
+        "words": curve.words,
+        "load": curve.load,
+        "pressure": edge_value("pressure", curve.pressure),
+        "camber": edge_value("camber", curve.camber),
+        "points": curve.points,
+        "rms": curve.rms,
+        "rms_noise": curve.rms / found.noise,
     }

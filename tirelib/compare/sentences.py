@@ -14,7 +14,7 @@ UNITS = {
     "slip_angle": ("deg", "angle"), "camber": ("deg", "angle"), "slip_ratio": ("", "ratio"),
 }  # fmt: skip
 """Unit that each condition is told in, and its dimension."""
-_PLACES = {
+PLACES = {
     "contact": "in the contact",
     "entry edge": "at the entry of the contact",
     "exit edge": "at the exit of the contact",
@@ -62,30 +62,29 @@ def amount(mean: float, measured: float) -> str:
     return f"{size} microstrain too {'much' if more else 'little'} {kind}"
 
 
-def conditions(region: Region) -> str:
+def conditions(by: str, side: str, value: float) -> str:
     """Say the runs of a region; empty for all.
 
     Examples
     --------
-    >>> nothing = np.zeros(0, dtype=bool)
-    >>> conditions(Region(0, 1, "load", "above", 4500.0, 9, 0, 0, 0, 0, 0, nothing))
+    >>> conditions("load", "above", 4500.0)
     'at 4,500 N and above'
     """
-    if region.by == "all":
+    if by == "all":
         return ""
     names = {"slip_angle": "slip angle ", "camber": "camber ", "slip_ratio": "slip ratio "}
-    end = "and above" if region.side == "above" else "and below"
-    return f"at {names.get(region.by, '')}{told(region.by, region.value)} {end}"
+    end = "and above" if side == "above" else "and below"
+    return f"at {names.get(by, '')}{told(by, value)} {end}"
 
 
 def sentence(region: Region, edges: FloatArray) -> str:
     """Say one region in plain words."""
-    where = _PLACES[place(region, edges)]
+    where = PLACES[place(region, edges)]
     text = f"{where}, from {region.start:.2f} to {region.stop:.2f} rad, "
-    limit = conditions(region)
+    limit = conditions(region.by, region.side, region.value)
     text += f"{limit}, " if limit else "in all runs, "
     text += f"the model shows {amount(region.mean, region.measured)}"
-    text += f" (95 % \N{PLUS-MINUS SIGN} {_small(1.96e6 * region.std)}, {region.runs} runs)."
+    text += f" (95 % \N{PLUS-MINUS SIGN} {small(1.96e6 * region.std)}, {region.runs} runs)."
     return text[0].upper() + text[1:]
 
 
@@ -94,5 +93,18 @@ def sentences(regions: Sequence[Region], edges: FloatArray) -> tuple[str, ...]:
     return tuple(sentence(region, edges) for region in regions)
 
 
-def _small(value: float) -> str:
+def small(value: float) -> str:
+    """Say the size of an interval in microstrain."""
     return f"{value:,.0f}" if value >= 10 else f"{value:.1f}"
+
+
+def millimeters(y: float) -> str:
+    """Say a lateral position in whole millimeters with its sign; zero has none.
+
+    Examples
+    --------
+    >>> millimeters(0.06), millimeters(-1e-5)
+    ('+60 mm', '0 mm')
+    """
+    whole = round(1e3 * y)
+    return f"{whole:+d} mm" if whole else "0 mm"

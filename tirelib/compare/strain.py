@@ -7,12 +7,14 @@ from scipy import special
 
 from tirelib.arrays import FloatArray, IntArray
 from tirelib.compare.floor import Floor, floor_of
+from tirelib.compare.gages import Gage, compare_gages, gage_sentences
 from tirelib.compare.model import Model, Prediction, predict_runs
 from tirelib.compare.regions import SLIPS, Region, find_regions
 from tirelib.compare.runs import Chosen, choose
 from tirelib.compare.sectors import Cell, cells, sectors_of
 from tirelib.compare.sentences import sentences
 from tirelib.compare.set_points import NAMES, SetPoints, predict_set_points, tangents
+from tirelib.compare.track_words import track_sentences
 from tirelib.compare.tracks import Track, tracks
 from tirelib.identify.noise import RepeatNoise, repeat_noise
 from tirelib.identify.random_effects import scales, whitening_of
@@ -84,8 +86,10 @@ class Comparison:
     table : tuple of Cell
     regions : tuple of Region
     sentences : tuple of str
-        Lack of fit in plain words, by `regions`.
+        Lack of fit in plain words: `regions`, set points, `tracks`, `gages`.
     tracks : tuple of Track
+    gages : tuple of Gage
+        Each gage by itself.
     messages : tuple of str
         What limits the comparison.
     """
@@ -105,6 +109,7 @@ class Comparison:
     regions: tuple[Region, ...]
     sentences: tuple[str, ...]
     tracks: tuple[Track, ...]
+    gages: tuple[Gage, ...]
     messages: tuple[str, ...]
 
     @property
@@ -165,6 +170,13 @@ def compare_strain(waves: Waveforms, model: Model, data_hash: str = "") -> Compa
         regions = find_regions(difference, chosen.strain, counted, plain, repeats, points)
         if slips:
             regions += find_regions(difference, chosen.strain, counted, slips, repeats, points)
+    by_gage = prediction.gages - waves.strain[:, chosen.gages] + points.shift[:, None, :]
+    followed = tracks(waves, chosen.strain, prediction, chosen.tolerance)
+    gages = compare_gages(chosen, by_gage, difference, sector, points)
+    said = sentences(regions, prediction.edges) + _beyond(fit, points, chosen)
+    if fit.verdict in ("fits", "lack_of_fit"):
+        said += track_sentences(followed, counted, chosen.factors)
+        said += gage_sentences(gages, prediction.edges)
     return Comparison(
         chosen,
         model,
@@ -172,7 +184,7 @@ def compare_strain(waves: Waveforms, model: Model, data_hash: str = "") -> Compa
         points,
         repeats,
         difference,
-        prediction.gages - waves.strain[:, chosen.gages] + points.shift[:, None, :],
+        by_gage,
         sector,
         np.sqrt(np.mean(difference**2, axis=1)),
         fit,
@@ -181,8 +193,9 @@ def compare_strain(waves: Waveforms, model: Model, data_hash: str = "") -> Compa
         ),
         cells(difference, sector, counted, chosen.factors, repeats, points),
         regions,
-        sentences(regions, prediction.edges) + _beyond(fit, points, chosen),
-        tracks(waves, chosen.strain, prediction, chosen.tolerance),
+        said,
+        followed,
+        gages,
         (*_messages(chosen, repeats, fit), *chosen.notes),
     )
 

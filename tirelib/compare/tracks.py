@@ -1,5 +1,6 @@
-"""Contact length and deflection of every run, measured and by the model, with bands."""
+"""Contact length, deflection, entry and exit of every run, measured and by the model."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,10 @@ class Track:
         By the tolerance of the set points.
     noise : float, SI
         Of the measured number, from repeats; NaN without.
+    freedom : int
+        Degrees of freedom of the noise.
+    constant : bool
+        Whether the measured number may hold a constant error of the rig.
     """
 
     name: str
@@ -39,6 +44,13 @@ class Track:
     model: FloatArray
     model_std: FloatArray
     noise: float
+    freedom: int
+    constant: bool = False
+
+    @property
+    def difference(self) -> FloatArray:
+        """Model less measured, SI."""
+        return np.asarray(self.model - self.measured)
 
     @property
     def known(self) -> BoolArray:
@@ -46,64 +58,77 @@ class Track:
         return np.asarray(np.isfinite(self.measured) & np.isfinite(self.model))
 
 
-def contact_angle(strain: FloatArray) -> FloatArray:
-    """Return the angle from the steepest rise of strain to its steepest fall, (n_runs,), [rad].
+def contact_edges(strain: FloatArray) -> FloatArray:
+    """Return the angles of the steepest rise and of the steepest fall of strain, (n_runs, 2).
 
     Measurement and model are read in the same way; the contact's own edges differ a little.
     """
     slope = angle_slope(strain)
     entry = _peak(slope, (GRID < 0.0) & (GRID > -REACH))
     leaving = _peak(-slope, (GRID > 0.0) & (GRID < REACH))
-    return np.asarray(leaving - entry)
+    return np.stack([entry, leaving], axis=1)
+
+
+def contact_angle(strain: FloatArray) -> FloatArray:
+    """Return the angle from the steepest rise of strain to its steepest fall, (n_runs,), [rad]."""
+    edges = contact_edges(strain)
+    return np.asarray(edges[:, 1] - edges[:, 0])
 
 
 def tracks(
     waves: Waveforms, strain: FloatArray, prediction: Prediction, tolerance: Tolerance
 ) -> tuple[Track, ...]:
-    """Return contact length and deflection; without a loaded radius only the first."""
-    c = waves.conditions
+    """Return contact length, deflection (where the loaded radius is known), entry and exit."""
+    c, group = waves.conditions, waves.group
     radius = np.asarray(c["speed"] / np.where(c["omega"] > 0.0, c["omega"], np.nan))
-    measured = contact_angle(strain)
-    model = contact_angle(prediction.strain)
+    measured, model = contact_edges(strain), contact_edges(prediction.strain)
     moved = [
-        contact_angle(prediction.strain + size * slope) - model
+        contact_edges(prediction.strain + size * slope) - model
         for slope, size in (
             (prediction.by_load, tolerance.load), (prediction.by_pressure, tolerance.pressure),
         )
     ]  # fmt: skip
-    std = np.hypot(*moved)
-    group = waves.group
-    name = "contact length"
+    lengths = [np.diff(edges, axis=1)[:, 0] for edges in (measured, model)]
+    spread = np.hypot(*(np.diff(part, axis=1)[:, 0] for part in moved))
+    per_angle, unit, scale = np.ones(len(strain)), "deg", float(np.rad2deg(1.0))
     if np.isfinite(radius).all():
-        length = (name, "mm", 1e3, measured * radius, model * radius, std * radius)
-    else:
-        length = (name, "deg", float(np.rad2deg(1.0)), measured, model, std)
-    out = [_track(*length, group)]
+        per_angle, unit, scale = radius, "mm", 1e3
+    length = [per_angle * part for part in (*lengths, spread)]
+    out = [_track("contact length", unit, scale, length, group)]
     deflection = waves.header.tire.free_radius - c["loaded_radius"]
     if np.isfinite(deflection).any():
-        spread = np.abs(prediction.deflection_by_load) * tolerance.load
-        out.append(
-            _track("deflection", "mm", 1e3, deflection, prediction.deflection, spread, group)
-        )
+        by_load = np.abs(prediction.deflection_by_load) * tolerance.load
+        depth = [deflection, prediction.deflection, by_load]
+        out.append(_track("deflection", "mm", 1e3, depth, group, constant=True))
+    zero = np.minimum(waves.angle_std, 1.0)
+    for side, name in enumerate(("contact entry", "contact exit")):
+        std = np.sqrt(moved[0][:, side] ** 2 + moved[1][:, side] ** 2 + zero**2)
+        angle = [measured[:, side], model[:, side], std]
+        out.append(_track(name, "deg", float(np.rad2deg(1.0)), angle, group))
     return tuple(out)
 
 
 def _track(
-    name: str, unit: str, scale: float, measured: FloatArray, model: FloatArray,
-    std: FloatArray, group: IntArray,
+    name: str, unit: str, scale: float, numbers: Sequence[FloatArray], group: IntArray,
+    *, constant: bool = False,
 ) -> Track:  # fmt: skip
-    return Track(name, unit, scale, measured, model, std, pooled(measured - model, group))
+    measured, model, std = numbers
+    noise, freedom = pooled(measured - model, group)
+    return Track(name, unit, scale, measured, model, std, noise, freedom, constant)
 
 
-def pooled(values: FloatArray, group: IntArray) -> float:
-    """Return the standard deviation within groups, NaN if none has two known values."""
+def pooled(values: FloatArray, group: IntArray) -> tuple[float, int]:
+    """Return the standard deviation within groups and its degrees of freedom.
+
+    NaN and 0 if no group has two known values.
+    """
     square, freedom = 0.0, 0
     for number in np.unique(group):
         part = values[(group == number) & np.isfinite(values)]
         if part.size > 1:
             square += float(np.sum((part - part.mean()) ** 2))
             freedom += part.size - 1
-    return float(np.sqrt(square / freedom)) if freedom else float("nan")
+    return float(np.sqrt(square / freedom)) if freedom else float("nan"), freedom
 
 
 def _peak(values: FloatArray, inside: BoolArray) -> FloatArray:

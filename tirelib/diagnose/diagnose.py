@@ -33,6 +33,9 @@ BEYOND = 1.5
 """Misfit over the variants' largest from which it is more than the structure of a ring."""
 RANGE_SLACK = 2.0
 """Standard deviations by which a strength may leave its range."""
+IMITATION = 0.05
+"""Share of the range by which structure may imitate an effect that cannot be: it cannot be named,
+but tells of nothing unknown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +130,8 @@ class Stage:
         Of the variants, without any effect.
     in_range : shape (n_candidates,)
         Whether a strength is plausible, its sign included.
+    far : shape (n_candidates,)
+        Whether it lies farther outside than structure imitates.
     """
 
     model: Refit
@@ -136,6 +141,7 @@ class Stage:
     limit: FloatArray
     misfits: FloatArray
     in_range: BoolArray
+    far: BoolArray
 
     @classmethod
     def of(
@@ -167,6 +173,7 @@ class Stage:
         return cls(
             model, found, ranking, scores, np.maximum(limits(members), bound),
             np.array([member.misfit for member in members]), plausible(found, scores),
+            ~plausible(found, scores, IMITATION),
         )  # fmt: skip
 
     @property
@@ -203,15 +210,16 @@ class Stage:
 
     @property
     def outside(self) -> float:
-        """Largest ratio of an effect outside its range."""
-        return float(np.max(np.where(self.in_range, 0.0, self.ratio), initial=0.0))
+        """Largest ratio of an effect far outside its range."""
+        return float(np.max(np.where(self.far, self.ratio, 0.0), initial=0.0))
 
 
-def plausible(found: Candidates, scores: Scores) -> BoolArray:
-    """Return which strengths lie in their effects' ranges, to `RANGE_SLACK`."""
+def plausible(found: Candidates, scores: Scores, share: float = 0.0) -> BoolArray:
+    """Return which strengths lie in their effects' ranges, to `RANGE_SLACK` and a share of them."""
     good = []
     for candidate, strength, std in zip(found.living, scores.strength, scores.std, strict=True):
-        effect, slack = candidate.effect, RANGE_SLACK * std
+        effect = candidate.effect
+        slack = RANGE_SLACK * std + share * effect.scale
         inside = (strength >= effect.low - slack) & (strength <= effect.high + slack)
         good.append(bool(inside.all()))
     return np.array(good, dtype=bool)

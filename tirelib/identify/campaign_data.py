@@ -195,7 +195,7 @@ def _refuse_signs(waves: Waveforms, strain: FloatArray) -> None:
             f"rms; at most {1e6 * MOST_STRAIN:.0f} is allowed; correct the unit of the gages"
         )
     middle = strain[:, np.abs(GRID) < MIDDLE].mean(axis=1)
-    wrong = np.flatnonzero(middle < -1.0)
+    wrong = np.flatnonzero(middle <= 0.0)
     if wrong.size:
         raise CalibrationError(
             f"{waves.header.name}, run {waves.run[wrong[0]]}: {1e6 * middle[wrong[0]]:.0f} "

@@ -16,6 +16,8 @@ from tirelib.model.state import Operating
 
 REFERENCE_LOAD = 4000.0
 REFERENCE_PRESSURE = 2.0e5
+REFERENCE_OMEGA = 80.0
+"""Of a car's tire at 25 m/s, [rad/s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,9 +33,10 @@ class Discrepancy:
         Smooth bumps over the angle.
     reach : float, [-]
         Half-width that they cover, in half contact angles.
-    by_load, by_pressure : float, [-]
-        Standard deviation of the part that goes with ln(load) and with relative pressure, relative
-        to the constant part.
+    by_load, by_pressure, by_speed : float, [-]
+        Standard deviation of the part that goes with ln(load), with relative pressure and with the
+        square of speed (1 at 25 m/s), relative to the constant part. Without a part by speed there
+        are no columns for it.
     """
 
     inside: float = 0.08
@@ -42,6 +45,7 @@ class Discrepancy:
     reach: float = 5.0
     by_load: float = 0.5
     by_pressure: float = 0.25
+    by_speed: float = 0.0
 
     def columns(
         self, waveform: FloatArray, half_angle: FloatArray, points: Operating, phi: FloatArray
@@ -67,9 +71,11 @@ class Discrepancy:
         base = base - base.mean(axis=2, keepdims=True)
         load = np.log(points.load / REFERENCE_LOAD)[None, :, None]
         pressure = (points.pressure / REFERENCE_PRESSURE - 1.0)[None, :, None]
-        return np.concatenate(
-            [base, self.by_load * base * load, self.by_pressure * 4.0 * base * pressure]
-        )
+        parts = [base, self.by_load * base * load, self.by_pressure * 4.0 * base * pressure]
+        if self.by_speed > 0.0:
+            square = (points.omega / REFERENCE_OMEGA)[None, :, None] ** 2
+            parts.append(self.by_speed * base * square)
+        return np.concatenate(parts)
 
 
 def _bumps(scaled: FloatArray, knots: int, reach: float) -> FloatArray:

@@ -92,13 +92,18 @@ def _slope(deflection: FloatArray, load: FloatArray) -> float:
 def model_file(
     found: Identification, damping: Quantity | None = None, modal: Quantity | None = None
 ) -> TireFile:
-    """Return the identified tire as a model without effects.
+    """Return the identified tire as a model without effects, with the correlation of its numbers.
 
     The damping stands beside the model: the base has none, so that its lack can be diagnosed. The
     number is that of dashpots beside the sidewall's springs; `modal` is the ratio of every mode
     that shifts the contact alike, several times smaller, and the one that the models take.
     """
-    beside: dict[str, Any] = {}
+    beside: dict[str, Any] = {
+        "identified_correlation": {
+            "names": [each.name for each in found.estimates],
+            "values": found.correlation.tolist(),
+        }
+    }
     if damping is not None:
         beside["identified_damping"] = {
             "value": damping.value,

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.candidates import Candidates
-from tirelib.diagnose.diagnose import ALARM, Stage, plausible
+from tirelib.diagnose.diagnose import ALARM, IMITATION, Stage, plausible
 from tirelib.diagnose.noise import noise_in, white_level
 from tirelib.diagnose.refit import Refit
 from tirelib.diagnose.stored import ensemble_of
@@ -58,6 +58,11 @@ class FirstRound:
     def first(self, rest: FloatArray) -> str:
         """Return who comes first for a residual (n_runs, n_phi), empty without an alarm."""
         scores = self.stage.ranking.scores(rest)
-        judged = replace(self.stage, scores=scores, in_range=plausible(self.found, scores))
+        judged = replace(
+            self.stage,
+            scores=scores,
+            in_range=plausible(self.found, scores),
+            far=~plausible(self.found, scores, IMITATION),
+        )
         leader = judged.leader(set(judged.names), ALARM)
         return "" if leader is None else judged.names[leader]

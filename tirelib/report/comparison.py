@@ -12,15 +12,20 @@ import numpy as np
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
+from tirelib.compare.force_curves import curves_of
 from tirelib.compare.forces import UNITS as FORCE_UNITS
-from tirelib.compare.forces import ForceComparison, range_of
-from tirelib.compare.sectors import SECTORS, Cell
-from tirelib.compare.sentences import told
-from tirelib.compare.set_points import NAMES
+from tirelib.compare.forces import ForceComparison
 from tirelib.compare.strain import Comparison
-from tirelib.report.figures.compare_forces import force_plots
-from tirelib.report.figures.compare_heat import NAMES as CONDITIONS
-from tirelib.report.figures.compare_heat import heat_maps, unit_of
+from tirelib.report.comparison_tables import (
+    force_tables,
+    gage_table,
+    number_table,
+    point_table,
+    sector_tables,
+    track_table,
+)
+from tirelib.report.figures.compare_forces import curve_plots, force_plots, force_trends
+from tirelib.report.figures.compare_heat import gage_plots, heat_maps
 from tirelib.report.figures.compare_plot import Plot
 from tirelib.report.figures.compare_trends import set_point_plot, track_plots, trend_plots
 from tirelib.report.figures.compare_waveforms import waveform_plots
@@ -187,123 +192,42 @@ def summary_of(found: Comparison | ForceComparison) -> str:
 
 def strain_parts(found: Comparison) -> list[Part]:
     """Return the parts of a page on strain."""
-    maps = heat_maps(found)
     return [
-        Part("Noise, error, floor", "noise", floor_text(found), tables=[_numbers(found)]),
+        Part("Noise, error, floor", "noise", floor_text(found), tables=[number_table(found)]),
         Part(
             "Where: angle and condition", "maps",
             "Model less measured; set-point errors taken out. Angle 0 is below the axle, "
             "the entry is negative.",
-            plots=maps,
+            plots=heat_maps(found),
         ),
+        Part("Gages", "gages", tables=[gage_table(found)], plots=gage_plots(found)),
         Part("Best, median and worst run", "waveforms", plots=waveform_plots(found)),
         Part("Trends", "trends", plots=trend_plots(found)),
-        Part("Contact length and deflection", "tracks", plots=track_plots(found)),
-        Part("Table", "table", tables=_tables(found)),
-        Part("Set points", "points", tables=[_points(found)], plots=[set_point_plot(found)]),
+        Part(
+            "Contact and deflection", "tracks", tables=[track_table(found)],
+            plots=track_plots(found),
+        ),
+        Part("Table", "table", tables=sector_tables(found)),
+        Part("Set points", "points", tables=[point_table(found)], plots=[set_point_plot(found)]),
         Part("Sources", "sources", tables=_provenance(found), sources=_bibliography(found)),
     ]  # fmt: skip
 
 
 def force_parts(found: ForceComparison) -> list[Part]:
     """Return the parts of a page on a force."""
-    unit = FORCE_UNITS[found.quantity]
-    rows = []
-    for cell in found.table:
-        rows.append([
-            CONDITIONS.get(cell.by, "all points"), range_of(cell),
-            str(cell.points), number(cell.rms, 3), number(cell.rms / found.noise, 3),
-            number(cell.mean, 3), number(cell.excess, 3), number(1.96 * cell.excess_std, 2),
-        ])  # fmt: skip
-    table = Table(
-        "Difference, model less measured (slips by size)",
-        ["by", "range", "points", f"rms [{unit}]", "rms [noise]", f"mean [{unit}]",
-         f"size too large by [{unit}]", f"95 % \u00b1 [{unit}]"],
-        rows, texts=2,
-    )  # fmt: skip
-    noise = Table(
-        "Noise and error", ["", "value"],
-        [[f"noise of a point, from {found.repeats} repeated conditions [{unit}]",
-          number(found.noise, 3)],
-         ["error: rms difference over noise", number(found.error, 4)],
-         [f"rms difference [{unit}]", number(found.rms, 4)],
-         [f"rms measured [{unit}]", number(found.measured_rms, 4)]],
-    )  # fmt: skip
+    curves = curves_of(found)
+    noise, table, listed = force_tables(found, curves)
+    effects = [f"{used.effect.name}: {used.effect.source}" for used in found.used]
     return [
         Part("Noise and error", "noise", tables=[noise]),
-        Part("Where", "where", plots=force_plots(found)),
+        Part("Where: slip and condition", "where", plots=force_plots(found)),
+        Part("Best, median and worst curve", "curves", tables=[listed] if curves else (),
+             text="" if curves else "No set point has three points or more: there is no curve.",
+             plots=curve_plots(found, curves)),
+        Part("Trends", "trends", plots=force_trends(found)),
         Part("Table", "table", tables=[table]),
-        Part("Sources", "sources", sources=BRUSH),
-    ]
-
-
-def _numbers(found: Comparison) -> Table:
-    fit, noise = found.fit, found.noise
-    rows = [
-        [f"noise of a run's waveform, from {noise.repeats} repeated set points [microstrain]",
-         number(1e6 * noise.std, 3)],
-        ["error: rms whitened difference over noise", number(fit.error, 4)],
-        ["rms difference, set points taken out [noise]", number(fit.rms / noise.std, 4)],
-        ["rms difference, set points taken out [microstrain]", number(1e6 * fit.rms, 4)],
-        ["rms difference, set points left in [microstrain]", number(1e6 * fit.raw_rms, 4)],
-        ["rms measured strain [microstrain]", number(1e6 * fit.strain_rms, 4)],
-        ["floor as far as known [noise]", number(found.floor.value, 4)],
-        ["error without a smooth misfit [noise]", number(found.floor.smooth, 4)],
+        Part("Sources", "sources", sources=[*effects, *BRUSH]),
     ]  # fmt: skip
-    note = "The error counts straight, freely rolling runs." if np.isfinite(fit.error) else ""
-    return Table("Noise, error and floor", ["", "value"], rows, note=note)
-
-
-def _tables(found: Comparison) -> list[Table]:
-    """Return a table for each condition: a row per sector and level."""
-    factor, unit = unit_of(found)
-    out = []
-    names = list(dict.fromkeys(cell.by for cell in found.table))
-    for by in names:
-        cells = [cell for cell in found.table if cell.by == by]
-        cells.sort(key=lambda c: (np.nan_to_num(c.value), SECTORS.index(c.sector)))
-        rows = [_row(cell, factor) for cell in cells]
-        title = "All counted runs" if by == "all" else f"By {CONDITIONS[by]}"
-        out.append(
-            Table(
-                title,
-                ["level", "sector", "runs", f"rms [{unit}]", "rms [microstrain]",
-                 "mean [microstrain]", "95 % \u00b1 [microstrain]"],
-                rows, texts=2, folded=by != "all",
-                note="Model less measured; a positive mean is too much tension.",
-            )
-        )  # fmt: skip
-    return out
-
-
-def _row(cell: Cell, factor: float) -> list[str]:
-    level = "all" if cell.by == "all" else told(cell.by, cell.value)
-    return [
-        level, cell.sector, str(cell.runs), number(factor * cell.rms, 3), number(1e6 * cell.rms, 4),
-        number(1e6 * cell.mean, 4), number(1.96e6 * cell.std, 2),
-    ]  # fmt: skip
-
-
-def _points(found: Comparison) -> Table:
-    scaled, tolerance = found.points.scaled, found.points.tolerance
-    units = (("%", 100.0),) * 3 + (("mrad", 1e3),)
-    rows = []
-    for k, name in enumerate(NAMES):
-        unit, factor = units[k]
-        worst = int(np.argmax(np.abs(scaled[:, k])))
-        rows.append([
-            "angle zero" if name == "angle" else name,
-            f"{number(factor * float(np.median(tolerance[:, k])), 3)} {unit}",
-            number(float(np.sqrt(np.mean(scaled[:, k] ** 2))), 3),
-            number(float(scaled[worst, k]), 3), str(found.run[worst]),
-        ])  # fmt: skip
-    return Table(
-        "Random part of the set points",
-        ["set point", "tolerance (1 sigma)", "rms [tolerance]", "largest [tolerance]", "in run"],
-        rows, texts=2,
-        note="An rms far above 1 is misfit that looks like a set-point error; far below 1, the "
-             "misfit hides the set points.",
-    )  # fmt: skip
 
 
 def _provenance(found: Comparison) -> list[Table]:

@@ -2,8 +2,9 @@
 
 import json
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
@@ -22,6 +23,7 @@ from tirelib.report.figures.compare_plot import (
     limit_of,
     styled_figure,
 )
+from tirelib.report.figures.waterfall import waterfall_of
 from tirelib.report.page import Table, number, write_page
 from tirelib.report.style import BLUE, FAINT, RED
 from tirelib.waveforms import GRID
@@ -57,15 +59,24 @@ def answer_of(told: Assessment) -> str:
     }[told.verdict]
 
 
-def write_diagnosis(told: Assessment, folder: Path) -> tuple[Path, Path]:
+def write_diagnosis(
+    told: Assessment, folder: Path, history: Sequence[Mapping[str, Any]] = ()
+) -> tuple[Path, Path]:
     """Write ``diagnosis.html`` and ``diagnosis.md``; return their paths.
+
+    Parameters
+    ----------
+    told : Assessment
+    folder : Path
+    history : sequence of mapping
+        Of the model, as its file holds it.
 
     Raises
     ------
     OSError
         If the folder cannot be written.
     """
-    parts = parts_of(told)
+    parts = parts_of(told, history)
     shown = [Shown.of(plot) for part in parts for plot in part.plots]
     figures = "{" + ",".join(f"{json.dumps(s.name)}:{s.json}" for s in shown) + "}"
     by_name = {s.name: s for s in shown}
@@ -91,9 +102,10 @@ def write_diagnosis(told: Assessment, folder: Path) -> tuple[Path, Path]:
     return page, words
 
 
-def parts_of(told: Assessment) -> list[Part]:
+def parts_of(told: Assessment, history: Sequence[Mapping[str, Any]] = ()) -> list[Part]:
     """Return the parts of the page."""
     found = told.diagnosis
+    fall = waterfall_of(history, "strain")
     before = left_of(found.data, found.base)
     plots = [_map(told, before, "before", "Without the named effects")]
     if told.named:
@@ -101,7 +113,7 @@ def parts_of(told: Assessment) -> list[Part]:
     return [
         Part("Candidates", "candidates", METHOD_TEXT, tables=[_candidates(told)],
              plots=[_bars(told)]),
-        Part("Error", "error", tables=[_errors(told)]),
+        Part("Error", "error", tables=[_errors(told)], plots=[fall] if fall else []),
         Part("What is left", "left", _left_text(told), plots=plots),
         Part("What this plan cannot show", "blind", tables=_blind(told)),
         Part("Next", "next", _next_text(told)),

@@ -86,9 +86,10 @@ def test_contact_length_is_from_steepest_rise_to_steepest_fall() -> None:
 
 def test_tracks_of_own_data_agree_within_their_bands() -> None:
     found = compare_strain(waveforms(), MODEL)
-    length, depth = found.tracks
-    assert (length.name, depth.name) == ("contact length", "deflection")
-    for track, room in ((length, 0.2e-3), (depth, 0.2e-3)):
+    names = [track.name for track in found.tracks]
+    assert names == ["contact length", "deflection", "contact entry", "contact exit"]
+    length, depth, entry, leaving = found.tracks
+    for track, room in ((length, 0.2e-3), (depth, 0.2e-3), (entry, 3e-4), (leaving, 3e-4)):
         band = np.hypot(track.model_std, np.nan_to_num(track.noise)) + room
         assert (np.abs(track.model - track.measured) < 3.0 * band).mean() > 0.9
     assert length.measured.max() > 1.3 * length.measured.min()
@@ -97,8 +98,10 @@ def test_tracks_of_own_data_agree_within_their_bands() -> None:
 def test_pooled_deviation_knows_only_repeats() -> None:
     values = np.array([1.0, 3.0, 10.0, 14.0, 100.0])
     # (2 + 8) / 2 degrees of freedom
-    assert pooled(values, np.array([0, 0, 1, 1, 2])) == pytest.approx(np.sqrt(5.0))
-    assert np.isnan(pooled(values, np.arange(5)))
+    assert pooled(values, np.array([0, 0, 1, 1, 2])) == (pytest.approx(np.sqrt(5.0)), 2)
+    unknown, freedom = pooled(values, np.arange(5))
+    assert np.isnan(unknown)
+    assert freedom == 0
 
 
 def test_the_floor_is_what_the_file_says_and_only_for_these_data() -> None:

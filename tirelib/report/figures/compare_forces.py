@@ -3,22 +3,27 @@
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
+from scipy import special
 
-from tirelib.arrays import FloatArray
+from tirelib.arrays import FloatArray, IntArray
+from tirelib.compare.force_curves import Curve, ranked, slip_of
+from tirelib.compare.force_points import CELL_ANGLE
 from tirelib.compare.forces import UNITS, ForceComparison
+from tirelib.compare.sentences import told
 from tirelib.identify.error_bands import levels
-from tirelib.report.figures.compare_plot import Plot, styled_figure
+from tirelib.report.figures.compare_plot import DIVERGING, Plot, limit_of, styled_figure
 from tirelib.report.figures.compare_trends import SYMBOLS
-from tirelib.report.style import BLUE, CATEGORIES, FAINT
+from tirelib.report.style import BLUE, CATEGORIES, FAINT, RED
 
 _OVER = (("slip_angle", "slip angle [deg] (ISO 8855)", np.rad2deg(1.0)),
-         ("slip_ratio", "slip ratio [-] (ISO 8855)", 1.0), ("load", "load [N]", 1.0),
+         ("slip_ratio", "slip ratio [-] (ISO 8855)", 1.0),
+         ("camber", "camber [deg] (ISO 8855)", np.rad2deg(1.0)), ("load", "load [N]", 1.0),
          ("pressure", "inflation pressure [bar]", 1e-5))  # fmt: skip
 
 
 def force_plots(found: ForceComparison) -> list[Plot]:
-    """Return the force over its slip, the agreement, and the difference over each condition."""
-    return [_over_slip(found), _agreement(found), _differences(found)]
+    """Return the map, the force over its slip, the agreement, and differences."""
+    return [_map(found), _over_slip(found), _agreement(found), _differences(found)]
 
 
 def _label(found: ForceComparison) -> str:
@@ -26,7 +31,137 @@ def _label(found: ForceComparison) -> str:
 
 
 def _slip(found: ForceComparison) -> tuple[str, str, float]:
-    return _OVER[1 if found.quantity == "Fx" else 0]
+    return next(row for row in _OVER if row[0] == slip_of(found.quantity))
+
+
+def _unit(found: ForceComparison) -> tuple[float, str]:
+    """Return factor and name of the unit of differences: noise, or the force's own without."""
+    if np.isfinite(found.noise):
+        return 1.0 / found.noise, "noise"
+    return 1.0, UNITS[found.quantity]
+
+
+def _binned(values: FloatArray, name: str) -> tuple[FloatArray, IntArray]:
+    """Return the middle of each bin and the bin of each value, -1 where unknown."""
+    if name in ("load", "pressure"):
+        level = levels(values)
+        count = int(level.max()) + 1
+        return np.array([values[level == k].mean() for k in range(count)]), level
+    step = {"slip_angle": float(np.deg2rad(1.0)), "slip_ratio": 0.02, "camber": CELL_ANGLE}[name]
+    found, level = np.unique(np.round(np.nan_to_num(values) / step), return_inverse=True)
+    return found * step + 0.0, np.asarray(level, dtype=np.int64).ravel()
+
+
+def _map(found: ForceComparison) -> Plot:
+    """Return the difference over slip and load, in units of the noise."""
+    name, label, scale = _slip(found)
+    x, column = _binned(getattr(found.data, name), name)
+    y, row = _binned(found.data.load, "load")
+    factor, unit = _unit(found)
+    z = np.full((y.size, x.size), np.nan)
+    for i in range(y.size):
+        for j in range(x.size):
+            inside = (row == i) & (column == j)
+            if inside.any():
+                z[i, j] = factor * float(found.difference[inside].mean())
+    limit = limit_of(z)
+    labels = [told("load", 10.0 * round(float(v) / 10.0)) for v in y]
+    figure = go.Figure(
+        go.Heatmap(
+            z=np.round(z, 3), x=np.round(scale * x, 4), y=list(range(y.size)), zmin=-limit,
+            zmax=limit, colorscale=DIVERGING, hoverongaps=False,
+            hovertemplate="%{x:.3g}: %{z:.3g} " + unit + "<extra></extra>",
+            colorbar={"title": {"text": f"model less<br>measured<br>[{unit}]"}},
+        )
+    )  # fmt: skip
+    figure.update_xaxes(title=label)
+    figure.update_yaxes(title={"text": "load", "standoff": 12}, tickvals=list(range(y.size)),
+                        ticktext=labels, showgrid=False)  # fmt: skip
+    styled_figure(figure, 220 + 34 * y.size)
+    rows = [[round(scale * float(x[j]), 5), *np.round(z[:, j], 4).tolist()] for j in range(x.size)]
+    return Plot(
+        "force-map", f"{found.quantity}: model less measured over {label.split(' [')[0]} and load",
+        "Mean over the points of a bin. Red: the model is above the measurement with its sign; "
+        "blue: below.", figure,
+        [label, *(f"load {text}: [{unit}]" for text in labels)], rows,
+    )  # fmt: skip
+
+
+def curve_plots(found: ForceComparison, curves: tuple[Curve, ...]) -> list[Plot]:
+    """Return measurement and model over the slip for the best, the median and the worst curve."""
+    return [_curve(found, curve, name) for name, curve in ranked(curves).items()]
+
+
+def _curve(found: ForceComparison, curve: Curve, place: str) -> Plot:
+    name, label, scale = _slip(found)
+    unit = UNITS[found.quantity]
+    k = curve.member
+    x = scale * getattr(found.data, name)[k]
+    measured, model, rest = found.measured[k], found.predicted[k], found.difference[k]
+    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, row_heights=[0.66, 0.34],
+                           vertical_spacing=0.07)  # fmt: skip
+    figure.add_scatter(x=x, y=measured, mode="markers", name="measured",
+                       marker={"color": BLUE, "size": 6}, row=1, col=1)  # fmt: skip
+    figure.add_scatter(x=x, y=model, mode="markers", name="model",
+                       marker={"color": RED, "size": 6, "symbol": "x"}, row=1, col=1)  # fmt: skip
+    figure.add_scatter(x=x, y=rest, mode="markers", name="model less measured",
+                       marker={"color": "#1c2530", "size": 5}, row=2, col=1)  # fmt: skip
+    figure.add_hline(y=0.0, line={"color": FAINT, "width": 1}, row=2, col=1)
+    if np.isfinite(found.noise):
+        figure.add_hrect(y0=-1.96 * found.noise, y1=1.96 * found.noise, line_width=0,
+                         fillcolor=FAINT, opacity=0.3, row=2, col=1)  # fmt: skip
+    figure.update_xaxes(title=label, row=2, col=1)
+    figure.update_yaxes(title=_label(found), row=1, col=1)
+    figure.update_yaxes(title=f"difference<br>[{unit}]", row=2, col=1)
+    styled_figure(figure, 500, legend={"orientation": "h", "y": 1.1, "x": 0.0})
+    noise = f", {curve.rms / found.noise:.1f} noise" if np.isfinite(found.noise) else ""
+    rows = np.round(np.stack([x, measured, model, rest], axis=1), 5).tolist()
+    return Plot(
+        f"force-{place}", f"{place.capitalize()} curve: {curve.words}",
+        f"Difference {curve.rms:.3g} {unit} rms{noise}, {curve.points} points. The model is "
+        "computed at the conditions of each point. Grey: 95 % of the noise.", figure,
+        [label, f"measured [{unit}]", f"model [{unit}]", f"model less measured [{unit}]"], rows,
+    )  # fmt: skip
+
+
+def force_trends(found: ForceComparison) -> list[Plot]:
+    """Return the mean difference over each condition that varies, with confidence bands."""
+    used = [row for row in _OVER if _varies(getattr(found.data, row[0]), row[0])]
+    return [_trend(found, *row) for row in used]
+
+
+def _trend(found: ForceComparison, name: str, label: str, scale: float) -> Plot:
+    unit = UNITS[found.quantity]
+    x, column = _binned(getattr(found.data, name), name)
+    centre, half, count = np.full((3, x.size), np.nan)
+    for k in range(x.size):
+        part = found.difference[column == k]
+        centre[k], count[k] = part.mean(), part.size
+        if part.size > 1:
+            error = part.std(ddof=1) / np.sqrt(part.size)
+            half[k] = error * special.stdtrit(part.size - 1, 0.975)
+    x = scale * x
+    known = np.isfinite(half)
+    figure = go.Figure()
+    figure.add_scatter(
+        x=np.concatenate([x[known], x[known][::-1]]),
+        y=np.concatenate([(centre + half)[known], (centre - half)[known][::-1]]),
+        fill="toself", mode="lines", fillcolor="rgba(0,114,178,0.22)", line={"width": 0},
+        hoverinfo="skip", name="95 % confidence",
+    )  # fmt: skip
+    figure.add_scatter(x=x, y=centre, mode="lines+markers", line={"color": BLUE},
+                       name="mean over the points")  # fmt: skip
+    figure.add_hline(y=0.0, line={"color": FAINT, "width": 1})
+    figure.update_xaxes(title=label)
+    figure.update_yaxes(title=f"model less measured {found.quantity} [{unit}]")
+    styled_figure(figure, 380, legend={"orientation": "h", "y": 1.12, "x": 0.0})
+    rows = np.round(np.stack([x, count, centre, half], axis=1), 5).tolist()
+    return Plot(
+        f"force-trend-{name.replace('_', '-')}", f"Mean difference by {label.split(' [')[0]}",
+        "The band is the 95 % confidence interval of the bin's mean, from the scatter of its "
+        "points over the other conditions; bins of one point have none.", figure,
+        [label, "points", f"model less measured [{unit}]", f"95 % half-width [{unit}]"], rows,
+    )  # fmt: skip
 
 
 def _over_slip(found: ForceComparison) -> Plot:
@@ -82,7 +217,7 @@ def _agreement(found: ForceComparison) -> Plot:
 def _varies(values: FloatArray, name: str) -> bool:
     if name in ("load", "pressure"):
         return int(levels(values).max()) > 0
-    return float(np.ptp(values)) > (0.01 if name == "slip_angle" else 0.005)
+    return float(np.ptp(values)) > (0.005 if name == "slip_ratio" else 0.01)
 
 
 def _differences(found: ForceComparison) -> Plot:

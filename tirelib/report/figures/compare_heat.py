@@ -29,7 +29,7 @@ SIGN = "Red: the model shows too much tension (too little compression); blue: to
 
 
 def heat_maps(found: Comparison) -> list[Plot]:
-    """Return the map of every run, and one by each condition that varies and by gage."""
+    """Return the map of every run, and one by each condition that varies."""
     plots = [_runs(found)]
     for factor in found.chosen.factors:
         members = [factor.level == k for k in range(factor.values.size)]
@@ -38,6 +38,12 @@ def heat_maps(found: Comparison) -> list[Plot]:
         count = [int(m.sum()) for m in members]
         unit = UNITS[factor.name][0]
         plots.append(_map(found, data, rows, count, factor.name, unit, signed=len(count)))
+    return plots
+
+
+def gage_plots(found: Comparison) -> list[Plot]:
+    """Return the map by gage, from the right to the left; nothing for one gage."""
+    plots = []
     straight = found.chosen.straight
     lateral = [1e3 * found.chosen.waves.header.gage_lateral[g] for g in found.chosen.gages]
     if len(lateral) > 1:
@@ -72,8 +78,8 @@ def _runs(found: Comparison) -> Plot:
     figure = _heat(data, labels, unit, list(range(len(order))))
     ticks, texts = _load_ticks(found, order)
     figure.update_yaxes(
-        title="runs by load, pressure and speed", tickvals=ticks, ticktext=texts,
-        showgrid=False,
+        title={"text": "runs by load, pressure and speed", "standoff": 12}, tickvals=ticks,
+        ticktext=texts, showgrid=False, range=[-0.5, len(order) - 0.5],
     )  # fmt: skip
     _edges(figure, np.rad2deg(found.prediction.edges[order]), list(range(len(order))))
     styled_figure(figure, 620, showlegend=True, legend=_LEGEND)
@@ -122,7 +128,10 @@ def _map(
     figure = _heat(values, [f"{t} ({n} runs)" for t, n in zip(labels, count, strict=True)], noise,
                    list(range(signed)))  # fmt: skip
     figure.update_yaxes(
-        title=NAMES[name], tickvals=list(range(signed)), ticktext=labels, showgrid=False
+        title={"text": NAMES[name], "standoff": 12},
+        tickvals=list(range(signed)),
+        ticktext=labels,
+        showgrid=False,
     )
     styled_figure(figure, 200 + 34 * signed)
     axes = " (ISO 8855)" if name in ("slip_angle", "camber", "slip_ratio", "gage") else ""

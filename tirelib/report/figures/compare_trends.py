@@ -17,6 +17,16 @@ from tirelib.report.figures.compare_heat import NAMES as CONDITIONS
 from tirelib.report.figures.compare_plot import Plot, styled_figure
 from tirelib.report.style import BLACK, BLUE, CATEGORIES, FAINT, RED
 
+_HOW = {
+    "contact length": "From the steepest rise of strain at the entry to the steepest fall at the "
+    "exit, read from measurement and model in the same way",
+    "deflection": "Free radius less loaded radius; the measured one holds the rig's zero, which is "
+    "not corrected",
+    "contact entry": "Wheel angle of the steepest rise of strain, read from measurement and model "
+    "in the same way; above zero on the right, the model's contact begins too late",
+    "contact exit": "Wheel angle of the steepest fall of strain, read from measurement and model "
+    "in the same way; above zero on the right, the model's contact ends too late",
+}
 SYMBOLS = ("circle", "square", "triangle-up", "diamond", "cross", "x")
 _LEGEND = {"orientation": "h", "y": 1.16, "x": 0.0}
 _BAR = {"width": 0, "thickness": 1}
@@ -111,7 +121,7 @@ def _band(
 
 
 def track_plots(found: Comparison) -> list[Plot]:
-    """Return contact length and deflection, measured and by the model, over the load."""
+    """Return every track, measured and by the model, over the load."""
     return [_track(found, track) for track in found.tracks if track.known.any()]
 
 
@@ -157,12 +167,7 @@ def _track(found: Comparison, track: Track) -> Plot:
         f"Noise of the repeats {track.scale * track.noise:.2g} {track.unit}. "
         if np.isfinite(track.noise) else ""
     )  # fmt: skip
-    how = (
-        "From the steepest rise of strain at the entry to the steepest fall at the exit, read "
-        "from measurement and model in the same way"
-        if track.name == "contact length"
-        else "Free radius less loaded radius; the measured one holds the rig's zero"
-    )
+    how = _HOW[track.name]
     rows = [
         [int(found.run[i]), round(float(load[i]), 1)]
         + [round(track.scale * float(v[i]), 4) for v in (track.measured, track.model,

@@ -1,0 +1,40 @@
+"""``tirelib fmu virtual``: a tire with strain gages as an FMU, for any vehicle model."""
+
+from pathlib import Path
+
+import click
+
+from tirelib.cli.common import FILE, output, progress_bar
+from tirelib.fmu.build import DEFAULT_RATE
+from tirelib.fmu.virtual.spec import build_virtual, default_surface
+
+_EPILOG = """\b
+Examples:
+  tirelib fmu virtual --out build/out/VirtualTire.fmu --samples-per-step 10
+  tirelib fmu check build/out/VirtualTire.fmu
+
+\b
+FMI 2.0 co-simulation, one wheel: Fz, alpha, kappa, camber, speed and pressure in, strain frames out
+for StrainTire.fmu with the same samples per step. Needs CPython with numpy and scipy where it runs.
+"""
+
+
+@click.command(epilog=_EPILOG)
+@click.option("--out", metavar="X.fmu", type=FILE, required=True, help="The FMU to write.")
+@click.option("--samples-per-step", metavar="K", type=int, default=10, show_default=True,
+              help="Most samples of every gage that one communication step brings.")  # fmt: skip
+@click.option("--sample-rate", metavar="HZ", type=float, default=DEFAULT_RATE, show_default=True,
+              help="Start value of the parameter of that name.")  # fmt: skip
+@click.option("--surface", metavar="FILE.npz", type=FILE,
+              help="Response surface; by default the reference tire's.")  # fmt: skip
+def virtual(out: Path, samples_per_step: int, sample_rate: float, surface: Path | None) -> None:
+    """Write VirtualTire.fmu: the numerical rig as a sensor."""
+    with progress_bar("building", 3) as progress:
+        path = build_virtual(
+            out, samples_per_step=samples_per_step, sample_rate=sample_rate,
+            surface=surface or default_surface(), progress=progress,
+        )  # fmt: skip
+    console = output()
+    console.print(f"communication step up to {1e3 * samples_per_step / sample_rate:g} ms")
+    console.print(f"written: {path} ({path.stat().st_size / 1e3:.0f} kB)")
+    console.print(f"next: tirelib fmu check {path}")

@@ -1,0 +1,85 @@
+"""The points of a force in curves: one curve over the slip for every set point."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.arrays import IntArray
+from tirelib.compare.force_points import CELL_ANGLE
+from tirelib.compare.forces import ForceComparison
+from tirelib.compare.sentences import told
+from tirelib.identify.error_bands import levels
+
+LEAST_POINTS = 3
+"""Points that a curve has at least."""
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """Points at equal load, pressure and camber.
+
+    Attributes
+    ----------
+    load, pressure, camber : float, SI
+        Means; NaN where unknown.
+    member : shape (n,)
+        Numbers of the points, by rising slip.
+    rms : float
+        Of model less measured, in the unit of the force.
+    words : str
+    """
+
+    load: float
+    pressure: float
+    camber: float
+    member: IntArray
+    rms: float
+    words: str
+
+    @property
+    def points(self) -> int:
+        """How many points it has."""
+        return int(self.member.size)
+
+
+def slip_of(quantity: str) -> str:
+    """Return the slip that a force comes from."""
+    return "slip_ratio" if quantity == "Fx" else "slip_angle"
+
+
+def curves_of(found: ForceComparison) -> tuple[Curve, ...]:
+    """Return the curves with enough points, the best first."""
+    data = found.data
+    slip = getattr(data, slip_of(found.quantity))
+    camber = np.round(np.nan_to_num(data.camber) / CELL_ANGLE).astype(np.int64)
+    keys = np.stack([levels(data.load), levels(data.pressure), camber], axis=1)
+    several = [np.unique(column).size > 1 for column in keys.T]
+    out = []
+    for key in np.unique(keys, axis=0):
+        member = np.flatnonzero((keys == key).all(axis=1))
+        if member.size < LEAST_POINTS:
+            continue
+        member = member[np.argsort(slip[member], kind="stable")]
+        load, pressure = (float(getattr(data, name)[member].mean()) for name in
+                          ("load", "pressure"))  # fmt: skip
+        angle = float(key[2] * CELL_ANGLE)
+        words = told("load", 10.0 * round(load / 10.0)) if np.isfinite(load) else "load unknown"
+        if several[1] and np.isfinite(pressure):
+            words += f", {told('pressure', 1e3 * round(pressure / 1e3))}"
+        if several[2]:
+            words += f", camber {told('camber', angle)}"
+        rms = float(np.sqrt(np.mean(found.difference[member] ** 2)))
+        out.append(Curve(load, pressure, angle, member, rms, words))
+    return tuple(sorted(out, key=lambda curve: curve.rms))
+
+
+def ranked(curves: tuple[Curve, ...]) -> dict[str, Curve]:
+    """Return the best, the median and the worst curve; each once."""
+    if not curves:
+        return {}
+    places = {"best": 0, "median": (len(curves) - 1) // 2, "worst": len(curves) - 1}
+    out: dict[str, Curve] = {}
+    for name, place in places.items():
+        if all(curve is not curves[place] for curve in out.values()):
+            out[name] = curves[place]
+    return out

@@ -1,0 +1,168 @@
+"""The tables of a comparison's page."""
+
+import numpy as np
+
+from tirelib.compare.force_curves import Curve
+from tirelib.compare.forces import UNITS as FORCE_UNITS
+from tirelib.compare.forces import ForceComparison, range_of
+from tirelib.compare.sectors import SECTORS, Cell
+from tirelib.compare.sentences import millimeters, told
+from tirelib.compare.set_points import NAMES
+from tirelib.compare.strain import Comparison
+from tirelib.compare.track_words import track_fit
+from tirelib.report.figures.compare_heat import NAMES as CONDITIONS
+from tirelib.report.figures.compare_heat import unit_of
+from tirelib.report.page import Table, number
+
+
+def number_table(found: Comparison) -> Table:
+    """Return noise, error and floor."""
+    fit, noise = found.fit, found.noise
+    rows = [
+        [f"noise of a run's waveform, from {noise.repeats} repeated set points [microstrain]",
+         number(1e6 * noise.std, 3)],
+        ["error: rms whitened difference over noise", number(fit.error, 4)],
+        ["rms difference, set points taken out [noise]", number(fit.rms / noise.std, 4)],
+        ["rms difference, set points taken out [microstrain]", number(1e6 * fit.rms, 4)],
+        ["rms difference, set points left in [microstrain]", number(1e6 * fit.raw_rms, 4)],
+        ["rms measured strain [microstrain]", number(1e6 * fit.strain_rms, 4)],
+        ["floor as far as known [noise]", number(found.floor.value, 4)],
+        ["error without a smooth misfit [noise]", number(found.floor.smooth, 4)],
+    ]  # fmt: skip
+    note = "The error counts straight, freely rolling runs." if np.isfinite(fit.error) else ""
+    return Table("Noise, error and floor", ["", "value"], rows, note=note)
+
+
+def sector_tables(found: Comparison) -> list[Table]:
+    """Return a table for each condition: a row per sector and level."""
+    factor, unit = unit_of(found)
+    out = []
+    names = list(dict.fromkeys(cell.by for cell in found.table))
+    for by in names:
+        cells = [cell for cell in found.table if cell.by == by]
+        cells.sort(key=lambda c: (np.nan_to_num(c.value), SECTORS.index(c.sector)))
+        rows = [_row(cell, factor) for cell in cells]
+        title = "All counted runs" if by == "all" else f"By {CONDITIONS[by]}"
+        out.append(
+            Table(
+                title,
+                ["level", "sector", "runs", f"rms [{unit}]", "rms [microstrain]",
+                 "mean [microstrain]", "95 % \u00b1 [microstrain]"],
+                rows, texts=2, folded=by != "all",
+                note="Model less measured; a positive mean is too much tension.",
+            )
+        )  # fmt: skip
+    return out
+
+
+def _row(cell: Cell, factor: float) -> list[str]:
+    level = "all" if cell.by == "all" else told(cell.by, cell.value)
+    return [
+        level, cell.sector, str(cell.runs), number(factor * cell.rms, 3), number(1e6 * cell.rms, 4),
+        number(1e6 * cell.mean, 4), number(1.96e6 * cell.std, 2),
+    ]  # fmt: skip
+
+
+def gage_table(found: Comparison) -> Table:
+    """Return every gage: its noise, its rms and its mean difference in every sector."""
+    rows = []
+    for gage in sorted(found.gages, key=lambda g: -g.lateral):
+        means = {cell.sector: cell for cell in gage.table}
+        rows.append([
+            str(gage.number + 1), millimeters(gage.lateral), number(1e6 * gage.noise.std, 3),
+            number(1e6 * gage.rms, 4), number(gage.rms / gage.noise.std, 4),
+            *(_mean(means[name]) if name in means else "" for name in SECTORS),
+        ])  # fmt: skip
+    return Table(
+        "By gage, counted runs",
+        ["gage", "y (ISO 8855)", "noise [microstrain]", "rms [microstrain]", "rms [its noise]",
+         *(f"{name}: mean [microstrain]" for name in SECTORS)],
+        rows, texts=2,
+        note="Model less measured, set points taken out, with 95 % intervals by the noise of the "
+             "gage and by set points; y to the left. A positive mean is too much tension.",
+    )  # fmt: skip
+
+
+def _mean(cell: Cell) -> str:
+    text = number(1e6 * cell.mean, 3)
+    return f"{text} \u00b1 {number(1.96e6 * cell.std, 2)}" if np.isfinite(cell.std) else text
+
+
+def track_table(found: Comparison) -> Table:
+    """Return contact length, deflection, entry and exit: how far model and measurement differ."""
+    rows = []
+    for track in found.tracks:
+        fit, scale = track_fit(track, found.chosen.straight), track.scale
+        rows.append([
+            f"{track.name} [{track.unit}]", str(fit.runs), number(scale * track.noise, 2),
+            number(scale * fit.mean, 3), number(1.96 * scale * fit.std, 2),
+            number(scale * fit.rms, 3), number(fit.rms / track.noise, 3),
+            number(scale * fit.rms_beside, 3),
+        ])  # fmt: skip
+    note = (
+        "Model less measured. No number is corrected for a constant offset of the campaign; the "
+        "last column is what stays beside one."
+    )
+    return Table(
+        "Counted runs",
+        ["", "runs", "noise of a run", "mean", "95 % \u00b1", "rms", "rms [noise]",
+         "rms beside the mean"],
+        rows, note=note,
+    )  # fmt: skip
+
+
+def point_table(found: Comparison) -> Table:
+    """Return what was taken out as set-point errors."""
+    scaled, tolerance = found.points.scaled, found.points.tolerance
+    units = (("%", 100.0),) * 3 + (("mrad", 1e3),)
+    rows = []
+    for k, name in enumerate(NAMES):
+        unit, factor = units[k]
+        worst = int(np.argmax(np.abs(scaled[:, k])))
+        rows.append([
+            "angle zero" if name == "angle" else name,
+            f"{number(factor * float(np.median(tolerance[:, k])), 3)} {unit}",
+            number(float(np.sqrt(np.mean(scaled[:, k] ** 2))), 3),
+            number(float(scaled[worst, k]), 3), str(found.run[worst]),
+        ])  # fmt: skip
+    return Table(
+        "Random part of the set points",
+        ["set point", "tolerance (1 sigma)", "rms [tolerance]", "largest [tolerance]", "in run"],
+        rows, texts=2,
+        note="An rms far above 1 is misfit that looks like a set-point error; far below 1, the "
+             "misfit hides the set points.",
+    )  # fmt: skip
+
+
+def force_tables(found: ForceComparison, curves: tuple[Curve, ...]) -> tuple[Table, Table, Table]:
+    """Return a force's noise and error, its differences by condition, and its curves."""
+    unit = FORCE_UNITS[found.quantity]
+    noise = Table(
+        "Noise and error", ["", "value"],
+        [[f"noise of a point, from {found.repeats} repeated conditions [{unit}]",
+          number(found.noise, 3)],
+         ["error: rms difference over noise", number(found.error, 4)],
+         [f"rms difference [{unit}]", number(found.rms, 4)],
+         [f"rms measured [{unit}]", number(found.measured_rms, 4)]],
+    )  # fmt: skip
+    rows = [
+        [CONDITIONS.get(cell.by, "all points"), range_of(cell),
+         str(cell.points), number(cell.rms, 3), number(cell.rms / found.noise, 3),
+         number(cell.mean, 3), number(cell.excess, 3), number(1.96 * cell.excess_std, 2)]
+        for cell in found.table
+    ]  # fmt: skip
+    table = Table(
+        "Difference, model less measured (slips by size)",
+        ["by", "range", "points", f"rms [{unit}]", "rms [noise]", f"mean [{unit}]",
+         f"size too large by [{unit}]", f"95 % \u00b1 [{unit}]"],
+        rows, texts=2,
+    )  # fmt: skip
+    each = [
+        [curve.words, str(curve.points), number(curve.rms, 3), number(curve.rms / found.noise, 3)]
+        for curve in curves
+    ]
+    listed = Table(
+        "Curves, the best first", ["set point", "points", f"rms [{unit}]", "rms [noise]"], each,
+        folded=len(each) > 8,
+    )  # fmt: skip
+    return noise, table, listed
