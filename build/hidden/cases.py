@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from bench.rig.hidden import HIDDEN
+from bench.rig.observe import Trace
 from hidden.measured import CACHE, Plain, Planted, blank, keep, plain, traces, waveforms
 from hidden.plan import day
 from tirelib.arrays import BoolArray, FloatArray
@@ -36,6 +37,8 @@ NODES = 1
 """The same of solved states with one effect."""
 TOLERANCE = 0.1
 """Of ratio - 1, relative."""
+ACCEPTED = 0.25
+"""The same after the last correction; the reached ratio stands in the case."""
 CORRECTIONS = 6
 STRONGEST = 1.5
 """Error ratio near which effects of the tire are solved; weaker ones lie between it and none."""
@@ -193,6 +196,7 @@ class _Search:
             states, shown = pickle.loads(file.read_bytes())
         else:
             states, shown = traces(self.base, {name: strength}, self.progress)
+            shown = [_thinned(seen) for seen in shown]
             slim = [replace(s, grid=None, control=None, by_load=None) for s in states]  # type: ignore[arg-type]
             keep(file, pickle.dumps((slim, shown)))
         return waveforms(self.base, states, shown, self.kind)
@@ -247,6 +251,8 @@ class _Search:
                 return strength
             tried.append((share, reached**2 - 1.0))
             share = float(np.clip(_next(tried, ratio), 0.4 * share, 2.5 * share))
+        if abs(reached - ratio) <= ACCEPTED * (ratio - 1.0):
+            return strength
         raise TirelibError(
             f"hidden effect {name}, tire {self.base.day.seed}: ratio {reached:.3f} at strength "
             f"{strength:.3g} {effect.unit}, {ratio} is wanted; the effect is too weak at its "
@@ -266,6 +272,11 @@ class _Search:
             _root(own, rest, self.floor, ratio),
             _root(fit.whiten(own), fit.whiten(rest), fit.error, ratio),
         )
+
+
+def _thinned(seen: Trace) -> Trace:
+    """Return every fifth point of a trace: still eight times what the waveform's filter passes."""
+    return Trace(seen.phi[::5], seen.strain[::5], seen.slope[::5], seen.by_load[::5])
 
 
 def _root(own: FloatArray, rest: FloatArray, floor: float, ratio: float) -> float:

@@ -65,10 +65,15 @@ def _spread(names: Sequence[str], ratio: float, count: int, first: int) -> list[
     return [(first + k // size, names[k % size], ratio) for k in range(count)]
 
 
+def _failure(want: Wanted) -> Path:
+    """Return where is kept why a case cannot be made."""
+    return CACHE / "failed" / case_file(*want).with_suffix(".txt").name
+
+
 def run_one(want: Wanted, members: int, make: bool) -> dict[str, Any] | None:
     """Return the verdict of one case; None where it cannot be made or has not been."""
     file = case_file(*want)
-    failed = CACHE / "failed" / file.with_suffix(".txt").name
+    failed = _failure(want)
     if failed.exists() or not (make or file.exists()):
         return None
     if not make:
@@ -126,7 +131,8 @@ def main() -> None:
         "code": fingerprint(),
         "seeds": f"{given.first}-{max((r['seed'] for r in rows), default=given.first)}",
         "members": given.members,
-        "left_out": len(left_out),
+        "out_of_reach": [f"{w[0]} {w[1]} {w[2]:g}" for w in left_out if _failure(w).exists()],
+        "not_run": sum(not _failure(w).exists() for w in left_out),
         "figures": figures(rows),
         "by_files": [
             json.loads(file.read_text())

@@ -100,6 +100,8 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("compare")
     write_tire(model_file(), folder / "M.toml")
     write_tire(brush_file(), folder / "B.toml", "tirelib-model/1")
+    alone = {name: brush_file().numbers[name] for name in ("bristle_lateral", "friction")}
+    write_tire(replace(brush_file(), numbers=alone), folder / "brush.toml", "tirelib-model/1")
     write_campaign(folder / "strain", header(), strain_runs(plant=3e-4))
     bare = replace(header(), gage_lateral=(), rate=float("nan"))
     write_campaign(folder / "forces", bare, force_runs(excess=150.0))
@@ -180,6 +182,7 @@ def test_forces_without_repeats_have_no_noise_and_no_statement(place: Path) -> N
         (("forces", "--model", "M.toml"), "states no bristle_lateral"),
         (("forces", "--model", "B.toml", "--quantity", "Fx"), "Fx is not measured"),
         (("forces", "--model", "B.toml", "--quantity", "strain"), "no strain gages"),
+        (("strain", "--model", "brush.toml"), "a model of the brush only (bristle_lateral"),
     ],
 )
 def test_bad_input_ends_with_2_and_a_message(

@@ -1,6 +1,6 @@
 """How much of the error the model's structure is known to leave."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -81,13 +81,18 @@ def floor_of(
 def _from_file(model: Model, data_hash: str) -> tuple[float, str, float]:
     """Return error, where it is from, and rms strain as the model's file has them."""
     rms = _number(model.provenance, "rms_microstrain") * 1e-6
-    if model.history:
-        last = model.history[-1]
-        value = _number(last, "error_after")
+    if any(entry.get("quantity", "strain") == "strain" for entry in model.history):
+        value = last_error(model.history, "strain")
         return value, "history" if np.isfinite(value) else "", float("nan")
     if np.isfinite(rms) and model.provenance.get("data_sha256") == data_hash:
         return float("nan"), "identification", rms
     return float("nan"), "", float("nan")
+
+
+def last_error(history: Sequence[Mapping[str, Any]], quantity: str) -> float:
+    """Return the error in noise units after the last change for a quantity; NaN where unknown."""
+    told = [entry for entry in history if entry.get("quantity", "strain") == quantity]
+    return _number(told[-1], "error_after") if told else float("nan")
 
 
 def _number(table: Mapping[str, Any], key: str) -> float:

@@ -63,9 +63,9 @@ def curves_of(found: ForceComparison) -> tuple[Curve, ...]:
         load, pressure = (float(getattr(data, name)[member].mean()) for name in
                           ("load", "pressure"))  # fmt: skip
         angle = float(key[2] * CELL_ANGLE)
-        words = told("load", 10.0 * round(load / 10.0)) if np.isfinite(load) else "load unknown"
+        words = told("load", 50.0 * round(load / 50.0)) if np.isfinite(load) else "load unknown"
         if several[1] and np.isfinite(pressure):
-            words += f", {told('pressure', 1e3 * round(pressure / 1e3))}"
+            words += f", {told('pressure', 5e3 * round(pressure / 5e3))}"
         if several[2]:
             words += f", camber {told('camber', angle)}"
         rms = float(np.sqrt(np.mean(found.difference[member] ** 2)))

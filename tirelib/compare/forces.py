@@ -14,6 +14,7 @@ from scipy import special
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.brush.predict import PointParameters
 from tirelib.campaign import Campaign
+from tirelib.compare.floor import last_error
 from tirelib.compare.force_model import ForceBench, ForceModel, force_model_of
 from tirelib.compare.force_points import CELL_ANGLE, ForcePoints, force_points, noise_of
 from tirelib.compare.model import UsedEffect
@@ -95,6 +96,9 @@ class ForceComparison:
     sentences, messages : tuple of str
     used : tuple of UsedEffect
         Effects that the model has.
+    floor : float
+        Error that the last change of the model for this force left, by its history, in noise
+        units; NaN where unknown.
     """
 
     quantity: str
@@ -115,6 +119,7 @@ class ForceComparison:
     sentences: tuple[str, ...]
     messages: tuple[str, ...]
     used: tuple[UsedEffect, ...] = ()
+    floor: float = float("nan")
 
     @property
     def difference(self) -> FloatArray:
@@ -264,6 +269,7 @@ def _compare(
         name, campaign.header.name, model.name, data, data.block, measured, predicted, noise,
         repeats, error, rms, size, p, verdict, table, said,
         _messages(campaign, name, points, verdict, rms / size, repeats), model.used,
+        last_error(model.history, name),
     )  # fmt: skip
 
 

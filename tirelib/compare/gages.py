@@ -21,7 +21,7 @@ from tirelib.waveforms import GRID
 
 @dataclass(frozen=True, slots=True)
 class Departure:
-    """Where a gage differs from the mean over the gages, all counted runs; strain, [-].
+    """Where a gage differs more than the mean over the gages does, counted runs; strain, [-].
 
     Attributes
     ----------
@@ -120,25 +120,21 @@ def _departure(
     k: int, strain: FloatArray, part: FloatArray, difference: FloatArray, noise: RepeatNoise,
     chosen: Chosen, points: SetPoints,
 ) -> Departure | None:  # fmt: skip
-    """Return where a gage stands out most beside the mean over the gages."""
+    """Return where a gage is worse than the mean over the gages, by the most squares."""
     rest = _noise(strain - chosen.strain, chosen, points)
     regions = find_regions(part - difference, strain, chosen.straight, (), rest, points)
-    level = LEVEL / len(chosen.gages)
-    standing = [region for region in regions if region.p < level]
-    if not standing:
-        return None
-    region = standing[0]
-    inside = (region.start <= GRID) & (region.stop > GRID)
-    weights = np.tile(inside / inside.sum(), (len(strain), 1))
-    variance = weighted_variance(weights, noise, points)[region.member]
-
-    def mean(values: FloatArray) -> float:
-        return float(values[region.member][:, inside].mean())
-
-    return Departure(
-        region, mean(part), float(np.sqrt(variance.sum()) / variance.size), mean(difference),
-        mean(chosen.strain),
-    )  # fmt: skip
+    for region in regions:
+        inside = (region.start <= GRID) & (region.stop > GRID)
+        mean, of_all, measured = (
+            float(values[region.member][:, inside].mean())
+            for values in (part, difference, chosen.strain)
+        )
+        if region.p * len(chosen.gages) < LEVEL and abs(mean) > abs(of_all):
+            weights = np.tile(inside / inside.sum(), (len(strain), 1))
+            variance = weighted_variance(weights, noise, points)[region.member]
+            std = float(np.sqrt(variance.sum()) / variance.size)
+            return Departure(region, mean, std, of_all, measured)
+    return None
 
 
 def gage_sentences(gages: Sequence[Gage], edges: FloatArray) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.waveform_fit import Data
 
-ALARM = 2.0
+ALARM = 3.0
 """Score over the variants' largest from which an effect is an alarm; from 1 on it is a hint."""
 FURTHER = 4.0
 """The same for a further effect: the law of the one before is right but roughly."""

@@ -18,7 +18,7 @@ from tirelib.compare.forces import ForceComparison
 from tirelib.compare.strain import Comparison
 from tirelib.report.comparison_tables import (
     force_tables,
-    gage_table,
+    gage_tables,
     number_table,
     point_table,
     sector_tables,
@@ -34,8 +34,8 @@ from tirelib.report.style import millimetres
 
 SENTENCE_NOTE = (
     "Only what stands out is said: each statement holds against noise and set-point errors at a "
-    "chance of 1 % that any of them is false, and holds at least 2 % of the squares of the "
-    "difference. The differences are means."
+    "chance of 1 % that any of its kind (mean strain, contact and deflection, single gages) is "
+    "false, and holds at least 2 % of the squares of the difference. The differences are means."
 )
 RING = (
     "Flexible ring on an elastic foundation with inner pressure and unilateral radial tread "
@@ -121,6 +121,16 @@ def floor_text(found: Comparison) -> str:
     return " ".join(parts)
 
 
+def force_floor_text(found: ForceComparison) -> str:
+    """Say what is known of a force's floor."""
+    if np.isfinite(found.floor):
+        return (
+            f"Floor as far as known: error {number(found.floor, 3)}, by the last entry for "
+            f"{found.quantity} in the model's history."
+        )
+    return f"The model's history tells no floor for {found.quantity}: nothing was added for it."
+
+
 def write_comparison(found: Comparison | ForceComparison, folder: Path) -> tuple[Path, Path]:
     """Write ``index.html`` and ``comparison.md``; return their paths.
 
@@ -200,7 +210,7 @@ def strain_parts(found: Comparison) -> list[Part]:
             "the entry is negative.",
             plots=heat_maps(found),
         ),
-        Part("Gages", "gages", tables=[gage_table(found)], plots=gage_plots(found)),
+        Part("Gages", "gages", tables=gage_tables(found), plots=gage_plots(found)),
         Part("Best, median and worst run", "waveforms", plots=waveform_plots(found)),
         Part("Trends", "trends", plots=trend_plots(found)),
         Part(
@@ -219,7 +229,7 @@ def force_parts(found: ForceComparison) -> list[Part]:
     noise, table, listed = force_tables(found, curves)
     effects = [f"{used.effect.name}: {used.effect.source}" for used in found.used]
     return [
-        Part("Noise and error", "noise", tables=[noise]),
+        Part("Noise, error, floor", "noise", force_floor_text(found), tables=[noise]),
         Part("Where: slip and condition", "where", plots=force_plots(found)),
         Part("Best, median and worst curve", "curves", tables=[listed] if curves else (),
              text="" if curves else "No set point has three points or more: there is no curve.",

@@ -63,24 +63,31 @@ def _row(cell: Cell, factor: float) -> list[str]:
     ]  # fmt: skip
 
 
-def gage_table(found: Comparison) -> Table:
-    """Return every gage: its noise, its rms and its mean difference in every sector."""
-    rows = []
-    for gage in sorted(found.gages, key=lambda g: -g.lateral):
-        means = {cell.sector: cell for cell in gage.table}
-        rows.append([
-            str(gage.number + 1), millimeters(gage.lateral), number(1e6 * gage.noise.std, 3),
-            number(1e6 * gage.rms, 4), number(gage.rms / gage.noise.std, 4),
-            *(_mean(means[name]) if name in means else "" for name in SECTORS),
-        ])  # fmt: skip
-    return Table(
-        "By gage, counted runs",
-        ["gage", "y (ISO 8855)", "noise [microstrain]", "rms [microstrain]", "rms [its noise]",
-         *(f"{name}: mean [microstrain]" for name in SECTORS)],
-        rows, texts=2,
-        note="Model less measured, set points taken out, with 95 % intervals by the noise of the "
-             "gage and by set points; y to the left. A positive mean is too much tension.",
-    )  # fmt: skip
+def gage_tables(found: Comparison) -> list[Table]:
+    """Return every gage's noise and rms, and its mean difference in every sector."""
+    gages = sorted(found.gages, key=lambda g: -g.lateral)
+    rows = [
+        [millimeters(g.lateral), str(g.number + 1), number(1e6 * g.noise.std, 3),
+         number(1e6 * g.rms, 4), number(g.rms / g.noise.std, 4)]
+        for g in gages
+    ]  # fmt: skip
+    cells = [{cell.sector: cell for cell in gage.table} for gage in gages]
+    means = [[name, *(_mean(cell[name]) if name in cell else "" for cell in cells)]
+             for name in SECTORS]  # fmt: skip
+    return [
+        Table(
+            "Difference of each gage, counted runs",
+            ["y (ISO 8855)", "gage", "noise [microstrain]", "rms [microstrain]",
+             "rms [noise of the gage]"],
+            rows, note="y to the left; set points taken out.",
+        ),
+        Table(
+            "Mean difference of each gage in each sector [microstrain]",
+            ["sector", *(f"y = {millimeters(g.lateral)}" for g in gages)], means,
+            note="Model less measured, with 95 % intervals by the noise of the gage and by set "
+                 "points. A positive mean is too much tension.",
+        ),
+    ]  # fmt: skip
 
 
 def _mean(cell: Cell) -> str:
@@ -142,6 +149,7 @@ def force_tables(found: ForceComparison, curves: tuple[Curve, ...]) -> tuple[Tab
         [[f"noise of a point, from {found.repeats} repeated conditions [{unit}]",
           number(found.noise, 3)],
          ["error: rms difference over noise", number(found.error, 4)],
+         ["floor as far as known [noise]", number(found.floor, 4)],
          [f"rms difference [{unit}]", number(found.rms, 4)],
          [f"rms measured [{unit}]", number(found.measured_rms, 4)]],
     )  # fmt: skip

@@ -113,6 +113,9 @@ def test_the_floor_is_what_the_file_says_and_only_for_these_data() -> None:
     history = {"history": [{"error_after": 3.0}, {"error_after": 2.5}]}
     said = compare_strain(waves, model_of(replace(file, extra=history)), "hash").floor
     assert (said.value, said.source) == (2.5, "history")
+    mixed = {"history": [*history["history"], {"quantity": "Fy", "error_after": 9.0}]}
+    other = compare_strain(waves, model_of(replace(file, extra=mixed)), "hash").floor
+    assert other.value == 2.5
     now = compare_strain(waves, MODEL).fit
     made = {"provenance": {"data_sha256": "hash", "rms_microstrain": 1e6 * now.raw_rms}}
     model = model_of(replace(file, extra=made))

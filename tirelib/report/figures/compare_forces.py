@@ -65,7 +65,7 @@ def _map(found: ForceComparison) -> Plot:
             if inside.any():
                 z[i, j] = factor * float(found.difference[inside].mean())
     limit = limit_of(z)
-    labels = [told("load", 10.0 * round(float(v) / 10.0)) for v in y]
+    labels = [told("load", 50.0 * round(float(v) / 50.0)) for v in y]
     figure = go.Figure(
         go.Heatmap(
             z=np.round(z, 3), x=np.round(scale * x, 4), y=list(range(y.size)), zmin=-limit,
@@ -134,8 +134,12 @@ def _trend(found: ForceComparison, name: str, label: str, scale: float) -> Plot:
     unit = UNITS[found.quantity]
     x, column = _binned(getattr(found.data, name), name)
     centre, half, count = np.full((3, x.size), np.nan)
+    own = name == slip_of(found.quantity)
+    size = np.abs(found.predicted) - np.abs(found.measured)
+    difference = found.difference if own else size
+    what = f"model less measured {found.quantity}" if own else f"size of {found.quantity} too large"
     for k in range(x.size):
-        part = found.difference[column == k]
+        part = difference[column == k]
         centre[k], count[k] = part.mean(), part.size
         if part.size > 1:
             error = part.std(ddof=1) / np.sqrt(part.size)
@@ -153,14 +157,15 @@ def _trend(found: ForceComparison, name: str, label: str, scale: float) -> Plot:
                        name="mean over the points")  # fmt: skip
     figure.add_hline(y=0.0, line={"color": FAINT, "width": 1})
     figure.update_xaxes(title=label)
-    figure.update_yaxes(title=f"model less measured {found.quantity} [{unit}]")
+    figure.update_yaxes(title=f"{what} [{unit}]")
     styled_figure(figure, 380, legend={"orientation": "h", "y": 1.12, "x": 0.0})
     rows = np.round(np.stack([x, count, centre, half], axis=1), 5).tolist()
     return Plot(
         f"force-trend-{name.replace('_', '-')}", f"Mean difference by {label.split(' [')[0]}",
-        "The band is the 95 % confidence interval of the bin's mean, from the scatter of its "
+        ("" if own else "Of the sizes, since both signs of the slip are in it. ")
+        + "The band is the 95 % confidence interval of the bin's mean, from the scatter of its "
         "points over the other conditions; bins of one point have none.", figure,
-        [label, "points", f"model less measured [{unit}]", f"95 % half-width [{unit}]"], rows,
+        [label, "points", f"{what} [{unit}]", f"95 % half-width [{unit}]"], rows,
     )  # fmt: skip
 
 

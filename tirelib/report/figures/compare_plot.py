@@ -45,7 +45,7 @@ def styled_figure(figure: go.Figure, height: int, **layout: Any) -> go.Figure:
         margin={"l": 75, "r": 25, "t": 45, "b": 60}, **layout,
     )  # fmt: skip
     rule = {"gridcolor": RULE, "linecolor": FAINT, "zerolinecolor": FAINT, "automargin": True}
-    figure.update_xaxes(ticks="outside", **rule)
+    figure.update_xaxes(ticks="outside", title_standoff=10, **rule)
     figure.update_yaxes(ticks="outside", **rule)
     return figure
 
