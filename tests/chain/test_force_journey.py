@@ -147,6 +147,17 @@ def test_adding_what_was_named_lets_the_held_out_error_fall_step_by_step(
     assert again["error"] == pytest.approx(added["error_after"], rel=0.02)
 
 
+def test_the_next_test_of_forces_is_the_diagnosis_s_advice(
+    place: Path, told: dict[str, Any]
+) -> None:
+    plan = done("next-test", place / "sweep", "--model", place / "M.toml", "--quantity", "Fy",
+                "--members", 30, "--json", place / "N.json")  # fmt: skip
+    assert plan["format"] == "tirelib-next-test/1"
+    assert (plan["quantity"], plan["verdict"]) == ("Fy", told["verdict"])
+    assert plan["what"] == told["next_test"]["what"]
+    assert plan["candidates"] == []
+
+
 def test_undo_goes_back_to_the_digit_and_remove_fits_anew(
     place: Path, tmp_path: Path, told: dict[str, Any]
 ) -> None:

@@ -126,7 +126,7 @@ def test_where_nothing_is_in_doubt_the_list_is_empty_and_the_exit_code_zero(
 
 def test_bad_input_is_told(model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = ("next-test", "x", "--model", model)
-    assert "strain only" in refused(*run, "--quantity", "Fy")
+    assert "strain only" in refused(*run, "--quantity", "Fy", "--suspects", "low_pass")
     assert "both given" in refused(*run, "--suspects", "low_pass", "--diagnosis", "D.json")
     assert "'lowpass' is not known" in refused(*run, "--suspects", "lowpass")
     assert "load 7000 to 2000" in refused(

@@ -74,15 +74,15 @@ def diagnose(
     catalogue = all_effects(effect_files)
     file = read_tire(model_name)
     campaign = read_campaign(folder)
-    of_forces = explains_forces(quantity, campaign.header, file)
-    explain = _of_forces if of_forces else _of_strain
+    forces = explains_forces(quantity, campaign.header, file)
+    explain = of_forces if forces else _of_strain
     with progress_bar("diagnosing") as progress:
         told, document = explain(campaign, file, catalogue, quantity, members, seed, progress)
     _say(document)
     console = output()
     targets = [path for path in (json_file, out and out / "diagnosis.json") if path]
     if out is not None:
-        for path in _write(told, out, of_forces, file.extra.get("history", [])):
+        for path in _write(told, out, forces, file.extra.get("history", [])):
             console.print(f"written: {path}")
     for path in targets:
         write_json(path, document)
@@ -153,7 +153,7 @@ def _of_strain(
     return told, document
 
 
-def _of_forces(
+def of_forces(
     campaign: Campaign,
     file: "TireFile",
     catalogue: Mapping[str, "Effect"],
@@ -162,6 +162,7 @@ def _of_forces(
     seed: int,
     progress: Callable[[str], None],
 ) -> tuple[Any, dict[str, Any]]:
+    """Return a diagnosis of forces, and its document."""
     from tirelib.diagnose.forces.assess import assess_forces, force_case
     from tirelib.diagnose.forces.document import force_diagnosis_document
 
@@ -173,9 +174,9 @@ def _of_forces(
 
 
 def _write(
-    told: Any, out: Path, of_forces: bool, history: Sequence[Mapping[str, Any]]
+    told: Any, out: Path, forces: bool, history: Sequence[Mapping[str, Any]]
 ) -> Sequence[Path]:
-    if of_forces:
+    if forces:
         from tirelib.report.force_diagnosis import write_force_diagnosis
 
         return write_force_diagnosis(told, out)

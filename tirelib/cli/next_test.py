@@ -11,10 +11,12 @@ from rich.table import Table
 
 from tirelib.campaign import read_campaign
 from tirelib.cli.common import CAMPAIGN, FILE, output, progress_bar, write_json
+from tirelib.cli.diagnose import explains_forces, of_forces
 from tirelib.errors import FormatError, ParameterError
 
 if TYPE_CHECKING:
     from tirelib.diagnose.refit import Refit
+    from tirelib.planning.document import Plan
     from tirelib.planning.envelope import Range
 
 _EXAMPLE = """\b
@@ -38,8 +40,9 @@ DIAGNOSIS = "tirelib-diagnosis/1"
 @click.argument("folder", metavar="CAMPAIGN", type=CAMPAIGN)
 @click.option("--model", "model_name", metavar="M.toml|NAME", required=True,
               help="Model that `tirelib identify` or `tirelib add` wrote.")  # fmt: skip
-@click.option("--quantity", metavar="strain", default="strain", show_default=True,
-              help="Measured quantity; forces are not planned.")  # fmt: skip
+@click.option("--quantity", metavar="strain|Fy|Fx|Mz",
+              help="Default: strain where the campaign has it, else the force that fits worst. For "
+                   "forces the advice is in words, without a table of runs.")  # fmt: skip
 @click.option("--diagnosis", "diagnosis_file", metavar="D.json", type=FILE,
               help="Of `tirelib diagnose` on this campaign and model.")  # fmt: skip
 @click.option("--suspects", "names", metavar="A,B",
@@ -64,7 +67,7 @@ DIAGNOSIS = "tirelib-diagnosis/1"
 def next_test(
     folder: Path,
     model_name: str,
-    quantity: str,
+    quantity: str | None,
     diagnosis_file: Path | None,
     names: str | None,
     load_range: tuple[float, float] | None,
@@ -85,16 +88,27 @@ def next_test(
     from tirelib.effects.load import all_effects
     from tirelib.identify.campaign_data import straight_runs
     from tirelib.parameters import read_tire
-    from tirelib.planning.document import plan_document, plan_test
+    from tirelib.planning.document import force_plan_document, plan_document, plan_test
     from tirelib.planning.envelope import Envelope
     from tirelib.planning.suspects import given_suspects, suspects_of
     from tirelib.waveforms import measure_waveforms
 
-    _strain_only(quantity)
     if diagnosis_file is not None and names is not None:
         raise ParameterError("--diagnosis and --suspects are both given; give one of them")
     catalogue = all_effects(effect_files)
-    model = model_of(read_tire(model_name), catalogue)
+    file = read_tire(model_name)
+    campaign = read_campaign(folder)
+    if explains_forces(quantity, campaign.header, file):
+        if diagnosis_file is not None or names is not None:
+            raise ParameterError(
+                "--diagnosis, --suspects: runs are planned for strain only; for forces leave both "
+                "out, the campaign is diagnosed"
+            )
+        with progress_bar("diagnosing") as progress:
+            _, forces = of_forces(campaign, file, catalogue, quantity, members, seed, progress)
+        _give(force_plan_document(forces), None, out, json_file)
+        return
+    model = model_of(file, catalogue)
     used = [each for each in model.used if each.effect.hook != "brush"]
     effects = [each.effect for each in used]
     strengths = [np.atleast_1d(np.asarray(each.strength, dtype=float)) for each in used]
@@ -107,7 +121,6 @@ def next_test(
     elif told is not None:
         _belongs(told, [e.name for e in effects], diagnosis_file)
         suspects = suspects_of(told, catalogue)
-    campaign = read_campaign(folder)
     with progress_bar("planning") as progress:
         runs = straight_runs(measure_waveforms(campaign, progress=progress))
         data = runs.data(with_deflection=False)
@@ -132,10 +145,17 @@ def next_test(
     document = plan_document(plan)
     if told is not None:
         document["verdict"] = told["verdict"]
+    _give(document, plan, out, json_file)
+
+
+def _give(
+    document: dict[str, Any], plan: "Plan | None", out: Path | None, json_file: Path | None
+) -> None:
+    """Print and write an answer; a page where there is a plan."""
     _say(document)
     console = output()
     targets = [path for path in (json_file, out and out / "next_test.json") if path]
-    if out is not None:
+    if out is not None and plan is not None:
         from tirelib.report.next_test import write_next_test
 
         for path in write_next_test(plan, out):
@@ -148,8 +168,8 @@ def next_test(
 def _strain_only(quantity: str) -> None:
     if quantity != "strain":
         raise ParameterError(
-            f"--quantity {quantity}: the next test is planned for strain only; leave the option "
-            "out; for forces see the candidates of `tirelib diagnose --quantity`"
+            f"--diagnosis of {quantity}: runs are planned for strain only; for forces leave the "
+            f"option out: --quantity {quantity}"
         )
 
 
@@ -196,7 +216,7 @@ def _belongs(told: dict[str, Any], has: list[str], path: Path | None) -> None:
 
 def _say(document: dict[str, Any]) -> None:
     console = output()
-    console.print(f"{document['campaign']}, strain: {document['why']}")
+    console.print(f"{document['campaign']}, {document['quantity']}: {document['why']}")
     console.print(f"  {document['message']}")
     if not document["candidates"]:
         return

@@ -181,6 +181,26 @@ def plan_document(plan: Plan) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def force_plan_document(told: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the advice of a diagnosis of forces as ``tirelib-next-test/1``, without a table."""
+    advised = told["next_test"]
+    between = list(advised["between"])
+    return {
+        "format": FORMAT,
+        "campaign": told["campaign"],
+        "axes": "iso",
+        "quantity": told["quantity"],
+        "verdict": told["verdict"],
+        "what": advised["what"],
+        "message": advised["what"],
+        "between": between,
+        "why": f"{' and '.join(between)} look alike" if between else "nothing is in doubt",
+        "would_revive": advised["would_revive"],
+        "suspects": [], "left_out": {}, "present": [], "candidates": [], "best": None,
+        "random_median": None, "repeats": None, "envelope": None, "dropped": 0,
+    }  # fmt: skip
+
+
 def _candidate(test: NextTest, k: int) -> dict[str, Any]:
     load, pressure, speed = test.points[k]
     return {
