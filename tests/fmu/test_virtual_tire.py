@@ -1,16 +1,12 @@
 """Laws of ``VirtualTire.fmu``, through FMPy: it is the surface, and the surface is the rig."""
 
-import shutil
 from collections.abc import Callable, Iterator
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from fmpy import extract, read_model_description
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Slave
 from fmpy.validation import validate_fmu
 from hypothesis import given
 from hypothesis import strategies as st
@@ -19,94 +15,15 @@ from bench.rig.observe import forces, trace
 from bench.rig.solve import solve
 from bench.rig.tire import Condition, tire
 from tests.fmu import live
-from tirelib.campaign import CampaignHeader, Run, RunPlan, TireGeometry, write_campaign
-from tirelib.campaign.read import read_campaign
+from tests.fmu.virtual_host import RATE, TYPICAL, Host, calibration_file, file, surface
 from tirelib.errors import FormatError, ParameterError
-from tirelib.estimators.calibration_file import write_calibration
-from tirelib.estimators.train import train
 from tirelib.fmu.build import build_fmu
 from tirelib.fmu.check import check_fmu
 from tirelib.fmu.virtual.coordinates import INPUTS, MIRRORED
 from tirelib.fmu.virtual.faults import Faults
 from tirelib.fmu.virtual.spec import build_virtual, default_surface
-from tirelib.fmu.virtual.surface import Surface, read_surface, write_surface
+from tirelib.fmu.virtual.surface import read_surface, write_surface
 from tirelib.fmu.virtual.wheel import Options, VirtualWheel
-from tirelib.observations import observe
-
-RATE = 1e4
-TYPICAL = {"Fz": 4000.0, "alpha": 0.03, "kappa": -0.01, "camber": 0.01, "speed": 20.0,
-           "pressure": 2.3e5}  # fmt: skip
-QUIET = {"noise_std": 0.0}
-
-
-@cache
-def surface() -> Surface:
-    return read_surface(default_surface())
-
-
-@cache
-def file(samples: int) -> Path:
-    return build_virtual(live.folder() / f"VirtualTire_{samples}.fmu", samples_per_step=samples)
-
-
-class Host:
-    """One instance in FMPy."""
-
-    def __init__(self, path: Path) -> None:
-        description = read_model_description(str(path))
-        self.kinds = {v.name: v.type for v in description.modelVariables}
-        self.references = {v.name: v.valueReference for v in description.modelVariables}
-        self.strains = [
-            v.valueReference for v in description.modelVariables if v.name[:7] == "strain_"
-        ]
-        self.samples = len(self.strains) // 5
-        self.folder = extract(str(path))
-        self.slave: Any = FMU2Slave(
-            guid=description.guid, unzipDirectory=self.folder,
-            modelIdentifier=description.coSimulation.modelIdentifier, instanceName="wheel",
-        )  # fmt: skip
-        self.slave.instantiate()
-        self.time = 0.0
-
-    def close(self) -> None:
-        self.slave.freeInstance()
-        shutil.rmtree(self.folder, ignore_errors=True)
-
-    def put(self, **values: float) -> None:
-        for name, value in values.items():
-            setter = self.slave.setReal if self.kinds[name] == "Real" else self.slave.setInteger
-            setter([self.references[name]], [value])
-
-    def start(self, inputs: dict[str, float] = TYPICAL, **parameters: float) -> None:
-        self.slave.reset()
-        self.slave.setupExperiment(startTime=0.0)
-        self.put(**{**QUIET, **parameters, **inputs})
-        self.slave.enterInitializationMode()
-        self.slave.exitInitializationMode()
-        self.time = 0.0
-
-    def step(self, step: float | None = None) -> None:
-        step = self.samples / RATE if step is None else step
-        self.slave.doStep(self.time, step)
-        self.time += step
-
-    def frame(self) -> np.ndarray:
-        return np.array(self.slave.getReal(self.strains)).reshape(self.samples, 5)
-
-    def get(self, name: str) -> Any:
-        reader = getattr(self.slave, f"get{self.kinds[name]}")
-        value = reader([self.references[name]])[0]
-        if self.kinds[name] == "String":
-            return value.decode() if isinstance(value, bytes) else value
-        return bool(value) if self.kinds[name] == "Boolean" else value
-
-    def play(self, n: int) -> np.ndarray:
-        """Samples of so many steps, shape (n * samples, 5)."""
-        found = []
-        for _ in range(n):
-            self.step()
-            found.append(self.frame())
-        return np.concatenate(found)
 
 
 @pytest.fixture(scope="module")
@@ -129,17 +46,16 @@ def test_the_fmu_is_valid_and_gives_its_reference_signals() -> None:
 
 
 def test_the_surface_is_the_rig_within_its_stated_error() -> None:
-    condition = (5200.0, -0.06, -0.03, 0.03, 30.0, 2.6e5)
+    condition = (2200.0, 0.04, 0.02, -0.02, 25.0, 2.2e5)
     load, alpha, kappa, camber, speed, pressure = condition
     slip = (1.0 + kappa) / np.cos(alpha) - 1.0
     state = solve(tire("reference"), Condition(load, pressure, speed, alpha, camber, slip))
     seen, force = trace(state, 1440), forces(state)
     answers = surface().answers(np.array([condition]))
     error = 1e6 * (surface().strain(answers, seen.phi) - seen.strain)
-    told = surface().about["left_out"]["all"]
-    # one waveform may lie above the rms of all of them, hardly above twice that
-    assert np.sqrt(np.mean(error**2)) < 2.0 * told["strain_ustrain_rms"]
-    assert np.abs(error).max() < told["strain_ustrain_largest"]
+    told = surface().about["left_out"]["Fz 2 .. 6 kN"]
+    assert np.sqrt(np.mean(error**2)) < told["strain_ustrain_rms"]
+    assert np.abs(error).max() < told["strain_ustrain_median_of_largest"]
     given = surface().forces_of(answers)[0]
     assert abs(given[0] - force.fx) < 3.0 * told["Fx_N_rms"]
     assert abs(given[1] - force.fy) < 3.0 * told["Fy_N_rms"]
@@ -232,11 +148,12 @@ def test_slip_is_felt_after_the_relaxation_length(ten: Host, length: float) -> N
     assert ten.get("Fy_rig") == pytest.approx(surface().forces_of(surface().answers(felt))[0, 1])
 
 
-def test_a_state_is_taken_up_bit_by_bit(ten: Host) -> None:
+@pytest.mark.parametrize("alpha", [TYPICAL["alpha"], -0.05])
+def test_a_state_is_taken_up_bit_by_bit(ten: Host, alpha: float) -> None:
     options = {"noise_std": 4e-6, "dropped_frames": 0.2, "seed": 3}
     ten.start(**options)
-    ten.put(alpha=-0.05)
-    ten.play(7)
+    ten.put(alpha=alpha)
+    ten.play(1)
     state = ten.slave.getFMUState()
     text, time = ten.slave.serializeFMUState(state), ten.time
     wanted = ten.play(40)
@@ -384,7 +301,7 @@ def test_a_damaged_surface_is_refused(tmp_path: Path) -> None:
 
 def test_the_estimator_finds_the_load_and_slip_angle_of_the_virtual_tire() -> None:
     strain_tire = build_fmu(
-        _calibration(), live.folder() / "StrainOfVirtual.fmu", samples_per_step=100
+        calibration_file(), live.folder() / "StrainOfVirtual.fmu", samples_per_step=100
     )
     virtual, estimator = Host(file(100)), Host(strain_tire)
     try:
@@ -407,40 +324,3 @@ def test_the_estimator_finds_the_load_and_slip_angle_of_the_virtual_tire() -> No
     finally:
         virtual.close()
         estimator.close()
-
-
-def _calibration() -> Path:
-    """Return a calibration made on runs of the surface, at other conditions."""
-    place = live.folder() / "virtual_campaign"
-    geometry = TireGeometry("virtual", 0.316, 0.303, 0.0115, 0.168, -0.003)
-    header = CampaignHeader(
-        name="virtual", axes="iso", tire=geometry,
-        gage_lateral=tuple(surface().lateral.tolist()), rate=RATE,
-    )  # fmt: skip
-    points = [(load, alpha) for load in (3200.0, 4000.0, 4800.0, 5600.0)
-              for alpha in (-0.06, -0.03, 0.0, 0.03, 0.06)]  # fmt: skip
-    write_campaign(place, header, [_run(n, *point) for n, point in enumerate(points, start=1)])
-    path = live.folder() / "virtual.toml"
-    write_calibration(train(observe([read_campaign(place)])).calibration, path, {})
-    return path
-
-
-def _run(number: int, load: float, alpha: float) -> Run:
-    slip = float(np.cos(alpha)) - 1.0  # rolls freely
-    given = np.array([[load, alpha, slip, 0.0, 20.0, 2.3e5]])
-    answers = surface().answers(given)
-    omega = 20.0 * (1.0 + slip) / surface().rolling_radius(load, 20.0, 2.3e5)
-    angle = -np.pi - 0.3 + omega * np.arange(int(3.4 * 2.0 * np.pi / omega * RATE)) / RATE
-    noise = np.random.default_rng(number).normal(0.0, 4e-6, (angle.size, 5))
-    turn = np.floor((angle + np.pi) / (2.0 * np.pi))
-    fx, fy = surface().forces_of(answers)[0, :2]
-    times = np.arange(0.0, angle.size / RATE, 0.01)
-    held = {"Fz": load, "Fy": fy, "Fx": fx, "slip_angle": alpha, "camber": 0.0,
-            "slip_ratio": slip, "speed": 20.0, "pressure": 2.3e5}  # fmt: skip
-    plan = RunPlan(number, f"runs/{number:03d}.mf4", "corner" if alpha else "free", load, 2.3e5,
-                   20.0, alpha, 0.0, 0.0)  # fmt: skip
-    strain = (surface().strain(answers, angle) + noise).T
-    return Run(
-        plan, strain, RATE, 0.0, np.concatenate(([False], np.diff(turn) > 0.0)),
-        {name: np.full(times.size, value) for name, value in held.items()}, times,
-    )  # fmt: skip

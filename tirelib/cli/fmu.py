@@ -8,6 +8,7 @@ import click
 from tirelib.campaign import read_campaign
 from tirelib.cli.common import CAMPAIGN, FILE, output, progress_bar, write_json
 from tirelib.cli.estimate import print_document
+from tirelib.cli.fmu_virtual import virtual
 from tirelib.errors import FormatError
 from tirelib.estimators.result import estimate_document
 from tirelib.fmu.build import DEFAULT_RATE, build_fmu, embedded_calibration
@@ -17,6 +18,7 @@ from tirelib.fmu.run import LoadedFmu, play_campaign
 _GROUP = """\b
 Examples:
   tirelib fmu build --calibration cal.toml --out StrainTire.fmu --samples-per-step 10
+  tirelib fmu virtual --out VirtualTire.fmu --samples-per-step 10
   tirelib fmu check StrainTire.fmu --out build/out/fmu_check
   tirelib fmu run StrainTire.fmu data/another-day --json f.json
 """
@@ -53,7 +55,10 @@ Exit code 0: all passed; 1: something failed; 2: the file is no FMU.
 
 @click.group(epilog=_GROUP)
 def fmu() -> None:
-    """Export the estimator as an FMU, check it, and run it."""
+    """Export the estimator or the virtual tire as an FMU, check it, and run it."""
+
+
+fmu.add_command(virtual)
 
 
 @fmu.command(epilog=_BUILD)

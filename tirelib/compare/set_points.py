@@ -19,8 +19,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.compare.model import Prediction
 from tirelib.identify import random_effects
-from tirelib.identify.noise import LEAST_NOISE
-from tirelib.identify.noise import independent as independent
+from tirelib.identify.noise import LEAST_NOISE, independent
 
 NAMES = ("load", "pressure", "gain", "angle")
 ROUNDS = 60

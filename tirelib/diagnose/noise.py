@@ -3,9 +3,9 @@
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.compare.set_points import independent
 from tirelib.diagnose.refit import Refit
 from tirelib.identify.campaign_data import StraightRuns
+from tirelib.identify.noise import independent
 
 UNKNOWN_NOISE = 3e-6
 """Noise that variants get where no runs were repeated, [-]."""

@@ -73,8 +73,12 @@ def answer_of(found: Comparison | ForceComparison) -> str:
     verdict = found.verdict if isinstance(found, ForceComparison) else found.fit.verdict
     error = found.error if isinstance(found, ForceComparison) else found.fit.error
     left = _left(found)
+    but = (
+        " Single gages, the contact or the deflection differ, see below." if found.sentences else ""
+    )
     return {
-        "fits": f"The model fits: error {number(error, 3)} in units of the repeats' noise; {left}.",
+        "fits": f"The model fits: error {number(error, 3)} in units of the repeats' noise; {left}."
+        + but,
         "lack_of_fit": f"The model does not reach the noise: error {number(error, 3)} in units of "
         f"the repeats' noise; {left}.",
         "does_not_fit": f"The model does not fit: {left}.",

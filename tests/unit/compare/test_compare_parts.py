@@ -98,7 +98,9 @@ def test_tracks_of_own_data_agree_within_their_bands() -> None:
 def test_pooled_deviation_knows_only_repeats() -> None:
     values = np.array([1.0, 3.0, 10.0, 14.0, 100.0])
     # (2 + 8) / 2 degrees of freedom
-    assert pooled(values, np.array([0, 0, 1, 1, 2])) == (pytest.approx(np.sqrt(5.0)), 2)
+    std, freedom = pooled(values, np.array([0, 0, 1, 1, 2]))
+    assert std == pytest.approx(np.sqrt(5.0))
+    assert freedom == 2
     unknown, freedom = pooled(values, np.arange(5))
     assert np.isnan(unknown)
     assert freedom == 0

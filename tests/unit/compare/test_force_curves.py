@@ -1,6 +1,7 @@
 """Curves of a force: set points, best and worst, and the page's figures with their data."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -54,9 +55,9 @@ def test_few_points_make_no_curve_and_unknown_pressure_is_no_fault() -> None:
 
 
 def test_the_floor_is_of_the_same_force() -> None:
-    history = [{"error_after": 7.0}, {"quantity": "Fy", "error_after": 3.0},
-               {"quantity": "Fy", "error_after": 2.0},
-               {"quantity": "Mz", "error_after": 5.0}]  # fmt: skip
+    said = (("strain", 7.0), ("Fy", 3.0), ("Fy", 2.0), ("Mz", 5.0))
+    history: list[dict[str, Any]] = [{"quantity": q, "error_after": error} for q, error in said]
+    del history[0]["quantity"]
     assert last_error(history, "Fy") == 2.0
     assert last_error(history, "strain") == 7.0
     assert np.isnan(last_error(history, "Fx"))

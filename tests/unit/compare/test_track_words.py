@@ -5,7 +5,10 @@ import re
 import numpy as np
 import pytest
 
+from tests.unit.compare.compare_synthetic import ANGLE, model_file, waveforms
+from tirelib.compare.model import model_of
 from tirelib.compare.runs import Factor
+from tirelib.compare.strain import compare_strain
 from tirelib.compare.track_words import track_fit, track_sentences
 from tirelib.compare.tracks import Track, contact_edges, pooled
 from tirelib.waveforms import GRID
@@ -75,6 +78,17 @@ def test_without_repeats_nothing_is_told() -> None:
     bare = Track(one.name, one.unit, one.scale, one.measured, one.model, one.model_std,
                  *pooled(one.difference, np.arange(LOADS.size)))  # fmt: skip
     assert said(bare) == ()
+
+
+def test_a_zero_of_the_trigger_is_within_the_band_of_entry_and_exit() -> None:
+    found = compare_strain(waveforms(seed=1), model_of(model_file()))
+    _, _, entry, leaving = found.tracks
+    for one in (entry, leaving):
+        assert (one.model_std >= ANGLE).all()
+        fit = track_fit(one, found.chosen.straight)
+        # 28 runs whose zero is off by the stated tolerance, beside load, pressure and noise
+        assert abs(fit.mean) < 4.0 * fit.std
+    assert found.sentences == ()
 
 
 def test_entry_and_exit_are_where_strain_is_steepest() -> None:

@@ -81,7 +81,10 @@ def _runs(found: Comparison) -> Plot:
         title={"text": "runs by load, pressure and speed", "standoff": 12}, tickvals=ticks,
         ticktext=texts, showgrid=False, range=[-0.5, len(order) - 0.5],
     )  # fmt: skip
-    _edges(figure, np.rad2deg(found.prediction.edges[order]), list(range(len(order))))
+    edges = np.rad2deg(found.prediction.edges[order])
+    first = int(found.chosen.straight.sum())
+    _edges(figure, np.insert(edges, first, np.nan, axis=0),
+           np.insert(np.arange(len(order)), first, first).tolist())  # fmt: skip
     styled_figure(figure, 620, showlegend=True, legend=_LEGEND)
     return Plot(
         "heat-runs", "Every run: model less measured",

@@ -1,0 +1,277 @@
+"""Make the virtual tire's surface of the rig's solutions, and state its error at points left out.
+
+    python build/virtual_tire/surface.py --points 308 --out models/virtual_tire/reference.npz
+
+The solutions come from `design.py`. Errors are those of a tenfold cross-validation in which a point
+and its mirror image are left out together; only the scales of the coordinates were fitted to all.
+"""
+
+import argparse
+import json
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from design import HIGH, LOW, OUT
+from scipy.interpolate import CubicSpline, RBFInterpolator
+from scipy.optimize import minimize
+
+from bench.rig.tire import tire
+from tirelib import __version__
+from tirelib.fmu.virtual.coordinates import INPUTS, MIRRORED, coordinates, half_angle, warped
+from tirelib.fmu.virtual.surface import (
+    DEGREE,
+    KERNEL,
+    Surface,
+    radius_terms,
+    write_surface,
+)  # fmt: skip
+
+GRID = 720
+"""Angles of a component."""
+KEPT = 1e-5
+"""Share of the waveforms' variance that the components may miss."""
+FOLDS = 10
+RANGE_LOW = np.array([800.0, -np.radians(8.0), -0.12, -np.radians(4.0), 20.0 / 3.6, 1.8e5])
+RANGE_HIGH = np.array([9000.0, np.radians(8.0), 0.12, np.radians(4.0), 150.0 / 3.6, 3.0e5])
+SLIP = (18.5, 11.5, 0.0, -0.84)
+"""Start of the fit of the coordinates."""
+_EFFORT = {"maxfev": 200, "xatol": 0.01, "fatol": 0.05, "adaptive": True}
+RESTARTS = 0
+SCALES = (1.85, 0.57, 0.3, 1.1, 0.85, 0.61, 0.18, 0.25)
+
+
+@dataclass(frozen=True)
+class Solutions:
+    """What `design.py` solved, one row a point."""
+
+    inputs: np.ndarray
+    strain: np.ndarray
+    edges: np.ndarray
+    forces: np.ndarray
+    free_radius: np.ndarray
+    failed: int
+
+    def part(self, chosen: np.ndarray) -> "Solutions":
+        """Return some of the points."""
+        return Solutions(
+            self.inputs[chosen], self.strain[chosen], self.edges[chosen], self.forces[chosen],
+            self.free_radius[chosen], 0,
+        )  # fmt: skip
+
+
+def read_solutions(folder: Path, most: int | None = None) -> Solutions:
+    """Read the first solved points, or all; fill in the edges of strips that touch no road."""
+    files = [np.load(path) for path in sorted(folder.glob("*.npz"))[:most]]
+    good = [file for file in files if "strain" in file.files]
+    inputs = np.array([file["inputs"] for file in good])
+    ends = np.array([file["edges"] for file in good])
+    edges = np.stack((0.25 * (ends[..., 1] - ends[..., 0]) ** 2, ends.mean(axis=2)), axis=1)
+    force = np.array([file["forces"] for file in good])
+    radius = np.array([float(file["loaded_radius"]) for file in good])
+    return Solutions(
+        inputs,
+        np.array([file["strain"] for file in good]),
+        _filled(inputs, edges),
+        np.column_stack((force[:, [0, 1, 4]], radius)),
+        np.array([float(file["free_radius"]) for file in good]),
+        len(files) - len(good),
+    )
+
+
+def _filled(inputs: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    places = coordinates(np.concatenate((inputs, inputs * MIRRORED)), SLIP, np.array(SCALES))
+    both = np.concatenate((edges, edges[:, :, ::-1]))
+    for gage in range(edges.shape[2]):
+        free = np.isnan(both[:, 0, gage])
+        if free.any():
+            known = RBFInterpolator(places[~free], both[~free, :, gage], kernel="linear", degree=1)
+            both[free, :, gage] = known(places[free])
+    return both[: len(edges)]
+
+
+def common(solutions: Solutions) -> np.ndarray:
+    """Return the waveforms moved to the common contact, shape (n, GRID, 5)."""
+    n, points, gages = solutions.strain.shape
+    angle = -np.pi + 2.0 * np.pi / points * np.arange(points)
+    grid = -np.pi + 2.0 * np.pi / GRID * np.arange(GRID)
+    found = np.empty((n, GRID, gages))
+    for i in range(n):
+        half = half_angle(solutions.edges[i, 0])
+        for g in range(gages):
+            seen = warped(angle, solutions.edges[i, 1, g], half[g])
+            order = np.argsort(seen)
+            x, y = seen[order], solutions.strain[i, order, g]
+            spline = CubicSpline(
+                np.append(x, x[0] + 2.0 * np.pi), np.append(y, y[0]), bc_type="periodic"
+            )
+            found[i, :, g] = spline(x[0] + (grid - x[0]) % (2.0 * np.pi))
+    return found
+
+
+def make(solutions: Solutions, waves: np.ndarray, slip: np.ndarray, scales: np.ndarray) -> Surface:
+    """Return the surface of these solutions."""
+    n = len(waves)
+    turned = waves[:, :, ::-1]
+    even, odd = 0.5 * (waves + turned), 0.5 * (waves - turned)
+    mean = even.mean(axis=0)
+    parts = [_components(even - mean), _components(odd)]
+    scores = [part.reshape(len(part), -1) for part in parts]
+    terms = radius_terms(solutions.inputs)
+    return Surface(
+        lateral=tire("reference").lateral,
+        low=RANGE_LOW, high=RANGE_HIGH, slip=slip, scales=scales, points=solutions.inputs,
+        even=(even - mean).reshape(n, -1) @ scores[0].T,
+        odd=odd.reshape(n, -1) @ scores[1].T,
+        edges=solutions.edges, forces=solutions.forces, mean=mean, basis=np.concatenate(parts),
+        rolling=np.linalg.lstsq(terms, solutions.free_radius, rcond=None)[0], about={},
+    )  # fmt: skip
+
+
+def _components(waves: np.ndarray) -> np.ndarray:
+    _, size, rows = np.linalg.svd(waves.reshape(len(waves), -1), full_matrices=False)
+    left = 1.0 - np.cumsum(size**2) / np.sum(size**2)
+    count = int(np.argmax(left < KEPT)) + 1
+    return rows[:count].reshape(count, *waves.shape[1:])
+
+
+def fitted_coordinates(solutions: Solutions, waves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return slip constants and scales with the least error at points left out."""
+    start = np.concatenate((SLIP, np.log(SCALES)))
+    first = make(solutions, waves, start[:4], np.exp(start[4:]))
+    n, gages = len(first.points), first.lateral.size
+    slope = float(np.sqrt(np.mean(np.gradient(waves, 2.0 * np.pi / GRID, axis=1) ** 2)))
+    size = np.full(2 * gages, slope * np.sqrt(1.0 / gages))
+    size[:gages] /= 2.0 * np.sqrt(np.mean(first.edges[:, 0], axis=0))
+    weights = np.concatenate((np.full(len(first.basis), (GRID * gages) ** -0.5), size))
+    one = np.hstack((first.even, first.odd, first.edges.reshape(n, -1)))
+    two = np.hstack((first.even, -first.odd, first.edges[:, :, ::-1].reshape(n, -1)))
+    values = np.concatenate((one, two)) * weights
+    inputs = np.concatenate((first.points, first.points * MIRRORED))
+    fold = np.tile(np.arange(n) % 5, 2)
+
+    def error(guess: np.ndarray) -> float:
+        places = coordinates(inputs, guess[:4].tolist(), np.exp(guess[4:]))
+        total = 0.0
+        for k in range(5):
+            out = fold == k
+            known = RBFInterpolator(places[~out], values[~out], kernel=KERNEL, degree=DEGREE)
+            total += float(np.sum((known(places[out]) - values[out]) ** 2))
+        return 1e6 * float(np.sqrt(total / len(inputs)))
+
+    best = minimize(error, start, method="Nelder-Mead", options=_EFFORT)
+    for factors in np.random.default_rng(1).uniform(0.5, 2.0, (RESTARTS, start.size)):
+        guess = np.where(np.arange(start.size) < 4, best.x * factors, best.x + np.log(factors))
+        again = minimize(error, guess, method="Nelder-Mead", options=_EFFORT)
+        best = again if again.fun < best.fun else best
+    _tell(f"left-out error while the coordinates were fitted: {error(start):.1f} -> {best.fun:.1f}")
+    return best.x[:4], np.exp(best.x[4:])
+
+
+def predicted(surface: Surface, inputs: np.ndarray, points: int) -> np.ndarray:
+    """Return the strain over the angle, shape (n, points, 5)."""
+    angle = -np.pi + 2.0 * np.pi / points * np.arange(points)
+    answers = surface.answers(inputs)
+    return np.array([surface.strain(row[None], angle) for row in answers])
+
+
+def left_out(solutions: Solutions, waves: np.ndarray, like: Surface) -> dict[str, np.ndarray]:
+    """Return the errors at every point when it was left out: strain, forces, R_e."""
+    n = len(waves)
+    strain = np.empty_like(solutions.strain)
+    force, radius = np.empty_like(solutions.forces), np.empty(n)
+    for k in range(FOLDS):
+        out = np.arange(n) % FOLDS == k
+        known = make(solutions.part(~out), waves[~out], like.slip, like.scales)
+        inputs = solutions.inputs[out]
+        strain[out] = predicted(known, inputs, strain.shape[1]) - solutions.strain[out]
+        force[out] = known.forces_of(known.answers(inputs)) - solutions.forces[out]
+        radius[out] = radius_terms(inputs) @ known.rolling - solutions.free_radius[out]
+    return {"strain": strain, "forces": force, "R_e": radius}
+
+
+def statement(solutions: Solutions, errors: dict[str, np.ndarray]) -> dict[str, Any]:
+    """Return errors by part of the range: rms and largest, [ustrain], [N], [N m], [m]."""
+    x = solutions.inputs
+    inside = np.all((x >= RANGE_LOW) & (x <= RANGE_HIGH), axis=1)
+    slip = np.hypot(x[:, 1] / RANGE_HIGH[1], x[:, 2] / RANGE_HIGH[2])
+    parts = {
+        "all": inside,
+        "Fz 0.8 .. 2 kN": inside & (x[:, 0] < 2e3),
+        "Fz 2 .. 6 kN": inside & (x[:, 0] >= 2e3) & (x[:, 0] < 6e3),
+        "Fz 6 .. 9 kN": inside & (x[:, 0] >= 6e3),
+        "|alpha| <= 4 deg": inside & (np.abs(x[:, 1]) <= np.radians(4.0)),
+        "|alpha| > 4 deg": inside & (np.abs(x[:, 1]) > np.radians(4.0)),
+        "|kappa| <= 0.04": inside & (np.abs(x[:, 2]) <= 0.04),
+        "|kappa| > 0.04": inside & (np.abs(x[:, 2]) > 0.04),
+        "small slip: hypot(alpha / 8 deg, kappa / 0.12) < 0.5": inside & (slip < 0.5),
+        "|camber| > 2 deg": inside & (np.abs(x[:, 3]) > np.radians(2.0)),
+        "|camber| <= 2 deg": inside & (np.abs(x[:, 3]) <= np.radians(2.0)),
+        "speed < 60 km/h": inside & (x[:, 4] < 60.0 / 3.6),
+        "speed >= 60 km/h": inside & (x[:, 4] >= 60.0 / 3.6),
+        "pressure < 2.4 bar": inside & (x[:, 5] < 2.4e5),
+        "pressure >= 2.4 bar": inside & (x[:, 5] >= 2.4e5),
+    }
+    return {
+        name: {
+            "points": int(chosen.sum()),
+            **_sizes(1e6 * errors["strain"][chosen], "strain_ustrain"),
+            **{
+                f"{force}_rms": float(np.sqrt(np.mean(errors["forces"][chosen, i] ** 2)))
+                for i, force in enumerate(("Fx_N", "Fy_N", "Mz_Nm", "loaded_radius_m"))
+            },
+            "R_e_m_rms": float(np.sqrt(np.mean(errors["R_e"][chosen] ** 2))),
+        }
+        for name, chosen in parts.items()
+        if chosen.any()
+    }
+
+
+def _tell(*words: object) -> None:
+    sys.stdout.write(" ".join(map(str, words)) + "\n")
+
+
+def _sizes(error: np.ndarray, name: str) -> dict[str, float]:
+    largest = np.abs(error).max(axis=(1, 2))
+    return {
+        f"{name}_rms": float(np.sqrt(np.mean(error**2))),
+        f"{name}_median_of_largest": float(np.median(largest)),
+        f"{name}_largest": float(largest.max()),
+    }
+
+
+def main(folder: Path, out: Path, most: int | None) -> None:
+    """Fit, state the error, write."""
+    solutions = read_solutions(folder, most)
+    waves = common(solutions)
+    slip, scales = fitted_coordinates(solutions, waves)
+    surface = make(solutions, waves, slip, scales)
+    errors = left_out(solutions, waves, surface)
+    told = statement(solutions, errors)
+    size = 1e6 * float(np.sqrt(np.mean((solutions.strain - solutions.strain.mean((0, 1))) ** 2)))
+    about = {
+        "tire": tire("reference").name,
+        "made_by": f"build/virtual_tire of tirelib {__version__}, numerical rig, default mesh",
+        "inputs": list(INPUTS),
+        "solutions": len(waves), "not_solved": solutions.failed,
+        "design": "scrambled Sobol points, seed 2",
+        "design_low": LOW.tolist(), "design_high": HIGH.tolist(),
+        "error": f"{FOLDS}-fold cross-validation, a point and its mirror image left out together",
+        "strain_spread_ustrain": size, "left_out": told,
+    }  # fmt: skip
+    write_surface(replace(surface, about=about), out)
+    _tell(json.dumps(about, indent=1))
+    _tell(f"components {surface.even.shape[1]} + {surface.odd.shape[1]}")
+    _tell("slip", slip.round(3), "scales", scales.round(3))
+    _tell(f"{out}: {out.stat().st_size / 1e6:.2f} MB")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--folder", type=Path, default=OUT)
+    parser.add_argument("--out", type=Path, default=OUT.parent / "virtual_tire.npz")
+    parser.add_argument("--points", type=int, help="take only the first ones")
+    given = parser.parse_args()
+    main(given.folder, given.out, given.points)

@@ -1,0 +1,208 @@
+"""What ``VirtualTire.fmu`` consists of: a surface, the slave, reference signals, its page."""
+
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.errors import ParameterError
+from tirelib.fmu.build import DEFAULT_RATE, export, source_file
+from tirelib.fmu.handbook import html_table, page
+from tirelib.fmu.reference import FOLDER, Reference
+from tirelib.fmu.spec import SlaveSpec
+from tirelib.fmu.virtual.coordinates import INPUTS
+from tirelib.fmu.virtual.surface import Surface, read_surface
+from tirelib.fmu.virtual.table import START, inputs, outputs, parameters
+from tirelib.fmu.virtual.wheel import RATES, Options, VirtualWheel
+from tirelib.parameters.tire_file import models_folder
+
+MODEL = "VirtualTire"
+DESCRIPTION = "Tire with strain gages: strain frames from load, slip, camber, speed and pressure"
+MOST_SAMPLES = 256
+STEPS = 120
+"""Communication steps of the reference signals."""
+
+
+def build_virtual(
+    out: str | Path,
+    *,
+    samples_per_step: int = 10,
+    sample_rate: float = DEFAULT_RATE,
+    surface: str | Path | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Path:
+    """Write ``VirtualTire.fmu``: an FMI 2.0 co-simulation unit, the mirror of ``StrainTire.fmu``.
+
+    Parameters
+    ----------
+    out : path
+        The FMU to write.
+    samples_per_step : int
+        Most samples of every gage that one communication step brings.
+    sample_rate : float, [Hz]
+        Start value of the parameter of that name.
+    surface : path, optional
+        By default the numerical rig's reference tire.
+    progress : callable, optional
+        Called with what was done.
+
+    Raises
+    ------
+    ParameterError
+        If a number is out of range.
+    FormatError
+        If the surface cannot be read, or the FMU cannot be written.
+    """
+    spec = virtual_tire(surface or default_surface(), samples_per_step, sample_rate)
+    return export(spec, out, progress)
+
+
+def default_surface() -> Path:
+    """Return the file of the reference tire's surface."""
+    return models_folder() / "virtual_tire" / "reference.npz"
+
+
+def virtual_tire(surface: str | Path, samples_per_step: int, sample_rate: float) -> SlaveSpec:
+    """Return what `tirelib.fmu.build.export` needs; see `build_virtual`."""
+    if not 1 <= samples_per_step <= MOST_SAMPLES:
+        raise ParameterError(
+            f"samples per step = {samples_per_step}; allowed are 1 .. {MOST_SAMPLES}; take a "
+            "shorter communication step"
+        )
+    low, high = RATES
+    if not low <= sample_rate <= high:
+        raise ParameterError(
+            f"sample rate = {sample_rate} Hz; allowed are {low:g} .. {high:g} Hz; give the rate of "
+            "the gages"
+        )
+    known = read_surface(Path(surface))
+    table = [
+        *parameters(sample_rate), *inputs(known), *outputs(known, samples_per_step)
+    ]  # fmt: skip
+    reference = virtual_reference(known, sample_rate, samples_per_step)
+    return SlaveSpec(
+        model=MODEL,
+        script="virtual_tire.py",
+        description=DESCRIPTION,
+        table=table,
+        step_size=samples_per_step / sample_rate,
+        settings={"samples_per_step": samples_per_step, "sample_rate": sample_rate},
+        resources={
+            "surface.npz": Path(surface).read_bytes(),
+            **{f"{FOLDER}/{name}": data for name, data in reference.files(MODEL).items()},
+        },
+        documentation={"index.html": _page(known, table, samples_per_step, sample_rate).encode()},
+        icon=source_file("strain_tire.png").read_bytes(),
+    )
+
+
+def virtual_reference(surface: Surface, rate: float, samples: int) -> Reference:
+    """Return input and expected output: load, slip and pressure change, one input leaves the range.
+
+    What is expected is what the library says, not what an FMU said.
+    """
+    step = samples / rate
+    phase: FloatArray = np.linspace(0.0, 2.0 * np.pi, STEPS, dtype=np.float64)
+    given: dict[str, FloatArray] = {name: np.full(STEPS, START[name]) for name in INPUTS}
+    given["Fz"] = np.round(4000.0 + 1500.0 * np.sin(phase), 1)
+    given["alpha"] = np.where(phase > 2.0, 0.05, 0.0)
+    given["kappa"] = np.where(phase > 4.0, -0.03, 0.0)
+    given["pressure"] = np.round(2.3e5 + 1e4 * np.sin(phase))
+    given["camber"] = np.where((phase > 5.0) & (phase < 5.3), 0.5, 0.0)
+    wheel = VirtualWheel(surface, Options(rate=rate), samples)
+    wheel.begin([float(given[name][0]) for name in INPUTS])
+    rows = [_row(wheel)]
+    for at in range(STEPS - 1):
+        wheel.step(step, [float(given[name][at]) for name in INPUTS])
+        rows.append(_row(wheel))
+    names = [v.name for v in outputs(surface, samples) if v.kind != "String"]
+    table = np.array(rows)
+    return Reference(step, given, {name: table[:, i] for i, name in enumerate(names)})
+
+
+def _row(wheel: VirtualWheel) -> list[float]:
+    values, others = wheel.outputs()
+    return [*values, *(float(value) for value in others if not isinstance(value, str))]
+
+
+def _page(surface: Surface, table: list[Any], samples: int, rate: float) -> str:
+    lead = (
+        "A tire in place of a measured one: what five gages on its innerliner would show, sample "
+        "by sample, at the load, slip, camber, speed and pressure that a vehicle model gives."
+    )
+    facts = {
+        "tire": str(surface.about.get("tire", "")),
+        "gages": ", ".join(f"{1e3 * y:+g}" for y in surface.lateral) + " mm, ISO 8855",
+        "samples per step": f"up to {samples} (output samples says how many are new)",
+        "sample rate": f"{rate:g} Hz (parameter sample_rate)",
+        "communication step": f"up to {1e3 * samples / rate:g} ms",
+        "needs": "CPython 3.11 or newer with numpy and scipy; linux64 or win64",
+        "version": "{version}",
+        "licences": "documentation/licenses: MIT, tirelib and pythonfmu",
+    }
+    drawing = source_file("conventions.svg").read_text(encoding="utf-8")
+    sections = {
+        "Conventions": f"{drawing}\n{_CONVENTIONS}",
+        "Range": _ranges(surface),
+        "Interpolation error": _errors(surface.about),
+        "Steps and frames": _FRAMES,
+        "Transients": _TRANSIENTS,
+        "Limits": _LIMITS,
+    }
+    return page(MODEL, lead, facts, table, sections)
+
+
+_SHOWN = {"Fz": (1e-3, "kN"), "alpha": (180.0 / math.pi, "deg"), "kappa": (100.0, "%"),
+          "camber": (180.0 / math.pi, "deg"), "speed": (3.6, "km/h"),
+          "pressure": (1e-5, "bar")}  # fmt: skip
+
+
+def _ranges(surface: Surface) -> str:
+    rows = [
+        (name, f"{factor * low:.4g}", f"{factor * high:.4g}", unit)
+        for (name, (factor, unit)), low, high in zip(
+            _SHOWN.items(), surface.low, surface.high, strict=True
+        )
+    ]
+    return html_table(("input", "from", "to", "unit"), rows) + (
+        "<p>Outside, nothing is extrapolated: <code>frame_valid</code> is false, the last frame is "
+        "held, <code>status</code> names the inputs.</p>"
+    )
+
+
+def _errors(about: Mapping[str, Any]) -> str:
+    rows = [
+        (
+            name, f"{part['points']}", f"{part['strain_ustrain_rms']:.0f}",
+            f"{part['strain_ustrain_median_of_largest']:.0f}",
+            f"{part['strain_ustrain_largest']:.0f}",
+        )
+        for name, part in about.get("left_out", {}).items()
+    ]  # fmt: skip
+    head = ("part of the range", "points", "rms [ustrain]", "largest of a waveform, median",
+            "largest of all")  # fmt: skip
+    spread = float(about.get("strain_spread_ustrain", math.nan))
+    return (
+        f"{html_table(head, rows)}\n<p>Against {about.get('solutions', 0)} solutions of the "
+        "numerical rig, each left out with its mirror image. The strain itself spreads by "
+        f"{spread:.0f} ustrain (rms); the largest errors are at the edges of the contact.</p>"
+    )
+
+
+_CONVENTIONS = """<p>All values are SI, ISO 8855: a positive slip angle gives a negative lateral
+force. <code>wheel_angle</code> is 0 where the gages are over the road. The slip ratio refers to the
+travel speed: a wheel that rolls freely at a slip angle has cos(alpha) - 1.</p>"""
+_FRAMES = """<p>Samples are taken at whole multiples of the sample period. After a step the frame
+holds the samples that were due in it, oldest first, the last one repeated to the frame's end; a
+step may have any length up to a full frame. Frames of any length hold the same samples.</p>"""
+_TRANSIENTS = """<p>Slip angle and slip ratio are felt after first-order relaxation over the way
+travelled; load, camber and pressure at once. Everything else is the steady rolling state of the
+numerical rig.</p>"""
+_LIMITS = """<ul>
+<li>Steady rolling only, apart from the relaxation: no vibration, no uneven road.</li>
+<li>Gages are alike and exact but for the noise and the faults that are asked for.</li>
+<li>Without a finite speed the wheel goes on at its last turn rate, not valid.</li>
+</ul>"""
