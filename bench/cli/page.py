@@ -12,9 +12,9 @@ from rich.console import Console
 from bench.chain import Turn
 from bench.device import Device
 from bench.links import Link
-from bench.page.commands import Switch
 from bench.page.feed import About, WatchedLink
 from bench.page.live import LOOPBACK, LivePage, PageChoice
+from bench.page.recording_switch import RecordingSwitch
 from bench.wheels import Wheels
 from tirelib.estimators.calibration import Calibration
 
@@ -73,9 +73,10 @@ class Shown:
         self._page: LivePage | None = None
         self.quiet = choice.terminal and console.is_terminal
 
-    def watched(self, link: Link) -> Link:
-        """Return the link that the session is to read."""
-        self._link = WatchedLink(link)
+    def watched(self, link: Link, switch: RecordingSwitch | None) -> Link:
+        """Return the link that the session is to read, each read recorded before it is decoded."""
+        self._link = WatchedLink(link, switch)
+        self._switch = switch
         return self._link
 
     def open(
@@ -84,7 +85,6 @@ class Shown:
         fmu: Path,
         calibration: Calibration | None,
         devices: Mapping[int | None, Device],
-        switch: Switch | None,
     ) -> None:
         """Start what is to be shown and say where it is."""
         choice, console = self._choice, self._console
@@ -100,7 +100,7 @@ class Shown:
             about = About(self._link.name, fmu.name, calibration.tire, calibration.lateral)
         elif lateral is not None:
             about = About(self._link.name, fmu.name, "", lateral)
-        page = LivePage(choice, wheels, self._link, about, switch)
+        page = LivePage(choice, wheels, self._link, about, self._switch)
         self._page = self._stack.enter_context(page)
         if choice.open_to_others:
             console.print(

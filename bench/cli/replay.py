@@ -41,4 +41,4 @@ def replay(
 ) -> None:
     """Estimate from a recording what the run estimated."""
     context.invoke(run, replay=recording, fmu_file=fmu_file, trust=trust, pace=pace,
-                   numbers=numbers, json_file=json_file, no_page=True)  # fmt: skip
+                   numbers=numbers, json_file=json_file, page=False)  # fmt: skip

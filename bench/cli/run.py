@@ -22,6 +22,7 @@ from bench.cli.options import (
     port_options,
     protocol_of,
 )
+from bench.cli.page import Shown, page_choice, page_options
 from bench.cli.stop import on_stop
 from bench.conditions import Conditions, read_conditions
 from bench.device import Device
@@ -30,6 +31,7 @@ from bench.errors import DeviceError
 from bench.fmu_archive import FmuArchive, read_fmu
 from bench.links import Link
 from bench.links.opening import PortPlan
+from bench.page.recording_switch import RecordingSwitch
 from bench.protocols.plan import ProtocolPlan
 from bench.recording import Recorder, RecordingHeader
 from bench.session import Limits, Outcome, Session
@@ -94,7 +96,7 @@ class Source:
               help="End when nothing came for so long.")  # fmt: skip
 @click.option("--turns", metavar="N", type=click.IntRange(min=1), help="End after so many turns.")
 @bridge_options
-@click.option("--no-page", is_flag=True, help="No live page in the browser (there is none yet).")
+@page_options
 @click.pass_context
 def run(
     context: click.Context,
@@ -123,13 +125,19 @@ def run(
     turns: int | None,
     estimates_out: str | None,
     plotjuggler: str | None,
-    no_page: bool,
+    page: bool | None,
+    host: str,
+    network: bool,
+    page_port: int,
+    tui: bool,
 ) -> None:
     """Estimate Fz, alpha, kappa and Fy of each turn, live from a port or from a recording."""
     if (port is None) == (replay is None):
         raise click.UsageError("just one of --port and --replay is needed")
     if replay is not None and record is not None:
         raise click.UsageError("--record goes with --port: a recording is there already")
+    paced = replay is None or pace is not None
+    choice = page_choice(page, host, network, page_port, tui, paced=paced)
     archive = read_fmu(fmu_file)
     given = _conditions(speed, pressure, camber, sidecar)
     devices, device_text = devices_of(device_texts)
@@ -154,21 +162,32 @@ def run(
         if calibration is not None:
             for device in source.devices.values():
                 device.check_layout(calibration.lateral, str(fmu_file))
-        recorder = None
-        if record is not None:
+        shown = stack.enter_context(Shown(choice, console))
+        recorder: RecordingSwitch | None = None
+        if replay is None:
             settings = {"port": port, "baud": baud, "bitrate": bitrate,
                         "data_bitrate": data_bitrate, "wheels": list(numbers),
                         "fmu": str(fmu_file), "speed_kmh": speed, "pressure_bar": pressure,
                         "camber_deg": camber}  # fmt: skip
-            header = RecordingHeader(settings, source.device_text, archive.sha256,
-                                     source.protocol.as_header())  # fmt: skip
-            recorder = stack.enter_context(Recorder(record, header, source.conditions))
+
+            def begin(file: Path) -> Recorder:
+                header = RecordingHeader(settings, source.device_text, archive.sha256,
+                                         source.protocol.as_header())  # fmt: skip
+                return Recorder(file, header, source.conditions)
+
+            first = record or Path(time.strftime("tirebench-%Y%m%d-%H%M%S.mcap"))
+            switch = RecordingSwitch(begin, first, started=record is not None)
+            recorder = stack.enter_context(switch)
+        link = shown.watched(source.link, recorder)
         wheels = Wheels(source.protocol.decoder(), models.of_wheel, source.devices,
                         source.conditions, source.wheels)  # fmt: skip
         limits = Limits(duration, silence, turns)
         keep = json_file is not None
-        outcome, used = _session(source, wheels, models, recorder, limits, keep, console, bridges)
-    _summary(console, outcome, wheels, used, source, record)
+        shown.open(wheels, fmu_file, calibration, source.devices)
+        outcome, used = _session(
+            link, wheels, models, recorder, limits, keep, console, bridges, shown
+        )
+    _summary(console, outcome, wheels, used, source, recorder)
     if json_file is not None:
         origin = {"link": source.link.name, "fmu_sha256": archive.sha256, "ended": outcome.reason,
                   "cpu_share": used if source.link.live else None}  # fmt: skip
@@ -212,31 +231,37 @@ class _Models:
 
 
 def _session(
-    source: Source,
+    link: Link,
     wheels: Wheels,
     models: _Models,
-    recorder: Recorder | None,
+    recorder: RecordingSwitch | None,
     limits: Limits,
     keep: bool,
     console: Console,
     bridges: Bridges,
+    shown: Shown,
 ) -> tuple[Outcome, float]:
     """Run until something ends it; return what came of it and the share of a core it took."""
-    with Screen(console, wheels, source.link.name) as screen:
+    with ExitStack() as stack:
+        screen = None
+        if not shown.quiet:
+            screen = stack.enter_context(Screen(console, wheels, link.name))
 
         def watch(turns: list[Turn]) -> None:
-            for said in models.take_messages():
-                console.print(f"FMU: {said}", soft_wrap=True, markup=False)
-            screen.watch(turns)
+            messages = models.take_messages()
+            if screen is not None:
+                for said in messages:
+                    console.print(f"FMU: {said}", soft_wrap=True, markup=False)
+                screen.watch(turns)
             bridges.send(turns)
+            shown.watch(turns, messages)
 
-        session = Session(
-            source.link, wheels, recorder=recorder, limits=limits, keep=keep, watch=watch
-        )
+        session = Session(link, wheels, limits=limits, keep=keep, watch=watch)
         start = time.monotonic(), time.process_time()
         with on_stop(session.stop):
             outcome = session.run()
         used = (time.process_time() - start[1]) / max(time.monotonic() - start[0], 1e-9)
+        shown.end(outcome.reason)
     if recorder is not None:
         recorder.close(outcome.reason)
     return outcome, used
@@ -295,7 +320,7 @@ def _summary(
     wheels: Wheels,
     used: float,
     source: Source,
-    record: Path | None,
+    recorder: RecordingSwitch | None,
 ) -> None:
     """Say how it ended and what came of it."""
     if outcome.message:
@@ -312,5 +337,5 @@ def _summary(
         middle, high = np.percentile(np.array(outcome.latency) * 1e3, (50, 99))
         console.print(f"byte in to estimate out: median {middle:.1f} ms, 99 % {high:.1f} ms; "
                       f"{100 * used:.0f} % of a core")  # fmt: skip
-    if record is not None:
-        console.print(f"recorded: {record}", soft_wrap=True)
+    for file in () if recorder is None else recorder.files:
+        console.print(f"recorded: {file}", soft_wrap=True)

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-INSTALL = 600.0
+INSTALL = 240.0
 """Time that an installation may take, [s]."""
 
 
@@ -32,6 +32,7 @@ def chromium() -> Iterator[Any]:
     api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     path = _found()
     if path is None and hasattr(os, "geteuid") and os.geteuid() == 0 and shutil.which("apt-get"):
+        _done("apt-get", "update")
         _done("apt-get", "install", "-y", "--no-install-recommends", "chromium")
         path = _found()
     if path is None and not _done(sys.executable, "-m", "playwright", "install", "chromium"):

@@ -1,0 +1,173 @@
+"""What the viewers ask the run to do: set a marker, start or stop recording.
+
+A command crosses from the page's process as JSON in one write of a pipe; the run asks for it
+between two reads and never waits. Nothing that a viewer sends names a file.
+"""
+
+import json
+import time
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from typing import Any, Protocol
+
+from bench.errors import BenchError, DeviceError
+
+LONGEST_MARKER = 200
+"""Characters of a marker."""
+KINDS = ("marker", "record")
+ASK_EVERY = 0.05
+"""Time between two looks into the pipe, [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """One wish of a viewer.
+
+    Attributes
+    ----------
+    kind : str
+        ``marker`` or ``record``.
+    text : str
+        Of a marker.
+    on : bool
+        Whether to record.
+    """
+
+    kind: str
+    text: str = ""
+    on: bool = False
+
+    def pack(self) -> bytes:
+        """Return the command as bytes, short enough for one write of a pipe."""
+        return json.dumps([self.kind, self.text, self.on]).encode()
+
+    @classmethod
+    def unpack(cls, data: bytes) -> "Command":
+        """Return the command of `pack`, checked again."""
+        kind, text, on = json.loads(data)
+        return parse_command({"command": kind, "text": text, "on": on})
+
+
+def parse_command(document: Any) -> Command:
+    """Return the command that a viewer sent.
+
+    Raises
+    ------
+    DeviceError
+        If it is none.
+    """
+    given = document.get("command") if isinstance(document, dict) else type(document).__name__
+    if given not in KINDS:
+        raise DeviceError(
+            f"command = {str(given)[:40]!r}; {' and '.join(KINDS)} are known; send one of them"
+        )
+    text, on = document.get("text", ""), document.get("on", False)
+    printable = isinstance(text, str) and all(c.isprintable() for c in text)
+    if not printable or len(text) > LONGEST_MARKER or not isinstance(on, bool):
+        raise DeviceError(
+            f"command = {given!r} with text of {len(str(text))} characters, on = {on!r}; a line of "
+            f"up to {LONGEST_MARKER} characters and true or false are needed; shorten it"
+        )
+    return Command(str(given), text, on)
+
+
+class Target(Protocol):
+    """What records: the recorder of the run."""
+
+    bytes: int
+
+    def marker(self, text: str) -> None:
+        """Write a marker."""
+
+
+class Switch(Protocol):
+    """Recording that is turned on and off while the run goes on."""
+
+    @property
+    def recorder(self) -> Target | None:
+        """What records now; None if nothing does."""
+
+    def start(self) -> str:
+        """Begin a recording and return its name; the name of one that is going on."""
+
+    def stop(self) -> None:
+        """End the recording that is going on, if there is one."""
+
+
+class CommandDesk:
+    """Take commands from the page and carry them out between two reads.
+
+    Parameters
+    ----------
+    switch : Switch or None
+        None when there is nothing to record, as in a replay.
+    """
+
+    def __init__(self, switch: Switch | None) -> None:
+        self._switch = switch
+        self._pipes: list[Connection] = []
+        self._next = 0.0
+        self._markers = 0
+        self._done: list[dict[str, Any]] = []
+        self._name = ""
+
+    def listen(self, pipe: Connection) -> None:
+        """Take commands from this pipe from now on, instead of the one before."""
+        self._pipes.append(pipe)
+
+    def poll(self) -> None:
+        """Carry out what has come; costs a system call, at most every `ASK_EVERY`."""
+        now = time.monotonic()
+        if now < self._next:
+            return
+        self._next = now + ASK_EVERY
+        while len(self._pipes) > 1:
+            self._pipes.pop(0).close()
+        while self._pipes:
+            try:
+                if not self._pipes[0].poll(0):
+                    return
+                data = self._pipes[0].recv_bytes(8192)
+            except (EOFError, OSError):
+                self._pipes.pop(0).close()
+                return
+            try:
+                self._carry_out(Command.unpack(data))
+            except (BenchError, ValueError, TypeError) as error:
+                self._say(False, str(error))
+
+    def _carry_out(self, command: Command) -> None:
+        switch = self._switch
+        if switch is None:
+            self._say(False, "this run cannot record: a recording is being replayed")
+        elif command.kind == "marker":
+            if switch.recorder is None:
+                self._say(False, "nothing is being recorded: start a recording first")
+                return
+            self._markers += 1
+            text = command.text or f"marker {self._markers}"
+            switch.recorder.marker(text)
+            self._say(True, f"marker set: {text}")
+        elif command.on:
+            self._name = switch.start()
+            self._say(True, f"recording {self._name}")
+        else:
+            switch.stop()
+            self._say(True, "recording stopped")
+
+    def _say(self, good: bool, text: str) -> None:
+        number = self._done[-1]["number"] + 1 if self._done else 1
+        self._done = [*self._done[-4:], {"number": number, "good": good, "text": text}]
+
+    def state(self) -> dict[str, Any]:
+        """Return what the page shows of it."""
+        recorder = None if self._switch is None else self._switch.recorder
+        return {
+            "recording": {
+                "possible": self._switch is not None,
+                "on": recorder is not None,
+                "bytes": 0 if recorder is None else recorder.bytes,
+                "markers": self._markers,
+            },
+            "answers": self._done,
+        }

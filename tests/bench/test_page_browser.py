@@ -1,0 +1,361 @@
+"""The page in a real browser: what it shows is what was recorded; keys; two viewers."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bench.page.feed import About, WatchedLink
+from bench.page.history import COLUMNS
+from bench.page.laps import GRID
+from bench.page.live import LivePage, PageChoice
+from bench.page.quantities import UNITS
+from bench.recording import Recording
+from tests.bench.browser import chromium
+from tests.bench.conftest import Spawn
+from tests.bench.test_live import PATIENCE, port_of, result
+from tests.bench.test_page import FakeChain, FakeLink, FakeWheels, turn
+from tirelib.estimators.calibration import Calibration
+from tirelib.estimators.calibration_file import write_calibration
+from tirelib.fmu.build import build_fmu
+
+WAIT = 1000.0 * PATIENCE
+DIGITS = {"Fz": (1.0, 0), "alpha": (1.0, 2), "kappa": (100.0, 2), "Fy": (1.0, 0)}
+NOTHING = "\u2013"
+ROWS = "wheel => (tirebench.wheels.get(wheel)?.rows ?? []).map(row => Array.from(row))"
+
+
+@dataclass
+class Visit:
+    """What was seen on the page of one run, and what the run recorded."""
+
+    pressed: dict[str, Any] = field(default_factory=dict)
+    rows: dict[int, list[list[float]]] = field(default_factory=dict)
+    rows_again: list[list[float]] = field(default_factory=list)
+    other_rows: list[list[float]] = field(default_factory=list)
+    numbers: dict[str, dict[str, str]] = field(default_factory=dict)
+    counters: dict[str, str] = field(default_factory=dict)
+    trace: Any = None
+    lengths: list[str] = field(default_factory=list)
+    addresses: list[str] = field(default_factory=list)
+    complaints: list[str] = field(default_factory=list)
+    unplugged: str = ""
+    replay: dict[str, Any] = field(default_factory=dict)
+    markers: list[str] = field(default_factory=list)
+    host: str = ""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def spawn_all(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Spawn]:
+    """Start ``tirebench`` with its output in a file that nobody has to empty."""
+    started: list[subprocess.Popen[str]] = []
+    folder = tmp_path_factory.mktemp("output")
+
+    def start(*arguments: object) -> "subprocess.Popen[str]":
+        with (folder / f"{arguments[0]}.txt").open("w") as file:
+            process = subprocess.Popen(
+                [sys.executable, "-u", "-m", "bench", *map(str, arguments)],
+                stdout=file, stderr=subprocess.STDOUT, text=True,
+            )  # fmt: skip
+        process.output = folder / f"{arguments[0]}.txt"  # type: ignore[attr-defined]
+        started.append(process)
+        return process
+
+    yield start
+    for process in started:
+        if process.poll() is None:
+            process.kill()
+        process.wait()
+
+
+def address_of(run: Any) -> str:
+    """Wait until a run says where its page is."""
+    end = time.monotonic() + PATIENCE
+    while not (found := re.search(r"live page: (\S+)\n", run.output.read_text())):
+        assert time.monotonic() < end
+        assert run.poll() is None, run.output.read_text()
+        time.sleep(0.05)
+    return found[1]
+
+
+def opened(browser: Any, url: str, visit: Visit) -> Any:
+    context = browser.new_context(color_scheme="light", viewport={"width": 1280, "height": 800})
+    page = context.new_page()
+    page.set_default_timeout(WAIT)
+    page.on("request", lambda request: visit.addresses.append(request.url))
+    page.on("websocket", lambda stream: visit.addresses.append(stream.url))
+    page.on("console", lambda said: visit.complaints.append(said.text))
+    page.on("pageerror", lambda error: visit.complaints.append(str(error)))
+    page.goto(url)
+    return page
+
+
+@pytest.fixture(scope="module")
+def visit(
+    browser: Any, spawn_all: Spawn, campaign: Path, calibration: Calibration,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Visit:  # fmt: skip
+    folder, seen = tmp_path_factory.mktemp("visit"), Visit()
+    write_calibration(calibration, folder / "cal.toml")
+    fmu = build_fmu(folder / "cal.toml", folder / "StrainTire.fmu", samples_per_step=16)
+    emulator = spawn_all("emulate", "--campaign", campaign, "--all", "--loop", "--wheel", 0,
+                          "--wheel", 5, "--port-file", folder / "port", "--fault", "lost=0.002",
+                          "--conditions", folder / "c.json")  # fmt: skip
+    port = port_of(folder / "port")
+    run = spawn_all("run", "--port", port, "--fmu", fmu, "--trust", "--conditions",
+                     folder / "c.json", "--record", folder / "a.mcap")  # fmt: skip
+    url = address_of(run)
+    seen.host = re.split("[/?]", url)[2]
+    page = opened(browser, url, seen)
+    other = opened(browser, url, seen)
+    wait_for(page, "tirebench.wheels.get(5)?.last?.turn > 12 && tirebench.lap?.laps > 3")
+    press_keys(page, seen)
+    look(page, seen)
+    for wheel in (0, 5):
+        seen.rows[wheel] = page.evaluate(ROWS, wheel)
+    seen.other_rows = other.evaluate(ROWS, 0)
+    for process in pages_of(run.pid):
+        os.kill(process, signal.SIGKILL)
+    wait_for(page, "tirebench.page.starts === 2 && tirebench.away === null")
+    seen.rows_again = page.evaluate(ROWS, 0)
+    page.keyboard.press("Space")
+    emulator.send_signal(signal.SIGKILL)
+    status = page.locator("#status")
+    status.filter(has_text="unplugged since").wait_for()
+    seen.unplugged = status.inner_text()
+    page.context.close()
+    other.context.close()
+    run.send_signal(signal.SIGINT)
+    run.wait(PATIENCE)
+    replay = spawn_all("replay", folder / "a.mcap", "--fmu", fmu,
+                        "--json", folder / "r.json")  # fmt: skip
+    assert replay.wait(2.0 * PATIENCE) == 0
+    seen.replay = result(folder / "r.json")
+    recording = Recording(folder / "a.mcap")
+    seen.markers = re.findall(
+        r'"marker", "text": "(.*?)"', (folder / "a.mcap").read_text("latin-1")
+    )
+    recording.close()
+    return seen
+
+
+def pages_of(run: int) -> list[int]:
+    """Return the processes that a run has spawned to show itself."""
+    pages = []
+    for entry in Path("/proc").iterdir():
+        try:
+            mine = entry.name.isdecimal() and f"PPid:\t{run}\n" in (entry / "status").read_text()
+            if mine and b"spawn_main" in (entry / "cmdline").read_bytes():
+                pages.append(int(entry.name))
+        except OSError:
+            continue
+    return pages
+
+
+def wait_for(page: Any, script: str) -> None:
+    """Wait until a script gives true; Playwright's own way evaluates text, which is forbidden."""
+    end = time.monotonic() + PATIENCE
+    while page.evaluate(script) is not True:
+        assert time.monotonic() < end, script
+        page.wait_for_timeout(50)
+
+
+def press_keys(page: Any, seen: Visit) -> None:
+    """Press each key once, or there and back, and note what came of it."""
+    keyboard, got = page.keyboard, seen.pressed
+
+    def note(key: str, script: str) -> None:
+        before = page.evaluate(script)
+        keyboard.press(key)
+        wait_for(page, f"({script}) !== {json.dumps(before)}")
+        got[key] = (before, page.evaluate(script))
+
+    note("d", "document.documentElement.dataset.theme")
+    note("z", "document.querySelector('.trace .chart').plot.scales.x.max")
+    note("-", "tirebench.seconds")
+    note("+", "tirebench.seconds")
+    note("?", "document.getElementById('help-box').open")
+    note("Escape", "document.getElementById('help-box').open")
+    note("2", "tirebench.wheel")
+    note("1", "tirebench.wheel")
+    note("n", "document.getElementById('toast').textContent")
+    note("m", "document.getElementById('marker-box').open")
+    keyboard.type("kerb, right")
+    note("Enter", "document.getElementById('toast').textContent")
+    keyboard.press("z")
+    wait_for(page, "tirebench.lap?.wheel === 0 && tirebench.band != null")
+    note(" ", "tirebench.hold")
+
+
+def look(page: Any, seen: Visit) -> None:
+    """Note what stands on the page, which is held."""
+    for name in UNITS:
+        box = page.locator(f"#q-{name}")
+        seen.numbers[name] = {
+            "value": box.locator(".value").inner_text(),
+            "limits": box.locator(".pm").inner_text(),
+            "why": box.locator(".why").inner_text(),
+            "turn": box.get_attribute("data-turn"),
+            "raw": box.get_attribute("data-value"),
+        }
+    seen.lengths = page.locator("#shape text[data-gage]").all_text_contents()
+    seen.trace = page.evaluate(
+        "[...document.querySelectorAll('.trace .chart')].map(c => c.plot.data.map(d => [...d]))"
+    )
+    cells = page.locator("#health tbody tr").first.locator("td[data-counter]")
+    for cell in cells.all():
+        seen.counters[cell.get_attribute("data-counter")] = cell.inner_text()
+
+
+def recorded(seen: Visit, wheel: int) -> list[dict[str, Any]]:
+    return [turn for turn in seen.replay["turns"] if turn["wheel"] == wheel]
+
+
+def shown_text(value: float | None, factor: float, digits: int) -> str:
+    if value is None:
+        return NOTHING
+    text = f"{factor * value:.{digits}f}"
+    return (text.replace("-", "") if float(text) == 0.0 else text).replace("-", "\u2212")
+
+
+def test_every_turn_on_the_page_is_that_of_the_recording(visit: Visit) -> None:
+    for wheel, rows in visit.rows.items():
+        turns = recorded(visit, wheel)
+        kept = [row for i, row in enumerate(rows) if i + 1 == len(rows) or row[0] != rows[i + 1][0]]
+        assert 12 < len(kept) <= len(turns)
+        for row, turn in zip(kept, turns, strict=False):
+            shown = dict(zip(COLUMNS, row, strict=True))
+            assert shown["time"] == turn["device_time"]
+            assert int(shown["valid"]) >> 4 & 1 == turn["valid"]
+            for place, name in enumerate(UNITS):
+                value = float("nan") if turn[name] is None else turn[name]
+                np.testing.assert_equal(float(shown[name]), value)
+                assert int(shown["valid"]) >> place & 1 == turn[f"{name}_valid"]
+
+
+def test_the_large_numbers_are_those_of_the_recording(visit: Visit) -> None:
+    for name, seen in visit.numbers.items():
+        turn = recorded(visit, 0)[int(seen["turn"]) - 1]
+        factor, digits = DIGITS[name]
+        assert json.loads(seen["raw"]) == turn[name]
+        # JavaScript and Python round a half differently, which no measured value is
+        assert seen["value"] == shown_text(turn[name], factor, digits)
+        std = turn[f"{name}_std"]
+        half = None if std is None else 1.959964 * std
+        assert seen["limits"] == f"± {shown_text(half, factor, digits)}"
+        assert seen["why"].startswith("invalid: ") == (not turn[f"{name}_valid"])
+        assert bool(seen["why"]) == bool(turn["flags"])
+    lengths = [turn[f"contact_length_{gage}_mm"] for gage in range(1, 6)]
+    known = any(x is not None for x in lengths)
+    assert visit.lengths == (["-" if x is None else f"{x:.0f}" for x in lengths] if known else [])
+
+
+def test_five_traces_lie_over_wheel_angle_with_their_band(visit: Visit) -> None:
+    assert len(visit.trace) == 5
+    for angle, high, low, strain in visit.trace:
+        np.testing.assert_allclose(angle, GRID)
+        top, bottom, line = (np.array(x, dtype=float) for x in (high, low, strain))
+        assert np.nanmax(line) > 1000.0  # microstrain: the contact is in it
+        assert abs(GRID[np.nanargmax(line)]) < 12.0  # and under the axle
+        assert (top >= bottom)[np.isfinite(top)].all()
+        assert np.isfinite(top).mean() > 0.9
+
+
+def test_every_key_does_what_the_help_says(visit: Visit) -> None:
+    got = visit.pressed
+    assert got["d"] == ("light", "dark")
+    assert got["z"] == (180, 40)
+    assert got["-"] == (30, 60)
+    assert got["+"] == (60, 30)
+    assert got["?"] == (False, True)
+    assert got["Escape"] == (True, False)
+    assert got["2"] == (0, 5)
+    assert got["1"] == (5, 0)
+    assert got[" "] == (False, True)
+    assert got["n"][1] == "marker set: marker 1"
+    assert got["Enter"][1] == "marker set: kerb, right"
+
+
+def test_markers_of_the_page_stand_in_the_recording(visit: Visit) -> None:
+    assert visit.markers == ["marker 1", "kerb, right"]
+
+
+def test_losses_are_counted_on_the_page(visit: Visit) -> None:
+    line = visit.replay["wheels"]["0"]
+    assert 0 < int(visit.counters["frames"]) <= line["frames"]
+    assert int(visit.counters["crc_bad"]) == line["crc_bad"] == 0
+    assert 0 <= int(visit.counters["lost_frames"]) <= line["lost_frames"]
+
+
+def test_two_viewers_see_the_same(visit: Visit) -> None:
+    both = min(len(visit.other_rows), len(visit.rows[0]))
+    assert both > 12
+    np.testing.assert_array_equal(
+        np.array(visit.other_rows[:both], dtype=float), np.array(visit.rows[0][:both], dtype=float)
+    )
+
+
+def test_the_page_needs_no_other_address_and_breaks_no_policy(visit: Visit) -> None:
+    places = {re.split("[/?]", address)[2] for address in visit.addresses}
+    assert places == {visit.host}
+    lost = "WebSocket connection to"  # what a browser says when the server was killed
+    assert [said for said in visit.complaints if not said.startswith(lost)] == []
+
+
+def test_a_page_that_is_killed_comes_back_and_still_knows_every_turn(visit: Visit) -> None:
+    before, after = np.array(visit.rows[0], float), np.array(visit.rows_again, float)
+    assert len(after) > len(before)
+    np.testing.assert_array_equal(after[: len(before)], before)
+    assert (np.diff(after[:, 0]) >= 0.0).all()  # told anew, not twice
+
+
+def test_a_pulled_cable_is_told(visit: Visit) -> None:
+    assert re.fullmatch(r"unplugged since \d\d:\d\d:\d\d", visit.unplugged)
+
+
+def test_without_data_the_page_says_what_it_waits_for(browser: Any) -> None:
+    seen, wheels = Visit(), FakeWheels()
+    link = WatchedLink(FakeLink())
+    with LivePage(PageChoice(), wheels, link, About("port"), None) as run:  # type: ignore[arg-type]
+        run.watch([])
+        page = opened(browser, run.url, seen)
+        page.locator("#status").filter(has_text="waiting for the first frame").wait_for()
+        assert page.locator("#record").is_disabled()
+        assert page.locator("#q-Fz .value").inner_text() == NOTHING
+        run.end("stopped")
+        page.locator("#status").filter(has_text="run ended: stopped").wait_for()
+        page.context.close()
+    assert seen.complaints == []
+
+
+def test_single_turns_shortly_after_each_other_all_arrive(browser: Any) -> None:
+    """News that come while the page looks away are not slept through."""
+    wheels: Any = FakeWheels()
+    wheels.chains[0] = FakeChain()
+    link = WatchedLink(FakeLink())
+    link.heard = time.time() + 30.0
+    with LivePage(PageChoice(), wheels, link, About("port"), None) as run:
+        page = opened(browser, run.url, Visit())
+        for number in range(1, 7):
+            run.watch([turn(number)])
+            wait_for(page, f"() => ({ROWS})(0).length === {number}")
+            time.sleep(0.03)  # about a tick: into the gap between looking and waiting
+        run.end("stopped")
+        page.locator("#status").filter(has_text="run ended: stopped").wait_for()
+        page.context.close()
