@@ -24,7 +24,8 @@ from bench.recording import Recording
 from tests.bench.browser import chromium
 from tests.bench.conftest import Spawn
 from tests.bench.test_live import PATIENCE, port_of, result
-from tests.bench.test_page import FakeChain, FakeLink, FakeWheels, turn
+from tests.bench.test_page import FakeChain, FakeLink, FakeWheels
+from tests.bench.test_page import turn as made_turn
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.fmu.build import build_fmu
@@ -353,7 +354,7 @@ def test_single_turns_shortly_after_each_other_all_arrive(browser: Any) -> None:
     with LivePage(PageChoice(), wheels, link, About("port"), None) as run:
         page = opened(browser, run.url, Visit())
         for number in range(1, 7):
-            run.watch([turn(number)])
+            run.watch([made_turn(number)])
             wait_for(page, f"() => ({ROWS})(0).length === {number}")
             time.sleep(0.03)  # about a tick: into the gap between looking and waiting
         run.end("stopped")
