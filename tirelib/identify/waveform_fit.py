@@ -28,6 +28,8 @@ SETTLED = 0.01
 """Gauss-Newton step, in standard deviations, below which the fit has settled."""
 NEAR = 1.0
 """The same, below which whitening and the misfit's shapes are kept: they hardly change any more."""
+FOLLOWED = 25
+"""Steps after which the cost is kept in any case: one that follows the solution may go in circles."""
 LEAST_FALL = 1e-3
 """Fall of the cost below which a step is the last: the bottom may have an edge, where an
 integration node of the contact meets its end."""
@@ -128,7 +130,7 @@ def fit_waveforms(
     solver = Solver(data, start, prior, free, changes, discrepancy, exact)
     moved = np.inf
     for steps in range(1, MAX_STEPS + 1):
-        solver.refresh(renew=moved > NEAR)
+        solver.refresh(renew=moved > NEAR and steps <= FOLLOWED)
         moved = solver.step()
         if progress is not None:
             progress(f"error {solver.cost.error(solver.model):.2f}")

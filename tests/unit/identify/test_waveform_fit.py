@@ -253,3 +253,23 @@ def test_a_tire_with_damping_is_fitted_as_one() -> None:
     assert fit.error == pytest.approx(1.0, abs=0.05)
     still = fit_waveforms(measured, values_of(START), WIDE, free=FITTED)
     assert still.error > 1.5
+
+
+def test_a_cost_that_follows_the_solution_is_kept_in_the_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Or it could go in circles for ever: the last steps are downhill on one surface."""
+    renewed: list[bool] = []
+    whole = waveform_fit.Solver.refresh
+
+    def refresh(self: waveform_fit.Solver, *, renew: bool = True) -> None:
+        if not renewed:
+            whole(self)
+        renewed.append(renew)
+
+    monkeypatch.setattr(waveform_fit.Solver, "refresh", refresh)
+    monkeypatch.setattr(waveform_fit.Solver, "step", lambda self: 5.0)
+    with pytest.raises(ConvergenceError):
+        plain(data(loads=LOADS[::2]))
+    kept = waveform_fit.FOLLOWED
+    assert renewed == [True] * kept + [False] * (waveform_fit.MAX_STEPS - kept)
