@@ -144,7 +144,8 @@ def _say_damping(console: Console, damping: dict[str, Any]) -> None:
         flags = f" ({', '.join(found['flags'])})" if found["flags"] else ""
         return f"{found['value']:.3f}, 95 % {found['low']:.3f} to {found['high']:.3f}{flags}"
 
-    console.print(f"  damping of the sidewall's dashpots {words(damping)}, from strain alone")
+    console.print(f"  damping of the sidewall's dashpots {words(damping)}, from strain alone;")
+    console.print("    not in the model: `tirelib add sidewall_damping` puts it there")
     readings, modal = damping["readings"], damping["modal"]
     console.print(f"    against the trigger: {words(readings['with_angle'])}")
     if modal is not None:
@@ -152,7 +153,6 @@ def _say_damping(console: Console, damping: dict[str, Any]) -> None:
             f"    as a ratio of every mode, Eq. (107): {words(modal['without_angle'])}; `simulate "
             "--damping` takes this one"
         )
-    console.print("    not in the model: `tirelib add sidewall_damping` puts it there")
 
 
 def _say_brush(console: Console, document: dict[str, Any]) -> None:

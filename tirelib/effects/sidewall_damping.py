@@ -1,15 +1,16 @@
-"""Damping of the rolling tire."""
+"""Damping of the sidewall."""
 
 from tirelib.effects.effect import State, effect
 
 
 @effect(
     "sidewall_damping", stage="stiffness", unit="1", low=0.0, high=0.3, varies_with=("speed",),
-    source="dissertation, Eq. (107) and Fig. 6-33: 0 to 0.1 there",
+    source="dissertation, Fig. 6-33: 0 to 0.1 there; dashpots instead of the modal Eq. (107)",
 )  # fmt: skip
 def sidewall_damping(state: State, strength: float) -> State:
     """Damping of the sidewall, which shifts the contact forward with speed.
 
-    lambda + s in c_n = 2 lambda sqrt(m_n k_n).
+    Dashpots beside the springs, c = 2 s sqrt(k rho A) for k_u and k_v. The same ratio in every
+    mode, Eq. (107), would damp the belt's bending as well.
     """
-    return state.but(damping=state.damping + strength)
+    return state.but(dashpots=state.dashpots + strength)

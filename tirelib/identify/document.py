@@ -118,7 +118,7 @@ def model_file(
         beside["identified_damping"] |= {
             "modal_value": modal.value,
             "modal_interval": [modal.low, modal.high],
-            "modal_law": "c_n = 2 lambda sqrt(m_n k_n), as simulate and sidewall_damping take it",
+            "modal_law": "c_n = 2 lambda sqrt(m_n k_n), as simulate takes it",
         }
     extra = {
         **found.tire.extra,

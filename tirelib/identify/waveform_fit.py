@@ -29,7 +29,7 @@ SETTLED = 0.01
 NEAR = 1.0
 """The same, below which whitening and the misfit's shapes are kept: they hardly change any more."""
 FOLLOWED = 25
-"""Steps after which the cost is kept in any case: one that follows the solution may go in circles."""
+"""Steps after which the cost is kept in any case: following the solution, it may go in circles."""
 LEAST_FALL = 1e-3
 """Fall of the cost below which a step is the last: the bottom may have an edge, where an
 integration node of the contact meets its end."""

@@ -65,7 +65,8 @@ class State:
     conditions : Operating
     radius, free_radius, width, thickness, offset : shape (n_points,), [m]
         Ring radius R, free radius R0, belt width b, tread thickness h0, gage offset y < 0.
-    EI, mass, tension_pressure, k_u, k_v, damping, EA, GA, rotary_inertia, inertia_share, tension
+    EI, mass, tension_pressure, k_u, k_v, damping, EA, GA, rotary_inertia, inertia_share, tension,
+    dashpots
         Of the ring (`tirelib.ring.ring.Ring`); tension_pressure is p of the tension p b R.
     k_t, hardening
         Of the tread (`tirelib.contact.tread.Tread`).
@@ -101,6 +102,7 @@ class State:
     rotary_inertia: FloatArray
     inertia_share: FloatArray
     tension: FloatArray
+    dashpots: FloatArray
     k_t: FloatArray
     hardening: FloatArray
     phi: FloatArray
@@ -140,6 +142,7 @@ class State:
             rotary_inertia=column("rotary_inertia"),
             inertia_share=np.ones(n),
             tension=np.zeros(n),
+            dashpots=np.zeros(n),
             k_t=column("tread_stiffness"),
             hardening=column("tread_hardening"),
             phi=phi,
@@ -176,6 +179,7 @@ class State:
             radial_stiffness=self.k_u,
             tangential_stiffness=self.k_v,
             damping=self.damping,
+            dashpots=self.dashpots,
             extension_stiffness=self.EA,
             shear_stiffness=self.GA,
             rotary_inertia=self.rotary_inertia,

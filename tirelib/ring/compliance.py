@@ -16,6 +16,7 @@ from tirelib.ring.ring import (
     ComplexArray,
     Ring,
     columns,
+    dashpots,
     modal_damping_time,
     modal_parts,
     plain_stiffness,
@@ -109,6 +110,8 @@ def _plain(ring: Ring, omega: float | FloatArray, n_modes: int) -> ComplexArray:
     rotary = -rho_i * (n * w * (1.0 - n**2) / r) ** 2
     further = more * ((1.0 - n**2) / r) ** 2
     lagging = static * (1.0 + 1j * n * w * modal_damping_time(ring, n_modes))
+    c_u, c_v = dashpots(ring)
+    lagging = lagging + 1j * n * w * (c_v + c_u * n**2)
     dynamic = lagging + rotation + rotary + further
     _refuse_critical(dynamic.real, static)
     shape = np.stack(
@@ -136,6 +139,9 @@ def _general(ring: Ring, omega: float | FloatArray, n_modes: int) -> ComplexArra
     elastic[..., 1, 1] += np.where(free, _RIM * np.asarray(ring.radial_stiffness).max(), 0.0)
     lag = 1.0 + 1j * n * w * modal_damping_time(ring, n_modes)
     dynamic = elastic * lag[..., None, None] + inertial
+    c_u, c_v = dashpots(ring)
+    dynamic[..., 0, 0] += 1j * n * w * c_u
+    dynamic[..., 1, 1] += 1j * n * w * c_v
     if ring.inextensible:  # v and beta are free, u = -v'
         basis = _basis([-1j * n + zero, one, zero], [zero, zero, one])
     elif ring.unshearable:  # u and v are free, beta = (v - u') / R

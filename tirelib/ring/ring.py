@@ -45,6 +45,8 @@ class Ring:
         k_u and k_v of the sidewall per length of circumference.
     damping : [-]
         lambda of Eq. (107): c_n = 2 lambda sqrt(m_n k_n), k_n without rotation.
+    dashpots : [-]
+        lambda of dashpots beside the sidewall's springs, c = 2 lambda sqrt(k rho A) each.
     extension_stiffness : [N]
         EA; infinite for the dissertation's inextensible ring.
     shear_stiffness : [N]
@@ -64,6 +66,7 @@ class Ring:
     radial_stiffness: float | FloatArray
     tangential_stiffness: float | FloatArray
     damping: float | FloatArray = 0.0
+    dashpots: float | FloatArray = 0.0
     extension_stiffness: float | FloatArray = np.inf
     shear_stiffness: float | FloatArray = np.inf
     rotary_inertia: float | FloatArray = 0.0
@@ -255,6 +258,17 @@ def modal_damping_time(ring: Ring, n_modes: int) -> FloatArray:
     n = np.arange(n_modes + 1.0)[None, :]
     time: FloatArray = 2.0 * lam * np.sqrt(m * (1.0 + n**2) / k)
     return time
+
+
+def dashpots(ring: Ring) -> tuple[FloatArray, FloatArray]:
+    """Return c_u and c_v of the sidewall's dashpots, [N s/m^2], shape (n_points, 1).
+
+    c = 2 lambda sqrt(k rho A) beside each spring, whatever the harmonic.
+    """
+    m, lam, ku, kv = columns(
+        ring.mass, ring.dashpots, ring.radial_stiffness, ring.tangential_stiffness
+    )
+    return 2.0 * lam * np.sqrt(ku * m), 2.0 * lam * np.sqrt(kv * m)
 
 
 def plain_stiffness(ring: Ring, n_modes: int) -> FloatArray:
