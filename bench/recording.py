@@ -112,7 +112,7 @@ class Recorder:
         try:
             self._writer.add_metadata("end", {"reason": reason})
             # mcap leaves this one method without annotations
-            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._writer.finish()  # type: ignore[no-untyped-call]  # mcap states no types here
             self._file.close()
         except OSError as error:
             raise _unwritable(self.path, error) from None

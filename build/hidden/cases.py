@@ -197,7 +197,7 @@ class _Search:
         else:
             states, shown = traces(self.base, {name: strength}, self.progress)
             shown = [_thinned(seen) for seen in shown]
-            slim = [replace(s, grid=None, control=None, by_load=None) for s in states]  # type: ignore[arg-type]
+            slim = [replace(s, grid=None, control=None, by_load=None) for s in states]
             keep(file, pickle.dumps((slim, shown)))
         return waveforms(self.base, states, shown, self.kind)
 
@@ -224,7 +224,7 @@ class _Search:
         return replace(
             self.floor_waves,
             strain=mixed(lambda w: w.strain),
-            conditions={n: mixed(lambda w, n=n: w.conditions[n]) for n in every[0].conditions},  # type: ignore[misc]
+            conditions={n: mixed(lambda w, n=n: w.conditions[n]) for n in every[0].conditions},
         )
 
     def _ratio(self, planted: Planted) -> float:

@@ -59,7 +59,7 @@ def plain(seed: int) -> Plain:
         near = min(states.values(), key=lambda s: _apart(s.condition, cond), default=None)
         states[run] = solve(today.tire, cond, near and _toward(near, cond), grid)
     made = Plain(today, tuple(states[k] for k in range(len(order))))
-    slim = Plain(today, tuple(replace(s, grid=None) for s in made.states))  # type: ignore[arg-type]
+    slim = Plain(today, tuple(replace(s, grid=None) for s in made.states))
     keep(file, pickle.dumps(slim))
     return made
 

@@ -212,7 +212,7 @@ def test_a_viewer_gets_each_turn_once_the_state_and_its_wheels_strain() -> None:
     with Board() as board:
         wheels: Any = FakeWheels(1, 3)
         link = WatchedLink(FakeLink(Read(1, b"x")))
-        link.receive(None)  # type: ignore[arg-type]
+        link.receive(None)
         feed = Feed(board, wheels, link, About("port"))
         feed.watch([])
         history, viewer, late = History(board), Viewer(), Viewer(wheel=3)
@@ -268,7 +268,7 @@ def test_the_state_tells_when_the_port_went_away_and_came_back(memory: Board) ->
     assert feed.state()["heard"] is None
     seen = []
     for _ in reads:
-        link.receive(None)  # type: ignore[arg-type]
+        link.receive(None)
         seen.append(feed.state()["lost"])
     assert [moment is None for moment in seen] == [True, False, False, True]
     assert recorded == [reads[0], reads[1], reads[3]]

@@ -74,7 +74,7 @@ def spawn_all(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Spawn]:
                 [sys.executable, "-u", "-m", "bench", *map(str, arguments)],
                 stdout=file, stderr=subprocess.STDOUT, text=True,
             )  # fmt: skip
-        process.output = folder / f"{arguments[0]}.txt"  # type: ignore[attr-defined]
+        process.output = folder / f"{arguments[0]}.txt"
         started.append(process)
         return process
 
@@ -333,7 +333,7 @@ def test_a_pulled_cable_is_told(visit: Visit) -> None:
 def test_without_data_the_page_says_what_it_waits_for(browser: Any) -> None:
     seen, wheels = Visit(), FakeWheels()
     link = WatchedLink(FakeLink())
-    with LivePage(PageChoice(), wheels, link, About("port"), None) as run:  # type: ignore[arg-type]
+    with LivePage(PageChoice(), wheels, link, About("port"), None) as run:
         run.watch([])
         page = opened(browser, run.url, seen)
         page.locator("#status").filter(has_text="waiting for the first frame").wait_for()

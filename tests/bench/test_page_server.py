@@ -122,7 +122,7 @@ def wait_until_it_answers(served: Served) -> None:
 def served() -> Iterator[Served]:
     markers, wheels = Markers(), FakeWheels(0)
     link = WatchedLink(FakeLink())
-    with LivePage(PageChoice().checked(), wheels, link, About("port"), markers) as page:  # type: ignore[arg-type]
+    with LivePage(PageChoice().checked(), wheels, link, About("port"), markers) as page:
         served = Served(page, markers)
         wait_until_it_answers(served)
         yield served

@@ -116,7 +116,11 @@ def predict_forces(parameters: PointParameters, conditions: PointConditions) -> 
     >>> float(predict_forces(brush, PointConditions(4000.0, np.radians(3.0))).Fy)
     -2317.79468
     """
-    contact = _Contact.of(parameters, conditions)
+    return _answer(_Contact.of(parameters, conditions), parameters)
+
+
+def _answer(contact: "_Contact", parameters: PointParameters) -> PointForces:
+    """Return a contact's forces, turned by a compliant carcass, with the offsets."""
     yaw = np.asarray(parameters.yaw_compliance, dtype=np.float64)
     turn: FloatArray | float = _balance(contact, yaw) if np.any(yaw) else 0.0
     Fx, Fy, moment = contact.forces(turn)

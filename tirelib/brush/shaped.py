@@ -23,7 +23,7 @@ from tirelib.brush.predict import (
     PointConditions,
     PointForces,
     PointParameters,
-    _balance,
+    _answer,
     _Contact,
     predict_forces,
 )
@@ -67,17 +67,7 @@ def predict_shaped(
     plain = _Contact.of(parameters, conditions)
     contact = _Shaped(plain.c_px, plain.c_py, plain.stick, plain.slide, plain.a, plain.kappa,
                       plain.tangent, c)  # fmt: skip
-    yaw = np.asarray(parameters.yaw_compliance, dtype=np.float64)
-    turn: FloatArray | float = _balance(contact, yaw) if np.any(yaw) else 0.0
-    Fx, Fy, moment = contact.forces(turn)
-    if np.any(parameters.lateral_compliance):
-        moment = moment - Fx * Fy * np.asarray(parameters.lateral_compliance)
-    found = (
-        Fx + np.asarray(parameters.Fx_offset, dtype=np.float64),
-        Fy + np.asarray(parameters.Fy_offset, dtype=np.float64),
-        moment + np.asarray(parameters.Mz_offset, dtype=np.float64),
-    )
-    return PointForces(*(np.array(part) for part in np.broadcast_arrays(*found)))
+    return _answer(contact, parameters)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

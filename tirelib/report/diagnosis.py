@@ -1,21 +1,17 @@
 """The page of a diagnosis: one self-contained HTML file; and the same in Markdown."""
 
-import json
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
-from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from tirelib.diagnose.diagnose import ALARM, Finding
 from tirelib.diagnose.document import Assessment, exceeds, next_test
 from tirelib.diagnose.held_out import pooled
 from tirelib.diagnose.left import Left, left_of
-from tirelib.report.comparison import METHOD, RING, Part, Shown, markdown_parts
+from tirelib.report.comparison import METHOD, RING, Part
 from tirelib.report.figures.compare_plot import (
     ANGLE_TITLE,
     DIVERGING,
@@ -24,7 +20,8 @@ from tirelib.report.figures.compare_plot import (
     styled_figure,
 )
 from tirelib.report.figures.waterfall import waterfall_of
-from tirelib.report.page import Table, number, write_page
+from tirelib.report.page import Table, number
+from tirelib.report.parts_page import write_parts_page
 from tirelib.report.style import BLUE, FAINT, RED
 from tirelib.waveforms import GRID
 
@@ -76,30 +73,10 @@ def write_diagnosis(
     OSError
         If the folder cannot be written.
     """
-    parts = parts_of(told, history)
-    shown = [Shown.of(plot) for part in parts for plot in part.plots]
-    figures = "{" + ",".join(f"{json.dumps(s.name)}:{s.json}" for s in shown) + "}"
-    by_name = {s.name: s for s in shown}
-    views = [
-        {
-            "title": part.title, "anchor": part.anchor, "text": part.text, "tables": part.tables,
-            "plots": [by_name[plot.name] for plot in part.plots], "sources": part.sources,
-        }
-        for part in parts
-    ]  # fmt: skip
-    folder.mkdir(parents=True, exist_ok=True)
-    page, words = folder / "diagnosis.html", folder / "diagnosis.md"
-    # pages are written as index.html, which may be another report's in this folder
-    with tempfile.TemporaryDirectory() as aside:
-        made = write_page(
-            Path(aside), "comparison.html", title=TITLE, sections=(), parts=views,
-            summary=_summary(told), answer=answer_of(told), messages=told.messages,
-            sentences=(), sentence_note="", plotly=Markup(get_plotlyjs()),
-            figures=Markup(figures.replace("</", "<\\/")),
-        )  # fmt: skip
-        page.write_text(made.read_text(encoding="utf-8"), encoding="utf-8")
-    words.write_text(_markdown(told, parts), encoding="utf-8")
-    return page, words
+    return write_parts_page(
+        folder, "diagnosis", parts_of(told, history), title=TITLE, summary=_summary(told),
+        answer=answer_of(told), messages=told.messages,
+    )  # fmt: skip
 
 
 def parts_of(told: Assessment, history: Sequence[Mapping[str, Any]] = ()) -> list[Part]:
@@ -283,9 +260,3 @@ def _map(told: Assessment, left: Left, name: str, title: str) -> Plot:
         "both maps. Red: the model shows too much tension; blue: too much compression.",
         figure, ["wheel angle [deg]", *labels], rows,
     )  # fmt: skip
-
-
-def _markdown(told: Assessment, parts: Sequence[Part]) -> str:
-    lines = [f"# {TITLE}", "", _summary(told), "", f"**{answer_of(told)}**", ""]
-    lines += [f"> {message}\n" for message in told.messages]
-    return "\n".join([*lines, *markdown_parts(parts)]).rstrip() + "\n"

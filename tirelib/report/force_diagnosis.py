@@ -1,24 +1,21 @@
 """The page of a diagnosis of forces: one self-contained HTML file; and the same in Markdown."""
 
-import json
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import plotly.graph_objects as go
-from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from tirelib.diagnose.forces.assess import ForceAssessment
 from tirelib.diagnose.forces.document import exceeds, fold_words, next_test
 from tirelib.diagnose.forces.held_out import pooled
 from tirelib.diagnose.forces.search import ALARM
-from tirelib.report.comparison import BRUSH, Part, Shown, markdown_parts
+from tirelib.report.comparison import BRUSH, Part
 from tirelib.report.figures.compare_plot import Plot, styled_figure
 from tirelib.report.figures.force_left import residual_map
 from tirelib.report.figures.waterfall import Step, waterfall, waterfall_of
-from tirelib.report.page import Table, number, write_page
+from tirelib.report.page import Table, number
+from tirelib.report.parts_page import write_parts_page
 from tirelib.report.style import BLUE, FAINT, RED
 
 METHOD_TEXT = (
@@ -63,34 +60,10 @@ def write_force_diagnosis(told: ForceAssessment, folder: Path) -> tuple[Path, Pa
     OSError
         If the folder cannot be written.
     """
-    parts = parts_of(told)
-    title = f"Which effect is missing: {told.case.quantity}"
-    shown = [Shown.of(plot) for part in parts for plot in part.plots]
-    figures = "{" + ",".join(f"{json.dumps(s.name)}:{s.json}" for s in shown) + "}"
-    by_name = {s.name: s for s in shown}
-    views = [
-        {
-            "title": part.title, "anchor": part.anchor, "text": part.text, "tables": part.tables,
-            "plots": [by_name[plot.name] for plot in part.plots], "sources": part.sources,
-        }
-        for part in parts
-    ]  # fmt: skip
-    folder.mkdir(parents=True, exist_ok=True)
-    page, words = folder / "diagnosis.html", folder / "diagnosis.md"
-    # pages are written as index.html, which may be another report's in this folder
-    with tempfile.TemporaryDirectory() as aside:
-        made = write_page(
-            Path(aside), "comparison.html", title=title, sections=(), parts=views,
-            summary=_summary(told), answer=answer_of(told), messages=told.messages,
-            sentences=(), sentence_note="", plotly=Markup(get_plotlyjs()),
-            figures=Markup(figures.replace("</", "<\\/")),
-        )  # fmt: skip
-        page.write_text(made.read_text(encoding="utf-8"), encoding="utf-8")
-    lines = [f"# {title}", "", _summary(told), "", f"**{answer_of(told)}**", ""]
-    lines += [f"> {message}\n" for message in told.messages]
-    text = "\n".join([*lines, *markdown_parts(parts)]).rstrip() + "\n"
-    words.write_text(text, encoding="utf-8")
-    return page, words
+    return write_parts_page(
+        folder, "diagnosis", parts_of(told), title=f"Which effect is missing: {told.case.quantity}",
+        summary=_summary(told), answer=answer_of(told), messages=told.messages,
+    )  # fmt: skip
 
 
 def parts_of(told: ForceAssessment) -> list[Part]:

@@ -13,7 +13,7 @@ from tirelib.planning.rivals import NOTHING
 from tirelib.report.comparison import Part
 from tirelib.report.figures.compare_plot import Plot, styled_figure
 from tirelib.report.page import Table, number
-from tirelib.report.planning_page import write_plan_page
+from tirelib.report.parts_page import write_parts_page
 from tirelib.report.style import BLUE, FAINT, RED
 
 TITLE = "Which run to measure next"
@@ -41,7 +41,7 @@ def write_next_test(plan: Plan, folder: Path) -> tuple[Path, Path]:
         If the folder cannot be written.
     """
     text = advice(plan)
-    return write_plan_page(
+    return write_parts_page(
         folder, "next_test", parts_of(plan), title=TITLE, summary=_summary(plan),
         answer=f"{text[0].upper()}{text[1:]}.", messages=_messages(plan),
     )  # fmt: skip

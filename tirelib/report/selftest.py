@@ -10,7 +10,7 @@ import plotly.graph_objects as go
 from tirelib.report.comparison import Part
 from tirelib.report.figures.compare_plot import Plot, styled_figure
 from tirelib.report.page import DASH, Table, number
-from tirelib.report.planning_page import write_plan_page
+from tirelib.report.parts_page import write_parts_page
 
 TITLE = "What this plan can find"
 
@@ -23,7 +23,7 @@ def write_selftest(document: Mapping[str, Any], folder: Path) -> tuple[Path, Pat
     OSError
         If the folder cannot be written.
     """
-    return write_plan_page(
+    return write_parts_page(
         folder, "selftest", parts_of(document), title=TITLE, summary=_summary(document),
         answer=_answer(document), messages=[document["note"]],
     )  # fmt: skip

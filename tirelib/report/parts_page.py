@@ -1,4 +1,4 @@
-"""Pages of the planning verbs: one self-contained HTML file, and the same in Markdown."""
+"""Pages made of parts: one self-contained HTML file, and the same in Markdown."""
 
 import json
 import tempfile
@@ -12,7 +12,7 @@ from tirelib.report.comparison import Part, Shown, markdown_parts
 from tirelib.report.page import write_page
 
 
-def write_plan_page(
+def write_parts_page(
     folder: Path,
     name: str,
     parts: Sequence[Part],
