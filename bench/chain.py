@@ -1,30 +1,28 @@
-"""Bytes of one wheel to estimates: decode, put in line, step the estimator by up to k samples.
+"""Samples of one wheel to estimates: step the estimator by up to k samples.
 
-The estimator takes k samples a step, frames bring 16 or any other number: a store between the two
-makes the result independent of both, and of how the line was cut into reads. A step is shorter
-where a condition changes, so that it changes at its sample, and at the end of a segment.
+The estimator takes k samples a step, blocks bring any number: a store between the two makes the
+result independent of both, and of how the line was cut into reads. A step is shorter where a
+condition changes, so that it changes at its sample, and at the end of a segment.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from bench.clock import ClockFit
-from bench.conditions import ROUNDING, UNKNOWN, Condition, Conditions, Held, Measured
-from bench.decoder import SerialDecoder
-from bench.device import Device
-from bench.frames import GAGES, Frames
-from bench.line_counts import LineCounts
-from bench.protocols import Decoder
-from bench.timeline import Samples, Timeline, TimelineCounts
+from bench.conditions import ROUNDING, UNKNOWN, Condition, Conditions, Held
+from bench.frames import GAGES
+from bench.timeline import Samples
+from bench.wheels import Block
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.flags import TurnFlag
 
 Outputs = tuple[Mapping[str, float], Mapping[str, str]]
 """Numbers (SI) and texts that an estimator gives at the end of a turn."""
+RESTARTED, SKIPPED = "restarted", "skipped"
+"""Why an estimator began afresh within a segment; a note of the turn that comes next."""
 
 
 class Estimator(Protocol):
@@ -49,7 +47,7 @@ class Turn:
     run : int
         Of the campaign, where a sidecar says; else 0.
     segment : int
-        Counts the estimator's fresh starts.
+        Stretch of the line's samples, see `bench.timeline`.
     t, ready : float, [s]
         Middle of the contact, and when its last sample was taken: on the run's clock where a
         sidecar gives it, else since the first sample. `t` is NaN if the estimator does not say.
@@ -58,12 +56,14 @@ class Turn:
     outputs : mapping of name to value, SI
         All numbers that the estimator gives.
     texts : mapping of name to str
-        What it says in words: ``rolling``, ``status``.
+        What it says in words: ``rolling``, ``status``; ``note`` where it began afresh.
     flags : int
         `TurnFlag` bits of the estimator and of the line.
     saturated : tuple of int
         Saturated samples of each gage since the turn before.
     wheel : int
+    arrival : int, [ns]
+        Monotonic, of the bytes that ended it; that of the last bytes where the line's end did.
     """
 
     run: int
@@ -76,11 +76,56 @@ class Turn:
     flags: int
     saturated: tuple[int, ...]
     wheel: int = 0
+    arrival: int = 0
 
     @property
     def valid(self) -> bool:
         """Whether the estimate may be used."""
         return self.outputs["valid"] > 0.5
+
+
+def quantity_valid(turn: Turn, name: str) -> bool:
+    """Whether one quantity of a turn may be used.
+
+    An FMU with an output ``Fz_valid`` says so itself; without it the whole turn decides, and a slip
+    ratio needs a speed.
+    """
+    own = turn.outputs.get(f"{name}_valid")
+    if own is not None:
+        return own > 0.5
+    known = math.isfinite(turn.outputs[name])
+    return turn.valid and known and not (name == "kappa" and turn.flags & TurnFlag.NO_SPEED)
+
+
+class Place(NamedTuple):
+    """A sample of a wheel's line: its segment, and its number within."""
+
+    segment: int
+    sample: int
+
+
+class Jump(NamedTuple):
+    """Where the estimator of a wheel left the line of samples and where it began afresh.
+
+    It is written into the recording, so that a replay does the same.
+
+    Attributes
+    ----------
+    wheel : int
+    start, end : Place
+        First sample that is not stepped, and the first that is again; both begin a block.
+    why : str
+        `RESTARTED` or `SKIPPED`.
+    samples, turns : int
+        About how much was left out.
+    """
+
+    wheel: int
+    start: Place
+    end: Place
+    why: str
+    samples: int = 0
+    turns: int = 0
 
 
 @dataclass(slots=True)
@@ -102,79 +147,50 @@ class _Segment:
 
 
 class Chain:
-    """The whole way for one wheel; the same bytes give the same estimates.
+    """The estimator of one wheel and what feeds it; the same blocks give the same estimates.
 
     Parameters
     ----------
     estimator : Estimator
-    device : Device
     conditions : Conditions
-    wheel : int, optional
-        By default that of the first frame.
-    decoder : Decoder, optional
-        Of the line; by default that of SERIAL v1. Several wheels on one line share it.
 
     Attributes
     ----------
-    clock : ClockFit
-        The wheel's clock against the host's.
-    watch : callable, optional
-        Called with each block of samples before it is stepped; for a live page.
+    steps : int
+        Steps so far.
     """
 
-    def __init__(
-        self,
-        estimator: Estimator,
-        device: Device,
-        conditions: Conditions,
-        wheel: int | None = None,
-        decoder: Decoder | None = None,
-    ) -> None:
-        self.line: Decoder = SerialDecoder() if decoder is None else decoder
-        self.clock = ClockFit()
-        self.watch: Callable[[Samples], None] | None = None
-        self.timeline = Timeline(device, wheel)
+    def __init__(self, estimator: Estimator, conditions: Conditions) -> None:
         self.steps = 0
         self._estimator = estimator
+        self._known = conditions
         self._conditions = Held(conditions)
         self._segment: _Segment | None = None
-        self._first_us: int | None = None
+        self._wheel = 0
+        self._arrival = 0
+        self._note = ""
+        self._afresh = False
 
-    @property
-    def counts(self) -> tuple[LineCounts, TimelineCounts]:
-        """What was seen and lost so far."""
-        return self.line.counts, self.timeline.counts
-
-    def push(self, data: bytes, arrival: int = 0) -> list[Turn]:
-        """Take bytes that came at a moment [ns, monotonic] and return the turns that they end."""
-        return self.take(self.line.push(data, arrival), arrival)
-
-    def take(self, items: Iterable[Frames | Measured], arrival: int = 0) -> list[Turn]:
-        """Take decoded frames, of this wheel or of several, and return the turns that they end."""
+    def take(self, block: Block) -> list[Turn]:
+        """Take what comes next and return the turns that it ends."""
+        content = block.content
+        if not isinstance(content, Samples):
+            self._conditions.tell(content.t_us, content.measured)
+            if self._segment is not None:
+                self._segment.until = -1.0
+            return []
+        self._wheel = block.wheel
         turns: list[Turn] = []
-        newest: int | None = None
-        for item in items:
-            if isinstance(item, Measured):
-                self._tell(item)
-                continue
-            for block in self.timeline.push(item):
-                if self.watch is not None:
-                    self.watch(block)
-                if block.reset:
-                    turns += self.finish()
-                    self._begin(block)
-                    self.clock.restart()
-                turns += self._take(block)
-                newest = block.end_us
-        if newest is not None and arrival:
-            self.clock.push(newest, arrival)
-        return turns
+        if content.reset or self._afresh:
+            turns = self.finish()
+            self._begin(content, block.first_us)
+        self._arrival = block.arrival
+        return turns + self._take(content)
 
-    def _tell(self, measured: Measured) -> None:
-        """Let a condition hold from the next sample on."""
-        self._conditions.tell(self.timeline.end_us, measured)
-        if self._segment is not None:
-            self._segment.until = -1.0
+    def jump(self, why: str) -> None:
+        """Begin afresh with the next samples; what was not stepped and what a bus told is lost."""
+        self._segment, self._afresh, self._note = None, True, why
+        self._conditions = Held(self._known)
 
     def finish(self) -> list[Turn]:
         """Step what is left, in a shorter step, and close the segment."""
@@ -185,11 +201,10 @@ class Chain:
         turn = self._step(segment, segment.waiting)
         return [] if turn is None else [turn]
 
-    def _begin(self, block: Samples) -> None:
+    def _begin(self, block: Samples, first_us: int) -> None:
+        self._afresh = False
         self._estimator.start(block.period)
-        if self._first_us is None:
-            self._first_us = block.t_us
-        device_origin = 1e-6 * (block.t_us - self._first_us)
+        device_origin = 1e-6 * (block.t_us - first_us)
         run, origin = 0, device_origin
         known = self._conditions.run_at(block.t_us)
         if known is not None:
@@ -239,9 +254,11 @@ class Chain:
         if result is None:
             return None
         outputs, texts = result
+        if self._note:
+            texts, self._note = {**texts, "note": self._note}, ""
         saturated = tuple(segment.saturated.tolist())
         segment.saturated[:] = 0
-        ready = self._ready(outputs, segment)
+        ready = segment.stepped * segment.period - outputs["age"]
         return Turn(
             run=segment.run,
             segment=segment.number,
@@ -252,10 +269,6 @@ class Chain:
             texts=texts,
             flags=int(outputs["flags"]) | (int(TurnFlag.SATURATED) if any(saturated) else 0),
             saturated=saturated,
-            wheel=self.timeline.wheel or 0,
+            wheel=self._wheel,
+            arrival=self._arrival,
         )
-
-    @staticmethod
-    def _ready(outputs: Mapping[str, float], segment: _Segment) -> float:
-        """Time at which the estimate was ready, since the segment's first sample, [s]."""
-        return segment.stepped * segment.period - outputs["age"]

@@ -54,7 +54,7 @@ class Device:
         Counts at strain zero.
     lateral : tuple of 5 float, or None, [m]
         Gage positions, ISO; None where the file does not say.
-    lowest, highest : int
+    lowest, highest : float
         Counts at the ends of the range, which mean saturation.
     """
 
@@ -62,8 +62,8 @@ class Device:
     scale: float = 0.02 / 32768
     zero: tuple[float, ...] = (0.0,) * GAGES
     lateral: tuple[float, ...] | None = None
-    lowest: int = LOWEST
-    highest: int = HIGHEST
+    lowest: float = LOWEST
+    highest: float = HIGHEST
 
     def strain(self, counts: CountArray, flags: IntArray) -> tuple[FloatArray, BoolArray]:
         """Return the strain of frames, shape (m * n, 5), and where a gage was saturated.

@@ -10,14 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from bench.chain import Chain, Turn
+from bench.chain import Turn, quantity_valid
 from bench.conditions import RunMark
 from bench.frames import GAGES
 from bench.line_counts import LineCounts
 from bench.timeline import TimelineCounts
+from bench.wheels import Wheels
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.result import EDGE_UNIT, FORMAT, VARIED
-from tirelib.flags import TurnFlag, flag_names
+from tirelib.flags import flag_names
 
 QUANTITIES = EDGE_UNIT
 """Unit and factor of each quantity in the document."""
@@ -26,15 +27,13 @@ QUANTITIES = EDGE_UNIT
 def document(
     turns: Sequence[Turn],
     runs: Iterable[RunMark],
-    counts: tuple[LineCounts, TimelineCounts],
+    wheels: Wheels,
     source: Mapping[str, Any],
     calibration: Calibration | None = None,
-    wheels: Mapping[int, Chain] | None = None,
 ) -> dict[str, Any]:
-    """Return summary, turns, what the line lost, and where all came from.
+    """Return summary, turns, what the line and each wheel lost, and where all came from.
 
     `calibration` is that of the FMU, where it is known: a quantity that it lacks has no summary.
-    `wheels` adds the counters and the clock of each wheel.
     """
     truth = {mark.run: mark.truth for mark in runs}
     chain = None if calibration is None else calibration.chains[-1]
@@ -47,8 +46,8 @@ def document(
             for name in QUANTITIES
         },
         "turns": [turn_document(turn) for turn in turns],
-        "line": line_document(*counts),
-        "wheels": {wheel: wheel_document(chain) for wheel, chain in (wheels or {}).items()},
+        "line": line_document(*wheels.counts),
+        "wheels": {wheel: wheel_document(wheels, wheel) for wheel in wheels.heard},
         "source": dict(source),
     }
 
@@ -77,14 +76,15 @@ def line_document(line: LineCounts, timeline: TimelineCounts) -> dict[str, Any]:
     }
 
 
-def wheel_document(chain: Chain) -> dict[str, Any]:
+def wheel_document(wheels: Wheels, number: int) -> dict[str, Any]:
     """Return the losses of one wheel, those of its line included, and its clock.
 
     A damaged frame does not say whose it was: what the line counts, all its wheels show.
     """
-    clock = chain.clock
+    wheel = wheels.heard[number]
+    clock = wheel.clock
     return {
-        **line_document(*chain.counts),
+        **line_document(wheels.line.counts, wheel.timeline.counts),
         "clock_drift_ppm": _number(clock.drift_ppm),
         "clock_residual_us": _number(1e6 * clock.residual),
     }
@@ -119,21 +119,8 @@ def turn_document(turn: Turn) -> dict[str, Any]:
 def flags(turn: Turn) -> list[str]:
     """Return the names of a turn's flags, then the estimator's notes."""
     names = flag_names(turn.flags)
-    said = turn.texts.get("status", "").split(";")
+    said = [*turn.texts.get("status", "").split(";"), turn.texts.get("note", "")]
     return [*names, *(note for note in said if note and note not in names)]
-
-
-def quantity_valid(turn: Turn, name: str) -> bool:
-    """Whether one quantity of a turn may be used.
-
-    An FMU with an output ``Fz_valid`` says so itself; without it the whole turn decides, and a slip
-    ratio needs a speed.
-    """
-    own = turn.outputs.get(f"{name}_valid")
-    if own is not None:
-        return own > 0.5
-    known = math.isfinite(turn.outputs[name])
-    return turn.valid and known and not (name == "kappa" and turn.flags & TurnFlag.NO_SPEED)
 
 
 def _summary(

@@ -9,7 +9,7 @@ import ctypes
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from fmpy import read_model_description
@@ -30,8 +30,9 @@ from bench.fmu_archive import FmuArchive
 from bench.frames import GAGES
 from tirelib.arrays import FloatArray
 from tirelib.errors import FormatError
-from tirelib.estimators.calibration import Calibration
-from tirelib.estimators.calibration_file import read_calibration
+
+if TYPE_CHECKING:
+    from tirelib.estimators.calibration import Calibration
 
 CONDITIONS = ("speed", "pressure", "camber")
 RATE = "sample_rate"
@@ -71,8 +72,11 @@ class _Ports:
         self._set(self._slave.component, self._references, self._count, self._values)
 
 
-class FmuModel:
-    """One instance of the estimator; a context manager that frees it.
+class FmuFile:
+    """An FMU that was unpacked and found to be a strain estimator; nothing of it runs yet.
+
+    A context manager that removes the unpacked files. It can be sent to another process, which then
+    uses these files and leaves them.
 
     Parameters
     ----------
@@ -81,6 +85,8 @@ class FmuModel:
 
     Attributes
     ----------
+    path : Path
+    folder : str
     samples : int
         k, samples a step.
     name : str
@@ -88,52 +94,122 @@ class FmuModel:
     Raises
     ------
     FmuError
-        If the FMU cannot be loaded or is no strain estimator.
+        If the FMU cannot be unpacked or is no strain estimator.
     """
 
     def __init__(self, archive: FmuArchive) -> None:
-        self._path = archive.path
-        self._folder = archive.unpack()
+        self.path = archive.path
+        self._unpacked = archive.unpack()
+        self.folder = self._unpacked.name
+        try:
+            description = self.description()
+            self.samples = _samples_a_step(self.path, description)
+            self.name = str(description.modelName)
+        except FmuError:
+            self.close()
+            raise
+
+    def description(self) -> Any:
+        """Return what the FMU says of itself.
+
+        Raises
+        ------
+        FmuError
+            If it cannot be read.
+        """
+        try:
+            return read_model_description(self.folder)
+        except Exception as error:  # FMPy raises bare Exception and whatever lxml does
+            raise _fmu_error(self.path, "cannot be loaded", error, []) from None
+
+    @property
+    def calibration(self) -> "Calibration | None":
+        """The calibration inside, where the FMU has one that can be read."""
+        from tirelib.estimators.calibration_file import read_calibration  # takes a while
+
+        path = Path(self.folder) / "resources" / "calibration.toml"
+        try:
+            return read_calibration(path) if path.is_file() else None
+        except FormatError:
+            return None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "_unpacked": None}
+
+    def close(self) -> None:
+        """Remove the unpacked files; calling twice does no harm."""
+        if self._unpacked is not None:
+            self._unpacked.cleanup()
+
+    def __enter__(self) -> "FmuFile":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _samples_a_step(path: Path, description: Any) -> int:
+    """Return k; refuse an FMU that is no strain estimator."""
+    if description.coSimulation is None:
+        raise FmuError(f"{path}: it is no FMU for co-simulation; FMI 2.0 co-simulation "
+                       "is needed; build it with `tirelib fmu build`")  # fmt: skip
+    names = {variable.name for variable in description.modelVariables}
+    found = [m for name in names if (m := _STRAIN.fullmatch(name))]
+    samples = len(found) // GAGES
+    wanted = {f"strain_{g}" for g in range(1, GAGES + 1)}
+    if any(m[1] for m in found):
+        wanted = {f"strain_{i}_{g}" for i in range(1, samples + 1) for g in range(1, GAGES + 1)}
+    missing = sorted(wanted - names)
+    missing += [name for name in REQUIRED if name not in names]
+    if not description.coSimulation.canHandleVariableCommunicationStepSize:
+        missing.append("variable communication steps")
+    if missing or len(found) != len(wanted):
+        raise FmuError(
+            f"{path}: {', '.join(missing[:8]) or 'some strain inputs'} are missing; the "
+            "variables of a StrainTire.fmu are needed; build it with `tirelib fmu build`"
+        )
+    return samples
+
+
+class FmuModel:
+    """One instance of the estimator; a context manager that frees it.
+
+    Parameters
+    ----------
+    file : FmuFile
+
+    Attributes
+    ----------
+    samples : int
+        k, samples a step.
+
+    Raises
+    ------
+    FmuError
+        If the FMU cannot be loaded.
+    """
+
+    def __init__(self, file: FmuFile) -> None:
+        self._path = file.path
+        self._file = file  # its folder lives as long
         self._messages: list[str] = []
         self._slave: Any = None
+        self._description = file.description()
+        self._variables = {v.name: v for v in self._description.modelVariables}
+        self.samples = file.samples
         try:
-            self._description = read_model_description(self._folder.name)
-            self._variables = {v.name: v for v in self._description.modelVariables}
-            self.samples = self._check()
-            self.name: str = self._description.modelName
             self._instantiate()
         except FmuError:
             self.close()
             raise
-        except Exception as error:  # FMPy raises bare Exception and whatever lxml and ctypes do
+        except Exception as error:  # FMPy raises bare Exception and whatever ctypes does
             self.close()
             raise self._error("cannot be loaded", error) from None
-
-    def _check(self) -> int:
-        """Return k; refuse an FMU that is no strain estimator."""
-        if self._description.coSimulation is None:
-            raise FmuError(f"{self._path}: it is no FMU for co-simulation; FMI 2.0 co-simulation "
-                           "is needed; build it with `tirelib fmu build`")  # fmt: skip
-        found = [m for name in self._variables if (m := _STRAIN.fullmatch(name))]
-        samples = len(found) // GAGES
-        wanted = {f"strain_{g}" for g in range(1, GAGES + 1)}
-        if any(m[1] for m in found):
-            wanted = {f"strain_{i}_{g}" for i in range(1, samples + 1) for g in range(1, GAGES + 1)}
-        missing = sorted(wanted - set(self._variables))
-        missing += [name for name in REQUIRED if name not in self._variables]
-        if not self._description.coSimulation.canHandleVariableCommunicationStepSize:
-            missing.append("variable communication steps")
-        if missing or len(found) != len(wanted):
-            raise FmuError(
-                f"{self._path}: {', '.join(missing[:8]) or 'some strain inputs'} are missing; the "
-                "variables of a StrainTire.fmu are needed; build it with `tirelib fmu build`"
-            )
-        return samples
 
     def _instantiate(self) -> None:
         slave = FMU2Slave(
             guid=self._description.guid,
-            unzipDirectory=self._folder.name,
+            unzipDirectory=self._file.folder,
             modelIdentifier=self._description.coSimulation.modelIdentifier,
             instanceName="wheel",
         )
@@ -173,15 +249,6 @@ class FmuModel:
             )
         return _Ports(self._slave, variables, kinds.pop())
 
-    @property
-    def calibration(self) -> Calibration | None:
-        """The calibration inside, where the FMU has one that can be read."""
-        path = Path(self._folder.name) / "resources" / "calibration.toml"
-        try:
-            return read_calibration(path) if path.is_file() else None
-        except FormatError:
-            return None
-
     def start(self, period: float) -> None:
         """Begin afresh, with this sample period [s]; whatever came before is forgotten."""
         slave = self._slave
@@ -189,7 +256,6 @@ class FmuModel:
             if self._ready:
                 slave.terminate()
                 slave.reset()
-            self._period = period
             if RATE in self._variables:
                 rate = self._ports([RATE])
                 rate.values[0] = round(1.0 / period, 6)
@@ -197,11 +263,11 @@ class FmuModel:
             slave.setupExperiment(startTime=0.0)
             slave.enterInitializationMode()
             if self._valid is not None:
-                self._valid.values[0] = self._frame_valid = 1
+                self._valid.values[0] = 1
                 self._valid.set()
             slave.exitInitializationMode()
             self._ready = True
-            self._count = 0
+            self._period, self._count, self._frame_valid = period, 0, True
             self._seen = float(self._turn.get()[0])
         except FMICallException as error:
             raise self._error("does not start", error) from None
@@ -267,18 +333,12 @@ class FmuModel:
         del self._messages[:-5]
 
     def _error(self, what: str, error: Exception) -> FmuError:
-        said = "; it says: " + " | ".join(self._messages) if self._messages else ""
         if isinstance(error, FMICallException) and error.status == fmi2Fatal:
             self._slave = None  # FMI allows no call after this, not even to free the instance
-        cause = str(error) or type(error).__name__
-        cause = cause if len(cause) <= LONGEST_CAUSE else cause[:LONGEST_CAUSE] + " ..."
-        return FmuError(
-            f"{self._path}: the FMU {what} ({cause}){said}; an FMU of this version of tirelib is "
-            "needed; build it again with `tirelib fmu build`, or correct the inputs that it names"
-        )
+        return _fmu_error(self._path, what, error, self._messages)
 
     def close(self) -> None:
-        """Free the instance and remove the unpacked files; calling twice does no harm."""
+        """Free the instance; calling twice does no harm."""
         slave, self._slave = self._slave, None
         if slave is not None:
             try:
@@ -287,10 +347,19 @@ class FmuModel:
                 slave.freeInstance()
             except FMICallException:
                 self._messages.append("terminate failed")
-        self._folder.cleanup()
 
     def __enter__(self) -> "FmuModel":
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _fmu_error(path: Path, what: str, error: Exception, messages: list[str]) -> FmuError:
+    said = "; it says: " + " | ".join(messages) if messages else ""
+    cause = str(error) or type(error).__name__
+    cause = cause if len(cause) <= LONGEST_CAUSE else cause[:LONGEST_CAUSE] + " ..."
+    return FmuError(
+        f"{path}: the FMU {what} ({cause}){said}; an FMU of this version of tirelib is "
+        "needed; build it again with `tirelib fmu build`, or correct the inputs that it names"
+    )

@@ -47,8 +47,8 @@ LONGEST_ON_WIRE = LONGEST + LONGEST // 254 + 1
 
 Int16Array = npt.NDArray[np.int16]
 IntArray = npt.NDArray[np.int64]
-CountArray = npt.NDArray[np.int16] | npt.NDArray[np.int32]
-"""Counts: sixteen bits of our transmitter, up to 32 of another make."""
+CountArray = npt.NDArray[np.int16] | npt.NDArray[np.int32] | npt.NDArray[np.float64]
+"""Counts: sixteen bits of our transmitter, up to 32 or real numbers of another make."""
 
 
 class FrameFlag(IntFlag):

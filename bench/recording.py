@@ -1,8 +1,9 @@
 """Recording of a live run (``tirebench-recording/1``, MCAP): raw bytes as they came, bad ones too.
 
-The file is MCAP without chunks, so every read of the port stands on disk (in the kernel's cache, at
-least) before it is decoded: a process that is killed loses nothing that it had read. MCAP readers
-that take a stream (and PlotJuggler, Foxglove) open it; a file without its end does as well.
+The file is MCAP without chunks, so that what is written stands on disk (in the kernel's cache, at
+least) and can be read whatever happens next. MCAP readers that take a stream (and PlotJuggler,
+Foxglove) open it; a file without its end does as well. A recorder that is started again goes on in
+the same file, where it is known to be whole.
 
 ==============  ===================  ============================================================
 part            encoding             content
@@ -10,7 +11,8 @@ part            encoding             content
 metadata        ``tirebench``        format, settings (JSON), start on both clocks, device file
 ``/serial``     ``serial-v1``        bytes of one read; log time is UTC, publish time monotonic;
                                      ``/slcan`` and ``/can`` on another kind of line
-``/events``     ``json``             the port went away or came back; markers
+``/events``     ``json``             the port went away or came back; markers; a process was
+                                     started again; where an estimator began afresh
 ``/conditions`` ``json``             conditions as a sidecar holds them (``tirebench-conditions/1``)
 metadata        ``end``              why the run ended
 ==============  ===================  ============================================================
@@ -18,7 +20,7 @@ metadata        ``end``              why the run ended
 
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -28,9 +30,10 @@ from mcap.records import Channel, Message, Metadata
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
+from bench.chain import Jump, Place
 from bench.conditions import Conditions, conditions_document, parse_conditions
 from bench.errors import DeviceError, RecordingError
-from bench.links import BACK, LOST, Read
+from bench.links import BACK, LOST, RESUMED, Read
 from bench.protocols import SERIAL
 
 FORMAT = "tirebench-recording/1"
@@ -45,22 +48,42 @@ class Recorder:
     Parameters
     ----------
     path : Path
-        A file that does not exist yet.
-    header : dict of str
-        What the run was: see `RecordingHeader`.
+        A file that does not exist yet, or one to go on with.
+    header : RecordingHeader
+        What the run was.
+    conditions : Conditions
+    length : int, optional
+        Of a file that another recorder has begun: bytes that are known to be whole. What follows
+        them is cut off, and the recording goes on there.
+
+    Attributes
+    ----------
+    bytes : int
+        Raw bytes so far, since this recorder began.
 
     Raises
     ------
     RecordingError
-        If the file exists or cannot be written.
+        If the file exists already, or cannot be written.
     """
 
-    def __init__(self, path: Path, header: "RecordingHeader", conditions: Conditions) -> None:
+    def __init__(
+        self,
+        path: Path,
+        header: "RecordingHeader",
+        conditions: Conditions,
+        length: int | None = None,
+    ) -> None:
         self.path = path
+        self.bytes = 0
         self._clock = time.time_ns() - time.monotonic_ns()
+        self._number = 0
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._file: BinaryIO = path.open("xb")
+            self._file: BinaryIO = path.open("xb" if length is None else "r+b")
+            if length is not None:
+                self._file.truncate(length)
+                self._file.seek(length)
         except FileExistsError:
             raise RecordingError(
                 f"{path}: it exists; a recording is never overwritten; name another file"
@@ -68,32 +91,44 @@ class Recorder:
         except OSError as error:
             raise _unwritable(path, error) from None
         self._writer = Writer(self._file, use_chunking=False, compression=CompressionType.NONE)
-        self._writer.start("tirebench", FORMAT)
-        self._writer.add_metadata("tirebench", header.as_text())
-        topic = raw_topic(header.encoding)
-        self._raw = self._writer.register_channel(topic, header.encoding, 0)
+        if length is None:
+            self._writer.start("tirebench", FORMAT)
+            self._writer.add_metadata("tirebench", header.as_text())
+        # the same channels with the same numbers again, which MCAP allows
+        self._raw = self._writer.register_channel(raw_topic(header.encoding), header.encoding, 0)
         self._events = self._writer.register_channel(EVENTS, "json", 0)
         channel = self._writer.register_channel(CONDITIONS, "json", 0)
-        self._number = self.bytes = 0
-        text = json.dumps(conditions_document(conditions)).encode()
-        self._message(channel, text, time.monotonic_ns())
+        if length is None:
+            text = json.dumps(conditions_document(conditions)).encode()
+            self._message(channel, text, time.monotonic_ns())
+        else:
+            self.event({"event": "recorder started again"})
+        self.flush()
 
-    def raw(self, data: bytes, arrival: int) -> None:
-        """Write the bytes of one read; `arrival` is `time.monotonic_ns`."""
-        self._message(self._raw, data, arrival)
-        self.bytes += len(data)
+    @property
+    def length(self) -> int:
+        """Bytes of the file so far."""
+        return self._file.tell()
 
     def read(self, read: Read) -> None:
-        """Write one read: its bytes and what happened to the port."""
+        """Write one read: what happened to the port, and its bytes."""
         if read.event:
-            self._message(self._events, json.dumps({"event": read.event}).encode(), read.arrival)
+            self.event({"event": read.event}, read.arrival)
         if read.data:
-            self.raw(read.data, read.arrival)
+            self._message(self._raw, read.data, read.arrival)
+            self.bytes += len(read.data)
 
-    def marker(self, text: str) -> None:
-        """Write a marker of the user at this moment."""
-        event = json.dumps({"event": "marker", "text": text}).encode()
-        self._message(self._events, event, time.monotonic_ns())
+    def event(self, event: Mapping[str, Any], arrival: int | None = None) -> None:
+        """Write an event of a moment [ns, monotonic], by default of this one."""
+        moment = time.monotonic_ns() if arrival is None else arrival
+        self._message(self._events, json.dumps(event).encode(), moment)
+
+    def flush(self) -> None:
+        """Let what was written outlive this process."""
+        try:
+            self._file.flush()
+        except OSError as error:
+            raise _unwritable(self.path, error) from None
 
     def _message(self, channel: int, data: bytes, arrival: int) -> None:
         self._number += 1
@@ -101,7 +136,6 @@ class Recorder:
             self._writer.add_message(
                 channel, arrival + self._clock, data, arrival, self._number % 2**32
             )
-            self._file.flush()
         except OSError as error:
             raise _unwritable(self.path, error) from None
 
@@ -122,6 +156,23 @@ class Recorder:
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self.close("closed" if kind is None else kind.__name__)
+
+
+def jump_event(jump: Jump, *, whole: bool = True) -> dict[str, Any]:
+    """Return a jump as an event of a recording.
+
+    Its places count from the beginning of the run: a recording that is not `whole`, because it was
+    begun later, tells of the jump, but a replay does not find the place.
+    """
+    return {
+        "event": "jump" if whole else "jump of the run",
+        "wheel": jump.wheel,
+        "from": list(jump.start),
+        "to": list(jump.end),
+        "why": jump.why,
+        "samples": jump.samples,
+        "turns": jump.turns,
+    }
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,8 +282,21 @@ class Recording:
             topic = self._topics.get(record.channel_id)
             if topic == raw:
                 yield Read(record.publish_time, record.data)
-            elif topic == EVENTS and (event := _event(record.data)) in (LOST, BACK):
-                yield Read(record.publish_time, b"", event)
+            elif topic == EVENTS:
+                event = _event(record.data).get("event")
+                if event in (LOST, BACK, RESUMED):
+                    yield Read(record.publish_time, b"", str(event))
+
+    def jumps(self) -> list[Jump]:
+        """Return where estimators began afresh, in order; reads a file of its own to the end."""
+        other = Recording(self.path)
+        found = [
+            _jump(_event(record.data))
+            for record in other._sound()
+            if isinstance(record, Message) and other._topics.get(record.channel_id) == EVENTS
+        ]
+        other.close()
+        return [jump for jump in found if jump is not None]
 
     def close(self) -> None:
         """Close the file."""
@@ -289,12 +353,25 @@ def raw_topic(encoding: str) -> str:
     return f"/{encoding.partition('-')[0]}"
 
 
-def _event(data: bytes) -> str:
+def _event(data: bytes) -> dict[str, Any]:
     """Return what an event says; empty if it is damaged."""
     try:
-        return str(json.loads(data)["event"])
-    except (ValueError, KeyError, TypeError):
-        return ""
+        event = json.loads(data)
+    except ValueError:
+        return {}
+    return event if isinstance(event, dict) else {}
+
+
+def _jump(event: Mapping[str, Any]) -> Jump | None:
+    """Return the jump that an event tells of; None if it tells of something else."""
+    if event.get("event") != "jump":
+        return None
+    try:
+        start, end = (Place(*map(int, event[key])) for key in ("from", "to"))
+        return Jump(int(event["wheel"]), start, end, str(event["why"]),
+                    int(event["samples"]), int(event["turns"]))  # fmt: skip
+    except (KeyError, TypeError, ValueError):
+        return None
 
 
 def _unwritable(path: Path, error: OSError) -> RecordingError:

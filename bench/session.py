@@ -1,19 +1,72 @@
-"""One session at the bench: read a link, record, estimate, until something ends it."""
+"""One session at the bench: take news of a source, show them, until something ends it."""
 
 import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 from bench.chain import Turn
 from bench.deadline import Deadline
-from bench.errors import UnpluggedError
-from bench.links import BACK, Link, Read
-from bench.recording import Recorder
+from bench.estimation import News
 from bench.wheels import Wheels
 
 WAIT = 0.2
-"""The longest wait for bytes before the screen is looked after, [s]."""
+"""The longest wait for news before the screen is looked after, [s]."""
+
+
+class Source(Protocol):
+    """Where news come from: the live chain, or a recording.
+
+    Attributes
+    ----------
+    name : str
+        Of the port or the file.
+    live : bool
+        Whether time passes at the other end.
+    ended, message : str
+        Why nothing will come any more, empty while something may; what is to be said of it.
+    wheels : Wheels
+        Counters and clocks.
+    heard, lost : float or None, [s]
+        When bytes came last and when the port went away, on `time.time`; None if not.
+    last_byte : float or None, [s]
+        When bytes came last, on `time.monotonic`.
+    """
+
+    live: bool
+    ended: str
+    message: str
+
+    @property
+    def name(self) -> str: ...  # noqa: D102  # see the class
+
+    @property
+    def wheels(self) -> Wheels: ...  # noqa: D102
+
+    @property
+    def heard(self) -> float | None: ...  # noqa: D102
+
+    @property
+    def lost(self) -> float | None: ...  # noqa: D102
+
+    @property
+    def last_byte(self) -> float | None: ...  # noqa: D102
+
+    def counts(self) -> dict[str, Any]:
+        """Return what was started again, skipped and not recorded."""
+
+    def cpu_time(self) -> float:
+        """Return what the processes beside this one have used, [s]."""
+
+    def wheel_counts(self, wheel: int) -> dict[str, int]:
+        """Return what was skipped of a wheel."""
+
+    def poll(self, deadline: Deadline) -> News:
+        """Return what has come by the deadline, at once when there is something."""
+
+    def finish(self, reason: str) -> News:
+        """End in good order and return what was left."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,9 +100,9 @@ class Outcome:
     count, valid : int
         Turns so far, and those that may be used.
     turns : list of Turn
-        Empty unless they are to be kept.
+        In the order in which their bytes came; empty unless they are to be kept.
     latency : deque of float, [s]
-        Arrival of the bytes that ended a turn to its estimate; the last 1000.
+        Arrival of the bytes that ended a turn to its estimate; the last 10,000.
     """
 
     reason: str = "end"
@@ -57,113 +110,79 @@ class Outcome:
     count: int = 0
     valid: int = 0
     turns: list[Turn] = field(default_factory=list)
-    latency: deque[float] = field(default_factory=lambda: deque(maxlen=1000))
+    latency: deque[float] = field(default_factory=lambda: deque(maxlen=10_000))
 
 
 class Session:
-    """Read, record, estimate.
+    """Take news until something ends it.
 
     Parameters
     ----------
-    link : Link
-    wheels : Wheels
-        The decoder and a chain for each wheel.
-    recorder : Recorder, optional
-        Gets every byte before it is decoded.
+    source : Source
     limits : Limits
     keep : bool
         Keep all turns in the outcome.
     watch : callable, optional
-        Called with the new turns after each read, an empty list included; for the screen.
+        Called with what is new, also when nothing is; for the screen.
+
+    Attributes
+    ----------
+    outcome : Outcome
+    watch : callable or None
     """
 
     def __init__(
         self,
-        link: Link,
-        wheels: Wheels,
+        source: Source,
         *,
-        recorder: Recorder | None = None,
         limits: Limits | None = None,
         keep: bool = True,
-        watch: Callable[[list[Turn]], None] | None = None,
+        watch: Callable[[News], None] | None = None,
     ) -> None:
         self.outcome = Outcome()
-        self._link = link
-        self._wheels = wheels
-        self._recorder = recorder
+        self._source = source
         self._limits = limits or Limits()
         self._keep = keep
-        self._watch = watch
+        self.watch = watch
         self._stopped = False
-        self._overruns: int | None = None
-        self._next_look = 0.0
 
     def stop(self) -> None:
         """Ask the session to end; safe in a signal handler."""
         self._stopped = True
 
     def run(self) -> Outcome:
-        """Go on until a limit, the end of the link, or `stop`."""
+        """Go on until a limit, the end of the source, or `stop`."""
         limits, outcome = self._limits, self.outcome
         end = Deadline.never() if limits.duration is None else Deadline.after(limits.duration)
-        last_byte: float | None = None
         while True:
             if self._stopped:
                 outcome.reason = "stopped"
+            elif self._source.ended:
+                outcome.reason, outcome.message = self._source.ended, self._source.message
             elif end.expired:
                 outcome.reason = "duration"
             elif limits.turns is not None and outcome.count >= limits.turns:
                 outcome.reason = "turns"
-            elif self._silent(last_byte):
+            elif self._silent():
                 outcome.reason = "silence"
             else:
-                try:
-                    read = self._link.receive(end.sooner(WAIT))
-                except UnpluggedError as error:
-                    outcome.reason, outcome.message = "unplugged", str(error)
-                    break
-                if read is None:
-                    break
-                last_byte = time.monotonic() if read.data else last_byte
-                self._take(read)
+                self._note(self._source.poll(end.sooner(WAIT)))
                 continue
             break
-        self._note(self._wheels.finish())
+        self._note(self._source.finish(outcome.reason))
+        order = {wheel: place for place, wheel in enumerate(self._source.wheels.heard)}
+        outcome.turns.sort(key=lambda turn: (turn.arrival, order[turn.wheel]))
         return outcome
 
-    def _silent(self, last_byte: float | None) -> bool:
-        limit = self._limits.silence
-        if limit is None or last_byte is None:
-            return False
-        return time.monotonic() - last_byte > limit
+    def _silent(self) -> bool:
+        limit, last = self._limits.silence, self._source.last_byte
+        return limit is not None and last is not None and time.monotonic() - last > limit
 
-    def _take(self, read: Read) -> None:
-        if self._recorder is not None and (read.data or read.event):
-            self._recorder.read(read)
-        if read.event == BACK:
-            self._wheels.interrupt()
-        if not read.data:
-            self._note([])
-            return
-        turns = self._wheels.push(read.data, read.arrival)
-        self._wheels.line.counts.overruns += self._new_overruns()
-        if turns and self._link.live:
-            self.outcome.latency.append(1e-9 * (time.monotonic_ns() - read.arrival))
-        self._note(turns)
-
-    def _new_overruns(self) -> int:
-        """Return the overruns of the port since it was last asked, once a second."""
-        now = time.monotonic()
-        if now < self._next_look:
-            return 0
-        self._next_look = now + 1.0
-        seen, self._overruns = self._overruns, self._link.overruns()
-        return 0 if seen is None else self._overruns - seen
-
-    def _note(self, turns: list[Turn]) -> None:
-        self.outcome.count += len(turns)
-        self.outcome.valid += sum(turn.valid for turn in turns)
+    def _note(self, news: News) -> None:
+        self.outcome.count += len(news.turns)
+        self.outcome.valid += sum(turn.valid for turn in news.turns)
+        self.outcome.latency.extend(news.latency)
         if self._keep:
-            self.outcome.turns.extend(turns)
-        if self._watch is not None:
-            self._watch(turns)
+            self.outcome.turns.extend(news.turns)
+        if self.watch is not None:
+            self.watch(news)

@@ -12,8 +12,10 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from bench.chain import Turn
-from bench.document import QUANTITIES, flags, line_document, quantity_valid
+from bench.chain import Turn, quantity_valid
+from bench.document import QUANTITIES, flags, line_document
+from bench.estimation import News
+from bench.session import Source
 from bench.wheels import Wheels
 
 ROWS = 20
@@ -33,15 +35,13 @@ class Screen:
     Parameters
     ----------
     console : Console
-    wheels : Wheels
+    source : Source
         Whose counters are shown.
-    title : str
     """
 
-    def __init__(self, console: Console, wheels: Wheels, title: str) -> None:
+    def __init__(self, console: Console, source: Source) -> None:
         self._console = console
-        self._wheels = wheels
-        self._title = title
+        self._source = source
         self._turns: deque[Turn] = deque(maxlen=ROWS)
         self._live = Live(console=console, auto_refresh=False) if console.is_terminal else None
         self._drawn = 0.0
@@ -63,23 +63,25 @@ class Screen:
             self._live.update(self._table(), refresh=True)
             self._live.stop()
 
-    def watch(self, turns: Sequence[Turn]) -> None:
-        """Show new turns; called after each read."""
-        self._turns.extend(turns)
+    def watch(self, news: News) -> None:
+        """Show what is new, also when nothing is; called again and again."""
+        for said in news.messages:
+            self._console.print(f"FMU: {said}", soft_wrap=True, markup=False)
+        self._turns.extend(news.turns)
         if self._live is None:
-            for turn in turns:
+            for turn in news.turns:
                 self._console.print(_plain_row(_cells(turn)), soft_wrap=True, markup=False)
         elif time.monotonic() - self._drawn > REFRESH:
             self._live.update(self._table(), refresh=True)
             self._drawn = time.monotonic()
 
     def _table(self) -> RenderableType:
-        table = Table(box=SIMPLE_HEAD, title=self._title)
+        table = Table(box=SIMPLE_HEAD, title=self._source.name)
         for heading in HEADINGS:
             table.add_column(Text(heading), justify="left" if heading == "flags" else "right")
         for turn in self._turns:
             table.add_row(*_cells(turn), style=None if turn.valid else "dim")
-        return Group(table, Text(counters(self._wheels)))
+        return Group(table, Text(counters(self._source.wheels)))
 
 
 def counters(wheels: Wheels) -> str:

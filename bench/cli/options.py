@@ -8,7 +8,6 @@ import click
 
 from bench.device import Device, read_device
 from bench.errors import DeviceError
-from bench.links import Link
 from bench.links.opening import BITRATE, PortPlan
 from bench.protocols.plan import RATE, ProtocolPlan
 from tirelib.cli.common import FILE
@@ -66,13 +65,6 @@ def protocol_of(port: PortPlan, rate: float, map_file: Path | None) -> ProtocolP
         )
     user = None if map_file is None else read_map(map_file)
     return ProtocolPlan(port.encoding, rate if user is None else user.rate, user)
-
-
-def opened(port: PortPlan, patience: float) -> Link:
-    """Open a port that comes back by itself."""
-    from bench.links.reconnecting import ReconnectingLink
-
-    return ReconnectingLink(port.open, patience)
 
 
 def devices_of(texts: Sequence[str]) -> tuple[dict[int | None, Device], str]:

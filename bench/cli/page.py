@@ -1,6 +1,6 @@
 """Options of the live page, and what is said of it."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from importlib.util import find_spec
 from pathlib import Path
@@ -9,13 +9,12 @@ from typing import Any, TypeVar
 import click
 from rich.console import Console
 
-from bench.chain import Turn
 from bench.device import Device
-from bench.links import Link
-from bench.page.feed import About, WatchedLink
+from bench.estimation import News
+from bench.page.commands import Switch
+from bench.page.feed import About
 from bench.page.live import LOOPBACK, LivePage, PageChoice
-from bench.page.recording_switch import RecordingSwitch
-from bench.wheels import Wheels
+from bench.session import Source
 from tirelib.estimators.calibration import Calibration
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -72,16 +71,12 @@ class Shown:
         self._stack = ExitStack()
         self._page: LivePage | None = None
         self.quiet = choice.terminal and console.is_terminal
-
-    def watched(self, link: Link, switch: RecordingSwitch | None) -> Link:
-        """Return the link that the session is to read, each read recorded before it is decoded."""
-        self._link = WatchedLink(link, switch)
-        self._switch = switch
-        return self._link
+        self.anything = choice.page or choice.terminal
 
     def open(
         self,
-        wheels: Wheels,
+        source: Source,
+        switch: Switch | None,
         fmu: Path,
         calibration: Calibration | None,
         devices: Mapping[int | None, Device],
@@ -95,12 +90,12 @@ class Shown:
         if not (choice.page or choice.terminal):
             return
         lateral = next((d.lateral for d in devices.values() if d.lateral), None)
-        about = About(self._link.name, fmu.name)
+        about = About(source.name, fmu.name)
         if calibration is not None:
-            about = About(self._link.name, fmu.name, calibration.tire, calibration.lateral)
+            about = About(source.name, fmu.name, calibration.tire, calibration.lateral)
         elif lateral is not None:
-            about = About(self._link.name, fmu.name, "", lateral)
-        page = LivePage(choice, wheels, self._link, about, self._switch)
+            about = About(source.name, fmu.name, "", lateral)
+        page = LivePage(choice, source, about, switch)
         self._page = self._stack.enter_context(page)
         if choice.open_to_others:
             console.print(
@@ -111,10 +106,14 @@ class Shown:
         if page.url:
             console.print(f"live page: {page.url}", soft_wrap=True, markup=False, highlight=False)
 
-    def watch(self, turns: Sequence[Turn], messages: Sequence[str]) -> None:
-        """Show what a read has brought; called after each read."""
+    def watch(self, news: News) -> None:
+        """Show what is new; called again and again."""
         if self._page is not None:
-            self._page.watch(turns, messages)
+            self._page.watch(news)
+
+    def cpu_time(self) -> float:
+        """Return what the page's process has used, [s]."""
+        return 0.0 if self._page is None else self._page.cpu_time
 
     def end(self, reason: str) -> None:
         """Say that the run has ended."""

@@ -1,22 +1,20 @@
 """``tirebench record``: raw bytes of a port to a file, without an estimator."""
 
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import click
 
-from bench.chain import Outputs
 from bench.cli.live import counters
-from bench.cli.options import PORTS, devices_of, opened, port_options, protocol_of
+from bench.cli.options import PORTS, devices_of, port_options, protocol_of
 from bench.cli.stop import on_stop
-from bench.conditions import Condition, Conditions, read_conditions
+from bench.conditions import Conditions, read_conditions
 from bench.document import line_document, wheel_document
 from bench.links.opening import PortPlan
-from bench.recording import Recorder, RecordingHeader
+from bench.live.chain import LiveChain, LivePlan
+from bench.live.reader import ReaderPlan
+from bench.recording import RecordingHeader
 from bench.session import Limits, Session
-from bench.wheels import Wheels
-from tirelib.arrays import FloatArray
 from tirelib.cli.common import FILE, write_json
 
 _EXAMPLE = f"""\b
@@ -26,21 +24,9 @@ Examples:
 
 {PORTS}
 \b
-Every read is written as it came, bad frames included, before it is decoded.
+Every read is written as it came, bad frames included; decoding only counts.
 Exit code: 0 done, 1 the port went away or not one good frame came, 2 bad input.
 """
-
-
-class Idle:
-    """An estimator that estimates nothing: frames are only counted."""
-
-    samples = 1 << 16
-
-    def start(self, period: float) -> None:
-        """Forget nothing."""
-
-    def step(self, strain: FloatArray, conditions: Condition, valid: bool) -> Outputs | None:
-        """Return nothing."""
 
 
 @click.command(epilog=_EXAMPLE)
@@ -81,25 +67,21 @@ def record(
     settings: dict[str, Any] = {"port": port, "baud": baud, "bitrate": bitrate,
                                 "data_bitrate": data_bitrate}  # fmt: skip
     header = RecordingHeader(settings, text, "", protocol.as_header())
-    with ExitStack() as stack:
-        link = opened(plan, reconnect)
-        stack.callback(link.close)
-        recorder = stack.enter_context(Recorder(out, header, conditions))
-        wheels = Wheels(protocol.decoder(), lambda _: Idle(), devices or {None: protocol.device},
-                        conditions)  # fmt: skip
-        session = Session(link, wheels, recorder=recorder, limits=Limits(duration, silence))
-        click.echo(f"{link.name} -> {out}")
+    reader = ReaderPlan(plan, reconnect, protocol, devices or {None: protocol.device})
+    with LiveChain(LivePlan(reader, None, conditions, header, out)) as chain:
+        session = Session(chain, limits=Limits(duration, silence))
+        click.echo(f"{chain.name} -> {out}")
         with on_stop(session.stop):
             outcome = session.run()
-        recorder.close(outcome.reason)
+        wheels, recorded, counts = chain.wheels, chain.recorded.bytes, chain.counts()
     if outcome.message:
         click.echo(f"unplugged: {outcome.message}")
-    click.echo(f"ended: {outcome.reason}; {recorder.bytes} bytes; {counters(wheels)}")
+    click.echo(f"ended: {outcome.reason}; {recorded} bytes; {counters(wheels)}")
     if json_file is not None:
         write_json(json_file, {
-            "format": "tirebench-record/1", "ended": outcome.reason, "bytes": recorder.bytes,
-            "line": line_document(*wheels.counts),
-            "wheels": {n: wheel_document(chain) for n, chain in wheels.chains.items()},
+            "format": "tirebench-record/1", "ended": outcome.reason, "bytes": recorded,
+            "line": line_document(*wheels.counts), "chain": counts,
+            "wheels": {n: wheel_document(wheels, n) for n in wheels.heard},
         })  # fmt: skip
     good = wheels.counts[0].ok > 0 and outcome.reason != "unplugged"
     context.exit(0 if good else 1)

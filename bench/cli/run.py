@@ -5,20 +5,18 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
 from rich.console import Console
 
-from bench.chain import Estimator, Turn
+from bench.chain import Estimator
 from bench.cli.bridges import Bridges, bridge_options
 from bench.cli.live import Screen, counters
 from bench.cli.options import (
     PORTS,
     devices_of,
     devices_of_text,
-    opened,
     port_options,
     protocol_of,
 )
@@ -28,20 +26,22 @@ from bench.conditions import Conditions, read_conditions
 from bench.device import Device
 from bench.document import document
 from bench.errors import DeviceError
+from bench.estimation import Estimation, News
 from bench.fmu_archive import FmuArchive, read_fmu
-from bench.links import Link
+from bench.fmu_model import FmuFile, FmuModel
 from bench.links.opening import PortPlan
+from bench.links.replay import ReplayLink
+from bench.live.chain import LiveChain, LivePlan
+from bench.live.reader import ReaderPlan
 from bench.page.recording_switch import RecordingSwitch
 from bench.protocols.plan import ProtocolPlan
-from bench.recording import Recorder, RecordingHeader
-from bench.session import Limits, Outcome, Session
+from bench.recording import RecordingHeader
+from bench.replay import ReplayChain
+from bench.session import Limits, Outcome, Session, Source
 from bench.trust import check_trust
 from bench.wheels import Wheels
 from tirelib.cli.common import FILE, output, write_json
 from tirelib.units import to_si
-
-if TYPE_CHECKING:
-    from bench.fmu_model import FmuModel
 
 _EXAMPLE = f"""\b
 Examples:
@@ -60,10 +60,19 @@ Exit code: 0 done, 1 unplugged or not one valid turn, 2 bad input. Ctrl-C ends i
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
-    """Where bytes come from and what they mean."""
+class Given:
+    """What the bytes mean and what is known beside them.
 
-    link: Link
+    Attributes
+    ----------
+    protocol : ProtocolPlan
+    devices : mapping of wheel to Device
+    device_text : str
+        Of the device files.
+    conditions : Conditions
+    wheels : tuple of int
+    """
+
     protocol: ProtocolPlan
     devices: Mapping[int | None, Device]
     device_text: str
@@ -139,132 +148,103 @@ def run(
     paced = replay is None or pace is not None
     choice = page_choice(page, host, network, page_port, tui, paced=paced)
     archive = read_fmu(fmu_file)
-    given = _conditions(speed, pressure, camber, sidecar)
+    conditions = _conditions(speed, pressure, camber, sidecar)
     devices, device_text = devices_of(device_texts)
     plan = PortPlan(port or "", baud, bitrate, data_bitrate, bus_options)
     console = output()
     console.print(f"FMU {fmu_file}, sha256 {archive.sha256}", soft_wrap=True)
     console.print(f"FMU {check_trust(archive, trust=trust)}", soft_wrap=True)
     with ExitStack() as stack:
-        models = _Models(archive, stack)
-        models.first()  # a port is opened last: from then on bytes come
-        if replay is not None:
-            source = _replayed(replay, pace, given, devices, numbers, archive, console)
-        else:
+        file = stack.enter_context(FmuFile(archive))
+        link = None if replay is None else stack.enter_context(ReplayLink(replay, pace))
+        if link is None:
             protocol = protocol_of(plan, rate, map_file)
-            source = Source(opened(plan, reconnect), protocol, devices or {None: protocol.device},
-                            device_text, given or Conditions.constant(), numbers)  # fmt: skip
-        stack.callback(source.link.close)
-        bridges = stack.enter_context(Bridges(estimates_out, plotjuggler, plan))
-        model = models.first()
-        console.print(f"{source.link.name} -> {model.name}, {model.samples} samples a step")
-        calibration = model.calibration
+            known = Given(protocol, devices or {None: protocol.device}, device_text,
+                          conditions or Conditions.constant(), numbers)  # fmt: skip
+        else:
+            known = _replayed(link, conditions, devices, numbers, archive, console)
+        calibration = file.calibration
         if calibration is not None:
-            for device in source.devices.values():
+            for device in known.devices.values():
                 device.check_layout(calibration.lateral, str(fmu_file))
-        shown = stack.enter_context(Shown(choice, console))
-        recorder: RecordingSwitch | None = None
-        if replay is None:
+        bridges = stack.enter_context(Bridges(estimates_out, plotjuggler, plan))
+        shown = Shown(choice, console)
+        switch: RecordingSwitch | None = None
+        source: Source
+        if link is None:
             settings = {"port": port, "baud": baud, "bitrate": bitrate,
                         "data_bitrate": data_bitrate, "wheels": list(numbers),
                         "fmu": str(fmu_file), "speed_kmh": speed, "pressure_bar": pressure,
                         "camber_deg": camber}  # fmt: skip
-
-            def begin(file: Path) -> Recorder:
-                header = RecordingHeader(settings, source.device_text, archive.sha256,
-                                         source.protocol.as_header())  # fmt: skip
-                return Recorder(file, header, source.conditions)
-
+            header = RecordingHeader(settings, device_text, archive.sha256,
+                                     known.protocol.as_header())  # fmt: skip
+            recorded = record is not None or shown.anything
+            reader = ReaderPlan(plan, reconnect, known.protocol, known.devices, numbers, recorded)
+            chain = stack.enter_context(LiveChain(
+                LivePlan(reader, file, known.conditions, header, record, shown.anything)
+            ))  # fmt: skip
             first = record or Path(time.strftime("tirebench-%Y%m%d-%H%M%S.mcap"))
-            switch = RecordingSwitch(begin, first, started=record is not None)
-            recorder = stack.enter_context(switch)
-        link = shown.watched(source.link, recorder)
-        wheels = Wheels(source.protocol.decoder(), models.of_wheel, source.devices,
-                        source.conditions, source.wheels)  # fmt: skip
+            switch = RecordingSwitch(chain, first, started=record is not None)
+            source = chain
+        else:
+            source = _in_process(link, file, known, stack, laps=shown.anything)
+        console.print(f"{source.name} -> {file.name}, {file.samples} samples a step")
+        stack.enter_context(shown)
+        shown.open(source, switch, fmu_file, calibration, known.devices)
         limits = Limits(duration, silence, turns)
-        keep = json_file is not None
-        shown.open(wheels, fmu_file, calibration, source.devices)
-        outcome, used = _session(
-            link, wheels, models, recorder, limits, keep, console, bridges, shown
-        )
-    _summary(console, outcome, wheels, used, source, recorder)
-    if json_file is not None:
-        origin = {"link": source.link.name, "fmu_sha256": archive.sha256, "ended": outcome.reason,
-                  "cpu_share": used if source.link.live else None}  # fmt: skip
-        runs = source.conditions.runs
-        write_json(json_file, document(outcome.turns, runs, wheels.counts, origin, calibration,
-                                       wheels.chains))  # fmt: skip
-        console.print(f"written: {json_file}", soft_wrap=True)
+        session = Session(source, limits=limits, keep=json_file is not None)
+        outcome, used = _session(session, source, console, bridges, shown)
+        _summary(console, outcome, source, used, link, switch)
+        if json_file is not None:
+            origin = {"link": source.name, "fmu_sha256": archive.sha256, "ended": outcome.reason,
+                      "cpu_share": used if source.live else None,
+                      "chain": source.counts()}  # fmt: skip
+            write_json(json_file, document(outcome.turns, known.conditions.runs, source.wheels,
+                                           origin, calibration))  # fmt: skip
+            console.print(f"written: {json_file}", soft_wrap=True)
     good = outcome.valid > 0 and outcome.reason != "unplugged"
     context.exit(0 if good else 1)
 
 
-class _Models:
-    """An instance of the FMU for each wheel; the first is made early, to fail early."""
+def _in_process(
+    link: ReplayLink, file: FmuFile, known: Given, stack: ExitStack, *, laps: bool
+) -> ReplayChain:
+    """Return a recording through an instance of the FMU for each wheel, in this process."""
 
-    def __init__(self, archive: FmuArchive, stack: ExitStack) -> None:
-        self._archive = archive
-        self._stack = stack
-        self._made: list[FmuModel] = []
-        self._used = 0
+    def estimator(_: int) -> Estimator:
+        return stack.enter_context(FmuModel(file))
 
-    def first(self) -> "FmuModel":
-        """Return the first instance."""
-        if not self._made:
-            from bench.fmu_model import FmuModel  # late: FMPy takes a second to import
-
-            self._made.append(self._stack.enter_context(FmuModel(self._archive)))
-        return self._made[0]
-
-    def of_wheel(self, wheel: int) -> Estimator:
-        """Return a fresh instance for a wheel."""
-        from bench.fmu_model import FmuModel
-
-        self._used += 1
-        if self._used > len(self._made):
-            self._made.append(self._stack.enter_context(FmuModel(self._archive)))
-        return self._made[self._used - 1]
-
-    def take_messages(self) -> list[str]:
-        """Return what the instances have logged since the last call."""
-        return [said for model in self._made for said in model.take_messages()]
+    wheels = Wheels(known.protocol.decoder(), known.devices, known.wheels)
+    jumps = link.recording.jumps()
+    return ReplayChain(link, wheels, Estimation(estimator, known.conditions, jumps, laps=laps))
 
 
 def _session(
-    link: Link,
-    wheels: Wheels,
-    models: _Models,
-    recorder: RecordingSwitch | None,
-    limits: Limits,
-    keep: bool,
-    console: Console,
-    bridges: Bridges,
-    shown: Shown,
+    session: Session, source: Source, console: Console, bridges: Bridges, shown: Shown
 ) -> tuple[Outcome, float]:
     """Run until something ends it; return what came of it and the share of a core it took."""
     with ExitStack() as stack:
-        screen = None
-        if not shown.quiet:
-            screen = stack.enter_context(Screen(console, wheels, link.name))
+        screen = None if shown.quiet else stack.enter_context(Screen(console, source))
 
-        def watch(turns: list[Turn]) -> None:
-            messages = models.take_messages()
+        def watch(news: News) -> None:
             if screen is not None:
-                for said in messages:
-                    console.print(f"FMU: {said}", soft_wrap=True, markup=False)
-                screen.watch(turns)
-            bridges.send(turns)
-            shown.watch(turns, messages)
+                screen.watch(news)
+            bridges.send(news.turns)
+            shown.watch(news)
 
-        session = Session(link, wheels, limits=limits, keep=keep, watch=watch)
-        start = time.monotonic(), time.process_time()
+        session.watch = watch
+        start = time.monotonic(), _cpu_time(source, shown)
         with on_stop(session.stop):
             outcome = session.run()
-        used = (time.process_time() - start[1]) / max(time.monotonic() - start[0], 1e-9)
+        spent = _cpu_time(source, shown) - start[1]
+        used = spent / max(time.monotonic() - start[0], 1e-9)
         shown.end(outcome.reason)
-    if recorder is not None:
-        recorder.close(outcome.reason)
     return outcome, used
+
+
+def _cpu_time(source: Source, shown: Shown) -> float:
+    """Return what all processes of the run have used, [s]."""
+    return time.process_time() + source.cpu_time() + shown.cpu_time()
 
 
 def _conditions(
@@ -289,53 +269,57 @@ def _conditions(
 
 
 def _replayed(
-    replay: Path,
-    pace: float | None,
+    link: ReplayLink,
     conditions: Conditions | None,
     devices: Mapping[int | None, Device],
     wheels: tuple[int, ...],
     archive: FmuArchive,
     console: Console,
-) -> Source:
-    """Open a recording; options that are given replace what it holds, and that is said."""
-    from bench.links.replay import ReplayLink
-
-    link = ReplayLink(replay, pace)
+) -> Given:
+    """Return what a recording says; options that are given replace it, and that is said."""
     header = link.recording.header
-    protocol = ProtocolPlan.of_header(header.protocol, str(replay))
+    protocol = ProtocolPlan.of_header(header.protocol, link.name)
     if header.fmu and header.fmu != archive.sha256:
         console.print(f"note: recorded with another FMU ({header.fmu[:12]}...)")
     if devices or conditions is not None:
         console.print("note: device file or conditions of the recording are replaced by options")
-    own = devices_of_text(header.device, str(replay)) or {None: protocol.device}
+    own = devices_of_text(header.device, link.name) or {None: protocol.device}
     if not wheels:
         wheels = tuple(header.settings.get("wheels") or ())
-    return Source(link, protocol, devices or own, header.device,
-                  conditions or link.recording.conditions, wheels)  # fmt: skip
+    return Given(protocol, devices or own, header.device,
+                 conditions or link.recording.conditions, wheels)  # fmt: skip
 
 
 def _summary(
     console: Console,
     outcome: Outcome,
-    wheels: Wheels,
-    used: float,
     source: Source,
-    recorder: RecordingSwitch | None,
+    used: float,
+    link: ReplayLink | None,
+    switch: RecordingSwitch | None,
 ) -> None:
     """Say how it ended and what came of it."""
     if outcome.message:
         console.print(f"unplugged: {outcome.message}", soft_wrap=True, markup=False)
     console.print(
         f"ended: {outcome.reason}; {outcome.count} turns, {outcome.valid} valid (ISO 8855 axes); "
-        f"{counters(wheels)}",
+        f"{counters(source.wheels)}",
         soft_wrap=True,
     )
-    recording: Any = getattr(source.link, "recording", None)
-    if recording is not None and recording.complete is False:
-        console.print(f"note: the recording breaks off ({recording.damage})", soft_wrap=True)
-    if source.link.live and outcome.latency:
+    if link is not None and link.recording.complete is False:
+        console.print(f"note: the recording breaks off ({link.recording.damage})", soft_wrap=True)
+    counts = source.counts()
+    for name, number in counts.get("restarts", {}).items():
+        if number:
+            console.print(f"note: the {name} was started again {number} times")
+    for wheel, mine in counts.get("wheels", {}).items():
+        if mine["skipped_samples"]:
+            console.print(f"note: wheel {wheel}: {mine['skipped_turns']} turns were skipped")
+    if counts and counts["raw"]["lost_bytes"]:
+        console.print(f"note: {counts['raw']['lost_bytes']} raw bytes were not recorded")
+    if source.live and outcome.latency:
         middle, high = np.percentile(np.array(outcome.latency) * 1e3, (50, 99))
         console.print(f"byte in to estimate out: median {middle:.1f} ms, 99 % {high:.1f} ms; "
                       f"{100 * used:.0f} % of a core")  # fmt: skip
-    for file in () if recorder is None else recorder.files:
+    for file in () if switch is None else switch.files:
         console.print(f"recorded: {file}", soft_wrap=True)

@@ -19,7 +19,8 @@ class Read(NamedTuple):
     data : bytes
         Empty if nothing came.
     event : str
-        ``lost`` or ``back`` when the port went away or came back; else empty.
+        `LOST` or `BACK` when the port went away or came back, `RESUMED` when the process that
+        reads it was started again; else empty.
     """
 
     arrival: int
@@ -27,7 +28,7 @@ class Read(NamedTuple):
     event: str = ""
 
 
-LOST, BACK = "lost", "back"
+LOST, BACK, RESUMED = "lost", "back", "resumed"
 
 
 class Link(Protocol):
@@ -65,4 +66,4 @@ class Link(Protocol):
         """Return how often a buffer below was full, as far as the system tells."""
 
 
-__all__ = ["BACK", "LOST", "Link", "Read"]
+__all__ = ["BACK", "LOST", "RESUMED", "Link", "Read"]

@@ -10,17 +10,29 @@ import numpy as np
 
 from bench.can_batch import FD_SIZE, CanBatch, pack
 from bench.deadline import Deadline
-from bench.errors import LinkError, UnpluggedError
+from bench.errors import DeviceError, LinkError, UnpluggedError
 from bench.links import Read
 from bench.protocols import CAN
 
 LARGEST_BATCH = 4096
 """Frames that one read brings at most."""
-GATHER = 0.004
+GATHER = 0.002
 """After the first frame, wait this long for more, [s]."""
-_SILENT: Mapping[str, dict[str, Any]] = {"slcan": {"listen_only": True},
-                                         "pcan": {"state": can.BusState.PASSIVE}}  # fmt: skip
-"""How an interface is told to listen only, where it can be told."""
+_SILENT: Mapping[str, dict[str, Any]] = {
+    "cantact": {"monitor": True},
+    "kvaser": {"driver_mode": False},
+    "nixnet": {"listen_only": True},
+    "pcan": {"state": can.BusState.PASSIVE},
+    "seeedstudio": {"operation_mode": "silent"},
+    "slcan": {"listen_only": True},
+    "systec": {"state": can.BusState.PASSIVE},
+    "vector": {"listen_only": True},
+}
+"""How an interface is told to listen only."""
+_NO_CONTROLLER = ("virtual", "udp_multicast", "serial", "socketcan", "socketcand")
+"""Interfaces that drive no controller themselves; that of SocketCAN is set by the system."""
+ACKNOWLEDGE = "acknowledge"
+"""Bus option that accepts a controller which cannot be told to be silent."""
 
 
 class CanLink:
@@ -35,12 +47,15 @@ class CanLink:
     options : mapping, optional
         More of python-can's arguments: ``host``, ``port``, ``app_name``.
     transmit : bool
-        Else nothing is sent, and the controller is silent where that can be set.
+        Else nothing is sent, and the controller is told to be silent.
 
     Raises
     ------
     LinkError
         If the bus cannot be opened.
+    DeviceError
+        If the controller cannot be told to be silent, and the option `ACKNOWLEDGE` does not accept
+        that.
     """
 
     live = True
@@ -68,11 +83,12 @@ class CanLink:
         if interface == "virtual":
             arguments["protocol"] = can.CanProtocol.CAN_FD
             arguments.pop("fd", None)
-        if not transmit:
-            arguments |= _SILENT.get(interface, {})
+        given = dict(options or {})
+        accepted = bool(given.pop(ACKNOWLEDGE, 0))
+        if not (transmit or accepted):
+            arguments |= _silent(self.name, interface)
         try:
-            self._bus = can.Bus(interface=interface, channel=channel,
-                                **(arguments | dict(options or {})))  # fmt: skip
+            self._bus = can.Bus(interface=interface, channel=channel, **(arguments | given))
         except Exception as error:  # each backend has its own, and some raise bare OSError
             known = ", ".join(sorted(can.VALID_INTERFACES))
             raise LinkError(
@@ -149,6 +165,19 @@ class CanLink:
             f"{self.name}: the bus went away ({type(error).__name__}: {error}); a steady "
             "connection is needed; check cable and adapter, then start again"
         )
+
+
+def _silent(name: str, interface: str) -> dict[str, Any]:
+    """Return what makes the controller of an interface silent."""
+    if interface in _SILENT or interface in _NO_CONTROLLER:
+        return _SILENT.get(interface, {})
+    if interface not in can.VALID_INTERFACES:
+        return {}  # python-can says so better
+    raise DeviceError(
+        f"{name}: python-can cannot make this interface silent, and its controller would "
+        f"acknowledge the frames of others; {', '.join(sorted(_SILENT))} can be silent; use one of "
+        f"them, or accept it with --bus-option {ACKNOWLEDGE}=1"
+    )
 
 
 def packed(messages: list[can.Message]) -> CanBatch:

@@ -23,25 +23,34 @@ class ReconnectingLink:
         Opens the port.
     patience : float, [s]
         When the port stays away for longer, the loss is raised.
+    away : str, optional
+        Name of a port that was open before and may be away now: it is waited for.
 
     Raises
     ------
     LinkError
-        If the port cannot be opened at first.
+        If the port cannot be opened at first, and is not one that may be away.
     """
 
-    def __init__(self, open_link: Callable[[], Link], patience: float) -> None:
+    live = True
+
+    def __init__(self, open_link: Callable[[], Link], patience: float, away: str = "") -> None:
         self._open = open_link
         self._patience = patience
-        self._link: Link | None = open_link()
-        self.name = self._link.name
-        self.live = self._link.live
-        self.encoding = self._link.encoding
+        self._link: Link | None = None
+        self.name, self.encoding = away, ""
         self._overruns = 0
         self._wait = FIRST_WAIT
         self._next = self._given_up = 0.0
-        self._loss = UnpluggedError(self.name)
+        self._loss = UnpluggedError(f"{away}: the port went away; check cable and receiver")
         self._seen = True
+        try:
+            self._link = open_link()
+            self.name, self.encoding = self._link.name, self._link.encoding
+        except LinkError:
+            if not away:
+                raise
+            self._lose(self._loss)
 
     def receive(self, deadline: Deadline) -> Read | None:
         """Return what has come by the deadline; see `bench.links.Link.receive`."""
@@ -100,6 +109,7 @@ class ReconnectingLink:
             self._link = self._open()
         except LinkError:
             return False
+        self.name, self.encoding = self._link.name, self._link.encoding
         return True
 
     def _there(self) -> bool:

@@ -61,3 +61,9 @@ class ReplayLink:
     def overruns(self) -> int:
         """Return 0: those of the run are not repeated."""
         return 0
+
+    def __enter__(self) -> "ReplayLink":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

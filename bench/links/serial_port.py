@@ -15,7 +15,7 @@ from bench.protocols import SERIAL
 
 BAUD = 2_000_000
 """Default rate; 16 samples a frame at 10 kHz need 1.13 Mbaud."""
-GATHER = 0.004
+GATHER = 0.002
 """After the first byte, wait this long for more: fewer and larger batches cost less, [s]."""
 _TIOCGICOUNT = 0x545D
 """Linux: the counters of a UART."""

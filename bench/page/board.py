@@ -11,9 +11,11 @@ import zlib
 from dataclasses import dataclass
 from multiprocessing.shared_memory import SharedMemory
 
+from bench.rings import memory
+
 _HEAD = struct.Struct("<Q")
 _SLOT = struct.Struct("<QII")
-_BEAT = struct.Struct("<d")
+_BEAT = struct.Struct("<dd")
 _START = 64
 """Bytes before the first ring: the reader's heartbeat."""
 
@@ -67,7 +69,7 @@ class Board:
     def __init__(self, name: str | None = None) -> None:
         total = _START + sum(ring.bytes for ring in RINGS.values())
         self._owner = name is None
-        self._memory = SharedMemory(name, create=self._owner, size=total if self._owner else 0)
+        self._memory = memory(total) if name is None else SharedMemory(name)
         self.name = self._memory.name
         place, rings = _START, {}
         for ring, size in RINGS.items():
@@ -79,7 +81,13 @@ class Board:
 
     def beat(self, grace: float = 0.0) -> None:
         """Note that the reader is alive, or will be after a time of grace [s]."""
-        _BEAT.pack_into(_view(self._memory), 0, time.monotonic() + grace)
+        used = 0.0 if self._owner else time.process_time()
+        _BEAT.pack_into(_view(self._memory), 0, time.monotonic() + grace, used)
+
+    @property
+    def cpu_time(self) -> float:
+        """Time that the process that showed the last sign of life had used, [s]."""
+        return float(_BEAT.unpack_from(_view(self._memory), 0)[1])
 
     @property
     def silence(self) -> float:

@@ -74,7 +74,9 @@ def parse_command(document: Any) -> Command:
 class Target(Protocol):
     """What records: the recorder of the run."""
 
-    bytes: int
+    @property
+    def bytes(self) -> int:
+        """Raw bytes so far."""
 
     def marker(self, text: str) -> None:
         """Write a marker."""

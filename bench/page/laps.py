@@ -91,17 +91,15 @@ class Laps:
     ----------
     lost : int
         Laps that were not in memory any more.
-    newest_us : int, [us]
-        Device time of the newest sample.
     """
 
     def __init__(self, wheel: int) -> None:
         self.wheel = wheel
         self.lost = 0
-        self.newest_us = 0
         self._rows = np.empty((ROOM, GAGES), np.float32)
         self._used = 0
         self._start = 0  # number within the segment of the first row
+        self._first = 0  # the same, of the first sample that the estimator was given
         self._segment = -1
         self._period = math.nan
         self._pending: deque[_Pending] = deque()
@@ -112,8 +110,8 @@ class Laps:
         if block.segment != self._segment:
             self._pending.clear()
             self._segment, self._start, self._used = block.segment, block.start, 0
+            self._first = block.start
         self._period = block.period
-        self.newest_us = block.end_us
         strain = block.strain[-ROOM // 2 :]
         if len(strain) < len(block.strain):
             self._used = 0  # what is left out may not be bridged
@@ -135,7 +133,7 @@ class Laps:
             duration = contact - last
         if turn.segment != self._segment or not (math.isfinite(contact) and duration > 0.0):
             return
-        middle, half = contact / self._period, 0.5 * duration / self._period
+        middle, half = self._first + contact / self._period, 0.5 * duration / self._period
         self._pending.append(_Pending(number, turn.segment, turn.valid, middle, half))
 
     def take(self) -> list[Lap]:

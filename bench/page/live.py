@@ -1,25 +1,32 @@
-"""The live page as the run sees it: one context manager, called after each read."""
+"""The live page as the run sees it: one context manager, called with the news."""
 
 import ipaddress
 import socket
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from types import TracebackType
 from typing import Any
 
-from bench.chain import Turn
 from bench.errors import DeviceError
+from bench.estimation import News
+from bench.live.kept import CONTEXT, Kept
+from bench.page.address import listener, new_token
 from bench.page.board import Board
 from bench.page.commands import CommandDesk, Switch
-from bench.page.feed import About, Feed, WatchedLink
+from bench.page.feed import About, Feed
 from bench.page.guard import bracketed
-from bench.page.process import Keeper, listener, new_token
-from bench.wheels import Wheels
+from bench.session import Source
 
 LOOPBACK = "127.0.0.1"
+HANGS = 10.0
+"""A page without a sign of life for so long is ended and started again, [s]."""
+STARTS = 60.0
+"""One that starts may be silent for so long more, [s]."""
+LOOK = 0.05
+"""Time between two looks after the page's process, [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +87,7 @@ class LivePage:
     ----------
     choice : PageChoice
         Checked.
-    wheels : Wheels
-    link : WatchedLink
+    source : Source
     about : About
     switch : Switch or None
         What a record button turns on and off; None if there is nothing to record.
@@ -95,8 +101,7 @@ class LivePage:
     def __init__(
         self,
         choice: PageChoice,
-        wheels: Wheels,
-        link: WatchedLink,
+        source: Source,
         about: About,
         switch: Switch | None,
     ) -> None:
@@ -104,9 +109,12 @@ class LivePage:
         self.desk = CommandDesk(switch)
         self._choice = choice
         self._stack = ExitStack()
-        self._keepers: list[Keeper] = []
+        self._kept: list[Kept] = []
+        self._next_look = 0.0
+        self._writing: Connection | None = None
+        self._source = source
         self._board = self._stack.enter_context(Board())
-        self.feed = Feed(self._board, wheels, link, about, self._state)
+        self.feed = Feed(self._board, source, about, self._state)
 
     def __enter__(self) -> "LivePage":
         try:
@@ -127,10 +135,15 @@ class LivePage:
     ) -> None:
         self._stack.close()
 
-    def watch(self, turns: Sequence[Turn], messages: Sequence[str] = ()) -> None:
-        """Show what a read has brought and take commands; called after each read."""
-        self.feed.watch(turns, messages)
+    def watch(self, news: News) -> None:
+        """Show what is new, take commands and look after the page; called again and again."""
+        self.feed.watch(news)
         self.desk.poll()
+        now = time.monotonic()
+        if now >= self._next_look:
+            self._next_look = now + LOOK
+            for kept in self._kept:
+                kept.look()
 
     def end(self, reason: str) -> None:
         """Say that the run has ended, and leave viewers the time to hear it."""
@@ -138,17 +151,22 @@ class LivePage:
         time.sleep(0.3)
 
     @property
+    def cpu_time(self) -> float:
+        """Time that the process that shows the board has used, [s]."""
+        return self._board.cpu_time
+
+    @property
     def starts(self) -> int:
         """How often the page's process has been started."""
-        return sum(keeper.starts for keeper in self._keepers)
+        return sum(kept.starts for kept in self._kept)
 
     @property
     def process_id(self) -> int | None:
         """Of the first process that shows the board."""
-        return self._keepers[0].process_id if self._keepers else None
+        return self._kept[0].process_id if self._kept else None
 
     def _state(self) -> dict[str, Any]:
-        return self.desk.state()
+        return {**self.desk.state(), "chain": self._source.counts()}
 
     def _open_page(self) -> None:
         from bench.page.server import PagePlan, serve
@@ -161,27 +179,42 @@ class LivePage:
             f"http://{LOOPBACK if _unspecified(choice.host) else shown}:{port}/?token={token}"
         )
 
-        def arguments(starts: int, pipe: Connection) -> tuple[Any, ...]:
-            return PagePlan(self._board.name, token, choice.host, port, starts), opened, pipe
+        def arguments(starts: int) -> tuple[Any, ...]:
+            reading, writing = CONTEXT.Pipe(duplex=False)
+            self._listen(reading, writing)
+            self._board.beat(STARTS)
+            plan = PagePlan(self._board.name, token, choice.host, port, starts)
+            return plan, opened, writing
 
-        self._keep(serve, arguments, self.desk.listen)
+        self._keep(serve, arguments)
+        self._stack.callback(self._hang_up)
 
     def _open_terminal(self) -> None:
         from bench.page.terminal import show
 
-        def arguments(starts: int, pipe: Connection) -> tuple[Any, ...]:
+        def arguments(starts: int) -> tuple[Any, ...]:
+            self._board.beat(STARTS)
             return self._board.name, starts
 
-        self._keep(show, arguments, Connection.close)
+        self._keep(show, arguments)
+
+    def _listen(self, reading: Connection, writing: Connection) -> None:
+        """Take commands from a new pipe; the end of the one before is closed here too."""
+        if self._writing is not None:
+            self._writing.close()
+        self._writing = writing
+        self.desk.listen(reading)
+
+    def _hang_up(self) -> None:
+        if self._writing is not None:
+            self._writing.close()
 
     def _keep(
-        self,
-        target: Callable[..., None],
-        arguments: Callable[[int, Connection], tuple[Any, ...]],
-        listen: Callable[[Connection], None],
+        self, target: Callable[..., None], arguments: Callable[[int], tuple[Any, ...]]
     ) -> None:
-        keeper = Keeper(self._board, target, arguments, listen)
-        self._keepers.append(self._stack.enter_context(keeper))
+        kept = Kept(target, arguments, lambda: self._board.silence > HANGS)
+        self._kept.append(kept)
+        self._stack.callback(kept.wait, 0.0)
 
 
 def _unspecified(host: str) -> bool:

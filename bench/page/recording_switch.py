@@ -1,26 +1,26 @@
 """Recordings that are turned on and off while the run goes on."""
 
-from collections.abc import Callable
 from pathlib import Path
 
-from bench.links import Read
-from bench.recording import Recorder
+from bench.deadline import Deadline
+from bench.errors import RecordingError
+from bench.live.chain import LiveChain
+
+PATIENCE = 5.0
+"""How long the recorder may take to answer, [s]."""
 
 
 class RecordingSwitch:
-    """Recordings one after another, in files that the run names; a context manager.
-
-    It stands where a session wants a recorder: while nothing is being recorded it takes reads and
-    drops them.
+    """Recordings one after another, in files that the run names; see `bench.page.commands.Switch`.
 
     Parameters
     ----------
-    make : callable
-        Starts a recording in this file.
+    chain : LiveChain
+        Whose recorder is told.
     first : Path
         Of the first recording; those after it get a number, see `numbered`.
     started : bool
-        Whether to begin at once.
+        Whether it goes on already.
 
     Attributes
     ----------
@@ -28,18 +28,25 @@ class RecordingSwitch:
         Recordings so far.
     """
 
-    def __init__(self, make: Callable[[Path], Recorder], first: Path, *, started: bool) -> None:
-        self.files: list[Path] = []
-        self._make = make
+    def __init__(self, chain: LiveChain, first: Path, *, started: bool) -> None:
+        self.files: list[Path] = [first] if started else []
+        self._chain = chain
         self._first = first
-        self._recorder: Recorder | None = None
-        if started:
-            self._begin(first)
+        self._on = started
 
     @property
-    def recorder(self) -> Recorder | None:
+    def recorder(self) -> "RecordingSwitch | None":
         """What records now; None if nothing does."""
-        return self._recorder
+        return self if self._on else None
+
+    @property
+    def bytes(self) -> int:
+        """Raw bytes of the recording that goes on."""
+        return self._chain.recorded.bytes
+
+    def marker(self, text: str) -> None:
+        """Write a marker of the user at this moment."""
+        self._chain.order("event", {"event": "marker", "text": text})
 
     def start(self) -> str:
         """Begin a recording, unless one is going on; return the name of its file.
@@ -49,34 +56,23 @@ class RecordingSwitch:
         RecordingError
             If it cannot be written.
         """
-        if self._recorder is None:
-            self._begin(numbered(self._first))
+        if not self._on:
+            file = numbered(self._first)
+            self._chain.order("start", str(file))
+            if not self._chain.obeyed(Deadline.after(PATIENCE)):
+                raise RecordingError(f"{file}: the recorder does not answer; wait, then try again")
+            if self._chain.recorded.answer:
+                raise RecordingError(self._chain.recorded.answer)
+            self._on = True
+            self.files.append(file)
         return self.files[-1].name
 
     def stop(self) -> None:
         """End the recording that is going on, if there is one."""
-        self.close("stopped by a viewer")
-
-    def read(self, read: Read) -> None:
-        """Record a read of the link, if a recording is going on."""
-        if self._recorder is not None:
-            self._recorder.read(read)
-
-    def close(self, reason: str) -> None:
-        """End the recording; `reason` is kept in it."""
-        recorder, self._recorder = self._recorder, None
-        if recorder is not None:
-            recorder.close(reason)
-
-    def __enter__(self) -> "RecordingSwitch":
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        self.close("closed" if kind is None else kind.__name__)
-
-    def _begin(self, file: Path) -> None:
-        self._recorder = self._make(file)
-        self.files.append(file)
+        if self._on:
+            self._on = False
+            self._chain.order("stop", "stopped by a viewer")
+            self._chain.obeyed(Deadline.after(PATIENCE))
 
 
 def numbered(file: Path) -> Path:

@@ -24,7 +24,8 @@ REFRESH = 0.2
 """Time between two drawings, [s]."""
 BLOCKS = " ▁▂▃▄▅▆▇█"
 LOSSES = ("crc_bad", "framing_bad", "lost_frames", "lost_samples", "duplicates", "out_of_order",
-          "resets", "overruns", "reconnects", "radio_loss", "low_battery")  # fmt: skip
+          "resets", "overruns", "reconnects", "queue_overruns", "skipped_turns",
+          "estimator_restarts", "radio_loss", "low_battery")  # fmt: skip
 
 
 def show(board_name: str, starts: int) -> None:
@@ -139,6 +140,7 @@ def _health(state: dict[str, Any], history: History, starts: int) -> RenderableT
                       " ".join(map(str, counts["saturated_samples"])),
                       _or_dash(counts["clock_drift_ppm"]),
                       _or_dash(counts["newest_sample_age_ms"]))  # fmt: skip
+    starts += sum(state.get("chain", {}).get("restarts", {}).values())
     dropped = history.missed + state.get("left_out", 0)
     said = "".join(f"\nFMU: {message}" for message in state.get("messages", []))
     return Group(table, Text(f"{dropped} frames of this view dropped, {starts - 1} restarts{said}"))

@@ -20,8 +20,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from bench.can_batch import CanBatch, same_kind
-from bench.chain import Turn
-from bench.document import quantity_valid
+from bench.chain import Turn, quantity_valid
 from bench.protocols.signals import Signal
 
 ESTIMATE, ESTIMATE_STD, ESTIMATE_STATE = "ESTIMATE", "ESTIMATE_STD", "ESTIMATE_STATE"

@@ -1,11 +1,13 @@
 """A signal in the data bytes of a CAN frame, taken out of whole batches at once. Pure."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from bench.can_batch import ByteArray
 from bench.frames import IntArray
+from tirelib.arrays import FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +25,12 @@ class Signal:
     big_endian : bool
     offset : float
     comment : str
+    real : bool
+        A number of IEEE 754 with 32 or 64 bits instead of an integer.
+    selector : Signal or None
+        Multiplexer: the signal is in the frame only where this one has one of the values...
+    selected : tuple of int
+        ...that stand here.
     """
 
     name: str
@@ -34,6 +42,9 @@ class Signal:
     big_endian: bool = False
     offset: float = 0.0
     comment: str = ""
+    real: bool = False
+    selector: "Signal | None" = None
+    selected: tuple[int, ...] = ()
 
     @property
     def line(self) -> str:
@@ -62,7 +73,26 @@ class Signal:
         return np.asarray(8 * (along // 8) + 7 - along % 8)
 
 
-def raw_values(data: ByteArray, signals: "tuple[Signal, ...] | list[Signal]") -> IntArray:
+def real_values(data: ByteArray, signals: Sequence[Signal]) -> FloatArray:
+    """Return the raw values of signals that are real, shape (m, number of signals).
+
+    Examples
+    --------
+    >>> data = np.frombuffer(np.array([1.5, -2.0], ">f4").tobytes(), np.uint8)[None, :]
+    >>> real_values(data, [Signal("a", 7, 32, real=True, big_endian=True)]).tolist()
+    [[1.5]]
+    """
+    bits = np.unpackbits(data, axis=1, bitorder="little")
+    values = np.empty((len(data), len(signals)))
+    for column, signal in enumerate(signals):
+        packed = np.ascontiguousarray(
+            np.packbits(bits[:, signal.places], axis=1, bitorder="little")
+        )
+        values[:, column] = packed.view("<f4" if signal.length == 32 else "<f8")[:, 0]
+    return values
+
+
+def raw_values(data: ByteArray, signals: Sequence[Signal]) -> IntArray:
     """Return the raw values of signals, shape (m, number of signals); data of shape (m, n).
 
     Examples

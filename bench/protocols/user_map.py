@@ -25,11 +25,13 @@
     id   = 0x210                  # extended = true for 29 bits
     length = 8
     signals = [{ name = "g1", start = 4, length = 12, signed = true, order = "little" }, ...]
+    # a real number: float = true; multiplexed: multiplexer = "page", page = 1
 """
 
+import math
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -187,12 +189,17 @@ class _Reader:
             signals = {
                 s.name: Signal(
                     s.name, s.start, s.length, s.is_signed, float(s.scale), s.unit or "",
-                    s.byte_order == "big_endian", float(s.offset),
+                    s.byte_order == "big_endian", float(s.offset), real=s.is_float,
                 )
                 for s in m.signals
-                if not s.is_float and not s.multiplexer_ids
             }  # fmt: skip
-            messages[m.name] = Message(m.name, m.frame_id, m.is_extended_frame, m.length, signals)
+            ways = {
+                s.name: (s.multiplexer_signal, tuple(s.multiplexer_ids))
+                for s in m.signals
+                if s.multiplexer_ids and s.multiplexer_signal
+            }
+            messages[m.name] = Message(m.name, m.frame_id, m.is_extended_frame, m.length,
+                                       _multiplexed(signals, ways))  # fmt: skip
         return messages
 
     def _of_tables(self) -> dict[str, Message]:
@@ -200,6 +207,12 @@ class _Reader:
         for table in self.document.get("message", []):
             try:
                 signals = {s["name"]: _signal(s) for s in table["signals"]}
+                ways = {
+                    s["name"]: (s["multiplexer"], (int(s["page"]),))
+                    for s in table["signals"]
+                    if "multiplexer" in s
+                }
+                signals = _multiplexed(signals, ways)
                 message = Message(
                     str(table["name"]), int(table["id"]), bool(table.get("extended", False)),
                     int(table["length"]), signals,
@@ -229,6 +242,7 @@ class _Reader:
         tick = 1.0
         if time is not None:
             tick = self._seconds(what, table.get("time_unit"), time)
+            self._integer(what, time)
         elif counter is None:
             self.fault(what, sorted(table), "counter or time is needed: else no loss can be seen",
                        "name one")  # fmt: skip
@@ -236,6 +250,13 @@ class _Reader:
             self.fault(f"{what}: counter", counter.name, f"it wraps after {1e3 * wrap:.0f} ms, "
                        f"{1e3 * SHORTEST_WRAP:.0f} ms are needed without a time, or a gap could "
                        "not be seen", "name a time too")  # fmt: skip
+        if counter is not None:
+            self._integer(what, counter)
+        used = [s for s in (*strain, counter, time) if s is not None]
+        if len({(s.selector, s.selected) for s in used}) > 1:
+            self.fault(f"{what}: samples", [s.name for s in used], "all signals of a wheel, "
+                       "counter and time included, must stand in the same frames: one "
+                       "multiplexer, one value")  # fmt: skip
         number = table.get("wheel")
         if not isinstance(number, int) or not 0 <= number <= 255:
             self.fault("wheel", number, "0 .. 255 is needed")
@@ -253,17 +274,25 @@ class _Reader:
     def _signal(self, what: str, name: Any, message: Message) -> Signal | None:
         signal = message.signals.get(str(name))
         if signal is None:
-            self.fault(f"{what}: signal", name, f"{message.name} has the integer signals "
-                       f"{', '.join(message.signals) or 'none'} (not multiplexed)")  # fmt: skip
+            self.fault(f"{what}: signal", name, f"{message.name} has the signals "
+                       f"{', '.join(message.signals) or 'none'}")  # fmt: skip
             return None
-        places = signal.places
-        if not 1 <= signal.length <= LONGEST_SIGNAL or not (
-            places.min() >= 0 and places.max() < 8 * message.length
-        ):
-            self.fault(f"{what}: signal", name, f"1 to {LONGEST_SIGNAL} bits inside the "
-                       f"{message.length} bytes of {message.name} are allowed")  # fmt: skip
+        for part in (signal, signal.selector):
+            if part is not None and not _fits(part, message):
+                self.fault(f"{what}: signal", part.name, f"1 to {LONGEST_SIGNAL} bits, 32 or 64 of "
+                           f"a real one, inside the {message.length} bytes of {message.name} are "
+                           "allowed")  # fmt: skip
+                return None
+        if signal.selector is not None and signal.selector.selector is not None:
+            self.fault(f"{what}: signal", name, "a multiplexer that is multiplexed itself is not "
+                       "read", "name another")  # fmt: skip
             return None
         return signal
+
+    def _integer(self, what: str, signal: Signal) -> None:
+        if signal.real:
+            self.fault(f"{what}: signal", signal.name, "counter and time must be integers: a real "
+                       "number does not say where it wraps", "name another")  # fmt: skip
 
     def _optional(
         self, what: str, table: dict[str, Any], key: str, message: Message
@@ -280,13 +309,18 @@ class _Reader:
     def _device(self, wheels: list[WheelMap]) -> Device:
         """Scale, zero and ends of the range, from the signals."""
         strain = [signal for wheel in wheels for signal in wheel.strain]
-        kinds = {(s.length, s.signed, s.factor) for s in strain}
+        kinds = {(s.length, s.signed, s.factor, s.real) for s in strain}
         if len(kinds) > 1:
             self.fault("samples", sorted(kinds), "all gages need one length, sign and factor")
         if len(kinds) != 1:
             return Device()
-        low, high = strain[0].bounds
+        low: float
+        high: float
+        low, high = (-math.inf, math.inf) if strain[0].real else strain[0].bounds
         unit = self.document.get("strain_unit")
+        if unit is None and strain[0].real:
+            self.fault("strain_unit", unit, "real numbers are no counts: their unit is needed")
+            return Device()
         if unit is None:
             return Device(lowest=low, highest=high)
         try:
@@ -313,6 +347,31 @@ class _Reader:
         return None if signal is None else (message, signal, unit)
 
 
+def _fits(signal: Signal, message: Message) -> bool:
+    """Whether a signal has a length that can be read and lies inside its message."""
+    places = signal.places
+    good = signal.length in (32, 64) if signal.real else 1 <= signal.length <= LONGEST_SIGNAL
+    return good and int(places.min()) >= 0 and int(places.max()) < 8 * message.length
+
+
+def _multiplexed(
+    signals: Mapping[str, Signal], ways: Mapping[str, tuple[str | None, tuple[int, ...]]]
+) -> dict[str, Signal]:
+    """Return the signals with their multiplexers: its name and its values."""
+    plain = {
+        name: replace(signal, selector=signals[str(ways[name][0])], selected=ways[name][1])
+        if name in ways
+        else signal
+        for name, signal in signals.items()
+    }
+    return {
+        name: replace(signal, selector=plain[signal.selector.name])
+        if signal.selector is not None
+        else signal
+        for name, signal in plain.items()
+    }
+
+
 def _signal(table: dict[str, Any]) -> Signal:
     order = table.get("order", "little")
     if order not in ("little", "big"):
@@ -320,5 +379,5 @@ def _signal(table: dict[str, Any]) -> Signal:
     return Signal(
         str(table["name"]), int(table["start"]), int(table["length"]),
         bool(table.get("signed", False)), float(table.get("factor", 1.0)), "", order == "big",
-        float(table.get("offset", 0.0)),
+        float(table.get("offset", 0.0)), real=bool(table.get("float", False)),
     )  # fmt: skip

@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.chain import Chain, Outputs, Turn
+from bench.chain import Outputs, Turn
 from bench.conditions import Condition, Conditions
 from bench.device import Device
 from bench.document import document
 from bench.emulator import Script, write_script
 from bench.faults import Faults, parse_faults
 from tests.bench.campaigns import tiny_runs
+from tests.bench.in_process import InProcess
 from tests.synthetic import frames as cuts
 from tirelib.arrays import FloatArray
 from tirelib.campaign import read_campaign
@@ -66,8 +67,8 @@ def estimates(
     conditions: Conditions,
     samples: int = 16,
     longest: int | None = None,
-) -> tuple[list[Turn], Chain]:
-    chain = Chain(StandIn(calibration, samples), Device(), conditions)
+) -> tuple[list[Turn], InProcess]:
+    chain = InProcess(lambda _: StandIn(calibration, samples), conditions)
     stream = b"".join(frames)
     parts = [slice(0, len(stream))] if longest is None else cuts(len(stream), longest, 1)
     turns = [turn for part in parts for turn in chain.push(stream[part])]
@@ -89,7 +90,7 @@ def test_the_bench_gives_the_estimates_of_the_library(
     observations = observe([read_campaign(campaign)])
     library = estimate_document(observations, calibration.estimate(observations.features),
                                 calibration)  # fmt: skip
-    bench = document(turns, script.conditions.runs, chain.counts, {})
+    bench = document(turns, script.conditions.runs, chain.wheels, {})
     assert len(bench["turns"]) == len(library["turns"]) >= 15
     assert sum(turn["valid"] for turn in bench["turns"]) >= 12
     for mine, theirs in zip(bench["turns"], library["turns"], strict=True):

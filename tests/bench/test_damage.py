@@ -5,10 +5,20 @@ import tracemalloc
 from collections import Counter
 
 import numpy as np
+import pytest
 
 from bench.can_batch import same_kind
-from bench.damage import KINDS, damaged, strike_serial
+from bench.damage import (
+    BUS_KINDS,
+    CHANGED,
+    KINDS,
+    damaged,
+    strike_bus,
+    strike_serial,
+    strike_slcan,
+)
 from bench.line_counts import LineCounts
+from bench.protocols.layouts import RAW12C, RAW16
 from bench.protocols.slcan import SlcanDecoder, encode
 from tests.bench.test_slcan import Keep
 
@@ -45,23 +55,27 @@ def test_memory_stays_flat_under_damage() -> None:
     assert max(sizes[10:]) < max(sizes[5:10]) + 10_000
 
 
-def test_an_slcan_line_loses_little_and_takes_no_cut_line_for_whole() -> None:
-    """The text has no checksum: a digit that became another passes, a line of odd length never."""
-    rng = np.random.default_rng(3)
-    data = rng.integers(0, 256, (4000, 64), np.uint8)
-    lines = encode(same_kind(0x120, data, fd=True))
-    whole = {bytes(row) for row in data}
-    decoder = SlcanDecoder(Keep(), LineCounts())
-    decoder.frames_of(b"\r")
-    arrived, lost, cut = 0, 0, 0
-    for start in range(0, 4000, 200):
-        text = bytearray(b"".join(lines[start : start + 200]))
-        for _ in range(8):
-            place = int(rng.integers(len(text) - 10))
-            del text[place : place + int(rng.integers(1, 9))]
-            cut += 1
-        batch = decoder.frames_of(bytes(text))
-        arrived += len(batch)
-        assert all(bytes(row) in whole for row in batch.data)
-    lost = 4000 - arrived
-    assert 0.8 * cut <= lost <= 1.3 * cut
+@pytest.mark.parametrize(("kind", "most"), [(RAW16, 1.1), (RAW12C, 1.5)])
+def test_an_slcan_line_takes_nothing_shorter_or_longer_for_whole(kind: str, most: float) -> None:
+    outcome = strike_slcan(400, 3, kind, ("cut", "insertion"))
+    assert set(outcome.kinds) == {"cut", "insertion"}
+    assert outcome.wrong == 0
+    assert 0.8 <= outcome.lost_per_damage <= most  # two in one frame cost one
+    assert outcome.counts.framing >= 0.5 * outcome.good_lost
+
+
+def test_what_a_text_without_checksum_cannot_see_is_counted_as_wrong() -> None:
+    """Else the zero of the others would only say that nobody looked."""
+    outcome = strike_slcan(400, 4, RAW16, CHANGED)
+    assert 0.2 * outcome.damaged < outcome.wrong < 0.6 * outcome.damaged
+    assert outcome.lost_per_damage <= 1.1
+
+
+def test_a_bus_takes_no_foreign_frame_and_none_of_another_length() -> None:
+    outcome = strike_bus(800, seed=5)
+    assert set(outcome.kinds) == set(BUS_KINDS)
+    assert outcome.wrong == 0
+    # what comes twice is not lost
+    assert outcome.good_lost == outcome.damaged - outcome.kinds["doubled"]
+    strangers = outcome.kinds["foreign"] + outcome.kinds["other length"]
+    assert outcome.counts.unknown == strangers

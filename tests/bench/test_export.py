@@ -167,6 +167,6 @@ def test_a_lost_port_is_recorded_and_replayed(serial: Path, tmp_path: Path) -> N
     with Recorder(path, RecordingHeader({}), Conditions.constant()) as recorder:
         for read in (Read(1, b"abc"), Read(2, b"", LOST), Read(3, b"", BACK), Read(4, b"d")):
             recorder.read(read)
-        recorder.marker("here")
+        recorder.event({"event": "marker", "text": "here"})
     assert [(r.data, r.event) for r in reads_of(path)] == [
         (b"abc", ""), (b"", LOST), (b"", BACK), (b"d", "")]  # fmt: skip

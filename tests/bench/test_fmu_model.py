@@ -1,36 +1,37 @@
 """An FMU file through FMPy: any number of samples a step, fresh starts, errors with a cause."""
 
 import gc
+import pickle
 import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from bench.chain import Chain
 from bench.conditions import Conditions
 from bench.device import Device
 from bench.emulator import write_script
 from bench.errors import FmuError
 from bench.faults import Faults
 from bench.fmu_archive import read_fmu
-from bench.fmu_model import FmuModel
+from bench.fmu_model import FmuFile, FmuModel
 from tests.bench.campaigns import tiny_runs
+from tests.bench.in_process import InProcess
 
 STEADY = Conditions.constant(18.0, 2.3e5, 0.0)
 
 
 def turns(path: Path, conditions: Conditions = STEADY) -> list[tuple[float, ...]]:
     script = write_script(tiny_runs(), Device(), Faults({}))
-    with FmuModel(read_fmu(path)) as model:
-        chain = Chain(model, Device(), conditions)
+    with FmuFile(read_fmu(path)) as file, FmuModel(file) as model:
+        chain = InProcess(lambda _: model, conditions)
         found = [*chain.push(b"".join(script.frames)), *chain.finish()]
     return [(turn.segment, turn.t, turn.ready, turn.outputs["Fz"]) for turn in found]
 
 
 def test_the_samples_a_step_are_those_of_the_file(toy_fmus: dict[int, Path]) -> None:
     for samples, path in toy_fmus.items():
-        with FmuModel(read_fmu(path)) as model:
+        with FmuFile(read_fmu(path)) as file, FmuModel(file) as model:
             assert model.samples == samples
 
 
@@ -43,7 +44,7 @@ def test_estimates_are_the_same_with_any_samples_a_step(toy_fmus: dict[int, Path
 
 def test_a_fresh_start_forgets(toy_fmus: dict[int, Path]) -> None:
     strain = np.tile(np.linspace(0.0, 0.01, 16)[:, None], (1, 5))
-    with FmuModel(read_fmu(toy_fmus[16])) as model:
+    with FmuFile(read_fmu(toy_fmus[16])) as file, FmuModel(file) as model:
         seen = []
         for _ in range(2):
             model.start(1e-4)
@@ -69,11 +70,14 @@ def test_after_a_fatal_error_the_process_lives(toy_fmus: dict[int, Path]) -> Non
 
 
 def test_the_unpacked_files_are_removed(toy_fmus: dict[int, Path]) -> None:
-    model = FmuModel(read_fmu(toy_fmus[16]))
-    folder = Path(model._folder.name)
+    file = FmuFile(read_fmu(toy_fmus[16]))
+    folder = Path(file.folder)
     assert folder.is_dir()
-    model.close()
-    model.close()
+    copy = pickle.loads(pickle.dumps(file))  # as another process gets it, which must leave them
+    copy.close()
+    assert folder.is_dir()
+    file.close()
+    file.close()
     assert not folder.exists()
 
 
@@ -101,5 +105,5 @@ def test_another_fmu_is_refused(
     toy_fmus: dict[int, Path], tmp_path: Path, old: str, new: str, message: str
 ) -> None:
     path = edited(toy_fmus[16], tmp_path / "x.fmu", old, new)
-    with pytest.raises(FmuError, match=message):
-        FmuModel(read_fmu(path))
+    with pytest.raises(FmuError, match=message), FmuFile(read_fmu(path)) as file:
+        FmuModel(file)

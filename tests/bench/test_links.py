@@ -5,6 +5,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import can
@@ -26,6 +27,34 @@ from bench.protocols.slcan import SlcanDecoder, encode
 from tests.bench.test_slcan import Keep, keys, some_frames
 
 PATIENCE = 10.0
+CANNOT = {"canalystii", "etas", "gs_usb", "iscan", "ixxat", "neousys", "neovi", "nican",
+          "robotell", "usb2can"}  # fmt: skip
+"""Interfaces of python-can that cannot be told to be silent."""
+
+
+@pytest.mark.parametrize("interface", sorted(can.VALID_INTERFACES))
+def test_a_bus_is_silent_or_refused_unless_transmission_is_asked_for(
+    interface: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[dict[str, object]] = []
+    monkeypatch.setattr(can, "Bus", lambda **given: asked.append(given))
+    words = {"listen_only": True, "monitor": True, "driver_mode": False,
+             "operation_mode": "silent", "state": can.BusState.PASSIVE}  # fmt: skip
+    software = interface in ("virtual", "udp_multicast", "serial", "socketcan", "socketcand")
+    refused = False
+    with suppress(DeviceError):
+        refused = True
+        CanLink(interface, "x")
+        refused = False
+    if refused:
+        assert not asked
+        CanLink(interface, "x", options={"acknowledge": 1})
+        assert "acknowledge" not in asked[0]
+    else:
+        assert software or any(asked[0].get(word) == value for word, value in words.items())
+    assert refused == (interface in CANNOT)
+    CanLink(interface, "x", transmit=True)
+    assert not set(words) & set(asked[-1])
 
 
 @pytest.fixture

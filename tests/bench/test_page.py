@@ -4,7 +4,9 @@ import io
 import json
 import math
 import struct
+import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,18 +19,20 @@ from rich.console import Console
 from bench.chain import Turn
 from bench.conditions import Conditions
 from bench.errors import DeviceError
-from bench.links import BACK, LOST, Read
+from bench.estimation import News, WheelEstimation
+from bench.live.recorder import RecorderState
 from bench.page.board import RINGS, Board, RingReader
 from bench.page.commands import Command, CommandDesk, parse_command
-from bench.page.feed import About, Feed, WatchedLink
+from bench.page.feed import About, Feed
 from bench.page.history import COLUMNS, History, Viewer
 from bench.page.laps import GRID, Lap, Laps, band
 from bench.page.live import PageChoice
 from bench.page.quantities import UNITS
 from bench.page.recording_switch import RecordingSwitch
 from bench.page.terminal import numbers, picture
-from bench.recording import Recorder, Recording, RecordingHeader
 from bench.timeline import Samples
+from bench.wheels import Block
+from tests.bench.in_process import FakeSource
 from tirelib.estimators.result import EDGE_UNIT
 
 PERIOD = 1e-4
@@ -163,39 +167,6 @@ def test_a_band_is_numpys_percentile_of_what_is_known() -> None:
     assert np.isnan(band([np.full((5, 4), np.nan, np.float32)] * 3)).all()
 
 
-class FakeChain:
-    """As much of a chain as a feed looks at."""
-
-    def __init__(self) -> None:
-        from bench.clock import ClockFit
-        from bench.line_counts import LineCounts
-        from bench.timeline import TimelineCounts
-
-        self.watch: Any = None
-        self.clock = ClockFit()
-        self.counts = (LineCounts(ok=7, crc=3), TimelineCounts(lost_frames=2))
-
-
-class FakeWheels:
-    def __init__(self, *numbers: int) -> None:
-        self.chains = {number: FakeChain() for number in numbers}
-
-
-class FakeLink:
-    name, live, encoding = "port", True, "serial-v1"
-
-    def __init__(self, *reads: Read) -> None:
-        self.reads = list(reads)
-
-    def receive(self, deadline: object) -> Read | None:
-        return self.reads.pop(0) if self.reads else None
-
-    def close(self) -> None: ...
-
-    def overruns(self) -> int:
-        return 0
-
-
 def decode(message: bytes) -> tuple[dict[str, Any], list[Any]]:
     (length,) = struct.unpack_from("<I", message)
     header = json.loads(message[4 : 4 + length])
@@ -210,21 +181,23 @@ def decode(message: bytes) -> tuple[dict[str, Any], list[Any]]:
 
 def test_a_viewer_gets_each_turn_once_the_state_and_its_wheels_strain() -> None:
     with Board() as board:
-        wheels: Any = FakeWheels(1, 3)
-        link = WatchedLink(FakeLink(Read(1, b"x")))
-        link.receive(None)
-        feed = Feed(board, wheels, link, About("port"))
-        feed.watch([])
+        source = FakeSource(1, 3)
+        source.heard = time.time()
+        feed = Feed(board, source, About("port"))
+        feed.watch(News())
         history, viewer, late = History(board), Viewer(), Viewer(wheel=3)
         assert history.update()
         header, _ = decode(viewer.message(history, {}) or b"")
         assert set(header["state"]["wheels"]) == {"1", "3"}
         assert header["state"]["wheels"]["1"]["crc_bad"] == 3
         assert viewer.message(history, {}) is None
+        laps = Laps(3)
         for number in range(1, 4):
-            wheels.chains[3].watch(block(800 * (number - 1), np.full((800, 5), 1e-6 * number)))
-            feed.watch([turn(number, 0.08 * number - 0.05, wheel=3)])
-        feed.watch([turn(1, wheel=1, valid=0.0, Fz=math.nan)])
+            laps.samples(block(800 * (number - 1), np.full((800, 5), 1e-6 * number)))
+            laps.turn(turn(number, 0.08 * number - 0.05, wheel=3), number)
+            done = [lap.pack() for lap in laps.take()]
+            feed.watch(News([turn(number, 0.08 * number - 0.05, wheel=3)], done))
+        feed.watch(News([turn(1, wheel=1, valid=0.0, Fz=math.nan)]))
         history.update()
         header, arrays = decode(viewer.message(history, {}) or b"")
         rows = arrays[header["turns"]["3"]["rows"]]
@@ -254,37 +227,46 @@ def test_a_viewer_gets_each_turn_once_the_state_and_its_wheels_strain() -> None:
         assert "crc_bad 3" in text
 
 
-def test_the_state_tells_when_the_port_went_away_and_came_back(memory: Board) -> None:
-    recorded: list[Read] = []
-
-    class Sink:
-        def read(self, read: Read) -> None:
-            recorded.append(read)
-
-    reads = [Read(1, b"x"), Read(2, b"", LOST), Read(3, b""), Read(4, b"", BACK)]
-    link = WatchedLink(FakeLink(*reads), Sink())
-    wheels: Any = FakeWheels()
-    feed = Feed(memory, wheels, link, About("port"))
+def test_the_state_tells_what_the_source_tells(memory: Board) -> None:
+    source = FakeSource(0)
+    feed = Feed(memory, source, About("port"), lambda: {"more": 1})
     assert feed.state()["heard"] is None
-    seen = []
-    for _ in reads:
-        link.receive(None)
-        seen.append(feed.state()["lost"])
-    assert [moment is None for moment in seen] == [True, False, False, True]
-    assert recorded == [reads[0], reads[1], reads[3]]
+    source.heard, source.lost, source.skipped = 5.0, 7.0, 4
+    feed.watch(News(messages=["said"], left_out=3, latency=[0.01] * 99 + [0.3]))
+    state = feed.state()
+    assert (state["heard"], state["lost"], state["left_out"], state["more"]) == (5.0, 7.0, 3, 1)
+    assert state["wheels"]["0"]["skipped_turns"] == 4
+    assert state["messages"] == ["said"]
+    assert 10.0 < state["latency_p99_ms"] < 300.0
 
 
-def test_a_late_run_leaves_laps_out_first_and_counts_them(memory: Board) -> None:
-    wheels: Any = FakeWheels(0)
-    link = WatchedLink(FakeLink())
-    feed = Feed(memory, wheels, link, About("port"))
-    feed.watch([])
-    wheels.chains[0].watch(block(0, np.zeros((2000, 5))))
-    laps, turns = memory.laps.written, memory.turns.written
-    link.arrival = 1  # long ago
-    feed.watch([turn(1, 0.1)])
-    assert (memory.laps.written, memory.turns.written) == (laps, turns + 1)
-    assert feed.state()["left_out"] == 1
+def test_a_late_estimator_leaves_laps_out_first_and_counts_them() -> None:
+    made = {}
+    for age in (-60.0, 2.0):
+        estimation = WheelEstimation(Peaks(), Conditions.constant())
+        news = News()
+        arrival = time.monotonic_ns() - round(1e9 * age)
+        for first in range(0, 4000, 800):
+            content = replace(block(first, np.zeros((800, 5))), reset="" if first else "start")
+            news.add(estimation.take(Block(0, arrival, 0, content), live=True))
+        made[age] = news
+    assert len(made[-60.0].turns) == len(made[2.0].turns) == 5
+    assert len(made[-60.0].laps) == made[2.0].left_out >= 3
+    assert not made[2.0].laps
+    assert not made[-60.0].left_out
+
+
+class Peaks:
+    """An estimator that ends a turn with every 800 samples."""
+
+    samples = 800
+
+    def start(self, period: float) -> None:
+        self.count = 0
+
+    def step(self, strain: Any, conditions: Any, valid: bool) -> Any:
+        self.count += 1
+        return outputs(self.count, PERIOD * (800 * self.count - 400), flags=0.0), {}
 
 
 @pytest.mark.parametrize(
@@ -309,11 +291,24 @@ def test_a_command_crosses_the_pipe_as_it_is_and_in_one_write(text: str) -> None
     assert len(command.pack()) + 4 <= 4096  # what a pipe takes whole
 
 
+class Told:
+    """As much of a live chain as a record button needs."""
+
+    def __init__(self) -> None:
+        self.orders: list[tuple[str, Any]] = []
+        self.recorded = RecorderState()
+
+    def order(self, kind: str, what: Any) -> None:
+        self.orders.append((kind, what))
+        if kind == "start":
+            Path(what).touch()
+
+    def obeyed(self, deadline: Any) -> bool:
+        return True
+
+
 def test_recordings_are_turned_on_and_off_and_markers_land_in_them(tmp_path: Path) -> None:
     import multiprocessing
-
-    def make(file: Path) -> Recorder:
-        return Recorder(file, RecordingHeader({}), Conditions.constant())
 
     def say(**document: Any) -> dict[str, Any]:
         writing.send_bytes(parse_command(document).pack())
@@ -322,31 +317,30 @@ def test_recordings_are_turned_on_and_off_and_markers_land_in_them(tmp_path: Pat
         return dict(desk.state()["answers"][-1])
 
     reading, writing = multiprocessing.Pipe(duplex=False)
-    with RecordingSwitch(make, tmp_path / "a.mcap", started=False) as switch:
-        desk = CommandDesk(switch)
-        desk.listen(reading)
-        assert not say(command="marker", text="too soon")["good"]
-        switch.read(Read(1, b"nobody records this"))
-        assert say(command="record", on=True)["text"] == "recording a.mcap"
-        switch.read(Read(2, b"one"))
-        assert say(command="marker", text="over the kerb")["good"]
-        assert desk.state()["recording"]["on"]
-        assert say(command="record", on=False)["good"]
-        assert say(command="record", on=True)["text"] == "recording a-2.mcap"
-        switch.read(Read(3, b"two"))
-        writing.close()  # the page's process has died
-        desk._next = 0.0
-        desk.poll()
-        desk.poll()
-    first, second = (Recording(tmp_path / name) for name in ("a.mcap", "a-2.mcap"))
-    assert [data for _, data in first.raw()] == [b"one"]
-    assert [data for _, data in second.raw()] == [b"two"]
-    assert b"over the kerb" in (tmp_path / "a.mcap").read_bytes()
-    assert (first.complete, second.complete) == (True, True)
-    first.close()
-    second.close()
-    replay = CommandDesk(None)
-    assert replay.state()["recording"]["possible"] is False
+    chain: Any = Told()
+    desk = CommandDesk(RecordingSwitch(chain, tmp_path / "a.mcap", started=False))
+    desk.listen(reading)
+    assert not say(command="marker", text="too soon")["good"]
+    assert say(command="record", on=True)["text"] == "recording a.mcap"
+    assert say(command="marker", text="over the kerb")["good"]
+    assert desk.state()["recording"]["on"]
+    assert say(command="record", on=False)["good"]
+    assert not desk.state()["recording"]["on"]
+    assert say(command="record", on=True)["text"] == "recording a-2.mcap"
+    assert say(command="record", on=False)["good"]
+    chain.recorded.answer = "a-3.mcap: it cannot be written"
+    assert say(command="record", on=True) == {"number": 7, "good": False,
+                                              "text": "a-3.mcap: it cannot be written"}  # fmt: skip
+    assert not desk.state()["recording"]["on"]
+    writing.close()  # the page's process has died
+    desk._next = 0.0
+    desk.poll()
+    desk.poll()
+    event = {"event": "marker", "text": "over the kerb"}
+    assert [order for order in chain.orders if order[0] == "event"] == [("event", event)]
+    kinds = [kind for kind, _ in chain.orders]
+    assert kinds == ["start", "event", "stop", "start", "stop", "start"]
+    assert CommandDesk(None).state()["recording"]["possible"] is False
 
 
 def test_only_this_machine_is_let_in_unless_asked_for() -> None:

@@ -8,14 +8,15 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from bench.page.feed import About, WatchedLink
+from bench.estimation import News
+from bench.page.feed import About
 from bench.page.history import COLUMNS
 from bench.page.laps import GRID
 from bench.page.live import LivePage, PageChoice
@@ -23,11 +24,12 @@ from bench.page.quantities import UNITS
 from bench.recording import Recording
 from tests.bench.browser import chromium
 from tests.bench.conftest import Spawn
+from tests.bench.in_process import FakeSource
 from tests.bench.test_live import PATIENCE, port_of, result
-from tests.bench.test_page import FakeChain, FakeLink, FakeWheels
 from tests.bench.test_page import turn as made_turn
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import write_calibration
+from tirelib.flags import TurnFlag
 from tirelib.fmu.build import build_fmu
 
 WAIT = 1000.0 * PATIENCE
@@ -117,6 +119,7 @@ def visit(
     fmu = build_fmu(folder / "cal.toml", folder / "StrainTire.fmu", samples_per_step=16)
     emulator = spawn_all("emulate", "--campaign", campaign, "--all", "--loop", "--wheel", 0,
                           "--wheel", 5, "--port-file", folder / "port", "--fault", "lost=0.002",
+                          "--speedup", 0.4,
                           "--conditions", folder / "c.json")  # fmt: skip
     port = port_of(folder / "port")
     run = spawn_all("run", "--port", port, "--fmu", fmu, "--trust", "--conditions",
@@ -131,9 +134,10 @@ def visit(
     for wheel in (0, 5):
         seen.rows[wheel] = page.evaluate(ROWS, wheel)
     seen.other_rows = other.evaluate(ROWS, 0)
-    for process in pages_of(run.pid):
+    for process in spawned_by(run.pid):
         os.kill(process, signal.SIGKILL)
     wait_for(page, "tirebench.page.starts === 2 && tirebench.away === null")
+    wait_for(page, f"({ROWS})(0).length > {len(seen.rows[0]) + 1}")
     seen.rows_again = page.evaluate(ROWS, 0)
     page.keyboard.press("Space")
     emulator.send_signal(signal.SIGKILL)
@@ -156,8 +160,8 @@ def visit(
     return seen
 
 
-def pages_of(run: int) -> list[int]:
-    """Return the processes that a run has spawned to show itself."""
+def spawned_by(run: int) -> list[int]:
+    """Return the processes that a run has spawned: reader, estimators, recorder, page."""
     pages = []
     for entry in Path("/proc").iterdir():
         try:
@@ -320,6 +324,7 @@ def test_the_page_needs_no_other_address_and_breaks_no_policy(visit: Visit) -> N
 
 
 def test_a_page_that_is_killed_comes_back_and_still_knows_every_turn(visit: Visit) -> None:
+    """All other processes of the run were killed with it."""
     before, after = np.array(visit.rows[0], float), np.array(visit.rows_again, float)
     assert len(after) > len(before)
     np.testing.assert_array_equal(after[: len(before)], before)
@@ -331,10 +336,9 @@ def test_a_pulled_cable_is_told(visit: Visit) -> None:
 
 
 def test_without_data_the_page_says_what_it_waits_for(browser: Any) -> None:
-    seen, wheels = Visit(), FakeWheels()
-    link = WatchedLink(FakeLink())
-    with LivePage(PageChoice(), wheels, link, About("port"), None) as run:
-        run.watch([])
+    seen = Visit()
+    with LivePage(PageChoice(), FakeSource(), About("port"), None) as run:
+        run.watch(News())
         page = opened(browser, run.url, seen)
         page.locator("#status").filter(has_text="waiting for the first frame").wait_for()
         assert page.locator("#record").is_disabled()
@@ -345,16 +349,48 @@ def test_without_data_the_page_says_what_it_waits_for(browser: Any) -> None:
     assert seen.complaints == []
 
 
+def test_what_may_not_be_used_is_struck_out_and_says_why(browser: Any) -> None:
+    """A turn that is invalid, one with an invalid quantity, and one that is whole again."""
+    source, wrong = FakeSource(0), int(TurnFlag.OUT_OF_RANGE)
+    turns = [
+        made_turn(1),
+        replace(made_turn(2, valid=0.0), flags=wrong),
+        replace(
+            made_turn(3, **{f"{name}_valid": float(name != "Fy") for name in UNITS}), flags=wrong
+        ),
+        made_turn(4),
+    ]
+    bad = [set(), set(UNITS), {"Fy"}, set()]
+    with LivePage(PageChoice(), source, About("port"), None) as run:
+        page = opened(browser, run.url, Visit())
+        for number, (turn, names) in enumerate(zip(turns, bad, strict=True), 1):
+            run.watch(News([turn]))
+            wait_for(page, f"document.getElementById('q-Fz').dataset.turn === '{number}'")
+            for name in UNITS:
+                box = page.locator(f"#q-{name}")
+                struck = box.locator(".value").evaluate(
+                    "box => getComputedStyle(box).textDecorationLine"
+                )
+                assert (struck == "line-through") == (name in names), (number, name)
+                why = box.locator(".why").text_content()
+                assert why.startswith("invalid: outside") == (name in names), (number, name)
+        # in the charts: a gap of the line, and a dot
+        drawn = page.evaluate(
+            "() => document.querySelector('#q-Fy .chart').plot.data.map(d => [...d])"
+        )
+        assert [value is None for value in drawn[3]] == [False, True, True, False]
+        assert [value is None for value in drawn[4]] == [True, False, False, True]
+        page.context.close()
+
+
 def test_single_turns_shortly_after_each_other_all_arrive(browser: Any) -> None:
     """News that come while the page looks away are not slept through."""
-    wheels: Any = FakeWheels()
-    wheels.chains[0] = FakeChain()
-    link = WatchedLink(FakeLink())
-    link.heard = time.time() + 30.0
-    with LivePage(PageChoice(), wheels, link, About("port"), None) as run:
+    source = FakeSource(0)
+    source.heard = time.time() + 30.0
+    with LivePage(PageChoice(), source, About("port"), None) as run:
         page = opened(browser, run.url, Visit())
         for number in range(1, 7):
-            run.watch([made_turn(number)])
+            run.watch(News([made_turn(number)]))
             wait_for(page, f"() => ({ROWS})(0).length === {number}")
             time.sleep(0.03)  # about a tick: into the gap between looking and waiting
         run.end("stopped")

@@ -18,11 +18,12 @@ import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from bench.page.feed import About, WatchedLink
+from bench.estimation import News
+from bench.page.feed import About
 from bench.page.live import LivePage, PageChoice
 from bench.page.server import MOST_VIEWERS, STATIC
+from tests.bench.in_process import FakeSource
 from tests.bench.test_live import PATIENCE
-from tests.bench.test_page import FakeLink, FakeWheels
 
 Answer = tuple[int, dict[str, str], bytes]
 
@@ -90,7 +91,7 @@ class Served:
     def settle(self) -> None:
         """Let the run take commands that are on their way."""
         for _ in range(6):
-            self.page.watch([])
+            self.page.watch(News())
             time.sleep(0.06)
 
     @contextmanager
@@ -120,9 +121,8 @@ def wait_until_it_answers(served: Served) -> None:
 
 @pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
-    markers, wheels = Markers(), FakeWheels(0)
-    link = WatchedLink(FakeLink())
-    with LivePage(PageChoice().checked(), wheels, link, About("port"), markers) as page:
+    markers = Markers()
+    with LivePage(PageChoice().checked(), FakeSource(0), About("port"), markers) as page:
         served = Served(page, markers)
         wait_until_it_answers(served)
         yield served
@@ -249,10 +249,10 @@ def test_a_page_that_is_killed_comes_back_at_the_same_address_and_is_counted(
     starts, process = served.page.starts, served.page.process_id
     assert process is not None
     os.kill(process, signal.SIGKILL)
-    for _ in range(50):  # the run goes on meanwhile
-        start = time.thread_time()
-        served.page.watch([])
-        assert time.thread_time() - start < 0.5  # CPU; far more than it needs, far less than a wait
+    end = time.monotonic() + PATIENCE
+    while served.page.starts == starts and time.monotonic() < end:  # the run goes on meanwhile
+        served.page.watch(News())
+        time.sleep(0.01)
     wait_until_it_answers(served)
     assert served.page.starts == starts + 1
     with served.stream(Cookie=served.cookie) as stream:
@@ -280,10 +280,10 @@ def test_a_run_that_is_killed_leaves_no_page_behind() -> None:
 
 A_RUN = """
 import time
-from bench.page.feed import About, WatchedLink
+from bench.page.feed import About
 from bench.page.live import LivePage, PageChoice
-from tests.bench.test_page import FakeLink, FakeWheels
-with LivePage(PageChoice(), FakeWheels(), WatchedLink(FakeLink()), About("port"), None) as page:
+from tests.bench.in_process import FakeSource
+with LivePage(PageChoice(), FakeSource(), About("port"), None) as page:
     print(page.process_id, flush=True)
     time.sleep(60)
 """

@@ -12,6 +12,7 @@ from mcap.reader import make_reader
 from bench.conditions import Conditions, RunMark
 from bench.deadline import Deadline
 from bench.errors import DeviceError, RecordingError
+from bench.links import Read
 from bench.links.replay import ReplayLink
 from bench.recording import Recorder, Recording, RecordingHeader
 
@@ -28,7 +29,7 @@ def write(path: Path) -> None:
     header = RecordingHeader({"port": "p", "wheel": 3}, "format = 'x'", "ab" * 32)
     with Recorder(path, header, CONDITIONS) as recorder:
         for number, data in enumerate(READS):
-            recorder.raw(data, time.monotonic_ns() + number)
+            recorder.read(Read(time.monotonic_ns() + number, data))
 
 
 def assert_same(a: Conditions, b: Conditions) -> None:

@@ -1,24 +1,21 @@
-"""A session ends when it should, records before it decodes, and outlives an unplugged cable."""
+"""A session ends when it should; what is played in a loop goes on in time."""
 
 import time
 from collections.abc import Sequence
-from pathlib import Path
 
 import pytest
 
-from bench.chain import Chain, Outputs, Turn
+from bench.chain import Outputs, Turn
 from bench.conditions import Condition, Conditions
 from bench.deadline import Deadline
-from bench.decoder import SerialDecoder
 from bench.device import Device
 from bench.emulator import write_script
-from bench.errors import UnpluggedError
 from bench.faults import Faults
 from bench.links import Read
-from bench.recording import Recorder, Recording, RecordingHeader
+from bench.replay import ReplayChain
 from bench.session import Limits, Session
-from bench.wheels import Wheels
 from tests.bench.campaigns import tiny_runs
+from tests.bench.in_process import InProcess
 from tirelib.arrays import FloatArray
 
 
@@ -68,8 +65,8 @@ def wire() -> list[bytes]:
 
 
 def session(reads: Sequence[bytes | Exception | None], **options: object) -> Session:
-    wheels = Wheels(SerialDecoder(), lambda _: Counter(), {}, Conditions.constant())
-    return Session(Scripted(reads), wheels, **options)
+    line = InProcess(lambda _: Counter(), Conditions.constant())
+    return Session(ReplayChain(Scripted(reads), line.wheels, line.estimation), **options)
 
 
 @pytest.mark.parametrize(
@@ -79,7 +76,6 @@ def session(reads: Sequence[bytes | Exception | None], **options: object) -> Ses
         (Limits(turns=2), [], "turns"),
         (Limits(silence=0.05), [], "silence"),
         (Limits(duration=2.0), [], "duration"),
-        (Limits(), [UnpluggedError("gone")], "unplugged"),
     ],
 )
 def test_a_session_ends_for_a_reason(
@@ -88,7 +84,6 @@ def test_a_session_ends_for_a_reason(
     outcome = session([*wire, *end], limits=limits).run()
     assert outcome.reason == reason
     assert len(outcome.turns) == (2 if reason == "turns" else 6)
-    assert outcome.message == ("gone" if reason == "unplugged" else "")
 
 
 def test_silence_counts_from_the_first_byte() -> None:
@@ -98,22 +93,8 @@ def test_silence_counts_from_the_first_byte() -> None:
 
 def test_stop_ends_in_good_order(wire: list[bytes]) -> None:
     seen: list[Turn] = []
-    running = session(wire, watch=lambda turns: (seen.extend(turns), running.stop())[0])
+    running = session(wire, watch=lambda news: (seen.extend(news.turns), running.stop())[0])
     assert running.run().reason == "stopped"
-
-
-def test_bytes_are_recorded_before_they_are_decoded(tmp_path: Path) -> None:
-    """Whatever the decoder does with them, damaged or not, they stand in the file."""
-    noise = [bytes(range(256)), b"\0\0\0", b"\xff" * 5000]
-    running = session([*noise, None])
-    running._wheels.push = lambda data, arrival: 1 / 0
-    recorder = Recorder(tmp_path / "a.mcap", RecordingHeader({}), Conditions.constant())
-    running._recorder = recorder
-    with recorder, pytest.raises(ZeroDivisionError):
-        running.run()
-    recording = Recording(tmp_path / "a.mcap")
-    assert [data for _, data in recording.raw()] == noise[:1]
-    recording.close()
 
 
 def test_a_pass_of_a_loop_goes_on_in_time_and_number() -> None:
@@ -121,7 +102,7 @@ def test_a_pass_of_a_loop_goes_on_in_time_and_number() -> None:
     passes = [write_script(runs, device, Faults({}), turn=turn) for turn in (0, 1, 2)]
     known = passes[0].conditions
     looped = Conditions(known.t_us, known.values, known.runs, round(passes[0].duration * 1e6))
-    chain = Chain(Counter(), device, looped)
+    chain = InProcess(lambda _: Counter(), looped)
     turns = [t for script in passes for t in chain.push(b"".join(script.frames))] + chain.finish()
     assert chain.timeline.counts.resets == 5
     assert chain.timeline.counts.lost_frames == 0

@@ -6,15 +6,17 @@ import cantools
 import numpy as np
 import pytest
 
-from bench.can_batch import joined, same_kind
-from bench.chain import Chain, Outputs
+from bench.can_batch import joined, pack, same_kind
+from bench.chain import Outputs
 from bench.conditions import Condition, Conditions, Held, Measured
 from bench.errors import DeviceError
+from bench.estimation import Estimation
 from bench.protocols import CAN
 from bench.protocols.plan import ProtocolPlan
 from bench.protocols.user_can import UserCan
 from bench.protocols.user_map import parse_map, read_map
 from bench.timeline import Timeline
+from bench.wheels import Wheels
 from tirelib.arrays import FloatArray
 
 DBC = """VERSION ""
@@ -113,6 +115,81 @@ def test_signals_may_be_listed_without_a_dbc() -> None:
     assert frames[0].t_us.tolist()[:3] == [0, 500, 1000]
 
 
+PAGED = """VERSION ""
+BU_: W
+BO_ 530 WHEEL: 32 W
+ SG_ page M : 0|8@1+ (1,0) [0|0] "" W
+ SG_ g1 m1 : 8|32@1- (2,10) [0|0] "ustrain" W
+ SG_ g2 m1 : 40|32@1- (2,10) [0|0] "ustrain" W
+ SG_ g3 m1 : 72|32@1- (2,10) [0|0] "ustrain" W
+ SG_ g4 m1 : 104|32@1- (2,10) [0|0] "ustrain" W
+ SG_ g5 m1 : 143|32@0- (2,10) [0|0] "ustrain" W
+ SG_ count m1 : 168|16@1+ (1,0) [0|0] "" W
+ SG_ v m2 : 8|64@1- (1,0) [0|0] "km/h" W
+ SG_ other : 184|8@1+ (1,0) [0|0] "" W
+SIG_VALTYPE_ 530 g1 : 1;
+SIG_VALTYPE_ 530 g2 : 1;
+SIG_VALTYPE_ 530 g3 : 1;
+SIG_VALTYPE_ 530 g4 : 1;
+SIG_VALTYPE_ 530 g5 : 1;
+SIG_VALTYPE_ 530 v : 2;
+"""
+PAGED_MAP = """
+format = "tirebench-map/1"
+dbc = "wheel.dbc"
+rate_hz = 1000
+strain_unit = "ustrain"
+[[wheel]]
+wheel = 0
+message = "WHEEL"
+samples = [["g1", "g2", "g3", "g4", "g5"]]
+counter = "count"
+[speed]
+message = "WHEEL"
+signal = "v"
+unit = "km/h"
+"""
+
+
+def test_multiplexed_and_real_signals_are_read_as_cantools_wrote_them() -> None:
+    """Strain on one page of a message, the speed on another; counted apart."""
+    user = parse_map(PAGED_MAP, PAGED, "m.toml")
+    message = cantools.database.load_string(PAGED, "dbc").get_message_by_name("WHEEL")
+    rng = np.random.default_rng(1)
+    sent = rng.normal(scale=500.0, size=(40, 5)).astype(np.float32).astype(float)
+    rows = []
+    for i, row in enumerate(sent):
+        gages = {f"g{g + 1}": 2.0 * row[g] + 10.0 for g in range(5)}
+        rows.append(message.encode({"page": 1, **gages, "count": i, "other": 0}))
+        if i % 10 == 0:
+            rows.append(message.encode({"page": 2, "v": 36.0 + i, "other": 7}))
+    batch = same_kind(530, np.frombuffer(b"".join(rows), np.uint8).reshape(-1, 32), fd=True)
+    plan = ProtocolPlan(CAN, 1e3, user)
+    speeds = Speeds()
+    wheels = Wheels(plan.decoder(), {None: plan.device})
+    estimation = Estimation(lambda _: speeds, Conditions.constant(5.0))
+    blocks = wheels.push(pack(batch), 10**6)
+    estimation.take(blocks)
+    estimation.finish()
+    strain = np.concatenate([b.content.strain for b in blocks if hasattr(b.content, "strain")])
+    np.testing.assert_allclose(1e6 * strain, 2.0 * sent + 10.0, rtol=1e-12)
+    assert wheels.counts[1].gaps == 0
+    assert wheels.counts[0].ok == len(batch)
+    told = [5.0] + [(36.0 + 10 * (i // 10)) / 3.6 for i in range(39)]
+    np.testing.assert_allclose(speeds.seen, told, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("change", "message"), [
+    (('counter = "count"', 'counter = "other"'), "must stand in the same frames"),
+    (('strain_unit = "ustrain"', ""), "real numbers are no counts"),
+    (('"g5"]]', '"count"]]'), "all gages need one length, sign and factor"),
+    (('counter = "count"', 'counter = "g1"'), "counter and time must be integers"),
+])  # fmt: skip
+def test_a_wrong_map_of_pages_says_what_is_wrong(change: tuple[str, str], message: str) -> None:
+    with pytest.raises(DeviceError, match=message):
+        parse_map(PAGED_MAP.replace(*change), PAGED, "m.toml")
+
+
 class Speeds:
     """An estimator that notes the speed of every sample."""
 
@@ -140,11 +217,11 @@ def test_a_speed_on_the_bus_holds_from_the_sample_after_it(reads: int) -> None:
     batch = joined([strain.take(rows[:10]), told.take(rows[:1]), strain.take(rows[10:61]),
                     told.take(rows[1:2]), strain.take(rows[61:])])  # fmt: skip
     plan, speeds = ProtocolPlan(CAN, 1e3, user), Speeds()
-    chain = Chain(speeds, plan.device, Conditions.constant(5.0), 2)
-    decoder = UserCan(user, chain.line.counts)
+    wheels = Wheels(plan.decoder(), {None: plan.device})
+    estimation = Estimation(lambda _: speeds, Conditions.constant(5.0))
     for part in np.array_split(np.arange(102), reads):
-        chain.take(decoder.push(batch.take(part), 10**6 * int(part[-1])))
-    chain.finish()
+        estimation.take(wheels.push(pack(batch.take(part)), 10**6 * int(part[-1])))
+    estimation.finish()
     assert speeds.seen == [5.0] * 10 + [10.0] * 51 + [20.0] * 39
 
 
@@ -160,7 +237,7 @@ def test_what_is_held_is_bounded_and_the_newest_counts() -> None:
 @pytest.mark.parametrize(("change", "message"), [
     (('"tirebench-map/1"', '"x/1"'), "'x/1'; 'tirebench-map/1' is understood"),
     (("rate_hz = 1000", "rate_hz = 1"), "rate_hz = 1; 153 .. 200000 Hz"),
-    (('"g5"', '"g9"'), "signal = 'g9'; WHEEL_FL has the integer signals g1"),
+    (('"g5"', '"g9"'), "signal = 'g9'; WHEEL_FL has the signals g1"),
     (('"WHEEL_FL"', '"FR"'), "message = 'FR'; known are ABS, WHEEL_FL"),
     (('time = "stamp"', ""), "time_unit|wraps after 256"),
     (('"ms"', '"bar"'), "time_unit = 'bar'; a unit of time is needed"),

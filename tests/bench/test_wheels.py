@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from bench.chain import Outputs
 from bench.clock import ClockFit
 from bench.conditions import Condition, Conditions
-from bench.decoder import SerialDecoder
 from bench.device import Device
 from bench.document import document, wheel_document
 from bench.emulator import Player, record_tape
@@ -17,6 +16,7 @@ from bench.protocols import SERIAL
 from bench.transmitter import transmitter
 from bench.wheels import MOST, Wheels
 from tests.bench.campaigns import tiny_runs
+from tests.bench.in_process import InProcess
 from tirelib.arrays import FloatArray
 
 
@@ -46,13 +46,13 @@ def played(
         return made[wheel]
 
     devices = {None: Device(), 2: Device(scale=1e-6)}
-    wheels = Wheels(SerialDecoder(), estimator, devices, Conditions.constant(), chosen)
+    line = InProcess(estimator, Conditions.constant(), devices, chosen=chosen)
     faults = Faults(parse_faults(["flips=0.05"]), 2)
     tape = record_tape(tiny_runs()[:1], Device(), Faults({}), numbers)
     for piece in Player(transmitter("serial"), SERIAL, faults).pieces(tape):
-        wheels.push(b"".join(piece.frames), round(1e9 * (1 + piece.due[-1])))
-    wheels.finish()
-    return wheels, made
+        line.push(b"".join(piece.frames), round(1e9 * (1 + piece.due[-1])))
+    line.finish()
+    return line.wheels, made
 
 
 def test_each_wheel_has_its_own_estimator_device_and_counters() -> None:
@@ -62,15 +62,15 @@ def test_each_wheel_has_its_own_estimator_device_and_counters() -> None:
     both = np.isfinite(one[:4000]) & np.isfinite(two[:4000])
     ratio = two[:4000][both] / one[:4000][both]
     np.testing.assert_allclose(ratio, 1e-6 / Device().scale, rtol=1e-9)
-    own = [chain.timeline.counts.lost_frames for chain in wheels.chains.values()]
+    own = [wheel.timeline.counts.lost_frames for wheel in wheels.heard.values()]
     line, total = wheels.counts
     assert line.bad > 10
     assert min(own) > 0
     assert total.lost_frames == sum(own)
-    shown = document([], (), wheels.counts, {}, wheels=wheels.chains)["wheels"]
+    shown = document([], (), wheels, {})["wheels"]
     assert [entry["lost_frames"] for entry in shown.values()] == own
     assert shown[0]["crc_bad"] == line.crc  # a damaged frame does not say whose it was
-    assert wheel_document(wheels.chains[2])["clock_drift_ppm"] is None  # less than three seconds
+    assert wheel_document(wheels, 2)["clock_drift_ppm"] is None  # less than three seconds
 
 
 def test_no_more_wheels_than_can_be_afforded_unless_they_are_named() -> None:

@@ -6,16 +6,16 @@ from pathlib import Path
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from bench.chain import Chain
 from bench.conditions import Conditions
 from bench.decoder import SerialDecoder
 from bench.device import Device
 from bench.emulator import write_script
 from bench.faults import Faults
 from bench.fmu_archive import read_fmu
-from bench.fmu_model import FmuModel
+from bench.fmu_model import FmuFile, FmuModel
 from bench.timeline import Timeline
 from tests.bench.campaigns import quantised
+from tests.bench.in_process import InProcess
 from tests.synthetic import cornering_runs, synthetic_run, write
 from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration_file import write_calibration
@@ -65,10 +65,10 @@ def test_whole_chain(benchmark: BenchmarkFixture, wire: list[bytes], fmu: Path) 
     """Decode and step the FMU file; against the time that the samples took."""
     reads = [b"".join(wire[i : i + READ]) for i in range(0, len(wire), READ)]
     duration = 16e-4 * len(wire)
-    with FmuModel(read_fmu(fmu)) as model:
+    with FmuFile(read_fmu(fmu)) as file, FmuModel(file) as model:
 
         def estimate() -> int:
-            chain = Chain(model, Device(), Conditions.constant(18.0, 2.3e5, 0.0))
+            chain = InProcess(lambda _: model, Conditions.constant(18.0, 2.3e5, 0.0))
             return sum(len(chain.push(read)) for read in reads) + len(chain.finish())
 
         start = time.process_time()

@@ -19,12 +19,14 @@ const REASONS = {
   reduced_gages: "one gage is out", too_few_gages: "too few gages",
   no_condition: "pressure or camber unknown", weak_edge: "contact edge not distinct",
   no_contact: "no contact: standstill or dead gages", fault: "the estimator met an error",
+  restarted: "the FMU was started again", skipped: "turns were skipped: overload",
 };
 const COUNTERS = [
   ["frames", "frames good"], ["crc_bad", "CRC bad", 1], ["framing_bad", "framing bad", 1],
   ["lost_frames", "frames lost", 1], ["lost_samples", "samples lost", 1],
   ["duplicates", "doubled", 1], ["out_of_order", "late", 1], ["resets", "resets", 1],
   ["overruns", "overruns", 1], ["reconnects", "replugs", 1],
+  ["skipped_turns", "turns skipped", 1],
   ["saturated_samples", "saturated gage 1..5", 1], ["radio_loss", "radio loss", 1],
   ["low_battery", "low battery", 1], ["clock_drift_ppm", "clock, ppm"],
   ["newest_sample_age_ms", "sample age, ms"], ["turns", "turns"],
@@ -313,12 +315,18 @@ function drawState() {
   });
   const parts = [`byte to estimate p99 ${shown(state.latency_p99_ms, 1)} ms`,
     `page: ${page.missed + page.skipped_all + state.left_out} frames dropped`,
-    `${page.starts - 1} restart${page.starts === 2 ? "" : "s"}`, `${page.viewers} viewer${page.viewers === 1 ? "" : "s"}`];
+    `${restarts(state, page)} restarts`, `${page.viewers} viewer${page.viewers === 1 ? "" : "s"}`];
   if (state.messages.length) parts.push(`FMU: ${state.messages.at(-1)}`);
   $("system").textContent = parts.join(" · ");
   $("system").title = $("system").textContent;
   drawHealth(state.wheels);
   drawNumbers();
+}
+
+// Processes that were started again, the page's own included.
+function restarts(state, page) {
+  const others = Object.values((state.chain || {}).restarts || {});
+  return others.reduce((a, b) => a + b, page.starts - 1);
 }
 
 function drawHealth(wheels) {

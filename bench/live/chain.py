@@ -1,0 +1,340 @@
+"""The run's side of the live chain: starts the processes, keeps them going, gathers their news."""
+
+import gc
+import pickle
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from bench import errors
+from bench.chain import Jump
+from bench.conditions import Conditions
+from bench.deadline import Deadline
+from bench.errors import FmuError, LinkTimeoutError, RecordingError
+from bench.estimation import News, skipped
+from bench.fmu_model import FmuFile
+from bench.live.estimator import EstimatorPlan, Report, estimate
+from bench.live.exchange import FINISH, STOP, Exchange, woken
+from bench.live.kept import CONTEXT, Kept
+from bench.live.reader import LineState, ReaderPlan, read_port
+from bench.live.recorder import Order, RecorderState, record
+from bench.recording import RecordingHeader, jump_event
+from bench.wheels import MOST, Wheels
+
+START = 60.0
+"""Processes that are not ready after so long do not start, [s]."""
+TRIES = 3
+"""So often the FMU may crash when it is loaded."""
+LOOK = 0.05
+"""Time between two looks after the processes and the line, [s]."""
+PATIENCE = 20.0
+"""At the end estimators get so long for what still waits, [s]."""
+LEAVE = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class LivePlan:
+    """What runs.
+
+    Attributes
+    ----------
+    reader : ReaderPlan
+    file : FmuFile or None
+        None: nothing is estimated.
+    conditions : Conditions
+    header : RecordingHeader
+        Of every recording.
+    record : Path or None
+        File of the recording that begins with the run.
+    laps : bool
+        Whether anybody looks at laps.
+    """
+
+    reader: ReaderPlan
+    file: FmuFile | None
+    conditions: Conditions
+    header: RecordingHeader
+    record: Path | None = None
+    laps: bool = True
+
+
+class LiveChain:
+    """The processes of a run; see `bench.session.Source`. A context manager that ends them.
+
+    Raises
+    ------
+    BenchError
+        If the port cannot be opened, or the FMU not be loaded.
+    """
+
+    live = True
+
+    def __init__(self, plan: LivePlan) -> None:
+        self.ended = self.message = ""
+        self.jumps: list[Jump] = []
+        self._plan = plan
+        self._slots = len(plan.reader.wheels) or MOST
+        self._exchange = Exchange.create(CONTEXT, self._slots)
+        self._state = LineState(
+            Wheels(plan.reader.protocol.decoder(), plan.reader.devices, plan.reader.wheels)
+        )
+        self._recorded = RecorderState()
+        self._orders = 0
+        self._pending = News()
+        self._turns: Counter[int] = Counter()  # of each slot
+        self._cursors: Counter[int] = Counter()
+        self._cpu: dict[int, float] = {}
+        self._ready: set[int] = set()
+        self._done: set[int] = set()
+        self._next_look = 0.0
+        self._reader: Kept | None = None
+        self._recorder: Kept | None = None
+        self._estimators: dict[int, Kept] = {}
+        self._finished = False
+
+    def __enter__(self) -> "LiveChain":
+        try:
+            if self._plan.record is not None:
+                self.order("start", str(self._plan.record))
+            if self._plan.reader.recorded:
+                plan, address = self._plan, self._exchange.address
+                self._recorder = Kept(record, lambda _: (plan.header, plan.conditions, address))
+            if self._plan.file is not None:
+                self._start_estimator(0)
+                self._wait(lambda: 0 in self._ready)
+            self._wait(lambda: self.obeyed(Deadline.after(0.0)))
+            # a port is opened last: from then on bytes come
+            self._reader = Kept(read_port, lambda _: (self._plan.reader, self._exchange.address))
+            self._wait(lambda: bool(self._state.name))
+            gc.collect()
+            gc.freeze()
+        except BaseException:
+            self._close()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._close()
+
+    @property
+    def name(self) -> str:
+        """Name of the port."""
+        return self._state.name
+
+    @property
+    def wheels(self) -> Wheels:
+        """The line as it was a moment ago: counters and clocks."""
+        return self._state.wheels
+
+    @property
+    def heard(self) -> float | None:
+        """When bytes came last, on `time.time`."""
+        return self._state.heard
+
+    @property
+    def lost(self) -> float | None:
+        """When the port went away, on `time.time`; None while it is there."""
+        return self._state.lost
+
+    @property
+    def last_byte(self) -> float | None:
+        """When bytes came last, on `time.monotonic`."""
+        return self._state.last_byte
+
+    @property
+    def recorded(self) -> RecorderState:
+        """How far the recorder is."""
+        return self._recorded
+
+    @property
+    def process_ids(self) -> dict[str, int | None]:
+        """Processes by what they do: ``reader``, ``recorder``, ``estimator 0`` ..."""
+        return {name: kept.process_id for name, kept in self._processes().items()}
+
+    def counts(self) -> dict[str, Any]:
+        """Return what was started again, skipped and not recorded."""
+        exchange = self._exchange
+        refused, refused_bytes = exchange.raw.refused
+        return {
+            "processes": self.process_ids,
+            "cpu_s": {"reader": self._state.cpu, "recorder": self._recorded.cpu,
+                      **{f"estimator {slot}": cpu for slot, cpu in self._cpu.items()}},
+            "restarts": {name: kept.starts - 1 for name, kept in self._processes().items()},
+            "raw": {"lost_reads": refused, "lost_bytes": refused_bytes,
+                    "most_waiting_bytes": exchange.raw.high},
+            "wheels": {wheel: self.wheel_counts(wheel) for wheel in self.wheels.heard},
+        }  # fmt: skip
+
+    def cpu_time(self) -> float:
+        """Return what reader, recorder and estimators have used so far, [s]."""
+        return float(sum(self.counts()["cpu_s"].values()))
+
+    def wheel_counts(self, wheel: int) -> dict[str, int]:
+        """Return what was skipped of a wheel."""
+        slot = list(self.wheels.heard).index(wheel)
+        return {
+            **skipped(self.jumps, wheel),
+            "queue_overruns": self._exchange.samples[slot].refused[0],
+            "most_waiting_bytes": self._exchange.samples[slot].high,
+        }  # fmt: skip
+
+    def poll(self, deadline: Deadline) -> News:
+        """Return what has come by the deadline, at once when there is something.
+
+        Raises
+        ------
+        BenchError
+            That ended a process on purpose.
+        """
+        while True:
+            woken(self._exchange.address.news, min(deadline.remaining, LOOK))
+            news = self._gather()
+            if time.monotonic() >= self._next_look:
+                self._look()
+            if news or deadline.expired or self.ended:
+                return news
+
+    def order(self, kind: str, what: object) -> None:
+        """Tell the recorder what to do; see `bench.live.recorder.Order`."""
+        order = Order(kind, what, time.monotonic_ns())
+        if self._exchange.orders.put(pickle.dumps(order, 5)):
+            self._orders += 1
+
+    def obeyed(self, deadline: Deadline) -> bool:
+        """Wait until the recorder has done what it was told; False at the deadline."""
+        while self._recorder is not None and self._recorded.done < self._orders:
+            if deadline.expired:
+                return False
+            self._recorder.look()
+            time.sleep(0.005)
+            self._see()
+        return True
+
+    def finish(self, reason: str) -> News:
+        """End the processes in order, so that nothing that came is left undone."""
+        self._finished = True
+        news = News()
+        self._exchange.set(STOP)
+        if self._reader is not None:
+            self._reader.wait(LEAVE)
+        self._see()
+        self._exchange.set(FINISH)
+        end = Deadline.after(PATIENCE)
+        while len(self._done) < len(self._estimators) and not end.expired:
+            woken(self._exchange.address.news, LOOK)
+            news.add(self._gather())
+            for slot in self._estimators.keys() - self._done:
+                self._estimators[slot].look()
+        self.order("close", reason)
+        if self._recorder is not None:
+            self.obeyed(Deadline.after(PATIENCE))
+            self._recorder.wait(LEAVE)
+            self._see()
+        return news
+
+    def _processes(self) -> dict[str, Kept]:
+        named = {"reader": self._reader, "recorder": self._recorder}
+        named |= {f"estimator {slot}": kept for slot, kept in self._estimators.items()}
+        return {name: kept for name, kept in named.items() if kept is not None}
+
+    def _start_estimator(self, slot: int) -> None:
+        file = self._plan.file
+        if file is None:
+            return
+
+        def arguments(starts: int) -> tuple[Any, ...]:
+            self._drain(slot, self._pending)
+            plan = EstimatorPlan(file, self._plan.conditions, slot, self._plan.laps,
+                                 self._turns[slot], self._cursors[slot], starts > 1)  # fmt: skip
+            return plan, self._exchange.address
+
+        self._estimators[slot] = Kept(estimate, arguments)
+
+    def _wait(self, ready: Callable[[], bool]) -> None:
+        """Wait until the processes are so far."""
+        end = Deadline.after(START)
+        while not ready():
+            woken(self._exchange.address.news, LOOK)
+            self._pending.add(self._gather())
+            self._look()
+            if any(kept.starts > TRIES for kept in self._estimators.values()):
+                raise FmuError(
+                    f"{self._plan.file and self._plan.file.path}: the process that loads it ended "
+                    f"{TRIES} times, as native code does when it crashes; an FMU that loads is "
+                    "needed; build it again with `tirelib fmu build`"
+                )
+            if self._recorded.answer:
+                raise RecordingError(self._recorded.answer)
+            if end.expired:
+                raise LinkTimeoutError(
+                    f"{self._plan.reader.port.port}: the processes of the run are not ready after "
+                    f"{START:.0f} s; a machine with time for them is needed; try again"
+                )
+
+    def _gather(self) -> News:
+        """Return what the estimators have told since the last time."""
+        news, self._pending = self._pending, News()
+        for slot in self._estimators:
+            self._drain(slot, news)
+        return news
+
+    def _drain(self, slot: int, news: News) -> None:
+        queue, now = self._exchange.news[slot], time.monotonic_ns()
+        while (message := queue.read()) is not None:
+            report: Report = pickle.loads(message)
+            queue.take()
+            self._cursors[slot] = report.cursor
+            self._cpu[slot] = report.cpu
+            self._turns[slot] += len(report.news.turns)
+            report.news.latency = [1e-9 * (now - turn.arrival) for turn in report.news.turns]
+            news.add(report.news)
+            for jump in report.news.jumps:
+                self.jumps.append(jump)
+                whole = self._recorded.path in (None, self._plan.record)
+                self.order("event", jump_event(jump, whole=whole))
+            if report.ready:
+                self._ready.add(slot)
+            if report.done:
+                self._done.add(slot)
+            if report.error and slot not in self._ready:
+                raise FmuError(report.error)
+            if report.error:
+                news.messages.append(report.error)
+
+    def _look(self) -> None:
+        """Look after the processes, and at the line."""
+        self._next_look = time.monotonic() + LOOK
+        self._see()
+        for kept in self._processes().values():
+            if kept is self._reader and self._state.ended:
+                continue
+            kept.look()
+        for slot in range(len(self._estimators), min(len(self.wheels.heard), self._slots)):
+            self._start_estimator(slot)
+
+    def _see(self) -> None:
+        line, recorded = self._exchange.line.get(), self._exchange.recorded.get()
+        if line is not None:
+            self._state = pickle.loads(line)
+        if recorded is not None:
+            self._recorded = pickle.loads(recorded)
+        state = self._state
+        if state.error:
+            kind, text = state.error
+            raise getattr(errors, kind)(text)
+        if self._recorded.error and not self._finished:
+            raise RecordingError(self._recorded.error)
+        self.ended, self.message = state.ended, state.message
+
+    def _close(self) -> None:
+        """End what still runs and give the memory back."""
+        self._exchange.set(STOP)
+        self._exchange.set(FINISH)
+        if not self._finished:
+            self.order("close", "the run ended with an error")
+        for kept in self._processes().values():
+            kept.wait(LEAVE)
+        self._exchange.close()

@@ -1,0 +1,131 @@
+"""The shared memory of a run: one queue or cell for each way that something passes."""
+
+from dataclasses import dataclass
+from multiprocessing.context import SpawnContext
+from multiprocessing.shared_memory import SharedMemory
+from typing import Any
+
+from bench.rings import ByteQueue, Cell, memory
+
+RAW = 8 * 2**20
+"""Reads that wait for the recorder, [bytes]: a minute of one wheel, 9 s of four on CAN FD."""
+SAMPLES = 27 * 2**18
+"""Samples of a wheel that wait for its estimator, [bytes]: 13 s at 10 kHz."""
+NEWS = 2**20
+ORDERS = 2**18
+LINE = 2**20
+STATE = 2**16
+_STOP = 64
+STOP, FINISH = 0, 1
+"""Flags: the reader is to end; estimators are to end when nothing is left."""
+
+
+@dataclass(frozen=True, slots=True)
+class Address:
+    """What a process needs to take part.
+
+    Attributes
+    ----------
+    name : str
+        Of the shared memory.
+    slots : int
+        Wheels that there is room for.
+    fresh : tuple of semaphores
+        Released for each slot when samples came.
+    news : semaphore
+        Released when an estimator has news, or the line an event.
+    """
+
+    name: str
+    slots: int
+    fresh: tuple[Any, ...]
+    news: Any
+
+
+class Exchange:
+    """The memory, cut into its parts; a context manager that gives it back.
+
+    Parameters
+    ----------
+    address : Address
+        Of memory that is there.
+    owner : bool
+        Whether the memory ends with this object.
+
+    Attributes
+    ----------
+    raw : ByteQueue
+        Reads, from the reader to the recorder.
+    orders : ByteQueue
+        From the run to the recorder.
+    samples, news : tuple of ByteQueue
+        Of each slot: blocks to the estimator, reports to the run.
+    line, recorded : Cell
+        State of the reader and of the recorder.
+    """
+
+    def __init__(self, address: Address, shared: SharedMemory | None = None) -> None:
+        self.address = address
+        self._owner = shared is not None
+        self._shared = SharedMemory(address.name) if shared is None else shared
+        buffer = self._shared.buf
+        if buffer is None:
+            raise ValueError("the memory is closed")
+        self._views: list[memoryview] = []
+        place = 0
+
+        def part(size: int) -> memoryview:
+            nonlocal place
+            self._views.append(buffer[place : place + size])
+            place += size
+            return self._views[-1]
+
+        self._flags = part(_STOP).cast("Q")
+        self.raw, self.orders = ByteQueue(part(RAW)), ByteQueue(part(ORDERS))
+        self.line, self.recorded = Cell(part(LINE)), Cell(part(STATE))
+        slots = range(address.slots)
+        self.samples = tuple(ByteQueue(part(SAMPLES)) for _ in slots)
+        self.news = tuple(ByteQueue(part(NEWS)) for _ in slots)
+
+    @classmethod
+    def create(cls, context: SpawnContext, slots: int) -> "Exchange":
+        """Make the memory.
+
+        Raises
+        ------
+        LinkError
+            If there is not enough.
+        """
+        shared = memory(_STOP + RAW + ORDERS + LINE + STATE + slots * (SAMPLES + NEWS))
+        fresh = tuple(context.Semaphore(0) for _ in range(slots))
+        return cls(Address(shared.name, slots, fresh, context.Semaphore(0)), shared)
+
+    def is_set(self, flag: int) -> bool:
+        """Whether the run has set a flag."""
+        return bool(self._flags[flag])
+
+    def set(self, flag: int) -> None:
+        """Set a flag."""
+        self._flags[flag] = 1
+
+    def close(self) -> None:
+        """Let go of the memory; its maker removes it. Calling twice does no harm."""
+        for queue in (self.raw, self.orders, *self.samples, *self.news):
+            queue.close()
+        for cell in (self.line, self.recorded):
+            cell.close()
+        self._flags.release()
+        for view in self._views:
+            view.release()
+        self._views.clear()
+        self._shared.close()
+        if self._owner:
+            self._owner = False
+            self._shared.unlink()
+
+
+def woken(signal: Any, timeout: float) -> None:
+    """Wait until a semaphore is released, or the time has passed, and forget how often it was."""
+    if signal.acquire(timeout=max(timeout, 0.0)):
+        while signal.acquire(block=False):
+            continue

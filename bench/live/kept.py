@@ -1,0 +1,113 @@
+"""A process that is started again when it dies or hangs, and how often that was."""
+
+import gc
+import signal
+import time
+from collections.abc import Callable
+from multiprocessing import get_context, parent_process
+from multiprocessing.context import SpawnContext
+from typing import Any
+
+FIRST_PAUSE, LONGEST_PAUSE = 0.05, 10.0
+"""Before a new start: it doubles while starts fail, [s]."""
+LIVED = 5.0
+"""A process that lived longer starts over with the first pause, [s]."""
+CONTEXT: SpawnContext = get_context("spawn")
+
+
+class Kept:
+    """A process beside the run. `look` is called often and never waits.
+
+    Parameters
+    ----------
+    target : callable
+        Runs in the process.
+    arguments : callable
+        Called before each start, with the number of starts (from 1); gives what the target gets.
+    hangs : callable, optional
+        Tells whether a process that lives has to be ended: it does nothing any more.
+
+    Attributes
+    ----------
+    starts : int
+    """
+
+    def __init__(
+        self,
+        target: Callable[..., None],
+        arguments: Callable[[int], tuple[Any, ...]],
+        hangs: Callable[[], bool] | None = None,
+    ) -> None:
+        self.starts = 0
+        self._target = target
+        self._arguments = arguments
+        self._hangs = hangs
+        self._process: Any = None
+        self._started = self._due = 0.0
+        self._pause = FIRST_PAUSE
+        self.start()
+
+    @property
+    def process_id(self) -> int | None:
+        """Of the process, while there is one."""
+        return None if self._process is None else self._process.pid
+
+    @property
+    def alive(self) -> bool:
+        """Whether the process runs."""
+        return self._process is not None and self._process.is_alive()
+
+    def start(self) -> None:
+        """Start the process."""
+        arguments = self._arguments(self.starts + 1)
+        self._process = CONTEXT.Process(target=self._target, args=arguments, daemon=True)
+        before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # which the process inherits
+        try:
+            self._process.start()
+        finally:
+            signal.signal(signal.SIGINT, before)
+        self._started = time.monotonic()
+        self.starts += 1
+
+    def look(self) -> None:
+        """Start the process again if it has ended, after a pause."""
+        now = time.monotonic()
+        if self._process is not None:
+            if self._process.is_alive():
+                if self._hangs is not None and self._hangs():
+                    self._process.kill()
+                return
+            self._pause = FIRST_PAUSE if now - self._started > LIVED else self._pause
+            self._due = now + self._pause
+            self._pause = min(2.0 * self._pause, LONGEST_PAUSE)
+            self._process.join()
+            self._process.close()
+            self._process = None
+        if now >= self._due:
+            self.start()
+
+    def wait(self, patience: float) -> None:
+        """Wait for the end of a process that was told to end; end it when it does not [s]."""
+        process, self._process = self._process, None
+        if process is None:
+            return
+        process.join(patience)
+        for end in (process.terminate, process.kill):
+            if process.is_alive():
+                end()
+                process.join(2.0)
+        process.close()
+
+
+def settled() -> None:
+    """Prepare a process of the run: Ctrl-C is the run's, and what is there is no garbage."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    gc.collect()
+    gc.freeze()
+
+
+def orphaned() -> bool:
+    """Whether the run that started this process is gone."""
+    parent = parent_process()
+    return parent is not None and not parent.is_alive()

@@ -1,0 +1,62 @@
+"""A recording through the same decoder and estimators as a live run, in one process."""
+
+import time
+from typing import Any
+
+from bench.deadline import Deadline
+from bench.estimation import Estimation, News, skipped
+from bench.links import BACK, RESUMED, Link
+from bench.wheels import Wheels
+
+
+class ReplayChain:
+    """Reads of a link to news, one after the other; see `bench.session.Source`.
+
+    Parameters
+    ----------
+    link : Link
+    wheels : Wheels
+        Fresh.
+    estimation : Estimation
+    """
+
+    lost: float | None = None
+    message = ""
+
+    def __init__(self, link: Link, wheels: Wheels, estimation: Estimation) -> None:
+        self.name, self.live = link.name, link.live
+        self.ended = ""
+        self.wheels = wheels
+        self.heard: float | None = None
+        self.last_byte: float | None = None
+        self._link = link
+        self._estimation = estimation
+
+    def poll(self, deadline: Deadline) -> News:
+        """Return what the next read brings."""
+        read = self._link.receive(deadline)
+        if read is None:
+            self.ended = "end"
+            return News()
+        if read.event in (BACK, RESUMED):
+            self.wheels.interrupt()
+        if not read.data:
+            return News()
+        self.heard, self.last_byte = time.time(), time.monotonic()
+        return self._estimation.take(self.wheels.push(read.data, read.arrival))
+
+    def finish(self, reason: str) -> News:
+        """Step what is left."""
+        return self._estimation.finish()
+
+    def counts(self) -> dict[str, Any]:
+        """Return nothing: there are no other processes."""
+        return {}
+
+    def cpu_time(self) -> float:
+        """Return 0: there are no other processes."""
+        return 0.0
+
+    def wheel_counts(self, wheel: int) -> dict[str, int]:
+        """Return what the run skipped of a wheel; a replay skips no more."""
+        return {**skipped(self._estimation.jumps, wheel), "queue_overruns": 0}

@@ -1,0 +1,76 @@
+"""Bytes to turns without processes, as a replay does it; and a source of news for a page."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from bench.chain import Estimator, Turn
+from bench.conditions import Conditions
+from bench.deadline import Deadline
+from bench.decoder import SerialDecoder
+from bench.device import Device
+from bench.estimation import Estimation, News
+from bench.protocols import Decoder
+from bench.timeline import Timeline
+from bench.wheels import Wheels
+
+
+class InProcess:
+    """A line and what is made of it."""
+
+    def __init__(
+        self,
+        estimator: Callable[[int], Estimator],
+        conditions: Conditions,
+        devices: Mapping[int | None, Device] | None = None,
+        decoder: Decoder | None = None,
+        chosen: Sequence[int] = (),
+    ) -> None:
+        known = {None: Device()} if devices is None else devices
+        self.wheels = Wheels(decoder or SerialDecoder(), known, chosen)
+        self.estimation = Estimation(estimator, conditions)
+
+    @property
+    def timeline(self) -> Timeline:
+        """Of the first wheel that was heard."""
+        return next(iter(self.wheels.heard.values())).timeline
+
+    def push(self, data: bytes, arrival: int = 0) -> list[Turn]:
+        return self.estimation.take(self.wheels.push(data, arrival)).turns
+
+    def finish(self) -> list[Turn]:
+        return self.estimation.finish().turns
+
+
+class FakeSource:
+    """A line that was told what to say; see `bench.session.Source`."""
+
+    name, live, ended, message = "port", True, "", ""
+    last_byte: float | None = None
+
+    def __init__(self, *numbers: int) -> None:
+        self.heard: float | None = None
+        self.lost: float | None = None
+        self.wheels = Wheels(SerialDecoder(), {None: Device()})
+        self.skipped = 0
+        for number in numbers:
+            self.hear(number)
+
+    def hear(self, number: int) -> None:
+        counts = self.wheels._wheel(number).timeline.counts
+        self.wheels.line.counts.ok, self.wheels.line.counts.crc = 7, 3
+        counts.lost_frames = 2
+
+    def counts(self) -> dict[str, Any]:
+        return {}
+
+    def cpu_time(self) -> float:
+        return 0.0
+
+    def wheel_counts(self, wheel: int) -> dict[str, int]:
+        return {"skipped_turns": self.skipped, "estimator_restarts": 0, "queue_overruns": 0}
+
+    def poll(self, deadline: Deadline) -> News:
+        return News()
+
+    def finish(self, reason: str) -> News:
+        return News()

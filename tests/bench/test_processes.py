@@ -1,0 +1,283 @@
+"""The live chain in processes: each may be killed, and a replay still gives what the run gave."""
+
+import os
+import pickle
+import signal
+import time
+from collections.abc import Callable, Iterator
+from multiprocessing.shared_memory import SharedMemory
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.reader import make_reader
+
+from bench.chain import RESTARTED, SKIPPED, Jump, Outputs, Place, Turn
+from bench.conditions import Condition, Conditions
+from bench.deadline import Deadline
+from bench.decoder import SerialDecoder
+from bench.device import Device
+from bench.document import flags, turn_document
+from bench.emulator import write_script
+from bench.estimation import Estimation, News
+from bench.faults import Faults
+from bench.fmu_archive import read_fmu
+from bench.fmu_model import FmuFile, FmuModel
+from bench.links import BACK, LOST, RESUMED, Read
+from bench.links.opening import PortPlan
+from bench.links.replay import ReplayLink
+from bench.live.chain import LiveChain, LivePlan
+from bench.live.estimator import EstimatorPlan, Report, _Estimator
+from bench.live.exchange import Exchange
+from bench.live.kept import CONTEXT
+from bench.live.reader import ReaderPlan
+from bench.live.recorder import Order, RecorderState, _Recorder
+from bench.protocols.plan import ProtocolPlan
+from bench.recording import Recorder, Recording, RecordingHeader, jump_event
+from bench.replay import ReplayChain
+from bench.wheels import Block, Wheels
+from tests.bench.campaigns import tiny_runs
+from tests.bench.conftest import Spawn
+from tests.bench.test_live import PATIENCE, port_of
+from tirelib.arrays import FloatArray
+
+STEADY = Conditions.constant(18.0, 2.3e5, 0.0)
+
+
+def documents(turns: list[Turn]) -> list[dict[str, Any]]:
+    return [turn_document(turn) for turn in turns]
+
+
+def replayed(path: Path, file: FmuFile) -> tuple[list[Turn], Wheels]:
+    with ReplayLink(path) as link, FmuModel(file) as model:
+        wheels = Wheels(SerialDecoder(), {None: Device()})
+        estimation = Estimation(lambda _: model, STEADY, link.recording.jumps())
+        chain, news = ReplayChain(link, wheels, estimation), News()
+        while not chain.ended:
+            news.add(chain.poll(Deadline.never()))
+        news.add(chain.finish("end"))
+    return news.turns, wheels
+
+
+def gathered(chain: LiveChain, news: News, enough: Callable[[], bool]) -> None:
+    end = Deadline.after(2.0 * PATIENCE)
+    while not enough():
+        news.add(chain.poll(Deadline.after(0.1)))
+        assert not end.expired, chain.counts()
+
+
+@pytest.fixture
+def file(toy_fmus: dict[int, Path]) -> Iterator[FmuFile]:
+    with FmuFile(read_fmu(toy_fmus[16])) as opened:
+        yield opened
+
+
+def plan_of(port: str, file: FmuFile | None, record: Path) -> LivePlan:
+    reader = ReaderPlan(PortPlan(port), 60.0, ProtocolPlan(), {None: Device()})
+    return LivePlan(reader, file, STEADY, RecordingHeader({}), record)
+
+
+def test_each_process_may_be_killed_and_a_replay_gives_what_the_run_gave(
+    spawn: Spawn, campaign: Path, file: FmuFile, tmp_path: Path
+) -> None:
+    spawn("emulate", "--campaign", campaign, "--all", "--loop", "--port-file", tmp_path / "port")
+    news = News()
+    with LiveChain(plan_of(port_of(tmp_path / "port"), file, tmp_path / "a.mcap")) as chain:
+        name, processes = chain._exchange.address.name, set(chain.process_ids.values())
+        gathered(chain, news, lambda: len(news.turns) > 3)
+        for victim in ("estimator 0", "recorder", "reader"):
+            if victim == "reader":  # until then nothing may be lost
+                before = chain.wheels.counts[1]
+                assert before.lost_samples == 0
+                assert chain.counts()["raw"]["lost_bytes"] == 0
+            os.kill(chain.process_ids[victim] or 0, signal.SIGKILL)
+            seen = len(news.turns) + 8  # more than what may have been on its way
+            gathered(chain, news, lambda: chain.counts()["restarts"][victim] == 1)  # noqa: B023
+            processes |= set(chain.process_ids.values())
+            gathered(chain, news, lambda: len(news.turns) > seen)  # noqa: B023
+        news.add(chain.finish("stopped"))
+        counts, wheels = chain.counts(), chain.wheels
+    assert counts["restarts"] == {"reader": 1, "recorder": 1, "estimator 0": 1}
+    assert counts["wheels"][0]["estimator_restarts"] == 1
+    assert counts["wheels"][0]["queue_overruns"] == 0
+    recording = Recording(tmp_path / "a.mcap")
+    reads = list(recording.reads())
+    recording.close()
+    assert recording.complete
+    assert [read.event for read in reads if read.event] == [RESUMED]
+    assert sum(len(read.data) for read in reads) == wheels.line.counts.bytes
+    notes = [note for turn in news.turns for note in flags(turn) if note == RESTARTED]
+    assert len(notes) == 1
+    turns, again = replayed(tmp_path / "a.mcap", file)
+    assert documents(turns) == documents(news.turns)
+    assert again.counts == wheels.counts
+    assert wheels.counts[0].reconnects == 1
+    with pytest.raises(FileNotFoundError):
+        SharedMemory(name)
+    assert not [pid for pid in processes if pid and Path(f"/proc/{pid}").exists()]
+
+
+def test_a_cable_in_and_out_is_told_and_every_time_it_comes_back(
+    spawn: Spawn, campaign: Path, tmp_path: Path
+) -> None:
+    spawn("emulate", "--campaign", campaign, "--all", "--loop", "--link", tmp_path / "port",
+          "--unplug", 0.5, "--replug", 0.2)  # fmt: skip
+    end = Deadline.after(PATIENCE)
+    while not (tmp_path / "port").is_symlink() and not end.expired:
+        time.sleep(0.02)
+    with LiveChain(plan_of(str(tmp_path / "port"), None, tmp_path / "a.mcap")) as chain:
+        lost = 0
+        for _ in range(3):
+            gathered(chain, News(), lambda: chain.wheels.line.counts.reconnects > lost)  # noqa: B023
+            lost = chain.wheels.line.counts.reconnects
+        chain.finish("stopped")
+    recording = Recording(tmp_path / "a.mcap")
+    events = [read.event for read in recording.reads() if read.event]
+    recording.close()
+    assert events[:6] == [LOST, BACK] * 3
+
+
+class Turns:
+    """An estimator that ends a turn every 1000 samples and says what it was given."""
+
+    samples = 16
+
+    def start(self, period: float) -> None:
+        self.count, self.sum = 0, 0.0
+
+    def step(self, strain: FloatArray, conditions: Condition, valid: bool) -> Outputs | None:
+        before, self.count = self.count, self.count + len(strain)
+        self.sum += float(strain.sum())
+        if before // 1000 == self.count // 1000:
+            return None
+        names = ("alpha", "kappa", "Fy", "flags", "age")
+        return {**dict.fromkeys(names, 0.0), "Fz": self.sum, "valid": 1.0}, {}
+
+    def take_messages(self) -> list[str]:
+        return []
+
+
+def stepped(
+    blocks: list[Block], late: slice = slice(0), gone: slice = slice(0), *, again: bool = False
+) -> News:
+    """Step blocks in the estimator's process, but here; some come late, some not at all."""
+    exchange = Exchange.create(CONTEXT, 1)
+    now = time.monotonic_ns()
+    old = set(range(len(blocks))[late])
+    for number, block in enumerate(blocks):
+        if number not in set(range(len(blocks))[gone]):
+            age = 10**10 if number in old else -(10**10)
+            fresh = Block(block.wheel, now - age, block.first_us, block.content)
+            assert exchange.samples[0].put(pickle.dumps(fresh))
+    plan = EstimatorPlan(None, STEADY, 0, laps=False, again=again)  # type: ignore[arg-type]
+    worker = _Estimator(plan, exchange)
+    model: Any = Turns()
+    end = exchange.is_set
+    exchange.is_set = lambda flag: end(flag) or exchange.samples[0].waiting == 0  # type: ignore[method-assign]
+    worker.run(model)
+    news = News()
+    while (message := exchange.news[0].read()) is not None:
+        report: Report = pickle.loads(message)
+        news.add(report.news)
+    assert report.done
+    exchange.close()
+    return news
+
+
+@pytest.fixture(scope="module")
+def blocks() -> list[Block]:
+    wire = write_script(tiny_runs()[:2], Device(), Faults({})).frames
+    wheels = Wheels(SerialDecoder(), {None: Device()})
+    return [b for i in range(0, len(wire), 3) for b in wheels.push(b"".join(wire[i : i + 3]))]
+
+
+@pytest.mark.parametrize("case", [
+    {}, {"late": slice(60, 90)}, {"gone": slice(60, 90)}, {"gone": slice(120, 170)},
+    {"again": True}, {"late": slice(0, 30)},
+])  # fmt: skip
+def test_what_an_estimator_leaves_out_is_flagged_and_a_replay_leaves_it_out_too(
+    blocks: list[Block], case: dict[str, Any]
+) -> None:
+    news = stepped(blocks, **case)
+    done = Estimation(lambda _: Turns(), STEADY, news.jumps)
+    again = [*done.take(blocks).turns, *done.finish().turns]
+    assert documents(again) == documents(news.turns)
+    notes = [note for turn in news.turns for note in flags(turn)]
+    why = RESTARTED if "again" in case else SKIPPED
+    jumped = bool(case) and case != {"late": slice(0, 30)}  # at the start it may catch up
+    assert notes == [why] * jumped
+    assert [jump.why for jump in news.jumps] == [why] * jumped
+    if why == SKIPPED and jumped:
+        (jump,) = news.jumps
+        assert jump.samples > 900
+        assert jump.turns >= 1
+    whole = Estimation(lambda _: Turns(), STEADY).take(blocks).turns
+    assert (len(news.turns) < len(whole)) == (why == SKIPPED and jumped)
+
+
+def test_a_recorder_that_starts_again_cuts_off_what_was_left_half_done(tmp_path: Path) -> None:
+    path, header = tmp_path / "a.mcap", RecordingHeader({"port": "p"})
+    first = Recorder(path, header, STEADY)
+    for number in range(3):
+        first.read(Read(number + 1, bytes([number]) * 100))
+    first.flush()
+    whole = first.length
+    first.read(Read(9, b"x" * 9000))
+    first.flush()
+    with path.open("r+b") as file:
+        file.truncate(whole + 8000)  # killed in the middle
+    with Recorder(path, header, STEADY, whole) as second:
+        second.read(Read(4, b"y" * 100))
+    first._file.close()
+    recording = Recording(path)
+    reads = [data for _, data in recording.raw()]
+    recording.close()
+    assert [data[:1] for data in reads] == [b"\0", b"\1", b"\2", b"y"]
+    assert recording.complete
+    assert recording.header.settings == {"port": "p"}
+    with path.open("rb") as file:  # and for other programs, which begin at the end
+        found = [
+            m.data[:1] for _, c, m in make_reader(file).iter_messages() if c.topic == "/serial"
+        ]
+    assert found == [data[:1] for data in reads]
+
+
+def test_a_read_that_is_on_disk_is_not_written_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A recorder that is killed when it has noted what it did, before it gave back the room."""
+    monkeypatch.setattr("bench.live.recorder.settled", lambda: None)
+    exchange, header = Exchange.create(CONTEXT, 1), RecordingHeader({})
+    first = Recorder(tmp_path / "a.mcap", header, STEADY)
+    for number in range(2):
+        exchange.raw.put(pickle.dumps(Read(number + 1, bytes([number]) * 9)))
+    first.read(pickle.loads(exchange.raw.read() or b""))
+    first.flush()
+    state = RecorderState(tmp_path / "a.mcap", first.length, 9, exchange.raw.cursor)
+    exchange.orders.put(pickle.dumps(Order("close", "stopped", 0)))
+    other = Exchange(exchange.address)
+    _Recorder(header, STEADY, other, state).run()
+    other.close()
+    exchange.close()
+    first._file.close()
+    recording = Recording(tmp_path / "a.mcap")
+    assert [data for _, data in recording.raw()] == [b"\0" * 9, b"\1" * 9]
+    recording.close()
+
+
+def test_an_estimator_goes_on_behind_what_it_has_reported(tmp_path: Path) -> None:
+    chain = LiveChain(plan_of("p", None, tmp_path / "a.mcap"))
+    jump = Jump(0, Place(0, 0), Place(0, 16), SKIPPED, 16, 1)
+    chain._exchange.news[0].put(pickle.dumps(Report(News(jumps=[jump]), cursor=4711)))
+    news = News()
+    chain._drain(0, news)
+    assert chain._cursors[0] == 4711
+    assert news.jumps == chain.jumps == [jump]
+    order: Order = pickle.loads(chain._exchange.orders.read() or b"")
+    assert order.what == jump_event(jump)
+    chain._recorded = RecorderState(tmp_path / "a-2.mcap")  # begun later: other places
+    chain._exchange.news[0].put(pickle.dumps(Report(News(jumps=[jump]))))
+    chain._drain(0, news)
+    order = pickle.loads(chain._exchange.orders.read() or b"")
+    assert order.what["event"] == "jump of the run"
+    chain._close()
