@@ -8,10 +8,9 @@ process.
 import pythonfmu
 from pythonfmu import Fmi2Slave
 
-from tirelib.estimators.calibration_file import read_calibration
 from tirelib.fmu.slave import GuardedSlave
 from tirelib.fmu.variables import Variable, inputs, outputs, parameters
-from tirelib.fmu.wheel import Wheel, load_wheel
+from tirelib.fmu.wheel import Wheel, embedded_calibration, load_wheel
 from tirelib.stream.estimator import RATES
 
 
@@ -24,7 +23,7 @@ class StrainTire(GuardedSlave, Fmi2Slave):
         """Return the variables; note where the frame, the conditions and the age stand."""
         self._samples = int(self.settings["samples_per_step"])
         self._buffered = bool(self.settings["buffered"])
-        lateral = read_calibration(self.folder / "calibration.toml").lateral
+        lateral = embedded_calibration(self.folder / "calibration.toml").lateral
         fixed = parameters(self.settings["sample_rate"], RATES)
         given = inputs(lateral, self._samples, buffered=self._buffered)
         taken = outputs(lateral)

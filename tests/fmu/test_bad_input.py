@@ -84,6 +84,12 @@ FAULTS = {
     "frozen gages, wheel locked or cable cut": (freeze(0, 1, 2, 3, 4), GOOD, "no_contact"),
     "centre gage frozen": (freeze(2), GOOD, "no_contact"),
     "two gages frozen": (freeze(0, 3), GOOD, "too_few_gages"),
+    "a gage frozen": (freeze(3), GOOD, "reduced_gages"),
+    "a gage NaN": (set_all(np.nan, (1,)), GOOD, "reduced_gages"),
+    "a gage infinite": (set_all(-np.inf, (4,)), GOOD, "reduced_gages"),
+    "speed zero while the wheel turns": (nothing, np.array([0.0, live.PRESSURE, 0.0]), "no_speed"),
+    "speed lost": (nothing, np.array([np.nan, live.PRESSURE, 0.0]), "no_speed"),
+    "speed infinite": (nothing, np.array([np.inf, live.PRESSURE, 0.0]), "no_speed"),
     "two gages NaN": (set_all(np.nan, (0, 3)), GOOD, "too_few_gages"),
     "reverse": (nothing, np.array([-live.SPEED, live.PRESSURE, 0.0]), "reversed"),
     "load above the calibrated": (load(9e3), GOOD, "out_of_range"),
@@ -108,14 +114,19 @@ def test_valid_drops_within_two_turns(fmu: LoadedFmu, strain: np.ndarray, name: 
     assert not after[-1]["valid"]
 
 
+@pytest.mark.parametrize("phase", [0.0, 0.3, 0.375, 0.4, 0.45, 0.7])
 def test_a_single_frozen_gage_is_told_within_two_turns_and_the_others_go_on(
-    fmu: LoadedFmu, strain: np.ndarray
+    fmu: LoadedFmu, strain: np.ndarray, phase: float
 ) -> None:
     faulty = strain.copy()
-    freeze(1)(faulty)
+    onset = ONSET + int(phase * TURN) // 10 * 10
+    faulty[1, onset:] = faulty[1, onset]
     fmu.start(live.RATE)
-    before = play(fmu, faulty[:, :ONSET])[-1]
-    last = play(fmu, faulty[:, ONSET : ONSET + 2 * TURN])[-1]
+    before = play(fmu, faulty[:, :onset])[-1]
+    last = play(fmu, faulty[:, onset : onset + 2 * TURN])[-1]
+    assert before["valid"]
+    assert not last["valid"]
+    assert last["Fz_valid"]
     assert last["flags"] & TurnFlag.REDUCED_GAGES
     assert last["flags"] & TurnFlag.DEAD_GAGE
     assert np.isnan(last["contact_length_2"])
@@ -302,14 +313,14 @@ def test_a_fault_at_every_step_is_logged_a_few_times_and_the_values_are_held(
     fmu.start(live.RATE)
     before = play(fmu, strain[:, :ONSET])[-1]
     package = next((Path(fmu.slave.unzipDirectory) / "resources").glob("tirelib_*")).name
-    cutter = sys.modules[f"{package}.signal.turns"].TurnCutter
+    estimator = sys.modules[f"{package}.stream.estimator"].StreamEstimator
     count = [0]
 
     def always(*_: Any, **__: Any) -> Any:
         count[0] += 1
         raise RuntimeError("each one differs" if count[0] <= 150 else f"number {count[0]}")
 
-    monkeypatch.setattr(cutter, "push", always)
+    monkeypatch.setattr(estimator, "take", always)
     fmu.messages.clear()
     for first in range(0, 3000, 10):
         fmu.step(strain[:, first : first + 10], GOOD)

@@ -2,15 +2,19 @@
 
 import gc
 import json
-from collections.abc import Iterator
+import shutil
+import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from fmpy import extract, read_model_description
 from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave
 
-from tests.fmu import live
+from tests.fmu import live, virtual_host
 from tirelib.errors import FormatError
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.flags import TurnFlag, flag_names
@@ -235,8 +239,18 @@ def test_a_dead_gage_is_told(ten: LoadedFmu) -> None:
     ten.start(live.RATE)
     last = play(ten, samples)[-1]
     assert {"dead_gage", "reduced_gages"} <= set(flag_names(last["flags"]))
-    assert last["valid"]
+    assert not last["valid"]
+    assert all(last[f"{name}_valid"] for name in QUANTITIES)
     assert np.isnan(last["contact_length_4"])
+
+
+def test_a_gage_that_lives_but_shows_no_contact_does_not_drop_validity(ten: LoadedFmu) -> None:
+    samples = strain()
+    samples[3] = 1e-3 + np.random.default_rng(1).normal(0.0, 4e-6, samples.shape[1])
+    ten.start(live.RATE)
+    last = play(ten, samples)[-1]
+    assert {"dead_gage", "reduced_gages"} <= set(flag_names(last["flags"]))
+    assert last["valid"]
 
 
 def test_when_contacts_stay_away_validity_drops_and_values_are_held(ten: LoadedFmu) -> None:
@@ -351,15 +365,13 @@ def test_forbidden_calls_are_fmi_errors_again_and_again_and_the_importer_lives(
 def test_an_unexpected_error_holds_the_values_invalid_and_the_fmu_recovers(
     ten: LoadedFmu, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import sys
-
     ten.start(live.RATE)
     samples = strain(turns=3.0)
     before = play(ten, samples)[-1]
     resources = Path(ten.slave.unzipDirectory) / "resources"
     package = next(resources.glob("tirelib_*")).name
-    cutter = sys.modules[f"{package}.signal.turns"].TurnCutter
-    good, calls = cutter.push, [0]
+    estimator = sys.modules[f"{package}.stream.estimator"].StreamEstimator
+    good, calls = estimator.take, [0]
 
     def fails_once(*arguments: Any, **options: Any) -> Any:
         calls[0] += 1
@@ -367,7 +379,7 @@ def test_an_unexpected_error_holds_the_values_invalid_and_the_fmu_recovers(
             raise ZeroDivisionError("made by a test")
         return good(*arguments, **options)
 
-    monkeypatch.setattr(cutter, "push", fails_once)
+    monkeypatch.setattr(estimator, "take", fails_once)
     ten.messages.clear()
     after = play(ten, samples[:, :20])
     assert ten.messages == ["ZeroDivisionError: made by a test"]
@@ -380,6 +392,41 @@ def test_an_unexpected_error_holds_the_values_invalid_and_the_fmu_recovers(
     assert recovered["valid"]
     assert recovered["turn"] > before["turn"]
     assert recovered["contact_time"] > before["contact_time"] + 0.2
+
+
+@pytest.mark.parametrize("file", [live.fmu_file, virtual_host.file])
+def test_instances_come_and_go_without_growth(file: Callable[[int], Path]) -> None:
+    description = read_model_description(str(file(10)))
+    folder = extract(str(file(10)))
+
+    def cycle() -> None:
+        slave = FMU2Slave(
+            guid=description.guid, unzipDirectory=folder, instanceName="cycle",
+            modelIdentifier=description.coSimulation.modelIdentifier,
+        )  # fmt: skip
+        slave.instantiate()
+        slave.setupExperiment(startTime=0.0)
+        slave.enterInitializationMode()
+        slave.exitInitializationMode()
+        slave.doStep(0.0, float(description.defaultExperiment.stepSize))
+        slave.freeInstance()
+
+    def left() -> tuple[int, int]:
+        gc.collect()
+        name = (Path(folder) / "resources" / "slavemodule.txt").read_text()
+        return len(gc.get_objects()), sys.getrefcount(vars(sys.modules[name]))
+
+    try:
+        for _ in range(3):
+            cycle()
+        before = left()
+        for _ in range(30):
+            cycle()
+        after = left()
+    finally:
+        shutil.rmtree(folder)
+    assert after[0] - before[0] < 15  # an empty slave of pythonfmu leaves 14 objects each time
+    assert after[1] == before[1]  # what pythonfmu gives up is what the launcher takes
 
 
 def test_a_freed_instance_leaves_at_once_with_its_memory() -> None:

@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree as Xml
 
@@ -12,7 +13,7 @@ import pytest
 from fmpy import extract, read_model_description
 from fmpy.validation import validate_fmu
 
-from tests.fmu import live
+from tests.fmu import live, virtual_host
 from tirelib.errors import FormatError, ParameterError
 from tirelib.flags import TurnFlag
 from tirelib.fmu.build import build_fmu, embedded_calibration, source_file
@@ -22,7 +23,8 @@ from tirelib.stream.estimator import RATES
 from tirelib.units import TABLE
 
 GIVEN = {"1": "ratio", "N": "force", "rad": "angle", "m": "length", "m/s": "speed",
-         "Pa": "pressure", "rad/s": "angular_speed", "s": "time", "Hz": "frequency"}  # fmt: skip
+         "Pa": "pressure", "rad/s": "angular_speed", "s": "time", "Hz": "frequency",
+         "N m": "moment", "1/s": "strain_rate"}  # fmt: skip
 
 
 @pytest.mark.parametrize("samples", [1, 10])
@@ -50,8 +52,11 @@ def test_inputs_and_outputs_are_those_of_the_contract(samples: int) -> None:
     assert float(description.defaultExperiment.stepSize) == samples / live.RATE
 
 
-def test_every_real_has_a_unit_and_display_units_convert_as_the_library_does() -> None:
-    description = read_model_description(str(live.fmu_file(10)))
+@pytest.mark.parametrize("file", [live.fmu_file, virtual_host.file])
+def test_every_real_has_a_unit_and_display_units_convert_as_the_library_does(
+    file: Callable[[int], Path],
+) -> None:
+    description = read_model_description(str(file(10)))
     units = {unit.name: unit for unit in description.unitDefinitions}
     reals = [v for v in description.modelVariables if v.type == "Real"]
     assert all(v.unit in units for v in reals)
@@ -67,6 +72,9 @@ def test_every_real_has_a_unit_and_display_units_convert_as_the_library_does() -
     shown = {v.name: v.displayUnit for v in reals}
     assert (shown["alpha"], shown["speed"], shown["pressure"]) == ("deg", "km/h", "bar")
     assert shown["strain_1_1"] == "ustrain"
+    newton, metre, second = (units["N m"].baseUnit, units["m"].baseUnit, units["1/s"].baseUnit)
+    assert (newton.kg, newton.m, newton.s) == (metre.kg + 1, metre.m + 1, 2 * second.s)
+    assert {v.unit for v in reals if v.name in ("Mz_rig", "drift")} <= {"N m", "1/s"}
 
 
 def test_all_outputs_are_unknown_at_the_start_and_depend_on_nothing_then() -> None:

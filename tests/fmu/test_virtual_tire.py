@@ -217,7 +217,7 @@ def test_dropped_frames_are_marked_and_hold_the_last_one(ten: Host) -> None:
 @pytest.mark.parametrize(
     ("name", "value"),
     [("Fz", 500.0), ("Fz", -1.0), ("alpha", 0.2), ("kappa", -0.2), ("camber", -0.1),
-     ("speed", 0.0), ("speed", -20.0), ("pressure", 4e5), ("Fz", np.nan), ("alpha", np.inf),
+     ("speed", 2.0), ("speed", -20.0), ("pressure", 4e5), ("Fz", np.nan), ("alpha", np.inf),
      ("speed", np.nan)],
 )  # fmt: skip
 def test_out_of_range_nothing_is_extrapolated_and_the_input_is_named(
@@ -236,6 +236,61 @@ def test_out_of_range_nothing_is_extrapolated_and_the_input_is_named(
     ten.play(40)
     assert ten.get("status") == "ok"
     assert ten.get("frame_valid") is True
+
+
+@pytest.mark.parametrize(
+    ("why", "inputs"),
+    [("standstill", {"speed": 0.0, "kappa": np.nan, "alpha": 1.0}),
+     ("locked", {"kappa": -1.0}), ("locked", {"kappa": -1.0, "speed": 2.0})],
+)  # fmt: skip
+def test_a_wheel_that_does_not_turn_keeps_the_strain_of_its_angle(
+    ten: Host, why: str, inputs: dict[str, float]
+) -> None:
+    ten.start(relaxation_length_kappa=0.05)
+    ten.play(47)
+    ten.step(4.3e-4)  # ends between two samples, close to the contact
+    angle = ten.get("wheel_angle")
+    assert abs(angle) < 0.5
+    assert ten.get("moving") is True
+    ten.put(**inputs)
+    found = np.concatenate((ten.play(2), ten.play(1)))
+    np.testing.assert_allclose(found, np.tile(steady(TYPICAL, np.array([angle])), (30, 1)),
+                               atol=1e-11)  # fmt: skip
+    told = [ten.get(name) for name in ("moving", "omega", "wheel_angle", "frame_valid", "status")]
+    assert told == [False, 0.0, angle, True, why]
+    ten.put(Fz=np.nan)
+    ten.step()
+    assert (ten.get("frame_valid"), ten.get("status")) == (False, "out_of_range: Fz")
+    ten.put(**TYPICAL)
+    ten.play(60)
+    assert (ten.get("moving"), ten.get("status")) == (True, "ok")
+    felt = {**TYPICAL, "kappa": ten.get("kappa_relaxed")}
+    since = ten.get("omega") * 0.3 / RATE  # the last sample was 0.3 samples before the step's end
+    now = steady(felt, np.array([ten.get("wheel_angle") - since]))
+    np.testing.assert_allclose(ten.frame()[-1:], now, atol=1e-9)
+
+
+def test_a_wheel_that_stands_at_the_start_has_no_strain_yet_and_then_starts(ten: Host) -> None:
+    ten.start({**TYPICAL, "speed": 0.0})
+    ten.step()
+    assert [ten.get(n) for n in ("moving", "frame_valid", "status")] == [False, False, "standstill"]
+    ten.put(speed=20.0)
+    ten.step()
+    assert [ten.get(n) for n in ("moving", "frame_valid", "status")] == [True, True, "ok"]
+
+
+def test_a_state_of_a_standing_wheel_is_taken_up_bit_by_bit(ten: Host) -> None:
+    ten.start(noise_std=4e-6)
+    ten.play(47)
+    ten.put(speed=0.0)
+    ten.step()
+    state = ten.slave.getFMUState()
+    wanted = ten.play(3)
+    ten.start()
+    ten.slave.setFMUState(state)
+    ten.put(speed=0.0)
+    assert ten.play(3).tobytes() == wanted.tobytes()
+    ten.slave.freeFMUState(state)
 
 
 def test_slip_that_is_still_out_of_range_is_named_until_it_is_back(ten: Host) -> None:

@@ -17,7 +17,7 @@ from tirelib import __version__
 from tirelib.errors import FormatError
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration
-from tirelib.fmu.bundle import collect, content_hash, renamed, write_package
+from tirelib.fmu.bundle import collect, content_hash, write_package
 from tirelib.fmu.describe import described, repack
 from tirelib.fmu.spec import SlaveSpec
 
@@ -25,6 +25,20 @@ _NAMESPACE = UUID("5b1f6a2e-3c7d-5e84-9a10-7469726c6962")
 _OPTIONS = {"canGetAndSetFMUstate": True, "canSerializeFMUstate": True}
 _FOREIGN = re.compile(r"^(\s*(?:from|import)\s+)pythonfmu(?=[.\s])", re.MULTILINE)
 _MODULE = re.compile(r"^import (\S+\.pythonfmu)$", re.MULTILINE)
+_LAUNCHER = '''"""Finds the slave. pythonfmu 0.7.0 runs this file anew for every instance.
+
+Whatever class it finds among the names that are new, it never lets go, so there is none, and it
+looks for a name without letters in the module. It gives up a reference to the module's names that
+it never took; one more is taken here.
+"""
+
+import ctypes
+
+import {package}.{module} as slave
+
+globals().update(dict.fromkeys(("", "{model}"), slave.{model}))
+ctypes.pythonapi.Py_IncRef(ctypes.py_object(globals()))
+'''
 DEFAULT_RATE = 1e4
 
 
@@ -86,13 +100,12 @@ def export(spec: SlaveSpec, out: str | Path, progress: Callable[[str], None] | N
     target = Path(out)
     _check_writable(target)
     slave = source_file(spec.script)
-    text = slave.read_text(encoding="utf-8")
-    sources = collect(slave)
+    sources = {**collect(slave), slave.name: slave.read_text(encoding="utf-8")}
     settings = {**spec.settings, "description": spec.description, "step_size": spec.step_size}
     digest = content_hash(
         {
             **sources,
-            "slave": text,
+            "launcher": _LAUNCHER,
             "settings": json.dumps(settings),
             "pythonfmu": _pythonfmu(),
             **{f"resources/{k}": v.hex() for k, v in spec.resources.items()},
@@ -108,7 +121,8 @@ def export(spec: SlaveSpec, out: str | Path, progress: Callable[[str], None] | N
     with tempfile.TemporaryDirectory(prefix="tirelib_fmu_") as name:
         folder = Path(name)
         script = folder / f"{slave.stem}_{suffix}.py"
-        script.write_text(renamed(text, package), encoding="utf-8")
+        launcher = _LAUNCHER.format(package=package, module=slave.stem, model=spec.model)
+        script.write_text(launcher, encoding="utf-8")
         content = [write_package(folder, sources, package)]
         for path, data in {
             **spec.resources, "settings.json": json.dumps(settings, indent=1).encode()
@@ -120,7 +134,7 @@ def export(spec: SlaveSpec, out: str | Path, progress: Callable[[str], None] | N
             content += [top] if top not in content else []
         raw = _export(script, folder / "raw" / f"{spec.model}.fmu", content, suffix)
         tell("exported by pythonfmu")
-        files = _own_pythonfmu(_unzipped(raw), script.name, package)
+        files = _own_pythonfmu(_unzipped(raw), slave.name, package)
     files |= {
         "modelDescription.xml": described(files["modelDescription.xml"], spec.table),
         "model.png": spec.icon,
@@ -220,11 +234,11 @@ def _unzipped(raw: Path) -> dict[str, bytes]:
         return {name: archive.read(name) for name in archive.namelist() if name[-1] != "/"}
 
 
-def _own_pythonfmu(files: Mapping[str, bytes], script: str, package: str) -> dict[str, bytes]:
+def _own_pythonfmu(files: Mapping[str, bytes], slave: str, package: str) -> dict[str, bytes]:
     """Move pythonfmu's modules into the FMU's own package, where no other version can be met."""
     moved = {}
     for name, data in files.items():
-        if name == f"resources/{script}":
+        if name == f"resources/{package}/{slave}":
             text = _FOREIGN.sub(rf"\g<1>{package}.pythonfmu", data.decode())
             moved[name] = _MODULE.sub(r"import \1 as pythonfmu", text).encode()
         else:

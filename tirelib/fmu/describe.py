@@ -14,6 +14,7 @@ from tirelib.fmu.variables import Variable
 UNITS: Mapping[str, tuple[dict[str, str], dict[str, float]]] = {
     "1": ({}, {"ustrain": 1e6, "%": 1e2}),
     "N": ({"kg": "1", "m": "1", "s": "-2"}, {"kN": 1e-3}),
+    "N m": ({"kg": "1", "m": "2", "s": "-2"}, {"kN m": 1e-3}),
     "rad": ({"rad": "1"}, {"deg": 180.0 / math.pi}),
     "m": ({"m": "1"}, {"mm": 1e3}),
     "m/s": ({"m": "1", "s": "-1"}, {"km/h": 3.6}),
@@ -21,11 +22,14 @@ UNITS: Mapping[str, tuple[dict[str, str], dict[str, float]]] = {
     "rad/s": ({"rad": "1", "s": "-1"}, {"rpm": 30.0 / math.pi}),
     "s": ({"s": "1"}, {"ms": 1e3}),
     "Hz": ({"s": "-1"}, {"kHz": 1e-3}),
+    "1/s": ({"s": "-1"}, {"ustrain/s": 1e6}),
 }
 """Exponents of the base units, and factors of the display units, of every unit in use."""
 TYPES: Mapping[str, tuple[str, str | None, str]] = {
     "Strain": ("1", "ustrain", "strain, positive in tension"),
+    "StrainRate": ("1/s", "ustrain/s", "strain per time"),
     "Force": ("N", "kN", "force"),
+    "Moment": ("N m", "kN m", "moment"),
     "Angle": ("rad", "deg", "angle"),
     "Ratio": ("1", None, "number without unit"),
     "Length": ("m", "mm", "length"),

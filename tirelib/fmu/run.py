@@ -17,7 +17,7 @@ from tirelib.errors import CalibrationError, FormatError
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.chain import QUANTITIES
 from tirelib.features.extract import Features
-from tirelib.flags import flag_names
+from tirelib.flags import INVALIDATING, flag_names
 from tirelib.fmu.build import embedded_calibration
 from tirelib.observations import SET_POINTS, TRUTH, Observations, truth_of
 
@@ -291,13 +291,19 @@ def _estimates(rows: list[dict[str, Any]], calibration: Calibration) -> Estimate
         value={quantity: _column(rows, quantity) for quantity in QUANTITIES},
         std={quantity: _column(rows, f"{quantity}_std") for quantity in QUANTITIES},
         valid={quantity: told(f"{quantity}_valid") for quantity in QUANTITIES},
-        turn_valid=told("valid"),
+        turn_valid=np.array([_turn_valid(row) for row in rows], dtype=np.bool_),
         flags=_column(rows, "flags").astype(np.int64),
         notes=tuple(_notes(row) for row in rows),
         rolling=tuple(row["rolling"] for row in rows),
         radius=_column(rows, "rolling_radius"),
         contact_length=np.stack([_column(rows, f"contact_length_{g}") for g in gages], axis=1),
     )
+
+
+def _turn_valid(row: Mapping[str, Any]) -> bool:
+    """Tell what the batch calls valid: a turn with one gage out, or without a speed, may be."""
+    in_range = not any(note.endswith("_out_of_range") for note in _notes(row))
+    return not row["flags"] & int(INVALIDATING) and in_range
 
 
 def _notes(row: Mapping[str, Any]) -> tuple[str, ...]:

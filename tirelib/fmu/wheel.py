@@ -1,6 +1,7 @@
 """One wheel inside an FMU: parameters and frames in, the values of the output variables out."""
 
 import math
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +52,7 @@ class Wheel:
         self._estimator = StreamEstimator(calibration, rate)
         self.rate = float(rate)
         self.samples = samples
+        self._known_step = math.nan, 0  # a communication step [s] and its samples
         self._seen: tuple[int, bool] | None = None
         self._offset = 0.0  # time at which the estimator was started anew, after a fault
         self._turns = 0  # turns before that
@@ -66,6 +68,8 @@ class Wheel:
         StepError
             If it is no whole number, or more than the longest turn holds.
         """
+        if step == self._known_step[0]:
+            return self._known_step[1]
         exact = step * self.rate
         whole = round(exact) if math.isfinite(exact) else 0
         if whole < 1 or abs(exact - whole) > STEP_TOLERANCE:
@@ -74,6 +78,7 @@ class Wheel:
                 f"number of samples is needed; step by {self.samples / self.rate:g} s"
             )
         self._check_length(step)
+        self._known_step = step, whole
         return whole
 
     def _check_length(self, step: float) -> None:
@@ -116,10 +121,9 @@ class Wheel:
         """
         n = self.samples_in(step) if count is None else self._counted(step, count)
         if n:
-            strain = self._strain(frame, n, valid)
             speed, pressure, camber, omega = conditions
-            turns = self._estimator.push(
-                strain,
+            turns = self._estimator.take(
+                self._strain(frame, n, valid),
                 speed=speed if math.isfinite(speed) else math.nan,
                 pressure=pressure if math.isfinite(pressure) else math.nan,
                 camber=camber if math.isfinite(camber) else math.nan,
@@ -134,17 +138,14 @@ class Wheel:
         self._seen = now
         return changed
 
-    def _strain(self, frame: list[float], n: int, valid: bool) -> FloatArray:
-        """Return the next n samples, shape (n_gages, n); those that did not come are NaN."""
-        taken = min(n, self.samples) if valid else 0
-        rows: FloatArray = np.array(frame).reshape(self.samples, -1)[:taken].T
-        if self._mirrored:
-            rows = rows[self._order]
-        if taken == n:
-            return rows
-        strain = np.full((self._estimator.gages, n), np.nan)
-        strain[:, :taken] = rows
-        return strain
+    def _strain(self, frame: list[float], n: int, valid: bool) -> list[float]:
+        """Return the next n samples, one after the other; those that did not come are NaN."""
+        gages = self._estimator.gages
+        taken = frame[: n * gages] if valid else []
+        if self._mirrored and taken:
+            rows: FloatArray = np.array(taken).reshape(-1, gages)[:, self._order]
+            taken = rows.ravel().tolist()
+        return taken + [math.nan] * (n * gages - len(taken))
 
     def _counted(self, step: float, count: int) -> int:
         """Return how many samples are new in a buffered frame."""
@@ -239,6 +240,15 @@ class Wheel:
         self._held = None if held is None else (_unhex(held[0]), tuple(held[1]))
 
 
+@lru_cache(maxsize=4)
+def embedded_calibration(path: Path) -> Calibration:
+    """Return the calibration inside an FMU, which does not change while the FMU is loaded.
+
+    Read once for all instances and resets: reading takes as long as half a turn.
+    """
+    return read_calibration(path)
+
+
 def load_wheel(
     embedded: Path,
     override: str,
@@ -270,7 +280,7 @@ def load_wheel(
     ParameterError
         If a parameter is out of range.
     """
-    own = read_calibration(embedded)
+    own = embedded_calibration(embedded)
     calibration = read_calibration(override) if override else own
     where = f"StrainTire.fmu: {override or 'the embedded calibration'}"
     calibration.check_layout(tire or own.tire, own.lateral, where)

@@ -7,16 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.errors import FormatError, ParameterError
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.features.extract import Features, extract_features
 from tirelib.flags import TurnFlag
 from tirelib.signal.lowpass import LowPass
+from tirelib.signal.quality import UNUSABLE
 from tirelib.signal.turns import LONGEST_TURN, Turn, TurnCutter, stack_turns
+from tirelib.stream.backlog import Backlog
 from tirelib.stream.snapshot import from_plain, restore_cutter, snapshot_cutter, to_plain
 
-STATE_FORMAT = "tirelib-stream-state/2"
+STATE_FORMAT = "tirelib-stream-state/3"
 WATCHDOG_TURNS = 2.0
 """Turns after the middle of the last contact at which an estimate ceases to be valid."""
 STANDSTILL = 0.05
@@ -132,9 +134,11 @@ class StreamEstimator:
     def reset(self) -> None:
         """Forget everything but the calibration and the rate."""
         self._cutter = TurnCutter(self.calibration.lateral, self.rate, self._low_pass)
+        self._backlog = Backlog(self._cutter)
         self._count = 0
         self._turns = 0
         self._latest: TurnEstimate | None = None
+        self._complete = False  # no gage was out in the last turn, nor the speed
         self._deadline = LONGEST_TURN * self.rate
         self._standing = -1  # number of the last sample at which the wheel stood
         self._idle = 0.0  # time without samples since the last ones, [s]
@@ -167,14 +171,50 @@ class StreamEstimator:
         ShapeError
             If the frame has another number of gages.
         """
-        turns = self._cutter.push(
+        turns = self._caught_up()
+        turns += self._cutter.push(
             frame, speed=speed, pressure=pressure, camber=camber, trigger=trigger
         )
+        self._backlog.forget_range()
         self._watch(omega, frame.shape[1])
         if frame.shape[1]:
             self._idle = 0.0
         self._count += frame.shape[1]
         return [self._estimate(turn) for turn in turns] if turns else []
+
+    def take(
+        self,
+        samples: list[float],
+        *,
+        speed: float = math.nan,
+        pressure: float = math.nan,
+        camber: float = math.nan,
+        omega: float = math.nan,
+    ) -> list[TurnEstimate]:
+        """Do as `push`, for short frames of plain numbers; what cannot end a turn waits.
+
+        Parameters
+        ----------
+        samples : list of float
+            Raw strain, sample by sample, oldest first.
+        speed, pressure, camber, omega : float
+            As in `push`.
+        """
+        n = len(samples) // self.gages
+        standing = -STANDSTILL < omega < STANDSTILL
+        if not standing and self._backlog.keep(samples, n, (speed, pressure, camber)):
+            self._idle = 0.0
+            self._count += n
+            return []
+        frame: FloatArray = np.array(samples, dtype=np.float64).reshape(n, self.gages).T
+        return self.push(frame, speed=speed, pressure=pressure, camber=camber, omega=omega)
+
+    def _caught_up(self) -> list[Turn]:
+        """Give the cutter what waits; no turn ends in it."""
+        if not self._backlog.count:
+            return []
+        strain, (speed, pressure, camber) = self._backlog.drained()
+        return self._cutter.push(strain, speed=speed, pressure=pressure, camber=camber)
 
     def wait(self, time: float) -> None:
         """Let time [s] go by in which no samples came; they may still come later.
@@ -197,9 +237,20 @@ class StreamEstimator:
         self._turns += 1
         features = extract_features(stack_turns([turn], self._cutter.lateral, self.rate))
         self._latest = TurnEstimate(self._turns, features, self.calibration.estimate(features))
+        no_speed = bool(turn.flags & TurnFlag.NO_SPEED)
+        self._complete = not (no_speed or self._gage_out(turn.gage_flags))
         period = turn.period if math.isfinite(turn.period) else LONGEST_TURN / WATCHDOG_TURNS
         self._deadline = (turn.time + WATCHDOG_TURNS * period) * self.rate
         return self._latest
+
+    def _gage_out(self, flags: IntArray) -> bool:
+        """Tell whether a gage is missing, saturated or frozen; one without contact may be well."""
+        silent = (flags & int(TurnFlag.DEAD_GAGE)) != 0
+        if ((flags & int(UNUSABLE)) != 0)[~silent].any():
+            return True
+        with np.errstate(invalid="ignore"):
+            swing = np.ptp(self._cutter.needed()[: self.gages][silent], axis=1)
+        return not bool((np.isfinite(swing) & (swing > 0.0)).all())
 
     @property
     def latest(self) -> TurnEstimate | None:
@@ -244,8 +295,12 @@ class StreamEstimator:
 
     @property
     def valid(self) -> bool:
-        """Whether the last estimate may be used now."""
-        return self._latest is not None and self._latest.valid and not self.stale
+        """Whether all is well: every calibrated quantity may be used now, no gage or speed is out.
+
+        With one gage out, or without a speed, the quantities that `is_valid` names may still be
+        used. A gage whose strip does not touch the road, but lives, is not out.
+        """
+        return self._latest is not None and self._latest.valid and self._complete and not self.stale
 
     def is_valid(self, quantity: str) -> bool:
         """Tell whether a quantity of the last estimate may be used now."""
@@ -256,12 +311,14 @@ class StreamEstimator:
 
         An estimator of the same calibration and rate that restores it goes on exactly alike.
         """
+        self._caught_up()
         return {
             "format": STATE_FORMAT,
             "rate": self.rate,
             "lateral": list(self.calibration.lateral),
             "count": self._count,
             "turns": self._turns,
+            "complete": self._complete,
             "deadline": self._deadline,
             "standing": self._standing,
             "idle": self._idle.hex(),
@@ -292,5 +349,6 @@ class StreamEstimator:
         restore_cutter(self._cutter, state["cutter"])
         self._count, self._turns = state["count"], state["turns"]
         self._deadline, self._standing = state["deadline"], state["standing"]
+        self._complete = state["complete"]
         self._idle = float.fromhex(state["idle"])
         self._latest = from_plain(state["latest"])

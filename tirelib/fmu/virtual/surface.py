@@ -30,12 +30,12 @@ from tirelib.fmu.virtual.coordinates import (
     warped,
 )  # fmt: skip
 
-FORMAT = "tirelib-virtual-tire/1"
+FORMAT = "tirelib-virtual-tire/2"
 FORCES = ("Fx", "Fy", "Mz", "loaded_radius")
 """What is interpolated beside the strain."""
 _FORCE_MIRROR = np.array([1.0, -1.0, -1.0, 1.0])
-KERNEL: Final = "cubic"
-DEGREE: Final = 1
+KERNEL: Final = "quintic"
+DEGREE: Final = 2
 """Of `scipy.interpolate.RBFInterpolator`."""
 
 

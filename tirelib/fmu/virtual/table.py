@@ -36,7 +36,7 @@ def parameters(sample_rate: float) -> list[Variable]:
                  "magnitude of strain at which the amplifier ends; 0: none", 0.0, "1", "ustrain",
                  1e-2, 0.0, 1.0, type="Strain"),
         Variable("drift", "Real", "parameter", "strain per second that all gages run away", 0.0,
-                 None, None, 1e-6, -1.0, 1.0),
+                 "1/s", "ustrain/s", 1e-6, -1.0, 1.0, type="StrainRate"),
         Variable("dropped_frames", "Real", "parameter",
                  "probability that the frame of a step does not come", 0.0, "1", "%", 0.1, 0.0,
                  1.0, type="Ratio"),
@@ -99,7 +99,8 @@ def outputs(surface: Surface, samples: int) -> list[Variable]:
             for name, text in force.items()
         ),
         Variable("Mz_rig", "Real", "output",
-                 "aligning moment in N m, at the frame's last sample", NAN, None, None, 1e2),
+                 "aligning moment, at the frame's last sample", NAN, "N m", None, 1e2,
+                 type="Moment"),
         Variable("loaded_radius", "Real", "output", "distance of axle and road in the wheel plane",
                  NAN, "m", "mm", 0.3, type="Length"),
         Variable("rolling_radius", "Real", "output", "effective rolling radius R_e", NAN, "m",
@@ -108,6 +109,9 @@ def outputs(surface: Surface, samples: int) -> list[Variable]:
                  low=0, high=samples),
         Variable("frame_valid", "Boolean", "output",
                  "false: the frame is that of an earlier step, status says why", False),
+        Variable("moving", "Boolean", "output",
+                 "false: the wheel does not turn, the strain stays", False),
         Variable("status", "String", "output",
-                 "ok; out_of_range with the inputs; frame_dropped; names of faults", "not_started"),
+                 "ok; standstill; locked; out_of_range with the inputs; frame_dropped; names of "
+                 "faults", "not_started"),
     ]  # fmt: skip

@@ -1,0 +1,102 @@
+"""Law of samples that wait: they change nothing but the time at which they are looked at."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.fmu import live
+from tests.synthetic import frames as cut
+from tirelib.flags import TurnFlag
+from tirelib.signal.turns import TurnCutter
+from tirelib.stream import StreamEstimator
+from tirelib.stream.backlog import MOST, quiet_range
+
+TURN = int(2.0 * np.pi * live.RADIUS / live.SPEED * live.RATE)
+
+
+def spoilt(kind: str) -> np.ndarray:
+    """Five turns in which something happens."""
+    strain = live.strain_of(4e3, 0.05, turns=5.4)[0]
+    middle = slice(int(2.6 * TURN), int(2.8 * TURN))
+    if kind == "gap":
+        strain[:, int(2.7 * TURN) : int(2.7 * TURN) + 40] = np.nan
+    elif kind == "centre infinite":
+        strain[2, middle] = np.inf
+    elif kind == "jump":
+        strain[:, int(2.6 * TURN) :] *= 6.0
+    elif kind == "drift":
+        strain += np.linspace(0.0, 4e-3, strain.shape[1])
+    elif kind == "spikes":
+        strain[2, int(2.6 * TURN) :: 97] += 0.02
+    elif kind == "stop":
+        strain[:, int(2.7 * TURN) : int(4.0 * TURN)] = strain[:, int(2.7 * TURN)][:, None]
+    return strain
+
+
+def held(at: int) -> dict[str, Any]:
+    """Conditions that change now and then."""
+    return {"speed": live.SPEED + 0.01 * (at // 300), "pressure": live.PRESSURE,
+            "camber": 0.0 if at % 700 else 0.01}  # fmt: skip
+
+
+def told(estimator: StreamEstimator) -> Any:
+    return (estimator.turns, estimator.valid, estimator.flags, repr(estimator.age), estimator.time)
+
+
+KINDS = ["well", "gap", "centre infinite", "jump", "drift", "spikes", "stop"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@settings(max_examples=6)
+@given(longest=st.sampled_from([3, 17, 60, 700]), seed=st.integers(0, 99))
+def test_taken_samples_say_at_every_step_what_pushed_ones_do(
+    kind: str, longest: int, seed: int
+) -> None:
+    strain = spoilt(kind)
+    one, two = (StreamEstimator(live.calibration(), live.RATE) for _ in range(2))
+    for part in cut(strain.shape[1], longest, seed=seed):
+        conditions = held(part.start)
+        pushed = one.push(strain[:, part], **conditions)
+        taken = two.take(strain[:, part].T.ravel().tolist(), **conditions)
+        assert repr(taken) == repr(pushed)
+        assert told(two) == told(one)
+    assert json.dumps(two.state()) == json.dumps(one.state())
+
+
+def test_most_of_a_turn_waits_and_never_more_than_a_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    estimator = StreamEstimator(live.calibration(), live.RATE)
+    strain = live.strain_of(4e3, 0.05, turns=6.4)[0]
+    estimator.push(strain[:, : 2 * TURN], **held(0))
+    calls, honest = [], TurnCutter.push
+
+    def counted(self: TurnCutter, frame: np.ndarray, **options: Any) -> Any:
+        calls.append(frame.shape[1])
+        return honest(self, frame, **options)
+
+    monkeypatch.setattr(TurnCutter, "push", counted)
+    rest = strain[:, 2 * TURN : 2 * TURN + 4 * TURN // 10 * 10]
+    for first in range(0, rest.shape[1], 10):
+        estimator.take(rest[:, first : first + 10].T.ravel().tolist(), **held(0))
+    assert len(calls) < 0.35 * rest.shape[1] / 10
+    assert 100 < max(calls) <= MOST
+
+
+def test_a_standing_wheel_is_seen_at_once() -> None:
+    estimator = StreamEstimator(live.calibration(), live.RATE)
+    estimator.push(live.strain_of(4e3, 0.05, turns=3.0)[0], **held(1))
+    assert quiet_range(vars(estimator)["_cutter"]) is not None
+    assert estimator.valid
+    estimator.take([0.0] * 5, omega=0.0, **held(1))
+    assert not estimator.valid
+    assert estimator.flags & int(TurnFlag.NO_CONTACT)
+
+
+def test_before_the_first_contact_nothing_waits() -> None:
+    cutter = TurnCutter(live.calibration().lateral, live.RATE)
+    assert quiet_range(cutter) is None
+    cutter.push(np.zeros((5, 50)))
+    assert quiet_range(cutter) is None
