@@ -3,7 +3,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: all demo test lint types contracts docs bench rig figures fem proof hidden faults clean
+.PHONY: all demo test lint docs bench figures fem proof hidden cosim bench-demo faults endurance soak \
+	clean
 
 all: $(STAMP)
 
@@ -11,7 +12,7 @@ $(STAMP): pyproject.toml .ci/constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed")'
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --constraint .ci/constraints.txt --editable ".[fmu,bench,docs,dev]"
+	$(BIN)/python -m pip install --quiet --constraint .ci/constraints.txt --editable ".[fmu,bench,cosim,docs,dev]"
 	touch $@
 
 # The main job, end to end, on the numerical rig; ends by naming the files to open.
@@ -51,6 +52,22 @@ proof: $(STAMP)
 # Hides effects in the rig, lets the library find them, and counts; hours, but resumable and cached.
 hidden: $(STAMP)
 	$(BIN)/python build/hidden/run.py --golden
+
+# A vehicle on four virtual tires, told by four strain tires; exit code 1 while a figure is missed.
+cosim: $(STAMP)
+	$(BIN)/python build/cosim/run.py
+
+# The bench end to end: emulator, live page, recording, replay, campaign, comparison.
+bench-demo: $(STAMP)
+	$(BIN)/python build/bench_demo.py
+
+# Ten minutes live on each line, a hundred cables pulled, processes killed; half an hour.
+endurance: $(STAMP)
+	$(BIN)/python build/bench_endurance.py
+
+# A simulated day of one wheel, as fast as it goes; over an hour.
+soak: $(STAMP)
+	$(BIN)/python build/bench_soak.py
 
 # A million damaged frames on a serial line: none may pass, few good ones may be lost.
 faults: $(STAMP)

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
 DAYS = {"calibrated": (11, 5.1), "played": (12, 15.1)}
 """Campaign: the day (seed), and turns of the wheel in each run."""
-MODEL_ENDING = ".toml"
 ESTIMATES = ("library", "fmu", "live", "replay")
 LOOKED = 0.5
 """Share of the runs after which the picture of the live page is taken."""
@@ -178,31 +177,6 @@ def follow(run: "subprocess.Popen[bytes]", log: Path, say: object) -> None:
         time.sleep(0.2)
 
 
-def add_turn_rate(folder: Path, estimates: Path) -> None:
-    """Put the turn rate, which no rig told, into a campaign, as the estimates have it.
-
-    `tirelib compare` needs the turn rate of a run for the model's; a transmitter does not send it.
-    """
-    from dataclasses import replace
-
-    import numpy as np
-
-    from tirelib.campaign import read_campaign, write_campaign
-    from tirelib.report.agreement import by_run, read_turns
-
-    rates = {
-        number: [turn["omega_rad_s"] for turn in turns if turn["omega_rad_s"] is not None]
-        for number, turns in by_run(read_turns(estimates)).items()
-    }
-    campaign = read_campaign(folder)
-    runs = [
-        replace(run, rig={**run.rig, "omega": np.full(len(run.rig_time), np.mean(rates[n]))})
-        for run in campaign.runs()
-        if (n := run.plan.run) in rates and run.rig_time is not None
-    ]
-    write_campaign(folder, campaign.header, runs, overwrite=True)
-
-
 def use(steps: Steps, out: Path, fmu: Path, files: "LiveFiles", model: Path | str) -> None:
     """Replay and export the recording, and do with the campaign what one does with campaigns."""
     record, exported = out / "live.mcap", out / "exported"
@@ -211,8 +185,6 @@ def use(steps: Steps, out: Path, fmu: Path, files: "LiveFiles", model: Path | st
               program="tirebench")  # fmt: skip
     steps.run("Export it as a campaign (MDF4)", "export", record, "--out", exported,
               program="tirebench")  # fmt: skip
-    steps.run("Put the turn rate of the estimates into it", ROOT / "build/bench_demo.py",
-              "--turn-rate", exported, files.live, program="python")  # fmt: skip
     steps.run("Check the campaign", "campaign", "check", exported)
     steps.run("Estimate it with the library", "estimate", exported, "--calibration", calibration,
               "--json", files.direct)  # fmt: skip
@@ -272,12 +244,7 @@ def main(arguments: Sequence[str] | None = None, steps: Steps | None = None) -> 
     parser.add_argument("--pace", type=float, default=1.0, metavar="X", help="times real time")
     parser.add_argument("--no-browser", action="store_true", help="fetch the page, look not at it")
     parser.add_argument("--measure", nargs=2, metavar=("NAME", "DIR"), help=argparse.SUPPRESS)
-    parser.add_argument("--turn-rate", nargs=2, type=Path, metavar=("DIR", "LIVE.json"),
-                        help=argparse.SUPPRESS)  # fmt: skip
     given = parser.parse_args(arguments)
-    if given.turn_rate:
-        add_turn_rate(*given.turn_rate)
-        return
     if given.measure:
         measure(given.measure[0], Path(given.measure[1]).resolve())
         return

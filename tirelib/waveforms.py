@@ -178,10 +178,12 @@ def _measure(run: Run, header: CampaignHeader, low_pass: LowPass) -> _Row | str:
     scatter = float(np.sqrt(np.nanmean((stack - mean) ** 2) * count / max(count - 1, 1)))
     known = np.isfinite(turns.trace.axis_shift).sum()
     angle_std = float(np.mean(steps) / np.sqrt(12.0 * known)) if known else np.inf
+    conditions = {name: _condition(run, name) for name in CONDITIONS}
+    if not np.isfinite(conditions["omega"]):
+        conditions["omega"] = float(np.mean(steps)) * run.rate  # as the contacts follow each other
     return _Row(
-        run, mean, count, scatter if count > 1 else np.nan, angle_std,
-        {name: _condition(run, name) for name in CONDITIONS}, _extra(run),
-    )  # fmt: skip
+        run, mean, count, scatter if count > 1 else np.nan, angle_std, conditions, _extra(run)
+    )
 
 
 def _whole_turns(run: Run, turns: Turns, low_pass: LowPass) -> tuple[list[FloatArray], list[float]]:

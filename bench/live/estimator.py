@@ -110,7 +110,7 @@ class _Estimator:
         plan, fresh = self._plan, self._exchange.address.fresh[self._plan.slot]
         self._model = model
         self._estimation = WheelEstimation(model, plan.conditions, laps=plan.laps, turns=plan.turns)
-        while True:
+        while not orphaned():
             message = self._queue.read()
             if message is not None:
                 self._take(pickle.loads(message))
@@ -122,8 +122,6 @@ class _Estimator:
             else:
                 self._caught_up = self._caught_up or self._expected is not None
                 woken(fresh, LOOK)
-                if orphaned():
-                    return
 
     def _take(self, block: Block) -> None:
         content = block.content

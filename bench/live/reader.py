@@ -116,7 +116,7 @@ class _Reader:
     def run(self, link: Link) -> None:
         """Go on until the end of the link or of the run."""
         state, exchange = self._state, self._exchange
-        while not exchange.is_set(STOP):
+        while not exchange.is_set(STOP) and not orphaned():
             try:
                 read = link.receive(Deadline.after(WAIT))
             except UnpluggedError as error:
@@ -129,8 +129,6 @@ class _Reader:
             if read.data or read.event:
                 self._look(link)
                 self.take(read)
-            elif orphaned():
-                return
 
     def take(self, read: Read) -> None:
         """Hand a read to the recorder, decode it, and hand its samples to the estimators."""

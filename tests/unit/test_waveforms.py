@@ -1,5 +1,6 @@
 """Run mean waveforms of a campaign equal the closed form that made it."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -55,6 +56,15 @@ def test_the_angle_comes_from_the_trigger(waves: Waveforms) -> None:
         assert abs(shifts[int(np.argmin(errors))]) <= 0.004
     assert (waves.angle_std > 0).all()
     assert (waves.angle_std < 2e-3).all()
+
+
+def test_a_turn_rate_that_no_rig_tells_is_that_of_the_contacts(tmp_path: Path) -> None:
+    run = synthetic_run(0, load=4000.0)
+    assert run.rig is not None
+    told = float(np.mean(run.rig["omega"]))
+    silent = replace(run, rig={k: v for k, v in run.rig.items() if k != "omega"})
+    found = measure_waveforms(read_campaign(write(tmp_path / "w", [silent])))
+    assert found.conditions["omega"] == pytest.approx([told], rel=1e-3)
 
 
 def test_equal_set_points_are_a_group(waves: Waveforms) -> None:

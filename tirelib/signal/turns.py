@@ -236,7 +236,8 @@ class TurnCutter:
         conditions, _ = self._mean(
             slice(self._gages, self._gages + len(_HELD)), before.middle, contact.middle
         )
-        speed, pressure, camber = (float(value) for value in conditions)
+        speed, pressure, _ = (float(value) for value in conditions)
+        camber = self._in_contact(self._gages + _HELD.index("camber"), contact)
         if not np.isfinite(speed) or speed == 0.0:
             flags |= TurnFlag.NO_SPEED
             speed = np.nan  # a wheel that turns does not stand
@@ -302,6 +303,11 @@ class TurnCutter:
         for row in np.flatnonzero(~gap):
             middle[row] = average(part[row, good[row]])
         return middle, gap
+
+    def _in_contact(self, row: int, contact: Contact) -> float:
+        """Return the mean of a buffer row while the gages are in contact, where it acts."""
+        mean, _ = self._mean(slice(row, row + 1), contact.rise, contact.fall + 1.0)
+        return float(mean[0])
 
     def _trigger(self, start: float, stop: float, step: float) -> tuple[float, bool]:
         """Wheel angle of the contact's middle from the trigger, and whether it came just once."""

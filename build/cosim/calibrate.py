@@ -1,0 +1,119 @@
+"""Calibrate the strain tire on the numerical rig, over what a car's wheels do; an hour.
+
+    python build/cosim/calibrate.py                   # writes build/cosim/calibration.toml
+
+Two plans. One fills the range that the manoeuvres reach: a camber that follows the slip angle as on
+a car that leans outwards, no driving beyond a little, slip angle and slip ratio at once only inside
+an ellipse. The other rolls straight, free and braking, as wheels do most of the time. The rig
+solves its own tire; neither the response surface of the virtual tire nor any manoeuvre is known
+here. A campaign that is there is used again.
+"""
+
+import argparse
+import itertools
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import qmc
+
+from bench.rig.campaign import TRUTH_FILE, run_plan
+from bench.rig.plans import Plan
+from bench.rig.tire import Condition, tire
+from tirelib.arrays import FloatArray
+from tirelib.cli.common import progress_bar
+
+CALIBRATION = Path(__file__).with_name("calibration.toml")
+"""The calibration of the co-simulations."""
+POINTS, SEED = 150, 3
+LOAD = (900.0, 7400.0)
+ALPHA, KAPPA, CAMBER = float(np.radians(5.8)), 0.07, float(np.radians(3.7))
+"""Largest slip angle [rad], braking slip ratio [1] and camber [rad]."""
+DRIVING = 0.015
+SPEED = (8.0, 30.0)
+PRESSURE = 2.3e5
+FREE, STRAIGHT = 0.35, 0.2
+"""Shares of free rolling and of straight braking."""
+LOADS_FREE = (1200.0, 2000.0, 2900.0, 3600.0, 4300.0, 5200.0, 6300.0)
+LOADS_BRAKING = (1600.0, 2500.0, 3400.0, 4300.0, 5300.0)
+BRAKING = (0.008, 0.016, 0.026, 0.04)
+
+
+def design(n: int = POINTS) -> FloatArray:
+    """Return n conditions, shape (n, 5): load, slip angle, slip ratio, camber, speed; SI.
+
+    The slip ratio here is along the wheel's plane: 0 rolls freely at any slip angle.
+    """
+    u = qmc.Sobol(6, seed=SEED).random(2048)
+    s = 2.0 * u - 1.0
+    load = (LOAD[0] ** 0.5 + (LOAD[1] ** 0.5 - LOAD[0] ** 0.5) * u[:, 0]) ** 2
+    alpha = ALPHA * np.sign(s[:, 1]) * np.abs(s[:, 1]) ** 1.7
+    brakes = np.clip(1.0 - u[:, 2] / 0.85, 0.0, 1.0)
+    kappa = np.where(u[:, 2] < 0.85, -KAPPA * brakes**1.5, DRIVING * (u[:, 2] - 0.85) / 0.15)
+    straight = u[:, 5] > 1.0 - STRAIGHT
+    kappa[u[:, 5] < FREE] = 0.0
+    alpha[straight] *= 0.05
+    lean = np.minimum(1.0, 0.25 + np.abs(alpha) / np.radians(1.0))
+    camber = CAMBER * s[:, 3]
+    camber = np.where(straight, 0.4 * camber, -np.sign(alpha) * np.abs(camber) * lean)
+    speed = SPEED[0] + (SPEED[1] - SPEED[0]) * u[:, 4]
+    table: FloatArray = np.stack((load, alpha, kappa, camber, speed), axis=1)
+    return table[(alpha / ALPHA) ** 2 + (kappa / KAPPA) ** 2 < 1.0][:n]
+
+
+def straight_ahead() -> FloatArray:
+    """Return conditions as `design` does: loads, rolling freely at two speeds, and braking."""
+    free = [(load, 0.0, 0.0, 0.0, v) for load, v in itertools.product(LOADS_FREE, (12.0, 22.0))]
+    braking = [
+        (load, 0.0, -slip, 0.0, 18.0)
+        for load, slip in itertools.product(LOADS_BRAKING, BRAKING)
+    ]  # fmt: skip
+    return np.array([*free, *braking])
+
+
+def plans(points: int = POINTS) -> dict[str, tuple[Plan, int]]:
+    """Return the plans as the rig takes them, with their days, by folder."""
+
+    def conditions(table: FloatArray) -> tuple[Condition, ...]:
+        return tuple(
+            Condition(load, PRESSURE, speed, alpha, camber, kappa if kappa else None)
+            for load, alpha, kappa, camber, speed in table.tolist()
+        )
+
+    return {
+        "campaign": (Plan("vehicle", "what the wheels of a car do", conditions(design(points))), 7),
+        "straight": (Plan("straight", "free and braking", conditions(straight_ahead())), 8),
+    }
+
+
+def main() -> None:
+    """Measure the plans on the rig and calibrate."""
+    root = Path(__file__).parents[2]
+    parser = argparse.ArgumentParser(
+        description="Calibrate the strain tire on the numerical rig for the co-simulations."
+    )
+    parser.add_argument("--points", type=int, default=POINTS)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--out", type=Path, default=CALIBRATION, metavar="CAL.toml")
+    parser.add_argument(
+        "--data", type=Path, default=root / "build/out/cosim", metavar="DIR",
+        help="where the rig's measurements go",
+    )  # fmt: skip
+    given = parser.parse_args()
+    folders = []
+    for name, (plan, day) in plans(given.points).items():
+        folders.append(str(given.data / name))
+        if (given.data / name / TRUTH_FILE).exists():  # the rig writes it last
+            continue
+        with progress_bar(f"measuring {name}", len(plan.conditions)) as advance:
+            run_plan(
+                plan, tire("reference"), given.data / name, seed=day, jobs=given.jobs,
+                overwrite=True, progress=lambda *_, say=advance: say(""),
+            )  # fmt: skip
+    command = [str(Path(sys.executable).with_name("tirelib")), "calibrate", *folders]
+    sys.exit(subprocess.run([*command, "--out", str(given.out)], check=False).returncode)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,184 @@
+"""Co-simulations of a third-party vehicle with four virtual and four strain tires: ``make cosim``.
+
+A multi-body vehicle drives; four ``VirtualTire.fmu`` turn its wheels' states into strain, four
+``StrainTire.fmu`` turn the strain into estimates, which are held against the truth. The same
+tires then close a loop: a slip controller brakes with what they tell. Everything lands in
+``build/out/cosim``.
+"""
+
+import argparse
+import json
+import math
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from datetime import UTC, datetime
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from rich.console import Console
+
+from cosim import closed_loop, closed_loop_report
+from cosim.calibrate import CALIBRATION
+from cosim.drill import drill
+from cosim.manoeuvres import MANOEUVRES
+from cosim.recording import STEP, VEHICLE, Recording, build_fmus, record
+from cosim.score import LIMITS, score, turns_of
+from cosim.wheels import WHEELS, FourWheels
+from tirelib import __version__
+from tirelib.cli.common import progress_bar
+from tirelib.report.cosim import Series, write_cosim
+
+ROOT = Path(__file__).parents[2]
+DRILL, BRAKING = "range", "closed_loop"
+OTHERS = {DRILL: 4.0, BRAKING: 20.0}
+"""As long as a manoeuvre of so many seconds."""
+EVERY = 10
+"""The page shows every so many steps of the truth."""
+_EXAMPLES = """examples:
+  python build/cosim/run.py                                  # all, build/out/cosim/index.html
+  python build/cosim/run.py step_steer slalom --jobs 1       # two of them, nothing else
+  python build/cosim/run.py --json build/out/cosim/cosim.json --calibration cal.toml
+
+exit code: 0 all figures reached, 1 some are not, 2 wrong arguments"""
+
+
+Fmus = tuple[Path, Path]
+
+
+def work(name: str, fmus: Fmus) -> tuple[str, Any]:
+    """Do one part in a process of its own: a manoeuvre, the drill or the closed loop."""
+    if name == BRAKING:
+        return name, closed_loop.study(*fmus, closed_loop.ROADS[:1])
+    with FourWheels(*fmus) as wheels:
+        if name == DRILL:
+            return name, drill(wheels)
+        recording = record(MANOEUVRES[name], wheels)
+        return name, (score(recording), series(recording))
+
+
+def series(recording: Recording) -> Series:
+    """Return what the page draws of a recording."""
+    rows = slice(None, None, EVERY)
+    truth = {name: recording.truth[name][rows] for name in ("Fz", "alpha", "kappa")}
+    turns = [turns_of(recording, wheel) for wheel in range(len(WHEELS))]
+    return Series(
+        name=recording.name,
+        about=MANOEUVRES[recording.name].about,
+        time=recording.time[rows],
+        truth=truth | {"Fy": recording.told["tire_fy"][rows]},
+        contact=[t.contact for t in turns],
+        told=[t.told for t in turns],
+        valid=[t.valid for t in turns],
+        steady=[t.steady for t in turns],
+    )
+
+
+def reached(scores: Sequence[dict[str, Any]], checks: Sequence[dict[str, Any]]) -> list[str]:
+    """Return in words which figures are not reached."""
+    missed = []
+    for one in scores:
+        whole = one["all"]
+        for name, limit in LIMITS.items():
+            error = whole["steady"][name]
+            if math.isfinite(error) and error > limit:
+                missed.append(f"{one['name']}: {name} {error:.3g} > {limit:g}")
+        if whole["false_alarms"] > 0.01:
+            missed.append(f"{one['name']}: false alarms {100 * whole['false_alarms']:.1f} % > 1 %")
+        if whole["missed_s"] > 0.0:
+            missed.append(f"{one['name']}: valid {whole['missed_s']:.3f} s out of range")
+        if whole["over_deg"] > 0.0:
+            missed.append(f"{one['name']}: output {whole['over_deg']:.2f} deg too late")
+    missed += [f"range: {check['case']}" for check in checks if not check["passed"]]
+    return missed
+
+
+def run(parts: Mapping[str, Fmus], jobs: int) -> dict[str, Any]:
+    """Run parts, each with its FMUs; return what each found."""
+    found: dict[str, Any] = {}
+    names = sorted(parts, key=_length, reverse=True)
+    pool = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"))
+    with progress_bar("co-simulation", len(names)) as advance, pool:
+        for job in as_completed([pool.submit(work, name, parts[name]) for name in names]):
+            name, result = job.result()
+            found[name] = result
+            advance(name)
+    return found
+
+
+def _length(name: str) -> float:
+    return MANOEUVRES[name].duration if name in MANOEUVRES else OTHERS[name]
+
+
+def main() -> None:
+    """Run the co-simulations and write the page."""
+    parser = argparse.ArgumentParser(
+        description="Vehicle co-simulations: estimated against true wheel quantities.",
+        epilog=_EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    parser.add_argument(
+        "manoeuvres", nargs="*", metavar="MANOEUVRE", help=f"of {', '.join(MANOEUVRES)}"
+    )
+    parser.add_argument("--calibration", type=Path, default=CALIBRATION, metavar="CAL.toml")
+    parser.add_argument("--out", type=Path, default=ROOT / "build/out/cosim", metavar="DIR")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures as JSON too")
+    parser.add_argument("--jobs", type=int, default=2, metavar="N", help="processes")
+    given = parser.parse_args()
+    unknown = [name for name in given.manoeuvres if name not in MANOEUVRES]
+    if unknown or given.jobs < 1 or not given.calibration.is_file():
+        parser.error(
+            f"manoeuvres {', '.join(unknown) or 'are fine'}, jobs = {given.jobs}, calibration "
+            f"{given.calibration}; allowed are {', '.join(MANOEUVRES)}, 1 or more, a file made by "
+            "build/cosim/calibrate.py or `tirelib calibrate`"
+        )
+    console, began = Console(), time.monotonic()
+    names = given.manoeuvres or list(MANOEUVRES)
+    given.out.mkdir(parents=True, exist_ok=True)
+    fmus = build_fmus(given.out, given.calibration)
+    parts = dict.fromkeys([*names, DRILL], fmus)
+    if not given.manoeuvres:
+        parts[BRAKING] = build_fmus(given.out / BRAKING, given.calibration, closed_loop.STEP)
+    found = run(parts, given.jobs)
+    scores, checks = [found[name][0] for name in names], found[DRILL]
+    missed = reached(scores, checks)
+    study = found.get(BRAKING)
+    document = {
+        "format": "tirelib-cosim/1",
+        "tirelib": __version__,
+        "date": datetime.now(UTC).date().isoformat(),
+        "vehicle": f"CommonRoad multi-body, parameter set {VEHICLE}",
+        "step_s": STEP,
+        "calibration": given.calibration.name,
+        "limits": dict(LIMITS),
+        "missed": missed,
+        "manoeuvres": scores,
+        "range": checks,
+        "closed_loop": study.document() if study else None,
+    }
+    more = closed_loop_report.parts(study) if study else []
+    page = write_cosim(document, [found[name][1] for name in names], given.out, more)
+    if given.json:
+        given.json.parent.mkdir(parents=True, exist_ok=True)
+        given.json.write_text(json.dumps(_plain(document), indent=1) + "\n", encoding="utf-8")
+    for text in missed:
+        console.print(f"not reached  {text}", style="red", highlight=False, soft_wrap=True)
+    said = f"{len(names)} manoeuvres in {time.monotonic() - began:.0f} s"
+    console.print(f"{said}; open {page}", highlight=False, soft_wrap=True)
+    sys.exit(1 if missed else 0)
+
+
+def _plain(value: Any) -> Any:
+    """Return the same with null for what is no number, as JSON wants it."""
+    if isinstance(value, dict):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [_plain(entry) for entry in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+if __name__ == "__main__":
+    main()

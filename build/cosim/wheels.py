@@ -1,0 +1,320 @@
+"""Four wheels of a vehicle: true wheel states in, what four strain tires say out.
+
+Each wheel is one ``VirtualTire.fmu`` (state to strain frames) and one ``StrainTire.fmu`` (frames to
+estimates), stepped by FMPy. The vehicle is anything that can fill a `WheelStates`::
+
+    with FourWheels(virtual, strain) as wheels:
+        wheels.start(truth)                      # state at time zero; the gages begin to turn
+        for k in range(n):
+            told = wheels.step(k * h, h, truth)  # truth holds over (t, t + h]; told is at t + h
+"""
+
+from collections.abc import Sequence
+from ctypes import c_double, c_uint32
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from shutil import rmtree
+from typing import Any
+
+import numpy as np
+from fmpy import extract, read_model_description
+from fmpy.fmi2 import FMU2Slave
+
+from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.errors import ParameterError
+from tirelib.estimators.chain import QUANTITIES
+from tirelib.fmu.run import LoadedFmu
+from tirelib.fmu.virtual.coordinates import INPUTS
+
+WHEELS = ("FL", "FR", "RL", "RR")
+"""Order of the wheels in every array: front left, front right, rear left, rear right."""
+PRESSURE = 2.3e5
+"""Inflation pressure where a vehicle has none [Pa]."""
+_SHOWN = ("omega", "wheel_angle", "alpha_relaxed", "kappa_relaxed", "Fx_rig", "Fy_rig",
+          "rolling_radius")  # fmt: skip
+_REALS = (*QUANTITIES, *(f"{q}_std" for q in QUANTITIES), "turn_rate", "contact_time")
+_VALID = ("valid", *(f"{q}_valid" for q in QUANTITIES))
+
+
+def _nan() -> FloatArray:
+    return np.full(len(WHEELS), np.nan)
+
+
+@dataclass(frozen=True, slots=True)
+class WheelStates:
+    """True states of the four wheels, arrays of shape (4,) in the order of `WHEELS`; SI, ISO 8855.
+
+    Attributes
+    ----------
+    load : array, [N]
+        Vertical load Fz, positive.
+    alpha : array, [rad]
+        Slip angle: atan(v_y / v_x) in the wheel's axes, y to the left; positive gives negative Fy.
+    kappa : array, [1]
+        (Omega R_e - v) / v with v the travel speed of the contact point (not its component in the
+        wheel's plane: free rolling at a slip angle has cos(alpha) - 1); braking < 0.
+    camber : array, [rad]
+        Top of the wheel to the right: positive, on both sides of the vehicle.
+    speed : array, [m/s]
+        Travel speed v of each contact point.
+    pressure : array, [Pa]
+        Inflation pressure (gauge).
+    omega : array, [rad/s]
+        Turn rate that a wheel speed sensor measures; only the estimators' watchdog reads it. NaN:
+        there is none.
+    """
+
+    load: FloatArray
+    alpha: FloatArray
+    kappa: FloatArray
+    camber: FloatArray
+    speed: FloatArray
+    pressure: FloatArray = field(default_factory=lambda: np.full(len(WHEELS), PRESSURE))
+    omega: FloatArray = field(default_factory=_nan)
+
+    def rows(self) -> FloatArray:
+        """Return the inputs of the virtual tires, shape (4, 6), in the order of `INPUTS`."""
+        return np.stack(
+            (self.load, self.alpha, self.kappa, self.camber, self.speed, self.pressure), axis=1
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Estimates:
+    """What the strain tires say at the end of a step, arrays of shape (4,); SI, ISO 8855.
+
+    Values are those of the last completed turn; NaN before the first.
+
+    Attributes
+    ----------
+    Fz, alpha, kappa, Fy : array, [N], [rad], [1], [N]
+    Fz_std, alpha_std, kappa_std, Fy_std : array
+    turn_rate : array, [rad/s]
+        Of the turn before the contact, from the strain alone.
+    contact_time : array, [s]
+        Middle of the contact that the estimate is of, on the vehicle's clock.
+    valid, Fz_valid, alpha_valid, kappa_valid, Fy_valid : bool array
+        Whether the estimate may be used now.
+    turn : int array
+        Contacts so far: it counts up when an estimate is new.
+    flags : int array
+        `tirelib.flags.TurnFlag` bits.
+    tire_omega, tire_angle : array, [rad/s], [rad]
+        Turn rate and angle of the gages of the virtual tire (0: over the road).
+    tire_alpha, tire_kappa : array, [rad], [1]
+        Slip that the virtual tire feels, after relaxation.
+    tire_fx, tire_fy : array, [N]
+        Forces of the tire whose strain is estimated from: the truth for `Fy`.
+    tire_radius : array, [m]
+        Its effective rolling radius.
+    tire_valid : bool array
+        False: the state is outside the virtual tire's range, no frame came.
+    """
+
+    Fz: FloatArray = field(default_factory=_nan)
+    alpha: FloatArray = field(default_factory=_nan)
+    kappa: FloatArray = field(default_factory=_nan)
+    Fy: FloatArray = field(default_factory=_nan)
+    Fz_std: FloatArray = field(default_factory=_nan)
+    alpha_std: FloatArray = field(default_factory=_nan)
+    kappa_std: FloatArray = field(default_factory=_nan)
+    Fy_std: FloatArray = field(default_factory=_nan)
+    turn_rate: FloatArray = field(default_factory=_nan)
+    contact_time: FloatArray = field(default_factory=_nan)
+    valid: BoolArray = field(default_factory=lambda: np.zeros(len(WHEELS), dtype=np.bool_))
+    Fz_valid: BoolArray = field(default_factory=lambda: np.zeros(len(WHEELS), dtype=np.bool_))
+    alpha_valid: BoolArray = field(default_factory=lambda: np.zeros(len(WHEELS), dtype=np.bool_))
+    kappa_valid: BoolArray = field(default_factory=lambda: np.zeros(len(WHEELS), dtype=np.bool_))
+    Fy_valid: BoolArray = field(default_factory=lambda: np.zeros(len(WHEELS), dtype=np.bool_))
+    turn: IntArray = field(default_factory=lambda: np.zeros(len(WHEELS), dtype=np.int64))
+    flags: IntArray = field(default_factory=lambda: np.zeros(len(WHEELS), dtype=np.int64))
+    tire_omega: FloatArray = field(default_factory=_nan)
+    tire_angle: FloatArray = field(default_factory=_nan)
+    tire_alpha: FloatArray = field(default_factory=_nan)
+    tire_kappa: FloatArray = field(default_factory=_nan)
+    tire_fx: FloatArray = field(default_factory=_nan)
+    tire_fy: FloatArray = field(default_factory=_nan)
+    tire_radius: FloatArray = field(default_factory=_nan)
+    tire_valid: BoolArray = field(default_factory=lambda: np.zeros(len(WHEELS), dtype=np.bool_))
+
+
+NAMES = tuple(entry.name for entry in fields(Estimates))
+"""Names of everything that the wheels say."""
+
+
+class VirtualTire:
+    """One instance of ``VirtualTire.fmu`` in FMPy; close it when done.
+
+    Parameters
+    ----------
+    path : path
+    name : str
+        Of the instance.
+    """
+
+    def __init__(self, path: Path, name: str) -> None:
+        description = read_model_description(str(path))
+        self._at = {v.name: v.valueReference for v in description.modelVariables}
+        strains = [reference for name, reference in self._at.items() if name[:7] == "strain_"]
+        wanted = [*strains, *(self._at[name] for name in _SHOWN)]
+        self._n = len(strains)
+        self._folder = extract(str(path))
+        self.slave: Any = FMU2Slave(
+            guid=description.guid, unzipDirectory=self._folder, instanceName=name,
+            modelIdentifier=description.coSimulation.modelIdentifier,
+        )  # fmt: skip
+        self.slave.instantiate()
+        self._wanted = (c_uint32 * len(wanted))(*wanted)
+        self._values = (c_double * len(wanted))()
+        self._inputs = (c_uint32 * len(INPUTS))(*(self._at[name] for name in INPUTS))
+        self._given = (c_double * len(INPUTS))()
+
+    def close(self) -> None:
+        """Free the instance and the files that were unpacked."""
+        self.slave.freeInstance()
+        rmtree(self._folder, ignore_errors=True)
+
+    def start(self, state: FloatArray, parameters: dict[str, float]) -> None:
+        """Initialise with the first state, shape (6,), in the order of `INPUTS`."""
+        slave = self.slave
+        slave.reset()
+        slave.setupExperiment(startTime=0.0)
+        for name, value in parameters.items():
+            setter = slave.setInteger if isinstance(value, int) else slave.setReal
+            setter([self._at[name]], [value])
+        self._put(state)
+        slave.enterInitializationMode()
+        slave.exitInitializationMode()
+
+    def _put(self, state: FloatArray) -> None:
+        self._given[:] = state.tolist()
+        self.slave.fmi2SetReal(self.slave.component, self._inputs, len(INPUTS), self._given)
+
+    def step(self, time: float, step: float, state: FloatArray) -> tuple[FloatArray, list[float]]:
+        """Step with a state and return the frame, shape (samples, g), and `_SHOWN`."""
+        self._put(state)
+        self.slave.doStep(time, step)
+        self.slave.fmi2GetReal(self.slave.component, self._wanted, len(self._wanted), self._values)
+        found = np.array(self._values)
+        return found[: self._n].reshape(-1, 5), found[self._n :].tolist()
+
+    def frame(self) -> tuple[int, bool]:
+        """Return how many samples of the frame are new, and whether it may be used."""
+        n = self.slave.getInteger([self._at["samples"]])[0]
+        return n, bool(self.slave.getBoolean([self._at["frame_valid"]])[0])
+
+
+class FourWheels:
+    """Four virtual tires and four strain tires; use it in a ``with`` block.
+
+    Parameters
+    ----------
+    virtual, strain : path
+        The FMUs, with the same samples per step and sample rate; one file serves all wheels.
+    rate : float, [Hz]
+        Sample rate of the gages.
+    noise : float
+        Standard deviation of the gages' noise, as strain.
+    seed : int
+        Of noise; the wheels get seed .. seed + 3.
+    start_angles : sequence of 4 floats, [rad]
+        Where the gages of each wheel stand at time zero: contacts of the wheels are not in step.
+    parameters : dict, optional
+        Further parameters of all virtual tires, for example ``relaxation_length``.
+    """
+
+    def __init__(
+        self,
+        virtual: Path,
+        strain: Path,
+        *,
+        rate: float = 1e4,
+        noise: float = 4e-6,
+        seed: int = 1,
+        start_angles: Sequence[float] = (-3.1, -1.6, 0.6, 2.2),
+        parameters: dict[str, float] | None = None,
+    ) -> None:
+        self.rate = rate
+        self._options = [
+            {"sample_rate": rate, "noise_std": noise, "seed": seed + at, "start_angle": angle,
+             **(parameters or {})}
+            for at, angle in enumerate(start_angles)
+        ]  # fmt: skip
+        self.tires = [VirtualTire(virtual, f"tire_{name}") for name in WHEELS]
+        self.estimators = [LoadedFmu(strain, name=f"wheel_{name}") for name in WHEELS]
+        self.samples = self.estimators[0].samples
+
+    def __enter__(self) -> "FourWheels":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free all instances."""
+        for tire, estimator in zip(self.tires, self.estimators, strict=True):
+            tire.close()
+            estimator.close()
+
+    def start(self, truth: WheelStates) -> None:
+        """Begin at time zero with settled slip; whatever was before is forgotten."""
+        for tire, options, state in zip(self.tires, self._options, truth.rows(), strict=True):
+            tire.start(state, options)
+        for estimator in self.estimators:
+            estimator.start(self.rate)
+        self._fresh = [True] * len(WHEELS)
+        self.told = Estimates()
+
+    def step(self, time: float, step: float, truth: WheelStates) -> Estimates:
+        """Go on from `time` [s] by `step` [s] with states that hold over it.
+
+        Raises
+        ------
+        ParameterError
+            If the step is no whole number of samples, or longer than a frame.
+        """
+        n = round(step * self.rate)
+        if not 1 <= n <= self.samples or abs(n - step * self.rate) > 1e-6:
+            raise ParameterError(
+                f"step = {step} s is {step * self.rate:g} samples; allowed are 1 .. {self.samples} "
+                f"whole samples at {self.rate:g} Hz; step by {self.samples / self.rate:g} s"
+            )
+        parts: dict[str, Any] = {
+            entry.name: getattr(self.told, entry.name).copy() for entry in fields(Estimates)
+        }
+        for wheel, state in enumerate(truth.rows()):
+            frame, shown = self.tires[wheel].step(time, step, state)
+            new, good = self.tires[wheel].frame()
+            for name, value in zip(_TIRE, shown, strict=True):
+                parts[name][wheel] = value
+            parts["tire_valid"][wheel] = good
+            self._estimate(wheel, frame[:new], good, state, truth.omega[wheel], parts)
+        self.told = Estimates(**parts)
+        return self.told
+
+    def _estimate(
+        self, wheel: int, frame: FloatArray, good: bool, state: FloatArray, omega: float,
+        parts: dict[str, Any],
+    ) -> None:  # fmt: skip
+        """Give a frame to the strain tire of a wheel, and note what it says."""
+        fmu = self.estimators[wheel]
+        at, slave = fmu.references, fmu.slave
+        if good != self._fresh[wheel]:
+            slave.setBoolean([at["frame_valid"]], [good])
+            self._fresh[wheel] = good
+        if np.isfinite(omega):
+            slave.setReal([at["omega"]], [omega])
+        fmu.step(frame.T, np.array([state[4], state[5], state[3]]))
+        turn, flags = slave.getInteger([at["turn"], at["flags"]])
+        valid = slave.getBoolean([at[name] for name in _VALID])
+        for name, value in zip(_VALID, valid, strict=True):
+            parts[name][wheel] = bool(value)
+        if turn != parts["turn"][wheel]:
+            for name, value in zip(_REALS, fmu.reals(*_REALS), strict=True):
+                parts[name][wheel] = value
+            parts["contact_time"][wheel] += 1.0 / fmu.rate  # its first sample is not at zero
+        parts["turn"][wheel], parts["flags"][wheel] = turn, flags
+
+
+_TIRE = ("tire_omega", "tire_angle", "tire_alpha", "tire_kappa", "tire_fx", "tire_fy",
+         "tire_radius")  # fmt: skip
