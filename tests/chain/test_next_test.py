@@ -126,7 +126,6 @@ def test_where_nothing_is_in_doubt_the_list_is_empty_and_the_exit_code_zero(
 
 def test_bad_input_is_told(model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = ("next-test", "x", "--model", model)
-    assert "strain only" in refused(*run, "--quantity", "Fy", "--suspects", "low_pass")
     assert "both given" in refused(*run, "--suspects", "low_pass", "--diagnosis", "D.json")
     assert "'lowpass' is not known" in refused(*run, "--suspects", "lowpass")
     assert "load 7000 to 2000" in refused(
@@ -139,7 +138,9 @@ def test_bad_input_is_told(model: Path, tmp_path: Path, monkeypatch: pytest.Monk
     other = diagnosis(tmp_path, has=["camber"])
     assert "diagnose this model" in refused(*run, "--diagnosis", other)
     force = diagnosis(tmp_path, quantity="Fy")
-    assert "strain only" in refused(*run, "--diagnosis", force)
+    assert "is a diagnosis of Fy, and strain is planned" in refused(*run, "--diagnosis", force)
+    sideways = (*run, "--suspects", "low_pass", "--slip-angle-range", -5, 5)
+    assert "slip angle is declared, which these runs cannot have" in refused(*sideways)
     test = ("selftest", "x", "--model", model)
     assert "'oops' is not known" in refused(*test, "--effects-of", "oops")
     assert call(*test, "--ratio", 0.9).exit_code == 2

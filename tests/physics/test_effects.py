@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.effects.load import all_effects
 from tirelib.model.base import predict, values_of
-from tirelib.model.registration import reference_plan
 from tirelib.model.state import Operating, State
+from tirelib.model.strain_bench import reference_plan
 from tirelib.parameters import read_tire
 from tirelib.waveforms import GRID
 

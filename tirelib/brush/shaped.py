@@ -5,12 +5,13 @@ With X the place in the contact, 1 leading edge, -1 trailing edge, and c the fla
 .. math:: p(X) = \frac{3 F_z}{4 a}\,(1 - X^2)\,\frac{1 + c X^2}{1 + c/5}.
 
 c = 0 is the parabola, c = 1 rises with the fourth power toward the edges, above 1 the middle is
-lower than the sides. With y the share of the contact that slides, at its trailing end, and t as in
-`tirelib.brush.predict`,
+lower than the sides. With y a place in the contact, 0 at the trailing and 1 at the leading edge, and
+t as in `tirelib.brush.predict`, bristles stick where
 
-.. math:: y\,\frac{1 + c (2y - 1)^2}{1 + c/5} = t,
+.. math:: y\,\frac{1 + c (2y - 1)^2}{1 + c/5} > t.
 
-and the sliding part's force and moment are polynomials of y. Axes ISO 8855.
+They slide behind, and under a peaked pressure (c < -0.2) also ahead of that; force and moment of
+the parts are polynomials of the ends. Axes ISO 8855.
 """
 
 from dataclasses import dataclass
@@ -31,6 +32,8 @@ from tirelib.errors import ParameterError
 
 LOWEST, HIGHEST = -0.9, 2.9
 """Allowed flatness: beyond -1 the pressure is negative, from 3 on sticking has no single end."""
+ONE_END = -0.2
+"""Flatness below which the contact may slide at the leading end as well, where pressure is low."""
 _STEPS = 60
 
 
@@ -84,40 +87,57 @@ class _Shaped(_Contact):
         limit = 1.5 * rolling * self.stick / self.a**2
         size = np.hypot(demand_x, demand_y)
         t = np.where(limit > 0.0, size / np.where(limit > 0.0, limit, 1.0), np.inf)
-        y = _sliding(t, c)
-        s = 1.0 - y
-        stick = 2.0 * (self.a * s) ** 2 / np.where(rolling > 0.0, rolling, 1.0)
+        y, lead = _ends(t, c)
+        s, s_lead = 1.0 - y, 1.0 - lead
+        stick = 2.0 * self.a**2 / np.where(rolling > 0.0, rolling, 1.0)
         slip = np.hypot(self.kappa, across)
         slip = np.where(slip > 0.0, slip, 1.0)
         slide_x, slide_y = self.slide * (self.kappa / slip), self.slide * (across / slip)
-        share, arm = _share(y, c), _arm(y, c)
-        Fx = stick * demand_x + share * slide_x
-        Fy = stick * demand_y + share * slide_y
-        moment = self.a * (stick * demand_y * (1.0 - 4.0 / 3.0 * s) + arm * slide_y)
+        share = _share(y, c) + 1.0 - _share(lead, c)
+        arm = _arm(y, c) - _arm(lead, c)
+        held = stick * (s**2 - s_lead**2)
+        turned = held - 4.0 / 3.0 * stick * (s**3 - s_lead**3)
+        Fx = held * demand_x + share * slide_x
+        Fy = held * demand_y + share * slide_y
+        moment = self.a * (turned * demand_y + arm * slide_y)
         return Fx, Fy, moment
 
 
-def _sliding(t: FloatArray, c: FloatArray) -> FloatArray:
-    """Return the share of the contact that slides, by Newton steps kept inside a bracket."""
-    scale = 1.0 + c / 5.0
-    low, high = np.zeros(np.broadcast_shapes(t.shape, c.shape)), np.ones_like(t + c)
-    y = np.clip(t, 0.0, 1.0) + 0.0 * c
+def _ends(t: FloatArray, c: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return between which shares y, from the trailing end, the contact sticks."""
+    t, c = np.broadcast_arrays(t, c)
+    peaked = c < ONE_END
+    flat = np.where(peaked, c, -1.0)
+    peak = np.where(peaked, 1.0 / 3.0 - np.sqrt(flat**2 - 3.0 * flat) / (6.0 * flat), 1.0)
+    whole = t >= _reach(peak, c)
+    trailing = np.where(whole, 1.0, np.where(t > 0.0, _root(t, c, np.zeros_like(peak), peak), 0.0))
+    both = peaked & ~whole & (t > _reach(np.ones_like(peak), c))
+    leading = np.where(both, _root(t, c, np.ones_like(peak), peak), 1.0)
+    return trailing, leading
+
+
+def _reach(y: FloatArray, c: FloatArray) -> FloatArray:
+    """Return the demand t up to which a bristle at y sticks."""
+    out: FloatArray = y * (1.0 + c * (2.0 * y - 1.0) ** 2) / (1.0 + c / 5.0)
+    return out
+
+
+def _root(t: FloatArray, c: FloatArray, below: FloatArray, above: FloatArray) -> FloatArray:
+    """Return y where `_reach` is t, by Newton steps kept between too low and too high a reach."""
+    y = below + (above - below) * np.clip(t, 0.0, 1.0)
     for _ in range(_STEPS):
         x = 2.0 * y - 1.0
-        rest = y * (1.0 + c * x**2) / scale - t
-        low, high = np.where(rest < 0.0, y, low), np.where(rest >= 0.0, y, high)
-        slope = (1.0 + c * x**2 + 4.0 * c * x * y) / scale
-        with np.errstate(invalid="ignore"):
+        rest = _reach(y, c) - t
+        below, above = np.where(rest < 0.0, y, below), np.where(rest >= 0.0, y, above)
+        slope = (1.0 + c * x**2 + 4.0 * c * x * y) / (1.0 + c / 5.0)
+        with np.errstate(invalid="ignore", divide="ignore"):
             step = y - rest / slope
-        inside = (step > low) & (step < high)
-        new = np.where(inside, step, 0.5 * (low + high))
+        inside = (step > np.minimum(below, above)) & (step < np.maximum(below, above))
+        new = np.where(inside, step, 0.5 * (below + above))
         if np.all(np.abs(new - y) < 1e-15):
-            y = new
-            break
+            return new
         y = new
-    whole = t >= (1.0 + c) / scale
-    out: FloatArray = np.where(whole, 1.0, np.where(t > 0.0, y, 0.0))
-    return out
+    return y
 
 
 def _share(y: FloatArray, c: FloatArray) -> FloatArray:

@@ -18,6 +18,7 @@ VERBS = (
     "identify",
     "compare",
     "diagnose",
+    "effects",
     "next-test",
     "add",
     "selftest",

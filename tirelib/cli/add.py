@@ -105,11 +105,11 @@ def _change(
     out: Path,
     json_file: Path | None,
 ) -> None:
-    from tirelib.effects.load import all_effects
     from tirelib.extend.extension import known_effect
+    from tirelib.model.registration import registered_effects
     from tirelib.parameters import read_tire, write_tire
 
-    catalogue = all_effects(effect_files)
+    catalogue = registered_effects(effect_files)
     effect = known_effect(effect_name, catalogue)
     file = read_tire(model_name)
     campaign = read_campaign(folder)

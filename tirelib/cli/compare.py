@@ -43,10 +43,10 @@ def compare(
     """Hold a model against CAMPAIGN and say where it fails."""
     from tirelib.compare import compare as compare_model
     from tirelib.compare.document import comparison_document
-    from tirelib.effects.load import all_effects
+    from tirelib.model.registration import registered_effects
     from tirelib.parameters import read_tire
 
-    catalogue = all_effects(effect_files)
+    catalogue = registered_effects(effect_files)
     file = read_tire(model)
     campaign = read_campaign(folder)
     with progress_bar("comparing") as progress:

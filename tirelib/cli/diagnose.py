@@ -68,10 +68,10 @@ def diagnose(
     json_file: Path | None,
 ) -> None:
     """Tell which physical effect the model lacks in CAMPAIGN."""
-    from tirelib.effects.load import all_effects
+    from tirelib.model.registration import registered_effects
     from tirelib.parameters import read_tire
 
-    catalogue = all_effects(effect_files)
+    catalogue = registered_effects(effect_files)
     file = read_tire(model_name)
     campaign = read_campaign(folder)
     forces = explains_forces(quantity, campaign.header, file)

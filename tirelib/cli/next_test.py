@@ -1,6 +1,7 @@
 """``tirelib next-test``: the run that would tell suspects apart."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,12 @@ from tirelib.cli.diagnose import explains_forces, of_forces
 from tirelib.errors import FormatError, ParameterError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from tirelib.campaign import Campaign
     from tirelib.diagnose.refit import Refit
+    from tirelib.effects import Effect
+    from tirelib.parameters import TireFile
     from tirelib.planning.document import Plan
     from tirelib.planning.envelope import Range
 
@@ -33,6 +39,23 @@ separation is the chi-square that one run is expected to add against the wrong s
 out. Exit code: 0 done, also when nothing is in doubt; 2 bad input.
 """
 SHOWN = 8
+RANGES = {
+    "load": "Loads that the rig allows [N].", "pressure": "Pressures, gauge [bar].",
+    "speed": "Speeds [km/h].", "slip_angle": "Slip angles, for forces [deg].",
+    "slip_ratio": "Slip ratios, for forces.", "camber": "Cambers, for forces [deg].",
+    "temperature": "Tread temperatures, for forces [degC].",
+}  # fmt: skip
+
+
+def range_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add an option for the range of every condition that may be planned."""
+    for name, text in reversed(RANGES.items()):
+        command = click.option(
+            f"--{name.replace('_', '-')}-range", metavar="LOW HIGH", type=float, nargs=2, help=text
+        )(command)
+    return command
+
+
 DIAGNOSIS = "tirelib-diagnosis/1"
 
 
@@ -41,17 +64,13 @@ DIAGNOSIS = "tirelib-diagnosis/1"
 @click.option("--model", "model_name", metavar="M.toml|NAME", required=True,
               help="Model that `tirelib identify` or `tirelib add` wrote.")  # fmt: skip
 @click.option("--quantity", metavar="strain|Fy|Fx|Mz",
-              help="Default: strain where the campaign has it, else the force that fits worst. For "
-                   "forces the advice is in words, without a table of runs.")  # fmt: skip
+              help="Default: strain where the campaign has it, else the force that fits "
+                   "worst.")  # fmt: skip
 @click.option("--diagnosis", "diagnosis_file", metavar="D.json", type=FILE,
               help="Of `tirelib diagnose` on this campaign and model.")  # fmt: skip
 @click.option("--suspects", "names", metavar="A,B",
               help="Effects to tell apart; one alone stands against nothing.")  # fmt: skip
-@click.option("--load-range", metavar="LOW HIGH", type=float, nargs=2,
-              help="Loads that the rig allows [N].")  # fmt: skip
-@click.option("--pressure-range", metavar="LOW HIGH", type=float, nargs=2,
-              help="Pressures, gauge [bar].")  # fmt: skip
-@click.option("--speed-range", metavar="LOW HIGH", type=float, nargs=2, help="Speeds [km/h].")
+@range_options
 @click.option("--separation", "wanted", metavar="X", type=click.FloatRange(min=0, min_open=True),
               default=20.0, show_default=True,
               help="Separation for which repeats are counted.")  # fmt: skip
@@ -70,49 +89,45 @@ def next_test(
     quantity: str | None,
     diagnosis_file: Path | None,
     names: str | None,
-    load_range: tuple[float, float] | None,
-    pressure_range: tuple[float, float] | None,
-    speed_range: tuple[float, float] | None,
     wanted: float,
     effect_files: tuple[Path, ...],
     members: int,
     seed: int,
     out: Path | None,
     json_file: Path | None,
+    **ranges: tuple[float, float] | None,
 ) -> None:
     """Tell which further run would separate the suspects of CAMPAIGN best."""
     from tirelib.compare.model import model_of
     from tirelib.diagnose.diagnose import diagnose
     from tirelib.diagnose.document import assess, diagnosis_document
     from tirelib.diagnose.refit import refit
-    from tirelib.effects.load import all_effects
     from tirelib.identify.campaign_data import straight_runs
+    from tirelib.model.registration import registered_effects
     from tirelib.parameters import read_tire
-    from tirelib.planning.document import force_plan_document, plan_document, plan_test
+    from tirelib.planning.document import plan_document, plan_test
     from tirelib.planning.envelope import Envelope
     from tirelib.planning.suspects import given_suspects, suspects_of
     from tirelib.waveforms import measure_waveforms
 
     if diagnosis_file is not None and names is not None:
         raise ParameterError("--diagnosis and --suspects are both given; give one of them")
-    catalogue = all_effects(effect_files)
+    catalogue = registered_effects(effect_files)
     file = read_tire(model_name)
     campaign = read_campaign(folder)
+    declared: dict[str, Any] = {name: _si(name, ranges[f"{name}_range"]) for name in RANGES}
     if explains_forces(quantity, campaign.header, file):
-        if diagnosis_file is not None or names is not None:
-            raise ParameterError(
-                "--diagnosis, --suspects: runs are planned for strain only; for forces leave both "
-                "out, the campaign is diagnosed"
-            )
-        with progress_bar("diagnosing") as progress:
-            _, forces = of_forces(campaign, file, catalogue, quantity, members, seed, progress)
-        _give(force_plan_document(forces), None, out, json_file)
+        answer, force_plan = _for_force(
+            campaign, file, catalogue, quantity, diagnosis_file, names, declared, members, seed,
+            wanted,
+        )  # fmt: skip
+        _give(answer, force_plan, out, json_file)
         return
     model = model_of(file, catalogue)
     used = [each for each in model.used if each.effect.hook != "brush"]
     effects = [each.effect for each in used]
     strengths = [np.atleast_1d(np.asarray(each.strength, dtype=float)) for each in used]
-    told = _read_diagnosis(diagnosis_file) if diagnosis_file is not None else None
+    told = _read_diagnosis(diagnosis_file, "strain") if diagnosis_file is not None else None
     suspects = None
     if names is not None:
         suspects = given_suspects(
@@ -124,10 +139,7 @@ def next_test(
     with progress_bar("planning") as progress:
         runs = straight_runs(measure_waveforms(campaign, progress=progress))
         data = runs.data(with_deflection=False)
-        envelope = Envelope.of(
-            data.points, load=_si(load_range, 1.0), pressure=_si(pressure_range, 1e5),
-            speed=_si(speed_range, 1.0 / 3.6),
-        )  # fmt: skip
+        envelope = Envelope.of(data.points, **declared)
         base: Refit | None = None
         if suspects is None:
             found = diagnose(
@@ -148,6 +160,53 @@ def next_test(
     _give(document, plan, out, json_file)
 
 
+def _for_force(
+    campaign: "Campaign",
+    file: "TireFile",
+    catalogue: "Mapping[str, Effect]",
+    quantity: str | None,
+    diagnosis_file: Path | None,
+    names: str | None,
+    declared: dict[str, Any],
+    members: int,
+    seed: int,
+    wanted: float,
+) -> tuple[dict[str, Any], "Plan"]:
+    """Return the next test of a force, as a document and as a plan."""
+    from tirelib.diagnose.forces.assess import force_case
+    from tirelib.planning.document import plan_document, plan_force_test
+    from tirelib.planning.envelope import Envelope
+    from tirelib.planning.force_rivals import force_axes
+    from tirelib.planning.suspects import given_suspects, suspects_of
+
+    told: dict[str, Any] | None = None
+    with progress_bar("planning") as progress:
+        if diagnosis_file is not None:
+            told = _read_diagnosis(diagnosis_file, quantity)
+            quantity = str(told["quantity"])
+        elif names is None:
+            _, told = of_forces(campaign, file, catalogue, quantity, members, seed, progress)
+            quantity = told["quantity"]
+        case = force_case(campaign, file, catalogue, quantity)
+        has = [effect.name for effect in case.effects]
+        if told is not None:
+            _belongs(told, has, diagnosis_file)
+            suspects = suspects_of(told, catalogue)
+        else:
+            given = [name.strip() for name in str(names).split(",")]
+            suspects = given_suspects(given, has, catalogue, case.quantity)
+        at = case.problem.bench.conditions
+        envelope = Envelope.of(at, force_axes(case), **declared) if suspects.effects else None
+        plan = plan_force_test(case, suspects, envelope, wanted=wanted, progress=progress)
+    document = plan_document(plan)
+    if told is not None:
+        document |= {"verdict": told["verdict"],
+                     "would_revive": told["next_test"]["would_revive"]}  # fmt: skip
+        if plan.test is None:
+            document |= dict.fromkeys(("what", "message"), told["next_test"]["what"])
+    return document, plan
+
+
 def _give(
     document: dict[str, Any], plan: "Plan | None", out: Path | None, json_file: Path | None
 ) -> None:
@@ -165,25 +224,25 @@ def _give(
         console.print(f"written: {path}")
 
 
-def _strain_only(quantity: str) -> None:
-    if quantity != "strain":
-        raise ParameterError(
-            f"--diagnosis of {quantity}: runs are planned for strain only; for forces leave the "
-            f"option out: --quantity {quantity}"
-        )
+def _si(name: str, given: tuple[float, float] | None) -> "Range | None":
+    from tirelib.planning.envelope import AXES
+    from tirelib.units import to_si
+
+    if given is None:
+        return None
+    low, high = (float(to_si(x, AXES[name].unit, AXES[name].dimension)) for x in given)
+    return low, high
 
 
-def _si(given: tuple[float, float] | None, unit: float) -> "Range | None":
-    return None if given is None else (given[0] * unit, given[1] * unit)
-
-
-def _read_diagnosis(path: Path) -> dict[str, Any]:
+def _read_diagnosis(path: Path, quantity: str | None) -> dict[str, Any]:
     """Return a diagnosis file.
 
     Raises
     ------
     FormatError
-        If it cannot be read, or is no diagnosis of strain.
+        If it cannot be read.
+    ParameterError
+        If it is one of another quantity.
     """
     try:
         told = json.loads(path.read_text(encoding="utf-8"))
@@ -201,7 +260,13 @@ def _read_diagnosis(path: Path) -> dict[str, Any]:
     missing = [key for key in ("verdict", "named", "candidates", "quantity") if key not in told]
     if missing:
         raise FormatError(f"{path}: {', '.join(missing)} is missing; diagnose again")
-    _strain_only(str(told["quantity"]))
+    if quantity is not None and told["quantity"] != quantity:
+        raise ParameterError(
+            f"{path}: is a diagnosis of {told['quantity']}, and {quantity} is planned; give "
+            f"--quantity {told['quantity']}, or the other diagnosis"
+        )
+    if quantity is None and told["quantity"] == "strain":
+        raise ParameterError(f"{path}: is a diagnosis of strain; give --quantity strain")
     return dict(told)
 
 
@@ -215,18 +280,22 @@ def _belongs(told: dict[str, Any], has: list[str], path: Path | None) -> None:
 
 
 def _say(document: dict[str, Any]) -> None:
+    from tirelib.planning.envelope import AXES
+
     console = output()
     console.print(f"{document['campaign']}, {document['quantity']}: {document['why']}")
     console.print(f"  {document['message']}")
     if not document["candidates"]:
         return
     table = Table(box=SIMPLE_HEAD)
-    for column in ("load [N]", "pressure [bar]", "speed [km/h]", "separation", "chance to resolve"):
+    axes = [axis for axis in AXES.values() if axis.key in document["candidates"][0]]
+    columns = [axis.title if axis.unit == "1" else f"{axis.title} [{axis.unit}]" for axis in axes]
+    for column in (*columns, "separation", "chance to resolve"):
         table.add_column(column, justify="right")
     table.add_column("hardest pair")
     for entry in document["candidates"][:SHOWN]:
         table.add_row(
-            f"{entry['load_N']:.0f}", f"{entry['pressure_bar']:.2f}", f"{entry['speed_kmh']:.0f}",
+            *[f"{entry[axis.key]:.4g}" for axis in axes],
             f"{entry['separation']:.1f} +- {entry['separation_std']:.1f}",
             f"{100 * entry['resolves_probability']:.0f} %", " / ".join(entry["pair"]),
         )  # fmt: skip

@@ -59,14 +59,14 @@ def selftest(
 ) -> None:
     """Plant each effect at the plan and noise of CAMPAIGN and tell the chance of finding it."""
     from tirelib.compare.model import model_of
-    from tirelib.effects.load import all_effects
     from tirelib.identify.campaign_data import straight_runs
+    from tirelib.model.registration import registered_effects
     from tirelib.parameters import read_tire
     from tirelib.planning.selftest import selftest as test_plan
     from tirelib.planning.selftest_document import selftest_document
     from tirelib.waveforms import measure_waveforms
 
-    catalogue = all_effects(effect_files)
+    catalogue = registered_effects(effect_files)
     model = model_of(read_tire(model_name), catalogue)
     used = [each for each in model.used if each.effect.hook != "brush"]
     only = _only(names, [each.effect.name for each in used], catalogue)

@@ -46,6 +46,11 @@ class Candidate:
         """Norm of the own part at the end of the range."""
         return float(np.sqrt(np.sum(self.own**2)))
 
+    def error_left(self, rest: FloatArray) -> float:
+        """Return the rms of a whitened residual (n,) that would be left with it, to first order."""
+        weights = np.linalg.lstsq(self.own.T, rest, rcond=None)[0]
+        return float(np.sqrt(np.mean((rest - weights @ self.own) ** 2)))
+
 
 @dataclass(frozen=True, slots=True)
 class Candidates:

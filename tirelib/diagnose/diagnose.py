@@ -7,33 +7,36 @@ import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.diagnose.candidates import Candidates, candidates
-from tirelib.diagnose.ensemble import MEMBERS
+from tirelib.diagnose.ensemble import MEMBERS, Variants
 from tirelib.diagnose.guess import Guess, guess_law
 from tirelib.diagnose.left import left_of
 from tirelib.diagnose.noise import noise_in, white_level
 from tirelib.diagnose.ranking import Ranking, Scores, limits
 from tirelib.diagnose.refit import Refit, refit
 from tirelib.diagnose.rivals import inseparable
+from tirelib.diagnose.shape import structure_of
 from tirelib.diagnose.stored import ensemble_of
+from tirelib.diagnose.structure import FORM, LEAST
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.waveform_fit import Data
 
-ALARM = 3.0
+ALARM = 2.0
 """Score over the variants' largest from which an effect is an alarm; from 1 on it is a hint."""
-FURTHER = 4.0
+FURTHER = 2.4
 """The same for a further effect: the law of the one before is right but roughly."""
 ROUNDS = 3
 OUTSIDE = 3.0
 """Ratio of an effect outside its range from which something unknown is there."""
 EXPLAINED = 0.4
-"""Share of the misfit beyond the variants' that named effects have to explain."""
-BEYOND = 1.5
-"""Misfit over the variants' largest from which it is more than the structure of a ring."""
+"""Share of the misfit beyond structure's that named effects have to explain."""
+USUAL, BEYOND = 0.05, 0.57
+"""What the joint fit leaves, over what s^2 in every sample would: as much as structure outside the
+ensemble usually leaves, and more than it does."""
 RANGE_SLACK = 2.0
 """Standard deviations by which a strength may leave its range."""
-IMITATION = 0.05
+IMITATION = 0.1
 """Share of the range by which structure may imitate an effect that cannot be: it cannot be named,
 but tells of nothing unknown."""
 
@@ -89,7 +92,8 @@ class Diagnosis:
     base, final : Refit
         Without and with the named effects.
     left, floor : float
-        Misfit with the named effects, and the largest of the variants.
+        What the joint fit with the named effects leaves, over noise and `LEAST` in every sample,
+        and from where on it is more than structure.
     rounds : int
     runs : StraightRuns
     data : Data
@@ -126,8 +130,8 @@ class Stage:
     scores : Scores
     limit : shape (n_candidates,)
         Largest score of the variants.
-    misfits : shape (n_members,)
-        Of the variants, without any effect.
+    noise : float, [-]
+        Of a whitened sample.
     in_range : shape (n_candidates,)
         Whether a strength is plausible, its sign included.
     far : shape (n_candidates,)
@@ -139,7 +143,7 @@ class Stage:
     ranking: Ranking
     scores: Scores
     limit: FloatArray
-    misfits: FloatArray
+    noise: float
     in_range: BoolArray
     far: BoolArray
 
@@ -149,7 +153,7 @@ class Stage:
         data: Data,
         model: Refit,
         catalogue: Sequence[Effect],
-        rests: FloatArray,
+        rests: Variants,
         noise: float,
         least: Mapping[str, float],
     ) -> "Stage":
@@ -157,22 +161,21 @@ class Stage:
 
         Parameters
         ----------
-        rests : shape (n_members, n_runs * n_phi)
-            The variants' whitened residuals.
+        rests : Variants
         noise : float, [-]
             Of a whitened sample.
         least : mapping of name to float
             Limits that hold already: no effect added makes one smaller.
         """
         found = candidates(data, model, catalogue)
-        ranking = Ranking(model, found, rests, noise)
+        ranking = Ranking(model, found, structure_of(data, model, rests, noise))
         scores = ranking.scores(data.strain - model.waveform)
         members = ranking.of_members()
         names = [candidate.effect.name for candidate in found.living]
         bound = np.array([least.get(name, 0.0) for name in names])
         return cls(
             model, found, ranking, scores, np.maximum(limits(members), bound),
-            np.array([member.misfit for member in members]), plausible(found, scores),
+            noise, plausible(found, scores),
             ~plausible(found, scores, IMITATION),
         )  # fmt: skip
 
@@ -182,10 +185,28 @@ class Stage:
         return [candidate.effect.name for candidate in self.found.living]
 
     @property
+    def unit(self) -> float:
+        """Misfit of noise and `LEAST` in every sample."""
+        s = max(self.noise, LEAST)
+        return self.model.waveform.size * s**2 / self.ranking.structure.variance
+
+    @property
+    def beyond(self) -> float:
+        """What the joint fit leaves, in this unit."""
+        return self.scores.after / self.unit
+
+    @property
+    def threshold(self) -> FloatArray:
+        """The variants' largest scores, more where the joint fit leaves more than usual.
+
+        An effect has to stand out from what nothing explains as well.
+        """
+        return np.asarray(self.limit * max(1.0, self.beyond / USUAL))
+
+    @property
     def ratio(self) -> FloatArray:
-        """Scores over the variants' largest."""
-        ratio: FloatArray = self.scores.score / self.limit
-        return ratio
+        """Scores over the thresholds."""
+        return np.asarray(self.scores.score / self.threshold)
 
     @property
     def alarms(self) -> BoolArray:
@@ -203,7 +224,7 @@ class Stage:
             return None
         return int(np.argmax(np.where(fit, ratio, -np.inf)))
 
-    def beyond(self, waves: FloatArray) -> FloatArray:
+    def unexplained(self, waves: FloatArray) -> FloatArray:
         """Return what neither fit nor structure explains of waves (k, n_runs, n_phi), whitened."""
         rows = self.model.whiten(waves).reshape(len(waves), -1)
         return self.ranking.structure.beyond(rows).reshape(waves.shape)
@@ -215,12 +236,17 @@ class Stage:
 
 
 def plausible(found: Candidates, scores: Scores, share: float = 0.0) -> BoolArray:
-    """Return which strengths lie in their effects' ranges, to `RANGE_SLACK` and a share of them."""
+    """Return which strengths lie in their effects' ranges, to `RANGE_SLACK` and a share of them.
+
+    An end other than zero is as uncertain as the law.
+    """
     good = []
     for candidate, strength, std in zip(found.living, scores.strength, scores.std, strict=True):
         effect = candidate.effect
         slack = RANGE_SLACK * std + share * effect.scale
-        inside = (strength >= effect.low - slack) & (strength <= effect.high + slack)
+        low = effect.low - slack - FORM * effect.scale * (effect.low < 0.0)
+        high = effect.high + slack + FORM * effect.scale * (effect.high > 0.0)
+        inside = (strength >= low) & (strength <= high)
         good.append(bool(inside.all()))
     return np.array(good, dtype=bool)
 
@@ -257,18 +283,18 @@ def diagnose(
     level = white_level(runs, base, data.strain)
     first = Stage.of(data, base, catalogue, rests, level, {})
     stage, named, rounds = _rounds(data, first, catalogue, rests, level, progress)
-    named = _still_needed(named, stage.model)
+    named = stage.model.needed(named)
     findings = _findings(first, named, stage.model, data)
     twins = inseparable(data, first, findings, named)
     verdict, named = _verdict(named, twins, first, stage)
     last = stage if named else first
-    left, floor = last.scores.misfit, float(last.misfits.max())
-    beyond = last.beyond(last.model.waveform[None] - data.strain)[0]
+    left, floor = last.beyond, BEYOND
+    beyond = last.unexplained(last.model.waveform[None] - data.strain)[0]
     guess = None
     if left > floor or verdict == "unknown":
         guess = guess_law(
             data.strain - last.model.waveform, last.model.waveform, data.points,
-            left_of(data, last.model).edges, last.beyond,
+            left_of(data, last.model).edges, last.unexplained,
         )  # fmt: skip
     return Diagnosis(
         verdict, tuple(named), findings, first.found.dead, base, last.model, left, floor, rounds,
@@ -280,19 +306,23 @@ def _rounds(
     data: Data,
     first: Stage,
     catalogue: Sequence[Effect],
-    rests: FloatArray,
+    rests: Variants,
     level: float,
     progress: Callable[[str], None] | None,
 ) -> tuple[Stage, list[str], int]:
     """Add the leaders one after the other as long as the exact refit needs them."""
-    # the joint ranking sees all effects at once: who is no suspect now is none later
-    suspects = {name for name, alarm in zip(first.names, first.alarms, strict=True) if alarm}
+    # the joint ranking sees all effects at once: who is no hint now is no suspect later
+    hints = first.in_range & (first.scores.score >= first.limit)
+    suspects = {name for name, hint in zip(first.names, hints, strict=True) if hint}
     least = dict(zip(first.names, first.limit, strict=True))
     named: list[str] = []
     stage, rounds = first, 0
     while rounds < ROUNDS:
         best = stage.leader(suspects, FURTHER if named else ALARM)
         if best is None:
+            break
+        # the laws of those before are right but roughly: what they may be off by is no effect
+        if stage.scores.score[best] < FORM**2 * (first.scores.misfit - stage.scores.misfit):
             break
         effect = stage.found.living[best].effect
         suspects.discard(effect.name)
@@ -320,22 +350,11 @@ def _inside(effect: Effect, strength: FloatArray) -> FloatArray:
     return start
 
 
-def _still_needed(named: list[str], model: Refit) -> list[str]:
-    """Drop names whose strength the last refit takes back to zero."""
-    kept = []
-    for index, effect in enumerate(model.effects):
-        if effect.name not in named:
-            continue
-        strength, std = model.strengths[index], model.strength_std(index)
-        if (np.abs(strength) > 3.0 * std).any():
-            kept.append(effect.name)
-    return sorted(kept, key=named.index)
-
-
 def _findings(first: Stage, named: Sequence[str], model: Refit, data: Data) -> tuple[Finding, ...]:
-    ratio, inside, alarms, limit = first.ratio, first.in_range, first.alarms, first.limit
+    ratio, inside, alarms, limit = first.ratio, first.in_range, first.alarms, first.threshold
     scores = first.scores
     fitted = {effect.name: k for k, effect in enumerate(model.effects)}
+    rest = first.model.whiten(data.strain - first.model.waveform).ravel()
     rows = []
     for i, candidate in enumerate(first.found.living):
         name = candidate.effect.name
@@ -353,8 +372,8 @@ def _findings(first: Stage, named: Sequence[str], model: Refit, data: Data) -> t
                 bool(inside[i]),
                 float(scores.alone[i] / scores.misfit),
                 tuple(first.found.twins(i)),
-                _power(first, i),
-                _error_with(candidate.own, data, first.model),
+                first.ranking.power(i, ALARM * limit[i]),
+                candidate.error_left(rest),
             )
         )
     order = {name: k for k, name in enumerate(named)}
@@ -362,28 +381,13 @@ def _findings(first: Stage, named: Sequence[str], model: Refit, data: Data) -> t
     return tuple(rows)
 
 
-def _power(stage: Stage, index: int) -> float:
-    """Return in which share of the variants a third of the range would be an alarm."""
-    effect = stage.found.living[index].effect
-    third = effect.toward / effect.scale / 3.0
-    return float(np.mean(stage.ranking.planted(index, third) >= ALARM * stage.limit[index]))
-
-
-def _error_with(own: FloatArray, data: Data, base: Refit) -> float:
-    """Return the error that would be left with this effect alone, to first order."""
-    rest = base.whiten(data.strain - base.waveform).ravel()
-    weights = np.linalg.lstsq(own.T, rest, rcond=None)[0]
-    left = rest - weights @ own
-    return float(np.sqrt(np.mean(left**2)))
-
-
 def _verdict(
     named: list[str], twins: Sequence[str], first: Stage, last: Stage
 ) -> tuple[str, list[str]]:
     """Return the verdict and what it names."""
-    excess = first.scores.misfit - float(np.median(first.misfits))
-    left = last.scores.misfit - float(np.median(last.misfits))
-    beyond = last.scores.misfit > BEYOND * float(last.misfits.max())
+    excess = first.scores.misfit - BEYOND * first.unit
+    left = last.scores.misfit - BEYOND * last.unit
+    beyond = last.beyond > BEYOND
     if not named:
         return ("unknown" if beyond or last.outside >= OUTSIDE else "none"), []
     if beyond and left > (1.0 - EXPLAINED) * excess:

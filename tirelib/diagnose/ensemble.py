@@ -1,42 +1,52 @@
 """Structural variants of the user's own model, with no effect: what a fit leaves by itself.
 
-A ring is not a tire, and what it lacks looks to some extent like one effect or another. So the
-residual of the data is held against those of waveforms that variants of the model make: a belt that
-stretches and shears, a tread that hardens and gains width with load, sections with inertia,
-traction that is not as assumed, displacements whose large part is other than computed, a smooth
-misfit that goes with strain, load and pressure, run-out; measured at the user's plan with the rig's
-tolerances, delay and noise. The base model is fitted to each as it is to the data.
+A ring is not a tire, and what it lacks looks to some extent like one effect or another. There are
+two kinds of it.
+
+- Variants of the model: a belt that stretches and shears, a tread that hardens and gains width with
+  load, sections with inertia, displacements whose large part is other than computed. The base model
+  is fitted to each as it is to the data, and what that leaves is a sample of what structure does.
+- What adds to a waveform in proportion: a smooth misfit that goes with strain, load, pressure and
+  speed, sharper ends of the contact, shear of the tread that bends the flat piece, run-out, a late
+  trigger, set points, gain and angle that are off in a run. Its covariance is known, so it needs no
+  sample (`smooth_part`, `run_part`).
+
+A measured variant has both, and noise.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.refit import Refit
 from tirelib.effects import CATALOGUE
+from tirelib.effects.effect import State
+from tirelib.effects.patch import along, balanced, beam_strain, held_shear
 from tirelib.errors import TirelibError
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.identify import FITTED
-from tirelib.identify.random_effects import angle_slope
+from tirelib.identify.random_effects import angle_slope, random_tangents, scales
 from tirelib.identify.waveform_fit import Data
 from tirelib.model.base import Correction, move, predict
 from tirelib.waveforms import GRID
 
 MEMBERS = 100
 REFERENCE_LOAD = 4000.0
-MISFIT = Discrepancy(inside=0.01, outside=0.005, by_speed=0.25)
+MISFIT = Discrepancy(inside=0.002, outside=0.001, by_speed=0.25)
+"""What no variant shows either: some thousandths of the strain, at any angle."""
 BACK_STEPS = 3
-TRACTION = {"trailing_sliding": 0.3, "tread_friction": 0.03}
-"""Share of the range by which the traction of a rolling tire may differ from the ring's."""
-TIMING = 1e-4
-"""Common delay between trigger and gages that a rig may have, [s]: a sample at 10 kHz."""
-
-
+BENT = (0.0026, 0.017)
+"""Standard deviations of the outward shear that bends the flat piece under the tread by itself, as
+in `tread_friction`, and of the friction that does so in the contact's rear."""
+TIMING = 6e-5
+"""Standard deviation of a common delay of the gages, [s]: uniform to a sample at 10 kHz."""
+WIDEST = 0.01
+"""Largest standard deviation of the angle's zero that counts as structure, [rad]."""
 LARGE = 0.3
 """Relative standard deviation of the part that large displacements add."""
-ALIKE = {"gage_length": 600.0, "roughness": 0.2, "gage_saturation": 4e-3}
+ALIKE = {"gage_length": 200.0, "roughness": 0.05, "gage_saturation": 4e-3}
 """Standard deviation, in their units, of what a tire's structure shows that looks like these
 effects: the contact's ends are sharper or smoother than the ring's, contact begins gradually across
 a crowned tread, and strain is not quite in proportion to the belt's curvature."""
@@ -44,8 +54,24 @@ SECTIONS = 8e-5
 """Largest inertia of the belt's sections, [kg m]: twice that of 12.5 mm of belt and tread."""
 MASS = 0.15
 """Relative standard deviation of the belt's mass, which no fit of straight runs tells."""
-RUN_OUT, ONCE = 1.5e-4, 5e-6
-"""Largest run-out of a tire, [m], and largest strain once per turn beside it, [-]."""
+RUN_OUT, ONCE = 1e-4, 3e-6
+"""Standard deviation of a tire's run-out, [m], and of strain once per turn beside it, [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Variants:
+    """What is left of variants of a model.
+
+    Attributes
+    ----------
+    rests : shape (n, n_runs * n_phi)
+        Whitened residuals of the variants as they are.
+    noise : float, [-]
+        Of a run's waveform, from repeats, with which they would be measured.
+    """
+
+    rests: FloatArray
+    noise: float
 
 
 def structural_ensemble(
@@ -57,7 +83,7 @@ def structural_ensemble(
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
 ) -> FloatArray:
-    """Return whitened residuals of variants of a model at the plan, (n, n_runs * n_phi).
+    """Return whitened residuals of measured variants of a model, (n, n_runs * n_phi).
 
     Parameters
     ----------
@@ -67,27 +93,100 @@ def structural_ensemble(
     progress : callable, optional
         Called after each member.
     """
+    found = Variants(variants(data, model, members=members, seed=seed, progress=progress), noise)
+    return measured(data, model, found, smooth_part(data, model), run_part(data, model))
+
+
+def variants(
+    data: Data,
+    model: Refit,
+    *,
+    members: int = MEMBERS,
+    seed: int = 0,
+    progress: Callable[[str], None] | None = None,
+) -> FloatArray:
+    """Return whitened residuals of variants of a model at the plan, (n, n_runs * n_phi).
+
+    Parameters
+    ----------
+    members, seed : int
+    progress : callable, optional
+        Called after each variant.
+    """
     random = np.random.default_rng(seed)
     rows = model.whiten(model.slopes[: len(FITTED)]).reshape(len(FITTED), -1)
     normal = rows @ rows.T + 1e-6 * np.eye(len(FITTED))
     inverse = np.asarray(np.linalg.inv(normal), dtype=np.float64)
-    half = 0.6 * np.sqrt(2.0 * model.deflection / float(np.max(model.values["free_radius"])))
-    misfit = MISFIT.columns(model.waveform, half, data.points, GRID)
-    misfit = np.concatenate([misfit, _alike(data, model)])
-    swing = _by_load(data, model)
     rests: list[FloatArray] = []
     attempts = 0
     while len(rests) < members and attempts < 3 * members:
         attempts += 1
         try:
-            wave = _variant(data, model, misfit, swing, noise, random)
+            wave = _variant(data, model, random)
             rest = np.subtract(wave, _refitted(data, model, wave, rows, inverse))
         except TirelibError:
             continue  # the draw is no tire
         rests.append(model.whiten(rest).ravel())
         if progress is not None:
             progress(f"variant {len(rests)}")
-    return np.array(rests)
+    return np.array(rests).reshape(len(rests), -1)
+
+
+def smooth_part(data: Data, model: Refit) -> FloatArray:
+    """Return what one standard deviation of each additive part changes, (n, n_runs, n_phi)."""
+    half = 0.6 * np.sqrt(2.0 * model.deflection / float(np.max(model.values["free_radius"])))
+    swing = _by_load(data, model)
+    turns = np.stack([np.cos(GRID), np.sin(GRID)])[:, None]
+    late = angle_slope(model.waveform) * np.asarray(data.points.omega)[:, None]
+    return np.concatenate(
+        [
+            MISFIT.columns(model.waveform, half, data.points, GRID),
+            _alike(data, model),
+            _bent(data, model),
+            RUN_OUT * turns * swing,
+            ONCE * turns * np.ones_like(swing),
+            TIMING * late[None],
+        ]
+    )
+
+
+def run_part(data: Data, model: Refit) -> FloatArray:
+    """Return what one standard deviation of a run's load, pressure, gain and angle changes.
+
+    Of shape (n_runs, 4, n_phi).
+    """
+    tangents = random_tangents(model.waveform, model.values, data.points, data.low_pass)
+    sizes = scales(data.tolerance, np.minimum(data.angle_std, WIDEST))
+    return np.asarray((tangents * sizes[:, None, :]).swapaxes(1, 2))
+
+
+def measured(
+    data: Data,
+    model: Refit,
+    found: Variants,
+    smooth: FloatArray,
+    runs: FloatArray,
+) -> FloatArray:
+    """Return whitened residuals of variants as a campaign would measure them.
+
+    Parameters
+    ----------
+    found : Variants
+    smooth : shape (k, n_runs, n_phi)
+        `smooth_part`.
+    runs : shape (n_runs, 4, n_phi)
+        `run_part`.
+    """
+    random = np.random.default_rng(len(found.rests))
+    free = model.whiten(model.slopes[: len(FITTED)]).reshape(len(FITTED), -1)
+    basis = np.linalg.qr(free.T)[0]
+    rests = []
+    for rest in found.rests:
+        wave = np.tensordot(random.standard_normal(len(smooth)), smooth, axes=1)
+        wave = wave + np.einsum("rk,rkn->rn", random.standard_normal(runs.shape[:2]), runs)
+        white = model.whiten(wave + found.noise * random.standard_normal(wave.shape)).ravel()
+        rests.append(rest + white - basis @ (basis.T @ white))
+    return np.array(rests).reshape(found.rests.shape)
 
 
 def _by_load(data: Data, model: Refit) -> FloatArray:
@@ -115,17 +214,31 @@ def _alike(data: Data, model: Refit) -> FloatArray:
     return np.array(rows)
 
 
-def _variant(
-    data: Data,
-    model: Refit,
-    misfit: FloatArray,
-    swing: FloatArray,
-    noise: float,
-    random: np.random.Generator,
-) -> FloatArray:
-    """Return the waveforms of one variant, measured."""
-    points, tolerance = data.points, data.tolerance
-    n = len(points)
+def _bent(data: Data, model: Refit) -> FloatArray:
+    """Return what `BENT` changes, (2, n_runs, n_phi)."""
+
+    def held(state: State) -> State:
+        bent = beam_strain(state, balanced(state.contact, held_shear(state)))
+        return state.but(strain=state.strain + BENT[0] * bent)
+
+    def rear(state: State) -> State:
+        c = state.contact
+        pull = 0.5 * c.pressure * (1.0 + np.tanh((along(c) - 0.5) / 0.2))
+        return state.but(strain=state.strain + BENT[1] * beam_strain(state, balanced(c, pull)))
+
+    waves = [
+        predict(
+            model.values, data.points, [*model.changes, ("strain", change)],
+            low_pass=data.low_pass, correction=model.correction,
+        ).wave
+        for change in (held, rear)
+    ]  # fmt: skip
+    return np.stack(waves) - model.waveform
+
+
+def _variant(data: Data, model: Refit, random: np.random.Generator) -> FloatArray:
+    """Return the waveforms of one variant."""
+    points = data.points
     values = dict(model.values)
     for name in (
         "bending_stiffness", "radial_stiffness", "tangential_stiffness", "extension_stiffness",
@@ -138,32 +251,11 @@ def _variant(
     values["tread_stiffness"] = values["tread_stiffness"] * (
         points.load / REFERENCE_LOAD
     ) ** random.uniform(-0.1, 0.2)
-    really = replace(
-        points,
-        load=points.load * (1.0 + tolerance.load * random.standard_normal(n)),
-        pressure=points.pressure * (1.0 + tolerance.pressure * random.standard_normal(n)),
-    )
-    rolling = [
-        CATALOGUE[name].at(share * CATALOGUE[name].scale * random.uniform(-1.0, 1.0))
-        for name, share in TRACTION.items()
-        if name not in {effect.name for effect in model.effects}
-    ]
     large = 1.0 + LARGE * float(random.standard_normal())
     correction = Correction(large * model.correction.waveform, large * model.correction.deflection)
-    wave = predict(
-        values, really, [*model.changes, *rolling], low_pass=data.low_pass, correction=correction
+    return predict(
+        values, points, model.changes, low_pass=data.low_pass, correction=correction
     ).wave
-    wave = wave + np.tensordot(random.standard_normal(len(misfit)), misfit, axes=1)
-    turn = np.cos(GRID - random.uniform(-np.pi, np.pi))
-    wave = wave + random.uniform(0.0, RUN_OUT) * turn * swing
-    wave = wave + random.uniform(0.0, ONCE) * np.cos(GRID - random.uniform(-np.pi, np.pi))
-    wave = wave * (1.0 + tolerance.gain * random.standard_normal(n))[:, None]
-    zero = np.minimum(data.angle_std, 0.01) * random.standard_normal(n)
-    zero = zero + TIMING * random.uniform(-1.0, 1.0) * points.omega
-    wave = wave - angle_slope(wave) * zero[:, None]
-    wave = wave - wave.mean(axis=1, keepdims=True)
-    measured: FloatArray = wave + noise * random.standard_normal(wave.shape)
-    return measured
 
 
 def _refitted(

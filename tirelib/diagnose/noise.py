@@ -19,7 +19,8 @@ def noise_in(runs: StraightRuns) -> float:
 def white_level(runs: StraightRuns, model: Refit, strain: FloatArray) -> float:
     """Return the standard deviation of whitened white noise as strong as the repeats' is.
 
-    What set points and the angle's zero explain of the repeats' differences is no noise. Repeats
+    What set points, the angle's zero or other numbers of the tire explain of the repeats'
+    differences is no noise: a tire that warms up or wears between them is not noisy. Repeats
     differ by smooth noise, n_e independent samples in a turn of n: a shape that is smooth as well
     meets n / n_e times the variance of a sample.
 
@@ -37,11 +38,12 @@ def white_level(runs: StraightRuns, model: Refit, strain: FloatArray) -> float:
             continue
         rest = strain[member] - strain[member].mean(axis=0)
         # neighbours of equal set points have nearly equal slopes
-        slopes = basis[member[0]]
+        both = np.concatenate([basis[member[0]], model.slopes[:, member[0]].T], axis=1)
+        slopes = np.linalg.qr(both)[0]
         rest = rest - (rest @ slopes) @ slopes.T
         rows.append(rest)
         square += float(np.sum(rest**2))
-        free += (member.size - 1) * (rest.shape[1] - basis.shape[2])
+        free += (member.size - 1) * (rest.shape[1] - slopes.shape[1])
     if not rows:
         return UNKNOWN_NOISE / model.whiten.noise
     every = np.concatenate(rows)

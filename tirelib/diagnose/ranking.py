@@ -15,11 +15,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.candidates import Candidates
 from tirelib.diagnose.refit import Refit
-from tirelib.diagnose.structure import FORM, Normal, Structure
-
-SMALL, LEAST = 0.3, 0.5
-"""Size of an effect in a run, over the typical one, below which its shape there is not trusted,
-and least size that another law may have there."""
+from tirelib.diagnose.structure import Normal, Structure
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,17 +50,14 @@ class Ranking:
     ----------
     model : Refit
     found : Candidates
-    members : shape (n_members, n_runs * n_phi)
-        Whitened residuals of the structural ensemble.
-    noise : float, [-]
-        Standard deviation of a whitened sample by noise alone.
+    structure : Structure
+        What the model leaves by itself.
     """
 
-    def __init__(self, model: Refit, found: Candidates, members: FloatArray, noise: float) -> None:
-        self.model, self.found = model, found
-        free = model.whiten(model.slopes).reshape(len(model.slopes), -1)
-        self.structure = Structure(members, noise, free, form_rows(model))
-        self.rows = np.concatenate([c.own for c in found.living]) if found.living else free[:0]
+    def __init__(self, model: Refit, found: Candidates, structure: Structure) -> None:
+        self.model, self.found, self.structure = model, found, structure
+        empty = np.zeros((0, model.waveform.size))
+        self.rows = np.concatenate([c.own for c in found.living]) if found.living else empty
         self.slots: list[slice] = []
         first = 0
         for candidate in found.living:
@@ -80,11 +73,11 @@ class Ranking:
 
     @cached_property
     def normals(self) -> list[Normal]:
-        """The members' normal equations, each by the others' structure."""
+        """Normal equations of the measured variants, each by the structure without it."""
         return self.structure.of_members(self.rows)
 
     def of_members(self) -> tuple[Scores, ...]:
-        """Return the scores of the ensemble's members, each by the others' structure."""
+        """Return the scores of the measured variants."""
         return tuple(self._scores(normal) for normal in self.normals)
 
     def planted(self, index: int, strength: float) -> FloatArray:
@@ -96,6 +89,12 @@ class Ranking:
             moved = Normal(normal.gram, normal.right + strength * column, normal.square)
             out.append(self._score(moved, index)[0])
         return np.array(out)
+
+    def power(self, index: int, alarm: float) -> float:
+        """Return in which share of the variants a third of the range would reach a score."""
+        effect = self.found.living[index].effect
+        third = effect.toward / effect.scale / 3.0
+        return float(np.mean(self.planted(index, third) >= alarm))
 
     def _scores(self, normal: Normal) -> Scores:
         score, alone, strength, std = [], [], [], []
@@ -137,37 +136,6 @@ def _taken(normal: Normal, slot: slice) -> float:
         return 0.0
     weights = np.linalg.solve(gram + np.eye(right.size), right)
     return float(2.0 * weights @ right - weights @ gram @ weights)
-
-
-def form_rows(model: Refit) -> FloatArray:
-    """Return how a model's effects may be off from run to run, (n_effects * n_runs, n)."""
-    runs, samples = model.waveform.shape
-    rows: list[FloatArray] = []
-    first = len(model.slopes) - sum(effect.components for effect in model.effects)
-    for effect, strength in zip(model.effects, model.strengths, strict=True):
-        slopes = model.slopes[first : first + effect.components]
-        first += effect.components
-        change = model.whiten(np.tensordot(strength / effect.scale, slopes, axes=1))
-        each = np.zeros((runs, runs, samples))
-        each[np.arange(runs), np.arange(runs)] = FORM * filled(change)
-        rows.append(each.reshape(runs, -1))
-    return np.concatenate(rows) if rows else np.zeros((0, runs * samples))
-
-
-def filled(change: FloatArray) -> FloatArray:
-    """Return an effect's change per run, nowhere much smaller than it typically is.
-
-    Where the law gives little, another may give half of what it gives elsewhere, in that shape.
-    """
-    size = np.sqrt(np.sum(change**2, axis=1, keepdims=True))
-    typical = float(np.sqrt(np.mean(size**2)))
-    if typical == 0.0:
-        return change
-    shape = change / np.maximum(size, SMALL * typical)
-    trusted = size[:, 0] > SMALL * typical
-    shape[~trusted] = shape[trusted].mean(axis=0)
-    out: FloatArray = shape * np.maximum(size, LEAST * typical)
-    return out
 
 
 def limits(members: Sequence[Scores]) -> FloatArray:

@@ -75,6 +75,15 @@ class Refit:
         deviation: FloatArray = effect.scale * np.sqrt(np.diag(self.covariance)[rows])
         return deviation
 
+    def needed(self, names: Sequence[str]) -> list[str]:
+        """Return those of some effects whose strength the fit does not take back to zero."""
+        kept = []
+        for index, effect in enumerate(self.effects):
+            strength, std = self.strengths[index], self.strength_std(index)
+            if effect.name in names and (np.abs(strength) > 3.0 * std).any():
+                kept.append(effect.name)
+        return sorted(kept, key=list(names).index)
+
 
 def changes_of(effects: Sequence[Effect], strengths: Sequence[FloatArray]) -> Changes:
     """Return effects at strengths as changes of the chain."""

@@ -15,9 +15,8 @@ import numpy as np
 from tirelib import __version__
 from tirelib.arrays import FloatArray
 from tirelib.diagnose import ensemble
-from tirelib.diagnose.ensemble import MEMBERS, structural_ensemble
+from tirelib.diagnose.ensemble import MEMBERS, Variants, variants
 from tirelib.diagnose.refit import Refit
-from tirelib.effects import CATALOGUE
 from tirelib.identify.waveform_fit import Data
 
 VARIABLE = "TIRELIB_CACHE"
@@ -43,32 +42,29 @@ def ensemble_of(
     members: int = MEMBERS,
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
-) -> FloatArray:
-    """Return `structural_ensemble`, from the store if it is there.
+) -> Variants:
+    """Return the variants of a model, from the store if they are there.
 
-    Parameters as there.
+    Parameters as in `structural_ensemble`.
     """
     folder = cache_folder()
     if folder is None:
-        return structural_ensemble(
-            data, model, noise=noise, members=members, seed=seed, progress=progress
-        )
-    file = folder / f"{key_of(data, model, noise, members, seed)}.npy"
+        made = variants(data, model, members=members, seed=seed, progress=progress)
+        return Variants(made, noise)
+    file = folder / f"{key_of(data, model, members, seed)}.npy"
     shape = (members, data.strain.size)
     found = _read(file, shape)
     if found is not None:
-        return found
-    rests = structural_ensemble(
-        data, model, noise=noise, members=members, seed=seed, progress=progress
-    )
-    if rests.shape == shape:
+        return Variants(found, noise)
+    made = variants(data, model, members=members, seed=seed, progress=progress)
+    if made.shape == shape:
         # what is returned now is what a later call reads
-        rests = rests.astype(np.float32).astype(np.float64)
-        _write(file, rests)
-    return rests
+        made = made.astype(np.float32).astype(np.float64)
+        _write(file, made)
+    return Variants(made, noise)
 
 
-def key_of(data: Data, model: Refit, noise: float, members: int, seed: int) -> str:
+def key_of(data: Data, model: Refit, members: int, seed: int) -> str:
     """Return the hash of model, plan, ensemble's constants, laws and version."""
     told = hashlib.sha256()
 
@@ -84,7 +80,7 @@ def key_of(data: Data, model: Refit, noise: float, members: int, seed: int) -> s
                 told.update(repr(item).encode())
             told.update(b";")
 
-    add(__version__, members, seed, noise, data.noise, data.angle_std, data.tolerance)
+    add(__version__, members, seed, data.noise, data.angle_std, data.tolerance)
     add(repr(data.low_pass))
     for name in data.points.__slots__:
         add(name, np.asarray(getattr(data.points, name)))
@@ -94,8 +90,6 @@ def key_of(data: Data, model: Refit, noise: float, members: int, seed: int) -> s
         add(effect.name, strength)
     code = Path(ensemble.__file__).read_bytes()
     told.update(code)
-    for name in (*ensemble.TRACTION, *ensemble.ALIKE):
-        add(CATALOGUE[name].name, CATALOGUE[name].low, CATALOGUE[name].high)
     return told.hexdigest()
 
 

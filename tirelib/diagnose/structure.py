@@ -1,15 +1,16 @@
 """What a ring leaves by itself, as a covariance: the metric in which effects are weighed.
 
-Members of the structural ensemble are residuals that lack no effect. With M of them, e_m, and the
-noise s between repeats, a residual without effect has the covariance
+With the residuals e_m of M variants of the model, the parts d_k that add in proportion
+(`tirelib.diagnose.ensemble`) and noise s, a residual that lacks no effect has the covariance
 
-    C = s^2 I + sum_m e_m e_m' / M + sum_i f_i f_i'
+    C = s^2 I + sum_m e_m e_m' / M + sum_k d_k d_k' + sum_i f_i f_i'
 
-so what structure does often counts little and what it never does counts by the noise alone. The
-rows f_i are the parts in each run of an effect that the model has, times `FORM`: the law of an
-effect is right to such a share, and may be off by another factor in each run.
+so what structure does often counts little and what it never does counts by the noise alone. A
+sample of everything would leave most directions out, for there are more set points and smooth
+shapes than variants. The rows f_i are the parts in each run of an effect that the model has, times
+`FORM`: the law of an effect is right to such a share, and may be off by another factor in each run.
 
-A member is judged by the covariance of the others, as a measured residual is by that of all.
+A measured variant is judged by the covariance without it, as a residual is by that of all.
 """
 
 from dataclasses import dataclass
@@ -18,8 +19,9 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 
-LEAST = 0.1
-"""Least s, in whitened samples: a finite ensemble does not span everything that structure does."""
+LEAST, ALIKE = 0.1, 15
+"""Least s, in whitened samples, for no ensemble spans everything that structure does; and the
+number of runs from which on more runs tell no more of that, for it repeats in like runs."""
 FORM = 0.2
 """Share of an effect's own part by which its law may be off from run to run."""
 
@@ -43,30 +45,37 @@ class Normal:
     square: float
 
 
+def spread_of(noise: float, runs: int) -> float:
+    """Return s for runs with a noise, both of a whitened sample."""
+    return max(noise, LEAST * float(np.sqrt(max(1.0, runs / ALIKE))))
+
+
 class Structure:
     """The covariance, on the complement of what the fitted numbers of a model can do.
 
     Parameters
     ----------
-    members : shape (n_members, n)
-        Whitened residuals of the ensemble.
+    variants : shape (n_members, n)
+        Whitened residuals e_m of variants as they are.
+    measured : shape (n_members, n)
+        The same as they would be measured.
     noise : float, [-]
-        Standard deviation of a whitened sample by noise alone.
+        Standard deviation s of a whitened sample.
     nuisance : shape (n_free, n)
         Whitened slopes of the model's fitted numbers.
-    form : shape (n_form, n)
-        Whitened rows f_i; none for a model without effects.
+    parts : shape (n_parts, n)
+        Whitened rows d_k and f_i.
     """
 
     def __init__(
-        self, members: FloatArray, noise: float, nuisance: FloatArray, form: FloatArray
-    ) -> None:
+        self, variants: FloatArray, measured: FloatArray, noise: float, nuisance: FloatArray,
+        parts: FloatArray,
+    ) -> None:  # fmt: skip
         self.basis = np.linalg.qr(nuisance.T)[0]
-        self.variance = max(noise, LEAST) ** 2
-        self.count = len(members)
-        self.members = self.projected(members)
-        self.spread = np.concatenate(
-            [self.members / np.sqrt(max(self.count, 1)), self.projected(form)]
+        self.variance = noise**2
+        self.members = self.projected(measured)
+        self.spread = self.projected(
+            np.concatenate([variants / np.sqrt(max(len(variants), 1)), parts])
         )
         self.overlap = self.spread @ self.spread.T
 
@@ -78,10 +87,13 @@ class Structure:
     def normal(self, rows: FloatArray, residual: FloatArray) -> Normal:
         """Return the normal equations of rows (k, n) and a residual (n,)."""
         own, rest = self.projected(rows), self.projected(residual)
-        return self._normal(
-            np.arange(len(self.spread)), own @ own.T, own @ self.spread.T, own @ rest,
-            self.spread @ rest, float(rest @ rest),
-        )  # fmt: skip
+        across, mutual = self.spread @ own.T, self.spread @ rest
+        turned = np.linalg.solve(self._inner, np.column_stack([across, mutual]))
+        return Normal(
+            (own @ own.T - across.T @ turned[:, :-1]) / self.variance,
+            (own @ rest - across.T @ turned[:, -1]) / self.variance,
+            float(rest @ rest - mutual @ turned[:, -1]) / self.variance,
+        )
 
     def beyond(self, rows: FloatArray) -> FloatArray:
         """Return what neither fitted numbers nor structure explain of rows (k, n): s^2 C^-1 rows.
@@ -89,36 +101,32 @@ class Structure:
         The best linear prediction of structure, given the rows, is taken off.
         """
         own = self.projected(rows)
-        inner = self.overlap + self.variance * np.eye(len(self.spread))
-        out: FloatArray = own - np.linalg.solve(inner, self.spread @ own.T).T @ self.spread
+        out: FloatArray = own - np.linalg.solve(self._inner, self.spread @ own.T).T @ self.spread
         return out
 
     def of_members(self, rows: FloatArray) -> list[Normal]:
-        """Return the same for every member, each by the covariance of the others."""
+        """Return the same for every measured variant, each by the covariance without it."""
         own = self.projected(rows)
-        plain, across = own @ own.T, own @ self.spread.T
-        right, mutual = own @ self.members.T, self.spread @ self.members.T
-        every = np.arange(len(self.spread))
-        return [
-            self._normal(
-                np.delete(every, m), plain, across, right[:, m], mutual[:, m],
-                float(self.members[m] @ self.members[m]),
+        across, mutual = self.spread @ own.T, self.spread @ self.members.T
+        inverse = np.asarray(np.linalg.inv(self._inner), dtype=np.float64)
+        turned, met = inverse @ across, inverse @ mutual
+        gram = own @ own.T - across.T @ turned
+        right = own @ self.members.T - across.T @ met
+        square = np.sum(self.members**2, axis=1) - np.sum(mutual * met, axis=0)
+        found = []
+        for m in range(len(self.members)):
+            # the inverse without a row and column, by the row of the whole one
+            lost, own_met = turned[m] / inverse[m, m], float(met[m, m])
+            found.append(
+                Normal(
+                    (gram + np.outer(lost, turned[m])) / self.variance,
+                    (right[:, m] + lost * own_met) / self.variance,
+                    (float(square[m]) + own_met**2 / float(inverse[m, m])) / self.variance,
+                )
             )
-            for m in range(self.count)
-        ]  # fmt: skip
+        return found
 
-    def _normal(
-        self, kept: np.ndarray, plain: FloatArray, across: FloatArray, right: FloatArray,
-        mutual: FloatArray, square: float,
-    ) -> Normal:  # fmt: skip
-        """Return C^-1 by the matrix inversion lemma, for some of the covariance's rows."""
-        inner = self.overlap[np.ix_(kept, kept)] + self.variance * np.eye(kept.size)
-        columns = np.concatenate([across[:, kept], mutual[None, kept]]).T
-        turned = np.linalg.solve(inner, columns)
-        taken = columns.T @ turned
-        k = len(right)
-        return Normal(
-            (plain - taken[:k, :k]) / self.variance,
-            (right - taken[:k, k]) / self.variance,
-            (square - float(taken[k, k])) / self.variance,
-        )
+    @property
+    def _inner(self) -> FloatArray:
+        """What the matrix inversion lemma inverts in place of C."""
+        return np.asarray(self.overlap + self.variance * np.eye(len(self.spread)))

@@ -67,6 +67,30 @@ def pressed_again(state: State, loads: ComplexArray, lift: float | FloatArray = 
     return state.but(contact=contact, belt=contact.displacement, deflection=contact.deflection)
 
 
+def held_shear(state: State) -> FloatArray:
+    """Return the outward shear [N/m] of a tread that sticks up to full friction, at the nodes.
+
+    sgn(x) min(k_Gt g |x|, q) with g = (R0 - R) / R and k_Gt = k_t / 3, for rubber keeps its volume.
+    """
+    c = state.contact
+    x = state.radius[:, None] * (c.phi - c.edges.mean(axis=1)[:, None])
+    grip = state.k_t / 3.0 * (state.free_radius / state.radius - 1.0)
+    shear: FloatArray = np.sign(x) * np.minimum(grip[:, None] * np.abs(x), c.pressure)
+    return shear
+
+
+def sheared(state: State, traction: FloatArray) -> State:
+    """Return the state with traction [N/m] on the tread along +phi, at the contact's nodes.
+
+    Line loads q_v and q_beta = (R0 - R) q_v: the belt is pulled and its sections are turned.
+    """
+    c = state.contact
+    loads = np.zeros_like(state.belt)
+    loads[..., 1] = load_harmonics(c.phi, c.weights * traction, state.belt.shape[1] - 1)
+    loads[..., 2] = (state.free_radius - state.radius)[:, None] * loads[..., 1]
+    return pressed_again(state, loads)
+
+
 def inward(state: State, phi: FloatArray, force: FloatArray) -> ComplexArray:
     """Return harmonics of inward point loads [N/m rad] at phi, both (n_points, n_nodes)."""
     loads: ComplexArray = np.zeros_like(state.belt)

@@ -1,27 +1,32 @@
-"""Compression of the innerliner by the tread's outward shear."""
+"""Compression of belt and innerliner by the tread's outward shear."""
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from tirelib.effects.effect import State, effect
-from tirelib.effects.patch import balanced, beam_strain
+from tirelib.effects.patch import along, balanced, beam_strain, held_shear, sheared
+from tirelib.strain.innerliner import strain_harmonics
 
-FRICTION = 1.0
-SHEAR = 1.0 / 3.0
-"""Shear stiffness of a tread element over its normal one: rubber keeps its volume."""
+BUILT_UP = 1.0 / 3.0
+"""Share of half a contact over which friction builds up, from the middle."""
 
 
 @effect(
-    "tread_friction", stage="strain", unit="1", low=0.0, high=0.15, varies_with=("load",),
-    source="dissertation, chapter 7, Fig. 7-3; law of tirelib.strain.tread_traction",
+    "tread_friction", stage="strain", unit="1", low=-0.05, high=0.5, components=2,
+    varies_with=("load",),
+    source="dissertation, chapter 7, Fig. 7-3; on the ring as well (assumed form)",
 )  # fmt: skip
-def tread_friction(state: State, strength: float) -> State:
-    """Outward shear of the tread, held by the road, compresses the innerliner in the contact.
+def tread_friction(state: State, strength: Sequence[float]) -> State:
+    """Outward shear of the tread, held by the road, compresses the belt in the contact.
 
-    tau = sgn(x) min(k_Gt g |x|, mu q), g = (R0 - R) / R, k_Gt = k_t / 3, mu = 1, bends the flat
-    piece about the lever R0 - R. s = 1 is a beam whose sections turn freely; the road holds most.
+    s_1 q clip(3 xi, -1, 1), xi from -1 at the leading to 1 at the trailing edge, pulls the ring and
+    turns its sections about the lever R0 - R. s_2 sgn(x) min(k_Gt g |x|, q), g = (R0 - R) / R,
+    bends the flat piece by itself; s_2 = 1 is a beam whose sections turn freely.
     """
     c = state.contact
-    x = state.radius[:, None] * (c.phi - c.edges.mean(axis=1)[:, None])
-    grip = SHEAR * state.k_t * (state.free_radius / state.radius - 1.0)
-    shear = np.sign(x) * np.minimum(grip[:, None] * np.abs(x), FRICTION * c.pressure)
-    return state.but(strain=state.strain + strength * beam_strain(state, balanced(c, shear)))
+    pull = balanced(c, strength[0] * c.pressure * np.clip(along(c) / BUILT_UP, -1.0, 1.0))
+    bent = beam_strain(state, balanced(c, strength[1] * held_shear(state)))
+    after = sheared(state, pull)
+    more = strain_harmonics(after.belt - state.belt, state.radius, state.offset)
+    return after.but(strain=state.strain + more + bent)

@@ -1,10 +1,12 @@
 """An extension as JSON (``tirelib-extension/1``)."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tirelib.diagnose.held_out import pooled
 from tirelib.extend.extension import Extension
 from tirelib.extend.model_file import plain
+from tirelib.extend.step import Step
 from tirelib.parameters import TireFile
 from tirelib.units import from_si
 
@@ -18,16 +20,43 @@ _TOLD = {"load": ("N", "force"), "pressure": ("bar", "pressure")}
 
 def extension_document(done: Extension, file: TireFile) -> dict[str, Any]:
     """Return the numbers of an extension and the history of the model that came out."""
-    factor = done.unit.factor
     messages = [] if done.unit.known else [NO_REPEATS]
     if not done.folds:
         messages.append(
             "nothing can be held out: three loads or two pressures, and four other runs, are needed"
         )
+    held_out = [
+        {
+            "condition": fold.name,
+            "value": float(from_si(fold.value, *_TOLD[fold.name])),
+            "unit": _TOLD[fold.name][0],
+            "runs": int(fold.out.sum()),
+            "error_before": old,
+            "error_after": new,
+        }
+        for fold, old, new in zip(done.folds, done.held_before, done.held_after, strict=True)
+    ]
+    head = {
+        "campaign": done.runs.waves.header.name, "quantity": "strain",
+        "noise": 1e6 * done.unit.noise, "error_unit": done.unit.name,
+        "error_before": done.unit.factor * done.before.error,
+        "error_after": done.unit.factor * done.after.error, "floor": done.floor,
+        "heldout_error_before": pooled(done.held_before, done.folds),
+        "heldout_error_after": pooled(done.held_after, done.folds),
+    }  # fmt: skip
+    return step_document(done, file, head, held_out, messages)
+
+
+def step_document(
+    done: Step[Any],
+    file: TireFile,
+    head: Mapping[str, Any],
+    held_out: Sequence[Mapping[str, Any]],
+    messages: Sequence[str],
+) -> dict[str, Any]:
+    """Return ``tirelib-extension/1``: what every step tells, beside its own numbers."""
     return {
         "format": FORMAT,
-        "campaign": done.runs.waves.header.name,
-        "quantity": "strain",
         "action": done.action,
         "effect": done.effect.name,
         "title": done.effect.title,
@@ -37,28 +66,12 @@ def extension_document(done: Extension, file: TireFile) -> dict[str, Any]:
         "range": [done.effect.low, done.effect.high],
         "in_range": "out_of_range" not in done.flags,
         "flags": list(done.flags),
-        "noise": 1e6 * done.unit.noise,
-        "error_unit": done.unit.name,
-        "error_before": factor * done.before.error,
-        "error_after": factor * done.after.error,
-        "floor": done.floor,
-        "heldout_error_before": pooled(done.held_before, done.folds),
-        "heldout_error_after": pooled(done.held_after, done.folds),
-        "held_out": [
-            {
-                "condition": fold.name,
-                "value": float(from_si(fold.value, *_TOLD[fold.name])),
-                "unit": _TOLD[fold.name][0],
-                "runs": int(fold.out.sum()),
-                "error_before": old,
-                "error_after": new,
-            }
-            for fold, old, new in zip(done.folds, done.held_before, done.held_after, strict=True)
-        ],
+        **head,
+        "held_out": list(held_out),
         "effects": list(file.extra["effects"]),
         "history": [
             {key: value for key, value in entry.items() if key != "before"}
             for entry in file.extra["history"]
         ],
-        "messages": messages,
+        "messages": list(messages),
     }

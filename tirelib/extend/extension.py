@@ -1,4 +1,4 @@
-"""One effect more or less: both models fitted to the campaign, and judged on runs left out."""
+"""One effect of strain more or less: the model fitted to the straight runs, judged on others."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -7,57 +7,32 @@ from difflib import get_close_matches
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.compare.model import Model, UsedEffect
+from tirelib.compare.model import Model
 from tirelib.diagnose.candidates import IN_BASE, candidates
 from tirelib.diagnose.floor import FLOOR_MEMBERS, ErrorUnit, structural_floor
 from tirelib.diagnose.held_out import Fold, folds, held_out_errors
 from tirelib.diagnose.refit import Refit, refit
 from tirelib.effects import Effect
-from tirelib.errors import CalibrationError, ParameterError
+from tirelib.errors import ParameterError
+from tirelib.extend.step import Step, added, removed
 from tirelib.identify.campaign_data import StraightRuns
-from tirelib.identify.waveform_fit import Data
 
 START_INSIDE = 0.9
 """Share of the range within which a refit starts."""
-SIGNIFICANT = 2.0
-"""Standard deviations below which a strength is no different from zero."""
 
 
-@dataclass(frozen=True, slots=True)
-class Extension:
-    """A model before and after an effect was added or removed, both fitted.
+@dataclass(frozen=True, eq=False)
+class Extension(Step[Refit]):
+    """A step of a model of strain.
 
     Attributes
     ----------
-    action : str
-        add or remove.
-    effect : Effect
-    strength, std : shape (components,)
-        With the effect, in its unit.
-    before, after : Refit
     unit : ErrorUnit
-    floor : float
-        Error that the structure of the ring leaves, in `unit`.
-    folds : tuple of Fold
-    held_before, held_after : tuple of float
-        Errors on left-out runs, one per fold.
-    flags : tuple of str
-        out_of_range, not_significant, no_gain, heldout_worse.
+        Of floor and held-out errors.
     runs : StraightRuns
     """
 
-    action: str
-    effect: Effect
-    strength: FloatArray
-    std: FloatArray
-    before: Refit
-    after: Refit
     unit: ErrorUnit
-    floor: float
-    folds: tuple[Fold, ...]
-    held_before: tuple[float, ...]
-    held_after: tuple[float, ...]
-    flags: tuple[str, ...]
     runs: StraightRuns
 
 
@@ -89,18 +64,8 @@ def add_effect(
     ConvergenceError
         If a fit does not settle.
     """
-    used = strain_effects(model)
-    _allowed(effect, model)
-    data = runs.data(with_deflection=False)
-    before = _fitted(data, model, used, progress)
-    start = _start(data, before, effect)
-    after = refit(
-        data, before.values, [*before.effects, effect], [*before.strengths, start],
-        progress=progress,
-    )  # fmt: skip
-    index = len(after.effects) - 1
-    strength, std = after.strengths[index], after.strength_std(index)
-    return _judged("add", effect, strength, std, before, after, data, runs, members, progress)
+    subject = _Strain(runs, model, progress, members)
+    return subject.extension(added(subject, effect))
 
 
 def remove_effect(
@@ -115,28 +80,8 @@ def remove_effect(
 
     Parameters and errors as for `add_effect`.
     """
-    used = strain_effects(model)
-    names = [each.effect.name for each in used]
-    if effect.name not in names:
-        raise ParameterError(
-            f"{model.name}: it has no effect {effect.name!r} of strain to remove; it has "
-            f"{', '.join(names) or 'none'}"
-        )
-    data = runs.data(with_deflection=False)
-    before = _fitted(data, model, used, progress)
-    index = names.index(effect.name)
-    kept = [k for k in range(len(names)) if k != index]
-    after = refit(
-        data, before.values, [before.effects[k] for k in kept],
-        [before.strengths[k] for k in kept], progress=progress,
-    )  # fmt: skip
-    strength, std = before.strengths[index], before.strength_std(index)
-    return _judged("remove", effect, strength, std, before, after, data, runs, members, progress)
-
-
-def strain_effects(model: Model) -> list[UsedEffect]:
-    """Return a model's effects that strain shows; those of the brush are not among them."""
-    return [each for each in model.used if each.effect.hook != "brush"]
+    subject = _Strain(runs, model, progress, members)
+    return subject.extension(removed(subject, effect))
 
 
 def known_effect(name: str, catalogue: Mapping[str, Effect]) -> Effect:
@@ -154,82 +99,85 @@ def known_effect(name: str, catalogue: Mapping[str, Effect]) -> Effect:
     raise ParameterError(f"effect {name!r} is not known; {hint}")
 
 
-def _allowed(effect: Effect, model: Model) -> None:
-    if effect.name in {each.effect.name for each in model.used}:
-        raise ParameterError(
-            f"{model.name}: it has the effect {effect.name!r} already; choose another one, or "
-            "take it out first with --remove"
+class _Strain:
+    """A model of strain on straight runs (`tirelib.extend.step.Subject`)."""
+
+    acts_on = "strain"
+
+    def __init__(
+        self,
+        runs: StraightRuns,
+        model: Model,
+        progress: Callable[[str], None] | None,
+        members: int,
+    ) -> None:
+        self.runs, self.model, self.progress, self.members = runs, model, progress, members
+        self.name = model.name
+        self.used = [each for each in model.used if each.effect.hook != "brush"]
+        self.data = runs.data(with_deflection=False)
+        self.unit = ErrorUnit.of(runs, self.data)
+
+    def extension(self, step: Step[Refit]) -> Extension:
+        """Return a step with its runs."""
+        return Extension(**vars(step), unit=self.unit, runs=self.runs)
+
+    @property
+    def effects(self) -> list[Effect]:
+        """That the model has and strain shows."""
+        return [each.effect for each in self.used]
+
+    def refuse(self, effect: Effect) -> None:
+        """Raise ParameterError if the base fits an effect, or it is one of the brush."""
+        if effect.name in IN_BASE:
+            raise ParameterError(
+                f"effect {effect.name!r}: the base model has it as a fitted number; choose another "
+                "one"
+            )
+        if effect.hook == "brush":
+            raise ParameterError(
+                f"effect {effect.name!r} acts on the brush, which strain does not show; choose an "
+                "effect of another stage"
+            )
+
+    def fitted(self) -> Refit:
+        """Return the model as it is, fitted."""
+        strengths = [np.atleast_1d(np.asarray(x.strength, dtype=float)) for x in self.used]
+        return refit(self.data, self.model.values, self.effects, strengths, progress=self.progress)
+
+    def dead(self, before: Refit, effect: Effect) -> str:
+        """Return why the runs cannot show an effect, or an empty text."""
+        return candidates(self.data, before, [effect]).dead.get(effect.name, "")
+
+    def with_effect(self, before: Refit, effect: Effect) -> Refit:
+        """Return the fit with one effect more, from what serves best to first order."""
+        own = candidates(self.data, before, [effect]).living[0].own
+        rest = before.whiten(self.data.strain - before.waveform).ravel()
+        weights = np.linalg.lstsq(own.T, rest, rcond=None)[0]
+        start: FloatArray = np.clip(
+            weights * effect.scale, START_INSIDE * effect.low, START_INSIDE * effect.high
         )
-    if effect.name in IN_BASE:
-        raise ParameterError(
-            f"effect {effect.name!r}: the base model has it as a fitted number; choose another one"
+        return refit(
+            self.data, before.values, [*before.effects, effect], [*before.strengths, start],
+            progress=self.progress,
+        )  # fmt: skip
+
+    def without(self, before: Refit, kept: Sequence[int]) -> Refit:
+        """Return the fit with some of the effects."""
+        return refit(
+            self.data, before.values, [before.effects[k] for k in kept],
+            [before.strengths[k] for k in kept], progress=self.progress,
+        )  # fmt: skip
+
+    def left_out(self) -> Sequence[Fold]:
+        """Return the runs that are left out in turn."""
+        return folds(self.data)
+
+    def held_out(self, fit: Refit, left: Sequence[Fold]) -> tuple[float, ...]:
+        """Return the errors on left-out runs."""
+        return held_out_errors(self.data, fit, tuple(left), self.unit, progress=self.progress)
+
+    def floor(self, after: Refit) -> float:
+        """Return the error that the structure of the ring leaves."""
+        return structural_floor(
+            self.data, after, self.unit, members=self.members, progress=self.progress
         )
-    if effect.hook == "brush":
-        raise ParameterError(
-            f"effect {effect.name!r} acts on the brush, which strain does not show; choose an "
-            "effect of another stage"
-        )
-
-
-def _fitted(
-    data: Data,
-    model: Model,
-    used: Sequence[UsedEffect],
-    progress: Callable[[str], None] | None,
-) -> Refit:
-    strengths = [np.atleast_1d(np.asarray(each.strength, dtype=float)) for each in used]
-    return refit(data, model.values, [each.effect for each in used], strengths, progress=progress)
-
-
-def _start(data: Data, before: Refit, effect: Effect) -> FloatArray:
-    """Return the strength that serves best to first order, within the range.
-
-    Raises
-    ------
-    CalibrationError
-        If the plan shows nothing of the effect.
-    """
-    found = candidates(data, before, [effect])
-    if effect.name in found.dead:
-        raise CalibrationError(
-            f"effect {effect.name!r}: this campaign cannot show it: {found.dead[effect.name]}; "
-            "measure such runs, or leave the effect out"
-        )
-    own = found.living[0].own
-    rest = before.whiten(data.strain - before.waveform).ravel()
-    weights = np.linalg.lstsq(own.T, rest, rcond=None)[0]
-    start: FloatArray = np.clip(
-        weights * effect.scale, START_INSIDE * effect.low, START_INSIDE * effect.high
-    )
-    return start
-
-
-def _judged(
-    action: str,
-    effect: Effect,
-    strength: FloatArray,
-    std: FloatArray,
-    before: Refit,
-    after: Refit,
-    data: Data,
-    runs: StraightRuns,
-    members: int,
-    progress: Callable[[str], None] | None,
-) -> Extension:
-    unit, chosen = ErrorUnit.of(runs, data), folds(data)
-    floor = structural_floor(data, after, unit, members=members, progress=progress)
-    held_before = held_out_errors(data, before, chosen, unit, progress=progress)
-    held_after = held_out_errors(data, after, chosen, unit, progress=progress)
-    flags = []
-    if ((strength < effect.low) | (strength > effect.high)).any():
-        flags.append("out_of_range")
-    if (np.abs(strength) < SIGNIFICANT * std).all():
-        flags.append("not_significant")
-    if action == "add" and after.error >= before.error * (1.0 - 1e-6):
-        flags.append("no_gain")
-    if any(new > old for new, old in zip(held_after, held_before, strict=True)):
-        flags.append("heldout_worse")
-    return Extension(
-        action, effect, strength, std, before, after, unit, floor, chosen, held_before,
-        held_after, tuple(flags), runs,
-    )  # fmt: skip

@@ -9,7 +9,7 @@ from tirelib import __version__
 from tirelib.diagnose.forces.document import fold_entry
 from tirelib.diagnose.forces.held_out import pooled
 from tirelib.errors import FormatError
-from tirelib.extend.document import FORMAT
+from tirelib.extend.document import step_document
 from tirelib.extend.force_extension import ForceExtension
 from tirelib.extend.model_file import plain, written
 from tirelib.identify.brush_model import STORED, stored_number
@@ -19,7 +19,7 @@ from tirelib.parameters.tire import range_fault
 
 def force_extension_document(done: ForceExtension, file: TireFile) -> dict[str, Any]:
     """Return the numbers of an extension and the history of the model that came out."""
-    case, factor = done.case, done.case.factor
+    case = done.case
     messages = list(case.messages)
     if case.unit != "noise":
         messages.append(
@@ -28,37 +28,27 @@ def force_extension_document(done: ForceExtension, file: TireFile) -> dict[str, 
         )
     if not any(fold.main for fold in done.folds):
         messages.append("nothing can be held out: too few conditions vary")
-    return {
-        "format": FORMAT,
-        "campaign": case.name,
-        "quantity": case.quantity,
-        "action": done.action,
-        "effect": done.effect.name,
-        "title": done.effect.title,
-        "strength": plain(done.strength),
-        "std": plain(done.std),
-        "unit": done.effect.unit,
-        "range": [done.effect.low, done.effect.high],
-        "in_range": "out_of_range" not in done.flags,
-        "flags": list(done.flags),
-        "noise": case.noise,
-        "error_unit": case.unit,
-        "error_before": factor * done.before.error,
-        "error_after": factor * done.after.error,
-        "floor": factor * done.floor,
-        "heldout_error_before": factor * pooled(done.held_before, done.folds),
-        "heldout_error_after": factor * pooled(done.held_after, done.folds),
-        "held_out": [
-            fold_entry(fold, factor * old, factor * new)
-            for fold, old, new in zip(done.folds, done.held_before, done.held_after, strict=True)
-        ],
-        "effects": list(file.extra["effects"]),
-        "history": [
-            {key: value for key, value in entry.items() if key != "before"}
-            for entry in file.extra["history"]
-        ],
-        "messages": messages,
+    held_out = [
+        fold_entry(fold, case.factor * old, case.factor * new)
+        for fold, old, new in zip(done.folds, done.held_before, done.held_after, strict=True)
+    ]
+    head = {
+        "campaign": case.name, "quantity": case.quantity, "noise": case.noise,
+        "error_unit": case.unit, **_errors(done),
+    }  # fmt: skip
+    return step_document(done, file, head, held_out, messages)
+
+
+def _errors(done: ForceExtension) -> dict[str, float]:
+    """Return the errors of a step as they are told."""
+    errors = {
+        "error_before": done.before.error,
+        "error_after": done.after.error,
+        "floor": done.floor,
+        "heldout_error_before": pooled(done.held_before, done.folds),
+        "heldout_error_after": pooled(done.held_after, done.folds),
     }
+    return {name: done.case.factor * error for name, error in errors.items()}
 
 
 def force_extended_file(file: TireFile, done: ForceExtension, data_hash: str) -> TireFile:
@@ -99,16 +89,9 @@ def force_extended_file(file: TireFile, done: ForceExtension, data_hash: str) ->
 
 
 def _entry(file: TireFile, done: ForceExtension, data_hash: str) -> dict[str, Any]:
-    case, factor = done.case, done.case.factor
+    case = done.case
     # an error without noise is in another unit, under another name
     suffix = "" if case.unit == "noise" else f"_{case.unit}"
-    errors = {
-        "error_before": factor * done.before.error,
-        "error_after": factor * done.after.error,
-        "floor": factor * done.floor,
-        "heldout_error_before": factor * pooled(done.held_before, done.folds),
-        "heldout_error_after": factor * pooled(done.held_after, done.folds),
-    }
     names = [STORED[name] for name in done.after.names]
     return {
         "action": done.action,
@@ -117,7 +100,7 @@ def _entry(file: TireFile, done: ForceExtension, data_hash: str) -> dict[str, An
         "strength": plain(done.strength),
         "std": plain(done.std),
         "unit": done.effect.unit,
-        **{f"{name}{suffix}": value for name, value in errors.items() if np.isfinite(value)},
+        **{f"{name}{suffix}": value for name, value in _errors(done).items() if np.isfinite(value)},
         "campaign": case.name,
         "data_sha256": data_hash,
         "tirelib": __version__,

@@ -5,8 +5,10 @@ alone, the derivative at zero is finite, alive and linear, the whole range can b
 effect looks the same, and a planted strength is found again beside the base model's parameters.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.linalg import subspace_angles
@@ -14,14 +16,12 @@ from scipy.linalg import subspace_angles
 from tirelib.arrays import FloatArray
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.effects.effect import Strength
-from tirelib.errors import ParameterError, TirelibError
-from tirelib.model.base import FREE, linearised, move, predict, values_of
-from tirelib.model.chain import Change, Changes
-from tirelib.model.state import Operating, State
+from tirelib.effects.load import all_effects
+from tirelib.errors import FormatError, TirelibError
+from tirelib.model.brush_bench import BrushBench
+from tirelib.model.strain_bench import Plan, StrainBench, reference_plan
 from tirelib.parameters import Tire, read_tire
 
-DEAD = 1e-7
-"""Rms strain below which an effect at the end of its range is dead, [-]."""
 TWIN = 30.0
 """Angle below which two effects are twins, [deg]."""
 LINEAR = 0.02
@@ -29,62 +29,6 @@ LINEAR = 0.02
 RECOVERY = 0.2
 """Relative error of a planted strength that is found again."""
 _STEPS = 8
-_SIDE = 0.06
-
-
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """Operating points on which effects are compared.
-
-    Attributes
-    ----------
-    points : Operating
-    lateral : shape (n_points,), [m]
-        Gage of each point, left positive.
-    """
-
-    points: Operating
-    lateral: FloatArray
-
-    def changes(self, *more: tuple[str, Change]) -> Changes:
-        """Return changes that put the gages in place, then others; points may be repeated."""
-
-        def place(state: State) -> State:
-            return state.but(lateral=np.resize(self.lateral, len(state.conditions)))
-
-        return [("constants", place), *more]
-
-
-def reference_plan(tire: Tire) -> Plan:
-    """Return 5 loads x 3 pressures x 4 speeds of free rolling, and slip and camber at the sides."""
-    grid = np.meshgrid(
-        [1500.0, 2750.0, 4000.0, 5250.0, 6500.0], [1.6e5, 2.1e5, 2.6e5], [5.0, 15.0, 25.0, 35.0],
-        indexing="ij",
-    )  # fmt: skip
-    # six runs with slip angle, camber or slip ratio, each seen by the left and the right gage
-    slip = np.deg2rad([3.0, -3.0, 0.0, 0.0, 0.0, 0.0])
-    camber = np.deg2rad([0.0, 0.0, 4.0, -4.0, 0.0, 0.0])
-    ratio = np.array([0.0, 0.0, 0.0, 0.0, 0.03, -0.03])
-    twice = [np.repeat(column, 2) for column in (slip, camber, ratio)]
-    loads = np.tile([3000.0, 3000.0, 5000.0, 5000.0], 3)
-    load = np.concatenate([grid[0].ravel(), loads])
-    speed = np.concatenate([grid[2].ravel(), np.full(12, 15.0)])
-    alpha, gamma, kappa = (np.concatenate([np.zeros(60), column]) for column in twice)
-    n = load.size
-    points = Operating(
-        load=load,
-        pressure=np.concatenate([grid[1].ravel(), np.full(12, 2.1e5)]),
-        omega=speed / tire.ring_radius,
-        speed=speed,
-        camber=gamma,
-        slip_angle=alpha,
-        slip_ratio=kappa,
-        side_force=-load * (10.0 * alpha - 0.5 * gamma),
-        drive_force=load * 15.0 * kappa,
-        order=(np.arange(n) * 29 % n) / (n - 1.0),
-        temperature=np.full(n, np.nan),
-    )
-    return Plan(points, np.concatenate([np.zeros(60), np.tile([-_SIDE, _SIDE], 6)]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,42 +77,42 @@ def register(
     Parameters
     ----------
     effect : Effect
-        Of the strain chain; `others` may hold it.
+        Of the strain chain or the brush; `others` may hold it.
     others : mapping
         Effects to compare it with.
     tire : Tire
         Table 6-1 of the dissertation if none is given.
     plan : Plan
-        `reference_plan` if none is given.
-
-    Raises
-    ------
-    ParameterError
-        If the effect belongs to the brush.
+        `reference_plan` if none is given. Effects of the brush have their own
+        (`tirelib.model.brush_bench`).
     """
+    bench: Bench
     if effect.hook == "brush":
-        raise ParameterError(
-            f"effect {effect.name!r}: stage brush does not act on strain; check it with the brush"
-        )
-    tire = tire or read_tire("table-6-1").tire
-    bench = _Bench(tire, plan or reference_plan(tire))
+        bench = BrushBench()
+    else:
+        tire = tire or read_tire("table-6-1").tire
+        bench = StrainBench(tire, plan or reference_plan(tire))
+    return _registered(effect, others, bench)
+
+
+def _registered(effect: Effect, others: Mapping[str, Effect], bench: "Bench") -> Registration:
     where = f"effect {effect.name!r}, {effect.origin}"
     try:
         faults = [f"{where}: {fault}" for fault in _law_faults(effect, bench)]
-        tangents = bench.tangents(effect)
+        tangents = _tangents(effect, bench)
     except TirelibError as error:
         text = str(error)
         return _refused(effect, text if effect.name in text else f"{where}: {text}")
     signature = float(np.sqrt(np.mean(tangents**2)))
     if effect.untestable:
         return Registration(effect, tuple(faults), signature, 0.0, (), np.nan, np.nan)
-    if signature < DEAD:
+    if signature < bench.dead:
         return _refused(
             effect,
-            f"{where}: has no influence on the strain (rms {1e6 * signature:.2g} ustrain at "
-            f"{effect.toward:g} {effect.unit}); correct the law, its stage or its range",
+            f"{where}: has no influence on {bench.words(signature)} at {effect.toward:g} "
+            f"{effect.unit}); correct the law, its stage or its range",
         )
-    rest = bench.beyond_base(tangents)
+    rest = _beyond_base(tangents, bench)
     survives = float(np.linalg.norm(rest) / np.linalg.norm(tangents))
     planted, recovered = (np.nan, np.nan) if faults else _plant(effect, bench)
     if not faults and not abs(recovered - planted) <= RECOVERY * abs(planted):
@@ -184,37 +128,55 @@ def _refused(effect: Effect, fault: str) -> Registration:
     return Registration(effect, (fault,), np.nan, np.nan, (), np.nan, np.nan)
 
 
-class _Bench:
-    """The base model on a plan, and what changes to it do."""
+class Bench(Protocol):
+    """A base model on a plan that varies everything, and what changes to it do.
 
-    def __init__(self, tire: Tire, plan: Plan) -> None:
-        self.values = values_of(tire)
-        self.plan = plan
-        linear = linearised(self.values, plan.points, FREE, plan.changes())
-        self.base = linear.waveform
-        slopes = linear.waveform_slopes.reshape(len(FREE), -1)
-        self.basis = np.linalg.qr((slopes / np.linalg.norm(slopes, axis=1)[:, None]).T)[0]
+    Attributes
+    ----------
+    base : shape (...)
+        What it predicts without any change.
+    basis : shape (n, n_free)
+        Orthonormal, spans what the base model's parameters can do.
+    dead : float
+        Rms change at the end of its range below which an effect is dead.
+    """
 
-    def waveform(self, *changes: tuple[str, Change]) -> FloatArray:
-        """Return the waveform with changes."""
-        state = predict(self.values, self.plan.points, self.plan.changes(*changes))
-        return state.wave
+    base: FloatArray
+    basis: FloatArray
+    dead: float
 
-    def tangents(self, effect: Effect) -> FloatArray:
-        """Return derivatives at zero times the end of the range, (components, points x angles)."""
-        rows = [
-            (self.waveform(effect.at(trial)) - self.base).ravel() * (effect.toward / effect.step)
-            for trial in effect.trials
-        ]
-        return np.stack(rows)
+    def acts(self, effect: Effect) -> bool:
+        """Whether an effect is one of this chain."""
 
-    def beyond_base(self, rows: FloatArray) -> FloatArray:
-        """Return what the base model's parameters cannot imitate."""
-        out: FloatArray = rows - (rows @ self.basis) @ self.basis.T
-        return out
+    def waveform(self, *changes: Any) -> FloatArray:
+        """Return what the model predicts with changes, shaped as `base`."""
+
+    def slopes(self, z: FloatArray, *changes: Any) -> tuple[FloatArray, FloatArray]:
+        """Return the prediction with parameters moved by z, and its slopes by them."""
+
+    def moved(self, z: FloatArray, *changes: Any) -> FloatArray:
+        """Return the prediction with parameters moved by z and changes."""
+
+    def words(self, size: float) -> str:
+        """Say on what an effect has no influence, and how small it is."""
 
 
-def _law_faults(effect: Effect, bench: _Bench) -> list[str]:
+def _tangents(effect: Effect, bench: Bench) -> FloatArray:
+    """Return derivatives at zero times the end of the range, (components, n)."""
+    rows = [
+        (bench.waveform(effect.at(trial)) - bench.base).ravel() * (effect.toward / effect.step)
+        for trial in effect.trials
+    ]
+    return np.stack(rows)
+
+
+def _beyond_base(rows: FloatArray, bench: Bench) -> FloatArray:
+    """Return what the base model's parameters cannot imitate."""
+    out: FloatArray = rows - (rows @ bench.basis) @ bench.basis.T
+    return out
+
+
+def _law_faults(effect: Effect, bench: Bench) -> list[str]:
     """Return which laws of an effect are broken, in words."""
     faults = []
     for k, trial in enumerate(effect.trials):
@@ -230,7 +192,7 @@ def _law_faults(effect: Effect, bench: _Bench) -> list[str]:
         whole = bench.waveform(effect.at(trial)) - bench.base
         half = bench.waveform(effect.at(effect.along(k, 0.5 * effect.step))) - bench.base
         size = float(np.sqrt(np.mean(whole**2)))
-        if size > DEAD * effect.step / effect.toward:
+        if size > bench.dead * effect.step / effect.toward:
             off = float(np.sqrt(np.mean((2.0 * half - whole) ** 2))) / size
             if off > LINEAR:
                 faults.append(
@@ -245,21 +207,21 @@ def _law_faults(effect: Effect, bench: _Bench) -> list[str]:
                 faults.append(f"cannot be computed at {end:g} {effect.unit}: {error}")
             else:
                 if not np.isfinite(wave).all():
-                    faults.append(f"the strain is not finite at {end:g} {effect.unit}")
+                    faults.append(f"what is predicted is not finite at {end:g} {effect.unit}")
     return list(dict.fromkeys(faults))
 
 
-def _altered(effect: Effect, trial: Strength, bench: _Bench) -> list[str]:
+def _altered(effect: Effect, trial: Strength, bench: Bench) -> list[str]:
     """Return fields of its argument that a law changes in place."""
     names: list[str] = []
 
-    def watched(state: State) -> State:
+    def watched(state: Any) -> Any:
         before = {
             field.name: value.copy()
-            for field in fields(State)
+            for field in fields(type(state))
             if isinstance(value := getattr(state, field.name), np.ndarray)
         }
-        after: State = effect.at(trial)[1](state)
+        after = effect.at(trial)[1](state)
         names.extend(
             name
             for name, value in before.items()
@@ -277,13 +239,13 @@ def _altered(effect: Effect, trial: Strength, bench: _Bench) -> list[str]:
 
 
 def _twins(
-    effect: Effect, rest: FloatArray, others: Mapping[str, Effect], bench: _Bench
+    effect: Effect, rest: FloatArray, others: Mapping[str, Effect], bench: Bench
 ) -> tuple[tuple[str, float], ...]:
     found = []
     for other in others.values():
-        if other.name == effect.name or other.hook == "brush" or other.untestable:
+        if other.name == effect.name or not bench.acts(other) or other.untestable:
             continue
-        rows = bench.beyond_base(bench.tangents(other))
+        rows = _beyond_base(_tangents(other, bench), bench)
         if not np.any(rows):
             continue
         angle = float(np.rad2deg(subspace_angles(rest.T, rows.T).min()))
@@ -292,7 +254,7 @@ def _twins(
     return tuple(sorted(found, key=lambda pair: pair[1]))
 
 
-def _plant(effect: Effect, bench: _Bench) -> tuple[float, float]:
+def _plant(effect: Effect, bench: Bench) -> tuple[float, float]:
     """Return a planted strength and what Gauss-Newton finds beside the base parameters."""
     trials = []
     for k in range(effect.components):
@@ -305,18 +267,15 @@ def _plant(effect: Effect, bench: _Bench) -> tuple[float, float]:
     return max(trials, key=lambda pair: np.nan_to_num(abs(pair[1] - pair[0]), nan=np.inf))
 
 
-def _recover(effect: Effect, component: int, data: FloatArray, bench: _Bench) -> float:
-    strength, z = 0.0, np.zeros(len(FREE))
+def _recover(effect: Effect, component: int, data: FloatArray, bench: Bench) -> float:
+    strength, z = 0.0, np.zeros(bench.basis.shape[1])
     for _ in range(_STEPS):
-        values = move(bench.values, z)
-        change = effect.at(effect.along(component, strength))
-        linear = linearised(values, bench.plan.points, FREE, bench.plan.changes(change))
+        here, slopes = bench.slopes(z, effect.at(effect.along(component, strength)))
         trial = effect.at(effect.along(component, strength + effect.step))
-        moved = predict(values, bench.plan.points, bench.plan.changes(trial)).wave
-        slope = (moved - linear.waveform) / effect.step
-        columns = np.stack([*linear.waveform_slopes, slope]).reshape(len(FREE) + 1, -1)
+        slope = (bench.moved(z, trial) - here).ravel() / effect.step
+        columns = np.concatenate([slopes, slope[None]])
         norm = np.linalg.norm(columns, axis=1)
-        rest = (data - linear.waveform).ravel()
+        rest = (data - here).ravel()
         step = np.linalg.lstsq((columns / norm[:, None]).T, rest, rcond=1e-10)[0] / norm
         z = z + np.clip(step[:-1], -0.5, 0.5)
         new = float(np.clip(strength + step[-1], effect.low, effect.high))
@@ -325,3 +284,27 @@ def _recover(effect: Effect, component: int, data: FloatArray, bench: _Bench) ->
         if done:
             break
     return strength
+
+
+def registered_effects(
+    files: Iterable[Path | str] = (), *, installed: bool = True
+) -> Mapping[str, Effect]:
+    """Return the catalogue with users' effects, each of which has been registered.
+
+    Parameters and errors as for `tirelib.effects.load.all_effects`; also
+
+    Raises
+    ------
+    FormatError
+        If an effect may not take part, with every fault of all.
+    """
+    found = all_effects(files, installed=installed)
+    faults = [
+        fault
+        for name, effect in found.items()
+        if name not in CATALOGUE
+        for fault in register(effect, found).faults
+    ]
+    if faults:
+        raise FormatError(faults)
+    return found

@@ -1,7 +1,6 @@
 """What a rival predicts at runs that nobody has made, and how sure it is there."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -11,83 +10,18 @@ from tirelib.identify.random_effects import SMALLEST_TOLERANCE, angle_slope
 from tirelib.identify.waveform_fit import Data
 from tirelib.model.state import Operating
 from tirelib.model.whole import Whole, solve_whole
-from tirelib.planning.fit import Guess, started
+from tirelib.planning.criterion import Forecast, Noise
+from tirelib.planning.fit import Guess
 from tirelib.planning.rivals import Rival, Trial
-from tirelib.planning.structure import structure_shapes
 
 
-@dataclass(frozen=True, slots=True)
-class Noise:
-    """Random parts of a run's waveform, [-], as white noise that counts as much.
+def noise_of(trial: Trial, repeats: float) -> Noise:
+    """Return the split of a trial's noise; `repeats` is the rms noise between repeated runs.
 
-    Attributes
-    ----------
-    random : float
-        Between repeated runs.
-    staying : float
-        Small-scale misfit of the ring's structure, which repeats do not average.
+    Without repeats (NaN) all of it is taken as random.
     """
-
-    random: float
-    staying: float
-
-    @classmethod
-    def of(cls, trial: Trial, repeats: float) -> "Noise":
-        """Return the split of a trial's noise; `repeats` is the rms noise between repeated runs.
-
-        Without repeats (NaN) all of it is taken as random.
-        """
-        random = min(repeats * trial.spread, trial.noise) if np.isfinite(repeats) else trial.noise
-        return cls(random, float(np.sqrt(trial.noise**2 - random**2)))
-
-
-@dataclass(frozen=True, slots=True)
-class Forecast:
-    """What a rival says of candidate runs.
-
-    Attributes
-    ----------
-    wave : shape (n_points, n_phi), [-]
-        Best guess, structural misfit included.
-    slopes : shape (n_unknowns, n_points, n_phi)
-        By free coordinates and by the misfit.
-    tangents : shape (n_points, n_phi, 4)
-        By set points, gain and angle zero, times their tolerance.
-    covariance : shape (n_unknowns, n_unknowns)
-    """
-
-    wave: FloatArray
-    slopes: FloatArray
-    tangents: FloatArray
-    covariance: FloatArray
-
-    def separation(self, other: FloatArray, noise: Noise, repeats: float) -> FloatArray:
-        """Return the chi-square by which this rival misses waveforms, after it adapts to them.
-
-        d' (S + J C J')^-1 d: S holds noise and set points, over the number of repeats, and what
-        repeats do not average; J C J' is what the present runs leave open of this rival.
-
-        Parameters
-        ----------
-        other : shape (n_points, n_phi), [-]
-        noise : Noise
-        repeats : float
-            Runs at each point.
-
-        Returns
-        -------
-        shape (n_points,), [-]
-        """
-        root = np.linalg.cholesky(self.covariance)
-        open_ = np.einsum("kpn,kj->pnj", self.slopes, root, optimize=True)
-        low = np.concatenate([open_, self.tangents / np.sqrt(repeats)], axis=2)
-        white = noise.staying**2 + noise.random**2 / repeats
-        difference = other - self.wave
-        inside = np.einsum("pnj,pn->pj", low, difference)
-        core = np.einsum("pnj,pnk->pjk", low, low, optimize=True) + white * np.eye(low.shape[2])
-        taken = np.einsum("pj,pj->p", inside, np.linalg.solve(core, inside[..., None])[..., 0])
-        out: FloatArray = (np.sum(difference**2, axis=1) - taken) / white
-        return np.maximum(out, 0.0)
+    random = min(repeats * trial.spread, trial.noise) if np.isfinite(repeats) else trial.noise
+    return Noise(random, float(np.sqrt(trial.noise**2 - random**2)))
 
 
 def forecasts(
@@ -114,14 +48,11 @@ def forecasts(
     """
     base = trial.base
     plain = solve_whole(base.values, points, base.changes, low_pass=data.low_pass)
-    shapes = structure_shapes(
-        base.values, base.changes, data, points, plain.waveform, plain.deflection, trial.barred
-    )
     told = []
     for rival in trial.rivals:
         if progress is not None:
             progress(f"{len(points)} runs with {rival.name}")
-        told.append(_forecast(rival, shapes, data, points, plain))
+        told.append(_forecast(rival, trial.shapes.ahead, data, points, plain))
     return told
 
 
@@ -144,13 +75,8 @@ def _forecast(
     )
 
 
-def possible(trial: Trial, data: Data, points: Operating) -> BoolArray:
-    """Return at which points every rival has a solution (tread not pressed through and so on)."""
-    base = trial.base
-    guesses = [
-        started(base.values, base.effects, base.strengths),
-        *(rival.fitted.guess for rival in trial.rivals),
-    ]
+def possible(guesses: Sequence[Guess], data: Data, points: Operating) -> BoolArray:
+    """Return at which points every guess has a solution (tread not pressed through and so on)."""
     good = np.ones(len(points), dtype=bool)
     for guess in guesses:
         if good.any():

@@ -6,18 +6,18 @@ from typing import Any
 
 import numpy as np
 
+from tirelib.compare.forces import UNITS
+from tirelib.diagnose.forces.assess import ForceCase
+from tirelib.diagnose.forces.fit import fit_force
 from tirelib.diagnose.refit import Refit, refit
 from tirelib.effects import Effect
 from tirelib.identify.waveform_fit import Data
-from tirelib.planning.envelope import LEVELS, WIDER, Envelope
-from tirelib.planning.next_test import RESOLVED, WANTED, NextTest, PairForecast, next_test
-from tirelib.planning.repeats import ENDLESS, gains
-from tirelib.planning.rivals import NOTHING
+from tirelib.planning.criterion import ENDLESS, NOTHING, RESOLVED, WANTED, NextTest, PairForecast
+from tirelib.planning.envelope import AXES, Envelope
+from tirelib.planning.next_test import force_next_test, next_test
+from tirelib.planning.repeats import gains
 from tirelib.planning.suspects import Suspects, suspects_of
-from tirelib.units import to_si
 
-BAR = to_si(1.0, "bar", "pressure")
-KMH = to_si(1.0, "km/h", "speed")
 FORMAT = "tirelib-next-test/1"
 PROMISING = 0.5
 """Chance of ruling a suspect out below which a run is not advised without a warning."""
@@ -38,6 +38,8 @@ class Plan:
     wanted : float
         Separation asked for.
     campaign : str
+    quantity : str
+        strain, or the force.
     """
 
     suspects: Suspects
@@ -45,6 +47,12 @@ class Plan:
     gains: Mapping[str, Mapping[float, float]]
     wanted: float
     campaign: str
+    quantity: str = "strain"
+
+    @property
+    def structure(self) -> str:
+        """What hides effects and does not average out."""
+        return "the structure of the ring" if self.quantity == "strain" else "the brush's shape"
 
 
 def plan_test(
@@ -96,6 +104,47 @@ def plan_test(
     return Plan(suspects, test, gains(test.trial, test.noise), wanted, campaign)
 
 
+def plan_force_test(
+    case: ForceCase,
+    suspects: Suspects,
+    envelope: Envelope | None,
+    *,
+    wanted: float = WANTED,
+    progress: Callable[[str], None] | None = None,
+) -> Plan:
+    """Judge further points of a force for suspects.
+
+    Parameters
+    ----------
+    case : ForceCase
+    suspects : Suspects
+    envelope : Envelope or None
+        On the axes of `tirelib.planning.force_rivals.force_axes`; needed if there are suspects.
+    wanted : float
+        Separation for which repeats are counted.
+    progress : callable, optional
+
+    Raises
+    ------
+    ConvergenceError
+        If the model with undoubted effects cannot be fitted.
+    ParameterError
+        If no point in the envelope has a solution.
+    """
+    if not suspects.effects or envelope is None:
+        return Plan(suspects, None, {}, wanted, case.name, case.quantity)
+    base = fit_force(
+        case.problem, case.model.values, [*case.effects, *(e for e, _ in suspects.beside)],
+        [*case.strengths, *(strength for _, strength in suspects.beside)],
+    )  # fmt: skip
+    test = force_next_test(
+        case, base, suspects.effects, envelope, with_nothing=suspects.with_nothing,
+        progress=progress,
+    )  # fmt: skip
+    again = gains(test.trial, test.noise)
+    return Plan(suspects, test, again, wanted, case.name, case.quantity)
+
+
 def next_test_document(
     told: Mapping[str, Any],
     data: Data,
@@ -141,7 +190,7 @@ def plan_document(plan: Plan) -> dict[str, Any]:
         "format": FORMAT,
         "campaign": plan.campaign,
         "axes": "iso",
-        "quantity": "strain",
+        "quantity": plan.quantity,
         "what": advice(plan),
         "message": advice(plan),
         "between": list(plan.suspects.names),
@@ -174,39 +223,23 @@ def plan_document(plan: Plan) -> dict[str, Any]:
         "repeats": _repeats(plan, test),
         "envelope": _envelope(test.envelope),
         "dropped": test.dropped,
-        "noise_ustrain": {
-            "random": 1e6 * test.noise.random, "structural": 1e6 * test.noise.staying,
-        },
+        **_noise(plan, test),
         "misfit_size": test.trial.size,
     }  # fmt: skip
 
 
-def force_plan_document(told: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the advice of a diagnosis of forces as ``tirelib-next-test/1``, without a table."""
-    advised = told["next_test"]
-    between = list(advised["between"])
-    return {
-        "format": FORMAT,
-        "campaign": told["campaign"],
-        "axes": "iso",
-        "quantity": told["quantity"],
-        "verdict": told["verdict"],
-        "what": advised["what"],
-        "message": advised["what"],
-        "between": between,
-        "why": f"{' and '.join(between)} look alike" if between else "nothing is in doubt",
-        "would_revive": advised["would_revive"],
-        "suspects": [], "left_out": {}, "present": [], "candidates": [], "best": None,
-        "random_median": None, "repeats": None, "envelope": None, "dropped": 0,
-    }  # fmt: skip
+def _noise(plan: Plan, test: NextTest) -> dict[str, Any]:
+    random, staying = test.noise.random, test.noise.staying
+    if plan.quantity == "strain":
+        return {"noise_ustrain": {"random": 1e6 * random, "structural": 1e6 * staying}}
+    unit = UNITS[plan.quantity]
+    return {"noise": {"random": random, "structural": staying, "unit": unit}}
 
 
 def _candidate(test: NextTest, k: int) -> dict[str, Any]:
-    load, pressure, speed = test.points[k]
+    conditions = zip(test.envelope.names, test.points[k], strict=True)
     return {
-        "load_N": float(load),
-        "pressure_bar": float(pressure / BAR),
-        "speed_kmh": float(speed / KMH),
+        **{AXES[name].key: float(AXES[name].told(value)) for name, value in conditions},
         "separation": float(test.score[k]),
         "separation_std": float(2.0 * np.sqrt(test.score[k])),
         "resolves_probability": float(test.probability[k]),
@@ -241,27 +274,14 @@ def _repeats(plan: Plan, test: NextTest) -> dict[str, Any]:
 
 
 def _envelope(envelope: Envelope) -> dict[str, Any]:
-    units = {"load_N": 1.0, "pressure_bar": BAR, "speed_kmh": KMH}
-    ranges = {
-        key: [x / unit for x in getattr(envelope, key.split("_")[0])] for key, unit in units.items()
-    }
+    told = {AXES[name].key: [float(AXES[name].told(x)) for x in ends]
+            for name, ends in envelope.ranges.items()}  # fmt: skip
+    free = [name for name in envelope.names if name not in envelope.declared]
     return {
-        **ranges, "declared": list(envelope.declared),
-        "widened_percent": {k: 100.0 * v for k, v in WIDER.items() if k not in envelope.declared},
-        "levels": dict(LEVELS),
+        **told, "declared": list(envelope.declared),
+        "widened_percent": {name: 100.0 * AXES[name].wider for name in free},
+        "levels": {name: AXES[name].levels for name in envelope.names},
     }  # fmt: skip
-
-
-def run_text(point: np.ndarray) -> str:
-    """Say a run's conditions.
-
-    Examples
-    --------
-    >>> run_text(np.array([4000.0, 2.1e5, 25.0]))
-    '4000 N, 2.1 bar, 90 km/h'
-    """
-    load, pressure, speed = point
-    return f"{load:.0f} N, {pressure / BAR:.3g} bar, {speed / KMH:.0f} km/h"
 
 
 def advice(plan: Plan) -> str:
@@ -289,7 +309,7 @@ def _said(pair: PairForecast) -> str:
 def _advised(plan: Plan, test: NextTest) -> str:
     best, chance = test.points[0], float(test.probability[0])
     pair = test.pairs[test.hardest[0]]
-    where = run_text(best)
+    where = test.envelope.text(best)
     between = " and ".join(name.replace(NOTHING, "no effect") for name in pair.names)
     if chance < PROMISING:
         text = (
@@ -304,7 +324,7 @@ def _advised(plan: Plan, test: NextTest) -> str:
     needed = pair.needed(plan.wanted)
     if needed is None and pair.limit < plan.wanted:
         text += (
-            f"; the structure of the ring limits its separation to {pair.limit:.0f}, repeats do "
+            f"; {plan.structure} limits its separation to {pair.limit:.0f}, repeats do "
             "not help: widen the envelope"
         )
     elif needed is not None and needed > 1:
@@ -322,7 +342,7 @@ def _weak(plan: Plan) -> list[str]:
         elif times == 1:
             said.append(
                 f"{name} stands out from the noise already (chi-square {by[1]:.0f}): what keeps it "
-                "a hint is the structure of the ring, which repeats of the plan do not change"
+                f"a hint is {plan.structure}, which repeats of the plan do not change"
             )
         elif times is not None:
             said.append(

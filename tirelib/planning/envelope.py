@@ -1,19 +1,63 @@
 """The conditions that a rig allows, and a grid of possible runs in them."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.errors import ParameterError
 from tirelib.model.state import Operating
+from tirelib.units import from_si
 
 Range = tuple[float, float]
 
-WIDER: dict[str, float] = {"load": 0.25, "pressure": 0.15, "speed": 0.25}
-"""Share by which the ends of a campaign are moved outward where nothing is declared."""
-LEVELS: dict[str, int] = {"load": 5, "pressure": 3, "speed": 5}
-"""Levels of the grid; a range of one value has one."""
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """A condition that may be set.
+
+    Attributes
+    ----------
+    title, unit, dimension : str
+        How it is told.
+    key : str
+        In JSON.
+    wider : float
+        Share by which the ends of a campaign are moved outward where nothing is declared.
+    levels : int
+        Of the grid; a range of one value has one.
+    positive : bool
+        Whether only positive values make sense.
+    """
+
+    title: str
+    unit: str
+    dimension: str
+    key: str
+    wider: float
+    levels: int
+    positive: bool = True
+
+    def told(self, value: Any) -> Any:
+        """Return SI values in the unit."""
+        return from_si(value, self.unit, self.dimension)
+
+
+AXES: Mapping[str, Axis] = MappingProxyType({
+    "load": Axis("load", "N", "force", "load_N", 0.25, 5),
+    "pressure": Axis("pressure", "bar", "pressure", "pressure_bar", 0.15, 3),
+    "speed": Axis("speed", "km/h", "speed", "speed_kmh", 0.25, 5),
+    "slip_angle": Axis("slip angle", "deg", "angle", "slip_angle_deg", 0.0, 7, False),
+    "slip_ratio": Axis("slip ratio", "1", "ratio", "slip_ratio", 0.0, 7, False),
+    "camber": Axis("camber", "deg", "angle", "camber_deg", 0.0, 2, False),
+    "temperature": Axis("tread temperature", "degC", "temperature", "temperature_degC", 0.0, 2),
+})  # fmt: skip
+"""Every condition that may be planned."""
+STRAIN = ("load", "pressure", "speed")
+"""Those of a straight run."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,76 +66,104 @@ class Envelope:
 
     Attributes
     ----------
-    load : (low, high), [N]
-    pressure : (low, high), [Pa]
-        Gauge.
-    speed : (low, high), [m/s]
+    ranges : mapping of axis to (low, high), SI
+        Pressure is gauge. In the order of the grid's columns.
     declared : tuple of str
-        Which of them somebody gave; the others are the campaign's, widened by `WIDER`.
+        Which of them somebody gave; the others are the campaign's, widened.
     """
 
-    load: Range
-    pressure: Range
-    speed: Range
+    ranges: Mapping[str, Range]
     declared: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         faults = [
             f"{name} {low:.6g} to {high:.6g}"
-            for name in WIDER
-            for low, high in [getattr(self, name)]
-            if not 0.0 < low <= high < np.inf
+            for name, (low, high) in self.ranges.items()
+            if not (-np.inf < low <= high < np.inf) or (AXES[name].positive and low <= 0.0)
         ]
         if faults:
             raise ParameterError(
-                f"envelope, SI: {'; '.join(faults)}; positive numbers are needed, the lower first; "
-                "correct the range"
+                f"envelope, SI: {'; '.join(faults)}; numbers are needed, the lower first, loads, "
+                "pressures and speeds positive; correct the range"
             )
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the axes, in the order of the grid's columns."""
+        return tuple(self.ranges)
+
     @classmethod
-    def of(
-        cls,
-        points: Operating,
-        *,
-        load: Range | None = None,
-        pressure: Range | None = None,
-        speed: Range | None = None,
-    ) -> "Envelope":
+    def of(cls, points: Any, axes: Sequence[str] = STRAIN, **declared: Any) -> "Envelope":
         """Return the declared ranges; else those of measured points, widened.
+
+        Parameters
+        ----------
+        points : Operating or BrushConditions
+        axes : sequence of str
+            That may be set.
+        declared : (low, high) or None
+            By axis, SI.
 
         Raises
         ------
         ParameterError
-            If a range is not in order or not positive; or the campaign does not tell its speeds.
+            If a range is not in order or not positive; the campaign does not tell its speeds or
+            another condition; or a range is given that is no axis of these runs.
         """
-        if not (np.isfinite(points.speed) & (points.speed > 0.0)).all():
-            raise ParameterError(
-                "envelope: the campaign does not tell its speed in every run, so no run at another "
-                "can be foretold; give speed_kmh in runs.csv"
-            )
-        given = {"load": load, "pressure": pressure, "speed": speed}
-        ranges: dict[str, Range] = {}
-        for name, wider in WIDER.items():
-            declared, values = given[name], getattr(points, name)
-            if declared is not None:
-                ranges[name] = declared
-            elif np.isfinite(values).all() and (values > 0.0).all():
-                low, high = float(values.min()), float(values.max())
-                ranges[name] = (low * (1.0 - wider), high * (1.0 + wider))
-            else:
+        given = {name: ends for name, ends in declared.items() if ends is not None}
+        for name in given:
+            if name not in axes:
                 raise ParameterError(
-                    f"envelope: the campaign does not tell its {name} in every run; declare the "
-                    f"range with --{name}-range"
+                    f"envelope: a range of {name.replace('_', ' ')} is declared, which these runs "
+                    f"cannot have; allowed are {', '.join(AXES[n].title for n in axes)}; leave "
+                    "it out"
                 )
-        return cls(**ranges, declared=tuple(name for name, x in given.items() if x is not None))
+        ranges = {name: given.get(name) or _campaigns(points, name) for name in axes}
+        return cls(ranges, tuple(name for name in axes if name in given))
 
     def grid(self) -> FloatArray:
-        """Return all combinations of the levels, (n, 3): load, pressure, speed."""
+        """Return all combinations of the levels, (n, axes)."""
         axes = []
-        for name, count in LEVELS.items():
-            low, high = getattr(self, name)
-            axes.append(np.linspace(low, high, count if high > low else 1))
+        for name, (low, high) in self.ranges.items():
+            axes.append(np.linspace(low, high, AXES[name].levels if high > low else 1))
         return np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")], axis=1)
+
+    def text(self, point: FloatArray) -> str:
+        """Say a run's conditions.
+
+        Examples
+        --------
+        >>> straight = Envelope({"load": (1e3, 5e3), "pressure": (2e5, 2e5), "speed": (5.0, 30.0)})
+        >>> straight.text(np.array([4000.0, 2.1e5, 25.0]))
+        '4000 N, 2.1 bar, 90 km/h'
+        """
+        said = []
+        for name, value in zip(self.names, point, strict=True):
+            axis = AXES[name]
+            number = float(axis.told(value))
+            digits = ".3g" if name in ("pressure", "slip_ratio") else ".0f"
+            digits = ".1f" if axis.dimension == "angle" else digits
+            unit = "" if axis.unit == "1" else f" {axis.unit}"
+            label = f"{axis.title} " if axis.dimension in ("angle", "ratio", "temperature") else ""
+            said.append(f"{label}{number:{digits}}{unit}")
+        return ", ".join(said)
+
+
+def _campaigns(points: Any, name: str) -> Range:
+    """Return the range of measured points, widened."""
+    axis, values = AXES[name], np.asarray(getattr(points, name))
+    if name == "speed" and not (np.isfinite(values) & (values > 0.0)).all():
+        raise ParameterError(
+            "envelope: the campaign does not tell its speed in every run, so no run at another "
+            "can be foretold; give speed_kmh in runs.csv"
+        )
+    if not np.isfinite(values).all() or (axis.positive and not (values > 0.0).all()):
+        raise ParameterError(
+            f"envelope: the campaign does not tell its {axis.title} in every run; declare the "
+            f"range with --{name.replace('_', '-')}-range"
+        )
+    low, high = float(values.min()), float(values.max())
+    return low * (1.0 - axis.wider), high * (1.0 + axis.wider)
 
 
 def operating_at(wanted: FloatArray, present: Operating) -> Operating:

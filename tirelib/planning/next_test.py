@@ -1,116 +1,30 @@
-"""The run that parts suspects best: a profiled T-criterion over a grid of possible runs.
+"""The next test for strain and for forces: rivals, what they foretell, and the judged runs."""
 
-Every suspect is fitted to the present runs. At each possible run each of two rivals in turn is
-taken as true, and the other may adapt within what the present runs leave open of its numbers and of
-the structural misfit (Atkinson and Fedorov's criterion with the parameters integrated out). What it
-still misses, in chi-square, is the separation; the smaller of both directions counts.
-"""
-
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import combinations
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
-from scipy.stats import norm
 
-from tirelib.arrays import FloatArray
+from tirelib.arrays import BoolArray, FloatArray
+from tirelib.diagnose.forces.assess import ForceCase
+from tirelib.diagnose.forces.fit import ForceFit, Problem
 from tirelib.diagnose.refit import Refit
 from tirelib.effects import Effect
 from tirelib.errors import ParameterError, TirelibError
 from tirelib.identify.waveform_fit import Data
-from tirelib.planning.candidate_runs import Forecast, Noise, forecasts, possible
+from tirelib.planning.candidate_runs import forecasts, noise_of, possible
+from tirelib.planning.criterion import NextTest, judged
 from tirelib.planning.envelope import Envelope, operating_at
-from tirelib.planning.rivals import NOTHING, Rival, Trial, try_suspects
-
-RESOLVED = 10.0
-"""Chi-square by which a rival has to be worse to be ruled out."""
-WANTED = 20.0
-"""Separation that one asks for: then at least four runs of five rule a rival out."""
-REPEATS = (1, 2, 3, 4, 6, 8, 12, 16, 24)
-"""Repeats of the best run that are looked at."""
-ENDLESS = 1e6
-"""Repeats that average everything that repeats can average."""
-
-Pair = tuple[str, str]
-
-
-@dataclass(frozen=True, slots=True)
-class PairForecast:
-    """Two rivals, now and at every possible run.
-
-    Attributes
-    ----------
-    names : (str, str)
-    gap : float
-        Chi-square by which the second is worse on the present runs; negative: the first.
-    separation : shape (n,)
-        Expected further chi-square by one run.
-    probability : shape (n,)
-        That one run rules one of them out.
-    repeats : mapping of number to float
-        Separation by so many repeats of the best run.
-    limit : float
-        Separation that no number of repeats exceeds.
-    """
-
-    names: Pair
-    gap: float
-    separation: FloatArray
-    probability: FloatArray
-    repeats: Mapping[int, float]
-    limit: float
-
-    @property
-    def better(self) -> str:
-        """The rival that the present runs like better."""
-        return self.names[0] if self.gap >= 0.0 else self.names[1]
-
-    @property
-    def resolved(self) -> bool:
-        """Whether the present runs rule one of them out."""
-        return abs(self.gap) >= RESOLVED
-
-    def needed(self, wanted: float) -> int | None:
-        """Return the fewest repeats of the best run with a separation, None beyond `REPEATS`."""
-        return next((n for n, reached in self.repeats.items() if reached >= wanted), None)
-
-
-@dataclass(frozen=True, slots=True)
-class NextTest:
-    """The possible runs, judged.
-
-    Attributes
-    ----------
-    envelope : Envelope
-    points : shape (n, 3)
-        Load [N], pressure [Pa] and speed [m/s] of the possible runs, best first.
-    score, probability : shape (n,)
-        Separation of the pair that is hardest there, and mean chance to rule a rival out.
-    hardest : tuple of int
-        Index of that pair, per run.
-    pairs : tuple of PairForecast
-        In the order of the points.
-    trial : Trial
-        The rivals on the present runs, and who is none.
-    dropped : int
-        Possible runs at which a rival has no solution.
-    noise : Noise
-    """
-
-    envelope: Envelope
-    points: FloatArray
-    score: FloatArray
-    probability: FloatArray
-    hardest: tuple[int, ...]
-    pairs: tuple[PairForecast, ...]
-    trial: Trial
-    dropped: int
-    noise: Noise
-
-    @property
-    def open_pairs(self) -> tuple[PairForecast, ...]:
-        """Pairs that the present runs do not part."""
-        return tuple(pair for pair in self.pairs if not pair.resolved)
+from tirelib.planning.fit import started
+from tirelib.planning.force_rivals import (
+    MEMBERS,
+    force_forecasts,
+    points_ahead,
+    structure_rows,
+    try_force_suspects,
+)
+from tirelib.planning.rivals import try_suspects
+from tirelib.planning.structure import Shapes, structure_shapes
 
 
 def next_test(
@@ -143,103 +57,96 @@ def next_test(
     ParameterError
         If no run in the envelope has a solution.
     """
-    trial = try_suspects(data, base, suspects, with_nothing=with_nothing, progress=progress)
-    chosen, random = envelope.grid(), Noise.of(trial, noise)
-    if len(trial.rivals) < 2:
-        empty = np.zeros(0)
-        return NextTest(envelope, np.zeros((0, 3)), empty, empty, (), (), trial, 0, random)
-    points = chosen
+    chosen, plain = envelope.grid(), started(base.values, base.effects, base.strengths)
+    points = chosen[possible([plain], data, operating_at(chosen, data.points))]
+    if not len(points):
+        raise _hopeless(len(chosen))
+    ahead = operating_at(points, data.points)
+    shapes = structure_shapes(data, base, ahead, progress=progress)
+    trial = try_suspects(
+        data, base, suspects, shapes=shapes, with_nothing=with_nothing, progress=progress
+    )
+    random = noise_of(trial, noise)
     try:
-        told = forecasts(trial, data, operating_at(points, data.points), progress=progress)
+        told = forecasts(trial, data, ahead, progress=progress)
     except TirelibError:
-        points = chosen[possible(trial, data, operating_at(chosen, data.points))]
-        if not len(points):
-            raise ParameterError(
-                f"envelope: the model has no solution at any of its {len(chosen)} runs (tread "
-                "pressed through, or too large a patch); lower the loads of --load-range"
-            ) from None
-        told = forecasts(trial, data, operating_at(points, data.points), progress=progress)
-    return _judged(envelope, points, trial, told, len(chosen) - len(points), random)
+        good = possible([rival.fitted.guess for rival in trial.rivals], data, ahead)
+        if not good.any():
+            raise _hopeless(len(chosen)) from None
+        points = points[good]
+        trial = replace(trial, shapes=Shapes(shapes.present, shapes.ahead[:, good]))
+        told = forecasts(trial, data, ahead.take(good), progress=progress)
+    return judged(envelope, points, trial, told, len(chosen) - len(points), random)
 
 
-def _judged(
+def _hopeless(count: int) -> ParameterError:
+    return ParameterError(
+        f"envelope: the model has no solution at any of its {count} runs (tread pressed through, "
+        "or too large a patch); lower the loads of --load-range"
+    )
+
+
+def force_next_test(
+    case: ForceCase,
+    base: ForceFit,
+    suspects: Sequence[tuple[Effect, FloatArray]],
     envelope: Envelope,
-    points: FloatArray,
-    trial: Trial,
-    told: Sequence[Forecast],
-    dropped: int,
-    noise: Noise,
+    *,
+    with_nothing: bool = False,
+    members: int = MEMBERS,
+    seed: int = 0,
+    progress: Callable[[str], None] | None = None,
 ) -> NextTest:
-    """Sort the runs by what they promise."""
-    rivals = trial.rivals
-    pairs = list(combinations(range(len(rivals)), 2))
-    sizes = np.array([_both(rivals, told, pair, noise, 1.0) for pair in pairs])
-    gaps = [rivals[j].cost - rivals[i].cost for i, j in pairs]
-    chances = np.array([resolving(size, gap) for size, gap in zip(sizes, gaps, strict=True)])
-    counted = [k for k, gap in enumerate(gaps) if abs(gap) < RESOLVED] or list(range(len(gaps)))
-    hardest = np.array(counted)[np.argmin(sizes[counted], axis=0)]
-    chance = chances[counted].mean(axis=0)
-    score = sizes[hardest, np.arange(len(points))]
-    order = np.lexsort((-score, -np.round(chance, 3)))
-    best = int(order[0])
-    found = []
-    for pair, size, gap, likely in zip(pairs, sizes, gaps, chances, strict=True):
-        there = [_at(each, best) for each in told]
-        repeated = {n: float(_both(rivals, there, pair, noise, n)[0]) for n in REPEATS}
-        names = (rivals[pair[0]].name, rivals[pair[1]].name)
-        limit = float(_both(rivals, there, pair, noise, ENDLESS)[0])
-        found.append(PairForecast(names, gap, size[order], likely[order], repeated, limit))
-    return NextTest(
-        envelope, points[order], score[order], chance[order], tuple(hardest[order].tolist()),
-        tuple(found), trial, dropped, noise,
-    )  # fmt: skip
+    """Judge further points of a force by how well they part suspects.
 
+    Parameters
+    ----------
+    case : ForceCase
+        The present points.
+    base : ForceFit
+        The model without the suspects, fitted.
+    suspects : sequence of (effect, start strength)
+    envelope : Envelope
+        On the axes of `force_axes`.
+    with_nothing : bool
+        Whether that nothing is missing is a rival too.
+    members, seed : int
+        Of the variants of the brush.
+    progress : callable, optional
 
-def _both(
-    rivals: Sequence[Rival],
-    told: Sequence[Forecast],
-    pair: tuple[int, int],
-    noise: Noise,
-    repeats: float,
-) -> FloatArray:
-    """Return the smaller separation of both directions.
-
-    That nothing is missing is a special case of every effect: only the other direction counts.
+    Raises
+    ------
+    ParameterError
+        If no point in the envelope has a solution.
     """
-    i, j = pair
-    ways = []
-    if rivals[i].name != NOTHING:
-        ways.append(told[j].separation(told[i].wave, noise, repeats))
-    if rivals[j].name != NOTHING:
-        ways.append(told[i].separation(told[j].wave, noise, repeats))
-    smaller: FloatArray = np.min(ways, axis=0)
-    return smaller
+    tell = progress or (lambda label: None)
+    chosen, n = envelope.grid(), len(case.problem)
+    joint = points_ahead(case, envelope, chosen)
+    good = _solvable(joint, base, n)
+    if not good.any():
+        raise _hopeless(len(chosen))
+    points = chosen[good]
+    joint = points_ahead(case, envelope, points)
+    tell("variants of the brush")
+    structure = structure_rows(joint, n, base, members, seed)
+    trial = try_force_suspects(
+        case, base, suspects, structure[:, :n], with_nothing=with_nothing, progress=progress
+    )
+    tell(f"{len(points)} points")
+    ahead = joint.take(np.arange(n, n + len(points)))
+    told = force_forecasts(trial, ahead, structure[:, n:])
+    return judged(envelope, points, trial, told, len(chosen) - len(points), trial.noise)
 
 
-def _at(told: Forecast, index: int) -> Forecast:
-    """Return the forecast of one point."""
-    one = slice(index, index + 1)
-    return Forecast(told.wave[one], told.slopes[:, one], told.tangents[one], told.covariance)
-
-
-def resolving(separation: FloatArray, gap: float) -> FloatArray:
-    """Return the chance that a run of this separation rules one of two rivals out.
-
-    The chi-square between them is normal about gap + separation with variance 4 separation if the
-    first is right, and about gap - separation if the second is. Each is right with the odds that
-    the present runs give.
-
-    Examples
-    --------
-    >>> resolving(np.array([0.0, 10.0, 40.0]), 0.0).round(2).tolist()
-    [0.0, 0.5, 0.99]
-    """
-    spread = 2.0 * np.sqrt(np.maximum(separation, 1e-12))
-    first = 1.0 / (1.0 + np.exp(-np.clip(gap, -100.0, 100.0) / 2.0))
-    # either may come out ahead by enough, whoever is right
-    ahead = norm.sf((RESOLVED - gap - separation) / spread)
-    ahead += norm.sf((RESOLVED + gap + separation) / spread)
-    behind = norm.sf((RESOLVED - gap + separation) / spread)
-    behind += norm.sf((RESOLVED + gap - separation) / spread)
-    chance: FloatArray = first * ahead + (1.0 - first) * behind
-    return chance
+def _solvable(joint: Problem, base: ForceFit, present: int) -> BoolArray:
+    """Return at which points ahead the base brush has a solution."""
+    good = np.ones(len(joint) - present, dtype=bool)
+    try:
+        joint.predict(base.values, base.changes)
+    except TirelibError:
+        for k in range(good.size):
+            try:
+                joint.take(np.array([present + k])).predict(base.values, base.changes)
+            except TirelibError:
+                good[k] = False
+    return good

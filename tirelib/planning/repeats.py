@@ -1,11 +1,9 @@
 """What repeating the whole plan would do for a weak effect."""
 
-from tirelib.planning.candidate_runs import Noise
-from tirelib.planning.rivals import NOTHING, Trial
+from tirelib.planning.criterion import ENDLESS, NOTHING, Noise, Trial
 
 PLAN_REPEATS = (1, 2, 3, 4, 6, 8, 12)
 """Times that the plan is measured."""
-ENDLESS = 1e6
 
 
 def gains(trial: Trial, noise: Noise) -> dict[str, dict[float, float]]:

@@ -2,8 +2,8 @@
 
 What the ring's structure does anyway (`tirelib.planning.structure`) stands beside the base
 coordinates and the strengths as unknowns with a prior, so that no rival is blamed for it. How large
-its smooth part is, the present runs tell: the size that makes them most likely. What is left then
-is the noise that counts, with its correlation over the angle.
+it is, the present runs tell: the size that makes them most likely. What is left then is the noise
+that counts, with its correlation over the angle.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,15 +18,15 @@ from tirelib.effects import Effect
 from tirelib.errors import TirelibError
 from tirelib.identify.random_effects import Whitening, whitening
 from tirelib.identify.waveform_fit import Data
+from tirelib.planning.criterion import NOTHING
 from tirelib.planning.fit import Fitted, Guess, Metric, started
-from tirelib.planning.structure import SMOOTH, structure_shapes
+from tirelib.planning.structure import Shapes, structure_shapes
 
-NOTHING = "no_effect"
-"""Name of the rival that needs no further effect."""
-SIZES = 2.0 ** np.arange(-4.0, 4.5, 0.5)
-"""Sizes of the smooth misfit that are tried, relative to the variants' of a diagnosis."""
+SIZES = 2.0 ** np.arange(-4.0, 1.5, 0.5)
+"""Sizes of the structural misfit that are tried, relative to the variants' of a diagnosis; what
+is left beyond twice that counts as noise, or structure would explain every effect."""
 FAINT = 0.02
-"""Second start of a strength, relative to the range."""
+"""Start of a strength where none is known, relative to the range."""
 LOST = 0.5
 """Chi-square by which a rival may be worse than without its effect before its fit has failed."""
 ROUNDS = 3
@@ -74,10 +74,10 @@ class Trial:
     rivals : tuple of Rival
     left_out : mapping of name to reason
         Suspects whose fit failed.
-    barred : tuple of str
-        Effects on trial or in the model.
+    shapes : Shapes
+        Of the structural misfit.
     size : float, [-]
-        Of the smooth structural misfit; 1 is that of the variants of a diagnosis.
+        Of the structural misfit; 1 is that of the variants of a diagnosis.
     noise : float, [-]
         White noise over the angle that counts as what is left does.
     spread : float, [-]
@@ -87,7 +87,7 @@ class Trial:
     base: Refit
     rivals: tuple[Rival, ...]
     left_out: dict[str, str]
-    barred: tuple[str, ...]
+    shapes: Shapes
     size: float
     noise: float
     spread: float
@@ -98,6 +98,7 @@ def try_suspects(
     base: Refit,
     suspects: Sequence[tuple[Effect, FloatArray]],
     *,
+    shapes: Shapes | None = None,
     with_nothing: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> Trial:
@@ -109,21 +110,21 @@ def try_suspects(
     base : Refit
         The model without any of the suspects, fitted.
     suspects : sequence of (effect, start strength)
+    shapes : Shapes, optional
+        Of the structural misfit; drawn if there are none.
     with_nothing : bool
         Whether the base itself is a rival.
     progress : callable, optional
     """
     plain = started(base.values, base.effects, base.strengths)
-    barred = tuple(effect.name for effect in (*base.effects, *(e for e, _ in suspects)))
-    shapes = structure_shapes(
-        base.values, base.changes, data, data.points, base.waveform, base.deflection, barred
-    )
+    if shapes is None:
+        shapes = structure_shapes(data, base, progress=progress)
     guesses = [
         started(base.values, [*base.effects, effect], [*base.strengths, _start(effect, strength)])
         for effect, strength in suspects
     ]
     noise, spread, size = _levels(data, plain, guesses, shapes)
-    metric = Metric(data, _whitening(data, base, noise), shapes, sizes_of(len(shapes), size))
+    metric = Metric(data, _whitening(data, base, noise), shapes.present, shapes.sizes(size))
     nothing = metric.fit(plain)
     rivals, left_out = [Rival(NOTHING, nothing, True)] if with_nothing else [], {}
     for guess in guesses:
@@ -135,7 +136,7 @@ def try_suspects(
             left_out[name] = found
         else:
             rivals.append(Rival(name, found, _in_range(found)))
-    return Trial(base, tuple(rivals), left_out, barred, size, noise, spread)
+    return Trial(base, tuple(rivals), left_out, shapes, size, noise, spread)
 
 
 def _start(effect: Effect, strength: FloatArray) -> FloatArray:
@@ -147,11 +148,11 @@ def _start(effect: Effect, strength: FloatArray) -> FloatArray:
 def _fit(metric: Metric, nothing: Fitted, guess: Guess) -> Fitted | str:
     """Return the minimum with an effect, or why none was found.
 
-    The fit without the effect, where the strength is nearly zero, is the second start.
+    The fit without the effect, at strength zero, is the second start: a one-sided effect that
+    would serve with the other sign only stays there.
     """
     effect = guess.effects[-1]
-    faint = np.full(effect.components, FAINT * effect.toward / effect.scale)
-    second = guess.at(np.concatenate([nothing.guess.z, faint]))
+    second = guess.at(np.concatenate([nothing.guess.z, np.zeros(effect.components)]))
     best: Fitted | None = None
     said = ""
     for start in (guess, second):
@@ -190,17 +191,10 @@ def _whitening(data: Data, base: Refit, noise: float) -> Whitening:
     )  # fmt: skip
 
 
-def sizes_of(count: int, size: float) -> FloatArray:
-    """Return the prior standard deviations of the structural unknowns."""
-    sizes = np.ones(count)
-    sizes[-SMOOTH:] = size
-    return sizes
-
-
 def _levels(
-    data: Data, plain: Guess, guesses: Sequence[Guess], shapes: FloatArray
+    data: Data, plain: Guess, guesses: Sequence[Guess], shapes: Shapes
 ) -> tuple[float, float, float]:
-    """Return noise that counts, its excess over the rms, and size of the smooth misfit.
+    """Return noise that counts, its excess over the rms, and size of the structural misfit.
 
     All suspects at once may serve: what they can explain is no noise.
     """
@@ -212,7 +206,7 @@ def _levels(
         more, _ = faint.slopes(found, data, data.points)
         rows.append(more[plain.z.size :])
         width.append(guess.width[plain.z.size :])
-    every, count = np.concatenate([*rows, shapes]), len(shapes)
+    every = np.concatenate([*rows, shapes.present])
     known = np.concatenate(width)
     rest = data.strain - found.waveform
     noise, spread, size = data.noise, 1.0, 1.0
@@ -225,7 +219,7 @@ def _levels(
         gram, project = flat @ flat.T, flat @ white.ravel()
 
         def precision(size: float) -> FloatArray:
-            return np.concatenate([known, sizes_of(count, size)]) ** -2.0
+            return np.concatenate([known, shapes.sizes(size)]) ** -2.0
 
         likely = [_likelihood(gram, project, precision(float(s))) for s in SIZES]
         size = float(SIZES[int(np.argmax(likely))])

@@ -32,6 +32,7 @@ REPEATS = 10
 SEED_APART = 7919
 """Added to the seed of the thresholds' ensemble: other draws, of another family too."""
 CHORD_STEPS = 3
+HALVINGS = 5
 LONGEST = 0.4
 ATTEMPTS = 4
 
@@ -223,23 +224,37 @@ class _Judge:
 
     def _refitted(self, waves: FloatArray) -> FloatArray:
         """Return the base brought near every tire's waveforms by a few chord steps."""
-        base, data = self.base, self.data
-        count, points = len(waves), len(data.points)
+        base, count = self.base, len(waves)
         z = np.zeros((count, len(FITTED)))
         fitted = np.broadcast_to(base.waveform, waves.shape)
-        tiled, correction = data.points.tiled(count), base.correction.tiled(count)
         for _ in range(CHORD_STEPS):
             white = base.whiten(waves - fitted).reshape(count, -1)
-            z = z + np.clip(white @ self.rows.T @ self.inverse, -LONGEST, LONGEST)
-            each = [move(base.values, row, FITTED) for row in z]
-            values = dict(base.values)
-            for coordinate in FITTED:
-                column = [float(np.max(moved[coordinate.name])) for moved in each]
-                values[coordinate.name] = np.repeat(column, points)
-            fitted = predict(
-                values, tiled, base.changes, low_pass=data.low_pass, correction=correction
-            ).wave.reshape(waves.shape)
+            step = np.clip(white @ self.rows.T @ self.inverse, -LONGEST, LONGEST)
+            z, fitted = self._stepped(z, step)
         return fitted
+
+    def _stepped(self, z: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return coordinates after a step, and the waveforms there; shorter where none exist."""
+        for share in 0.5 ** np.arange(HALVINGS):
+            try:
+                return z + share * step, self._predicted(z + share * step)
+            except TirelibError:
+                continue
+        return z, self._predicted(z)
+
+    def _predicted(self, z: FloatArray) -> FloatArray:
+        """Return the base's waveforms at every tire's coordinates."""
+        base, data, count = self.base, self.data, len(z)
+        each = [move(base.values, row, FITTED) for row in z]
+        values = dict(base.values)
+        for coordinate in FITTED:
+            column = [float(np.max(moved[coordinate.name])) for moved in each]
+            values[coordinate.name] = np.repeat(column, len(data.points))
+        found = predict(
+            values, data.points.tiled(count), base.changes, low_pass=data.low_pass,
+            correction=base.correction.tiled(count),
+        ).wave  # fmt: skip
+        return found.reshape(count, len(data.points), -1)
 
 
 def _planted(

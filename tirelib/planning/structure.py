@@ -1,129 +1,106 @@
 """What a ring's structure may do to waveforms, as unknowns with a prior.
 
-Two parts. Known ways in which a tire departs from the fitted ring (a belt that shears, a tread that
-hardens or gains width with load, sections with inertia, traction of the rolling tire, a crown,
-layers of a belt that smear the strain, run-out, delay of the gages) have tangents as effects have.
-The rest is smooth in the angle over the half contact angle, in proportion to the strain
-(`tirelib.identify.discrepancy`), and goes with load, pressure and speed. Sizes of the first part
-are as in the variants of a diagnosis; that of the smooth part is fitted.
+The variants of a diagnosis (`tirelib.diagnose.ensemble`) are measured at the present runs and at
+the possible ones alike, without noise and set-point errors. What the base model leaves of each is
+one way in which structure may show; M of them, each with a prior of size / sqrt(M), have the
+covariance in whose metric a diagnosis ranks effects. One draw holds for all runs, so what the
+present runs tell of a tire's structure is known at the possible ones too.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.effects import CATALOGUE
-from tirelib.identify.discrepancy import Discrepancy
-from tirelib.identify.random_effects import angle_slope
+from tirelib.campaign import Tolerance
+from tirelib.diagnose.ensemble import structural_ensemble
+from tirelib.diagnose.refit import Refit
+from tirelib.identify.identify import FITTED
+from tirelib.identify.random_effects import Whitening
 from tirelib.identify.waveform_fit import Data
-from tirelib.model.base import predict
-from tirelib.model.chain import Change, Changes
+from tirelib.model.base import large_displacements, linearised
 from tirelib.model.state import Operating
 from tirelib.waveforms import GRID
 
-Values = Mapping[str, float | FloatArray]
+MEMBERS = 60
+"""Variants; more of them change a separation by a few percent."""
 
-MISFIT = Discrepancy(inside=0.01, outside=0.005)
-"""Smooth misfit of size 1."""
-BY_SPEED = 0.5
-"""Smooth misfit that goes with relative speed, over the constant one."""
-HALF = 0.6
-"""Half contact angle over sqrt(2 d0 / R0)."""
-REFERENCE_LOAD = 4000.0
-STEP = 0.01
-"""Trial step over a standard deviation."""
-CONSTANTS: Mapping[str, tuple[str, float]] = {
-    "belt_shear": ("shear_stiffness", 1.5e-5),
-    "tread_hardening": ("tread_hardening", 1.5),
-    "rotary_inertia": ("rotary_inertia", 1.5e-4),
-}
-"""Constants that the fitted ring lacks: standard deviation, of 1 / GA for the shear, SI."""
-TREAD_POWER = 0.15
-"""Standard deviation of the power of the load with which the tread stiffens."""
-ACTING: Mapping[str, float] = {"trailing_sliding": 0.03, "tread_friction": 0.0045,
-                               "roughness": 0.2}  # fmt: skip
-"""Standard deviation of effects that any tire has a little of, in their units."""
-SMEARED = 4e-4
-"""Standard deviation of the square of the length over which strain is smeared, [m^2]."""
-RUN_OUT = 1e-5
-"""Standard deviation of a strain that comes once per turn, [-]."""
-DELAY = 3.5e-5
-"""Standard deviation of the common delay between trigger and gages, [s]."""
-SMOOTH = 4 * MISFIT.knots
-"""Unknowns of the smooth part; they stand last."""
+
+@dataclass(frozen=True, slots=True)
+class Shapes:
+    """Ways in which structure may show.
+
+    Attributes
+    ----------
+    present : shape (n_members, n_runs, n_phi)
+        In the present runs.
+    ahead : shape (n_members, n_points, n_phi)
+        In the possible ones.
+    """
+
+    present: FloatArray
+    ahead: FloatArray
+
+    def sizes(self, size: float) -> FloatArray:
+        """Return the prior standard deviations of the unknowns."""
+        return np.full(len(self.present), size / np.sqrt(max(len(self.present), 1)))
 
 
 def structure_shapes(
-    values: Values,
-    changes: Changes,
     data: Data,
-    points: Operating,
-    waveform: FloatArray,
-    deflection: FloatArray,
-    barred: Collection[str],
-) -> FloatArray:
-    """Return the change of waveforms for one standard deviation of every unknown.
+    base: Refit,
+    points: Operating | None = None,
+    *,
+    members: int = MEMBERS,
+    seed: int = 0,
+    progress: Callable[[str], None] | None = None,
+) -> Shapes:
+    """Return what variants of a model leave to it, at the present runs and at possible ones.
 
     Parameters
     ----------
-    values : mapping
-        Of the tire.
-    changes : sequence of (stage, change)
-        Effects of the model.
     data : Data
         The present runs.
-    points : Operating
-    waveform : shape (n_points, n_phi), [-]
-        Of the model at the points.
-    deflection : shape (n_points,), [m]
-    barred : collection of str
-        Effects on trial or in the model: what would do the same is left out.
+    base : Refit
+    points : Operating, optional
+        Possible runs, at which the base model has a solution.
+    members, seed : int
+        Of the variants.
+    progress : callable, optional
 
-    Returns
-    -------
-    shape (n_unknowns, n_points, n_phi)
+    Raises
+    ------
+    TirelibError
+        If the base model has no solution at a point.
     """
-    plain = predict(values, points, changes, low_pass=data.low_pass).wave
-    rows = [
-        (predict(moved, points, [*changes, *more], low_pass=data.low_pass).wave - plain) / STEP
-        for moved, more in _departures(values, points, barred)
-    ]
-    if not {"gage_length", "low_pass"} & set(barred):
-        rows.append(_smearing(waveform) * SMEARED / float(np.max(values["ring_radius"])) ** 2)
-    if "nonuniformity" not in barred:
-        for wave in (np.cos(GRID), np.sin(GRID)):
-            rows.append(np.broadcast_to(RUN_OUT * wave, waveform.shape))
-    rows.append(angle_slope(waveform) * (DELAY * points.omega)[:, None])
-    half = HALF * np.sqrt(2.0 * deflection / float(np.max(values["free_radius"])))
-    known = MISFIT.columns(waveform, half, points, GRID)
-    relative = (points.omega / np.mean(data.points.omega) - 1.0)[None, :, None]
-    return np.concatenate([np.array(rows), known, BY_SPEED * known[: MISFIT.knots] * relative])
+    n = len(data.points)
+    every = data.points if points is None else joined(data.points, points)
+    empty = np.zeros((len(every), GRID.size))
+    quiet = replace(
+        data, strain=empty, points=every, tolerance=Tolerance(0.0, 0.0, 0.0, 0.0),
+        angle_std=np.zeros(len(every)), deflection=np.full(len(every), np.nan),
+    )  # fmt: skip
+    rows = structural_ensemble(
+        quiet, _at(base, data, every), noise=0.0, members=members, seed=seed, progress=progress
+    ).reshape(-1, *empty.shape)
+    return Shapes(rows[:, :n], rows[:, n:])
 
 
-def _departures(
-    values: Values, points: Operating, barred: Collection[str]
-) -> list[tuple[Values, list[tuple[str, Change]]]]:
-    """Return values and changes of known departures, one trial step each."""
-    found: list[tuple[Values, list[tuple[str, Change]]]] = []
-    for name, (constant, deviation) in CONSTANTS.items():
-        if name in barred:
-            continue
-        old, step = values[constant], STEP * deviation
-        new = 1.0 / (1.0 / old + step) if constant == "shear_stiffness" else old + step
-        found.append(({**values, constant: new}, []))
-    if "tread_load" not in barred:
-        power = (points.load / REFERENCE_LOAD) ** (STEP * TREAD_POWER)
-        found.append(({**values, "tread_stiffness": values["tread_stiffness"] * power}, []))
-    for name, deviation in ACTING.items():
-        if name not in barred:
-            found.append((values, [CATALOGUE[name].at(STEP * deviation)]))
-    return found
+def joined(one: Operating, other: Operating) -> Operating:
+    """Return the points of both, one after the other."""
+    names = [field.name for field in fields(Operating)]
+    return Operating(*[np.concatenate([getattr(one, k), getattr(other, k)]) for k in names])
 
 
-def _smearing(waveform: FloatArray) -> FloatArray:
-    """Return the change of waveforms by the square of the angle that they are averaged over."""
-    n = waveform.shape[1]
-    order = np.fft.rfftfreq(n, 1.0 / n)
-    out: FloatArray = np.fft.irfft(-(order**2) / 24.0 * np.fft.rfft(waveform, axis=1), n=n, axis=1)
-    return out
+def _at(base: Refit, data: Data, points: Operating) -> Refit:
+    """Return a fitted model at other points, with residuals left as they are."""
+    correction = large_displacements(base.values, points, low_pass=data.low_pass)
+    found = linearised(
+        base.values, points, FITTED, base.changes, low_pass=data.low_pass, correction=correction
+    )
+    none = Whitening(np.zeros((len(points), GRID.size, 4)), np.zeros((len(points), 4, 4)), 1.0)
+    return replace(
+        base, waveform=found.waveform, deflection=found.deflection, slopes=found.waveform_slopes,
+        correction=correction, whiten=none,
+    )  # fmt: skip

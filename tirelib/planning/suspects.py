@@ -46,7 +46,8 @@ class Suspects:
 def suspects_of(told: Mapping[str, Any], catalogue: Mapping[str, Effect]) -> Suspects:
     """Return the suspects of a diagnosis.
 
-    Named effects that are indistinguishable; else a named effect with its twins that are alarms or
+    A found effect that is held back, with those that serve as well (forces); else named effects
+    that are indistinguishable; else a named effect with its twins that are alarms or
     hints; else, where nothing is named, the leading hints, each against nothing.
 
     Parameters
@@ -62,6 +63,10 @@ def suspects_of(told: Mapping[str, Any], catalogue: Mapping[str, Effect]) -> Sus
     """
     entries = {entry["effect"]: entry for entry in told["candidates"]}
     named = list(told["named"])
+    for held in told.get("held_back", []):
+        why = f"{held['effect']} is held back: {' and '.join(held['rivals'])} would serve as well"
+        chosen = [held["effect"], *held["rivals"]][:MOST]
+        return _of(chosen, named, entries, catalogue, False, why)
     alive = [
         name for name, e in entries.items() if e["level"] in ("alarm", "hint") and e["in_range"]
     ]
@@ -103,15 +108,18 @@ def _of(
 
 
 def given_suspects(
-    names: Sequence[str], has: Sequence[str], catalogue: Mapping[str, Effect]
+    names: Sequence[str],
+    has: Sequence[str],
+    catalogue: Mapping[str, Effect],
+    quantity: str = "strain",
 ) -> Suspects:
     """Return suspects by name; one alone stands against nothing.
 
     Raises
     ------
     ParameterError
-        If a name is unknown or given twice, the model has the effect or fits it, or it is none of
-        strain; with every fault.
+        If a name is unknown or given twice, the model has the effect or fits it, or it does not
+        act on the quantity; with every fault.
     """
     faults = []
     for name in dict.fromkeys(names):
@@ -123,8 +131,10 @@ def given_suspects(
             faults.append(f"the model has {name} already")
         elif name in IN_BASE:
             faults.append(f"the base model fits {name} as a number")
-        elif catalogue[name].hook == "brush":
+        elif catalogue[name].hook == "brush" and quantity == "strain":
             faults.append(f"{name} acts on the brush, which strain does not show")
+        elif catalogue[name].hook != "brush" and quantity != "strain":
+            faults.append(f"{name} acts on strain, which {quantity} does not show")
         elif catalogue[name].untestable:
             faults.append(f"{name} cannot be tested: {catalogue[name].untestable}")
     if not names or len(names) > MOST:

@@ -6,10 +6,10 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from tirelib.planning.document import BAR, KMH, Plan, advice, plan_document, run_text
-from tirelib.planning.envelope import WIDER
-from tirelib.planning.next_test import RESOLVED, NextTest, PairForecast
-from tirelib.planning.rivals import NOTHING
+from tirelib.arrays import FloatArray
+from tirelib.planning.criterion import NOTHING, RESOLVED, NextTest, PairForecast
+from tirelib.planning.document import Plan, advice, plan_document
+from tirelib.planning.envelope import AXES
 from tirelib.report.comparison import Part
 from tirelib.report.figures.compare_plot import Plot, styled_figure
 from tirelib.report.page import Table, number
@@ -18,8 +18,8 @@ from tirelib.report.style import BLUE, FAINT, RED
 
 TITLE = "Which run to measure next"
 METHOD = (
-    "Every suspect is fitted to the present runs, with what the structure of the ring does anyway "
-    "among the unknowns. At each possible run one suspect is taken as true and the other may adapt "
+    "Every suspect is fitted to the present runs, with what variants of the model do anyway among "
+    "the unknowns. At each possible run one suspect is taken as true and the other may adapt "
     "within what the present runs leave open of it; what it still misses, in chi-square, is the "
     "separation. The smaller of both directions counts. A chi-square of "
     f"{RESOLVED:.0f} between two suspects rules the worse one out."
@@ -49,7 +49,7 @@ def write_next_test(plan: Plan, folder: Path) -> tuple[Path, Path]:
 
 def _summary(plan: Plan) -> str:
     names = ", ".join(plan.suspects.names) or "none"
-    return f"Campaign {plan.campaign}, strain. Suspects: {names} ({plan.suspects.why})."
+    return f"Campaign {plan.campaign}, {plan.quantity}. Suspects: {names} ({plan.suspects.why})."
 
 
 def _messages(plan: Plan) -> list[str]:
@@ -70,7 +70,7 @@ def parts_of(plan: Plan) -> list[Part]:
              plots=[_map(test, pair) for pair in shown]),
         Part("Suspects on the present runs", "suspects", tables=[_suspects(test), _pairs(test)]),
         Part("Repeats", "repeats", tables=_repeat_tables(plan, test),
-             plots=[_repeats(test, shown, plan.wanted)]),
+             plots=[_repeats(plan, test, shown)]),
         Part("Method", "method", METHOD, sources=SOURCES),
     ]  # fmt: skip
 
@@ -81,20 +81,20 @@ def _said(pair: PairForecast) -> str:
 
 def _runs(test: NextTest) -> Table:
     rows = []
+    names = test.envelope.names
     for k in range(min(SHOWN, len(test.points))):
-        load, pressure, speed = test.points[k]
         rows.append([
-            str(k + 1), number(load), number(pressure / BAR, 3), number(speed / KMH, 3),
+            str(k + 1), *_told(test, test.points[k]),
             number(test.score[k], 3), number(2.0 * float(np.sqrt(test.score[k])), 2),
             number(100.0 * test.probability[k], 2), _said(test.pairs[test.hardest[k]]),
         ])  # fmt: skip
     median = [
-        "any run", "", "", "", number(float(np.median(test.score)), 3), "",
+        "any run", *[""] * len(names), number(float(np.median(test.score)), 3), "",
         number(100.0 * float(np.mean(test.probability)), 2), "",
     ]  # fmt: skip
     return Table(
         "Possible runs",
-        ["rank", "load [N]", "pressure [bar]", "speed [km/h]", "separation", "std",
+        ["rank", *[_heading(name) for name in names], "separation", "std",
          "chance to resolve [%]", "hardest pair"],
         [*rows, median],
         note="Separation of the pair that is hardest there; the chance is a mean over the pairs in "
@@ -102,73 +102,109 @@ def _runs(test: NextTest) -> Table:
     )  # fmt: skip
 
 
+def _heading(name: str) -> str:
+    axis = AXES[name]
+    return axis.title if axis.unit == "1" else f"{axis.title} [{axis.unit}]"
+
+
+def _told(test: NextTest, point: FloatArray) -> list[str]:
+    """Return a point's conditions in their units."""
+    pairs = zip(test.envelope.names, point, strict=True)
+    return [number(float(AXES[name].told(value)), 4) for name, value in pairs]
+
+
 def _envelope_text(test: NextTest) -> str:
     envelope = test.envelope
-    low = run_text(np.array([envelope.load[0], envelope.pressure[0], envelope.speed[0]]))
-    high = run_text(np.array([envelope.load[1], envelope.pressure[1], envelope.speed[1]]))
-    open_ = [name for name in WIDER if name not in envelope.declared]
+    low, high = (envelope.text(np.array(ends)) for ends in
+                 zip(*envelope.ranges.values(), strict=True))  # fmt: skip
+    open_ = [n for n in envelope.names if n not in envelope.declared and AXES[n].wider > 0.0]
     text = f"Envelope: from {low} to {high}."
     if open_:
-        wider = ", ".join(f"{name} by {100 * WIDER[name]:.0f} %" for name in open_)
+        wider = ", ".join(f"{name} by {100 * AXES[name].wider:.0f} %" for name in open_)
         text += f" Not declared, so the campaign's range was widened to both sides: {wider}."
     if test.dropped:
         text += f" {test.dropped} runs are beyond the tire's validity and were dropped."
     return text
 
 
+def _plane(test: NextTest) -> tuple[int, int, int | None]:
+    """Return the columns of the points that a map shows: along, upward, and one panel each."""
+    names = test.envelope.names
+    slip = next((name for name in names if name.startswith("slip")), None)
+    along, up = ("load", "speed") if slip is None else (slip, "load")
+    panel = names.index("pressure") if "pressure" in names else None
+    return names.index(along), names.index(up), panel
+
+
 def _map(test: NextTest, pair: PairForecast) -> Plot:
-    """Draw the separation over load and speed, one panel per pressure."""
-    loads, pressures, speeds = (np.unique(test.points[:, k]) for k in range(3))
-    top = max(float(pair.separation.max()), 1.0)
+    """Draw the separation over two conditions, one panel per pressure, others as advised."""
+    x, y, panel = _plane(test)
+    names, best = test.envelope.names, test.points[0]
+    others = [k for k in range(len(names)) if k not in (x, y, panel)]
+    shown = np.flatnonzero((test.points[:, others] == best[others]).all(axis=1))
+    xs, ys = np.unique(test.points[shown, x]), np.unique(test.points[shown, y])
+    panels = np.unique(test.points[shown, panel]) if panel is not None else np.zeros(1)
+    of_panel = test.points[:, panel] if panel is not None else np.zeros(len(test.points))
+    top = max(float(pair.separation[shown].max()), 1.0)
+    across, upward = (np.round(AXES[names[k]].told(v), 2) for k, v in ((x, xs), (y, ys)))
     figure = make_subplots(
-        cols=len(pressures), shared_yaxes=True, horizontal_spacing=0.03,
-        subplot_titles=[f"{p / BAR:.3g} bar" for p in pressures],
+        cols=len(panels), shared_yaxes=True, horizontal_spacing=0.03,
+        subplot_titles=[f"{AXES['pressure'].told(p):.3g} bar" for p in panels] if panel else None,
     )  # fmt: skip
-    for column, pressure in enumerate(pressures, start=1):
-        grid = np.full((len(speeds), len(loads)), np.nan)
+    for column, level in enumerate(panels, start=1):
+        grid = np.full((len(ys), len(xs)), np.nan)
         chance = grid.copy()
-        for k in np.flatnonzero(test.points[:, 1] == pressure):
-            at = (
-                np.searchsorted(speeds, test.points[k, 2]),
-                np.searchsorted(loads, test.points[k, 0]),
-            )
+        for k in shown[of_panel[shown] == level]:
+            at = np.searchsorted(ys, test.points[k, y]), np.searchsorted(xs, test.points[k, x])
             grid[at], chance[at] = pair.separation[k], 100.0 * pair.probability[k]
         figure.add_trace(
             go.Heatmap(
-                z=np.round(grid, 3), x=np.round(loads), y=np.round(speeds / KMH, 1), zmin=0.0,
-                zmax=top, colorscale="Viridis", customdata=np.round(chance), coloraxis="coloraxis",
-                hovertemplate="%{x} N, %{y} km/h: separation %{z:.3g}, chance %{customdata} %"
-                "<extra></extra>", texttemplate="%{z:.2g}", textfont={"size": 11},
+                z=np.round(grid, 3), x=across, y=upward, customdata=np.round(chance),
+                coloraxis="coloraxis", hovertemplate=_hover(names[x], names[y]),
+                texttemplate="%{z:.2g}", textfont={"size": 11},
             ),
             row=1, col=column,
         )  # fmt: skip
-    best = test.points[0]
+    at_best = AXES[names[x]].told(best[x]), AXES[names[y]].told(best[y])
     figure.add_trace(
         go.Scatter(
-            x=[best[0]], y=[best[2] / KMH], mode="markers", showlegend=False,
+            x=[at_best[0]], y=[at_best[1]], mode="markers", showlegend=False,
             marker={"symbol": "circle-open", "size": 30, "color": RED, "line": {"width": 3}},
             hovertemplate="advised<extra></extra>",
         ),
-        row=1, col=int(np.searchsorted(pressures, best[1])) + 1,
+        row=1, col=int(np.searchsorted(panels, of_panel[0])) + 1,
     )  # fmt: skip
-    figure.update_xaxes(title="load [N]")
-    figure.update_yaxes(title="speed [km/h]", col=1)
+    figure.update_xaxes(title=_heading(names[x]))
+    figure.update_yaxes(title=_heading(names[y]), col=1)
     styled_figure(
         figure, 420, coloraxis={"colorscale": "Viridis", "cmin": 0.0, "cmax": top,
                                 "colorbar": {"title": {"text": "separation"}}},
     )  # fmt: skip
-    rows = [
-        [round(float(point[0]), 1), round(float(point[1] / BAR), 4),
-         round(float(point[2] / KMH), 2), float(f"{sep:.5g}"), float(f"{chance:.4g}")]
-        for point, sep, chance in zip(test.points, pair.separation, pair.probability, strict=True)
-    ]  # fmt: skip
-    return Plot(
-        f"separation-{'-'.join(pair.names)}", f"Separation of {_said(pair)}",
+    note = (
         "Chi-square that one run is expected to add against the wrong suspect. The ring marks the "
-        "advised run; blank fields are beyond the tire's validity.",
-        figure, ["load [N]", "pressure [bar]", "speed [km/h]", "separation", "chance to resolve"],
-        rows,
+        "advised run; blank fields are beyond the tire's validity."
+    )
+    if others:
+        note += " What is not drawn is as in the advised run."
+    return Plot(
+        f"separation-{'-'.join(pair.names)}", f"Separation of {_said(pair)}", note, figure,
+        [*[_heading(name) for name in names], "separation", "chance to resolve"],
+        [_row(test, pair, k) for k in range(len(test.points))],
     )  # fmt: skip
+
+
+def _hover(x: str, y: str) -> str:
+    return (
+        f"%{{x}} {AXES[x].unit}, %{{y}} {AXES[y].unit}: separation %{{z:.3g}}, chance "
+        "%{customdata} %<extra></extra>"
+    )
+
+
+def _row(test: NextTest, pair: PairForecast, k: int) -> list[float]:
+    """Return a point as downloadable numbers."""
+    conditions = zip(test.envelope.names, test.points[k], strict=True)
+    told = [float(f"{float(AXES[name].told(value)):.5g}") for name, value in conditions]
+    return [*told, float(f"{pair.separation[k]:.5g}"), float(f"{pair.probability[k]:.4g}")]
 
 
 def _suspects(test: NextTest) -> Table:
@@ -197,7 +233,7 @@ def _pairs(test: NextTest) -> Table:
     )  # fmt: skip
 
 
-def _repeats(test: NextTest, pairs: tuple[PairForecast, ...], wanted: float) -> Plot:
+def _repeats(plan: Plan, test: NextTest, pairs: tuple[PairForecast, ...]) -> Plot:
     figure = go.Figure()
     rows = []
     for pair in pairs:
@@ -211,7 +247,7 @@ def _repeats(test: NextTest, pairs: tuple[PairForecast, ...], wanted: float) -> 
         )  # fmt: skip
         rows += [[_said(pair), n, float(f"{x:.5g}")] for n, x in pair.repeats.items()]
     figure.add_hline(
-        y=wanted, line={"dash": "dash", "color": BLUE}, annotation_text="wanted",
+        y=plan.wanted, line={"dash": "dash", "color": BLUE}, annotation_text="wanted",
         annotation_position="top left",
     )  # fmt: skip
     figure.update_xaxes(title="repeats of the advised run", rangemode="tozero")
@@ -219,8 +255,7 @@ def _repeats(test: NextTest, pairs: tuple[PairForecast, ...], wanted: float) -> 
     styled_figure(figure, 380, showlegend=True)
     return Plot(
         "repeats", "What repeats of the advised run add",
-        "Dotted: what no number of repeats exceeds, for the structure of the ring does not average "
-        "out.",
+        f"Dotted: what no number of repeats exceeds, for {plan.structure} does not average out.",
         figure, ["pair", "repeats", "separation"], rows,
     )  # fmt: skip
 

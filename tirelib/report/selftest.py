@@ -38,8 +38,9 @@ def _summary(document: Mapping[str, Any]) -> str:
 
 def _answer(document: Mapping[str, Any]) -> str:
     said = [
-        f"at an error ratio of {entry['ratio']:g} a planted effect is found in "
-        f"{100 * entry['found']:.0f} % and another named in {100 * entry['wrong']:.0f} %"
+        f"at an error ratio of {entry['ratio']:g} the planted effect is found in "
+        f"{100 * entry['found']:.0f}\u00a0% and another named in {100 * entry['wrong']:.0f}\u00a0% "
+        f"({entry['effects']} of {len(document['effects'])} effects could be planted)"
         for entry in document["summary"]
         if entry["n"]
     ]
@@ -47,7 +48,7 @@ def _answer(document: Mapping[str, Any]) -> str:
     text = "; ".join(said) or "no effect could be planted"
     return (
         f"{text[0].upper()}{text[1:]}. With nothing planted there is a false alarm in "
-        f"{100 * alarms['share']:.0f} % of {alarms['n']} tires."
+        f"{100 * alarms['share']:.0f}\u00a0% of {alarms['n']} tires."
     )
 
 

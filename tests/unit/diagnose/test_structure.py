@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from tirelib.arrays import FloatArray
-from tirelib.diagnose.ranking import LEAST, Ranking, filled
+from tirelib.diagnose.ranking import Ranking
+from tirelib.diagnose.shape import LEAST, filled, finer, run_by_run
 from tirelib.diagnose.structure import Structure
 
 SAMPLES, MEMBERS, NOISE = 40, 6, 0.5
@@ -27,7 +28,7 @@ def dense(structure: Structure, without: int | None = None) -> FloatArray:
 
 def test_normal_equations_are_those_of_the_whole_covariance(parts: Any) -> None:
     members, free, form, rows = parts
-    structure = Structure(members, NOISE, free, form)
+    structure = Structure(members, members, NOISE, free, form)
     residual = np.random.default_rng(2).standard_normal(SAMPLES)
     normal = structure.normal(rows, residual)
     inverse = np.linalg.inv(dense(structure))
@@ -40,16 +41,17 @@ def test_normal_equations_are_those_of_the_whole_covariance(parts: Any) -> None:
 
 def test_what_the_fitted_numbers_can_do_counts_nothing(parts: Any) -> None:
     members, free, form, rows = parts
-    structure = Structure(members, NOISE, free, form)
+    structure = Structure(members, members, NOISE, free, form)
     assert structure.normal(rows, free[0] - 2.0 * free[2]).square == pytest.approx(0.0, abs=1e-9)
 
 
-def test_a_member_is_judged_by_the_others(parts: Any) -> None:
+def test_a_measured_variant_is_judged_by_the_others(parts: Any) -> None:
     members, free, form, rows = parts
-    structure = Structure(members, NOISE, free, form)
+    measured = members + np.random.default_rng(6).standard_normal(members.shape)
+    structure = Structure(members, measured, NOISE, free, form)
     third = structure.of_members(rows)[2]
     inverse = np.linalg.inv(dense(structure, 2))
-    rest = structure.projected(members[2])
+    rest = structure.projected(measured[2])
     assert third.square == pytest.approx(rest @ inverse @ rest)
     assert third.right == pytest.approx(structure.projected(rows) @ inverse @ rest)
 
@@ -59,7 +61,8 @@ def test_more_of_what_structure_does_costs_less_than_the_same_of_what_it_never_d
     often[0] = 1.0
     never = np.roll(often, 1)
     empty = np.zeros((0, SAMPLES))
-    structure = Structure(10.0 * np.tile(often, (MEMBERS, 1)), NOISE, np.eye(1, SAMPLES, 30), empty)
+    variants = 10.0 * np.tile(often, (MEMBERS, 1))
+    structure = Structure(variants, variants, NOISE, np.eye(1, SAMPLES, 30), empty)
     assert structure.normal(empty, never).square == pytest.approx(1.0 / NOISE**2)
     assert structure.normal(empty, often).square == pytest.approx(1.0 / (NOISE**2 + 100.0))
 
@@ -77,11 +80,9 @@ def ranking(
     found = SimpleNamespace(
         living=living, twins=lambda k: [(names[pairs[k]], 0.1)] if k in pairs else []
     )
-    model = SimpleNamespace(
-        slopes=np.eye(1, SAMPLES, SAMPLES - 1)[:, None, :], whiten=lambda x: x, effects=(),
-        strengths=(), waveform=np.zeros((1, SAMPLES)),
-    )  # fmt: skip
-    return Ranking(model, found, members, NOISE)  # type: ignore[arg-type]
+    model = SimpleNamespace(whiten=lambda x: x, waveform=np.zeros((1, SAMPLES)))
+    free, none = np.eye(1, SAMPLES, SAMPLES - 1), np.zeros((0, SAMPLES))
+    return Ranking(model, found, Structure(members, members, NOISE, free, none))  # type: ignore[arg-type]
 
 
 def test_the_score_is_the_misfit_that_returns_and_the_strength_is_found() -> None:
@@ -134,3 +135,18 @@ def test_a_law_may_give_something_where_the_own_gives_nothing() -> None:
     typical = float(np.sqrt(np.mean(np.sum(change**2, axis=1))))
     assert out[0] == pytest.approx(LEAST * typical * shape / 5.0)
     assert filled(0.0 * change) == pytest.approx(0.0)
+
+
+def test_another_power_of_the_wave_number_is_what_a_law_may_be_off_by() -> None:
+    angle = np.linspace(-np.pi, np.pi, SAMPLES, endpoint=False)
+    change = np.cos(2.0 * angle) + np.cos(8.0 * angle)
+    # 2 and 8 are as far from their mean, 4: one falls, the other grows
+    assert finer(change[None])[0] == pytest.approx(np.cos(8.0 * angle) - np.cos(2.0 * angle))
+
+
+def test_what_is_off_in_a_run_is_off_in_no_other() -> None:
+    changes = np.arange(12.0).reshape(2, 2, 3) + 1.0
+    rows = run_by_run(changes).reshape(2, 2, 2, 3)
+    for run in range(2):
+        assert np.array_equal(rows[run, :, run], changes[run])
+        assert not rows[run, :, 1 - run].any()

@@ -8,8 +8,8 @@ import pytest
 from tirelib.effects import CATALOGUE, Effect, effect
 from tirelib.errors import ConvergenceError, ParameterError
 from tirelib.model.base import predict, values_of
-from tirelib.model.registration import reference_plan
 from tirelib.model.state import State
+from tirelib.model.strain_bench import reference_plan
 from tirelib.parameters import read_tire
 
 TIRE = read_tire("table-6-1").tire

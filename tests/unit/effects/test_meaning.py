@@ -10,16 +10,14 @@ from scipy.stats import norm
 from tests.physics.test_effects import BASE, FREE_ROLLING, PLAN, TIRE, VALUES, run, tangents, wave
 from tirelib.contact.fourier import evaluate
 from tirelib.contact.radial import press
-from tirelib.contact.strips import Layout, press_strips
 from tirelib.effects import CATALOGUE
 from tirelib.model.base import linearised
 from tirelib.model.state import State
 from tirelib.ring.compliance import compliance
-from tirelib.strain.tread_traction import TreadBeam, outward_shear, tread_strain
 from tirelib.waveforms import GRID
 
 
-def at(name: str, strength: float, **given: Any) -> State:
+def at(name: str, strength: float | tuple[float, ...], **given: Any) -> State:
     return run(CATALOGUE[name].at(strength), **given)
 
 
@@ -115,25 +113,24 @@ def test_dynamic_stiffening_follows_the_belts_speed() -> None:
     assert (state.deflection < run().deflection).all()
 
 
-def test_tread_friction_is_the_straight_beam_of_the_strips() -> None:
-    tire = TIRE.changed(tread_shear_stiffness=TIRE.tread_stiffness / 3.0, friction=1.0)
-    points = PLAN.points.take(np.array([4, 29, 52]))
-    strip = press_strips(
-        tire, points.load, pressure=points.pressure, omega=points.omega, layout=Layout.even((0.0,))
-    )
-    want = tread_strain(strip, outward_shear(strip, tire), TreadBeam.of(tire, 0.1))[:, 0]
-    with_it = at("tread_friction", 0.1, points=points, lateral=0.0).strain
-    without = run(points=points, lateral=0.0).strain
-    assert with_it is not None
-    assert without is not None
-    # two solutions of the same contact
-    np.testing.assert_allclose((with_it - without)[:, 1:], want[:, 1:], atol=1e-8)
+def test_traction_on_the_tread_pulls_the_belt_and_turns_it_and_leaves_no_resultant() -> None:
+    for name, strength in (("tread_friction", (0.1, 0.0)), ("trailing_sliding", 0.1)):
+        state, base = at(name, strength), run()
+        assert state.contact is not None
+        assert base.contact is not None
+        assert state.contact.extra is not None
+        pulled, turned = state.contact.extra[..., 1], state.contact.extra[..., 2]
+        np.testing.assert_allclose(
+            turned, (state.free_radius - state.radius)[:, None] * pulled, atol=1e-12
+        )
+        most = np.abs(pulled).max(axis=1)
+        assert (most > 10.0).all()
+        assert (np.abs(pulled[:, 0]) < 1e-9 * most).all()
+        np.testing.assert_allclose(state.contact.load, base.contact.load, rtol=1e-8)
 
 
-def test_outward_shear_lowers_the_tension_in_the_contact_more_at_high_load() -> None:
-    middle = changed(at("tread_friction", 0.05))[:60, GRID.size // 2].reshape(5, 12)
-    assert (middle < 0).all()
-    assert (np.diff(middle, axis=0) < 0).all()
+def test_outward_shear_lowers_the_tension_in_the_contact() -> None:
+    assert (changed(at("tread_friction", (0.05, 0.0)))[FREE_ROLLING, GRID.size // 2] < 0).all()
 
 
 def test_a_worn_tread_is_thin_and_stiff_and_keeps_its_modulus() -> None:

@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from tirelib.cli.effects import effects
 from tirelib.effects import CATALOGUE, Effect, effect
 from tirelib.effects.load import read_effects
-from tirelib.errors import ParameterError
-from tirelib.model.registration import Registration, register
+from tirelib.errors import FormatError
+from tirelib.model.registration import Registration, register, registered_effects
 from tirelib.model.state import State
 
 DOCS = Path(__file__).parents[3] / "docs/effects.md"
@@ -30,11 +32,19 @@ def fault(law: Any, **changes: Any) -> str:
     return text
 
 
-def test_the_documents_effect_is_accepted(tmp_path: Path) -> None:
-    code = re.search(r"```python\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.DOTALL)
-    assert code is not None
+def documented() -> list[str]:
+    """Effects in the documentation: one of the strain, one of the brush."""
+    return re.findall(r"```python\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.DOTALL)
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_the_documents_effects_are_accepted_and_have_at_most_15_lines(
+    tmp_path: Path, which: int
+) -> None:
+    code = documented()[which]
+    assert len([line for line in code.splitlines() if line.strip()]) <= 15
     file = tmp_path / "mine.py"
-    file.write_text(code[1], encoding="utf-8")
+    file.write_text(code, encoding="utf-8")
     (own,) = read_effects(file)
     found = register(own)
     assert found.accepted, found.faults
@@ -112,6 +122,61 @@ def test_what_the_base_model_imitates_is_not_found_again() -> None:
     assert "imitate all but" in text
 
 
-def test_an_effect_of_the_brush_is_not_of_the_strain() -> None:
-    with pytest.raises(ParameterError, match="stage brush does not act on strain"):
-        register(made(lambda s, x: s, stage="brush"))
+@pytest.mark.parametrize("name", [n for n, e in CATALOGUE.items() if e.hook == "brush"])
+def test_every_effect_of_the_brush_is_found_again_on_forces(name: str) -> None:
+    found = register(CATALOGUE[name], {})
+    assert found.accepted, found.faults
+    assert found.recovered == pytest.approx(found.planted, rel=1e-2)
+    assert 0.0 < found.survives < 1.0
+
+
+def test_the_brush_has_its_own_twins() -> None:
+    found = register(made(CATALOGUE["friction_pressure"].law, stage="brush"))
+    ((name, angle),) = found.twins
+    assert (name, angle < 0.1) == ("friction_pressure", True)
+    assert register(CATALOGUE["friction_load"]).twins == ()
+
+
+@pytest.mark.parametrize(
+    ("law", "says"),
+    [
+        (lambda s, x: s.but(mu=s.mu * (1.001 + x)), "strength zero is not the base model"),
+        (lambda s, x: s.but(mu=s.mu * (1.0 + 1e-9 * x)), "no influence on Fy, Fx and Mz"),
+        (lambda s, x: s.but(mu=s.mu * (1.0 - 0.1 * x**0.5)), "no derivative at zero"),
+        (lambda s, x: s.but(mu=s.mu * (1.0 - 3.0 * x)), "cannot be computed at 0.5 1: brush"),
+        (lambda s, x: s.but(mu=s.mue), "raised AttributeError"),
+        (lambda s, x: s.but(mu=s.mu * (1.0 + x)), "imitate all but 0.0% of it"),
+    ],
+)
+def test_a_law_of_the_brush_that_is_broken_is_told(law: Any, says: str) -> None:
+    assert says in fault(law, stage="brush")
+
+
+def test_an_argument_of_the_brush_that_is_changed_in_place_is_named() -> None:
+    def alters(state: Any, strength: float) -> Any:
+        state.mu[:] *= 1.0 - strength * state.conditions.load / 1e4
+        return state
+
+    assert "alters mu of its argument" in fault(alters, stage="brush")
+
+
+def test_users_effects_are_registered_before_they_take_part(tmp_path: Path) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(documented()[1], encoding="utf-8")
+    assert "wet_road" in registered_effects([file], installed=False)
+    file.write_text(documented()[1].replace("(1.0 - strength", "(1.1 - strength"))
+    with pytest.raises(FormatError, match=r"mine.py, line 6: strength zero"):
+        registered_effects([file], installed=False)
+
+
+def test_the_verb_tells_what_was_planted_and_found(tmp_path: Path) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(documented()[1], encoding="utf-8")
+    found = CliRunner().invoke(effects, ["--effects", str(file)])
+    assert found.exit_code == 0, found.output
+    assert "0.3 1 planted, 0.3 found" in found.output
+    assert "looks like: friction_speed (21 deg)" in found.output
+    file.write_text(documented()[1].replace("strength):", "strength)"))
+    refused = CliRunner().invoke(effects, ["--effects", str(file)])
+    assert "line 10: not Python" in str(refused.exception)
+    assert "friction_drift" in CliRunner().invoke(effects).output

@@ -125,12 +125,7 @@ def test_an_effect_is_fitted_to_the_force_of_the_last_step(
 
 def test_a_number_that_no_tire_has_is_not_written(added: ForceExtension, model: TireFile) -> None:
     wild = dict(added.after.values) | {"friction": 50.0}
-    after = type(added.after)(**{
-        name: getattr(added.after, name) for name in added.after.__slots__ if name != "values"
-    }, values=wild)  # fmt: skip
-    broken = type(added)(**{
-        name: getattr(added, name) for name in added.__slots__ if name != "after"
-    }, after=after)  # fmt: skip
+    broken = replace(added, after=replace(added.after, values=wild))
     with pytest.raises(FormatError, match="friction after the fit"):
         force_extended_file(model, broken, "hash")
 

@@ -12,8 +12,9 @@ from tirelib.effects import CATALOGUE
 from tirelib.identify.waveform_fit import Data
 from tirelib.model.base import values_of
 from tirelib.model.state import Operating
+from tirelib.planning.criterion import NextTest
 from tirelib.planning.envelope import Envelope
-from tirelib.planning.next_test import NextTest, next_test
+from tirelib.planning.next_test import next_test
 from tirelib.planning.variants import Track, Variants, draw_variants
 from tirelib.signal import LowPass
 

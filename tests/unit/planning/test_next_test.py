@@ -11,10 +11,11 @@ from tests.unit.planning.made import NOISE, PLANTED, STRENGTH, TWIN, case, joine
 from tirelib.diagnose.refit import refit
 from tirelib.effects import CATALOGUE
 from tirelib.errors import ParameterError
-from tirelib.planning.candidate_runs import Forecast, Noise
+from tirelib.planning.candidate_runs import noise_of
+from tirelib.planning.criterion import ENDLESS, RESOLVED, Forecast, Noise, resolving
 from tirelib.planning.document import Plan, advice, plan_document
 from tirelib.planning.envelope import Envelope, operating_at
-from tirelib.planning.next_test import ENDLESS, RESOLVED, next_test, resolving
+from tirelib.planning.next_test import next_test
 from tirelib.planning.repeats import gains
 from tirelib.planning.rivals import correlation, try_suspects
 from tirelib.planning.suspects import given_suspects
@@ -160,7 +161,7 @@ def test_runs_beyond_the_tires_validity_are_dropped_and_counted() -> None:
     assert test.dropped >= 1
     assert len(test.points) + test.dropped == 5
     assert np.isfinite(test.score).all()
-    hopeless = replace(envelope, load=(4e4, 5e4))
+    hopeless = replace(envelope, ranges={**envelope.ranges, "load": (4e4, 5e4)})
     with pytest.raises(ParameterError, match="no solution at any of its 5 runs"):
         next_test(made.data, made.base, suspects, hopeless, noise=NOISE)
 
@@ -200,6 +201,6 @@ def test_repeats_of_the_plan_raise_what_stands_out_up_to_a_limit() -> None:
 
 def test_without_repeats_all_noise_is_taken_as_random() -> None:
     trial = planned().trial
-    assert Noise.of(trial, np.nan) == Noise(trial.noise, 0.0)
-    split = Noise.of(trial, 0.5 * trial.noise / trial.spread)
+    assert noise_of(trial, np.nan) == Noise(trial.noise, 0.0)
+    split = noise_of(trial, 0.5 * trial.noise / trial.spread)
     assert np.hypot(split.random, split.staying) == pytest.approx(trial.noise)

@@ -86,11 +86,11 @@ def test_all_faults_of_given_names_are_told_at_once() -> None:
 def test_an_envelope_is_the_campaigns_wider_by_a_known_share_or_as_declared() -> None:
     points = points_at(CONDITIONS)
     free = Envelope.of(points)
-    assert free.load == pytest.approx((2250.0, 7500.0))
-    assert free.pressure == pytest.approx((1.53e5, 2.76e5))
-    assert free.speed == pytest.approx((8.25, 35.0))
+    assert free.ranges["load"] == pytest.approx((2250.0, 7500.0))
+    assert free.ranges["pressure"] == pytest.approx((1.53e5, 2.76e5))
+    assert free.ranges["speed"] == pytest.approx((8.25, 35.0))
     given = Envelope.of(points, load=(3e3, 4e3), speed=(10.0, 10.0))
-    assert given.load == (3e3, 4e3)
+    assert given.ranges["load"] == (3e3, 4e3)
     assert given.declared == ("load", "speed")
     assert len(given.grid()) == 15
     assert set(given.grid()[:, 2]) == {10.0}

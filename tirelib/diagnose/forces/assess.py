@@ -163,6 +163,8 @@ class ForceAssessment:
     left : ForceLeft
         What no effect explains.
     messages : tuple of str
+    held_back : mapping of name to names
+        Effects that were found, with those that serve as well; they are not named.
     """
 
     case: ForceCase
@@ -172,6 +174,7 @@ class ForceAssessment:
     findings: tuple[ForceFinding, ...]
     left: ForceLeft
     messages: tuple[str, ...]
+    held_back: Mapping[str, tuple[str, ...]]
 
 
 def assess_forces(
@@ -219,7 +222,12 @@ def assess_forces(
         messages.append("nothing can be held out: too few conditions vary")
     messages += _in_order(case, [f.effect for f in findings if f.effect.name in named])
     left = left_of(case.problem, found.final if named else found.base)
-    return ForceAssessment(case, found, verdict, named, findings, left, tuple(messages))
+    held = found.doubts if named and verdict != "indistinguishable" else {}
+    for name, rivals in held.items():
+        messages.append(
+            f"{name} is held back: {' or '.join(rivals)} would serve as well in its place"
+        )
+    return ForceAssessment(case, found, verdict, named, findings, left, tuple(messages), held)
 
 
 def _in_order(case: ForceCase, effects: Sequence[Effect]) -> list[str]:
@@ -233,7 +241,8 @@ def _in_order(case: ForceCase, effects: Sequence[Effect]) -> list[str]:
         together = float(np.corrcoef(getattr(at, name), at.order)[0, 1])
         if abs(together) > IN_ORDER:
             out.append(
-                f"{name} went with the order of measurement (correlation {together:.2f}): wear, "
-                "warming or drift would look like its effects; measure in another order to know"
+                f"{name} went with the order of measurement (correlation {together:.2f}): a "
+                "drift in its place serves worse, but one of another curve might not; repeat the "
+                f"first {name} at the end to know"
             )
     return out

@@ -8,7 +8,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.forces.candidates import ForceCandidates, force_candidates
 from tirelib.diagnose.forces.ensemble import MEMBERS, ForceEnsemble, force_ensemble
-from tirelib.diagnose.forces.fit import ForceFit, Problem, fit_force, room
+from tirelib.diagnose.forces.fit import ForceFit, Problem, fit_force, with_effect
 from tirelib.diagnose.forces.held_out import ForceFold, errors_of, force_folds, pooled
 from tirelib.diagnose.forces.ranking import ForceRanking, ForceScores
 from tirelib.diagnose.forces.search import ALARM, ROUNDS, Search, alarms, ratio_of
@@ -19,10 +19,8 @@ FORM = 1.6
 """Rms left after the joint fit, over the ensemble's largest, from which a law's form is doubted."""
 STEP_GAIN = 0.995
 """Held-out error of a step over that before, from which a name moves behind the others."""
-TOP_SHARE = 0.6
-"""Score of a twin, over the leader's, from which the two cannot be told apart."""
-TWIN_REFIT = 1.02
-"""Ratio of the two refits' errors up to which they cannot be told apart."""
+TWIN_REFIT, TWIN_GAIN = 1.02, 0.5
+"""Ratio of two refits' errors up to which, and share of the gain from which, they are alike."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,6 +71,9 @@ class ForceDiagnosis:
     steps : tuple of (name, error, held-out error)
         The named effects one after the other.
     rounds : int
+    doubts : mapping of name to names
+        Effects that are found, with the twins that serve as well in their place. They are held
+        back where others are named.
     """
 
     problem: Problem
@@ -92,6 +93,7 @@ class ForceDiagnosis:
     held_final: tuple[float, ...]
     steps: tuple[tuple[str, float, float], ...]
     rounds: int
+    doubts: Mapping[str, tuple[str, ...]]
 
 
 def diagnose_force(
@@ -143,21 +145,26 @@ def diagnose_force(
     held_before = errors_of(problem, base, folds)
     alone = {name: _alone(problem, base, search.effect(name), folds) for name in first.names
              if name in search.named or search.alarmed(name)}  # fmt: skip
-    twins = _inseparable(first, scores, limits, search, alone)
-    verdict = _verdict(search, twins, ensemble, scores)
-    final = search.model
-    named = _by_gain(search.named, alone, folds)
+    doubts = _doubts(problem, search, first, scores)
+    named, verdict = (
+        _by_gain(search.named, alone, folds),
+        _verdict(search, doubts, ensemble, scores),
+    )
     steps: Steps = ()
     if verdict == "indistinguishable":
-        named = [named[0], *twins]
+        named = list(dict.fromkeys(x for name in named for x in (name, *doubts[name])))
     elif named:
+        for name in doubts:
+            search.take_out(name)
+        named = [name for name in named if name not in doubts]
         named, steps = _in_steps(problem, base, search, named, folds)
+    final = search.model
     held_final = errors_of(problem, final, folds) if search.named else held_before
     findings = _findings(problem, base, search, scores, first, ensemble, named, alone, folds)
     return ForceDiagnosis(
         problem, noise, repeats, verdict, tuple(named), findings, first.dead, base, final,
         float(np.median(ensemble.before)) * problem.scale, search.now.after,
-        float(ensemble.after.max()), folds, held_before, held_final, steps, search.rounds,
+        float(ensemble.after.max()), folds, held_before, held_final, steps, search.rounds, doubts,
     )  # fmt: skip
 
 
@@ -165,18 +172,11 @@ def _alone(
     problem: Problem, base: ForceFit, effect: Effect, folds: Sequence[ForceFold]
 ) -> tuple[ForceFit | None, tuple[float, ...]]:
     """Return the base with one effect, and its held-out errors; nothing if it cannot be fitted."""
-    low, high = room(problem, base.values, effect)
-    best: ForceFit | None = None
-    for start in {0.3 * high, 0.3 * low}:
-        try:
-            found = fit_force(
-                problem, base.values, [*base.effects, effect],
-                [*base.strengths, np.full(effect.components, start)],
-            )  # fmt: skip
-        except TirelibError:
-            continue
-        best = found if best is None or found.error < best.error else best
-    return best, () if best is None else errors_of(problem, best, folds)
+    try:
+        best = with_effect(problem, base, effect)
+    except TirelibError:
+        return None, ()
+    return best, errors_of(problem, best, folds)
 
 
 Alone = Mapping[str, tuple[ForceFit | None, tuple[float, ...]]]
@@ -291,39 +291,68 @@ def _to_first_order(effect: Effect, own: FloatArray, problem: Problem, base: For
     return problem.scale * float(np.sqrt(np.mean((rest - weights @ own) ** 2)))
 
 
-def _inseparable(
-    found: ForceCandidates,
-    scores: ForceScores,
-    limits: Mapping[str, float],
-    search: Search,
-    alone: Alone,
-) -> list[str]:
-    """Return alarms that look like the only named effect and serve as well when refitted."""
-    if len(search.named) != 1 or search.named[0] not in found.names:
-        return []
-    index = found.names.index(search.named[0])
-    ratio, inside = ratio_of(found, scores, limits), scores.inside
-    mine, _ = alone[search.named[0]]
-    alike = []
-    for name, _ in found.twins(index):
-        other = found.names.index(name)
-        if not inside[other] or ratio[other] < TOP_SHARE * ratio[index]:
+def _doubts(
+    problem: Problem, search: Search, found: ForceCandidates, scores: ForceScores
+) -> dict[str, tuple[str, ...]]:
+    """Return named effects in whose place a twin serves as well, with those twins.
+
+    Both refits are exact, the other named effects stay. A drift over the order of measurement is
+    such a twin of an effect whose condition went with the order.
+    """
+    doubts = {}
+    for name in search.named:
+        if name not in found.names:
             continue
-        rival, _ = alone.get(name, (None, ()))
-        if mine is not None and rival is not None and rival.error <= TWIN_REFIT * mine.error:
-            alike.append(name)
-    return alike
+        without = _with_instead(problem, search, name, None)
+        alike = []
+        for twin, _ in found.twins(found.names.index(name)):
+            other = found.names.index(twin)
+            if twin in search.named or not scores.inside[other] or without is None:
+                continue
+            rival = _with_instead(problem, search, name, found.living[other].effect)
+            if rival is not None and _serves(rival.error, search.model.error, without.error):
+                alike.append(twin)
+        if alike:
+            doubts[name] = tuple(alike)
+    return doubts
+
+
+def _serves(rival: float, named: float, without: float) -> bool:
+    """Whether a rival's error is as good as that with the named effect, beside that with neither.
+
+    Examples
+    --------
+    >>> _serves(1.01, 1.0, 2.0), _serves(1.1, 1.0, 2.0), _serves(1.015, 1.0, 1.02)
+    (True, False, False)
+    """
+    gain = (without**2 - rival**2) >= TWIN_GAIN * (without**2 - named**2)
+    return rival <= TWIN_REFIT * named and gain
+
+
+def _with_instead(
+    problem: Problem, search: Search, name: str, other: Effect | None
+) -> ForceFit | None:
+    """Return the model with another effect in the place of a named one, or with none there."""
+    model = search.model
+    kept = [k for k, effect in enumerate(model.effects) if effect.name != name]
+    effects, strengths = [model.effects[k] for k in kept], [model.strengths[k] for k in kept]
+    if other is not None:
+        effects, strengths = [*effects, other], [*strengths, np.zeros(other.components)]
+    try:
+        return fit_force(problem, model.values, effects, strengths)
+    except TirelibError:
+        return None
 
 
 def _verdict(
     search: Search,
-    twins: Sequence[str],
+    doubts: Mapping[str, Sequence[str]],
     ensemble: ForceEnsemble,
     first: ForceScores,
 ) -> str:
     most = float(ensemble.after.max())
     if search.named:
-        if twins:
+        if len(doubts) == len(search.named):
             return "indistinguishable"
         return "form_inadequate" if search.now.after > FORM * most else "named"
     # strengths are held in their ranges, so what only an implausible one explains is left over

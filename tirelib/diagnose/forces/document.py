@@ -50,6 +50,10 @@ def force_diagnosis_document(told: ForceAssessment) -> dict[str, Any]:
         "joint_floor": factor * case.problem.scale * found.most_left,
         "verdict": told.verdict,
         "named": list(told.named),
+        "held_back": [
+            {"effect": name, "rivals": list(rivals), "test": parting(told, name, rivals)}
+            for name, rivals in told.held_back.items()
+        ],
         "has": [effect.name for effect in found.base.effects],
         "candidates": [_candidate(finding, k + 1, told) for k, finding in enumerate(told.findings)],
         "dead": list(found.dead),
@@ -145,8 +149,15 @@ def next_test(told: ForceAssessment) -> dict[str, Any]:
     varies = sorted({v for name in told.named for v in by_name[name].varies_with})
     between: list[str] = []
     if told.verdict == "indistinguishable":
-        between = list(told.named)
-        what = f"more levels of {_and(varies)}, to the ends that the rig allows"
+        name, rivals = next(iter(told.diagnosis.doubts.items()))
+        between = [name, *rivals]
+        what = parting(told, name, rivals)
+    elif told.held_back:
+        name, rivals = next(iter(told.held_back.items()))
+        between = [name, *rivals]
+        what = f"{name} or {' or '.join(rivals)}: {parting(told, name, rivals)}"
+        if told.named:
+            what += f"; add {told.named[0]} (`tirelib add {told.named[0]}`) meanwhile"
     elif told.verdict == "form_inadequate":
         what = (
             f"add {told.named[0]} (`tirelib add {told.named[0]}`); more is left than the shape of "
@@ -164,6 +175,19 @@ def next_test(told: ForceAssessment) -> dict[str, Any]:
     else:
         what = "none is needed for the effects that this plan can show"
     return {"what": what, "between": between, "would_revive": lacking}
+
+
+def parting(told: ForceAssessment, name: str, rivals: Sequence[str]) -> str:
+    """Say which test parts an effect from those that serve as well."""
+    by_name = {finding.effect.name: finding.effect for finding in told.findings}
+    varied = {v for each in (name, *rivals) for v in by_name[each].varies_with}
+    conditions = sorted(varied - {"order"})
+    if "order" in varied:
+        return (
+            f"repeat the first {_and(conditions)} at the end, at the highest load and slip: a "
+            "drift has gone on, an effect of the condition is back where it was"
+        )
+    return f"more levels of {_and(conditions)}, to the ends that the rig allows"
 
 
 def _and(names: Sequence[str]) -> str:

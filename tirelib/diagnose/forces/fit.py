@@ -29,6 +29,8 @@ BEYOND = 0.5
 """Share of its range by which a strength may leave it in a fit."""
 MISFIT = 0.02
 """Part of the measured rms that counts as noise of the brush itself when residuals are scaled."""
+START_SHARE = 0.3
+"""Start of a strength, as a share of either end of where it may lie."""
 STEP = 1e-5
 MOST = 60
 
@@ -236,6 +238,48 @@ def fit_force(
         _covariance(rows / problem.scale, rest / problem.scale, problem.block),
         float(np.sqrt(np.mean(rest**2))), names,
     )  # fmt: skip
+
+
+def with_effect(problem: Problem, model: ForceFit, effect: Effect) -> ForceFit:
+    """Return the fit with one effect more: the better of two starts, one to each side.
+
+    Raises
+    ------
+    TirelibError
+        If neither settles.
+    """
+    best: ForceFit | None = None
+    trouble: TirelibError | None = None
+    for end in dict.fromkeys(room(problem, model.values, effect)):
+        start = np.full(effect.components, START_SHARE * end)
+        try:
+            found = fit_force(
+                problem, model.values, [*model.effects, effect], [*model.strengths, start]
+            )
+        except TirelibError as error:
+            trouble = error
+            continue
+        best = found if best is None or found.error < best.error else best
+    if best is None:
+        assert trouble is not None  # noqa: S101 - a start has failed
+        raise trouble
+    return best
+
+
+def slopes_at(problem: Problem, model: ForceFit) -> FloatArray:
+    """Return a fitted brush's slopes at the points of another problem, as `ForceFit.slopes`."""
+    scale = [effect.scale for effect in model.effects for _ in range(effect.components)]
+    here = problem.predict(model.values, model.changes)
+    rows = []
+    for k in range(len(model.names) + len(scale)):
+        step = np.zeros(len(model.names) + len(scale))
+        step[k] = STEP
+        values = moved(model.values, model.names, step[: len(model.names)])
+        flat = np.concatenate([*model.strengths, []]) + step[len(model.names) :] * scale
+        cuts = np.cumsum([effect.components for effect in model.effects])[:-1]
+        strengths = np.split(flat, cuts) if model.effects else []
+        rows.append((problem.predict(values, changes_of(model.effects, strengths)) - here) / STEP)
+    return np.stack(rows)
 
 
 def _covariance(rows: FloatArray, rest: FloatArray, block: IntArray) -> FloatArray:

@@ -3,7 +3,8 @@
 Parameters of the brush and the strengths of every living candidate are fitted at once to the scaled
 residual, strengths with a ridge of one range and within their ranges: what could not be true must
 not hide what is. The score of an effect is the misfit that comes back without it, per point, over
-the rms that the whole fit leaves.
+the rms that the whole fit leaves. An effect with twins is scored without them in the fit: two that
+look alike would else take each other's score away.
 """
 
 from dataclasses import dataclass
@@ -67,18 +68,24 @@ class ForceRanking:
             self.slots.append(slot)
             first = slot.stop
         self.spread = np.sqrt(np.diag(np.linalg.inv(self.normal)))
+        names = found.names
+        self.twins = [[names.index(twin) for twin, _ in found.twins(k)] for k in range(len(names))]
 
     def scores(self, residual: FloatArray) -> ForceScores:
         """Return the scores for a residual, measured less predicted, shape (n,)."""
         white = residual / self.scale
         n, whole = white.size, float(white @ white)
         slope = self.rows @ white
-        weights, left = self._fit(slope, whole, np.ones(slope.size, dtype=bool))
-        left = max(left, 1e-30)
-        rms = np.sqrt(left / n)
+        every, least = self._fit(slope, whole, np.ones(slope.size, dtype=bool))
+        least = max(least, 1e-30)
+        rms = np.sqrt(least / n)
         score, share, strength, std, inside = [], [], [], [], []
-        for candidate, slot in zip(self.found.living, self.slots, strict=True):
+        for candidate, slot, twins in zip(self.found.living, self.slots, self.twins, strict=True):
             keep = np.ones(slope.size, dtype=bool)
+            for twin in twins:
+                keep[self.slots[twin]] = False
+            weights, left = self._fit(slope, whole, keep) if twins else (every, least)
+            left = max(left, 1e-30)
             keep[slot] = False
             own = weights[slot]
             returned = max(self._fit(slope, whole, keep)[1] - left, 0.0) if np.any(own) else 0.0

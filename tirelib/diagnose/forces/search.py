@@ -17,6 +17,8 @@ HELPS = 0.985
 """Error of the exact refit with an effect, over that without, up to which it is kept."""
 LEAST_SHARE = 0.03
 """Share of the left misfit that has to come back without an effect for it to matter."""
+LAW = 0.2
+"""Share by which the law of an effect may be off: a twin has to explain more than its square."""
 ROUNDS = 3
 RANGE_SLACK = 2.0
 """Standard deviations by which a strength may leave its range."""
@@ -70,7 +72,7 @@ class Search:
                 )  # fmt: skip
             except TirelibError:
                 continue
-            if trial.error <= HELPS * self.model.error:
+            if trial.error <= HELPS * self.model.error and self._beyond_law(effect.name, trial):
                 self.model, kept = trial, True
                 self.named.append(effect.name)
         self.rounds += 1
@@ -80,15 +82,34 @@ class Search:
             self.now = ranking.scores(self.problem.measured - self.model.predicted)
         return kept
 
+    def _beyond_law(self, name: str, trial: ForceFit) -> bool:
+        """Whether an effect explains more than what the law of a named twin may be off by."""
+        if name not in self.first.names:
+            return True
+        twins = {twin for twin, _ in self.first.twins(self.first.names.index(name))}
+        if not twins & set(self.named):
+            return True
+        before, now = self.base.error**2, self.model.error**2
+        return now - trial.error**2 >= LAW**2 * (before - now)
+
+    def _without(self, name: str) -> tuple[int, ForceFit]:
+        """Return the place of a named effect in the model, and the model fitted without it."""
+        index = [effect.name for effect in self.model.effects].index(name)
+        rest = [k for k in range(len(self.model.effects)) if k != index]
+        return index, fit_force(
+            self.problem, self.model.values, [self.model.effects[k] for k in rest],
+            [self.model.strengths[k] for k in rest],
+        )  # fmt: skip
+
+    def take_out(self, name: str) -> None:
+        """Take a named effect out of the model; what is left after the joint fit stays."""
+        _, self.model = self._without(name)
+        self.named.remove(name)
+
     def drop_needless(self) -> None:
         """Take out names without which the others do as well, or that end out of range."""
         for name in reversed(list(self.named)):
-            index = [effect.name for effect in self.model.effects].index(name)
-            rest = [k for k in range(len(self.model.effects)) if k != index]
-            less = fit_force(
-                self.problem, self.model.values, [self.model.effects[k] for k in rest],
-                [self.model.strengths[k] for k in rest],
-            )  # fmt: skip
+            index, less = self._without(name)
             effect, strength = self.model.effects[index], self.model.strengths[index]
             slack = RANGE_SLACK * self.model.strength_std(index)
             inside = (strength >= effect.low - slack) & (strength <= effect.high + slack)

@@ -1,0 +1,151 @@
+"""A drift and a condition that was visited in order: who is named, and which point parts them."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.unit.diagnose.test_force_parts import VALUES
+from tests.unit.planning.drifting import NOISE, PRESSURES, case, side_force
+from tirelib.diagnose.forces.assess import ForceAssessment, ForceCase, assess_forces
+from tirelib.diagnose.forces.candidates import force_candidates
+from tirelib.diagnose.forces.document import force_diagnosis_document
+from tirelib.diagnose.forces.fit import fit_force
+from tirelib.diagnose.forces.ranking import ForceRanking
+from tirelib.effects import CATALOGUE
+from tirelib.errors import ParameterError
+from tirelib.planning.criterion import NextTest
+from tirelib.planning.document import plan_document, plan_force_test
+from tirelib.planning.envelope import Envelope
+from tirelib.planning.force_rivals import (
+    force_axes,
+    points_ahead,
+    structure_rows,
+    try_force_suspects,
+)
+from tirelib.planning.suspects import given_suspects, suspects_of
+
+PAIR = ["friction_pressure", "friction_drift"]
+BRUSH = [effect for effect in CATALOGUE.values() if effect.hook == "brush"]
+WEAK = ("pressure", 0.03)
+
+
+@cache
+def told(kind: str, size: float) -> ForceAssessment:
+    return assess_forces(case(kind, size), BRUSH, members=15)
+
+
+def envelope(made: ForceCase) -> Envelope:
+    return Envelope.of(made.problem.bench.conditions, force_axes(made), speed=(20.0, 20.0),
+                       pressure=(PRESSURES[0], PRESSURES[-1]))  # fmt: skip
+
+
+@cache
+def planned() -> NextTest:
+    made = case(*WEAK)
+    suspects = given_suspects(PAIR, [], CATALOGUE, "Fy")
+    test = plan_force_test(made, suspects, envelope(made)).test
+    assert test is not None
+    return test
+
+
+def test_wear_is_never_taken_for_the_pressure_that_was_visited_in_order() -> None:
+    found = told("wear", 0.12)
+    assert "friction_drift" in found.named
+    assert found.verdict in ("named", "indistinguishable")
+    if found.verdict == "named":
+        assert found.named == ("friction_drift",)
+
+
+def test_pressure_that_was_visited_in_order_is_never_taken_for_wear() -> None:
+    found = told("pressure", 0.35)
+    assert "friction_pressure" in found.named
+    if found.verdict == "named":
+        assert "friction_drift" not in found.named
+
+
+def test_what_serves_as_well_is_indistinguishable_and_the_test_is_told() -> None:
+    found = told("wear", 0.03)
+    assert found.verdict == "indistinguishable"
+    assert set(found.named) == set(PAIR)
+    document = force_diagnosis_document(found)
+    assert set(document["next_test"]["between"]) == set(PAIR)
+    assert "repeat the first pressure at the end" in document["next_test"]["what"]
+    assert suspects_of(document, CATALOGUE).names == found.named
+
+
+def test_beside_sure_names_a_doubtful_one_is_held_back_with_its_rivals() -> None:
+    document = force_diagnosis_document(told("pressure", 0.35))
+    held = {"effect": PAIR[0], "rivals": PAIR[1:], "test": "x"}
+    document |= {"verdict": "named", "named": ["carcass"], "held_back": [held]}
+    found = suspects_of(document, CATALOGUE)
+    assert found.names == tuple(PAIR)
+    assert [effect.name for effect, _ in found.beside] == ["carcass"]
+
+
+def test_an_effect_is_scored_without_its_twins() -> None:
+    problem = case("pressure", 0.35).problem
+    base = fit_force(problem, VALUES)
+    rest = problem.measured - base.predicted
+    both, alone = (
+        force_candidates(problem, base, [CATALOGUE[name] for name in names])
+        for names in (PAIR, PAIR[:1])
+    )
+    assert [name for name, _ in both.twins(0)] == PAIR[1:]
+    scores = [ForceRanking(problem, base, found).scores(rest) for found in (both, alone)]
+    assert scores[0].share[0] == pytest.approx(scores[1].share[0], rel=1e-6)
+
+
+def test_the_advised_point_is_the_first_pressure_once_more_at_the_end() -> None:
+    test = planned()
+    names = test.envelope.names
+    best = dict(zip(names, test.points[0], strict=True))
+    assert best["pressure"] == PRESSURES[0]
+    assert abs(best["slip_angle"]) > np.deg2rad(4.0)
+    assert test.score[0] > 5.0 * np.median(test.score)
+    assert test.dropped == 0
+
+
+def test_the_advised_point_rules_the_wrong_one_out() -> None:
+    made, test = case(*WEAK), planned()
+    joint = points_ahead(made, test.envelope, np.repeat(test.points[:1], 4, axis=0))
+    n = len(made.problem)
+    at = joint.bench.conditions.take(np.arange(n, n + 4))
+    assert (at.order == 1.0).all()
+    side = side_force(WEAK, at.load, at.pressure, at.slip_angle, at.order)
+    side = side + NOISE * np.random.default_rng(8).standard_normal(4)
+    measured = np.concatenate([made.problem.measured, side])
+    after = replace(made, problem=replace(joint, measured=measured))
+    base = fit_force(after.problem, VALUES)
+    structure = structure_rows(after.problem, n + 4, base, 40, 0)
+    suspects = [(CATALOGUE[name], np.zeros(1)) for name in PAIR]
+    pressure, drift = try_force_suspects(after, base, suspects, structure).rivals
+    assert drift.cost - pressure.cost > max(10.0, test.pairs[0].gap)
+
+
+def test_a_point_ahead_is_told_in_engineers_units_and_repeats_add() -> None:
+    made, test = case(*WEAK), planned()
+    suspects = given_suspects(PAIR, [], CATALOGUE, "Fy")
+    plan = plan_force_test(made, suspects, test.envelope)
+    document = plan_document(plan)
+    assert (document["quantity"], document["between"]) == ("Fy", PAIR)
+    best = document["best"]
+    assert best["slip_angle_deg"] == pytest.approx(np.rad2deg(test.points[0, 3]))
+    assert best["speed_kmh"] == pytest.approx(72.0)
+    assert document["noise"]["unit"] == "N"
+    assert document["noise"]["random"] == pytest.approx(NOISE)
+    reached = list(test.pairs[0].repeats.values())
+    assert reached == sorted(reached)
+    assert reached[-1] <= test.pairs[0].limit
+
+
+def test_what_a_force_cannot_have_is_refused() -> None:
+    made = case(*WEAK)
+    with pytest.raises(ParameterError, match="low_pass acts on strain, which Fy does not show"):
+        given_suspects(["low_pass"], [], CATALOGUE, "Fy")
+    at = made.problem.bench.conditions
+    with pytest.raises(ParameterError, match="a range of camber is declared"):
+        Envelope.of(at, force_axes(made), camber=(0.0, 0.1))
+    with pytest.raises(ParameterError, match=r"slip_angle 0\.1 to -0\.1"):
+        Envelope.of(at, force_axes(made), slip_angle=(0.1, -0.1))

@@ -1,0 +1,65 @@
+"""``tirelib effects``: the catalogue, and the check of effects of your own."""
+
+from pathlib import Path
+
+import click
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from tirelib.cli.common import FILE, output, progress_bar
+from tirelib.errors import FormatError
+
+_EXAMPLE = """\b
+Examples:
+  tirelib effects
+  tirelib effects --effects mine.py
+
+\b
+Every effect of your own is registered: strength zero is the base, the derivative at zero is alive
+and linear, the whole range can be computed, a planted strength is found again. Exit code: 0 all may
+take part; 2 one may not.
+"""
+
+
+@click.command(epilog=_EXAMPLE)
+@click.option("--effects", "effect_files", metavar="FILE.py", type=FILE, multiple=True,
+              help="Effects of your own; may be given again.")  # fmt: skip
+def effects(effect_files: tuple[Path, ...]) -> None:
+    """List the effects of the catalogue, or register effects of your own."""
+    from tirelib.effects import CATALOGUE
+    from tirelib.effects.load import all_effects
+    from tirelib.model.registration import register
+
+    found = all_effects(effect_files)
+    own = [effect for name, effect in found.items() if name not in CATALOGUE]
+    if not own:
+        table = Table("stage", "effect", "unit", "range", "what it is", box=SIMPLE_HEAD)
+        for effect in found.values():
+            ends = f"{effect.low:g} .. {effect.high:g}"
+            table.add_row(effect.stage, effect.name, effect.unit, ends, effect.title)
+        output().print(table)
+        return
+    faults: list[str] = []
+    with progress_bar("registering") as progress:
+        told = []
+        for effect in own:
+            progress(effect.name)
+            told.append(register(effect, found))
+    for report in told:
+        faults += report.faults
+        if not report.accepted:
+            continue
+        effect, console = report.effect, output()
+        console.print(f"{effect.name}: {effect.title}")
+        if effect.untestable:
+            console.print(f"  no campaign can show it: {effect.untestable}")
+            continue
+        console.print(
+            f"  {report.planted:.4g} {effect.unit} planted, {report.recovered:.4g} found; the "
+            f"base imitates {100.0 * (1.0 - report.survives):.0f} % of it"
+        )
+        twins = ", ".join(f"{name} ({np.round(angle):.0f} deg)" for name, angle in report.twins)
+        console.print(f"  looks like: {twins or 'no other effect'}")
+    if faults:
+        raise FormatError(faults)

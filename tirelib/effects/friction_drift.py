@@ -1,0 +1,21 @@
+"""Friction that drifts during the campaign."""
+
+import numpy as np
+
+from tirelib.effects.effect import State, effect
+
+
+@effect(
+    "friction_drift", stage="brush", unit="1", low=-0.3, high=0.3, varies_with=("order",),
+    components=2,
+    source="wear and polish of tread and road during a test (assumed size)",
+)  # fmt: skip
+def friction_drift(state: State, strength: tuple[float, float]) -> State:
+    """Friction drifts from the first run to the last.
+
+    mu times exp(s1 x / 2 + s2 (x^2 - 1/3)), x from -1 at the first point to 1 at the last: s1 is
+    the logarithm of last over first, s2 the bend.
+    """
+    x = 2.0 * state.conditions.order - 1.0
+    curve = 0.5 * strength[0] * x + strength[1] * (x**2 - 1.0 / 3.0)
+    return state.but(mu=state.mu * np.exp(curve))

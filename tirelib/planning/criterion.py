@@ -1,0 +1,319 @@
+"""The run that parts rivals best: a profiled T-criterion over a grid of possible runs.
+
+Every suspect is fitted to the present runs. At each possible run each of two rivals in turn is
+taken as true, and the other may adapt within what the present runs leave open of its numbers and of
+the structural misfit (Atkinson and Fedorov's criterion with the parameters integrated out). What it
+still misses, in chi-square, is the separation; the smaller of both directions counts.
+
+Strain and forces differ in how rivals are fitted and foretell (`Rival`, `Trial`, `Forecast`), not
+in how runs are judged.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Protocol
+
+import numpy as np
+from scipy.stats import norm
+
+from tirelib.arrays import FloatArray
+from tirelib.planning.envelope import Envelope
+
+NOTHING = "no_effect"
+"""Name of the rival that needs no further effect."""
+RESOLVED = 10.0
+"""Chi-square by which a rival has to be worse to be ruled out."""
+WANTED = 20.0
+"""Separation that one asks for: then at least four runs of five rule a rival out."""
+REPEATS = (1, 2, 3, 4, 6, 8, 12, 16, 24)
+"""Repeats of the best run that are looked at."""
+ENDLESS = 1e6
+"""Repeats that average everything that repeats can average."""
+
+Pair = tuple[str, str]
+
+
+class Rival(Protocol):
+    """A suspect fitted to the present runs."""
+
+    @property
+    def name(self) -> str:
+        """Of the effect, or `NOTHING`."""
+
+    @property
+    def cost(self) -> float:
+        """Chi-square left on the present runs."""
+
+    @property
+    def strength(self) -> FloatArray:
+        """In the effect's unit, (components,); empty for `NOTHING`."""
+
+    @property
+    def in_range(self) -> bool:
+        """Whether it is plausible, give or take two standard deviations."""
+
+
+class Trial(Protocol):
+    """Rivals on the same runs, under the same noise."""
+
+    @property
+    def rivals(self) -> Sequence[Rival]:
+        """Those whose fits have converged."""
+
+    @property
+    def left_out(self) -> Mapping[str, str]:
+        """Suspects whose fit failed, and why."""
+
+    @property
+    def size(self) -> float:
+        """Of the structural misfit; 1 is that of the variants of a diagnosis."""
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """Random parts of a run's samples, as white noise that counts as much.
+
+    Attributes
+    ----------
+    random : float
+        Between repeated runs.
+    staying : float
+        Small-scale misfit of the ring's structure, which repeats do not average.
+    """
+
+    random: float
+    staying: float
+
+
+@dataclass(frozen=True, slots=True)
+class Forecast:
+    """What a rival says of candidate runs: a waveform of strain, or a force as a single sample.
+
+    Attributes
+    ----------
+    wave : shape (n_points, n_samples)
+        Best guess, structural misfit included.
+    slopes : shape (n_unknowns, n_points, n_samples)
+        By free coordinates and by the misfit.
+    tangents : shape (n_points, n_samples, n_tangents)
+        By set points and the like, times their tolerance.
+    covariance : shape (n_unknowns, n_unknowns)
+    """
+
+    wave: FloatArray
+    slopes: FloatArray
+    tangents: FloatArray
+    covariance: FloatArray
+
+    def separation(self, other: FloatArray, noise: Noise, repeats: float) -> FloatArray:
+        """Return the chi-square by which this rival misses waveforms, after it adapts to them.
+
+        d' (S + J C J')^-1 d: S holds noise and set points, over the number of repeats, and what
+        repeats do not average; J C J' is what the present runs leave open of this rival.
+
+        Parameters
+        ----------
+        other : shape (n_points, n_samples)
+        noise : Noise
+        repeats : float
+            Runs at each point.
+
+        Returns
+        -------
+        shape (n_points,), [-]
+        """
+        root = np.linalg.cholesky(self.covariance)
+        open_ = np.einsum("kpn,kj->pnj", self.slopes, root, optimize=True)
+        low = np.concatenate([open_, self.tangents / np.sqrt(repeats)], axis=2)
+        white = noise.staying**2 + noise.random**2 / repeats
+        difference = other - self.wave
+        if low.shape[1] < low.shape[2]:
+            whole = low @ np.swapaxes(low, 1, 2) + white * np.eye(low.shape[1])
+            inside = np.linalg.solve(whole, difference[..., None])[..., 0]
+            return np.asarray(np.sum(difference * inside, axis=1))
+        inside = np.einsum("pnj,pn->pj", low, difference)
+        core = np.einsum("pnj,pnk->pjk", low, low, optimize=True) + white * np.eye(low.shape[2])
+        taken = np.einsum("pj,pj->p", inside, np.linalg.solve(core, inside[..., None])[..., 0])
+        out: FloatArray = (np.sum(difference**2, axis=1) - taken) / white
+        return np.maximum(out, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class PairForecast:
+    """Two rivals, now and at every possible run.
+
+    Attributes
+    ----------
+    names : (str, str)
+    gap : float
+        Chi-square by which the second is worse on the present runs; negative: the first.
+    separation : shape (n,)
+        Expected further chi-square by one run.
+    probability : shape (n,)
+        That one run rules one of them out.
+    repeats : mapping of number to float
+        Separation by so many repeats of the best run.
+    limit : float
+        Separation that no number of repeats exceeds.
+    """
+
+    names: Pair
+    gap: float
+    separation: FloatArray
+    probability: FloatArray
+    repeats: Mapping[int, float]
+    limit: float
+
+    @property
+    def better(self) -> str:
+        """The rival that the present runs like better."""
+        return self.names[0] if self.gap >= 0.0 else self.names[1]
+
+    @property
+    def resolved(self) -> bool:
+        """Whether the present runs rule one of them out."""
+        return abs(self.gap) >= RESOLVED
+
+    def needed(self, wanted: float) -> int | None:
+        """Return the fewest repeats of the best run with a separation, None beyond `REPEATS`."""
+        return next((n for n, reached in self.repeats.items() if reached >= wanted), None)
+
+
+@dataclass(frozen=True, slots=True)
+class NextTest:
+    """The possible runs, judged.
+
+    Attributes
+    ----------
+    envelope : Envelope
+    points : shape (n, axes), SI
+        The possible runs on the envelope's axes, best first.
+    score, probability : shape (n,)
+        Separation of the pair that is hardest there, and mean chance to rule a rival out.
+    hardest : tuple of int
+        Index of that pair, per run.
+    pairs : tuple of PairForecast
+        In the order of the points.
+    trial : Trial
+        The rivals on the present runs, and who is none.
+    dropped : int
+        Possible runs at which a rival has no solution.
+    noise : Noise
+    """
+
+    envelope: Envelope
+    points: FloatArray
+    score: FloatArray
+    probability: FloatArray
+    hardest: tuple[int, ...]
+    pairs: tuple[PairForecast, ...]
+    trial: Trial
+    dropped: int
+    noise: Noise
+
+    @property
+    def open_pairs(self) -> tuple[PairForecast, ...]:
+        """Pairs that the present runs do not part."""
+        return tuple(pair for pair in self.pairs if not pair.resolved)
+
+
+def judged(
+    envelope: Envelope,
+    points: FloatArray,
+    trial: Trial,
+    told: Sequence[Forecast],
+    dropped: int,
+    noise: Noise,
+) -> NextTest:
+    """Sort the runs by what they promise.
+
+    Parameters
+    ----------
+    envelope : Envelope
+    points : shape (n, axes), SI
+    trial : Trial
+    told : sequence of Forecast
+        Of the points, per rival.
+    dropped : int
+        Possible runs without a solution.
+    noise : Noise
+    """
+    rivals = trial.rivals
+    if len(rivals) < 2:
+        empty = np.zeros(0)
+        none = np.zeros((0, len(envelope.names)))
+        return NextTest(envelope, none, empty, empty, (), (), trial, dropped, noise)
+    pairs = list(combinations(range(len(rivals)), 2))
+    sizes = np.array([_both(rivals, told, pair, noise, 1.0) for pair in pairs])
+    gaps = [rivals[j].cost - rivals[i].cost for i, j in pairs]
+    chances = np.array([resolving(size, gap) for size, gap in zip(sizes, gaps, strict=True)])
+    counted = [k for k, gap in enumerate(gaps) if abs(gap) < RESOLVED] or list(range(len(gaps)))
+    hardest = np.array(counted)[np.argmin(sizes[counted], axis=0)]
+    chance = chances[counted].mean(axis=0)
+    score = sizes[hardest, np.arange(len(points))]
+    # where all pairs are parted already, a run can only add to that
+    settled = all(abs(gap) >= RESOLVED for gap in gaps)
+    order = np.lexsort((-score, 0.0 * chance if settled else -np.round(chance, 3)))
+    best = int(order[0])
+    found = []
+    for pair, size, gap, likely in zip(pairs, sizes, gaps, chances, strict=True):
+        there = [_at(each, best) for each in told]
+        repeated = {n: float(_both(rivals, there, pair, noise, n)[0]) for n in REPEATS}
+        names = (rivals[pair[0]].name, rivals[pair[1]].name)
+        limit = float(_both(rivals, there, pair, noise, ENDLESS)[0])
+        found.append(PairForecast(names, gap, size[order], likely[order], repeated, limit))
+    return NextTest(
+        envelope, points[order], score[order], chance[order], tuple(hardest[order].tolist()),
+        tuple(found), trial, dropped, noise,
+    )  # fmt: skip
+
+
+def _both(
+    rivals: Sequence[Rival],
+    told: Sequence[Forecast],
+    pair: tuple[int, int],
+    noise: Noise,
+    repeats: float,
+) -> FloatArray:
+    """Return the smaller separation of both directions.
+
+    That nothing is missing is a special case of every effect: only the other direction counts.
+    """
+    i, j = pair
+    ways = []
+    if rivals[i].name != NOTHING:
+        ways.append(told[j].separation(told[i].wave, noise, repeats))
+    if rivals[j].name != NOTHING:
+        ways.append(told[i].separation(told[j].wave, noise, repeats))
+    smaller: FloatArray = np.min(ways, axis=0)
+    return smaller
+
+
+def _at(told: Forecast, index: int) -> Forecast:
+    """Return the forecast of one point."""
+    one = slice(index, index + 1)
+    return Forecast(told.wave[one], told.slopes[:, one], told.tangents[one], told.covariance)
+
+
+def resolving(separation: FloatArray, gap: float) -> FloatArray:
+    """Return the chance that a run of this separation rules one of two rivals out.
+
+    The chi-square between them is normal about gap + separation with variance 4 separation if the
+    first is right, and about gap - separation if the second is. Each is right with the odds that
+    the present runs give.
+
+    Examples
+    --------
+    >>> resolving(np.array([0.0, 10.0, 40.0]), 0.0).round(2).tolist()
+    [0.0, 0.5, 0.99]
+    """
+    spread = 2.0 * np.sqrt(np.maximum(separation, 1e-12))
+    first = 1.0 / (1.0 + np.exp(-np.clip(gap, -100.0, 100.0) / 2.0))
+    # either may come out ahead by enough, whoever is right
+    ahead = norm.sf((RESOLVED - gap - separation) / spread)
+    ahead += norm.sf((RESOLVED + gap + separation) / spread)
+    behind = norm.sf((RESOLVED - gap + separation) / spread)
+    behind += norm.sf((RESOLVED + gap - separation) / spread)
+    chance: FloatArray = first * ahead + (1.0 - first) * behind
+    return chance
