@@ -5,8 +5,8 @@ With X the place in the contact, 1 leading edge, -1 trailing edge, and c the fla
 .. math:: p(X) = \frac{3 F_z}{4 a}\,(1 - X^2)\,\frac{1 + c X^2}{1 + c/5}.
 
 c = 0 is the parabola, c = 1 rises with the fourth power toward the edges, above 1 the middle is
-lower than the sides. With y a place in the contact, 0 at the trailing and 1 at the leading edge, and
-t as in `tirelib.brush.predict`, bristles stick where
+lower than the sides. With y a place in the contact, 0 trailing and 1 leading edge, and t as in
+`tirelib.brush.predict`, bristles stick where
 
 .. math:: y\,\frac{1 + c (2y - 1)^2}{1 + c/5} > t.
 
