@@ -20,6 +20,7 @@ SLACK = {
     "angle_slope": 0.004,
     "utilisation": 0.02,
     "camber": np.deg2rad(0.5),
+    "kappa": 0.01,
 }
 """Least distance (SI) beyond the calibrated range that is still taken as calibrated."""
 LEAST_TRACTION = 0.08
@@ -55,14 +56,17 @@ def with_ranges(
         if not chain.has(quantity):
             return ()
         x = truth[measured]
-        low, high = float(x.min()), float(x.max())
-        return (Range(quantity, low, high, MARGIN * (high - low)),)
+        low, high = float(np.nanmin(x)), float(np.nanmax(x))
+        slack = max(SLACK.get(quantity, 0.0), MARGIN * (high - low))
+        return (Range(quantity, low, high, slack),)
+
+    driven = bool(np.ptp(values["traction"]) >= LEAST_TRACTION)
 
     guards = {
         "Fz": (*shape, *own("Fz", "Fz")),
         "Fy": (*shape, *own("Fy", "Fy")),
         "alpha": (*shape, *angle, *own("alpha", "slip_angle")),
-        "kappa": (),
+        "kappa": own("kappa", "slip_ratio") if driven else (),
     }
     return replace(chain, guards=guards, cloud=_cloud(values))
 

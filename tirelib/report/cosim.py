@@ -94,7 +94,9 @@ def _answer(document: Mapping[str, Any]) -> str:
     count, missed = len(document["manoeuvres"]), len(document["missed"])
     if not missed:
         return f"All figures are reached in {count} manoeuvres and in the range drill."
-    return f"{missed} figures are not reached, in {count} manoeuvres and the range drill."
+    figures = "1 figure is" if missed == 1 else f"{missed} figures are"
+    where = "1 manoeuvre" if count == 1 else f"{count} manoeuvres"
+    return f"{figures} not reached, in {where} and the range drill."
 
 
 def parts_of(document: Mapping[str, Any], series: Sequence[Series]) -> list[Part]:

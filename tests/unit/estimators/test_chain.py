@@ -161,6 +161,10 @@ def test_slip_ratio_and_rolling_condition(cornering: Campaign, braking: Campaign
         found = estimate(both, load=4500.0, slip_ratio=kappa)
         assert abs(np.nanmean(found.value["kappa"]) - kappa) < 2e-3
         assert set(found.rolling[1:]) == {word}
+        assert found.valid["kappa"][1:].all()
+    beyond = estimate(both, load=4500.0, slip_ratio=-0.4)
+    assert abs(np.nanmean(beyond.value["kappa"]) + 0.4) < 5e-3
+    assert not beyond.valid["kappa"].any()
 
 
 def test_without_speed_there_is_no_slip_ratio_but_a_load(trained: Trained) -> None:
