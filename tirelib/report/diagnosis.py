@@ -20,9 +20,9 @@ from tirelib.report.figures.compare_plot import (
     styled_figure,
 )
 from tirelib.report.figures.waterfall import waterfall_of
+from tirelib.report.findings import advice, dead_effects, score_bars
 from tirelib.report.page import Table, number
 from tirelib.report.parts_page import write_parts_page
-from tirelib.report.style import BLUE, FAINT, RED
 from tirelib.waveforms import GRID
 
 TITLE = "Which effect is missing"
@@ -33,7 +33,6 @@ METHOD_TEXT = (
     "threshold is the largest score among the variants, each judged by the others. From "
     f"{ALARM:g} times it on an effect in its plausible range is an alarm, from once on a hint."
 )
-_LEVELS = {"alarm": RED, "hint": BLUE, "quiet": FAINT}
 
 
 def answer_of(told: Assessment) -> str:
@@ -89,11 +88,11 @@ def parts_of(told: Assessment, history: Sequence[Mapping[str, Any]] = ()) -> lis
         plots.append(_map(told, told.left, "after", f"With {', '.join(told.named)}"))
     return [
         Part("Candidates", "candidates", METHOD_TEXT, tables=[_candidates(told)],
-             plots=[_bars(told)]),
+             plots=[score_bars(told.findings, ALARM)]),
         Part("Error", "error", tables=[_errors(told)], plots=[fall] if fall else []),
         Part("What is left", "left", _left_text(told), plots=plots),
-        Part("What this plan cannot show", "blind", tables=_blind(told)),
-        Part("Next", "next", _next_text(told)),
+        Part("What this plan cannot show", "blind", tables=dead_effects(told.diagnosis.dead)),
+        Part("Next", "next", advice(next_test(told))),
         Part("Sources", "sources", sources=_sources(told)),
     ]  # fmt: skip
 
@@ -182,52 +181,9 @@ def _left_text(told: Assessment) -> str:
     return text
 
 
-def _blind(told: Assessment) -> list[Table]:
-    dead = [[name, reason] for name, reason in told.diagnosis.dead.items()]
-    return [Table("Dead effects", ["effect", "why"], dead, texts=2)] if dead else []
-
-
-def _next_text(told: Assessment) -> str:
-    step = next_test(told)
-    text = f"{step['what'][0].upper()}{step['what'][1:]}."
-    revived = step["would_revive"]
-    if revived:
-        text += f" Other runs would show {', '.join(revived)}: see the dead effects."
-    return text
-
-
 def _sources(told: Assessment) -> list[str]:
     shown = [f.effect for f in told.findings if f.level != "quiet" or f.effect.name in told.named]
     return [*(f"{effect.name}: {effect.source}" for effect in shown), *RING, *METHOD]
-
-
-def _bars(told: Assessment) -> Plot:
-    names = [f.effect.name for f in told.findings]
-    ratio = [f.score / f.threshold for f in told.findings]
-    figure = go.Figure(
-        go.Bar(
-            x=np.round(ratio, 4), y=names, orientation="h",
-            marker={"color": [_LEVELS[f.level] for f in told.findings]},
-            hovertemplate="%{y}: %{x:.3g}<extra></extra>",
-        )
-    )  # fmt: skip
-    for at, text in ((1.0, "hint"), (ALARM, "alarm")):
-        figure.add_vline(x=at, line={"dash": "dot", "color": FAINT})
-        # places of annotations on an axis of powers are powers
-        figure.add_annotation(
-            x=float(np.log10(at)), y=1.0, yref="paper", yanchor="bottom", text=text,
-            showarrow=False, xanchor="left" if at > 1.0 else "right",
-        )  # fmt: skip
-    figure.update_yaxes(autorange="reversed")
-    figure.update_xaxes(title="score / threshold", type="log")
-    styled_figure(figure, 160 + 22 * len(names), showlegend=False)
-    return Plot(
-        "scores", "Score over threshold",
-        f"Red: alarm; blue: hint; gray: quiet. An effect beyond {ALARM:g} that is no alarm lies "
-        "outside its range.",
-        figure, ["effect", "score / threshold", "level"],
-        [[f.effect.name, r, f.level] for f, r in zip(told.findings, ratio, strict=True)],
-    )  # fmt: skip
 
 
 def _map(told: Assessment, left: Left, name: str, title: str) -> Plot:

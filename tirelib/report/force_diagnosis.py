@@ -4,19 +4,18 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-import plotly.graph_objects as go
 
 from tirelib.diagnose.forces.assess import ForceAssessment
 from tirelib.diagnose.forces.document import exceeds, fold_words, next_test
 from tirelib.diagnose.forces.held_out import pooled
 from tirelib.diagnose.forces.search import ALARM
 from tirelib.report.comparison import BRUSH, Part
-from tirelib.report.figures.compare_plot import Plot, styled_figure
+from tirelib.report.figures.compare_plot import Plot
 from tirelib.report.figures.force_left import residual_map
 from tirelib.report.figures.waterfall import Step, waterfall, waterfall_of
+from tirelib.report.findings import advice, dead_effects, score_bars
 from tirelib.report.page import Table, number
 from tirelib.report.parts_page import write_parts_page
-from tirelib.report.style import BLUE, FAINT, RED
 
 METHOD_TEXT = (
     "All effects of the brush are fitted at once. An effect's score is the misfit that returns "
@@ -27,9 +26,6 @@ METHOD_TEXT = (
     "plausible range that an exact refit needs is an alarm, from once on a hint. Named effects "
     "stand in the order of what each alone gains on held-out points."
 )
-LEAST_SHOWN = 0.01
-"""Left end of the logarithmic scale of scores."""
-_LEVELS = {"alarm": RED, "hint": BLUE, "quiet": FAINT}
 
 
 def answer_of(told: ForceAssessment) -> str:
@@ -74,11 +70,11 @@ def parts_of(told: ForceAssessment) -> list[Part]:
         maps.append(residual_map(told, found.final, "after", f"With {', '.join(told.named)}"))
     return [
         Part("Candidates", "candidates", METHOD_TEXT, tables=[_candidates(told)],
-             plots=[_bars(told)] if told.findings else []),
+             plots=[score_bars(told.findings, ALARM)] if told.findings else []),
         Part("Error", "error", tables=[_errors(told)], plots=_fall(told)),
         Part("What is left", "left", _left_text(told), plots=maps),
-        Part("What this plan cannot show", "blind", tables=_blind(told)),
-        Part("Next", "next", _next_text(told)),
+        Part("What this plan cannot show", "blind", tables=dead_effects(told.diagnosis.dead)),
+        Part("Next", "next", advice(next_test(told))),
         Part("Sources", "sources", sources=_sources(told)),
     ]  # fmt: skip
 
@@ -160,46 +156,7 @@ def _left_text(told: ForceAssessment) -> str:
     return f"What is left stands {told.left.where}; it {told.left.scaling}.{guess}"
 
 
-def _blind(told: ForceAssessment) -> list[Table]:
-    dead = [[name, reason] for name, reason in told.diagnosis.dead.items()]
-    return [Table("Dead effects", ["effect", "why"], dead, texts=2)] if dead else []
-
-
-def _next_text(told: ForceAssessment) -> str:
-    step = next_test(told)
-    text = f"{step['what'][0].upper()}{step['what'][1:]}."
-    revived = step["would_revive"]
-    if revived:
-        text += f" Other runs would show {', '.join(revived)}: see the dead effects."
-    return text
-
-
 def _sources(told: ForceAssessment) -> Sequence[str]:
     shown = [f.effect for f in told.findings if f.level != "quiet"]
     shown += [effect for effect in told.case.effects if effect not in shown]
     return [*(f"{effect.name}: {effect.source}" for effect in shown), *BRUSH]
-
-
-def _bars(told: ForceAssessment) -> Plot:
-    names = [f.effect.name for f in told.findings]
-    ratio = [f.score / f.threshold for f in told.findings]
-    figure = go.Figure(
-        go.Bar(
-            x=np.maximum(np.round(ratio, 4), LEAST_SHOWN), y=names, orientation="h",
-            marker={"color": [_LEVELS[f.level] for f in told.findings]},
-            hovertemplate="%{y}: %{x:.3g}<extra></extra>",
-        )
-    )  # fmt: skip
-    for at in (1.0, ALARM):
-        figure.add_vline(x=at, line={"dash": "dot", "color": FAINT})
-    figure.update_yaxes(autorange="reversed")
-    figure.update_xaxes(title="score / threshold", type="log")
-    styled_figure(figure, 160 + 22 * len(names), showlegend=False)
-    return Plot(
-        "scores", "Score over threshold",
-        "Dotted: 1, from which an effect is a hint, and 3, from which it is an alarm. Red: alarm; "
-        "blue: hint; gray: quiet. An effect beyond 3 that is no alarm lies outside its "
-        "range, or an exact refit does as well without it.",
-        figure, ["effect", "score / threshold", "level"],
-        [[f.effect.name, r, f.level] for f, r in zip(told.findings, ratio, strict=True)],
-    )  # fmt: skip

@@ -1,0 +1,81 @@
+"""What pages of a diagnosis, of strain or of forces, show alike: scores, dead effects, advice."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+import plotly.graph_objects as go
+
+from tirelib.effects import Effect
+from tirelib.report.figures.compare_plot import Plot, styled_figure
+from tirelib.report.page import Table
+from tirelib.report.style import BLUE, FAINT, RED
+
+LEAST_SHOWN = 0.01
+"""Left end of the logarithmic scale of scores."""
+_LEVELS = {"alarm": RED, "hint": BLUE, "quiet": FAINT}
+
+
+class Finding(Protocol):
+    """A candidate as it stands in the end."""
+
+    @property
+    def effect(self) -> Effect:
+        """Return the effect."""
+
+    @property
+    def score(self) -> float:
+        """Return the misfit that returns without it."""
+
+    @property
+    def threshold(self) -> float:
+        """Return the largest score among variants that lack no effect."""
+
+    @property
+    def level(self) -> str:
+        """Return alarm, hint or quiet."""
+
+
+def score_bars(findings: Sequence[Finding], alarm: float) -> Plot:
+    """Return the scores over their thresholds, with the marks of a hint and of an alarm."""
+    names = [f.effect.name for f in findings]
+    ratio = [f.score / f.threshold for f in findings]
+    figure = go.Figure(
+        go.Bar(
+            x=np.maximum(np.round(ratio, 4), LEAST_SHOWN), y=names, orientation="h",
+            marker={"color": [_LEVELS[f.level] for f in findings]},
+            hovertemplate="%{y}: %{x:.3g}<extra></extra>",
+        )
+    )  # fmt: skip
+    for at, text in ((1.0, "hint"), (alarm, "alarm")):
+        figure.add_vline(x=at, line={"dash": "dot", "color": FAINT})
+        # places of annotations on an axis of powers are powers
+        figure.add_annotation(
+            x=float(np.log10(at)), y=1.0, yref="paper", yanchor="bottom", text=text,
+            showarrow=False, xanchor="left" if at > 1.0 else "right",
+        )  # fmt: skip
+    figure.update_yaxes(autorange="reversed")
+    figure.update_xaxes(title="score / threshold", type="log")
+    styled_figure(figure, 160 + 22 * len(names), showlegend=False)
+    return Plot(
+        "scores", "Score over threshold",
+        f"Red: alarm; blue: hint; gray: quiet. An effect beyond {alarm:g} that is no alarm lies "
+        "outside its range, or an exact refit does as well without it.",
+        figure, ["effect", "score / threshold", "level"],
+        [[f.effect.name, r, f.level] for f, r in zip(findings, ratio, strict=True)],
+    )  # fmt: skip
+
+
+def dead_effects(dead: Mapping[str, str]) -> list[Table]:
+    """Return the table of effects that the plan cannot show, if there are any."""
+    rows = [[name, reason] for name, reason in dead.items()]
+    return [Table("Dead effects", ["effect", "why"], rows, texts=2)] if rows else []
+
+
+def advice(step: Mapping[str, Any]) -> str:
+    """Say the next test of a document in words."""
+    text = f"{step['what'][0].upper()}{step['what'][1:]}."
+    revived = step["would_revive"]
+    if revived:
+        text += f" Other runs would show {', '.join(revived)}: see the dead effects."
+    return text
