@@ -39,19 +39,24 @@ class Source(Protocol):
     message: str
 
     @property
-    def name(self) -> str: ...  # noqa: D102  # see the class
+    def name(self) -> str:
+        """Return what is read."""
 
     @property
-    def wheels(self) -> Wheels: ...  # noqa: D102
+    def wheels(self) -> Wheels:
+        """Return counters and clocks."""
 
     @property
-    def heard(self) -> float | None: ...  # noqa: D102
+    def heard(self) -> float | None:
+        """Return when bytes came last."""
 
     @property
-    def lost(self) -> float | None: ...  # noqa: D102
+    def lost(self) -> float | None:
+        """Return when the port went away."""
 
     @property
-    def last_byte(self) -> float | None: ...  # noqa: D102
+    def last_byte(self) -> float | None:
+        """Return when bytes came last, on the monotonic clock."""
 
     def counts(self) -> dict[str, Any]:
         """Return what was started again, skipped and not recorded."""

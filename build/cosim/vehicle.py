@@ -61,11 +61,9 @@ class _Opened(ast.NodeTransformer):
     def visit_Call(self, node: ast.Call) -> ast.AST:
         """Give every tire formula the parameters of the wheel that its first argument names."""
         self.generic_visit(node)
-        if isinstance(node.args[-1] if node.args else None, ast.Attribute):
-            last, first = node.args[-1], node.args[0]
-            assert isinstance(last, ast.Attribute)  # noqa: S101
-            if last.attr == "tire" and isinstance(first, ast.Name):
-                place = _PLACES.index(first.id[-2:].upper())
+        match node.args:
+            case [ast.Name(id=name), *_, ast.Attribute(attr="tire")]:
+                place = _PLACES.index(name[-2:].upper())
                 node.args[-1] = ast.parse(f"p.tires[{place}]", mode="eval").body
         return node
 
@@ -74,8 +72,8 @@ class _Opened(ast.NodeTransformer):
         rows = ", ".join(
             "(" + ", ".join(name.format(p, p.lower()) for name in _WHEEL) + ")" for p in _PLACES
         )
-        assert node.value is not None  # noqa: S101
-        node.value = ast.Tuple([node.value, ast.parse(f"({rows})", mode="eval").body], ast.Load())
+        derivatives = node.value or ast.Constant(None)
+        node.value = ast.Tuple([derivatives, ast.parse(f"({rows})", mode="eval").body], ast.Load())
         return node
 
 
