@@ -10,7 +10,7 @@ from click.testing import CliRunner, Result
 
 from tests.unit.diagnose.planted import EFFECT, STRENGTH, added, model_file, waves
 from tirelib.cli import program
-from tirelib.diagnose.diagnose import ALARM
+from tirelib.diagnose.stage import ALARM
 from tirelib.errors import TirelibError
 from tirelib.parameters import read_tire, write_tire
 from tirelib.waveforms import Waveforms

@@ -14,7 +14,7 @@ two kinds of it.
 A measured variant has both, and noise.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,6 +30,7 @@ from tirelib.identify.identify import FITTED
 from tirelib.identify.random_effects import angle_slope, random_tangents, scales
 from tirelib.identify.waveform_fit import Data
 from tirelib.model.base import Correction, move, predict
+from tirelib.model.state import Operating
 from tirelib.waveforms import GRID
 
 MEMBERS = 100
@@ -46,7 +47,7 @@ WIDEST = 0.01
 """Largest standard deviation of the angle's zero that counts as structure, [rad]."""
 LARGE = 0.3
 """Relative standard deviation of the part that large displacements add."""
-ALIKE = {"gage_length": 200.0, "roughness": 0.05, "gage_saturation": 4e-3}
+ALIKE = {"gage_length": 200.0, "roughness": 0.03, "gage_saturation": 1.2e-3}
 """Standard deviation, in their units, of what a tire's structure shows that looks like these
 effects: the contact's ends are sharper or smoother than the ring's, contact begins gradually across
 a crowned tread, and strain is not quite in proportion to the belt's curvature."""
@@ -245,7 +246,7 @@ def _variant(data: Data, model: Refit, random: np.random.Generator) -> FloatArra
     ):  # fmt: skip
         values[name] = values[name] * float(np.exp(0.1 * random.standard_normal()))
     values["mass"] = values["mass"] * float(np.exp(MASS * random.standard_normal()))
-    values["shear_stiffness"] = 1e3 / random.uniform(0.001, 0.03)
+    values["shear_stiffness"] = 1e3 / random.uniform(0.001, 0.03) - _tension(values, points)
     values["tread_hardening"] = random.uniform(0.0, 3.0)
     values["rotary_inertia"] = random.uniform(0.0, SECTIONS)
     values["tread_stiffness"] = values["tread_stiffness"] * (
@@ -254,8 +255,23 @@ def _variant(data: Data, model: Refit, random: np.random.Generator) -> FloatArra
     large = 1.0 + LARGE * float(random.standard_normal())
     correction = Correction(large * model.correction.waveform, large * model.correction.deflection)
     return predict(
-        values, points, model.changes, low_pass=data.low_pass, correction=correction
-    ).wave
+        values, points, [*model.changes, ("constants", _flung)], low_pass=data.low_pass,
+        correction=correction,
+    ).wave  # fmt: skip
+
+
+def _flung(state: State) -> State:
+    """Return the state with the sidewalls' share of what spins off the belt that stretches."""
+    share = 1.0 / (1.0 + state.EA / (state.k_u * state.radius**2))
+    spin = state.mass * (state.radius * np.asarray(state.conditions.omega)) ** 2
+    return state.but(tension=state.tension - share * spin)
+
+
+def _tension(values: Mapping[str, float | FloatArray], points: Operating) -> FloatArray:
+    """Return the belt's tension, which a sheared section loses of its stiffness (Haringx), [N]."""
+    radius = values["ring_radius"]
+    spin = values["mass"] * (radius * np.asarray(points.omega)) ** 2
+    return np.asarray(points.pressure * values["belt_width"] * radius + spin)
 
 
 def _refitted(

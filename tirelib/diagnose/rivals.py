@@ -11,7 +11,8 @@ from tirelib.errors import TirelibError
 from tirelib.identify.waveform_fit import Data
 
 if TYPE_CHECKING:
-    from tirelib.diagnose.diagnose import Finding, Stage
+    from tirelib.diagnose.diagnose import Finding
+    from tirelib.diagnose.stage import Stage
 
 MOST = 2
 """Rivals that are refitted."""

@@ -169,6 +169,13 @@ class State:
         return self.waveform
 
     @property
+    def belt_tension(self) -> FloatArray:
+        """Tension p b R + rho A R^2 Omega^2 of the whole belt and what effects add, (n,), [N]."""
+        spin = self.mass * (self.radius * np.asarray(self.conditions.omega)) ** 2
+        blown = self.tension_pressure * self.width * self.radius
+        return blown + self.inertia_share * spin + self.tension
+
+    @property
     def ring(self) -> Ring:
         """The ring of every point."""
         return Ring(

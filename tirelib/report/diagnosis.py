@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from tirelib.diagnose.diagnose import ALARM, Finding
+from tirelib.diagnose.diagnose import Finding
 from tirelib.diagnose.document import Assessment, exceeds, next_test
 from tirelib.diagnose.held_out import pooled
 from tirelib.diagnose.left import Left, left_of
+from tirelib.diagnose.stage import ALARM
 from tirelib.report.comparison import METHOD, RING, Part
 from tirelib.report.figures.compare_plot import (
     ANGLE_TITLE,

@@ -11,6 +11,7 @@ from tests.physics.test_effects import BASE, FREE_ROLLING, PLAN, TIRE, VALUES, r
 from tirelib.contact.fourier import evaluate
 from tirelib.contact.radial import press
 from tirelib.effects import CATALOGUE
+from tirelib.errors import ParameterError
 from tirelib.model.base import linearised
 from tirelib.model.state import State
 from tirelib.ring.compliance import compliance
@@ -94,15 +95,26 @@ def test_rotary_inertia_is_bending_stiffness_lost_with_speed() -> None:
     np.testing.assert_allclose(own.waveform, less.waveform, atol=1e-10)
 
 
-def test_a_belt_that_yields_is_the_tire_with_that_compliance() -> None:
-    for name, field, unit in (
-        ("belt_extension", "extension_stiffness", 1e6), ("belt_shear", "shear_stiffness", 1e3),
-    ):  # fmt: skip
-        top = CATALOGUE[name].high
-        given = {**VALUES, field: unit / top}
-        own = at(name, top).waveform
-        assert own is not None
-        np.testing.assert_allclose(own, wave(values=given), atol=1e-12)
+def test_a_belt_that_stretches_is_the_tire_with_that_compliance() -> None:
+    top = CATALOGUE["belt_extension"].high
+    own = at("belt_extension", top).wave
+    given = {**VALUES, "extension_stiffness": 1e6 / top}
+    np.testing.assert_allclose(own, wave(values=given), atol=1e-12)
+
+
+def test_a_belt_that_shears_is_the_tire_whose_sections_lose_their_tension() -> None:
+    """Haringx: the stiffness GA less the tension p b R + rho A R^2 Omega^2 resists shear."""
+    points, r = PLAN.points, VALUES["ring_radius"]
+    spin = VALUES["mass"] * (r * points.omega) ** 2
+    tension = points.pressure * VALUES["belt_width"] * r + spin
+    top = CATALOGUE["belt_shear"].high
+    given = {**VALUES, "shear_stiffness": 1e3 / top - tension}
+    np.testing.assert_allclose(at("belt_shear", top).wave, wave(values=given), atol=1e-12)
+
+
+def test_a_belt_whose_tension_takes_all_its_shear_stiffness_is_refused() -> None:
+    with pytest.raises(ParameterError, match=r"belt_shear: 0.2 1/kN leaves no shear stiffness"):
+        at("belt_shear", 0.2)
 
 
 def test_dynamic_stiffening_follows_the_belts_speed() -> None:

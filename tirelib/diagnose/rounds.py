@@ -1,0 +1,128 @@
+"""Rounds of a diagnosis: the leader is added, exactly refitted, and what it replaces is dropped."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.diagnose.ensemble import Variants
+from tirelib.diagnose.refit import refit
+from tirelib.diagnose.stage import ALARM, Stage
+from tirelib.effects import Effect
+from tirelib.errors import TirelibError
+from tirelib.identify.waveform_fit import Data
+
+FURTHER = 8.0
+"""What `ALARM` is to the first effect, for a further one."""
+ROUGH = 0.02
+"""Share of the misfit that effects took away by which their laws may be off beside `FORM`."""
+ROUNDS = 3
+
+
+def rounds(
+    data: Data,
+    first: Stage,
+    catalogue: Sequence[Effect],
+    rests: Variants,
+    noise: float,
+    progress: Callable[[str], None] | None,
+) -> tuple[Stage, list[str], int]:
+    """Add the leaders one after the other as long as the exact refit needs them.
+
+    Parameters
+    ----------
+    data : Data
+    first : Stage
+        Of the model without any.
+    catalogue : sequence of Effect
+    rests : Variants
+    noise : float, [-]
+        Of a whitened sample.
+    progress : callable or None
+
+    Returns
+    -------
+    stage : Stage
+        Of the model with them.
+    named : list of str
+        In the order in which they were added; those that a later one replaces are gone.
+    count : int
+        Of rounds.
+    """
+    # the joint ranking sees all effects at once: who is no hint now is no suspect later
+    hints = first.in_range & (first.scores.score >= first.limit)
+    suspects = {name for name, hint in zip(first.names, hints, strict=True) if hint}
+    least = dict(zip(first.names, first.limit, strict=True))
+
+    def fitted(
+        stage: Stage, effects: Sequence[Effect], strengths: Sequence[FloatArray]
+    ) -> Stage | None:
+        try:
+            model = refit(data, stage.model.values, effects, strengths, progress=progress)
+        except TirelibError:
+            return None
+        return Stage.of(data, model, catalogue, rests, noise, least)
+
+    named: list[str] = []
+    stage, count = first, 0
+    while count < ROUNDS:
+        found = _added(first, stage, stage.leaders(suspects, FURTHER if named else ALARM), fitted)
+        if found is None:
+            break
+        stage, name = found
+        suspects.discard(name)
+        count += 1
+        named.append(name)
+        stage, gone = _thinned(stage, named[:-1], least, fitted)
+        named = [name for name in named if name not in gone]
+    return stage, named, count
+
+
+_Fit = Callable[[Stage, Sequence[Effect], Sequence[FloatArray]], Stage | None]
+
+
+def _added(
+    first: Stage, stage: Stage, leaders: Sequence[int], fitted: _Fit
+) -> tuple[Stage, str] | None:
+    """Return the stage with the leader whose exact refit leaves least, and its name."""
+    best: tuple[Stage, str] | None = None
+    model = stage.model
+    for index in leaders:
+        effect, strength = stage.found.living[index].effect, stage.scores.strength[index]
+        # the laws of those before are right but roughly: what they may be off by is no effect
+        if stage.scores.score[index] < ROUGH * (first.scores.misfit - stage.scores.misfit):
+            continue
+        after = fitted(
+            stage, [*model.effects, effect], [*model.strengths, _inside(effect, strength)]
+        )
+        # to first order only if the exact refit does not need it
+        if after is None or (
+            stage.scores.misfit - after.scores.misfit < ALARM * stage.limit[index]
+        ):
+            continue
+        if best is None or after.scores.misfit < best[0].scores.misfit:
+            best = after, effect.name
+    return best
+
+
+def _thinned(
+    stage: Stage, before: Sequence[str], least: Mapping[str, float], fitted: _Fit
+) -> tuple[Stage, set[str]]:
+    """Return a stage without those effects that the one added last has made needless."""
+    gone: set[str] = set()
+    for name in before:
+        kept = [k for k, effect in enumerate(stage.model.effects) if effect.name != name]
+        effects = [stage.model.effects[k] for k in kept]
+        without = fitted(stage, effects, [stage.model.strengths[k] for k in kept])
+        if without is None:
+            continue
+        if without.scores.misfit - stage.scores.misfit < ALARM * least[name]:
+            stage = without
+            gone.add(name)
+    return stage, gone
+
+
+def _inside(effect: Effect, strength: FloatArray) -> FloatArray:
+    """Return a start for a refit within the range."""
+    start: FloatArray = np.clip(strength, 0.9 * effect.low, 0.9 * effect.high)
+    return start
