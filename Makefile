@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: all demo test lint docs bench figures fem proof hidden cosim bench-demo faults endurance soak \
+.PHONY: all demo test lint docs bench figures fem proof hidden next-test cosim bench-demo faults endurance soak \
 	clean
 
 all: $(STAMP)
@@ -52,6 +52,11 @@ proof: $(STAMP)
 # Hides effects in the rig, lets the library find them, and counts; hours, but resumable and cached.
 hidden: $(STAMP)
 	$(BIN)/python build/hidden/run.py --golden
+
+# How often the run that next-test advises tells two look-alikes apart; an hour, resumable.
+next-test: $(STAMP)
+	$(BIN)/python build/next_test/run.py
+	$(BIN)/python build/next_test/run.py --quantity Fy
 
 # A vehicle on four virtual tires, told by four strain tires; exit code 1 while a figure is missed.
 cosim: $(STAMP)

@@ -129,6 +129,7 @@ def _of_strain(
     from tirelib.diagnose.document import assess, diagnosis_document
     from tirelib.identify.campaign_data import straight_runs
     from tirelib.planning.document import next_test_document
+    from tirelib.planning.rivals import repeated_noise
     from tirelib.waveforms import measure_waveforms
 
     model = model_of(file, catalogue)
@@ -145,8 +146,8 @@ def _of_strain(
     if document["verdict"] == "indistinguishable":
         try:
             document["next_test"] |= next_test_document(
-                document, found.data, found.base, catalogue, noise=runs.noise.std,
-                progress=progress,
+                document, found.data, found.base, catalogue,
+                noise=repeated_noise(runs, found.data, found.base), progress=progress,
             )  # fmt: skip
         except TirelibError as error:
             document["messages"].append(f"no next test: {error}")

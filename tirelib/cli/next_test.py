@@ -107,6 +107,7 @@ def next_test(
     from tirelib.parameters import read_tire
     from tirelib.planning.document import plan_document, plan_test
     from tirelib.planning.envelope import Envelope
+    from tirelib.planning.rivals import repeated_noise
     from tirelib.planning.suspects import given_suspects, suspects_of
     from tirelib.waveforms import measure_waveforms
 
@@ -150,8 +151,9 @@ def next_test(
             suspects, base = suspects_of(told, catalogue), found.base
         elif suspects.effects:
             base = refit(data, model.values, effects, strengths, progress=progress)
+        noise = np.nan if base is None else repeated_noise(runs, data, base)
         plan = plan_test(
-            data, base, suspects, envelope, noise=runs.noise.std, campaign=campaign.header.name,
+            data, base, suspects, envelope, noise=noise, campaign=campaign.header.name,
             wanted=wanted, progress=progress,
         )  # fmt: skip
     document = plan_document(plan)

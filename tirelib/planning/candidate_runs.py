@@ -16,11 +16,12 @@ from tirelib.planning.rivals import Rival, Trial
 
 
 def noise_of(trial: Trial, repeats: float) -> Noise:
-    """Return the split of a trial's noise; `repeats` is the rms noise between repeated runs.
+    """Return the split of a trial's noise; `repeats` is that between repeated runs.
 
     Without repeats (NaN) all of it is taken as random.
     """
-    random = min(repeats * trial.spread, trial.noise) if np.isfinite(repeats) else trial.noise
+    known = repeats * max(trial.size, 1.0) if np.isfinite(repeats) else trial.noise
+    random = min(known, trial.noise)
     return Noise(random, float(np.sqrt(trial.noise**2 - random**2)))
 
 

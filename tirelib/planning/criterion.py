@@ -245,9 +245,10 @@ def judged(
         none = np.zeros((0, len(envelope.names)))
         return NextTest(envelope, none, empty, empty, (), (), trial, dropped, noise)
     pairs = list(combinations(range(len(rivals)), 2))
-    sizes = np.array([_both(rivals, told, pair, noise, 1.0) for pair in pairs])
+    ways = np.array([_both(rivals, told, pair, noise, 1.0) for pair in pairs])
+    sizes = ways.min(axis=1)
     gaps = [rivals[j].cost - rivals[i].cost for i, j in pairs]
-    chances = np.array([resolving(size, gap) for size, gap in zip(sizes, gaps, strict=True)])
+    chances = np.array([resolving(a, b, gap) for (a, b), gap in zip(ways, gaps, strict=True)])
     counted = [k for k, gap in enumerate(gaps) if abs(gap) < RESOLVED] or list(range(len(gaps)))
     hardest = np.array(counted)[np.argmin(sizes[counted], axis=0)]
     chance = chances[counted].mean(axis=0)
@@ -259,9 +260,9 @@ def judged(
     found = []
     for pair, size, gap, likely in zip(pairs, sizes, gaps, chances, strict=True):
         there = [_at(each, best) for each in told]
-        repeated = {n: float(_both(rivals, there, pair, noise, n)[0]) for n in REPEATS}
+        repeated = {n: float(_both(rivals, there, pair, noise, n).min()) for n in REPEATS}
         names = (rivals[pair[0]].name, rivals[pair[1]].name)
-        limit = float(_both(rivals, there, pair, noise, ENDLESS)[0])
+        limit = float(_both(rivals, there, pair, noise, ENDLESS).min())
         found.append(PairForecast(names, gap, size[order], likely[order], repeated, limit))
     return NextTest(
         envelope, points[order], score[order], chance[order], tuple(hardest[order].tolist()),
@@ -276,18 +277,16 @@ def _both(
     noise: Noise,
     repeats: float,
 ) -> FloatArray:
-    """Return the smaller separation of both directions.
+    """Return the separations if the first is right and if the second is, (2, n_points).
 
     That nothing is missing is a special case of every effect: only the other direction counts.
     """
     i, j = pair
-    ways = []
-    if rivals[i].name != NOTHING:
-        ways.append(told[j].separation(told[i].wave, noise, repeats))
-    if rivals[j].name != NOTHING:
-        ways.append(told[i].separation(told[j].wave, noise, repeats))
-    smaller: FloatArray = np.min(ways, axis=0)
-    return smaller
+    first = told[j].separation(told[i].wave, noise, repeats)
+    if rivals[j].name == NOTHING:
+        return np.array([first, first])
+    second = told[i].separation(told[j].wave, noise, repeats)
+    return np.array([second if rivals[i].name == NOTHING else first, second])
 
 
 def _at(told: Forecast, index: int) -> Forecast:
@@ -296,24 +295,33 @@ def _at(told: Forecast, index: int) -> Forecast:
     return Forecast(told.wave[one], told.slopes[:, one], told.tangents[one], told.covariance)
 
 
-def resolving(separation: FloatArray, gap: float) -> FloatArray:
-    """Return the chance that a run of this separation rules one of two rivals out.
+def resolving(first: FloatArray, second: FloatArray, gap: float) -> FloatArray:
+    """Return the chance that a run rules one of two rivals out.
 
     The chi-square between them is normal about gap + separation with variance 4 separation if the
     first is right, and about gap - separation if the second is. Each is right with the odds that
     the present runs give.
 
+    Parameters
+    ----------
+    first, second : shape (n,)
+        Separation if that rival is right.
+    gap : float
+        Chi-square by which the second is worse now.
+
     Examples
     --------
-    >>> resolving(np.array([0.0, 10.0, 40.0]), 0.0).round(2).tolist()
+    >>> size = np.array([0.0, 10.0, 40.0])
+    >>> resolving(size, size, 0.0).round(2).tolist()
     [0.0, 0.5, 0.99]
     """
-    spread = 2.0 * np.sqrt(np.maximum(separation, 1e-12))
-    first = 1.0 / (1.0 + np.exp(-np.clip(gap, -100.0, 100.0) / 2.0))
-    # either may come out ahead by enough, whoever is right
-    ahead = norm.sf((RESOLVED - gap - separation) / spread)
-    ahead += norm.sf((RESOLVED + gap + separation) / spread)
-    behind = norm.sf((RESOLVED - gap + separation) / spread)
-    behind += norm.sf((RESOLVED + gap - separation) / spread)
-    chance: FloatArray = first * ahead + (1.0 - first) * behind
+    odds = 1.0 / (1.0 + np.exp(-np.clip(gap, -100.0, 100.0) / 2.0))
+    chance: FloatArray = odds * _parted(gap, first) + (1.0 - odds) * _parted(-gap, second)
     return chance
+
+
+def _parted(gap: float, separation: FloatArray) -> FloatArray:
+    """Return the chance that either comes out ahead by enough, if the one with the gap is right."""
+    spread = 2.0 * np.sqrt(np.maximum(separation, 1e-12))
+    ahead = norm.sf((RESOLVED - gap - separation) / spread)
+    return np.asarray(ahead + norm.sf((RESOLVED + gap + separation) / spread))

@@ -114,22 +114,13 @@ def plan_force_test(
 ) -> Plan:
     """Judge further points of a force for suspects.
 
+    Other parameters, and errors, as in `plan_test`.
+
     Parameters
     ----------
     case : ForceCase
-    suspects : Suspects
     envelope : Envelope or None
         On the axes of `tirelib.planning.force_rivals.force_axes`; needed if there are suspects.
-    wanted : float
-        Separation for which repeats are counted.
-    progress : callable, optional
-
-    Raises
-    ------
-    ConvergenceError
-        If the model with undoubted effects cannot be fitted.
-    ParameterError
-        If no point in the envelope has a solution.
     """
     if not suspects.effects or envelope is None:
         return Plan(suspects, None, {}, wanted, case.name, case.quantity)
@@ -280,7 +271,9 @@ def _envelope(envelope: Envelope) -> dict[str, Any]:
     return {
         **told, "declared": list(envelope.declared),
         "widened_percent": {name: 100.0 * AXES[name].wider for name in free},
-        "levels": {name: AXES[name].levels for name in envelope.names},
+        "levels": {
+            name: envelope.levels.get(name, AXES[name].levels) for name in envelope.names
+        },
     }  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """The conditions that a rig allows, and a grid of possible runs in them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
@@ -70,10 +70,13 @@ class Envelope:
         Pressure is gauge. In the order of the grid's columns.
     declared : tuple of str
         Which of them somebody gave; the others are the campaign's, widened.
+    levels : mapping of axis to int
+        Of the grid, where they are not the usual ones (`AXES`).
     """
 
     ranges: Mapping[str, Range]
     declared: tuple[str, ...] = ()
+    levels: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         faults = [
@@ -125,7 +128,8 @@ class Envelope:
         """Return all combinations of the levels, (n, axes)."""
         axes = []
         for name, (low, high) in self.ranges.items():
-            axes.append(np.linspace(low, high, AXES[name].levels if high > low else 1))
+            levels = self.levels.get(name, AXES[name].levels)
+            axes.append(np.linspace(low, high, levels if high > low else 1))
         return np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")], axis=1)
 
     def text(self, point: FloatArray) -> str:

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.candidates import Candidates
-from tirelib.diagnose.diagnose import ALARM, IMITATION, Stage, plausible
 from tirelib.diagnose.noise import noise_in, white_level
 from tirelib.diagnose.refit import Refit
+from tirelib.diagnose.stage import ALARM, IMITATION, Stage, plausible
 from tirelib.diagnose.stored import ensemble_of
 from tirelib.effects import Effect
 from tirelib.identify.campaign_data import StraightRuns
@@ -64,5 +64,5 @@ class FirstRound:
             in_range=plausible(self.found, scores),
             far=~plausible(self.found, scores, IMITATION),
         )
-        leader = judged.leader(set(judged.names), ALARM)
-        return "" if leader is None else judged.names[leader]
+        leaders = judged.leaders(set(judged.names), ALARM)
+        return judged.names[leaders[0]] if leaders else ""

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.arrays import BoolArray, FloatArray
 from tirelib.diagnose.refit import STRENGTH_WIDTH, WIDTH, changes_of
+from tirelib.diagnose.structure import FORM
 from tirelib.effects import Effect
 from tirelib.errors import ConvergenceError, TirelibError
 from tirelib.identify.identify import FITTED
@@ -25,6 +26,10 @@ SETTLED = 0.05
 HALVINGS = 8
 LONGEST = 0.4
 """Longest step of a coordinate."""
+NEAR = 1e-6
+"""Distance from its end, in ranges, at which a strength is held by it."""
+HELD = 1e9
+"""Weight of a strength that is held: what is ahead moves it no more."""
 TRIAL = 1e-3
 """Trial step of a strength, relative to its range."""
 
@@ -91,6 +96,27 @@ class Guess:
         return np.concatenate([by[:-2], strength]), by[-2:]
 
     @property
+    def room(self) -> tuple[FloatArray, FloatArray]:
+        """How far the coordinates may go down and up: strengths stay in their ranges.
+
+        An end other than zero is as uncertain as the law.
+        """
+        low, high = np.full(self.z.size, -np.inf), np.full(self.z.size, np.inf)
+        first = len(FITTED)
+        for effect in self.effects:
+            rows = slice(first, first + effect.components)
+            low[rows] = effect.low / effect.scale - FORM * (effect.low < 0.0) - self.z[rows]
+            high[rows] = effect.high / effect.scale + FORM * (effect.high > 0.0) - self.z[rows]
+            first += effect.components
+        return np.minimum(low, 0.0), np.maximum(high, 0.0)
+
+    @property
+    def held(self) -> BoolArray:
+        """Which coordinates are at an end of their range."""
+        low, high = self.room
+        return np.asarray(np.minimum(-low, high) < NEAR)
+
+    @property
     def width(self) -> FloatArray:
         """Prior standard deviations."""
         more = self.z.size - len(FITTED)
@@ -126,16 +152,13 @@ class Metric:
     data : Data
     whiten : Whitening
     shapes : shape (n_structure, n_points, n_phi)
-    sizes : shape (n_structure,)
-        Standard deviations of the unknowns.
+        Each for one standard deviation.
     """
 
-    def __init__(
-        self, data: Data, whiten: Whitening, shapes: FloatArray, sizes: FloatArray
-    ) -> None:
+    def __init__(self, data: Data, whiten: Whitening, shapes: FloatArray) -> None:
         self.data, self.whiten = data, whiten
         self.rows = whiten(shapes).reshape(len(shapes), -1)
-        self.precision = np.diag(sizes**-2.0)
+        self.precision = np.eye(len(shapes))
         self.inner = np.asarray(np.linalg.inv(self.rows @ self.rows.T + self.precision))
 
     def rest(self, waveform: FloatArray) -> FloatArray:
@@ -154,6 +177,24 @@ class Metric:
         left = float(rest @ rest - project @ self.inner @ project)
         return left + float(np.sum((guess.z / guess.width) ** 2))
 
+    def left(self, slopes: FloatArray, width: FloatArray, found: Whole) -> float:
+        """Return the chi-square that unknowns with a prior leave, to first order.
+
+        Parameters
+        ----------
+        slopes : shape (n, n_runs, n_phi)
+        width : shape (n,)
+            Prior standard deviations.
+        found : Whole
+            Where the slopes are taken.
+        """
+        flat, rest = self.whiten(slopes).reshape(len(slopes), -1), self.rest(found.waveform)
+        cross, project = flat @ self.rows.T, self.rows @ rest
+        normal = flat @ flat.T - cross @ self.inner @ cross.T + np.diag(width**-2.0)
+        right = flat @ rest - cross @ (self.inner @ project)
+        before = rest @ rest - project @ self.inner @ project
+        return float(before - right @ np.linalg.solve(normal, right))
+
     def fit(self, guess: Guess) -> Fitted:
         """Return the minimum near a guess, by Gauss-Newton with backtracking.
 
@@ -167,7 +208,7 @@ class Metric:
         cost = self.cost(self.rest(found.waveform), guess)
         for _ in range(STEPS):
             rows, normal, gradient = self._normal(guess, found)
-            dz = np.clip(np.linalg.solve(normal, gradient), -LONGEST, LONGEST)
+            dz = np.clip(bounded(normal, gradient, *guess.room), -LONGEST, LONGEST)
             better = self._line(guess, found, dz, cost)
             if better is None or cost - better[2] < SETTLED:
                 if better is not None:
@@ -208,9 +249,36 @@ class Metric:
         every = np.concatenate([rows, self.rows])
         normal = every @ every.T
         size = len(rows)
-        normal[:size, :size] += np.diag(guess.width**-2.0)
+        normal[:size, :size] += np.diag(guess.width**-2.0 + HELD * guess.held)
         normal[size:, size:] += self.precision
         return Fitted(guess, weights, np.asarray(np.linalg.inv(normal)), cost)
+
+
+def bounded(
+    normal: FloatArray, gradient: FloatArray, low: FloatArray, high: FloatArray
+) -> FloatArray:
+    """Return the step that solves normal equations within bounds.
+
+    What would cross a bound is set to it, and the others are solved for again.
+
+    Parameters
+    ----------
+    normal : shape (n, n)
+    gradient : shape (n,)
+    low, high : shape (n,)
+        Bounds of the step, at most and at least zero.
+    """
+    step = np.zeros(gradient.size)
+    free = np.ones(gradient.size, dtype=bool)
+    while free.any():
+        right = gradient[free] - normal[np.ix_(free, ~free)] @ step[~free]
+        step[free] = np.linalg.solve(normal[np.ix_(free, free)], right)
+        beyond = free & ((step < low) | (step > high))
+        if not beyond.any():
+            break
+        step = np.where(beyond, np.clip(step, low, high), step)
+        free &= ~beyond
+    return step
 
 
 def started(start: Values, effects: Sequence[Effect], strengths: Sequence[FloatArray]) -> Guess:

@@ -1,11 +1,14 @@
 """Rivals for a force: what the present points say of each, and what each foretells of others.
 
 As for strain (`tirelib.planning.rivals`), with points in the place of runs: variants of the brush
-that lack no effect stand beside the parameters and strengths as unknowns with a prior.
+that lack no effect stand beside the parameters and strengths as unknowns with a prior. Set points
+that are off in a block are no such variant, for there are more of them than variants: they belong
+to the noise, exactly.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
 
 import numpy as np
 
@@ -14,24 +17,19 @@ from tirelib.compare.force_model import ForceBench
 from tirelib.compare.force_points import ForcePoints
 from tirelib.diagnose.forces.assess import ForceCase
 from tirelib.diagnose.forces.candidates import varies
-from tirelib.diagnose.forces.ensemble import ANGLE, SET_POINT, variant
+from tirelib.diagnose.forces.ensemble import variant
 from tirelib.diagnose.forces.fit import WIDTH, ForceFit, Problem, slopes_at, with_effect
 from tirelib.effects import Effect
 from tirelib.errors import CalibrationError, TirelibError
 from tirelib.identify.force_data import ForceData
 from tirelib.planning.criterion import NOTHING, Forecast, Noise
 from tirelib.planning.envelope import Envelope
-from tirelib.units import to_si
+from tirelib.planning.force_noise import Counted, counted_noise, set_points
+from tirelib.planning.on_trial import fitted_rivals
 
 MEMBERS = 60
-LOST = 0.5
-"""Chi-square by which a rival may be worse than without its effect before its fit has failed."""
 RANGE_SLACK = 2.0
 """Standard deviations by which a strength may leave its range."""
-RATIO = 0.01
-"""Standard deviation of the measured slip ratio, relative."""
-TURN = float(to_si(1.0, "km/h", "speed"))
-"""Least speed of a point."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,7 +60,11 @@ class ForceRival:
     @property
     def strength(self) -> FloatArray:
         """In the effect's unit, (components,); empty for `NOTHING`."""
-        return self.fit.strengths[-1] if self.name != NOTHING else np.zeros(0)
+        if self.name == NOTHING:
+            return np.zeros(0)
+        effect, last = self.fit.effects[-1], len(self.fit.slopes)
+        moves = self.weights[last - effect.components : last]
+        return np.asarray(self.fit.strengths[-1] + effect.scale * moves)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,12 +80,15 @@ class ForceTrial:
         Of the structural misfit; 1 is that of the variants of a diagnosis.
     noise : Noise
         Of one further point, [N] or [N m].
+    counted : Counted
+        That which counts in the present points.
     """
 
     rivals: tuple[ForceRival, ...]
     left_out: Mapping[str, str]
     size: float
     noise: Noise
+    counted: Counted
 
 
 def force_axes(case: ForceCase) -> tuple[str, ...]:
@@ -143,6 +148,8 @@ def structure_rows(
     CalibrationError
         If no variant can be computed.
     """
+    # one block: what differs from block to block is noise, and one draw holds for all points
+    whole = replace(joint, block=np.zeros(len(joint), dtype=np.int64))
     random = np.random.default_rng(seed)
     slopes, plain = slopes_at(joint, base), joint.predict(base.values, base.changes)
     near = slopes[:, :present]
@@ -150,7 +157,7 @@ def structure_rows(
     rows: list[FloatArray] = []
     for _ in range(3 * members):
         try:
-            made = variant(joint, base, 0.0, random) - plain
+            made = variant(whole, base, 0.0, random) - plain
         except TirelibError:
             continue  # the draw is no tire
         moves = inverse @ (near @ made[:present]) / joint.scale**2
@@ -189,65 +196,52 @@ def try_force_suspects(
         Whether the base itself is a rival.
     progress : callable, optional
     """
-    noise, counted = _noise(case, base, structure)
-    nothing = _rival(case, NOTHING, base, structure, counted)
-    rivals, left_out = [nothing] if with_nothing else [], {}
-    for effect, _ in suspects:
-        if progress is not None:
-            progress(f"fit with {effect.name}")
-        try:
-            fit = with_effect(case.problem, base, effect)
-        except TirelibError as error:
-            left_out[effect.name] = f"its fit did not converge: {error}"
-            continue
-        rival = _rival(case, effect.name, fit, structure, counted)
-        if rival.cost > nothing.cost + LOST:
-            left_out[effect.name] = (
-                f"its fit did not reach the minimum: chi-square {rival.cost:.1f} with it, "
-                f"{nothing.cost:.1f} without"
-            )
-        else:
-            rivals.append(rival)
-    return ForceTrial(tuple(rivals), left_out, 1.0, noise)
+    noise, white = counted_noise(case, base, structure)
+    fits = {effect.name: partial(_with, case, base, effect, structure, white)
+            for effect, _ in suspects}  # fmt: skip
+    rivals, left_out = fitted_rivals(
+        fits, _rival(case, NOTHING, base, structure, white), with_nothing=with_nothing,
+        progress=progress,
+    )  # fmt: skip
+    return ForceTrial(rivals, left_out, 1.0, noise, white)
 
 
-def _noise(case: ForceCase, base: ForceFit, structure: FloatArray) -> tuple[Noise, float]:
-    """Return the noise of a further point, and that which counts in the present ones.
+def _with(
+    case: ForceCase, base: ForceFit, effect: Effect, structure: FloatArray, white: Counted
+) -> ForceRival:
+    """Return the rival of an effect: about its own fit, or about strength zero if that is better.
 
-    What structure does not span is left by repeats. In the present points errors of one block go
-    together: the noise counts as much larger as the square of their sum exceeds the sum of their
-    squares.
+    The fit is the best without structure; beside it, it may be a worse place to start from.
     """
-    random = case.noise if np.isfinite(case.noise) else case.problem.scale
-    rest = case.problem.measured - base.predicted
-    rows = np.concatenate([base.slopes, structure])
-    normal = rows @ rows.T + random**2 * np.eye(len(rows))
-    left = rest - np.linalg.solve(normal, rows @ rest) @ rows
-    spread = float(np.sqrt(np.mean(left**2)))
-    _, block = np.unique(case.problem.block, return_inverse=True)
-    together = float(np.sum(np.bincount(np.ravel(block), left) ** 2) / np.sum(left**2))
-    counted = max(spread, random) * float(np.sqrt(max(together, 1.0)))
-    return Noise(float(random), float(np.sqrt(max(spread**2 - random**2, 0.0)))), counted
+    zero = replace(
+        base, effects=(*base.effects, effect),
+        strengths=(*base.strengths, np.zeros(effect.components)),
+    )  # fmt: skip
+    zero = replace(zero, slopes=slopes_at(case.problem, zero))
+    about = (with_effect(case.problem, base, effect), zero)
+    found = [_rival(case, effect.name, fit, structure, white) for fit in about]
+    return min(found, key=lambda rival: rival.cost)
 
 
 def _rival(
-    case: ForceCase, name: str, fit: ForceFit, structure: FloatArray, white: float
+    case: ForceCase, name: str, fit: ForceFit, structure: FloatArray, white: Counted
 ) -> ForceRival:
     """Return a rival at its minimum in the metric of structure, linear about its exact fit."""
-    rows = np.concatenate([fit.slopes, structure]) / white
-    rest = (case.problem.measured - fit.predicted) / white
+    rows = white(np.concatenate([fit.slopes, structure]))
+    rest = white(case.problem.measured - fit.predicted)
     prior = np.concatenate([np.full(len(fit.slopes), WIDTH**-2.0), np.ones(len(structure))])
     normal, right = rows @ rows.T + np.diag(prior), rows @ rest
     covariance = np.asarray(np.linalg.inv(normal), dtype=np.float64)
     weights = covariance @ right
-    inside = True
+    rival = ForceRival(name, fit, weights, covariance, float(rest @ rest - right @ weights), True)
     if name != NOTHING:
         effect, last = fit.effects[-1], len(fit.slopes)
         own = np.arange(last - effect.components, last)
         slack = RANGE_SLACK * effect.scale * np.sqrt(covariance[own, own])
-        strength = fit.strengths[-1]
-        inside = bool(((strength >= effect.low - slack) & (strength <= effect.high + slack)).all())
-    return ForceRival(name, fit, weights, covariance, float(rest @ rest - right @ weights), inside)
+        low, high = effect.low - slack, effect.high + slack
+        inside = (rival.strength >= low) & (rival.strength <= high)
+        rival = replace(rival, in_range=bool(inside.all()))
+    return rival
 
 
 def force_forecasts(trial: ForceTrial, ahead: Problem, structure: FloatArray) -> list[Forecast]:
@@ -272,28 +266,8 @@ def force_forecasts(trial: ForceTrial, ahead: Problem, structure: FloatArray) ->
         wave = ahead.predict(rival.fit.values, rival.fit.changes) + rival.weights @ slopes
         told.append(
             Forecast(
-                wave[:, None], slopes[..., None], _set_points(ahead, rival.fit)[:, None],
-                rival.covariance,
+                wave[:, None], slopes[..., None],
+                trial.counted.share * set_points(ahead, rival.fit)[:, None], rival.covariance,
             )
         )  # fmt: skip
     return told
-
-
-def _set_points(ahead: Problem, fit: ForceFit) -> FloatArray:
-    """Return the change of the force for one standard deviation of each set point, (n, 4)."""
-    at, here = ahead.bench.conditions, ahead.predict(fit.values, fit.changes)
-    steps = {
-        "load": SET_POINT * at.load, "pressure": SET_POINT * at.pressure,
-        "slip_angle": np.full(len(at), ANGLE), "slip_ratio": RATIO * at.slip_ratio,
-    }  # fmt: skip
-    columns = []
-    for name, step in steps.items():
-        moved = getattr(at, name) + step
-        data = replace(ahead.bench.points.data, **{name: moved})
-        bench = replace(
-            ahead.bench, points=replace(ahead.bench.points, data=data),
-            conditions=replace(at, **{name: moved}),
-        )  # fmt: skip
-        there = replace(ahead, bench=bench).predict(fit.values, fit.changes)
-        columns.append(np.nan_to_num(there - here))
-    return np.stack(columns, axis=1)

@@ -64,8 +64,9 @@ def next_test(
     ahead = operating_at(points, data.points)
     shapes = structure_shapes(data, base, ahead, progress=progress)
     trial = try_suspects(
-        data, base, suspects, shapes=shapes, with_nothing=with_nothing, progress=progress
-    )
+        data, base, suspects, noise=noise, shapes=shapes, with_nothing=with_nothing,
+        progress=progress,
+    )  # fmt: skip
     random = noise_of(trial, noise)
     try:
         told = forecasts(trial, data, ahead, progress=progress)
@@ -74,7 +75,7 @@ def next_test(
         if not good.any():
             raise _hopeless(len(chosen)) from None
         points = points[good]
-        trial = replace(trial, shapes=Shapes(shapes.present, shapes.ahead[:, good]))
+        trial = replace(trial, shapes=Shapes(trial.shapes.present, trial.shapes.ahead[:, good]))
         told = forecasts(trial, data, ahead.take(good), progress=progress)
     return judged(envelope, points, trial, told, len(chosen) - len(points), random)
 

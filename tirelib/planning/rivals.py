@@ -1,38 +1,34 @@
 """What the present runs say of each suspect: a fit, and how well its numbers are known.
 
-What the ring's structure does anyway (`tirelib.planning.structure`) stands beside the base
-coordinates and the strengths as unknowns with a prior, so that no rival is blamed for it. How large
-it is, the present runs tell: the size that makes them most likely. What is left then is the noise
-that counts, with its correlation over the angle.
+The fit is exact, in the metric in which a diagnosis ranks effects: what the ring's structure does
+anyway (`tirelib.planning.structure`) stands beside the base coordinates and the strengths as
+unknowns with a prior, so that no rival is blamed for it. Where even all suspects together leave
+more than structure usually does, noise and structure count as that much larger.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
-from scipy import linalg
 
 from tirelib.arrays import FloatArray
+from tirelib.diagnose.noise import white_level
 from tirelib.diagnose.refit import Refit
+from tirelib.diagnose.stage import USUAL
+from tirelib.diagnose.structure import LEAST, spread_of
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
+from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.random_effects import Whitening, whitening
 from tirelib.identify.waveform_fit import Data
 from tirelib.planning.criterion import NOTHING
 from tirelib.planning.fit import Fitted, Guess, Metric, started
+from tirelib.planning.on_trial import fitted_rivals
 from tirelib.planning.structure import Shapes, structure_shapes
 
-SIZES = 2.0 ** np.arange(-4.0, 1.5, 0.5)
-"""Sizes of the structural misfit that are tried, relative to the variants' of a diagnosis; what
-is left beyond twice that counts as noise, or structure would explain every effect."""
 FAINT = 0.02
 """Start of a strength where none is known, relative to the range."""
-LOST = 0.5
-"""Chi-square by which a rival may be worse than without its effect before its fit has failed."""
-ROUNDS = 3
-"""Times that noise and size of the misfit are brought in line."""
-RANGE_SLACK = 2.0
-"""Standard deviations by which a strength may leave its range."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +41,7 @@ class Rival:
         Of the effect, or `NOTHING`.
     fitted : Fitted
     in_range : bool
-        Whether the strength lies in its plausible range, give or take two standard deviations.
+        Whether the strength lies within its plausible range; else an end of it holds it.
     """
 
     name: str
@@ -77,11 +73,10 @@ class Trial:
     shapes : Shapes
         Of the structural misfit.
     size : float, [-]
-        Of the structural misfit; 1 is that of the variants of a diagnosis.
+        What even all suspects together leave, over what structure usually leaves, as a ratio of
+        rms. Beyond 1, noise and structure count as that much larger.
     noise : float, [-]
-        White noise over the angle that counts as what is left does.
-    spread : float, [-]
-        Over the rms of what is left: larger than 1, for neighbouring angles agree.
+        Standard deviation of a sample that nothing else explains.
     """
 
     base: Refit
@@ -90,7 +85,17 @@ class Trial:
     shapes: Shapes
     size: float
     noise: float
-    spread: float
+
+
+def repeated_noise(runs: StraightRuns, data: Data, base: Refit) -> float:
+    """Return the noise of a waveform by repeats, as a diagnosis takes it; NaN without, [-].
+
+    What set points or the tire's numbers explain of their differences is none, and smooth noise
+    counts as much as the white one that meets a smooth shape alike.
+    """
+    if not np.isfinite(runs.noise.std):
+        return float("nan")
+    return white_level(runs, base, data.strain) * base.whiten.noise
 
 
 def try_suspects(
@@ -98,6 +103,7 @@ def try_suspects(
     base: Refit,
     suspects: Sequence[tuple[Effect, FloatArray]],
     *,
+    noise: float,
     shapes: Shapes | None = None,
     with_nothing: bool = False,
     progress: Callable[[str], None] | None = None,
@@ -110,33 +116,50 @@ def try_suspects(
     base : Refit
         The model without any of the suspects, fitted.
     suspects : sequence of (effect, start strength)
+    noise : float, [-]
+        Of a run's waveform, from repeats; NaN without.
     shapes : Shapes, optional
         Of the structural misfit; drawn if there are none.
     with_nothing : bool
         Whether the base itself is a rival.
     progress : callable, optional
     """
-    plain = started(base.values, base.effects, base.strengths)
     if shapes is None:
         shapes = structure_shapes(data, base, progress=progress)
+    plain = started(base.values, base.effects, base.strengths)
     guesses = [
         started(base.values, [*base.effects, effect], [*base.strengths, _start(effect, strength)])
         for effect, strength in suspects
     ]
-    noise, spread, size = _levels(data, plain, guesses, shapes)
-    metric = Metric(data, _whitening(data, base, noise), shapes.present, shapes.sizes(size))
+    known = noise if np.isfinite(noise) else 0.0
+    white = data.noise * spread_of(known / data.noise, len(data.points))
+    metric = Metric(data, _whitening(data, base, white), shapes.present)
     nothing = metric.fit(plain)
-    rivals, left_out = [Rival(NOTHING, nothing, True)] if with_nothing else [], {}
+    usual = ((known / data.noise) ** 2 + USUAL * LEAST**2) / (white / data.noise) ** 2
+    size = float(np.sqrt(_left(metric, nothing.guess, guesses) / usual))
+    if size > 1.0:
+        shapes, white = Shapes(size * shapes.present, size * shapes.ahead), size * white
+        metric = Metric(data, _whitening(data, base, white), shapes.present)
+        nothing = metric.fit(nothing.guess)
+    rivals, left_out = fitted_rivals(
+        {guess.effects[-1].name: partial(_fit, metric, nothing, guess) for guess in guesses},
+        Rival(NOTHING, nothing, True),
+        with_nothing=with_nothing,
+        progress=progress,
+    )
+    return Trial(base, rivals, left_out, shapes, size, white)
+
+
+def _left(metric: Metric, plain: Guess, guesses: Sequence[Guess]) -> float:
+    """Return the chi-square a sample that all suspects together leave, to first order."""
+    data = metric.data
+    found = plain.solved(data, data.points)
+    rows, width = [plain.slopes(found, data, data.points)[0]], [plain.width]
     for guess in guesses:
-        name = guess.effects[-1].name
-        if progress is not None:
-            progress(f"fit with {name}")
-        found = _fit(metric, nothing, guess)
-        if isinstance(found, str):
-            left_out[name] = found
-        else:
-            rivals.append(Rival(name, found, _in_range(found)))
-    return Trial(base, tuple(rivals), left_out, shapes, size, noise, spread)
+        faint = guess.at(np.append(plain.z, np.zeros(guess.z.size - plain.z.size)))
+        rows.append(faint.slopes(found, data, data.points)[0][plain.z.size :])
+        width.append(guess.width[plain.z.size :])
+    return metric.left(np.concatenate(rows), np.concatenate(width), found) / data.strain.size
 
 
 def _start(effect: Effect, strength: FloatArray) -> FloatArray:
@@ -145,8 +168,8 @@ def _start(effect: Effect, strength: FloatArray) -> FloatArray:
     return start if np.any(start) else np.full(effect.components, FAINT * effect.toward)
 
 
-def _fit(metric: Metric, nothing: Fitted, guess: Guess) -> Fitted | str:
-    """Return the minimum with an effect, or why none was found.
+def _fit(metric: Metric, nothing: Fitted, guess: Guess) -> Rival:
+    """Return the minimum with an effect.
 
     The fit without the effect, at strength zero, is the second start: a one-sided effect that
     would serve with the other sign only stays there.
@@ -154,34 +177,25 @@ def _fit(metric: Metric, nothing: Fitted, guess: Guess) -> Fitted | str:
     effect = guess.effects[-1]
     second = guess.at(np.concatenate([nothing.guess.z, np.zeros(effect.components)]))
     best: Fitted | None = None
-    said = ""
+    trouble: TirelibError | None = None
     for start in (guess, second):
         try:
             found = metric.fit(start)
         except TirelibError as error:
-            said = f"its fit did not converge: {error}"
+            trouble = error
             continue
-        if best is None or found.cost < best.cost:
-            best = found
+        best = found if best is None or found.cost < best.cost else best
         if best.cost < nothing.cost:
             break
     if best is None:
-        return said
-    if best.cost > nothing.cost + LOST:
-        return (
-            f"its fit did not reach the minimum: chi-square {best.cost:.1f} with it, "
-            f"{nothing.cost:.1f} without"
-        )
-    return best
+        assert trouble is not None  # noqa: S101 - a start has failed
+        raise trouble
+    return Rival(effect.name, best, _in_range(best))
 
 
 def _in_range(found: Fitted) -> bool:
-    guess = found.guess
-    effect, strength = guess.effects[-1], guess.strengths[-1]
-    last = guess.z.size
-    own = np.arange(last - effect.components, last)
-    slack = RANGE_SLACK * effect.scale * np.sqrt(found.covariance[own, own])
-    return bool(((strength >= effect.low - slack) & (strength <= effect.high + slack)).all())
+    """Return whether no end of its range holds the last effect's strength."""
+    return not bool(found.guess.held[-found.guess.effects[-1].components :].any())
 
 
 def _whitening(data: Data, base: Refit, noise: float) -> Whitening:
@@ -189,64 +203,3 @@ def _whitening(data: Data, base: Refit, noise: float) -> Whitening:
         base.waveform, base.values, data.points, data.tolerance, data.angle_std, noise,
         data.low_pass,
     )  # fmt: skip
-
-
-def _levels(
-    data: Data, plain: Guess, guesses: Sequence[Guess], shapes: Shapes
-) -> tuple[float, float, float]:
-    """Return noise that counts, its excess over the rms, and size of the structural misfit.
-
-    All suspects at once may serve: what they can explain is no noise.
-    """
-    found = plain.solved(data, data.points)
-    slopes, _ = plain.slopes(found, data, data.points)
-    rows, width = [slopes], [plain.width]
-    for guess in guesses:
-        faint = guess.at(np.append(plain.z, np.zeros(guess.z.size - plain.z.size)))
-        more, _ = faint.slopes(found, data, data.points)
-        rows.append(more[plain.z.size :])
-        width.append(guess.width[plain.z.size :])
-    every = np.concatenate([*rows, shapes.present])
-    known = np.concatenate(width)
-    rest = data.strain - found.waveform
-    noise, spread, size = data.noise, 1.0, 1.0
-    for _ in range(ROUNDS):
-        whiten = whitening(
-            found.waveform, plain.values, data.points, data.tolerance, data.angle_std, noise,
-            data.low_pass,
-        )  # fmt: skip
-        white, flat = whiten(rest), whiten(every).reshape(len(every), -1)
-        gram, project = flat @ flat.T, flat @ white.ravel()
-
-        def precision(size: float) -> FloatArray:
-            return np.concatenate([known, shapes.sizes(size)]) ** -2.0
-
-        likely = [_likelihood(gram, project, precision(float(s))) for s in SIZES]
-        size = float(SIZES[int(np.argmax(likely))])
-        moved = np.linalg.solve(gram + np.diag(precision(size)), project)
-        left = white - (moved @ flat).reshape(white.shape)
-        spread = correlation(left)
-        noise = min(data.noise, noise * spread * float(np.sqrt(np.mean(left**2))))
-    return noise, spread, size
-
-
-def correlation(left: FloatArray) -> float:
-    """Return the noise that counts over the rms: root of samples over independent samples.
-
-    From the power spectrum over the turn, sum P^2 / (sum P)^2 is one over the independent ones.
-
-    Examples
-    --------
-    >>> correlation(np.random.default_rng(0).standard_normal((400, 360)))
-    1.00
-    """
-    power = np.mean(np.abs(np.fft.rfft(left, axis=1)[:, 1:]) ** 2, axis=0)
-    independent = 2.0 * float(np.sum(power)) ** 2 / float(np.sum(power**2))
-    return float(np.sqrt(left.shape[1] / independent))
-
-
-def _likelihood(gram: FloatArray, project: FloatArray, precision: FloatArray) -> float:
-    """Return twice the log likelihood of the runs, up to a constant."""
-    factor = linalg.cho_factor(gram + np.diag(precision), lower=True)
-    volume = 2.0 * np.log(np.diag(factor[0])).sum() - np.log(precision).sum()
-    return float(project @ linalg.cho_solve(factor, project) - volume)

@@ -161,7 +161,7 @@ def selftest(
     ranking = FirstRound.of(
         runs, data, base, catalogue, members=members, seed=seed, progress=progress
     )
-    size = try_suspects(data, base, []).size
+    size = try_suspects(data, base, [], noise=noise).size
     track = _track(data, base, size, noise, repeats, seed)
     judge = _Judge(data, base, ranking, track)
     plain = track.measured(base.changes, data)

@@ -1,10 +1,11 @@
-"""What a ring's structure may do to waveforms, as unknowns with a prior.
+"""What a ring's structure may do to waveforms, as unknowns of variance one.
 
-The variants of a diagnosis (`tirelib.diagnose.ensemble`) are measured at the present runs and at
-the possible ones alike, without noise and set-point errors. What the base model leaves of each is
-one way in which structure may show; M of them, each with a prior of size / sqrt(M), have the
-covariance in whose metric a diagnosis ranks effects. One draw holds for all runs, so what the
-present runs tell of a tire's structure is known at the possible ones too.
+It is the covariance in whose metric a diagnosis ranks effects (`tirelib.diagnose.structure`): the
+residuals of variants of the model, each over the root of their number; the parts that add in
+proportion, every one of them; and what the laws of effects that the model has may be off by in a
+run. One draw of variants and parts holds for all runs, so what the present runs tell of a tire's
+structure is known at the possible ones too, and runs of the same condition share it. What an
+effect's law is off by in a possible run, no other run tells.
 """
 
 from collections.abc import Callable
@@ -14,12 +15,14 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.campaign import Tolerance
-from tirelib.diagnose.ensemble import structural_ensemble
+from tirelib.diagnose.ensemble import smooth_part, variants
 from tirelib.diagnose.refit import Refit
+from tirelib.diagnose.shape import filled, finer, run_by_run
+from tirelib.diagnose.structure import FORM
 from tirelib.identify.identify import FITTED
 from tirelib.identify.random_effects import Whitening
 from tirelib.identify.waveform_fit import Data
-from tirelib.model.base import large_displacements, linearised
+from tirelib.model.base import large_displacements, linearised, predict
 from tirelib.model.state import Operating
 from tirelib.waveforms import GRID
 
@@ -29,22 +32,18 @@ MEMBERS = 60
 
 @dataclass(frozen=True, slots=True)
 class Shapes:
-    """Ways in which structure may show.
+    """Ways in which structure may show, each for one standard deviation.
 
     Attributes
     ----------
-    present : shape (n_members, n_runs, n_phi)
+    present : shape (n_shapes, n_runs, n_phi)
         In the present runs.
-    ahead : shape (n_members, n_points, n_phi)
+    ahead : shape (n_shapes, n_points, n_phi)
         In the possible ones.
     """
 
     present: FloatArray
     ahead: FloatArray
-
-    def sizes(self, size: float) -> FloatArray:
-        """Return the prior standard deviations of the unknowns."""
-        return np.full(len(self.present), size / np.sqrt(max(len(self.present), 1)))
 
 
 def structure_shapes(
@@ -56,7 +55,7 @@ def structure_shapes(
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
 ) -> Shapes:
-    """Return what variants of a model leave to it, at the present runs and at possible ones.
+    """Return what structure leaves to a model, at the present runs and at possible ones.
 
     Parameters
     ----------
@@ -76,15 +75,36 @@ def structure_shapes(
     """
     n = len(data.points)
     every = data.points if points is None else joined(data.points, points)
-    empty = np.zeros((len(every), GRID.size))
     quiet = replace(
-        data, strain=empty, points=every, tolerance=Tolerance(0.0, 0.0, 0.0, 0.0),
-        angle_std=np.zeros(len(every)), deflection=np.full(len(every), np.nan),
+        data, strain=np.zeros((len(every), GRID.size)), points=every,
+        tolerance=Tolerance(0.0, 0.0, 0.0, 0.0), angle_std=np.zeros(len(every)),
+        deflection=np.full(len(every), np.nan),
     )  # fmt: skip
-    rows = structural_ensemble(
-        quiet, _at(base, data, every), noise=0.0, members=members, seed=seed, progress=progress
-    ).reshape(-1, *empty.shape)
+    model = _at(base, data, every)
+    rests = variants(quiet, model, members=members, seed=seed, progress=progress)
+    rows = data.noise * rests.reshape(len(rests), len(every), -1) / np.sqrt(max(len(rests), 1))
+    rows = np.concatenate([rows, smooth_part(quiet, model), _form_part(data, model, every, n)])
     return Shapes(rows[:, :n], rows[:, n:])
+
+
+def _form_part(data: Data, model: Refit, points: Operating, present: int) -> FloatArray:
+    """Return how the laws of a model's effects may be off, (n, n_points, n_phi).
+
+    In each present run by itself, and in a possible one by itself, whichever it is.
+    """
+    rows = [np.zeros((0, len(points), GRID.size))]
+    for k in range(len(model.effects)):
+        others = [change for j, change in enumerate(model.changes) if j != k]
+        without = predict(
+            model.values, points, others, low_pass=data.low_pass, correction=model.correction
+        ).wave
+        change = filled(model.waveform - without)
+        both = FORM * np.stack([change, finer(change)], axis=1)
+        each = np.zeros((2 * present + 2, len(points), GRID.size))
+        each[:-2, :present] = run_by_run(both[:present]).reshape(-1, present, GRID.size)
+        each[-2:, present:] = both[present:].swapaxes(0, 1)
+        rows.append(each)
+    return np.concatenate(rows)
 
 
 def joined(one: Operating, other: Operating) -> Operating:
@@ -94,13 +114,14 @@ def joined(one: Operating, other: Operating) -> Operating:
 
 
 def _at(base: Refit, data: Data, points: Operating) -> Refit:
-    """Return a fitted model at other points, with residuals left as they are."""
+    """Return a fitted model at other points, whitened by noise alone; residuals as they are."""
     correction = large_displacements(base.values, points, low_pass=data.low_pass)
     found = linearised(
         base.values, points, FITTED, base.changes, low_pass=data.low_pass, correction=correction
     )
-    none = Whitening(np.zeros((len(points), GRID.size, 4)), np.zeros((len(points), 4, 4)), 1.0)
+    n = len(points)
+    white = Whitening(np.zeros((n, GRID.size, 4)), np.zeros((n, 4, 4)), data.noise)
     return replace(
         base, waveform=found.waveform, deflection=found.deflection, slopes=found.waveform_slopes,
-        correction=correction, whiten=none,
+        correction=correction, whiten=white,
     )  # fmt: skip

@@ -20,7 +20,7 @@ from tirelib.signal import LowPass
 
 NOISE = 4e-6
 PLANTED, TWIN = "temperature", "dynamic_stiffening"
-STRENGTH = 0.03
+STRENGTH = 0.014
 CONDITIONS = (
     (3000.0, 1.8e5, 11.0), (6000.0, 2.4e5, 11.0), (4500.0, 2.1e5, 17.0),
     (4500.0, 2.1e5, 22.0), (3000.0, 2.4e5, 28.0), (6000.0, 1.8e5, 28.0),

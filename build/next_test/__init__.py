@@ -1,0 +1,1 @@
+"""Measures how often an advised next run tells look-alikes apart, on tires that are no ring."""

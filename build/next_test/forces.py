@@ -1,0 +1,258 @@
+"""One case on side forces: two look-alikes, before, after a point at random and the advised one.
+
+The tire is a Magic Formula whose constants are drawn anew (`tests.magic_sweep`), with other laws of
+load, pressure and temperature than the effects have. Wear that slows down and a polish by the root
+of time are planted here. Plans are such as happen: one pressure after the other, a tread that warms
+with load, small slip angles only.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from tests.magic_sweep import _force
+from tirelib.arrays import FloatArray
+from tirelib.compare.force_model import ForceBench, ForceModel
+from tirelib.compare.force_points import force_points
+from tirelib.diagnose.forces.assess import ForceCase
+from tirelib.diagnose.forces.candidates import force_candidates
+from tirelib.diagnose.forces.fit import ForceFit, Problem, fit_force
+from tirelib.effects import CATALOGUE
+from tirelib.identify.brush_fit import fit_brush
+from tirelib.identify.brush_model import BrushModel
+from tirelib.identify.force_data import ForceData
+from tirelib.planning.envelope import Envelope
+from tirelib.planning.force_rivals import (
+    MEMBERS,
+    ForceTrial,
+    force_axes,
+    points_ahead,
+    structure_rows,
+    try_force_suspects,
+)
+from tirelib.planning.next_test import force_next_test
+
+NOISE, ANGLE_NOISE, LOAD_NOISE = 8.0, 2e-4, 0.003
+"""Of a point: side force [N], slip angle [rad], load (relative)."""
+SPEED, PAUSE = 11.0, 12.0
+"""[m/s], and [s] from point to point."""
+LOADS, PRESSURES = (700.0, 1500.0, 2300.0), (0.7e5, 0.83e5, 0.96e5)
+WIDE, SMALL = (-8.0, -5.0, -2.5, 2.5, 5.0, 8.0), (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)
+"""Slip angles [deg]."""
+DRIFTS = ("stiffness_drift", "friction_drift")
+PLANTED = ("friction_load", "stiffness_load", "friction_pressure", "stiffness_pressure",
+           "friction_temperature", "stiffness_temperature", *DRIFTS)  # fmt: skip
+ENVELOPE = MappingProxyType({
+    "load": (500.0, 2900.0), "pressure": (0.65e5, 1.0e5), "speed": (SPEED, SPEED),
+    "slip_angle": (np.deg2rad(-9.0), np.deg2rad(9.0)), "temperature": (315.0, 350.0),
+})  # fmt: skip
+REFERENCE = 1000
+"""Seed of the tire at which pairs are chosen."""
+A_PLAN = 3
+"""Pairs that each plan contributes."""
+
+
+@dataclass(frozen=True)
+class ForceTest:
+    """Who is planted on which tire, and who looks like it."""
+
+    seed: int
+    plan: str
+    truth: str
+    rival: str
+    visible: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Steady points in the order of time; each is measured twice, one after the other.
+
+    Attributes
+    ----------
+    in_order : bool
+        Whether pressures follow each other; else all is in turn at random.
+    heated : bool
+        Whether the tread is as warm as the load makes it; else 335 K, give or take.
+    """
+
+    angles: Sequence[float]
+    in_order: bool
+    heated: bool
+
+    def points(self, seed: int) -> dict[str, FloatArray]:
+        """Return the conditions as set, by name, SI."""
+        random = np.random.default_rng([seed, 21])
+        grid = np.meshgrid(PRESSURES, LOADS, np.deg2rad(self.angles), indexing="ij")
+        pressure, load, angle = (np.repeat(x.ravel(), 2) for x in grid)
+        n = load.size
+        order = np.arange(n).reshape(-1, 2)
+        if self.in_order:
+            blocks = order.reshape(len(PRESSURES), -1, 2)
+            order = np.concatenate([random.permutation(block) for block in blocks])
+        else:
+            order = random.permutation(order)
+        chosen = order.ravel()
+        pressure, load, angle = pressure[chosen], load[chosen], angle[chosen]
+        warm = 320.0 + 25.0 * load / max(LOADS) if self.heated else np.full(n, 335.0)
+        return {
+            "load": load, "pressure": pressure, "slip_angle": angle,
+            "temperature": warm + 1.5 * random.standard_normal(n), "time": PAUSE * np.arange(n),
+        }  # fmt: skip
+
+
+PLANS: Mapping[str, Plan] = MappingProxyType(
+    {
+        "pressures_in_order": Plan(WIDE, in_order=True, heated=False),
+        "warmed_by_load": Plan(WIDE, in_order=False, heated=True),
+        "small_angles": Plan(SMALL, in_order=False, heated=True),
+    }
+)
+
+
+@dataclass(frozen=True)
+class Tire:
+    """A Magic Formula tire with an effect."""
+
+    seed: int
+    span: float
+    truth: str
+    strength: float
+
+    def side(self, at: Mapping[str, FloatArray]) -> FloatArray:
+        """Return Fy without noise; the constants are those of the seed, whatever the points."""
+        order = at["time"] / self.span
+        stiff = self.strength * (1.0 - np.exp(-1.6 * order)) * (self.truth == DRIFTS[0])
+        slick = self.strength * np.sqrt(order) * (self.truth == DRIFTS[1])
+        planted = {} if self.truth in DRIFTS else {self.truth: self.strength}
+        angle = np.arctan(np.tan(at["slip_angle"]) * (1.0 + stiff) / (1.0 - slick))
+        out: FloatArray = (1.0 - slick) * _force(
+            np.random.default_rng([self.seed, 22]), planted, at["load"], at["pressure"],
+            np.zeros(angle.size), at["temperature"], angle, at["time"],
+        )  # fmt: skip
+        return out
+
+    def measured(self, at: Mapping[str, FloatArray], draw: int) -> ForceData:
+        """Return points as they are measured."""
+        random, n = np.random.default_rng([self.seed, 23, draw]), at["load"].size
+        side = self.side(at) + NOISE * random.standard_normal(n)
+        flat, nothing = np.zeros(n), np.full(n, np.nan)
+        return ForceData(
+            at["load"] * (1.0 + LOAD_NOISE * random.standard_normal(n)), at["pressure"],
+            at["slip_angle"] + ANGLE_NOISE * random.standard_normal(n), flat, flat, nothing,
+            nothing, side, nothing, np.arange(n), np.full(n, SPEED), at["temperature"], at["time"],
+        )  # fmt: skip
+
+
+def case_of(data: ForceData) -> ForceCase:
+    """Return a campaign with the brush that fits it."""
+    fit = fit_brush(data)
+    values = {k: v for k, v in fit.values.items() if k != "lateral_compliance"}
+    reference = (fit.reference.load, fit.reference.pressure)
+    model = ForceModel(
+        "fitted", BrushModel("fitted", values, fit.reference, None), (), reference, ()
+    )
+    problem = Problem.of(ForceBench.of(model, force_points(data)), "Fy", NOISE)
+    return ForceCase("steady", model, problem, NOISE, len(problem) // 2, ())
+
+
+def tire_of(test: ForceTest) -> Tire:
+    """Return the tire with the effect at the strength of the wanted visibility.
+
+    That is the chi-square, in the metric of structure, that the effect adds to the tire without it.
+    """
+    at = PLANS[test.plan].points(test.seed)
+    none = Tire(test.seed, float(at["time"].max()), test.truth, 0.0)
+    case = case_of(none.measured(at, 0))
+    base = fit_force(case.problem, case.model.values)
+    structure = structure_rows(case.problem, len(case.problem), base, MEMBERS, 0)
+    white = try_force_suspects(case, base, (), structure).counted
+    rows = white(np.concatenate([base.slopes, structure]))
+    inner = np.linalg.inv(rows @ rows.T + np.eye(len(rows)))
+    step = 0.05
+    for _ in range(2):
+        change = white(replace(none, strength=step).side(at) - none.side(at))
+        project = rows @ change
+        seen = float(change @ change - project @ inner @ project)
+        step = float(np.clip(step * np.sqrt(test.visible / seen), -0.8, 0.8))
+    sign = float(np.random.default_rng([test.seed, 24]).choice([-1.0, 1.0]))
+    if CATALOGUE[test.truth].low > -0.3 or test.truth in DRIFTS:
+        sign = 1.0
+    return replace(none, strength=sign * step)
+
+
+def pairs() -> list[tuple[str, str, str]]:
+    """Return plan and two look-alikes: of each plan the closest that no plan before has."""
+    chosen: list[tuple[str, str, str]] = []
+    for plan, points in PLANS.items():
+        at = points.points(REFERENCE)
+        case = case_of(Tire(REFERENCE, float(at["time"].max()), DRIFTS[0], 0.0).measured(at, 0))
+        base = fit_force(case.problem, case.model.values)
+        found = force_candidates(case.problem, base, [CATALOGUE[name] for name in PLANTED])
+        names = found.names
+        order = sorted(
+            (float(found.angles[i, j]), *sorted((names[i], names[j])))
+            for i in range(len(names)) for j in range(i)
+        )  # fmt: skip
+        known = {(a, b) for _, a, b in chosen}
+        chosen += [(plan, a, b) for _, a, b in order if (a, b) not in known][:A_PLAN]
+    return chosen
+
+
+def cases(first: int, count: int, visible: float) -> list[ForceTest]:
+    """Return cases: every pair on every tire, with the one and the other as the truth in turn."""
+    out = []
+    for seed in range(first, first + count):
+        for k, (plan, *names) in enumerate(pairs()):
+            truth, rival = names if (seed + k) % 2 else names[::-1]
+            out.append(ForceTest(seed, plan, truth, rival, visible))
+    return out
+
+
+def measured(test: ForceTest) -> dict[str, Any]:
+    """Return what the campaign, a further point at random, and the advised one tell of a pair."""
+    tire = tire_of(test)
+    case = case_of(tire.measured(PLANS[test.plan].points(test.seed), 1))
+    base = fit_force(case.problem, case.model.values)
+    suspects = [(CATALOGUE[name], np.zeros(1)) for name in sorted((test.truth, test.rival))]
+    axes = force_axes(case)
+    declared = {name: ends for name, ends in ENVELOPE.items() if name in axes}
+    envelope = Envelope.of(case.problem.bench.conditions, axes, **declared)
+    plan = force_next_test(case, base, suspects, envelope)
+    out: dict[str, Any] = {"strength": tire.strength, "before": gap_of(plan.trial, test)}
+    if len(plan.trial.rivals) < 2:
+        return out
+    random = np.random.default_rng([test.seed, 5])
+    for name, k in (("chosen", 0), ("random", int(random.integers(len(plan.points))))):
+        trial = _tried(case, envelope, plan.points[k], tire, base, suspects)
+        out[name] = gap_of(trial, test) | {
+            "at": envelope.text(plan.points[k]), "predicted": float(plan.score[k]),
+            "chance": float(plan.probability[k]),
+        }  # fmt: skip
+    return out
+
+
+def _tried(
+    case: ForceCase, envelope: Envelope, point: FloatArray, tire: Tire, near: ForceFit,
+    suspects: Sequence[Any],
+) -> ForceTrial:  # fmt: skip
+    """Return the rivals on a campaign with one point more."""
+    joint = points_ahead(case, envelope, point[None])
+    n = len(case.problem)
+    at = joint.bench.conditions.take(np.array([n]))
+    told = {name: getattr(at, name) for name in ("load", "pressure", "slip_angle", "temperature")}
+    side = tire.measured(told | {"time": np.array([tire.span + PAUSE])}, 2).Fy
+    problem = replace(joint, measured=np.concatenate([case.problem.measured, side]))
+    after = replace(case, problem=problem)
+    base = fit_force(problem, near.values)
+    structure = structure_rows(problem, len(problem), base, MEMBERS, 0)
+    return try_force_suspects(after, base, suspects, structure)
+
+
+def gap_of(trial: ForceTrial, test: ForceTest) -> Mapping[str, Any]:
+    """Return by how much the rival is worse than the truth, and who cannot be fitted."""
+    cost = {rival.name: rival.cost for rival in trial.rivals}
+    gap = cost[test.rival] - cost[test.truth] if len(cost) == 2 else None
+    return {"gap": gap, "left_out": dict(trial.left_out)}

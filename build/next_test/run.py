@@ -1,0 +1,123 @@
+"""Print how often a further run tells look-alikes apart: one at random, and the advised one.
+
+    python build/next_test/run.py --seeds 6000-6001
+    python build/next_test/run.py --quantity Fy --seeds 6000-6003
+
+Resumable: verdicts are kept in build/out/next_test as long as the library's code is the same. Seeds
+from 6000 on judge the method and are never used to change it; 1000 to 1999 are for development.
+"""
+
+import argparse
+import hashlib
+import json
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from hidden.make import seeds as seeds_of
+from hidden.measured import keep
+
+import tirelib
+from next_test import forces, strain
+from next_test.rig import CACHE
+from tirelib.errors import TirelibError
+from tirelib.planning.criterion import RESOLVED
+
+VISIBLE = {"strain": 50.0, "Fy": 12.0}
+"""Chi-square by which the campaign alone shows the effect, against none, in the metric of
+structure: an alarm, and weak enough that look-alikes would serve."""
+_PARTS = ("diagnose", "effects", "identify", "model", "planning", "contact", "ring", "brush")
+STAGES = ("before", "random", "chosen")
+Verdict = dict[str, Any]
+
+
+def fingerprint() -> str:
+    """Return a hash of the library's code that a verdict depends on."""
+    digest, root = hashlib.sha256(), Path(tirelib.__file__).parent
+    for part in _PARTS:
+        for file in sorted((root / part).rglob("*.py")):
+            digest.update(file.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def verdict(quantity: str, case: Any, code: str) -> Verdict:
+    """Return the verdict on one case, from the cache if it is there."""
+    told = asdict(case)
+    name = "-".join(str(value) for value in told.values())
+    file = CACHE / "verdicts" / code / f"{quantity}-{name}.json"
+    if file.exists():
+        found: Verdict = json.loads(file.read_text(encoding="utf-8"))
+        return found
+    began = time.process_time()
+    try:
+        found = told | (strain if quantity == "strain" else forces).measured(case)
+    except TirelibError as error:
+        found = told | {"error": str(error)}
+    found["cpu"] = time.process_time() - began
+    keep(file, json.dumps(found, default=float).encode())
+    return found
+
+
+def state(found: Verdict, stage: str) -> str:
+    """Return right, wrong or open: whether one of the two is ruled out, and which."""
+    gap = found.get(stage, {}).get("gap")
+    if gap is None or abs(gap) < RESOLVED:
+        return "open"
+    return "right" if gap > 0.0 else "wrong"
+
+
+def shares(found: Sequence[Verdict], stage: str) -> str:
+    """Return right and wrong of all as text."""
+    right, wrong = (sum(state(v, stage) == s for v in found) for s in ("right", "wrong"))
+    return f"{right} of {len(found)} | {wrong}"
+
+
+def table(found: Sequence[Verdict]) -> str:
+    """Return the table in Markdown: by pair, all, and those that were open before."""
+    rows = ["| pair | before: right | wrong | random: right | wrong | advised: right | wrong |",
+            "|---|---|---|---|---|---|---|"]  # fmt: skip
+    by: dict[str, list[Verdict]] = {}
+    for v in found:
+        by.setdefault(f"{v['plan']}: {', '.join(sorted((v['truth'], v['rival'])))}", []).append(v)
+    still = [v for v in found if state(v, "before") == "open"]
+    groups = [*by.items(), ("all", list(found)), ("open before", still)]
+    for name, each in groups:
+        rows.append(f"| {name} | " + " | ".join(shares(each, stage) for stage in STAGES) + " |")
+    return "\n".join(rows)
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
+
+
+def main() -> None:
+    """Run and tell."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--quantity", choices=("strain", "Fy"), default="strain")
+    parser.add_argument("--seeds", default="1000", help="such as 6000-6001; a tire each")
+    parser.add_argument("--visible", type=float, help="chi-square of the planted effect")
+    given = parser.parse_args()
+    visible = given.visible or VISIBLE[given.quantity]
+    maker = strain.cases if given.quantity == "strain" else forces.cases
+    code, found = fingerprint(), []
+    for case in [c for seed in seeds_of(given.seeds) for c in maker(seed, 1, visible)]:
+        v = verdict(given.quantity, case, code)
+        said = {stage: v.get(stage, {}).get("gap") for stage in STAGES}
+        gaps = ", ".join(f"{k} {x:.1f}" if x is not None else f"{k} -" for k, x in said.items())
+        _say(f"{case.seed} {case.plan} {case.truth} / {case.rival}: {gaps}")
+        found.append(v)
+    _say(f"\nseeds {given.seeds}, {len(found)} cases, visible {visible:g}, code {code}\n")
+    _say(table(found))
+
+
+if __name__ == "__main__":
+    main()

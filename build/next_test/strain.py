@@ -1,0 +1,128 @@
+"""One case on strain: two look-alikes, before, after a run at random and after the advised run."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from hidden.cases import base_fit
+
+from bench.rig.hidden import HIDDEN
+from next_test.rig import ENVELOPE, PLANS, bare, campaign
+from tirelib.diagnose.candidates import candidates
+from tirelib.diagnose.refit import Refit, refit
+from tirelib.effects import CATALOGUE
+from tirelib.identify.campaign_data import straight_runs
+from tirelib.identify.waveform_fit import Data
+from tirelib.planning.criterion import NextTest
+from tirelib.planning.envelope import Envelope
+from tirelib.planning.next_test import next_test
+from tirelib.planning.rivals import Trial, repeated_noise, try_suspects
+from tirelib.planning.structure import Shapes
+from tirelib.waveforms import Waveforms
+
+A_PLAN = 3
+"""Pairs that each plan contributes."""
+LEVELS = {"load": 3, "pressure": 2, "speed": 3}
+"""Of the envelope's grid: coarser than usual, for the best run lies at an end or near it."""
+REFERENCE = 1000
+"""Seed of the tire at which pairs are chosen."""
+
+
+@dataclass(frozen=True)
+class StrainCase:
+    """Who is planted, and who looks like it."""
+
+    seed: int
+    plan: str
+    truth: str
+    rival: str
+    visible: float
+
+
+def pairs() -> list[tuple[str, str, str]]:
+    """Return plan and two look-alikes: of each plan the closest that no plan before has.
+
+    Close by the angle between signatures, as a diagnosis tells it, on one tire without any effect.
+    """
+    chosen: list[tuple[str, str, str]] = []
+    for plan in PLANS:
+        none = bare(REFERENCE, plan)
+        data = straight_runs(none.waves).data(with_deflection=False)
+        able = [e for e in CATALOGUE.values() if e.name in HIDDEN]
+        found = candidates(data, none.fit, able)
+        names = [candidate.effect.name for candidate in found.living]
+        order = sorted(
+            (float(found.angles[i, j]), *sorted((names[i], names[j])))
+            for i in range(len(names)) for j in range(i)
+        )  # fmt: skip
+        known = {(a, b) for _, a, b in chosen}
+        chosen += [(plan, a, b) for _, a, b in order if (a, b) not in known][:A_PLAN]
+    return chosen
+
+
+def cases(first: int, count: int, visible: float) -> list[StrainCase]:
+    """Return cases: every pair on every tire, with the one and the other as the truth in turn."""
+    out = []
+    for seed in range(first, first + count):
+        for k, (plan, *names) in enumerate(pairs()):
+            truth, rival = names if (seed + k) % 2 else names[::-1]
+            out.append(StrainCase(seed, plan, truth, rival, visible))
+    return out
+
+
+def measured(case: StrainCase) -> dict[str, Any]:
+    """Return what the campaign, a further run at random, and the advised one tell of a pair."""
+    made = campaign(case.seed, case.plan, case.truth, case.visible)
+    none = bare(case.seed, case.plan).fit
+    base = base_fit(made.waves, np.zeros(len(made.waves), dtype=bool), none)
+    runs = straight_runs(made.waves)
+    data = runs.data(with_deflection=False)
+    noise = repeated_noise(runs, data, base)
+    suspects = [(CATALOGUE[k], np.full(CATALOGUE[k].components, 0.1 * CATALOGUE[k].toward))
+                for k in sorted((case.truth, case.rival))]  # fmt: skip
+    test = next_test(data, base, suspects, _envelope(data), noise=noise)
+    out: dict[str, Any] = {
+        "strength": made.strength, "reached": made.visible, "ratio": made.ratio,
+        "before": gap_of(test.trial, case),
+    }  # fmt: skip
+    if len(test.trial.rivals) < 2:
+        return out
+    random = np.random.default_rng([case.seed, 5])
+    for name, k in (("chosen", 0), ("random", int(random.integers(len(test.points))))):
+        trial = _tried(made.with_run(test.points[k]), base, test.trial, _ahead(test, k))
+        out[name] = gap_of(trial, case) | {
+            "at": test.envelope.text(test.points[k]), "predicted": float(test.score[k]),
+            "chance": float(test.probability[k]),
+        }  # fmt: skip
+    return out
+
+
+def _envelope(data: Data) -> Envelope:
+    return replace(Envelope.of(data.points, **ENVELOPE), levels=LEVELS)
+
+
+def _ahead(test: NextTest, rank: int) -> int:
+    """Return the place in the envelope's grid of a run of a rank."""
+    grid = np.lexsort(test.points.T[::-1])
+    return int(np.flatnonzero(grid == rank)[0])
+
+
+def _tried(waves: Waveforms, near: Refit, before: Trial, point: int) -> Trial:
+    """Return the rivals on a campaign and one run at a point, structure as it was foretold."""
+    runs = straight_runs(waves)
+    data = runs.data(with_deflection=False)
+    base = refit(data, near.values)
+    suspects = [(CATALOGUE[rival.name], rival.strength) for rival in before.rivals]
+    there = before.shapes.ahead[:, point : point + 1]
+    every = np.concatenate([before.shapes.present, there], axis=1) / max(before.size, 1.0)
+    shapes = Shapes(every, every[:, :0])
+    noise = repeated_noise(runs, data, base)
+    return try_suspects(data, base, suspects, noise=noise, shapes=shapes)
+
+
+def gap_of(trial: Trial, case: StrainCase) -> Mapping[str, Any]:
+    """Return by how much the rival is worse than the truth, and who cannot be fitted."""
+    cost = {rival.name: rival.cost for rival in trial.rivals}
+    gap = cost[case.rival] - cost[case.truth] if len(cost) == 2 else None
+    return {"gap": gap, "left_out": dict(trial.left_out)}
