@@ -30,12 +30,16 @@ from cosim.wheels import FourWheels
 from tirelib.arrays import FloatArray
 from tirelib.errors import ConvergenceError, ParameterError
 
+YAW, YAW_RATE = 5, 15
+"""Places in the vehicle's state."""
 SPEED, END_SPEED = 100.0 / 3.6, 25.0 / 3.6
 """The way is counted between these [m/s]."""
 SLOWEST = 21.0 / 3.6
 """The virtual tire ends at 20 km/h [m/s]."""
 LONGEST = 8.0
 """A run that has not ended by then never will [s]."""
+HOLDING = (0.8, 0.25)
+"""Steering angle per yaw [1] and per yaw rate [s] of a driver who holds the course."""
 STARTS = ((-3.1, -1.6, 0.6, 2.2), (-1.5, 0.0, 2.2, -2.5))
 """Wheel angles at time zero of repeated runs: when the contacts come is chance."""
 
@@ -53,6 +57,8 @@ class Braking:
         Of the front wheels.
     rolling : float, [s]
         Time before the brakes: two turns of every wheel, and the turn settles.
+    holds : bool
+        Whether the driver steers against a yaw of the vehicle.
     """
 
     name: str
@@ -60,6 +66,12 @@ class Braking:
     friction: Callable[[float], FloatArray]
     steer: float = 0.0
     rolling: float = 0.35
+    holds: bool = False
+
+    def angles(self, yaw: float, yaw_rate: float) -> FloatArray:
+        """Return the steering angles [rad], shape (4,), by yaw [rad] and its rate [rad/s]."""
+        against = HOLDING[0] * yaw + HOLDING[1] * yaw_rate if self.holds else 0.0
+        return (self.steer - against) * np.array([1.0, 1.0, 0.0, 0.0])
 
 
 def _dry(_: float) -> FloatArray:
@@ -71,11 +83,19 @@ def _wet_patch(way: float) -> FloatArray:
     return np.where(way + np.array([0.0, 0.0, -2.7, -2.7]) > 10.0, 0.8, 1.0)
 
 
+def _split(_: float) -> FloatArray:
+    """Return less friction under the left wheels; the virtual tire does not know of it."""
+    return np.array([0.6, 1.0, 0.6, 1.0])
+
+
 ROADS = (
     Braking("dry", "dry road", _dry),
     Braking("drop", "friction falls to 0.8 after 10 m", _wet_patch),
     Braking("turn", "in a turn of 4 m/s\N{SUPERSCRIPT TWO}", _dry, 0.019, 1.5),
+    Braking("split", "friction 0.6 under the left wheels", _split, holds=True),
 )
+SHOWN_ROADS = (ROADS[0], ROADS[3])
+"""What `make cosim` shows."""
 
 
 @dataclass(frozen=True)
@@ -139,8 +159,7 @@ def brake(
     control = controller or SlipController()
     vehicle = make_vehicle()
     drive = Drive(vehicle, vehicle.at_rest(SPEED), STEP)
-    steer = road.steer * np.array([1.0, 1.0, 0.0, 0.0])
-    given = dataclasses.replace(Controls.none(), steer=steer)
+    given = dataclasses.replace(Controls.none(), steer=road.angles(0.0, 0.0))
     motion = drive.look(given)
     source.begin(motion.wheels, drive.state[SPIN])
     asked, spin = np.full(4, control.first), drive.state[SPIN]
@@ -153,6 +172,7 @@ def brake(
                 f"braking, {road.title}: {speed:.1f} m/s after {LONGEST:g} s; the controller does "
                 "not stop the vehicle; look at what it knows", drive.state, speed - end_speed,
             )  # fmt: skip
+        given = dataclasses.replace(given, steer=road.angles(*drive.state[[YAW, YAW_RATE]]))
         if time < road.rolling:
             known = source.step(time, motion.wheels, drive.state[SPIN])
             push = _hold(vehicle.parameters.drag, speed)
@@ -188,7 +208,7 @@ def brake(
         known_kappa=known_kappa,
         known_load=known_load,
         torque=torques,
-        yaw=float(drive.state[5]),
+        yaw=float(drive.state[YAW]),
         out_of_range=int(getattr(source, "out_of_range", 0)),
         refused=int(getattr(source, "refused", 0)),
         delay=float(np.median(delays)) if delays else math.nan,
@@ -274,6 +294,11 @@ class Study:
             "controller": dataclasses.asdict(SlipController()),
             "rows": rows,
         }
+
+
+def joined(studies: Sequence[Study]) -> Study:
+    """Return several studies as one."""
+    return Study(tuple(o for study in studies for o in study.outcomes), studies[0].end_speed)
 
 
 def _finite(value: float) -> float | None:

@@ -2,8 +2,8 @@
 
 A multi-body vehicle drives; four ``VirtualTire.fmu`` turn its wheels' states into strain, four
 ``StrainTire.fmu`` turn the strain into estimates, which are held against the truth. The same
-tires then close a loop: a slip controller brakes with what they tell. Everything lands in
-``build/out/cosim``.
+tires then close two loops: a slip controller brakes with what they tell, and a stability
+controller holds the vehicle. Everything lands in ``build/out/cosim``.
 """
 
 import argparse
@@ -22,7 +22,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from rich.console import Console
 
-from cosim import closed_loop, closed_loop_report
+from cosim import closed_loop, closed_loop_report, closed_loop_stability
+from cosim import closed_loop_stability_report as stability_report
 from cosim.calibrate import CALIBRATION
 from cosim.drill import drill
 from cosim.manoeuvres import MANOEUVRES
@@ -34,8 +35,10 @@ from tirelib.cli.common import progress_bar
 from tirelib.report.cosim import Series, write_cosim
 
 ROOT = Path(__file__).parents[2]
-DRILL, BRAKING = "range", "closed_loop"
-OTHERS = {DRILL: 4.0, BRAKING: 20.0}
+DRILL, STABILITY = "range", "stability"
+BRAKING = {f"closed_loop_{road.name}": road for road in closed_loop.SHOWN_ROADS}
+LOOPS = (*BRAKING, STABILITY)
+OTHERS = {DRILL: 4.0, STABILITY: 15.0, **dict.fromkeys(BRAKING, 20.0)}
 """As long as a manoeuvre of so many seconds."""
 EVERY = 10
 """The page shows every so many steps of the truth."""
@@ -52,8 +55,10 @@ Fmus = tuple[Path, Path]
 
 def work(name: str, fmus: Fmus) -> tuple[str, Any]:
     """Do one part in a process of its own: a manoeuvre, the drill or the closed loop."""
-    if name == BRAKING:
-        return name, closed_loop.study(*fmus, closed_loop.ROADS[:1])
+    if name in BRAKING:
+        return name, closed_loop.study(*fmus, [BRAKING[name]])
+    if name == STABILITY:
+        return name, closed_loop_stability.stability(*fmus)
     with FourWheels(*fmus) as wheels:
         if name == DRILL:
             return name, drill(wheels)
@@ -141,11 +146,14 @@ def main() -> None:
     fmus = build_fmus(given.out, given.calibration)
     parts = dict.fromkeys([*names, DRILL], fmus)
     if not given.manoeuvres:
-        parts[BRAKING] = build_fmus(given.out / BRAKING, given.calibration, closed_loop.STEP)
+        slow = build_fmus(given.out / "closed_loop", given.calibration, closed_loop.STEP)
+        parts |= dict.fromkeys(LOOPS, slow)
     found = run(parts, given.jobs)
     scores, checks = [found[name][0] for name in names], found[DRILL]
     missed = reached(scores, checks)
-    study = found.get(BRAKING)
+    studies = [found[name] for name in BRAKING if name in found]
+    stability = found.get(STABILITY)
+    study = closed_loop.joined(studies) if studies else None
     document = {
         "format": "tirelib-cosim/1",
         "tirelib": __version__,
@@ -158,8 +166,10 @@ def main() -> None:
         "manoeuvres": scores,
         "range": checks,
         "closed_loop": study.document() if study else None,
+        "stability": closed_loop_stability.document(stability) if stability else None,
     }
     more = closed_loop_report.parts(study) if study else []
+    more += [stability_report.part(stability)] if stability else []
     page = write_cosim(document, [found[name][1] for name in names], given.out, more)
     if given.json:
         given.json.parent.mkdir(parents=True, exist_ok=True)

@@ -1,11 +1,15 @@
 """Which terms an estimator may use: candidates of growing size, chosen by cross-validation.
 
+The load may take up further families of terms, see `tirelib.estimators.grow`.
+
 Symmetry decides most of it. Fz is even in left and right, so it takes even regressors and products
 of two odd ones; Fy and the slip angle are odd, so every term holds an odd number of odd regressors.
 Regressors that do not vary in the data are left out.
 """
 
 from collections.abc import Collection, Iterable, Sequence
+
+from tirelib.estimators.regressors import ODD, SHAPE
 
 Powers = dict[str, int]
 """A term by regressor name; an empty one is the constant."""
@@ -73,6 +77,37 @@ def load_candidates(varying: Collection[str]) -> list[list[Powers]]:
     )
 
 
+def load_families(varying: Collection[str]) -> dict[str, list[Powers]]:
+    """Return families of terms by name; Fz may take up any of them, whole: the contact's shape.
+
+    A regressor of the shape comes alone and with the contact angle; what changes with traction
+    also with the traction, and what is not across the width squared. The last two families are the
+    products of two slopes, and some of them with the contact angle.
+    """
+    traction = [T1] if "traction" in varying else []
+    families: dict[str, list[Powers]] = {}
+    for name, square, others in (
+        ("angle_bow", False, traction),
+        ("tp_bow", False, traction),
+        ("cp1_bow", False, traction),
+        ("cp2_bow", False, traction),
+        ("fullness", True, []),
+        ("skew", True, traction),
+        ("steepness", True, []),
+        ("steepness_change", True, traction),
+    ):
+        if name in varying:
+            alone: Powers = {name: 1}
+            squared = [times(alone, alone)] if square else []
+            families[name] = [*grid([alone], [ONE, L1, *others]), *squared]
+    bends: list[Powers] = [{name: 1} for name in ("lead_bend", "trail_bend") if name in varying]
+    odd: list[Powers] = [{name: 1} for name in ODD if name in varying]
+    pairs = [times(a, b) for i, a in enumerate(odd) for b in odd[i:]]
+    families |= {"bends": grid(bends, [ONE, L1])} if bends else {}
+    families |= {"slopes": pairs, "slopes with angle": grid(pairs, [L1])} if pairs else {}
+    return families
+
+
 def force_candidates(varying: Collection[str]) -> list[list[Powers]]:
     """Return candidate term lists for Fy."""
     odd = [{name: 1} for name in ("cp1_slope", "cp2_slope", "angle_slope", "tp_slope")]
@@ -95,6 +130,23 @@ def force_candidates(varying: Collection[str]) -> list[list[Powers]]:
             [ONE, *grid(odd, [*even, L3]), *cubes, *extra, *conditions],
         ]
     )
+
+
+def force_families(varying: Collection[str]) -> dict[str, list[Powers]]:
+    """Return families of terms by name that Fy may take up whole, all odd.
+
+    The slopes and the camber with one regressor of the shape; and products of three of them.
+    """
+    slopes: list[Powers] = [{name: 1} for name in ODD]
+    camber = [G1] if "camber" in varying else []
+    families = {
+        name: grid([*slopes, *camber], [{name: 1}]) for name in SHAPE if name in varying
+    }  # fmt: skip
+    pairs = [times(a, b) for i, a in enumerate(slopes) for b in slopes[i:]]
+    families["cubes"] = _unique([grid(pairs, slopes)])[0]
+    if camber:
+        families["cubes with camber"] = grid(camber, pairs)
+    return families
 
 
 def angle_candidates(varying: Collection[str]) -> list[list[Powers]]:

@@ -18,6 +18,7 @@ from tirelib.estimators import basis
 from tirelib.estimators.chain import AngleModel, Chain
 from tirelib.estimators.fit import Fit, fit_best, levels_of, mean_by
 from tirelib.estimators.floor import with_floor
+from tirelib.estimators.grow import grow
 from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.polynomial import Polynomial
 from tirelib.estimators.ranges import with_ranges
@@ -38,6 +39,16 @@ VARIES = {
     "cp2_slope": 0.02,
     "angle_slope": 0.002,
     "tp_slope": 0.02,
+    "angle_bow": 0.005,
+    "tp_bow": 0.02,
+    "cp1_bow": 0.01,
+    "cp2_bow": 0.01,
+    "fullness": 0.02,
+    "skew": 0.0005,
+    "steepness": 0.1,
+    "steepness_change": 0.1,
+    "lead_bend": 0.01,
+    "trail_bend": 0.01,
 }
 """Range (SI) that a regressor must cover in the data to enter a regression."""
 MOSTLY = 0.5
@@ -214,11 +225,16 @@ def _fit_load(
         return None, mean
     say("Fz")
     correction, _ = laws.load_correction(values)
-    candidates = basis.load_candidates(_varying(values, list(VARIES)))
+    varying, level = _varying(values, list(VARIES)), links.load_level()
+    candidates = basis.load_candidates(varying)
+    grown = grow(
+        values, truth - correction, links.groups, candidates, basis.load_families(varying),
+        odd=ODD, level=level,
+    )  # fmt: skip
+    candidates += [grown] if grown and grown not in candidates else []
     try:
         fit = fit_best(
-            values, truth - correction, links.groups, candidates, odd=ODD,
-            level=links.load_level(), what="Fz",
+            values, truth - correction, links.groups, candidates, odd=ODD, level=level, what="Fz",
         )  # fmt: skip
     except CalibrationError as error:
         links.refused["Fz"] = str(error)
@@ -270,9 +286,15 @@ def _fit_force(links: Links, say: Callable[[str], None]) -> Polynomial | None:
     say("Fy")
     varying = _varying(values, list(VARIES))
     varying -= _frozen_with_slip(links, varying)
+    candidates, odd = basis.force_candidates(varying), (*ODD, "camber")
+    grown = grow(
+        values, truth, links.groups, candidates, basis.force_families(varying), odd=odd,
+        level=links.load_level(), centre=False,
+    )  # fmt: skip
+    candidates += [grown] if grown and grown not in candidates else []
     fit = fit_best(
-        values, truth, links.groups, basis.force_candidates(varying), odd=(*ODD, "camber"),
-        level=links.load_level(), centre=False, what="Fy",
+        values, truth, links.groups, candidates, odd=odd, level=links.load_level(), centre=False,
+        what="Fy",
     )  # fmt: skip
     _keep(links, "Fy", fit, fit.held_out)
     return fit.model

@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from tirelib.estimators.regressors import EVEN, ODD, SHAPE
+
 AXES = "iso"
 UNITS = {"Fz": "N", "R_eff": "m", "Fy": "N", "alpha": "rad"}
 """Models of a chain with the unit of their coefficients."""
 REGRESSORS = frozenset(
-    ("contact_angle", "compression", "traction", "tension", "cp1_slope", "cp2_slope", "tp_slope",
-     "angle_slope", "pressure", "speed_squared", "camber", "load", "utilisation", "slip_ratio",
-     "slip_size")
+    (*EVEN, *ODD, *SHAPE, "pressure", "speed_squared", "camber", "load", "utilisation",
+     "slip_ratio", "slip_size")
 )  # fmt: skip
 """Names that a polynomial or a range may use."""
 QUANTITIES = frozenset(("Fz", "alpha", "kappa", "Fy"))
@@ -67,6 +68,8 @@ def _chain(chain: Any, where: str, gages: int) -> Iterator[str]:
             yield from _model(chain[name], f"{where}.{name}", unit)
     if "alpha" in chain:
         yield from _numbers(chain, "alpha", ("blur", "bend"), where)
+    if "cloud" in chain:
+        yield from _cloud(chain["cloud"], f"{where}.cloud")
 
 
 def _laws(table: Any, where: str) -> Iterator[str]:
@@ -94,6 +97,29 @@ def _range(entry: Any, where: str) -> Iterator[str]:
             yield f"{where}.{name} = {entry.get(name)!r}; a finite number is needed"
     if not isinstance(entry.get("needed"), bool):
         yield f"{where}.needed = {entry.get('needed')!r}; true or false is needed"
+
+
+def _cloud(table: Any, where: str) -> Iterator[str]:
+    if not isinstance(table, dict):
+        yield f"{where}: is no table"
+        return
+    names, scale, points = table.get("names"), table.get("scale"), table.get("points")
+    if not isinstance(names, list) or len(names) != 2 or not set(names) <= REGRESSORS:
+        yield f"{where}.names = {names!r}; two names of regressors are needed"
+    if not isinstance(scale, list) or not _pair(scale) or min(scale) <= 0.0:
+        yield f"{where}.scale = {scale!r}; two numbers above 0 are needed"
+    if not isinstance(points, list) or not points or not all(map(_pair, points)):
+        yield f"{where}.points: pairs of finite numbers are needed"
+    for name in ("reach", "around"):
+        value: Any = table.get(name, 0.0 if name == "around" else None)
+        if not _finite(value) or value < 0.0:
+            yield f"{where}.{name} = {value!r}; a number from 0 is needed"
+    if not isinstance(table.get("mirrored", False), bool):
+        yield f"{where}.mirrored = {table['mirrored']!r}; true or false is needed"
+
+
+def _pair(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 2 and all(map(_finite, value))
 
 
 def _model(table: Any, where: str, unit: str) -> Iterator[str]:

@@ -124,6 +124,8 @@ def _chain_table(chain: Chain) -> dict[str, Any]:
             "scale": chain.cloud.scale.tolist(),
             "points": chain.cloud.points.tolist(),
             "reach": chain.cloud.reach,
+            "around": chain.cloud.around,
+            "mirrored": chain.cloud.mirrored,
         }
     models = {"Fz": chain.load, "R_eff": chain.radius, "Fy": chain.force}
     for name, model in models.items():
@@ -149,6 +151,8 @@ def _chain(table: Mapping[str, Any]) -> Chain:
             np.asarray(part["scale"], dtype=np.float64),
             np.asarray(part["points"], dtype=np.float64).reshape(-1, 2),
             float(part["reach"]),
+            float(part.get("around", 0.0)),  # files before these two keys: only what is near
+            bool(part.get("mirrored", False)),
         )
     if "alpha" in table:
         part = table["alpha"]

@@ -7,7 +7,7 @@ measured.
 """
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,6 +60,15 @@ def variables_for(
     return tuple(made)
 
 
+def design_for(
+    values: Mapping[str, FloatArray], terms: Sequence[Powers], odd: Sequence[str]
+) -> tuple[tuple[Variable, ...], tuple[tuple[int, ...], ...], FloatArray]:
+    """Return variables, exponents and values, shape (n, k), of terms."""
+    variables = variables_for(values, terms, odd)
+    exponents = tuple(tuple(term.get(v.name, 0) for v in variables) for term in terms)
+    return variables, exponents, design(variables, exponents, values)
+
+
 def fit_best(
     values: Mapping[str, FloatArray],
     y: FloatArray,
@@ -102,9 +111,7 @@ def fit_best(
     for terms in candidates:
         if len(terms) > max(LARGEST_SHARE * conditions, 1.0 if len(terms) == 1 else 0.0):
             continue
-        variables = variables_for(values, terms, odd)
-        exponents = tuple(tuple(term.get(v.name, 0) for v in variables) for term in terms)
-        x = design(variables, exponents, values)
+        variables, exponents, x = design_for(values, terms, odd)
         held_out, held_std = _cross_validate(x, y, groups, weights, centre)
         error = y - held_out
         squares = [float(np.average(error**2, weights=weights))]
@@ -136,10 +143,29 @@ def fit_best(
     return Fit(best[1].model, best[1].held_out, tuple(tried))
 
 
-def _ridge(
-    x: FloatArray, y: FloatArray, weights: FloatArray, centre: bool
-) -> tuple[FloatArray, FloatArray, float]:
-    """Return coefficients, their covariance and the noise, in the unit of y."""
+@dataclass(frozen=True, slots=True)
+class Ridge:
+    """A Bayesian ridge regression, with the scales in which it was solved.
+
+    Attributes
+    ----------
+    coefficients, covariance : arrays, shapes (k,) and (k, k), in the unit of y
+    noise : float, unit of y
+    size : array, shape (k,)
+        By which the columns of x were divided.
+    penalty : float
+        Of the squared coefficients in those columns, per unit of squared error of a row.
+    """
+
+    coefficients: FloatArray
+    covariance: FloatArray
+    noise: float
+    size: FloatArray
+    penalty: float
+
+
+def ridge_fit(x: FloatArray, y: FloatArray, weights: FloatArray, centre: bool) -> Ridge:
+    """Fit y by the columns of x; the first column is the constant."""
     middle = float(np.average(y, weights=weights)) if centre else 0.0
     spread = float(np.sqrt(np.average((y - middle) ** 2, weights=weights))) or 1.0
     size = np.sqrt(np.mean(x**2, axis=0))
@@ -150,8 +176,17 @@ def _ridge(
         ridge.fit(x / size, (y - middle) / spread, sample_weight=weights / weights.mean())
     coefficients = ridge.coef_ * spread / size
     covariance = ridge.sigma_ * spread**2 / np.outer(size, size)
-    coefficients[0] += middle  # the first term is the constant
-    return coefficients, covariance, spread / float(np.sqrt(ridge.alpha_))
+    coefficients[0] += middle
+    noise = spread / float(np.sqrt(ridge.alpha_))
+    return Ridge(coefficients, covariance, noise, size, float(ridge.lambda_ / ridge.alpha_))
+
+
+def _ridge(
+    x: FloatArray, y: FloatArray, weights: FloatArray, centre: bool
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return coefficients, their covariance and the noise, in the unit of y."""
+    found = ridge_fit(x, y, weights, centre)
+    return found.coefficients, found.covariance, found.noise
 
 
 def _cross_validate(
@@ -189,21 +224,29 @@ def levels_of(x: FloatArray, share: float = 0.05) -> IntArray | None:
     return number if 3 <= number.max() + 1 <= MOST_LEVELS else None
 
 
+def inner_levels(x: FloatArray, level: IntArray) -> Iterator[tuple[BoolArray, BoolArray]]:
+    """Yield the rows of each inner level that can be held out, and which of them to judge by.
+
+    What was measured at a level only cannot be asked of the others.
+    """
+    for number in range(1, int(level.max())):
+        test = level == number
+        if test.mean() > LARGEST_LEVEL:
+            continue
+        low, high = x[~test].min(axis=0), x[~test].max(axis=0)
+        slack = LEVEL_SLACK * (high - low)
+        inside = ((x[test] >= low - slack) & (x[test] <= high + slack)).all(axis=1)
+        if inside.sum() >= FEWEST_ROWS:
+            yield test, inside
+
+
 def _inner_levels(
     x: FloatArray, y: FloatArray, level: IntArray, weights: FloatArray, centre: bool
 ) -> list[float]:
     """Return the mean square error at each inner level by a fit without it."""
     squares = []
-    for number in range(1, int(level.max())):
-        test = level == number
-        if test.mean() > LARGEST_LEVEL:
-            continue
+    for test, inside in inner_levels(x, level):
         coefficients, _, _ = _ridge(x[~test], y[~test], weights[~test], centre)
-        low, high = x[~test].min(axis=0), x[~test].max(axis=0)
-        slack = LEVEL_SLACK * (high - low)
-        inside = ((x[test] >= low - slack) & (x[test] <= high + slack)).all(axis=1)
-        if inside.sum() < FEWEST_ROWS:
-            continue  # what was measured at this level only cannot be asked of the others
         error = (y[test] - x[test] @ coefficients)[inside]
         squares.append(float(np.average(error**2, weights=weights[test][inside])))
     return squares

@@ -49,27 +49,63 @@ class Range:
 class Cloud:
     """Combinations of two regressors that were calibrated: what lies near none of them was not.
 
+    A combination counts as calibrated if one that was lies within `reach`, or if it lies between
+    some that are within `around`: in their convex hull. Two arms of a cross, cornering and braking
+    apart, so do not calibrate what lies between the arms.
+
     Attributes
     ----------
     names : tuple of two str
+        An even and an odd regressor.
     scale : array, shape (2,), SI
         Half of each regressor's range.
     points : array, shape (m, 2), in units of `scale`
-    reach : float
-        Distance from the nearest point, in the same units, that is still taken as calibrated.
+    reach, around : float
+        Distances, in the same units; `around` = 0: nothing counts that lies between.
+    mirrored : bool
+        True: a combination was calibrated as well when its mirror image was.
     """
 
     names: tuple[str, str]
     scale: FloatArray
     points: FloatArray
     reach: float
+    around: float = 0.0
+    mirrored: bool = False
 
     def inside(self, values: Mapping[str, FloatArray]) -> BoolArray:
-        """Tell which rows lie near a calibrated combination, shape (n,)."""
+        """Tell which rows lie near calibrated combinations, or between them, shape (n,)."""
         x = np.stack([values[name] for name in self.names], axis=1) / self.scale
-        apart = x[:, None, :] - self.points
-        nearest = np.einsum("ijk,ijk->ij", apart, apart).min(axis=1)
-        return np.asarray(nearest <= self.reach**2, dtype=np.bool_)
+        points = self.points
+        if self.mirrored:
+            points = np.concatenate((points, points * np.array([1.0, -1.0])))
+        away = points - x[:, None, :]
+        square = np.einsum("ijk,ijk->ij", away, away)
+        near = square.min(axis=1) <= self.reach**2
+        if self.around == 0.0:
+            return np.asarray(near, dtype=np.bool_)
+        rows = np.flatnonzero(~near & np.isfinite(x).all(axis=1))
+        near[rows] = _surrounded(away[rows], square[rows] <= self.around**2)
+        return np.asarray(near, dtype=np.bool_)
+
+
+def _surrounded(away: FloatArray, counts: BoolArray) -> BoolArray:
+    """Tell whether the origin lies in the convex hull of the vectors that count.
+
+    It does when no half-plane is free of them: no gap between their directions exceeds pi.
+
+    Parameters
+    ----------
+    away : array, shape (n, m, 2)
+    counts : bool array, shape (n, m)
+    """
+    angle = np.where(counts, np.arctan2(away[..., 1], away[..., 0]), np.nan)
+    angle.sort(axis=1)  # what does not count comes last
+    known = counts.sum(axis=1)
+    last = angle[np.arange(len(angle)), np.maximum(known - 1, 0)]
+    gaps = np.fmax.reduce(np.diff(angle, axis=1), axis=1, initial=0.0)
+    largest = np.fmax(gaps, angle[:, 0] + 2.0 * np.pi - last)
+    return np.asarray((known > 0) & (largest <= np.pi), dtype=np.bool_)
 
 
 Term = tuple[int, ...]

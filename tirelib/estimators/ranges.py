@@ -7,8 +7,8 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.estimators.chain import Chain
-from tirelib.estimators.polynomial import Cloud, Range
-from tirelib.estimators.regressors import ODD
+from tirelib.estimators.polynomial import Cloud, Polynomial, Range
+from tirelib.estimators.regressors import ODD, SHAPE
 
 SLACK = {
     "contact_angle": 0.01,
@@ -21,6 +21,16 @@ SLACK = {
     "utilisation": 0.02,
     "camber": np.deg2rad(0.5),
     "kappa": 0.01,
+    "angle_bow": 0.004,
+    "tp_bow": 0.02,
+    "cp1_bow": 0.01,
+    "cp2_bow": 0.01,
+    "fullness": 0.01,
+    "skew": 0.0005,
+    "steepness": 0.1,
+    "steepness_change": 0.1,
+    "lead_bend": 0.01,
+    "trail_bend": 0.01,
 }
 """Least distance (SI) beyond the calibrated range that is still taken as calibrated."""
 LEAST_TRACTION = 0.08
@@ -29,8 +39,12 @@ LEAST_HALF_RANGE = 0.02
 """Floor of the scale with which combinations are compared."""
 REACH = (0.1, 0.2)
 """Least and largest distance from a calibrated combination, in half ranges."""
+AROUND = 0.4
+"""Distance within which calibrated combinations count that lie all round, in half ranges."""
 MARGIN = 0.05
 """The same, as a share of the range."""
+MIRRORED = (*ODD, "camber")
+"""What turns its sign in the mirror image: calibrated on one side, it is on the other as well."""
 GAIN_SLACK = 0.3
 """Share by which the tension may leave its range: gains drift, but a wrong unit is caught."""
 
@@ -43,6 +57,8 @@ def with_ranges(
     def limits(name: str, *, needed: bool = True) -> Range:
         x = values[name]
         low, high = float(np.nanmin(x)), float(np.nanmax(x))
+        if name in MIRRORED:
+            low, high = min(low, -high), max(high, -low)
         slack = GAIN_SLACK * high if name == "tension" else SLACK[name]
         return Range(name, low, high, max(slack, MARGIN * (high - low)), needed)
 
@@ -51,6 +67,10 @@ def with_ranges(
     if np.isfinite(values["camber"]).any():
         shape = (*shape, limits("camber", needed=_uses(chain, "camber")))
     angle = (limits("utilisation"),) if chain.angle is not None else ()
+
+    def carried(*models: Polynomial | None) -> tuple[Range, ...]:
+        used = {v.name for model in models if model is not None for v in model.variables}
+        return tuple(limits(name) for name in SHAPE if name in used)
 
     def own(quantity: str, measured: str) -> tuple[Range, ...]:
         if not chain.has(quantity):
@@ -63,9 +83,9 @@ def with_ranges(
     driven = bool(np.ptp(values["traction"]) >= LEAST_TRACTION)
 
     guards = {
-        "Fz": (*shape, *own("Fz", "Fz")),
-        "Fy": (*shape, *own("Fy", "Fy")),
-        "alpha": (*shape, *angle, *own("alpha", "slip_angle")),
+        "Fz": (*shape, *carried(chain.load), *own("Fz", "Fz")),
+        "Fy": (*shape, *carried(chain.force), *own("Fy", "Fy")),
+        "alpha": (*shape, *carried(chain.load, chain.force), *angle, *own("alpha", "slip_angle")),
         "kappa": own("kappa", "slip_ratio") if driven else (),
     }
     return replace(chain, guards=guards, cloud=_cloud(values))
@@ -82,7 +102,8 @@ def _cloud(values: Mapping[str, FloatArray]) -> Cloud | None:
     apart = np.linalg.norm(points[:, None, :] - points, axis=2)
     np.fill_diagonal(apart, np.inf)
     gap = float(np.quantile(apart.min(axis=1), 0.9))
-    return Cloud(names, scale, points, float(np.clip(1.5 * gap, *REACH)))
+    reach = float(np.clip(1.5 * gap, *REACH))
+    return Cloud(names, scale, points, reach, AROUND, mirrored=True)
 
 
 def _uses(chain: Chain, name: str) -> bool:

@@ -18,6 +18,10 @@ EVEN = ("contact_angle", "compression", "traction", "tension")
 """Regressors that keep their sign when left and right change places."""
 ODD = ("cp1_slope", "cp2_slope", "angle_slope", "tp_slope")
 """Regressors that change their sign when left and right change places."""
+SHAPE = ("angle_bow", "tp_bow", "cp1_bow", "cp2_bow", "fullness", "skew", "steepness",
+         "steepness_change", "lead_bend", "trail_bend")  # fmt: skip
+"""Even regressors of the contact's shape, over its width and along it."""
+FEWEST_FOR_BOW = 3
 CONDITIONS = ("pressure", "speed", "camber")
 
 
@@ -36,14 +40,27 @@ def compute_regressors(features: Features, gages: Sequence[int]) -> dict[str, Fl
         ``contact_angle`` [rad] mean contact angle; ``compression`` mean of CP1 and CP2 over TP;
         ``traction`` (CP1 - CP2) / TP; ``tension`` mean TP [strain]; ``cp1_slope``, ``cp2_slope``,
         ``tp_slope`` slopes over TP; ``angle_slope`` [rad]; ``omega`` [rad/s] and the conditions.
+        Of the shape: ``angle_bow`` [rad], ``tp_bow``, ``cp1_bow``, ``cp2_bow`` over TP, NaN for
+        fewer than three gages; ``fullness`` E_vertical over TP [rad], ``skew`` [rad]; ``steepness``
+        mean of the peak rates at both edges over TP and ``steepness_change`` leading less trailing
+        [1/rad]; ``lead_bend``, ``trail_bend`` from each edge to its compressive peak [rad].
     """
     use = list(gages)
     y = features.lateral[use]
-    line = _line(tuple((y / np.abs(features.lateral).max()).tolist()))
+    places = tuple((y / np.abs(features.lateral).max()).tolist())
+    line, parabola = _fitted(places, 1), _fitted(places, 2)
 
     def level_slope(values: FloatArray) -> tuple[FloatArray, FloatArray]:
         fitted = values[:, use] @ line.T
         return fitted[:, 0], fitted[:, 1]
+
+    def level(values: FloatArray) -> FloatArray:
+        return np.asarray(values[:, use] @ line[0], dtype=np.float64)
+
+    def bow(values: FloatArray) -> FloatArray:
+        if len(use) < FEWEST_FOR_BOW:
+            return np.full(len(features), np.nan)
+        return np.asarray(values[:, use] @ parabola[2], dtype=np.float64)
 
     scale = features.tp[:, use].mean(axis=1)
     angle, angle_slope = level_slope(features.contact_angle)
@@ -59,6 +76,16 @@ def compute_regressors(features: Features, gages: Sequence[int]) -> dict[str, Fl
         "cp2_slope": cp2_slope / scale,
         "angle_slope": angle_slope,
         "tp_slope": tp_slope / scale,
+        "angle_bow": bow(features.contact_angle),
+        "tp_bow": bow(features.tp) / scale,
+        "cp1_bow": bow(features.cp1) / scale,
+        "cp2_bow": bow(features.cp2) / scale,
+        "fullness": level(features.e_vertical) / scale,
+        "skew": level(features.skew),
+        "steepness": 0.5 * level(features.rate_lead - features.rate_trail) / scale,
+        "steepness_change": level(features.rate_lead + features.rate_trail) / scale,
+        "lead_bend": level(features.lead - features.cp1_angle),
+        "trail_bend": level(features.cp2_angle - features.trail),
         "omega": features.omega,
         "pressure": features.pressure,
         "speed": features.speed,
@@ -67,9 +94,9 @@ def compute_regressors(features: Features, gages: Sequence[int]) -> dict[str, Fl
 
 
 @cache
-def _line(y: tuple[float, ...]) -> FloatArray:
-    """Return the matrix, shape (2, n), that fits level and slope over the positions y."""
-    return np.asarray(np.linalg.pinv(np.stack((np.ones(len(y)), np.array(y)), axis=1)))
+def _fitted(y: tuple[float, ...], degree: int) -> FloatArray:
+    """Return the matrix, shape (degree + 1, n), that fits a polynomial over the positions y."""
+    return np.asarray(np.linalg.pinv(np.vander(np.array(y), degree + 1, increasing=True)))
 
 
 def select(regressors: Mapping[str, FloatArray], rows: BoolArray) -> dict[str, FloatArray]:

@@ -25,6 +25,8 @@ def put(*path: str | int, value: object) -> Edit:
     return edit
 
 
+CLOUD = {"names": ["traction", "cp1_slope"], "scale": [1.0, 1.0], "points": [[0.0, 0.0]],
+         "reach": 0.1}  # fmt: skip
 FZ = ("chain", 0, "Fz")
 FAULTS: dict[str, tuple[Edit, str]] = {
     "axes": (put("axes", value="sae"), "axes = 'sae'"),
@@ -44,6 +46,10 @@ FAULTS: dict[str, tuple[Edit, str]] = {
     "range": (put("chain", 0, "range", "Fz", value=[]), "it decides on validity"),
     "needed": (put("chain", 0, "range", "Fz", 0, "needed", value="no"), "true or false"),
     "order": (put("filter", "order", value="24"), "filter.order = '24'"),
+    "cloud": (put("chain", 0, "cloud", value=7), "cloud: is no table"),
+    "cloud's scale": (put("chain", 0, "cloud", value=CLOUD | {"scale": [1, 0]}), "numbers above 0"),
+    "cloud's reach": (put("chain", 0, "cloud", value=CLOUD | {"reach": -1.0}), "reach = -1.0"),
+    "cloud's points": (put("chain", 0, "cloud", value=CLOUD | {"points": [[1]]}), "pairs of"),
     "twice": (put("chain", 1, "missing_gage", value=0), "each once"),
 }  # fmt: skip
 

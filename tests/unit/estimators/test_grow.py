@@ -1,0 +1,99 @@
+"""Families of terms are taken up where they help with what was not seen, and only there."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from tirelib.estimators import basis
+from tirelib.estimators.fit import Ridge, design_for
+from tirelib.estimators.grow import grow, held_out_errors
+from tirelib.estimators.regressors import ODD, SHAPE
+
+N = 60
+ODD_HERE = ("slope",)
+
+
+def values(seed: int = 1) -> dict[str, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    names = ("angle", "bow", "slope", "noise_1", "noise_2", "noise_3")
+    return {name: rng.uniform(-1.0, 1.0, N) for name in names}
+
+
+BASE: list[basis.Powers] = [{}, {"angle": 1}]
+FAMILIES: dict[str, list[basis.Powers]] = {
+    "bow": [{"bow": 1}, {"bow": 1, "angle": 1}],
+    "slopes": [{"slope": 2}],
+    **{f"noise_{k}": [{f"noise_{k}": 1}, {f"noise_{k}": 2}] for k in (1, 2, 3)},
+}
+
+
+def test_a_family_that_carries_the_load_is_taken_up_whole_and_chance_is_not() -> None:
+    x = values()
+    y = 4.0 + 3.0 * x["angle"] + x["bow"] + 0.5 * x["bow"] * x["angle"] + 0.8 * x["slope"] ** 2
+    y = y + 0.05 * np.random.default_rng(2).standard_normal(N)
+    grown = grow(x, y, np.arange(N), [BASE], FAMILIES, odd=ODD_HERE)
+    assert grown == [*BASE, *FAMILIES["bow"], *FAMILIES["slopes"]]
+
+
+def test_nothing_is_taken_up_where_the_candidate_says_all() -> None:
+    x = values()
+    y = 4.0 + 3.0 * x["angle"] + 0.05 * np.random.default_rng(2).standard_normal(N)
+    assert grow(x, y, np.arange(N), [BASE], FAMILIES, odd=ODD_HERE) == BASE
+
+
+def test_terms_stay_below_a_share_of_the_conditions() -> None:
+    """Ten rows of each of six conditions say no more than six do."""
+    x = values()
+    y = 4.0 + 3.0 * x["angle"] + x["bow"]
+    few = np.repeat(np.arange(6), 10)
+    assert grow(x, y, few, [BASE], FAMILIES, odd=ODD_HERE) == BASE
+    assert grow(x, y, np.zeros(N, dtype=np.int64), [BASE], FAMILIES, odd=ODD_HERE) == []
+
+
+@pytest.mark.parametrize("centre", [True, False])
+def test_held_out_errors_are_those_of_fits_without_the_rows(
+    monkeypatch: pytest.MonkeyPatch, centre: bool
+) -> None:
+    """With the penalty held, the identity is exact: against fitting anew, group by group."""
+    x, penalty = values(), 0.3
+    terms = [*BASE, *FAMILIES["bow"]]
+    y = 2.0 * x["angle"] + x["slope"] + np.random.default_rng(4).standard_normal(N)
+    groups = np.repeat(np.arange(20), 3)
+    groups[:10] = 100 + np.arange(10)  # some alone
+    design = design_for(x, terms, ODD_HERE)[2]
+
+    def held(*_: object) -> Ridge:
+        return Ridge(np.zeros(4), np.eye(4), 1.0, np.ones(4), penalty)
+
+    monkeypatch.setattr("tirelib.estimators.grow.ridge_fit", held)
+    about = y - y.mean() if centre else y
+    square = []
+    for group in np.unique(groups):
+        rest = groups != group
+        a = design[rest].T @ design[rest] + penalty * np.eye(4)
+        found = np.linalg.solve(a, design[rest].T @ about[rest])
+        square += ((about - design @ found)[~rest] ** 2).tolist()
+    errors = held_out_errors(design, y, groups, None, centre)
+    assert errors.conditions == pytest.approx(np.sqrt(np.mean(square)), rel=1e-9)
+    assert errors.both == errors.conditions
+
+
+def test_families_keep_the_symmetry_of_what_they_describe() -> None:
+    """Fz is even in left and right, Fy odd; every term counts its odd regressors."""
+    varying = {*SHAPE, *ODD, "traction", "camber", "contact_angle", "compression"}
+    odd = {*ODD, "camber"}
+
+    def count(term: basis.Powers) -> int:
+        return sum(power for name, power in term.items() if name in odd)
+
+    load, force = basis.load_families(varying), basis.force_families(varying)
+    assert {count(term) % 2 for family in load.values() for term in family} == {0}
+    assert {count(term) % 2 for family in force.values() for term in family} == {1}
+    for families in (load, force):
+        for family in families.values():
+            assert all(a != b for a, b in pairwise(family))
+    # what stood still is in no family
+    for families in (basis.load_families({"cp1_slope"}), basis.force_families({"cp1_slope"})):
+        names = {name for family in families.values() for term in family for name in term}
+        assert not names & set(SHAPE)
