@@ -58,7 +58,8 @@ class Turn:
     texts : mapping of name to str
         What it says in words: ``rolling``, ``status``; ``note`` where it began afresh.
     flags : int
-        `TurnFlag` bits of the estimator and of the line.
+        `TurnFlag` bits of the estimator and of the line: `GAP` where samples were lost since the
+        turn before, whether the estimator needed them or not.
     saturated : tuple of int
         Saturated samples of each gage since the turn before.
     wheel : int
@@ -142,8 +143,26 @@ class _Segment:
     stepped: int = 0  # samples so far
     until: float = -1.0  # the sample at which the condition changes
     condition: Condition = UNKNOWN
-    marks: BoolArray = field(default_factory=lambda: np.empty((0, GAGES), np.bool_))
-    saturated: IntArray = field(default_factory=lambda: np.zeros(GAGES, np.int64))
+    marks: BoolArray = field(default_factory=lambda: np.empty((0, GAGES + 1), np.bool_))
+    """Of those that wait: saturated in each gage, lost."""
+    marked: IntArray = field(default_factory=lambda: np.empty((0, GAGES + 2), np.int64))
+    """Of those since the turn before that have a mark: number, saturated in each gage, lost."""
+
+    def mark(self, marks: BoolArray) -> None:
+        """Keep the marks of samples that are to be stepped next."""
+        rows = np.flatnonzero(marks.any(axis=1))
+        if len(rows):
+            new = np.column_stack((self.stepped + rows, marks[rows]))
+            self.marked = np.concatenate((self.marked, new))
+
+    def seen(self, ready: float) -> list[int]:
+        """Return and forget the marks up to the end of a turn [s], which a step may go beyond."""
+        if not len(self.marked):
+            return [0] * (GAGES + 1)
+        mine = self.marked[:, 0] < round(ready / self.period)
+        counts = self.marked[mine, 1:].sum(axis=0)
+        self.marked = self.marked[~mine]
+        return [int(count) for count in counts]
 
 
 class Chain:
@@ -197,7 +216,7 @@ class Chain:
         segment, self._segment = self._segment, None
         if segment is None or not len(segment.waiting):
             return []
-        segment.saturated += segment.marks.sum(axis=0)
+        segment.mark(segment.marks)
         turn = self._step(segment, segment.waiting)
         return [] if turn is None else [turn]
 
@@ -219,7 +238,7 @@ class Chain:
         segment = self._segment
         if segment is None or not len(block.strain):
             return []
-        strain, marks = block.strain, block.saturated
+        strain, marks = block.strain, np.column_stack((block.saturated, block.lost))
         if len(segment.waiting):
             strain = np.concatenate((segment.waiting, strain))
             marks = np.concatenate((segment.marks, marks))
@@ -227,7 +246,7 @@ class Chain:
         turns, first = [], 0
         while len(strain) - first >= (size := self._size(segment)):
             if marked:
-                segment.saturated += marks[first : first + size].sum(axis=0)
+                segment.mark(marks[first : first + size])
             turn = self._step(segment, strain[first : first + size])
             first += size
             if turn is not None:
@@ -256,9 +275,9 @@ class Chain:
         outputs, texts = result
         if self._note:
             texts, self._note = {**texts, "note": self._note}, ""
-        saturated = tuple(segment.saturated.tolist())
-        segment.saturated[:] = 0
         ready = segment.stepped * segment.period - outputs["age"]
+        *saturated, lost = segment.seen(ready)
+        seen = int(TurnFlag.SATURATED) * any(saturated) | int(TurnFlag.GAP) * (lost > 0)
         return Turn(
             run=segment.run,
             segment=segment.number,
@@ -267,8 +286,8 @@ class Chain:
             device_time=segment.device_origin + ready,
             outputs=outputs,
             texts=texts,
-            flags=int(outputs["flags"]) | (int(TurnFlag.SATURATED) if any(saturated) else 0),
-            saturated=saturated,
+            flags=int(outputs["flags"]) | seen,
+            saturated=tuple(saturated),
             wheel=self._wheel,
             arrival=self._arrival,
         )

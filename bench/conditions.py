@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from bench.errors import DeviceError
+from bench.errors import DeviceError, cause
 from tirelib.units import from_si, to_si
 
 FORMAT = "tirebench-conditions/1"
@@ -243,7 +243,7 @@ def read_conditions(path: Path) -> Conditions:
         document = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise DeviceError(
-            f"{path}: it cannot be read ({error}); JSON as `tirebench emulate --conditions` "
+            f"{path}: it cannot be read ({cause(error)}); JSON as `tirebench emulate --conditions` "
             "writes it is needed; check the path"
         ) from None
     return parse_conditions(document, str(path))

@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.errors import DeviceError
+from bench.errors import DeviceError, cause
 from bench.frames import GAGES, HIGHEST, LOWEST, CountArray, FrameFlag, Int16Array, IntArray
 from tirelib.arrays import BoolArray, FloatArray
 
@@ -38,6 +38,7 @@ _KNOWN = {
     "scale": {"strain_per_count"},
     "bridge": {"gage_factor", "excitation_V", "volt_per_count"},
 }
+_SATURATED = int(FrameFlag.SATURATED)
 _GAGE_BITS = 1 << np.arange(GAGES)
 
 
@@ -74,7 +75,7 @@ class Device:
         """
         m, n = counts.shape[:2]
         saturated = (counts == self.highest) | (counts == self.lowest)
-        if (flags & int(FrameFlag.SATURATED)).any():
+        if (flags & _SATURATED).any():
             named = (flags[:, None] & _GAGE_BITS) != 0
             saturated |= (named & ~saturated.any(axis=1))[:, None, :]
         strain = (counts - np.asarray(self.zero)) * self.scale
@@ -124,7 +125,8 @@ def read_device(path: Path) -> Device:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise DeviceError(
-            f"{path}: it cannot be read ({error}); a device file is TOML in UTF-8; check the path"
+            f"{path}: it cannot be read ({cause(error)}); a device file is TOML in UTF-8; check "
+            "the path"
         ) from None
     return parse_device(text, str(path))
 

@@ -52,3 +52,8 @@ class UnpluggedError(LinkError):
 
 class LinkTimeoutError(BenchError, TimeoutError):
     """Nothing came before the deadline. Example: the transmitter is off."""
+
+
+def cause(error: Exception) -> str:
+    """Return what an error says, without number and path where it comes from the system."""
+    return getattr(error, "strerror", None) or str(error)

@@ -30,7 +30,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.errors import DeviceError
+from bench.errors import DeviceError, cause
 from bench.rig.measure import Chain, gages
 from bench.rig.observe import forces, trace
 from bench.rig.solve import State, solve
@@ -134,8 +134,8 @@ def read_manoeuvre(path: Path) -> Manoeuvre:
             rows, tire = list(document.get("point", [])), str(document.get("tire", "reference"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, TypeError) as error:
         raise DeviceError(
-            f"{path}: it cannot be read ({error}); a manoeuvre is TOML or CSV in UTF-8; check "
-            "path and line"
+            f"{path}: it cannot be read ({cause(error)}); a manoeuvre is TOML or CSV in UTF-8; "
+            "check path and line"
         ) from None
     if tire not in TIRES:
         raise DeviceError(f"{path}: tire = {tire!r}; {', '.join(TIRES)} are known; choose one")

@@ -76,7 +76,7 @@ class Recorder:
     ) -> None:
         self.path = path
         self.bytes = 0
-        self._clock = time.time_ns() - time.monotonic_ns()
+        self._clock = header.wall_ns - header.monotonic_ns  # one for the whole file
         self._number = 0
         try:
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -4,6 +4,7 @@ Both have one writer and one reader and never wait. What a reader has taken up i
 the memory itself, so that a process that is started again goes on where the last one was.
 """
 
+import math
 import os
 import struct
 import zlib
@@ -22,6 +23,14 @@ _SKIP = 0xFFFFFFFF
 _PLACE = Path("/dev/shm")  # Linux; other systems have no such folder
 
 
+def free() -> float:
+    """Return the shared memory that is free, [bytes]; infinite where the system does not tell."""
+    if not _PLACE.is_dir():
+        return math.inf
+    state = os.statvfs(_PLACE)
+    return float(state.f_bavail * state.f_frsize)
+
+
 def memory(size: int) -> SharedMemory:
     """Return new shared memory.
 
@@ -30,15 +39,18 @@ def memory(size: int) -> SharedMemory:
     LinkError
         If there is not enough of it; to run out later would kill the process that writes.
     """
-    if _PLACE.is_dir():
-        state = os.statvfs(_PLACE)
-        free = state.f_bavail * state.f_frsize
-        if free < size:
-            raise LinkError(
-                f"{_PLACE}: {free / 2**20:.0f} MB of shared memory are free; {size / 2**20:.0f} MB "
-                "are needed; give a container more (--shm-size), or name fewer wheels with --wheel"
-            )
+    if free() < size:
+        raise too_little(size)
     return SharedMemory(create=True, size=size)
+
+
+def too_little(size: float) -> LinkError:
+    """Return the error that tells of missing shared memory."""
+    return LinkError(
+        f"{_PLACE}: {free() / 2**20:.0f} MB of shared memory are free; {size / 2**20:.0f} MB "
+        "are needed; give a container more (--shm-size), name fewer wheels with --wheel, or show "
+        "nothing (--no-page)"
+    )
 
 
 class ByteQueue:
@@ -65,6 +77,11 @@ class ByteQueue:
     def high(self) -> int:
         """The most bytes that have waited."""
         return self._control[_HIGH]
+
+    @property
+    def written(self) -> int:
+        """Where the next message will stand."""
+        return self._control[_WRITTEN]
 
     @property
     def waiting(self) -> int:

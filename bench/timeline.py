@@ -20,6 +20,8 @@ LATE = 64
 """A frame up to this many numbers back is late; further back, the transmitter restarted."""
 SEQ_RANGE = 2**16
 TIME_RANGE = 2**32
+_RESET = int(FrameFlag.TIME_RESET)
+_COUNTED = (("low_battery", int(FrameFlag.LOW_BATTERY)), ("radio_loss", int(FrameFlag.RADIO_LOSS)))
 
 
 @dataclass(slots=True)
@@ -151,31 +153,32 @@ class Timeline:
         """Return the number of frames from `first` on that just continue what came before."""
         if self._segment < 0:
             return 0
-        part = slice(first, None)
-        seq = np.concatenate(([self._seq], frames.seq[part]))
-        sent = np.concatenate(([self._wire_time], frames.t_us[part]))
-        length = np.full(len(frames) - first, frames.samples)
-        length[0] = self._samples
-        ticks = _signed(np.diff(sent), TIME_RANGE) * 10 - length * self._period
-        going = (np.diff(seq) % SEQ_RANGE == 1) & (np.abs(ticks) * 2 < self._period)
-        going &= frames.period[part] == self._period
-        reset = (frames.flags[part] & int(FrameFlag.TIME_RESET)) != 0
-        if reset.any() or self._flagged:
+        seq, sent = frames.seq[first:], frames.t_us[first:]
+        steps, elapsed = np.empty_like(seq), np.empty_like(sent)
+        steps[0], elapsed[0] = seq[0] - self._seq, sent[0] - self._wire_time
+        np.subtract(seq[1:], seq[:-1], out=steps[1:])
+        np.subtract(sent[1:], sent[:-1], out=elapsed[1:])
+        ticks = _signed(elapsed, TIME_RANGE) * 10 - frames.samples * self._period
+        ticks[0] += (frames.samples - self._samples) * self._period
+        going = (steps % SEQ_RANGE == 1) & (np.abs(ticks) * 2 < self._period)
+        going &= frames.period[first:] == self._period
+        reset = (frames.flags[first:] & _RESET) != 0
+        if self._flagged or reset.any():
             before = np.concatenate(([self._flagged], reset[:-1]))
             going &= ~reset | before
         return int(going.size if going.all() else np.argmin(going))
 
     def _single(self, frame: Frames) -> list[Samples]:
         """Take one frame that does not simply continue: decide what happened."""
-        reset = bool(frame.flags[0] & int(FrameFlag.TIME_RESET)) and not self._flagged
+        reset = bool(frame.flags[0] & _RESET) and not self._flagged
         if self._segment < 0:
             return [self._begin(frame, "start")]
         if reset:
             return [self._begin(frame, "time_reset")]
         if frame.period[0] != self._period:
             return [self._begin(frame, "period_change")]
-        steps = int(_signed(frame.seq - self._seq, SEQ_RANGE)[0])
-        elapsed = int(_signed(frame.t_us - self._wire_time, TIME_RANGE)[0])
+        steps = _signed_one(int(frame.seq[0]) - self._seq, SEQ_RANGE)
+        elapsed = _signed_one(int(frame.t_us[0]) - self._wire_time, TIME_RANGE)
         if steps == 0 and elapsed == 0:
             self.counts.duplicates += 1
             return []
@@ -197,7 +200,7 @@ class Timeline:
             self._time = int(frame.t_us[0])
         else:
             self.counts.resets += 1
-            elapsed = int(_signed(frame.t_us - self._wire_time, TIME_RANGE)[0])
+            elapsed = _signed_one(int(frame.t_us[0]) - self._wire_time, TIME_RANGE)
             self._time += elapsed if elapsed > 0 else self._frame_time
         self._segment += 1
         self._start = 0
@@ -228,7 +231,7 @@ class Timeline:
         if why:
             time = self._time
         else:
-            time = self._time + int(_signed(frames.t_us[:1] - self._wire_time, TIME_RANGE)[0])
+            time = self._time + _signed_one(int(frames.t_us[0]) - self._wire_time, TIME_RANGE)
         self._period = int(frames.period[0])
         strain, saturated = self._device.strain(frames.counts, frames.flags)
         if saturated.any():
@@ -236,13 +239,15 @@ class Timeline:
             self.counts.saturated = [
                 a + b for a, b in zip(self.counts.saturated, seen, strict=True)
             ]
-        self.counts.low_battery += int(((frames.flags & FrameFlag.LOW_BATTERY) != 0).sum())
-        self.counts.radio_loss += int(((frames.flags & FrameFlag.RADIO_LOSS) != 0).sum())
+        if frames.flags.any():
+            for name, bit in _COUNTED:
+                seen = int(np.count_nonzero(frames.flags & bit))
+                setattr(self.counts, name, getattr(self.counts, name) + seen)
         block = self._samples_of(strain, np.zeros(len(strain), np.bool_), saturated, time, why)
-        self._time = time + int(_signed(frames.t_us[-1:] - frames.t_us[0], TIME_RANGE)[0])
+        self._time = time + _signed_one(int(frames.t_us[-1]) - int(frames.t_us[0]), TIME_RANGE)
         self._wire_time, self._seq = int(frames.t_us[-1]), int(frames.seq[-1])
         self._samples = frames.samples
-        self._flagged = bool(frames.flags[-1] & int(FrameFlag.TIME_RESET))
+        self._flagged = bool(frames.flags[-1] & _RESET)
         return block
 
     def _samples_of(
@@ -257,3 +262,8 @@ class Timeline:
 def _signed(difference: npt.NDArray[np.int64], span: int) -> IntArray:
     """Return differences of wrapping counters as signed numbers."""
     return np.asarray((difference + span // 2) % span - span // 2, dtype=np.int64)
+
+
+def _signed_one(difference: int, span: int) -> int:
+    """Return one such difference."""
+    return (difference + span // 2) % span - span // 2

@@ -6,8 +6,6 @@ All of it can be pickled, so that a reader that is started again goes on where t
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from bench.clock import ClockFit
 from bench.conditions import Measured
 from bench.device import Device
@@ -133,11 +131,12 @@ class Wheels:
                 for items in sorted_items.values():
                     items.append(item)
                 continue
-            for wheel in np.unique(item.wheel).tolist():
+            numbers = sorted(set(item.wheel.tolist()))
+            for wheel in numbers:
                 rows = item.wheel == wheel
                 if self._wanted(wheel, len(sorted_items)):
                     items = sorted_items.setdefault(wheel, list(self._told.values()))
-                    items.append(item if rows.all() else select(item, rows))
+                    items.append(item if len(numbers) == 1 else select(item, rows))
                 else:
                     self.ignored += int(rows.sum())
         return [

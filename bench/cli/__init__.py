@@ -1,6 +1,7 @@
 """The command line of the bench, ``tirebench``: the only part of it that prints."""
 
 import sys
+from difflib import get_close_matches
 from importlib import import_module
 
 import click
@@ -36,6 +37,16 @@ class Verbs(click.Group):
             return None
         command = getattr(import_module(f"bench.cli.{cmd_name}"), cmd_name)
         return command if isinstance(command, click.Command) else None
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the verb of the arguments; say which there are where it is none of them."""
+        if args and args[0] not in VERBS and not args[0].startswith("-"):
+            near = get_close_matches(args[0], VERBS, 1, 0.5)
+            meant = f"; did you mean '{near[0]}'?" if near else ""
+            ctx.fail(f"no such command '{args[0]}'; there are {', '.join(VERBS)}{meant}")
+        return super().resolve_command(ctx, args)
 
 
 @click.group(cls=Verbs, epilog=_EXAMPLE)

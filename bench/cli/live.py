@@ -69,8 +69,9 @@ class Screen:
             self._console.print(f"FMU: {said}", soft_wrap=True, markup=False)
         self._turns.extend(news.turns)
         if self._live is None:
-            for turn in news.turns:
-                self._console.print(_plain_row(_cells(turn)), soft_wrap=True, markup=False)
+            rows = [_plain_row(_cells(turn)) for turn in news.turns]
+            if rows:
+                self._console.out("\n".join(rows), highlight=False)
         elif time.monotonic() - self._drawn > REFRESH:
             self._live.update(self._table(), refresh=True)
             self._drawn = time.monotonic()

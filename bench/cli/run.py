@@ -32,6 +32,7 @@ from bench.fmu_model import FmuFile, FmuModel
 from bench.links.opening import PortPlan
 from bench.links.replay import ReplayLink
 from bench.live.chain import LiveChain, LivePlan
+from bench.live.priority import realtime
 from bench.live.reader import ReaderPlan
 from bench.page.recording_switch import RecordingSwitch
 from bench.protocols.plan import ProtocolPlan
@@ -104,6 +105,8 @@ class Given:
 @click.option("--silence", metavar="S", type=click.FloatRange(min=0.0),
               help="End when nothing came for so long.")  # fmt: skip
 @click.option("--turns", metavar="N", type=click.IntRange(min=1), help="End after so many turns.")
+@click.option("--realtime", "asked", is_flag=True,
+              help="Go before all other programs (Linux; the right to it is needed).")  # fmt: skip
 @bridge_options
 @page_options
 @click.pass_context
@@ -132,6 +135,7 @@ def run(
     duration: float | None,
     silence: float | None,
     turns: int | None,
+    asked: bool,
     estimates_out: str | None,
     plotjuggler: str | None,
     page: bool | None,
@@ -145,6 +149,8 @@ def run(
         raise click.UsageError("just one of --port and --replay is needed")
     if replay is not None and record is not None:
         raise click.UsageError("--record goes with --port: a recording is there already")
+    if asked:
+        realtime()
     paced = replay is None or pace is not None
     choice = page_choice(page, host, network, page_port, tui, paced=paced)
     archive = read_fmu(fmu_file)

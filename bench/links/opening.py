@@ -18,6 +18,7 @@ from bench.links import Link
 from bench.protocols import CAN, SERIAL, SLCAN
 
 BITRATE = 500_000
+KINDS = ("slcan", "can")
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,10 +60,21 @@ class PortPlan:
         DeviceError
             If what was typed names no port.
         """
-        kind, _, rest = self.port.partition(":")
+        kind, colon, rest = self.port.partition(":")
+        if self.port in KINDS or (colon and kind not in KINDS and "/" not in kind):
+            raise DeviceError(
+                f"--port {self.port}: {kind!r} is no {'name' if kind in KINDS else 'kind'} of a "
+                "port; a serial port such as /dev/ttyUSB0 or COM3, slcan:/dev/ttyACM0 or "
+                "can:INTERFACE:CHANNEL is needed; see `tirebench ports`"
+            )
         if self.encoding == SLCAN:
             from bench.links.slcan_port import SlcanLink
 
+            if not rest:
+                raise DeviceError(
+                    f"--port {self.port}: no serial port; slcan:PORT is needed, such as "
+                    "slcan:/dev/ttyACM0; write it so, see `tirebench ports`"
+                )
             return SlcanLink(rest, self.bitrate, self.data_bitrate, transmit=transmit)
         if self.encoding == CAN:
             from bench.links.can_bus import CanLink

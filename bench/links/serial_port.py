@@ -1,5 +1,6 @@
 """A serial port, by pyserial: opened exclusively, read in bulk."""
 
+import errno
 import struct
 import sys
 import time
@@ -15,11 +16,21 @@ from bench.protocols import SERIAL
 
 BAUD = 2_000_000
 """Default rate; 16 samples a frame at 10 kHz need 1.13 Mbaud."""
-GATHER = 0.002
-"""After the first byte, wait this long for more: fewer and larger batches cost less, [s]."""
+GATHER = 0.003
+"""Time from one read to the next, [s]: fewer and larger batches cost less."""
+MUCH = 2048
+"""Bytes that are worth a batch at once: more could fill the system's buffer."""
 _TIOCGICOUNT = 0x545D
 """Linux: the counters of a UART."""
 _COUNTERS = struct.Struct("20i")
+_CAUSES = {
+    errno.ENOENT: "there is no such port; plug it in, or name another",
+    errno.EACCES: "this user may not; join the group dialout (then log in anew)",
+    errno.EAGAIN: "another program has it open; close that one",
+    errno.EBUSY: "another program has it open; close that one",
+    errno.EISDIR: "it is a folder; name a port",
+    errno.ENOTTY: "it is no serial port; name another",
+}
 _OVERRUNS = (7, 10)
 """Places of `overrun` and `buf_overrun` in ``struct serial_icounter_struct``."""
 
@@ -47,28 +58,31 @@ class SerialLink:
         self.name = port
         self.encoding = SERIAL
         self._gather = gather
+        self._last = 0.0
         try:
             self._port = serial.Serial(port, baud, timeout=0.0, exclusive=True, write_timeout=1.0)
         except (serial.SerialException, OSError, ValueError) as error:
             known = ", ".join(entry.split()[0] for entry in ports()) or "none"
             raise LinkError(
-                f"{port}: the port cannot be opened ({error}); a free serial port is needed, "
-                f"those found are: {known}; plug it in, close the other program, or check the "
-                "rights (group dialout)"
+                f"{port}: the port cannot be opened: {_cause(error)}; a free serial port is "
+                f"needed, those found are: {known}"
             ) from None
 
     def receive(self, deadline: Deadline) -> Read | None:
         """Return what has come by the deadline, at once when there is something."""
         try:
-            self._port.timeout = min(deadline.remaining, 1.0)
-            first = self._port.read(max(1, self._port.in_waiting))
+            patience = round(min(deadline.remaining, 1.0), 2)
+            if patience != self._port.timeout:  # to set it costs calls of the system
+                self._port.timeout = patience
+            data = self._port.read(max(1, self._port.in_waiting))
             arrival = time.monotonic_ns()
-            if not first:
-                return Read(arrival, b"")
-            if self._gather:
-                time.sleep(min(self._gather, deadline.remaining))
-            self._port.timeout = 0.0
-            return Read(arrival, bytes(first + self._port.read(self._port.in_waiting)))
+            if data and len(data) < MUCH:
+                soon = self._last + self._gather - 1e-9 * arrival
+                if soon > 0.0:
+                    time.sleep(min(soon, deadline.remaining))
+                data += self._port.read(self._port.in_waiting)
+            self._last = time.monotonic()
+            return Read(arrival, bytes(data))
         except (OSError, serial.SerialException, TypeError) as error:
             # in_waiting raises OSError, read SerialException; TypeError: closed by another thread
             raise self._gone(error) from None
@@ -108,6 +122,14 @@ class SerialLink:
             f"{self.name}: the port went away ({error}); a steady connection is needed; "
             "check cable and receiver, then start again"
         )
+
+
+def _cause(error: Exception) -> str:
+    """Return why a port does not open, and what to do; pyserial's own words where it is rare."""
+    number = getattr(error, "errno", None)
+    if number is None and f"({errno.ENOTTY}," in str(error):  # told in the text only
+        number = errno.ENOTTY
+    return _CAUSES.get(number or 0, f"{error}; plug it in, or close the program that has it")
 
 
 def ports() -> Iterator[str]:

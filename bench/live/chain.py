@@ -21,6 +21,7 @@ from bench.live.exchange import FINISH, STOP, Exchange, woken
 from bench.live.kept import CONTEXT, Kept
 from bench.live.reader import LineState, ReaderPlan, read_port
 from bench.live.recorder import Order, RecorderState, record
+from bench.page.board import SIZE
 from bench.recording import RecordingHeader, jump_event
 from bench.wheels import MOST, Wheels
 
@@ -77,7 +78,7 @@ class LiveChain:
         self.jumps: list[Jump] = []
         self._plan = plan
         self._slots = len(plan.reader.wheels) or MOST
-        self._exchange = Exchange.create(CONTEXT, self._slots)
+        self._exchange = Exchange.create(CONTEXT, self._slots, SIZE if plan.laps else 0)
         self._state = LineState(
             Wheels(plan.reader.protocol.decoder(), plan.reader.devices, plan.reader.wheels)
         )
@@ -103,16 +104,21 @@ class LiveChain:
                 plan, address = self._plan, self._exchange.address
                 self._recorder = Kept(record, lambda _: (plan.header, plan.conditions, address))
             if self._plan.file is not None:
-                self._start_estimator(0)
-                self._wait(lambda: 0 in self._ready)
+                known = range(max(1, len(self._plan.reader.wheels)))
+                for slot in known:  # those of wheels that are not named start when they are heard
+                    self._start_estimator(slot)
+                self._wait(lambda: self._ready.issuperset(known))
             self._wait(lambda: self.obeyed(Deadline.after(0.0)))
             # a port is opened last: from then on bytes come
-            self._reader = Kept(read_port, lambda _: (self._plan.reader, self._exchange.address))
+            self._reader = Kept(
+                read_port, lambda _: (self._plan.reader, self._exchange.address), stand_by=True
+            )
             self._wait(lambda: bool(self._state.name))
             gc.collect()
             gc.freeze()
         except BaseException:
             self._close()
+            self._remove_empty()
             raise
         return self
 
@@ -328,6 +334,12 @@ class LiveChain:
         if self._recorded.error and not self._finished:
             raise RecordingError(self._recorded.error)
         self.ended, self.message = state.ended, state.message
+
+    def _remove_empty(self) -> None:
+        """Remove the recording of a run that did not begin, so that its name is free again."""
+        file, begun = self._plan.record, self._orders and not self._recorded.answer
+        if file is not None and begun and self._recorded.done and not self._recorded.bytes:
+            file.unlink(missing_ok=True)
 
     def _close(self) -> None:
         """End what still runs and give the memory back."""

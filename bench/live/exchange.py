@@ -5,12 +5,13 @@ from multiprocessing.context import SpawnContext
 from multiprocessing.shared_memory import SharedMemory
 from typing import Any
 
-from bench.rings import ByteQueue, Cell, memory
+from bench.rings import ByteQueue, Cell, free, memory, too_little
 
 RAW = 8 * 2**20
 """Reads that wait for the recorder, [bytes]: a minute of one wheel, 9 s of four on CAN FD."""
-SAMPLES = 27 * 2**18
-"""Samples of a wheel that wait for its estimator, [bytes]: 13 s at 10 kHz."""
+SAMPLES, LEAST = 27 * 2**18, 2**21
+"""Samples of a wheel that wait for its estimator, [bytes]: 13 s at 10 kHz; 4 s where memory is
+short, which is more than the age at which samples are left out."""
 NEWS = 2**20
 ORDERS = 2**18
 LINE = 2**20
@@ -34,12 +35,15 @@ class Address:
         Released for each slot when samples came.
     news : semaphore
         Released when an estimator has news, or the line an event.
+    samples : int
+        Bytes of each queue of samples.
     """
 
     name: str
     slots: int
     fresh: tuple[Any, ...]
     news: Any
+    samples: int
 
 
 class Exchange:
@@ -84,21 +88,33 @@ class Exchange:
         self.raw, self.orders = ByteQueue(part(RAW)), ByteQueue(part(ORDERS))
         self.line, self.recorded = Cell(part(LINE)), Cell(part(STATE))
         slots = range(address.slots)
-        self.samples = tuple(ByteQueue(part(SAMPLES)) for _ in slots)
+        self.samples = tuple(ByteQueue(part(address.samples)) for _ in slots)
         self.news = tuple(ByteQueue(part(NEWS)) for _ in slots)
 
     @classmethod
-    def create(cls, context: SpawnContext, slots: int) -> "Exchange":
-        """Make the memory.
+    def create(cls, context: SpawnContext, slots: int, beside: int = 0) -> "Exchange":
+        """Make the memory; where it is short, the queues of samples are.
+
+        Parameters
+        ----------
+        context : SpawnContext
+        slots : int
+        beside : int
+            What others will need after this, [bytes].
 
         Raises
         ------
         LinkError
-            If there is not enough.
+            If there is not enough for the shortest queues.
         """
-        shared = memory(_STOP + RAW + ORDERS + LINE + STATE + slots * (SAMPLES + NEWS))
+        fixed = _STOP + RAW + ORDERS + LINE + STATE + slots * NEWS
+        room = (free() - fixed - beside) / slots
+        if room < LEAST:
+            raise too_little(fixed + slots * LEAST + beside)
+        samples = int(min(SAMPLES, room)) // 64 * 64
+        shared = memory(fixed + slots * samples)
         fresh = tuple(context.Semaphore(0) for _ in range(slots))
-        return cls(Address(shared.name, slots, fresh, context.Semaphore(0)), shared)
+        return cls(Address(shared.name, slots, fresh, context.Semaphore(0), samples), shared)
 
     def is_set(self, flag: int) -> bool:
         """Whether the run has set a flag."""

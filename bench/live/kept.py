@@ -1,4 +1,8 @@
-"""A process that is started again when it dies or hangs, and how often that was."""
+"""A process that is started again when it dies or hangs, and how often that was.
+
+Python takes some tenths of a second of CPU to start, seconds on a busy machine. Where that costs
+data, a second process stands by with everything loaded and takes over.
+"""
 
 import gc
 import signal
@@ -12,6 +16,10 @@ FIRST_PAUSE, LONGEST_PAUSE = 0.05, 10.0
 """Before a new start: it doubles while starts fail, [s]."""
 LIVED = 5.0
 """A process that lived longer starts over with the first pause, [s]."""
+STAND_BY = 0.5
+"""A process that has lived so long gets one that stands by, [s]."""
+GLANCE = 0.5
+"""Time between two looks of one that stands by whether the run goes on, [s]."""
 CONTEXT: SpawnContext = get_context("spawn")
 
 
@@ -26,6 +34,8 @@ class Kept:
         Called before each start, with the number of starts (from 1); gives what the target gets.
     hangs : callable, optional
         Tells whether a process that lives has to be ended: it does nothing any more.
+    stand_by : bool
+        Whether another process, which gets the same arguments, stands by.
 
     Attributes
     ----------
@@ -37,8 +47,14 @@ class Kept:
         target: Callable[..., None],
         arguments: Callable[[int], tuple[Any, ...]],
         hangs: Callable[[], bool] | None = None,
+        *,
+        stand_by: bool = False,
     ) -> None:
         self.starts = 0
+        self._stand_by = stand_by
+        self._spare: Any = None
+        self._call: Any = None
+        self._called: Any = None
         self._target = target
         self._arguments = arguments
         self._hangs = hangs
@@ -58,14 +74,13 @@ class Kept:
         return self._process is not None and self._process.is_alive()
 
     def start(self) -> None:
-        """Start the process."""
-        arguments = self._arguments(self.starts + 1)
-        self._process = CONTEXT.Process(target=self._target, args=arguments, daemon=True)
-        before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # which the process inherits
-        try:
-            self._process.start()
-        finally:
-            signal.signal(signal.SIGINT, before)
+        """Start the process, or call the one that stands by."""
+        if self._spare is not None and self._spare.is_alive():
+            self._process, self._spare = self._spare, None
+            self._called = self._call  # kept: it may not have been taken up yet
+            self._called.release()
+        else:
+            self._process = _begun(self._target, self._arguments(self.starts + 1))
         self._started = time.monotonic()
         self.starts += 1
 
@@ -76,9 +91,13 @@ class Kept:
             if self._process.is_alive():
                 if self._hangs is not None and self._hangs():
                     self._process.kill()
+                elif self._stand_by and self._spare is None and now - self._started > STAND_BY:
+                    self._call = CONTEXT.Semaphore(0)
+                    given = self._arguments(self.starts + 1)
+                    self._spare = _begun(_on_call, (self._call, self._target, *given))
                 return
             self._pause = FIRST_PAUSE if now - self._started > LIVED else self._pause
-            self._due = now + self._pause
+            self._due = now + (self._pause if self._spare is None else 0.0)
             self._pause = min(2.0 * self._pause, LONGEST_PAUSE)
             self._process.join()
             self._process.close()
@@ -89,6 +108,11 @@ class Kept:
     def wait(self, patience: float) -> None:
         """Wait for the end of a process that was told to end; end it when it does not [s]."""
         process, self._process = self._process, None
+        spare, self._spare = self._spare, None
+        if spare is not None:
+            spare.kill()
+            spare.join()
+            spare.close()
         if process is None:
             return
         process.join(patience)
@@ -97,6 +121,25 @@ class Kept:
                 end()
                 process.join(2.0)
         process.close()
+
+
+def _begun(target: Callable[..., None], arguments: tuple[Any, ...]) -> Any:
+    """Return a new process that ignores Ctrl-C from its first moment."""
+    process = CONTEXT.Process(target=target, args=arguments, daemon=True)
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # which the process inherits
+    try:
+        process.start()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    return process
+
+
+def _on_call(call: Any, target: Callable[..., None], *arguments: Any) -> None:
+    """Stand by until called, or until the run is gone; what the target needs is loaded."""
+    while not call.acquire(timeout=GLANCE):
+        if orphaned():
+            return
+    target(*arguments)
 
 
 def settled() -> None:

@@ -18,6 +18,7 @@ from bench.wheels import Wheels
 
 WAIT = 0.1
 """The longest wait for bytes before it is looked whether the run goes on, [s]."""
+TRIES = 2
 RAW_LOST = "raw bytes lost: "
 """Begins the event of a recording that tells of bytes that the recorder had no room for."""
 
@@ -62,6 +63,12 @@ class LineState:
         When bytes came last, monotonic.
     ended, message : str
         Why the line ended, empty while it goes on; what is to be said of it.
+    raw : int
+        Cursor of the queue of reads: those before it are done.
+    samples : tuple of int
+        Cursors of the queues of samples: what is before them comes of those reads.
+    tries : int
+        How often a reader began with what comes next of them and ended.
     cpu : float, [s]
         Time that the reader has used.
     error : tuple of str
@@ -75,6 +82,9 @@ class LineState:
     last_byte: float | None = None
     ended: str = ""
     message: str = ""
+    raw: int = 0
+    samples: tuple[int, ...] = ()
+    tries: int = 0
     cpu: float = 0.0
     error: tuple[str, str] | tuple[()] = ()
 
@@ -82,14 +92,13 @@ class LineState:
 def read_port(plan: ReaderPlan, address: Address) -> None:
     """Read until the run ends; the target of the process."""
     exchange = Exchange(address)
-    saved = exchange.line.get()
-    state = LineState(Wheels(plan.protocol.decoder(), plan.devices, plan.wheels))
-    if saved is not None:
-        state = pickle.loads(saved)
-    reader = _Reader(plan, exchange, state)
+    reader = _Reader(plan, exchange)
+    state = reader.state
     try:
+        if reader.again:
+            reader.catch_up()
         link = ReconnectingLink(plan.port.open, plan.patience, state.name)
-        if saved is not None:
+        if reader.again:
             reader.take(Read(time.monotonic_ns(), b"", RESUMED))
         state.name = link.name
         reader.publish()
@@ -104,18 +113,24 @@ def read_port(plan: ReaderPlan, address: Address) -> None:
 
 
 class _Reader:
-    def __init__(self, plan: ReaderPlan, exchange: Exchange, state: LineState) -> None:
+    """Goes on where a reader before this one ended, if there was one."""
+
+    def __init__(self, plan: ReaderPlan, exchange: Exchange) -> None:
         self._plan = plan
         self._exchange = exchange
-        self._state = state
         self._fresh = exchange.address.fresh
         self._raw_lost = 0  # bytes since the recorder was told of it
         self._overruns: int | None = None
         self._next_look = 0.0
+        self.state = LineState(Wheels(plan.protocol.decoder(), plan.devices, plan.wheels))
+        saved = exchange.line.get()
+        self.again = saved is not None
+        if saved is not None:
+            self.state = pickle.loads(saved)
 
     def run(self, link: Link) -> None:
         """Go on until the end of the link or of the run."""
-        state, exchange = self._state, self._exchange
+        state, exchange = self.state, self._exchange
         while not exchange.is_set(STOP) and not orphaned():
             try:
                 read = link.receive(Deadline.after(WAIT))
@@ -131,43 +146,88 @@ class _Reader:
                 self.take(read)
 
     def take(self, read: Read) -> None:
-        """Hand a read to the recorder, decode it, and hand its samples to the estimators."""
-        state, exchange = self._state, self._exchange
-        if self._plan.recorded:
-            self._record(read)
+        """Hand a read to the recorder, decode it, and hand its samples to the estimators.
+
+        The state is published last: whatever happens before, a reader after this one finds the read
+        in the queue and does the rest of it (`catch_up`).
+        """
+        found = self._record(read)
+        messages = self._decoded(read)
+        if not found:
+            self.publish()  # before the samples: what is missing then shows as a hole, never twice
+        for slot, message in messages:
+            self._exchange.samples[slot].put(message)
+        for slot in {slot for slot, _ in messages}:
+            self._fresh[slot].release()
+        self.publish()
+        if read.event:
+            self._exchange.address.news.release()
+
+    def publish(self) -> None:
+        """Let the run, and a reader after this one, see how the line is."""
+        state, exchange = self.state, self._exchange
+        state.raw = exchange.raw.written
+        state.samples = tuple(queue.written for queue in exchange.samples)
+        state.cpu, state.tries = time.process_time(), 0
+        exchange.line.put(pickle.dumps(state, 5))
+        if not self._plan.recorded:
+            exchange.raw.go_to(state.raw)  # nobody else takes them up
+
+    def catch_up(self) -> None:
+        """Do what a reader before this one has recorded and not done, or not to the end.
+
+        What has ended `TRIES` readers is left alone.
+        """
+        exchange, state = self._exchange, self.state
+        state.tries += 1
+        exchange.line.put(pickle.dumps(state, 5))
+        exchange.raw.cursor = state.raw if state.tries <= TRIES else exchange.raw.written
+        for queue, cursor in zip(exchange.samples, state.samples, strict=True):
+            queue.cursor = cursor
+        while (recorded := exchange.raw.read()) is not None:
+            read: Read = pickle.loads(recorded)
+            for slot, message in self._decoded(read):
+                queue = exchange.samples[slot]
+                before = queue.cursor
+                handed_over = queue.read()
+                if handed_over is None:
+                    queue.put(message)
+                    queue.cursor = queue.written
+                elif handed_over != message:  # there was no room for it, and it stays out
+                    queue.cursor = before
+        for fresh in self._fresh:
+            fresh.release()
+        self.publish()
+
+    def _decoded(self, read: Read) -> list[tuple[int, bytes]]:
+        """Return what a read brings, for the slot of each wheel."""
+        state = self.state
         if read.event in (BACK, RESUMED):
             state.wheels.interrupt()
         if read.event == LOST:
             state.lost = time.time()
         elif read.event == BACK or read.data:
             state.lost = None
-        blocks = state.wheels.push(read.data, read.arrival) if read.data else []
-        if read.data:
-            state.heard, state.last_byte = time.time(), time.monotonic()
-        self.publish()  # before the samples: what is missing then shows as a hole, never twice
+        if not read.data:
+            return []
+        state.heard, state.last_byte = time.time(), time.monotonic()
+        blocks = state.wheels.push(read.data, read.arrival)
         slots = {wheel: slot for slot, wheel in enumerate(state.wheels.heard)}
-        for block in blocks:
-            exchange.samples[slots[block.wheel]].put(pickle.dumps(block, 5))
-        for wheel in {block.wheel for block in blocks}:
-            self._fresh[slots[wheel]].release()
-        if read.event:
-            exchange.address.news.release()
+        return [(slots[block.wheel], pickle.dumps(block, 5)) for block in blocks]
 
-    def publish(self) -> None:
-        """Let the run, and a reader after this one, see how the line is."""
-        self._state.cpu = time.process_time()
-        self._exchange.line.put(pickle.dumps(self._state, 5))
-
-    def _record(self, read: Read) -> None:
+    def _record(self, read: Read) -> bool:
+        """Put a read into the queue of the recorder; False if there is no room for it."""
         raw = self._exchange.raw
         if self._raw_lost:
             told = Read(read.arrival, b"", f"{RAW_LOST}{self._raw_lost}")
             if not raw.put(pickle.dumps(told, 5)):
                 self._raw_lost += len(read.data)
-                return
+                return False
             self._raw_lost = 0
         if not raw.put(pickle.dumps(read, 5)):
             self._raw_lost += len(read.data)
+            return False
+        return True
 
     def _look(self, link: Link) -> None:
         """Count the overruns of the port since it was last asked, once a second."""
@@ -176,4 +236,4 @@ class _Reader:
             return
         self._next_look = now + 1.0
         seen, self._overruns = self._overruns, link.overruns()
-        self._state.wheels.line.counts.overruns += 0 if seen is None else self._overruns - seen
+        self.state.wheels.line.counts.overruns += 0 if seen is None else self._overruns - seen

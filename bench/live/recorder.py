@@ -52,6 +52,8 @@ class RecorderState:
         Bytes of that file that are whole.
     bytes : int
         Raw bytes in it.
+    began : tuple of int, [ns]
+        The start of that file on the wall clock and on the monotonic one.
     raw, orders : int
         Cursors of the queues: what is before them was done.
     done : int
@@ -67,6 +69,7 @@ class RecorderState:
     path: Path | None = None
     length: int = 0
     bytes: int = 0
+    began: tuple[int, int] = (0, 0)
     raw: int = 0
     orders: int = 0
     done: int = 0
@@ -151,7 +154,10 @@ class _Recorder:
 
     def _open(self, path: Path, length: int | None) -> str:
         """Begin a file, or go on in it; return why that is not possible, or nothing."""
-        header = replace(self._header, wall_ns=time.time_ns(), monotonic_ns=time.monotonic_ns())
+        if length is None:
+            self._state.began = time.time_ns(), time.monotonic_ns()
+        wall, monotonic = self._state.began
+        header = replace(self._header, wall_ns=wall, monotonic_ns=monotonic)
         try:
             self._recorder = Recorder(path, header, self._conditions, length)
         except RecordingError as error:

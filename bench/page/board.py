@@ -50,6 +50,8 @@ RINGS = {
     "state": RingSize(8, 32_768),
 }
 """Estimates and samples of each turn, and the state of the line."""
+SIZE = _START + sum(ring.bytes for ring in RINGS.values())
+"""Of a board, [bytes]."""
 
 
 class Board:
@@ -67,9 +69,8 @@ class Board:
     """
 
     def __init__(self, name: str | None = None) -> None:
-        total = _START + sum(ring.bytes for ring in RINGS.values())
         self._owner = name is None
-        self._memory = memory(total) if name is None else SharedMemory(name)
+        self._memory = memory(SIZE) if name is None else SharedMemory(name)
         self.name = self._memory.name
         place, rings = _START, {}
         for ring, size in RINGS.items():

@@ -25,6 +25,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from bench.errors import DeviceError
+from bench.live.priority import below
 from bench.page.board import Board
 from bench.page.commands import parse_command
 from bench.page.guard import LONGEST_BODY, Guard
@@ -188,6 +189,7 @@ def serve(plan: PagePlan, listener: socket.socket, pipe: Connection) -> None:
     """Run the page until the run ends; the target of the page's process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    below()
     board = Board(plan.board)
     if os.name == "posix":
         os.set_blocking(pipe.fileno(), False)  # a run that does not ask may not stop the page

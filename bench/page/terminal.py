@@ -16,6 +16,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
+from bench.live.priority import below
 from bench.page.board import Board
 from bench.page.history import History, WheelHistory
 from bench.page.quantities import DIGITS, NORMAL_95, UNITS
@@ -31,6 +32,7 @@ LOSSES = ("crc_bad", "framing_bad", "lost_frames", "lost_samples", "duplicates",
 def show(board_name: str, starts: int) -> None:
     """Draw the board until the run ends; the target of a process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    below()
     board, parent = Board(board_name), parent_process()
     history = History(board)
     stopped: list[int] = []

@@ -1,6 +1,7 @@
 """CAN frames of wheel transmitters to `Frames`: sorted by wheel and kind, numbers made wide."""
 
 import numpy as np
+import numpy.typing as npt
 
 from bench.can_batch import CanBatch
 from bench.errors import DeviceError
@@ -14,8 +15,18 @@ from bench.protocols.widening import Widener
 from tirelib.arrays import BoolArray
 
 _DECODE = {RAW16: layouts.decode_raw16, RAW12: layouts.decode_raw12}
-_BLOCKS = ((0, RAW12C, RAW16), (1, None, RAW12), (2, SYNC, None), (3, HEALTH, None))
-"""Block of identifiers, its frame of 8 bytes and its frame of 64."""
+_CODES = {kind: code for code, kind in enumerate(LAYOUTS)}
+
+
+def _table() -> npt.NDArray[np.int8]:
+    """Return the kind of frame of each block of identifiers and length; -1: none of ours."""
+    table = np.full((4, 65), -1, np.int8)
+    for kind, layout in LAYOUTS.items():
+        table[(layout.base - LAYOUTS[RAW16].base) // WHEELS, layout.length] = _CODES[kind]
+    return table
+
+
+_KINDS = _table()
 PASSED = int(FrameFlag.LOW_BATTERY | FrameFlag.TIME_RESET | FrameFlag.RADIO_LOSS)
 """Flags of HEALTH that hold for the strain frames after it; saturation is marked in band."""
 SLOWEST, FASTEST = 153.0, 200_000.0
@@ -68,10 +79,11 @@ class WheelCan:
         """Return the strain frames of a batch, those of each wheel in order."""
         place = batch.identifier - LAYOUTS[RAW16].base
         ours = ~batch.extended & (place >= 0) & (place < 4 * WHEELS)
+        wheels = np.where(ours, place % WHEELS, -1)
         before = self._counts.ok
         frames: list[Frames] = []
-        for wheel in np.unique(place[ours] % WHEELS).tolist():
-            mine = batch.take(np.flatnonzero(ours & (place % WHEELS == wheel)))
+        for wheel in sorted(set(wheels.tolist()) - {-1}):
+            mine = batch.take(np.flatnonzero(wheels == wheel))
             frames += self._wheel(wheel, mine, arrival)
         self._counts.unknown += len(batch) - (self._counts.ok - before)
         return frames
@@ -83,13 +95,11 @@ class WheelCan:
 
     def _wheel(self, wheel: int, batch: CanBatch, arrival: int) -> list[Frames]:
         """Take the frames of one wheel."""
-        block = (batch.identifier - LAYOUTS[RAW16].base) // WHEELS
-        rows = {}
-        for number, short, long in _BLOCKS:
-            for kind, length in ((short, 8), (long, 64)):
-                if kind is not None:
-                    rows[kind] = (block == number) & (batch.length == length)
-        strain = [kind for kind in (RAW16, RAW12, RAW12C) if rows[kind].any()]
+        kinds = _KINDS[(batch.identifier - LAYOUTS[RAW16].base) // WHEELS, batch.length]
+        there = set(kinds.tolist())
+        rows = {kind: kinds == code if code in there else _none(kinds)
+                for code, kind in enumerate(LAYOUTS)}  # fmt: skip
+        strain = [kind for kind in (RAW16, RAW12, RAW12C) if _CODES[kind] in there]
         if strain:
             self._kind.setdefault(wheel, strain[0])  # one kind a wheel, the first that is heard
         kind = self._kind.get(wheel)
@@ -104,10 +114,12 @@ class WheelCan:
 
     def _state(self, wheel: int, batch: CanBatch, rows: BoolArray) -> IntArray:
         """Return flags, rssi and temperature that hold at each frame, shape (m, 3)."""
-        said = [self.health.get(wheel, Health())]
+        said = [self.health.get(wheel) or Health()]
+        if not rows.any():
+            h = said[0]
+            return np.array([[h.flags & PASSED, h.rssi, h.temperature]]).repeat(len(rows), axis=0)
         said += [layouts.decode_health(batch.data[row]) for row in np.flatnonzero(rows).tolist()]
-        if len(said) > 1:
-            self.health[wheel] = said[-1]
+        self.health[wheel] = said[-1]
         table = np.array([(h.flags & PASSED, h.rssi, h.temperature) for h in said], np.int64)
         return np.asarray(table[np.cumsum(rows)])
 
@@ -153,3 +165,7 @@ class WheelCan:
         if wheel not in self._checks:
             self._checks[wheel] = RateCheck(wheel, samples * self._period / 10.0, samples)
         return self._checks[wheel]
+
+
+def _none(rows: npt.NDArray[np.int8]) -> BoolArray:
+    return np.zeros(len(rows), np.bool_)

@@ -8,9 +8,9 @@ of the number: only a host clock that is wrong by 8 s or more would mislead.
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from bench.frames import IntArray
+from tirelib.arrays import FloatArray
 
 
 @dataclass(slots=True)
@@ -47,18 +47,26 @@ class Widener:
         """
         if self._seq < 0:
             self._seq, self._time, self._arrival = int(seq[0]), int(t_us[0]), arrival
-        elapsed = _nearest(np.diff(t_us, prepend=self._time), 0.0, self.time_range)
-        host = 1e-3 * (arrival - self._arrival) / self.tick
-        elapsed[0] = _nearest(t_us[0] - self._time, host, self.time_range)
-        steps = np.diff(seq, prepend=self._seq)
-        steps = _nearest(steps, elapsed * (self.tick / self.frame_us), self.seq_range)
+        expected = np.zeros(len(t_us))
+        expected[0] = 1e-3 * (arrival - self._arrival) / self.tick  # as the host's clock says
+        elapsed = _nearest(_steps(t_us, self._time), expected, self.time_range)
+        frames = np.asarray(elapsed * (self.tick / self.frame_us), np.float64)
+        steps = _nearest(_steps(seq, self._seq), frames, self.seq_range)
         times, numbers = self._time + np.cumsum(elapsed), self._seq + np.cumsum(steps)
         self._time, self._seq = int(times[-1]), int(numbers[-1])
         self._arrival = arrival
         return numbers % 2**16, np.rint(times * self.tick).astype(np.int64) % 2**32
 
 
-def _nearest(difference: IntArray, expected: npt.ArrayLike, span: int) -> IntArray:
+def _steps(values: IntArray, before: int) -> IntArray:
+    """Return each value less the one before it."""
+    steps = values.copy()
+    steps[0] -= before
+    steps[1:] -= values[:-1]
+    return steps
+
+
+def _nearest(difference: IntArray, expected: FloatArray, span: int) -> IntArray:
     """Return what equals `difference` modulo `span` and lies nearest to what is expected."""
-    turns = np.rint((np.asarray(expected) - difference) / span).astype(np.int64)
+    turns = np.rint((expected - difference) / span).astype(np.int64)
     return np.asarray(difference + turns * span)

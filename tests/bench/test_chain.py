@@ -13,6 +13,7 @@ from bench.device import Device
 from bench.document import document
 from bench.emulator import Script, write_script
 from bench.faults import Faults, parse_faults
+from bench.frames import SAMPLES
 from tests.bench.campaigns import tiny_runs
 from tests.bench.in_process import InProcess
 from tests.synthetic import frames as cuts
@@ -198,3 +199,34 @@ def test_every_run_starts_the_estimator_afresh(calibration: Calibration, script:
     assert [turn.run for turn in turns] == sorted(turn.run for turn in turns)
     firsts = [turn for turn in turns if turn.flags & TurnFlag.FIRST_TURN]
     assert [turn.segment for turn in firsts] == [0, 1, 2]
+
+
+def test_every_turn_that_lost_samples_is_flagged_and_no_other_is_changed(
+    calibration: Calibration, script: Script
+) -> None:
+    """A lost frame far from the contact moves an estimate, although the estimator needs it not."""
+    frames, gap = script.frames[:300], int(TurnFlag.GAP)
+    whole, _ = estimates(calibration, frames, constant(script))
+    unflagged_by_the_estimator = 0
+    for place in range(90, 240, 6):
+        turns, chain = estimates(
+            calibration, [*frames[:place], *frames[place + 1 :]], constant(script)
+        )
+        assert chain.timeline.counts.lost_samples == SAMPLES
+        assert len(turns) == len(whole)
+        readies = [turn.ready for turn in turns]
+        lost = 1e-4 * (SAMPLES * place + np.arange(SAMPLES))
+        struck = {int(turn) for turn in np.searchsorted(readies, lost)} - {len(turns)}
+        for number, (turn, clean) in enumerate(zip(turns, whole, strict=True)):
+            if number in struck:
+                assert turn.flags & gap
+                unflagged_by_the_estimator += not int(turn.outputs["flags"]) & gap
+                continue
+            assert turn.flags == int(turn.outputs["flags"])
+            if not turn.flags & gap:
+                assert turn.flags == clean.flags
+                for name in QUANTITIES:
+                    assert turn.outputs[name] == pytest.approx(
+                        clean.outputs[name], rel=1e-9, abs=1e-12, nan_ok=True
+                    )
+    assert unflagged_by_the_estimator > 10

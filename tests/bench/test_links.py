@@ -21,7 +21,7 @@ from bench.links.can_bus import CanLink, message_of
 from bench.links.opening import PortPlan
 from bench.links.pseudo import PseudoTerminal
 from bench.links.reconnecting import LONGEST_WAIT, ReconnectingLink
-from bench.links.serial_port import SerialLink
+from bench.links.serial_port import MUCH, SerialLink
 from bench.links.slcan_port import SlcanLink
 from bench.protocols.slcan import SlcanDecoder, encode
 from tests.bench.test_slcan import Keep, keys, some_frames
@@ -92,8 +92,27 @@ def test_a_deadline_is_kept_where_nothing_comes(terminal: PseudoTerminal) -> Non
 
 def test_a_serial_port_is_opened_once(terminal: PseudoTerminal) -> None:
     link = SerialLink(terminal.path)
-    with pytest.raises(LinkError, match=r"the port cannot be opened"):
+    with pytest.raises(LinkError, match=r"the port cannot be opened: another program has it open"):
         SerialLink(terminal.path)
+    link.close()
+
+
+def test_bytes_that_fill_the_system_s_buffer_are_taken_at_once(
+    terminal: PseudoTerminal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Few bytes are waited for to become a batch; many are one already."""
+    link, slept = SerialLink(terminal.path, gather=60.0), []
+    monkeypatch.setattr("bench.links.serial_port.time.sleep", slept.append)
+    for size, sleeps in ((1, 0), (MUCH, 0), (10, 1)):  # nothing was read before the first
+        terminal.send(bytes(size))
+        end = Deadline.after(60.0)
+        while link._port.in_waiting < size and not end.expired:
+            threading.Event().wait(0.01)
+        read = link.receive(Deadline.after(5.0))
+        assert read is not None
+        assert read.data == bytes(size)
+        assert len(slept) == sleeps
+    assert 0.0 < slept[0] <= 5.0
     link.close()
 
 
@@ -191,7 +210,11 @@ def test_a_missing_can_interface_is_told() -> None:
 
 @pytest.mark.parametrize(("typed", "message"), [
     ("can:nonsense:0", r"interfaces are .*socketcan"), ("can:virtual", r"no channel"),
-    ("slcan:/dev/none", r"the port cannot be opened"), ("/dev/none", r"the port cannot be opened"),
+    ("slcan:/dev/none", r"the port cannot be opened"), ("/dev/none", r"there is no such port"),
+    ("/dev", r"it is a folder"), ("/dev/null", r"it is no serial port"), ("COM99", r"no such port"),
+    ("slcan", r"'slcan' is no name of a port"), ("can", r"'can' is no name of a port"),
+    ("slcan:", r"no serial port; slcan:PORT is needed"),
+    ("sclan:/dev/none", r"'sclan' is no kind of a port"),
 ])  # fmt: skip
 def test_a_port_that_is_none_says_so(typed: str, message: str) -> None:
     with pytest.raises((LinkError, DeviceError), match=message):

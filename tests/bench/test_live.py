@@ -208,6 +208,8 @@ def test_bad_input_ends_with_code_2_and_a_message(
         "it cannot be read": ("run", "--replay", tmp_path / "none.mcap", "--fmu", fmu),
         "run 9; its runs are 1, 2, 3": ("emulate", "--campaign", campaign, "--run", 9),
         "'rust' is not known": ("emulate", "--campaign", campaign, "--fault", "rust"),
+        "no such command 'rnu'; there are ports, load, emulate, run": ("rnu",),
+        "did you mean 'replay'?": ("repaly",),
         "nobody opened the port in time": ("emulate", "--campaign", campaign, "--wait", 0.1),
     }  # fmt: skip
     for message, arguments in cases.items():
@@ -215,9 +217,17 @@ def test_bad_input_ends_with_code_2_and_a_message(
         said = str(outcome.exception) + outcome.output
         assert message in said
         assert isinstance(outcome.exception, BenchError | SystemExit), message
-    code, _, err = finish(spawn("run", "--port", "p", "--fmu", tmp_path / "x.fmu"))
+    record = tmp_path / "free.mcap"
+    for _ in range(2):  # a run that did not begin leaves the name of its recording free
+        code, _, err = finish(spawn("run", "--port", "p", "--fmu", fmu, "--record", record))
+        assert code == 2
+        assert err.startswith("Error: p: the port cannot be opened")
+        assert not record.exists()
+    record.touch()
+    code, _, err = finish(spawn("run", "--port", "p", "--fmu", fmu, "--record", record))
     assert code == 2
-    assert err.startswith("Error: ")
+    assert "a recording is never overwritten" in err
+    assert record.exists()
 
 
 def test_ports_lists_what_there_is(spawn: Spawn, tmp_path: Path) -> None:

@@ -7,6 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bench.errors import LinkError
+from bench.live.exchange import LEAST, SAMPLES, Exchange
+from bench.live.kept import CONTEXT
+from bench.page.board import SIZE
 from bench.rings import _CONTROL, ByteQueue, Cell, _stride, memory
 
 ROOM = 256
@@ -111,3 +114,29 @@ def test_a_cell_holds_the_newest_message_even_while_the_next_is_written() -> Non
 def test_too_little_shared_memory_is_told_before_it_is_used() -> None:
     with pytest.raises(LinkError, match=r"of shared memory are free; .* --wheel"):
         memory(1 << 60)
+
+
+def test_where_shared_memory_is_short_the_queues_of_samples_are(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The 64 MB of a container hold four wheels and their page."""
+    for megabytes, beside, full in ((1000, SIZE, True), (64, SIZE, False), (40, 0, False)):
+        monkeypatch.setattr("bench.live.exchange.free", lambda n=megabytes: float(n * 2**20))
+        exchange = Exchange.create(CONTEXT, 4, beside)
+        size = exchange.address.samples
+        assert (size == SAMPLES) == full
+        assert LEAST <= size <= SAMPLES
+        assert exchange.samples[3].put(bytes(size // 2))
+        assert exchange._shared.size + beside <= megabytes * 2**20
+        other = Exchange(exchange.address)
+        assert other.samples[3].read() == bytes(size // 2)
+        other.close()
+        exchange.close()
+
+
+def test_too_little_shared_memory_names_all_that_a_run_needs(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("bench.live.exchange.free", lambda: 40.0 * 2**20)
+    with pytest.raises(LinkError, match=r"; 50 MB are needed; .*--shm-size.*--wheel.*--no-page"):
+        Exchange.create(CONTEXT, 4, SIZE)

@@ -1,0 +1,137 @@
+"""The reader: wherever it is killed, the one after it does just what is left."""
+
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from bench.decoder import SerialDecoder
+from bench.device import Device
+from bench.emulator import write_script
+from bench.faults import Faults
+from bench.links import RESUMED, Read
+from bench.links.opening import PortPlan
+from bench.live.exchange import Exchange
+from bench.live.kept import CONTEXT
+from bench.live.reader import ReaderPlan, _Reader
+from bench.protocols.plan import ProtocolPlan
+from bench.wheels import Wheels
+from tests.bench.campaigns import tiny_runs
+
+
+class KilledError(Exception):
+    """What ends a reader in the middle of a read."""
+
+
+WIRE = write_script(tiny_runs()[:1], Device(), Faults({})).frames
+KILLS = range(1, 7)
+"""Before each call that a reader makes for a read of two wheels; before none of them."""
+
+
+def read_until(killed_before: int, *, room: bool = True) -> tuple[list[list[bytes]], list[Read]]:
+    """Take four reads of two wheels; a reader ends in the second, another goes on.
+
+    Returns what the estimators and the recorder were given.
+    """
+    exchange = Exchange.create(CONTEXT, 2)
+    plan = ReaderPlan(PortPlan("p"), 60.0, ProtocolPlan(), {None: Device()})
+    lines = [WIRE, write_script(tiny_runs()[:1], Device(), Faults({}), wheel=1).frames]
+    reads = [Read(i + 1, b"".join(part for line in lines for part in line[3 * i : 3 * i + 3]))
+             for i in range(4)]  # fmt: skip
+    calls = 0
+
+    def counted(method: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*given: Any) -> Any:
+            nonlocal calls
+            calls += 1
+            if calls == killed_before:
+                raise KilledError
+            return method(*given)
+
+        return call
+
+    def reader() -> Any:
+        made: Any = _Reader(plan, exchange)
+        if not room:
+            made._record = lambda _: False
+        return made
+
+    first = reader()
+    first.publish()
+    first.take(reads[0])
+    queues: list[Any] = [exchange.raw, exchange.line, *exchange.samples]
+    methods = [(queue, queue.put) for queue in queues]
+    for queue, put in methods:
+        queue.put = counted(put)
+    first._decoded = counted(first._decoded)
+    try:
+        first.take(reads[1])
+        rest = reads[2:]
+    except KilledError:
+        rest = [Read(2, b"", RESUMED), *reads[2:]]
+    else:
+        assert killed_before == KILLS[-1]
+    for queue, put in methods:
+        queue.put = put
+    del first._decoded
+    second = first
+    if rest[0].event:
+        second = reader()
+        assert second.again
+        second.catch_up()
+    for read in rest:
+        second.take(read)
+    other = Exchange(exchange.address)
+    given = [list(iter(queue.read, None)) for queue in other.samples]
+    recorded = [pickle.loads(message) for message in iter(other.raw.read, None)]
+    other.close()
+    exchange.close()
+    return given, recorded
+
+
+@pytest.mark.parametrize("killed_before", KILLS)
+def test_wherever_a_reader_is_killed_samples_come_once_and_a_replay_gives_the_same(
+    killed_before: int,
+) -> None:
+    given, recorded = read_until(killed_before)
+    wheels = Wheels(SerialDecoder(), {None: Device()})
+    blocks: list[list[bytes]] = [[], []]
+    for read in recorded:
+        if read.event == RESUMED:
+            wheels.interrupt()
+        for block in wheels.push(read.data, read.arrival) if read.data else []:
+            blocks[block.wheel].append(pickle.dumps(block, 5))
+    assert given == blocks
+    assert all(given)
+
+
+def test_a_read_that_ends_every_reader_is_left_alone() -> None:
+    exchange = Exchange.create(CONTEXT, 1)
+    plan = ReaderPlan(PortPlan("p"), 60.0, ProtocolPlan(), {None: Device()})
+
+    def deadly(_: Read) -> list[tuple[int, bytes]]:
+        raise KilledError
+
+    _Reader(plan, exchange).publish()
+    exchange.raw.put(pickle.dumps(Read(1, b"deadly")))
+    for _ in range(2):
+        reader: Any = _Reader(plan, exchange)
+        reader._decoded = deadly
+        with pytest.raises(KilledError):
+            reader.catch_up()
+    third: Any = _Reader(plan, exchange)
+    third._decoded = deadly
+    third.catch_up()
+    del third._decoded
+    third.take(Read(2, WIRE[0]))
+    assert third.state.wheels.line.counts.bytes == len(WIRE[0])
+    exchange.close()
+
+
+@pytest.mark.parametrize("killed_before", KILLS)
+def test_samples_of_a_read_that_could_not_be_recorded_never_come_twice(killed_before: int) -> None:
+    given, _ = read_until(killed_before, room=False)
+    for messages in given:
+        places = [pickle.loads(message).content.start for message in messages]
+        assert places == sorted(set(places))
