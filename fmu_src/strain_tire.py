@@ -5,12 +5,14 @@ FMU beside this file, under a name of its own, so that FMUs of several versions 
 process.
 """
 
+from collections.abc import Sequence
+
 import pythonfmu
 from pythonfmu import Fmi2Slave
 
 from tirelib.fmu.slave import GuardedSlave
-from tirelib.fmu.variables import Variable, inputs, outputs, parameters
-from tirelib.fmu.wheel import Wheel, embedded_calibration, load_wheel
+from tirelib.fmu.variables import MISSING, Variable, inputs, outputs, parameters
+from tirelib.fmu.wheel import Wheel, check_missing, embedded_calibration, load_wheel
 from tirelib.stream.estimator import RATES
 
 
@@ -24,9 +26,10 @@ class StrainTire(GuardedSlave, Fmi2Slave):
         self._samples = int(self.settings["samples_per_step"])
         self._buffered = bool(self.settings["buffered"])
         lateral = embedded_calibration(self.folder / "calibration.toml").lateral
-        fixed = parameters(self.settings["sample_rate"], RATES)
+        fixed = parameters(self.settings["sample_rate"], RATES, float(self.settings["missing"]))
         given = inputs(lateral, self._samples, buffered=self._buffered)
         taken = outputs(lateral)
+        self._missing = [v.name for v in fixed].index(MISSING)
         first, strains = len(fixed), self._samples * len(lateral)
         self._frame = slice(first, first + strains)
         self._conditions = slice(first + strains, first + strains + 4)
@@ -35,6 +38,7 @@ class StrainTire(GuardedSlave, Fmi2Slave):
 
     def started(self) -> Wheel:
         """Return a wheel with the parameters as they are set now."""
+        check_missing(self.real[self.reference[MISSING]])
         return load_wheel(
             self.folder / "calibration.toml",
             str(self.other["calibration"]),
@@ -53,5 +57,13 @@ class StrainTire(GuardedSlave, Fmi2Slave):
             real[self._frame], step, self.other["frame_valid"], *real[self._conditions], count=count
         )
         if not changed:
-            real[self._age] = wheel.age
+            age = wheel.age
+            real[self._age] = age if age == age else real[self._missing]
         return changed
+
+    def shown(self, values: Sequence[float]) -> Sequence[float]:
+        """Return the Real outputs; what is missing as the parameter says."""
+        missing = self.real[self._missing]
+        if missing != missing:
+            return values
+        return [value if value == value else missing for value in values]

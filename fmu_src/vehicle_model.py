@@ -42,18 +42,6 @@ class VehicleModel(GuardedSlave, Fmi2Slave):
         vehicle: Model = self._port.Port(self._tires, values, self.real[self._given_place])
         return vehicle
 
-    def get_real(self, vrs: list[int]) -> list[float]:
-        """Return Reals; before the start, of the vehicle as it would start now.
-
-        An importer that initialises several FMUs reads outputs before all are initialised.
-        """
-        if self.model is None and not self._port.settings_problems(self.real[self._fixed_place]):
-            self.model = self.started()
-            self.publish()
-            self.model = None
-        found: list[float] = super().get_real(vrs)
-        return found
-
     def advance(self, step: float) -> bool:
         """Go on by a step with the inputs as they are."""
         given = self.real[self._given_place]

@@ -11,9 +11,10 @@ from pythonfmu import Fmi2Slave
 from tirelib.fmu.slave import GuardedSlave
 from tirelib.fmu.variables import Variable
 from tirelib.fmu.virtual.faults import Faults
+from tirelib.fmu.virtual.options import Options
 from tirelib.fmu.virtual.surface import shared_surface
 from tirelib.fmu.virtual.table import inputs, outputs, parameters
-from tirelib.fmu.virtual.wheel import Options, VirtualWheel
+from tirelib.fmu.virtual.wheel import VirtualWheel
 
 
 class VirtualTire(GuardedSlave, Fmi2Slave):

@@ -1,15 +1,17 @@
 """Solve the numerical rig at the points of a space-filling design; resumable, in a fixed order.
 
     python build/virtual_tire/design.py --points 200
+    python build/virtual_tire/design.py --points 280 --friction
 
 Solutions are kept in build/out/virtual_tire, one file a point; `surface.py` makes the surface of
-those that are there. A longer design starts with the points of a shorter one.
+those that are there. A longer design starts with the points of a shorter one. With `--friction` the
+coefficient of friction is a seventh input, and the points are others, in a folder of their own.
 """
 
 import argparse
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,10 +23,13 @@ from bench.rig.solve import SolverError, State, solve
 from bench.rig.tire import Condition, tire
 
 OUT = Path(__file__).parents[1] / "out" / "virtual_tire"
+OUT_FRICTION = OUT.parent / "virtual_tire_friction"
 INPUTS = ("Fz", "alpha", "kappa", "camber", "speed", "pressure")
 LOW = np.array([750.0, -np.radians(8.4), -0.126, -np.radians(4.2), 17.0 / 3.6, 1.75e5])
 HIGH = np.array([9300.0, np.radians(8.4), 0.126, np.radians(4.2), 155.0 / 3.6, 3.05e5])
 """Range of the design; a little wider than that of the surface, so that no use extrapolates."""
+FRICTION = (0.25, 1.15)
+"""Range of the coefficient of friction, in a design that varies it."""
 SLIP_POWER = 1.4
 """Slip angle and slip ratio are denser where the tire does not slide: u |u|^(power - 1)."""
 POINTS = 1440
@@ -34,7 +39,10 @@ FORCES = ("Fx", "Fy", "Fz", "Mx", "Mz", "torque")
 
 @dataclass(frozen=True)
 class Point:
-    """A solved point: inputs, strain (n, 5), contact edges (5, 2), forces, radii."""
+    """A solved point: inputs, strain (n, 5), contact edges (5, 2), forces, radii.
+
+    The inputs are those of `design`.
+    """
 
     inputs: np.ndarray
     strain: np.ndarray
@@ -45,28 +53,39 @@ class Point:
     loaded_radius: float
 
 
-def design(n: int) -> np.ndarray:
-    """Return the points, shape (n, 6), in SI."""
-    unit = qmc.Sobol(len(INPUTS), seed=2).random(2 ** int(np.ceil(np.log2(max(n, 2)))))[:n]
-    unit = 2.0 * unit - 1.0
+def limits(friction: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return the least and the largest of every input."""
+    if not friction:
+        return LOW, HIGH
+    return np.append(LOW, FRICTION[0]), np.append(HIGH, FRICTION[1])
+
+
+def design(n: int, friction: bool = False) -> np.ndarray:
+    """Return the points, shape (n, 6), or with friction (n, 7), in SI."""
+    low, high = limits(friction)
+    sobol = qmc.Sobol(low.size, seed=3 if friction else 2)
+    unit = 2.0 * sobol.random(2 ** int(np.ceil(np.log2(max(n, 2)))))[:n] - 1.0
     for column in (1, 2):
         unit[:, column] *= np.abs(unit[:, column]) ** (SLIP_POWER - 1.0)
-    found = 0.5 * (LOW + HIGH) + 0.5 * (HIGH - LOW) * unit
-    root = np.sqrt([LOW[0], HIGH[0]])
+    found = 0.5 * (low + high) + 0.5 * (high - low) * unit
+    root = np.sqrt([low[0], high[0]])
     found[:, 0] = (0.5 * root.sum() + 0.5 * np.diff(root) * unit[:, 0]) ** 2
     return found
 
 
 def condition(inputs: np.ndarray) -> Condition:
     """Return the rig's condition; its slip ratio refers to v_x, that of the inputs to v."""
-    load, alpha, kappa, camber, speed, pressure = (float(value) for value in inputs)
+    load, alpha, kappa, camber, speed, pressure = (float(value) for value in inputs[:6])
     slip = (1.0 + kappa) / float(np.cos(alpha)) - 1.0
     return Condition(load, pressure, speed, alpha, camber, slip)
 
 
 def solved(inputs: np.ndarray, start: State | None) -> tuple[State, Point]:
     """Solve a point."""
-    state = solve(tire("reference"), condition(inputs), start)
+    rolling = tire("reference")
+    if inputs.size > len(INPUTS):
+        rolling = replace(rolling, friction=float(inputs[-1]))
+    state = solve(rolling, condition(inputs), start)
     if abs(slip_ratio(state) - inputs[2]) > 1e-9:
         raise SolverError(f"the slip ratio is {slip_ratio(state)}, not {inputs[2]}")
     force = forces(state)
@@ -79,18 +98,19 @@ def solved(inputs: np.ndarray, start: State | None) -> tuple[State, Point]:
     )  # fmt: skip
 
 
-def main(points: int, seconds: float, folder: Path) -> None:
+def main(points: int, seconds: float, folder: Path, friction: bool) -> None:
     """Solve what is not there yet, for at most so many seconds of CPU."""
     folder.mkdir(parents=True, exist_ok=True)
     states: list[tuple[np.ndarray, State]] = []
     begun = time.process_time()
-    for number, inputs in enumerate(design(points)):
+    low, high = limits(friction)
+    for number, inputs in enumerate(design(points, friction)):
         path = folder / f"{number:04d}.npz"
         if path.exists():
             continue
         if time.process_time() - begun > seconds:
             break
-        unit = (inputs - LOW) / (HIGH - LOW)
+        unit = (inputs - low) / (high - low)
         near = sorted(states, key=lambda known: float(np.sum((known[0] - unit) ** 2)))
         start = near[0][1] if near else None
         try:
@@ -108,6 +128,8 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--points", type=int, default=200)
     parser.add_argument("--seconds", type=float, default=600.0, help="most CPU time to spend")
-    parser.add_argument("--folder", type=Path, default=OUT)
-    arguments = parser.parse_args()
-    main(arguments.points, arguments.seconds, arguments.folder)
+    parser.add_argument("--friction", action="store_true", help="vary the friction as well")
+    parser.add_argument("--folder", type=Path)
+    given = parser.parse_args()
+    place = given.folder or (OUT_FRICTION if given.friction else OUT)
+    main(given.points, given.seconds, place, given.friction)

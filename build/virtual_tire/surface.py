@@ -1,8 +1,10 @@
 """Make the virtual tire's surface of the rig's solutions, and state its error at points left out.
 
     python build/virtual_tire/surface.py --points 372 --out models/virtual_tire/reference.npz
+    python build/virtual_tire/surface.py --friction --out models/virtual_tire/friction.npz
 
-The solutions come from `design.py`. Errors are those of a tenfold cross-validation in which a point
+With `--friction` the solutions at the tire's own friction and those at others make one surface. The
+solutions come from `design.py`. Errors are those of a tenfold cross-validation in which a point
 and its mirror image are left out together; only the scales of the coordinates were fitted to all.
 """
 
@@ -14,17 +16,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from design import HIGH, LOW, OUT
+from design import FRICTION as FRICTION_DESIGN
+from design import OUT, OUT_FRICTION, limits
 from scipy.interpolate import CubicSpline, RBFInterpolator
 from scipy.optimize import minimize
 
 from bench.rig.tire import tire
 from tirelib import __version__
-from tirelib.fmu.virtual.coordinates import INPUTS, MIRRORED, coordinates, half_angle, warped
+from tirelib.fmu.virtual.coordinates import coordinates, half_angle, warped
 from tirelib.fmu.virtual.surface import (
     DEGREE,
     KERNEL,
     Surface,
+    mirrored,
     radius_terms,
     write_surface,
 )  # fmt: skip
@@ -36,11 +40,14 @@ KEPT = 1e-5
 FOLDS = 10
 RANGE_LOW = np.array([800.0, -np.radians(8.0), -0.12, -np.radians(4.0), 20.0 / 3.6, 1.8e5])
 RANGE_HIGH = np.array([9000.0, np.radians(8.0), 0.12, np.radians(4.0), 150.0 / 3.6, 3.0e5])
+FRICTION_RANGE = (0.3, 1.1)
 SLIP = (24.2, 13.5, 0.0, -0.98)
 """Start of the fit of the coordinates."""
 _EFFORT = {"maxfev": 200, "xatol": 0.01, "fatol": 0.05, "adaptive": True}
 RESTARTS = 0
 SCALES = (1.97, 0.78, 0.12, 1.08, 0.89, 0.66, 0.42, 0.32)
+FRICTION_SCALE = 0.6
+"""Start of the ninth scale, where there is one."""
 
 
 @dataclass(frozen=True)
@@ -62,11 +69,37 @@ class Solutions:
         )  # fmt: skip
 
 
-def read_solutions(folder: Path, most: int | None = None) -> Solutions:
-    """Read the first solved points, or all; fill in the edges of strips that touch no road."""
+def range_of(dimensions: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the range of the surface's inputs."""
+    if dimensions == RANGE_LOW.size:
+        return RANGE_LOW, RANGE_HIGH
+    return np.append(RANGE_LOW, FRICTION_RANGE[0]), np.append(RANGE_HIGH, FRICTION_RANGE[1])
+
+
+def start_scales(dimensions: int) -> np.ndarray:
+    """Return where the fit of the scales starts."""
+    return np.array(SCALES if dimensions == RANGE_LOW.size else (*SCALES, FRICTION_SCALE))
+
+
+def places_of(inputs: np.ndarray, slip: np.ndarray, scales: np.ndarray) -> np.ndarray:
+    """Return coordinates of conditions and of their mirror images, shape (2 n, ...)."""
+    both = np.concatenate((inputs, mirrored(inputs)))
+    return np.stack(coordinates(list(both.T), slip.tolist(), scales.tolist()), axis=1)
+
+
+def read_solutions(folder: Path, most: int | None = None, more: Path | None = None) -> Solutions:
+    """Read the first solved points, or all; fill in the edges of strips that touch no road.
+
+    `more` is a folder of points that have friction as an input; the others then get the tire's.
+    """
     files = [np.load(path) for path in sorted(folder.glob("*.npz"))[:most]]
-    good = [file for file in files if "strain" in file.files]
-    inputs = np.array([file["inputs"] for file in good])
+    with_friction = [np.load(path) for path in sorted(more.glob("*.npz"))] if more else []
+    good = [file for file in (*files, *with_friction) if "strain" in file.files]
+    own = [tire("reference").friction] if with_friction else []
+    inputs = np.array([
+        file["inputs"] if file["inputs"].size > RANGE_LOW.size else np.append(file["inputs"], own)
+        for file in good
+    ])  # fmt: skip
     ends = np.array([file["edges"] for file in good])
     edges = np.stack((0.25 * (ends[..., 1] - ends[..., 0]) ** 2, ends.mean(axis=2)), axis=1)
     force = np.array([file["forces"] for file in good])
@@ -77,12 +110,12 @@ def read_solutions(folder: Path, most: int | None = None) -> Solutions:
         _filled(inputs, edges),
         np.column_stack((force[:, [0, 1, 4]], radius)),
         np.array([float(file["free_radius"]) for file in good]),
-        len(files) - len(good),
+        len(files) + len(with_friction) - len(good),
     )
 
 
 def _filled(inputs: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    places = coordinates(np.concatenate((inputs, inputs * MIRRORED)), SLIP, np.array(SCALES))
+    places = places_of(inputs, np.array(SLIP), start_scales(inputs.shape[1]))
     both = np.concatenate((edges, edges[:, :, ::-1]))
     for gage in range(edges.shape[2]):
         free = np.isnan(both[:, 0, gage])
@@ -120,9 +153,10 @@ def make(solutions: Solutions, waves: np.ndarray, slip: np.ndarray, scales: np.n
     parts = [_components(even - mean), _components(odd)]
     scores = [part.reshape(len(part), -1) for part in parts]
     terms = radius_terms(solutions.inputs)
+    low, high = range_of(solutions.inputs.shape[1])
     return Surface(
-        lateral=tire("reference").lateral,
-        low=RANGE_LOW, high=RANGE_HIGH, slip=slip, scales=scales, points=solutions.inputs,
+        lateral=tire("reference").lateral, low=low, high=high, slip=slip, scales=scales,
+        points=solutions.inputs,
         even=(even - mean).reshape(n, -1) @ scores[0].T,
         odd=odd.reshape(n, -1) @ scores[1].T,
         edges=solutions.edges, forces=solutions.forces, mean=mean, basis=np.concatenate(parts),
@@ -139,7 +173,7 @@ def _components(waves: np.ndarray) -> np.ndarray:
 
 def fitted_coordinates(solutions: Solutions, waves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return slip constants and scales with the least error at points left out."""
-    start = np.concatenate((SLIP, np.log(SCALES)))
+    start = np.concatenate((SLIP, np.log(start_scales(solutions.inputs.shape[1]))))
     first = make(solutions, waves, start[:4], np.exp(start[4:]))
     n, gages = len(first.points), first.lateral.size
     slope = float(np.sqrt(np.mean(np.gradient(waves, 2.0 * np.pi / GRID, axis=1) ** 2)))
@@ -149,17 +183,16 @@ def fitted_coordinates(solutions: Solutions, waves: np.ndarray) -> tuple[np.ndar
     one = np.hstack((first.even, first.odd, first.edges.reshape(n, -1)))
     two = np.hstack((first.even, -first.odd, first.edges[:, :, ::-1].reshape(n, -1)))
     values = np.concatenate((one, two)) * weights
-    inputs = np.concatenate((first.points, first.points * MIRRORED))
     fold = np.tile(np.arange(n) % 5, 2)
 
     def error(guess: np.ndarray) -> float:
-        places = coordinates(inputs, guess[:4].tolist(), np.exp(guess[4:]))
+        places = places_of(first.points, guess[:4], np.exp(guess[4:]))
         total = 0.0
         for k in range(5):
             out = fold == k
             known = RBFInterpolator(places[~out], values[~out], kernel=KERNEL, degree=DEGREE)
             total += float(np.sum((known(places[out]) - values[out]) ** 2))
-        return 1e6 * float(np.sqrt(total / len(inputs)))
+        return 1e6 * float(np.sqrt(total / len(values)))
 
     best = minimize(error, start, method="Nelder-Mead", options=_EFFORT)
     for factors in np.random.default_rng(1).uniform(0.5, 2.0, (RESTARTS, start.size)):
@@ -195,7 +228,8 @@ def left_out(solutions: Solutions, waves: np.ndarray, like: Surface) -> dict[str
 def statement(solutions: Solutions, errors: dict[str, np.ndarray]) -> dict[str, Any]:
     """Return errors by part of the range: rms and largest, [ustrain], [N], [N m], [m]."""
     x = solutions.inputs
-    inside = np.all((x >= RANGE_LOW) & (x <= RANGE_HIGH), axis=1)
+    low, high = range_of(x.shape[1])
+    inside = np.all((x >= low) & (x <= high), axis=1)
     slip = np.hypot(x[:, 1] / RANGE_HIGH[1], x[:, 2] / RANGE_HIGH[2])
     parts = {
         "all": inside,
@@ -214,6 +248,13 @@ def statement(solutions: Solutions, errors: dict[str, np.ndarray]) -> dict[str, 
         "pressure < 2.4 bar": inside & (x[:, 5] < 2.4e5),
         "pressure >= 2.4 bar": inside & (x[:, 5] >= 2.4e5),
     }
+    if x.shape[1] > RANGE_LOW.size:
+        own = tire("reference").friction
+        for start, end in ((0.3, 0.5), (0.5, 0.8), (0.8, 1.1)):
+            parts[f"friction {start} .. {end}"] = (
+                inside & (x[:, 6] >= start) & (x[:, 6] < end) & (x[:, 6] != own)
+            )
+        parts[f"friction {own}"] = inside & (x[:, 6] == own)
     return {
         name: {
             "points": int(chosen.sum()),
@@ -242,22 +283,24 @@ def _sizes(error: np.ndarray, name: str) -> dict[str, float]:
     }
 
 
-def main(folder: Path, out: Path, most: int | None) -> None:
+def main(folder: Path, out: Path, most: int | None, more: Path | None) -> None:
     """Fit, state the error, write."""
-    solutions = read_solutions(folder, most)
+    solutions = read_solutions(folder, most, more)
     waves = common(solutions)
     slip, scales = fitted_coordinates(solutions, waves)
     surface = make(solutions, waves, slip, scales)
     errors = left_out(solutions, waves, surface)
     told = statement(solutions, errors)
+    low, high = limits(more is not None)
     size = 1e6 * float(np.sqrt(np.mean((solutions.strain - solutions.strain.mean((0, 1))) ** 2)))
     about = {
         "tire": tire("reference").name,
         "made_by": f"build/virtual_tire of tirelib {__version__}, numerical rig, default mesh",
-        "inputs": list(INPUTS),
+        "inputs": list(surface.inputs),
         "solutions": len(waves), "not_solved": solutions.failed,
-        "design": "scrambled Sobol points, seed 2",
-        "design_low": LOW.tolist(), "design_high": HIGH.tolist(),
+        "design": "scrambled Sobol points, seed 2"
+        + (f"; with friction {FRICTION_DESIGN}, seed 3" if more else ""),
+        "design_low": low.tolist(), "design_high": high.tolist(),
         "error": f"{FOLDS}-fold cross-validation, a point and its mirror image left out together",
         "strain_spread_ustrain": size, "left_out": told,
     }  # fmt: skip
@@ -273,5 +316,6 @@ if __name__ == "__main__":
     parser.add_argument("--folder", type=Path, default=OUT)
     parser.add_argument("--out", type=Path, default=OUT.parent / "virtual_tire.npz")
     parser.add_argument("--points", type=int, help="take only the first ones")
+    parser.add_argument("--friction", action="store_true", help="with friction as an input")
     given = parser.parse_args()
-    main(given.folder, given.out, given.points)
+    main(given.folder, given.out, given.points, OUT_FRICTION if given.friction else None)

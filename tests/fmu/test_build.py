@@ -24,7 +24,7 @@ from tirelib.units import TABLE
 
 GIVEN = {"1": "ratio", "N": "force", "rad": "angle", "m": "length", "m/s": "speed",
          "Pa": "pressure", "rad/s": "angular_speed", "s": "time", "Hz": "frequency",
-         "N m": "moment", "1/s": "strain_rate"}  # fmt: skip
+         "N m": "moment", "1/s": "strain_rate", "kg": "mass", "m/s2": "acceleration"}  # fmt: skip
 
 
 @pytest.mark.parametrize("samples", [1, 10])
@@ -77,14 +77,21 @@ def test_every_real_has_a_unit_and_display_units_convert_as_the_library_does(
     assert {v.unit for v in reals if v.name in ("Mz_rig", "drift")} <= {"N m", "1/s"}
 
 
-def test_all_outputs_are_unknown_at_the_start_and_depend_on_nothing_then() -> None:
-    with zipfile.ZipFile(live.fmu_file(1)) as archive:
+@pytest.mark.parametrize(
+    ("file", "known"), [(live.fmu_file, ["missing"]), (virtual_host.file, None)]
+)
+def test_all_outputs_are_unknown_at_the_start_and_say_what_they_depend_on_then(
+    file: Callable[[int], Path], known: list[str] | None
+) -> None:
+    with zipfile.ZipFile(file(1)) as archive:
         root = Xml.fromstring(archive.read("modelDescription.xml"))
     variables = list(root.iterfind("ModelVariables/ScalarVariable"))
     outputs = [n for n, v in enumerate(variables, 1) if v.get("causality") == "output"]
     unknowns = list(root.iterfind("ModelStructure/InitialUnknowns/Unknown"))
     assert [int(unknown.get("index", "0")) for unknown in unknowns] == outputs
-    assert {unknown.get("dependencies") for unknown in unknowns} == {""}
+    told = {unknown.get("dependencies") for unknown in unknowns}
+    numbers = {v.get("name"): str(n) for n, v in enumerate(variables, 1)}
+    assert told == {None if known is None else " ".join(numbers[name] for name in known)}
 
 
 def test_every_real_has_a_type_a_nominal_and_limits_that_hold_the_start() -> None:

@@ -189,7 +189,8 @@ def test_what_is_no_fmu_is_bad_input(tmp_path: Path) -> None:
     (tmp_path / "cut.fmu").write_bytes(live.fmu_file(10).read_bytes()[:9000])
     with zipfile.ZipFile(tmp_path / "zip.fmu", "w") as archive:
         archive.writestr("readme.txt", "a zip")
-    for name, cause in (("none", "cannot be read"), ("text", "is no FMU"), ("cut", "is no FMU"),
+    for name, cause in (("none", "cannot be read"), ("text", "is no FMU"),
+                        ("cut", "is cut short or damaged"),
                         ("zip", "without modelDescription.xml")):  # fmt: skip
         with pytest.raises(FormatError, match=cause):
             check_fmu(tmp_path / f"{name}.fmu")

@@ -19,11 +19,12 @@ from tests.fmu.virtual_host import RATE, TYPICAL, Host, calibration_file, file, 
 from tirelib.errors import FormatError, ParameterError
 from tirelib.fmu.build import build_fmu
 from tirelib.fmu.check import check_fmu
-from tirelib.fmu.virtual.coordinates import INPUTS, MIRRORED
+from tirelib.fmu.virtual.coordinates import INPUTS
 from tirelib.fmu.virtual.faults import Faults
+from tirelib.fmu.virtual.options import Options
 from tirelib.fmu.virtual.spec import build_virtual, default_surface
-from tirelib.fmu.virtual.surface import read_surface, write_surface
-from tirelib.fmu.virtual.wheel import Options, VirtualWheel
+from tirelib.fmu.virtual.surface import mirrored, read_surface, write_surface
+from tirelib.fmu.virtual.wheel import VirtualWheel
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +80,7 @@ def test_the_mirror_image_of_a_condition_has_the_mirror_image_of_its_strain(
     known = surface()
     inputs = (known.low + (known.high - known.low) * np.array(share))[None]
     at = np.array([angle])
-    here, there = known.answers(inputs), known.answers(inputs * MIRRORED)
+    here, there = known.answers(inputs), known.answers(mirrored(inputs))
     np.testing.assert_allclose(
         known.strain(there, at), known.strain(here, at)[:, ::-1], atol=1e-9
     )  # fmt: skip

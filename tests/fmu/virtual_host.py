@@ -14,7 +14,8 @@ from tirelib.campaign import CampaignHeader, Run, RunPlan, TireGeometry, write_c
 from tirelib.campaign.read import read_campaign
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.estimators.train import train
-from tirelib.fmu.virtual.spec import build_virtual, default_surface
+from tirelib.fmu.run import keeping
+from tirelib.fmu.virtual.spec import build_virtual, default_surface, friction_surface
 from tirelib.fmu.virtual.surface import Surface, read_surface
 from tirelib.observations import observe
 
@@ -30,6 +31,17 @@ def surface() -> Surface:
 
 
 @cache
+def friction() -> Surface:
+    return read_surface(friction_surface())
+
+
+@cache
+def friction_file() -> Path:
+    path = live.folder() / "VirtualTire_friction.fmu"
+    return build_virtual(path, samples_per_step=10, surface=friction_surface())
+
+
+@cache
 def file(samples: int) -> Path:
     return build_virtual(live.folder() / f"VirtualTire_{samples}.fmu", samples_per_step=samples)
 
@@ -37,7 +49,7 @@ def file(samples: int) -> Path:
 class Host:
     """One instance in FMPy."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, messages: list[str] | None = None) -> None:
         description = read_model_description(str(path))
         self.kinds = {v.name: v.type for v in description.modelVariables}
         self.references = {v.name: v.valueReference for v in description.modelVariables}
@@ -50,7 +62,8 @@ class Host:
             guid=description.guid, unzipDirectory=self.folder,
             modelIdentifier=description.coSimulation.modelIdentifier, instanceName="wheel",
         )  # fmt: skip
-        self.slave.instantiate()
+        self.messages: list[str] = [] if messages is None else messages
+        self.slave.instantiate(loggingOn=True, callbacks=keeping(self.messages))
         self.time = 0.0
 
     def close(self) -> None:

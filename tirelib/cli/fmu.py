@@ -1,5 +1,6 @@
 """``tirelib fmu``: the estimator as an FMU; build it, check it, play a campaign to it."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -71,14 +72,17 @@ fmu.add_command(virtual)
               help="Start value of the parameter of that name.")  # fmt: skip
 @click.option("--buffered", is_flag=True,
               help="Steps of any length, with up to K samples each.")  # fmt: skip
+@click.option("--missing", metavar="NUMBER", type=float, default=math.nan, show_default="NaN",
+              help="What outputs show where there is no value; see docs.")  # fmt: skip
 def build(
-    calibration: Path, out: Path, samples_per_step: int, sample_rate: float, buffered: bool
-) -> None:
+    calibration: Path, out: Path, samples_per_step: int, sample_rate: float, buffered: bool,
+    missing: float,
+) -> None:  # fmt: skip
     """Write StrainTire.fmu with a calibration inside."""
     with progress_bar("building", 3) as progress:
         path = build_fmu(
             calibration, out, samples_per_step=samples_per_step, sample_rate=sample_rate,
-            buffered=buffered, progress=progress,
+            buffered=buffered, missing=missing, progress=progress,
         )  # fmt: skip
     loaded = embedded_calibration(path)
     gages = ", ".join(f"{1e3 * y:+g}" for y in loaded.lateral)

@@ -5,12 +5,14 @@ from pathlib import Path
 import click
 
 from tirelib.cli.common import FILE, output, progress_bar
+from tirelib.errors import ParameterError
 from tirelib.fmu.build import DEFAULT_RATE
-from tirelib.fmu.virtual.spec import build_virtual, default_surface
+from tirelib.fmu.virtual.spec import build_virtual, default_surface, friction_surface
 
 _EPILOG = """\b
 Examples:
   tirelib fmu virtual --out build/out/VirtualTire.fmu --samples-per-step 10
+  tirelib fmu virtual --out build/out/VirtualTire.fmu --friction     # friction is an input
   tirelib fmu check build/out/VirtualTire.fmu
 
 \b
@@ -27,12 +29,22 @@ for StrainTire.fmu with the same samples per step. Needs CPython with numpy and 
               help="Start value of the parameter of that name.")  # fmt: skip
 @click.option("--surface", metavar="FILE.npz", type=FILE,
               help="Response surface; by default the reference tire's.")  # fmt: skip
-def virtual(out: Path, samples_per_step: int, sample_rate: float, surface: Path | None) -> None:
+@click.option("--friction", is_flag=True,
+              help="The reference tire's surface that has friction as an input.")  # fmt: skip
+def virtual(
+    out: Path, samples_per_step: int, sample_rate: float, surface: Path | None, friction: bool
+) -> None:
     """Write VirtualTire.fmu: the numerical rig as a sensor."""
+    if friction and surface is not None:
+        raise ParameterError(
+            f"fmu virtual: --friction and --surface {surface}; one of them is allowed; a surface "
+            "that knows friction brings the input by itself"
+        )
+    usual = friction_surface() if friction else default_surface()
     with progress_bar("building", 3) as progress:
         path = build_virtual(
             out, samples_per_step=samples_per_step, sample_rate=sample_rate,
-            surface=surface or default_surface(), progress=progress,
+            surface=surface or usual, progress=progress,
         )  # fmt: skip
     console = output()
     console.print(f"communication step up to {1e3 * samples_per_step / sample_rate:g} ms")

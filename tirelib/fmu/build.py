@@ -1,6 +1,7 @@
 """Build an FMU from a slave of ``fmu_src``. Same input and code, same bytes."""
 
 import json
+import math
 import re
 import shutil
 import sys
@@ -49,6 +50,7 @@ def build_fmu(
     samples_per_step: int = 1,
     sample_rate: float = DEFAULT_RATE,
     buffered: bool = False,
+    missing: float = math.nan,
     progress: Callable[[str], None] | None = None,
 ) -> Path:
     """Write ``StrainTire.fmu``: an FMI 2.0 co-simulation unit that estimates with a calibration.
@@ -80,8 +82,9 @@ def build_fmu(
 
     _check_writable(Path(out))
     spec = strain_tire(
-        calibration, samples_per_step=samples_per_step, sample_rate=sample_rate, buffered=buffered
-    )
+        calibration, samples_per_step=samples_per_step, sample_rate=sample_rate, buffered=buffered,
+        missing=missing,
+    )  # fmt: skip
     return export(spec, out, progress)
 
 
@@ -136,7 +139,9 @@ def export(spec: SlaveSpec, out: str | Path, progress: Callable[[str], None] | N
         tell("exported by pythonfmu")
         files = _own_pythonfmu(_unzipped(raw), slave.name, package)
     files |= {
-        "modelDescription.xml": described(files["modelDescription.xml"], spec.table),
+        "modelDescription.xml": described(
+            files["modelDescription.xml"], spec.table, spec.start_depends_on
+        ),
         "model.png": spec.icon,
         **_licenses(),
     }

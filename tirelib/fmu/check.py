@@ -123,6 +123,12 @@ def _archive(path: Path) -> list[str]:
     except OSError as error:
         raise FormatError(f"{path}: cannot be read ({error.strerror}); give an FMU") from None
     except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:
+        with path.open("rb") as file:
+            if file.read(4) == b"PK\x03\x04":
+                raise FormatError(
+                    f"{path}: is cut short or damaged (it begins as a zip archive, but: {error}); "
+                    "an FMU is whole; copy it once more, or build it anew"
+                ) from None
         raise FormatError(
             f"{path}: is no FMU ({error}); an FMU is a zip archive; build one with "
             "`tirelib fmu build`"

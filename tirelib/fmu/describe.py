@@ -23,6 +23,8 @@ UNITS: Mapping[str, tuple[dict[str, str], dict[str, float]]] = {
     "s": ({"s": "1"}, {"ms": 1e3}),
     "Hz": ({"s": "-1"}, {"kHz": 1e-3}),
     "1/s": ({"s": "-1"}, {"ustrain/s": 1e6}),
+    "kg": ({"kg": "1"}, {}),
+    "m/s2": ({"m": "1", "s": "-2"}, {}),
 }
 """Exponents of the base units, and factors of the display units, of every unit in use."""
 TYPES: Mapping[str, tuple[str, str | None, str]] = {
@@ -38,13 +40,17 @@ TYPES: Mapping[str, tuple[str, str | None, str]] = {
     "TurnRate": ("rad/s", "rpm", "turn rate"),
     "Time": ("s", "ms", "time"),
     "Frequency": ("Hz", "kHz", "frequency"),
+    "Mass": ("kg", None, "mass"),
+    "Acceleration": ("m/s2", None, "acceleration"),
 }
 """Unit, display unit and meaning of every declared type."""
 EPOCH = (2000, 1, 1, 0, 0, 0)
 """Time of every file in the zip, so that the same content has the same bytes."""
 
 
-def described(source: bytes, table: Sequence[Variable]) -> bytes:
+def described(
+    source: bytes, table: Sequence[Variable], known: Sequence[str] | None = None
+) -> bytes:
     """Return a model description with units, limits and unknowns added.
 
     Parameters
@@ -53,6 +59,9 @@ def described(source: bytes, table: Sequence[Variable]) -> bytes:
         What pythonfmu wrote.
     table : sequence of Variable
         In the order of the scalar variables.
+    known : sequence of str, optional
+        Names of the variables that the outputs at the start depend on; by default they may depend
+        on all parameters and inputs.
     """
     root = Xml.fromstring(source)
     root.attrib.pop("generationDateAndTime", None)
@@ -64,10 +73,12 @@ def described(source: bytes, table: Sequence[Variable]) -> bytes:
     place = list(root).index(simulation) + 1
     root[place:place] = [_unit_definitions(), _type_definitions()]
     unknown = Xml.SubElement(structure, "InitialUnknowns")
+    numbers = {variable.name: str(number) for number, variable in enumerate(table, start=1)}
+    given = {} if known is None else {"dependencies": " ".join(numbers[name] for name in known)}
     for number, (scalar, variable) in enumerate(zip(scalars, table, strict=True), start=1):
         _describe(scalar, variable)
         if variable.causality == "output":
-            Xml.SubElement(unknown, "Unknown", {"index": str(number), "dependencies": ""})
+            Xml.SubElement(unknown, "Unknown", {"index": str(number), **given})
     Xml.indent(root)
     text: bytes = Xml.tostring(root, encoding="UTF-8", xml_declaration=True)
     return text + b"\n"

@@ -24,6 +24,26 @@ from tirelib.observations import SET_POINTS, TRUTH, Observations, truth_of
 CONDITIONS = ("speed", "pressure", "camber")
 
 
+def keeping(messages: list[str]) -> Any:
+    """Return callbacks for ``FMU2Slave.instantiate`` that keep what the FMU logs."""
+    from fmpy import calloc, free
+    from fmpy.fmi2 import (
+        fmi2CallbackAllocateMemoryTYPE,
+        fmi2CallbackFreeMemoryTYPE,
+        fmi2CallbackFunctions,
+        fmi2CallbackLoggerTYPE,
+    )
+
+    def keep(_: Any, __: Any, ___: Any, ____: Any, message: bytes) -> None:
+        messages.append(message.decode("utf-8", "replace"))
+
+    found = fmi2CallbackFunctions()
+    found.logger = fmi2CallbackLoggerTYPE(keep)
+    found.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
+    found.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
+    return found
+
+
 class LoadedFmu:
     """One instance of a ``StrainTire.fmu`` in FMPy; use it in a ``with`` block.
 
@@ -60,7 +80,7 @@ class LoadedFmu:
             instanceName=name,
         )
         try:
-            self.slave.instantiate(loggingOn=True, callbacks=self._callbacks())
+            self.slave.instantiate(loggingOn=True, callbacks=keeping(self.messages))
         except Exception as error:  # FMPy raises bare exceptions
             shutil.rmtree(self._folder, ignore_errors=True)
             raise FormatError(
@@ -79,25 +99,6 @@ class LoadedFmu:
         """Free the instance and the files that were unpacked."""
         self.slave.freeInstance()
         shutil.rmtree(self._folder, ignore_errors=True)
-
-    def _callbacks(self) -> Any:
-        """Return callbacks that keep the FMU's messages."""
-        from fmpy import calloc, free
-        from fmpy.fmi2 import (
-            fmi2CallbackAllocateMemoryTYPE,
-            fmi2CallbackFreeMemoryTYPE,
-            fmi2CallbackFunctions,
-            fmi2CallbackLoggerTYPE,
-        )
-
-        def keep(_: Any, __: Any, ___: Any, ____: Any, message: bytes) -> None:
-            self.messages.append(message.decode("utf-8", "replace"))
-
-        self._kept = fmi2CallbackFunctions()
-        self._kept.logger = fmi2CallbackLoggerTYPE(keep)
-        self._kept.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
-        self._kept.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
-        return self._kept
 
     def _buffer(self, *names: str) -> tuple[Array[c_uint32], int, Array[c_double]]:
         references = (c_uint32 * len(names))(*(self.references[name] for name in names))

@@ -107,6 +107,8 @@ class GuardedSlave:
         self._results = slice(reals[0], reals[-1] + 1)
         self._names = [v.name for v in given if v.kind != "Real"]
         self._truths = [v.name for v in given if v.kind == "Boolean"]
+        self._results_first = {v.name: v.start for v in given}
+        self._foreseen: Any = None
         self.model: Any = None
         self._phase = "instantiated"
         self._refused = False
@@ -171,6 +173,8 @@ class GuardedSlave:
         return found
 
     def _read(self, vrs: Iterable[int], kind: str) -> list[Any]:
+        if self.model is None:
+            self._foresee()
         return [self.other[variable.name] for variable in self._named(vrs, kind)]
 
     def _write(self, vrs: Sequence[int], values: Iterable[Any], kind: str) -> None:
@@ -224,12 +228,38 @@ class GuardedSlave:
     @guarded
     def get_real(self, vrs: list[int]) -> list[float]:
         """Return Reals by value reference."""
+        if self.model is None:
+            self._foresee()
         if vrs != self._get_last:
             self._named(vrs, "Real")
             self._get_last, self._get_place = vrs, _place(vrs)
         if self._get_place is not None:
             return self.real[self._get_place]
         return [self.real[reference] for reference in vrs]
+
+    def _foresee(self) -> None:
+        """Before the start, show what the outputs would be if it came now.
+
+        Importers that connect several FMUs read outputs while they initialise them, and set them as
+        inputs of others. Parameters that cannot be leave the start values; a refused step is told
+        until the start.
+        """
+        if self._refused or self._foreseen == (self.real, self.other):
+            return
+        try:
+            self.model = self.started()
+        except Exception:  # the start will tell why
+            first = [float(self._results_first[v.name]) for v in self._variables[self._results]]
+            self.real[self._results] = self.shown(first)
+            self.other.update((name, self._results_first[name]) for name in self._names)
+        else:
+            self.publish()
+        self.model = None
+        self._foreseen = list(self.real), dict(self.other)
+
+    def shown(self, values: Sequence[float]) -> Sequence[float]:
+        """Return the Real outputs as an importer is to see them."""
+        return values
 
     @guarded
     def exit_initialization_mode(self) -> None:
@@ -263,7 +293,7 @@ class GuardedSlave:
     def publish(self) -> None:
         """Write the outputs."""
         values, others = self.model.outputs()
-        self.real[self._results] = values
+        self.real[self._results] = self.shown(values)
         self.other.update(zip(self._names, others, strict=True))
         self._refused = False
 

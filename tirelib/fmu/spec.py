@@ -31,6 +31,8 @@ class SlaveSpec:
         replaced.
     icon : bytes
         PNG shown by tools.
+    start_depends_on : sequence of str, optional
+        Names of the variables that the outputs at the start depend on; None: maybe all.
     """
 
     model: str
@@ -42,3 +44,4 @@ class SlaveSpec:
     resources: Mapping[str, bytes] = field(repr=False)
     documentation: Mapping[str, bytes] = field(repr=False)
     icon: bytes = field(repr=False)
+    start_depends_on: Sequence[str] | None = None

@@ -15,7 +15,8 @@ from tirelib.fmu.handbook import html_table, page
 from tirelib.fmu.reference import FOLDER
 from tirelib.fmu.spec import SlaveSpec
 from tirelib.fmu.strain_reference import strain_reference
-from tirelib.fmu.variables import Variable, inputs, outputs, parameters
+from tirelib.fmu.variables import MISSING, Variable, inputs, outputs, parameters
+from tirelib.fmu.wheel import check_missing
 from tirelib.stream.estimator import RATES
 
 MODEL = "StrainTire"
@@ -27,8 +28,9 @@ _SHOWN = {"Fz": ("N", 1.0), "alpha": ("deg", 180.0 / math.pi), "kappa": ("%", 10
 
 
 def strain_tire(
-    calibration: str | Path, *, samples_per_step: int, sample_rate: float, buffered: bool
-) -> SlaveSpec:
+    calibration: str | Path, *, samples_per_step: int, sample_rate: float, buffered: bool,
+    missing: float = math.nan,
+) -> SlaveSpec:  # fmt: skip
     """Return what `tirelib.fmu.build.export` needs; see `tirelib.fmu.build.build_fmu`.
 
     Raises
@@ -49,10 +51,11 @@ def strain_tire(
             f"sample rate = {sample_rate} Hz; allowed are {low:g} .. {high:g} Hz; give the rate of "
             "the gages"
         )
+    check_missing(missing)
     loaded = read_calibration(calibration)
     text = Path(calibration).read_text(encoding="utf-8")
     table = [
-        *parameters(sample_rate, RATES),
+        *parameters(sample_rate, RATES, missing),
         *inputs(loaded.lateral, samples_per_step, buffered=buffered),
         *outputs(loaded.lateral),
     ]
@@ -62,6 +65,7 @@ def strain_tire(
         "samples_per_step": samples_per_step,
         "sample_rate": sample_rate,
         "buffered": buffered,
+        "missing": str(missing),
     }
     return SlaveSpec(
         model=MODEL,
@@ -76,6 +80,7 @@ def strain_tire(
         },
         documentation={"index.html": _page(loaded, document, table, settings).encode()},
         icon=source_file("strain_tire.png").read_bytes(),
+        start_depends_on=(MISSING,),
     )
 
 
@@ -177,6 +182,8 @@ _LIMITS = """<ul>
 <li>An estimate is made once per turn, 20 degrees of wheel angle and half the filter after the
 trailing edge; <code>age</code> counts from there.</li>
 <li>The first turn after a start or a gap is never valid.</li>
+<li>Without an estimate a Real output shows the parameter <code>missing</code>, NaN by default; a
+number there says nothing, <code>valid</code> does.</li>
 <li>Forward rolling on a flat road; a turn shorter than 3 s.</li>
 <li>The slip ratio needs <code>speed</code>; a calibration with pressure or camber needs those.</li>
 <li>Without contacts for two turns <code>valid</code> drops and the last values are held.</li>

@@ -39,7 +39,13 @@ class Variable:
     type: str | None = None
 
 
-def parameters(sample_rate: float, limits: tuple[float, float]) -> list[Variable]:
+MISSING = "missing"
+"""Name of the parameter that says what Real outputs show where there is no value."""
+
+
+def parameters(
+    sample_rate: float, limits: tuple[float, float], missing: float = NAN
+) -> list[Variable]:
     """Return the parameters, fixed after initialisation."""
     return [
         Variable("sample_rate", "Real", "parameter", "sample rate of the gages", sample_rate,
@@ -48,6 +54,10 @@ def parameters(sample_rate: float, limits: tuple[float, float]) -> list[Variable
                  "cut-off of the low-pass, cycles per turn: a check that the calibration was made "
                  "with this one; 0: whatever it was made with", 0.0, "1", None, 10.0, 0.0, 1e3,
                  type="Ratio"),
+        Variable(MISSING, "Real", "parameter",
+                 "what Real outputs show where there is no value, as before the first turn: NaN, "
+                 "or a number for importers that take none; valid and flags are the same", missing,
+                 "1", None, 1.0, -1e9, 1e9, type="Ratio"),
         Variable("axes", "String", "parameter",
                  "axis system of outputs and gage order: iso, sae or adapted_sae", "iso"),
         Variable("calibration", "String", "parameter",

@@ -240,6 +240,21 @@ class Wheel:
         self._held = None if held is None else (_unhex(held[0]), tuple(held[1]))
 
 
+def check_missing(value: float) -> None:
+    """Refuse what cannot stand for a missing value.
+
+    Raises
+    ------
+    ParameterError
+        If it is infinite.
+    """
+    if math.isinf(value):
+        raise ParameterError(
+            f"missing = {value}; allowed are NaN and finite numbers; set what Real outputs show "
+            "where there is no value"
+        )
+
+
 @lru_cache(maxsize=4)
 def embedded_calibration(path: Path) -> Calibration:
     """Return the calibration inside an FMU, which does not change while the FMU is loaded.

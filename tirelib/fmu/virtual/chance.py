@@ -40,9 +40,11 @@ def noise(seed: int, first: int, count: int, gages: int) -> FloatArray:
     >>> bool(np.all(noise(7, 300, 2, 5) == noise(7, 250, 60, 5)[50:52]))
     True
     """
-    blocks = range(first // BLOCK, (first + count - 1) // BLOCK + 1)
+    number, start = divmod(first, BLOCK)
+    if start + count <= BLOCK:
+        return _block(seed, number, gages)[start : start + count]
+    blocks = range(number, (first + count - 1) // BLOCK + 1)
     found = np.concatenate([_block(seed, number, gages) for number in blocks])
-    start = first - blocks[0] * BLOCK
     return found[start : start + count]
 
 

@@ -1,13 +1,18 @@
-"""Coordinates in which the strain of a rolling tire is smooth: of the condition, of the angle."""
+"""Coordinates in which the strain of a rolling tire is smooth: of the condition, of the angle.
+
+Each formula stands once and serves arrays as well as single numbers, for which `math` takes a tenth
+of the time; `by` is the module that has the functions, ``numpy`` or ``math``.
+"""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
-
 INPUTS = ("Fz", "alpha", "kappa", "camber", "speed", "pressure")
-MIRRORED = np.array([1.0, -1.0, 1.0, -1.0, 1.0, 1.0])
+FRICTION = "friction"
+"""A seventh input, of surfaces that were made with it: the road's coefficient of friction."""
+MIRRORED = np.array([1.0, -1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
 """Sign of the inputs in the mirror image of a condition, left for right."""
 LOAD, SPEED, PRESSURE = 4000.0, 20.0, 2.4e5
 """Sizes by which loads, speeds and pressures are divided."""
@@ -15,44 +20,48 @@ HALF = 0.25
 """Half contact angle of the common waveform [rad]; the warp is monotonic up to twice that."""
 SMALLEST = 0.08
 """Half contact angle below which the warp does not follow [rad]."""
+_PI = float(np.pi)
 
 
-def coordinates(inputs: FloatArray, slip: Sequence[float], scales: FloatArray) -> FloatArray:
-    """Return coordinates of conditions, shape (n, 8).
+def coordinates(
+    inputs: Sequence[Any], slip: Sequence[float], scales: Sequence[float], by: Any = np
+) -> list[Any]:
+    """Return the coordinates of conditions: 8, or 9 where friction is an input.
 
     Slip acts through s = (u, w), u = C_x s_x m / (1 + s_x), w = C_y tan(alpha) m / (1 + s_x), with
-    s_x = (1 + kappa) / cos(alpha) - 1 and m = (Fz / 4 kN)^a (p / 2.4 bar)^b; s tanh(|s|) / |s|
-    bends where the tire slides.
+    s_x = (1 + kappa) / cos(alpha) - 1 and m = (Fz / 4 kN)^a (p / 2.4 bar)^b; s tanh(|s| / mu) mu /
+    |s| bends where the tire slides. Without an input for it, the friction mu is 1.
 
     Parameters
     ----------
-    inputs : array, shape (n, 6)
-        In the order of `INPUTS`, SI.
+    inputs : sequence of 6 or 7 floats or arrays
+        `INPUTS`, SI, and friction.
     slip : sequence of float, length 4
         C_x, C_y, a, b.
-    scales : array, shape (8,)
+    scales : sequence of float, as many as coordinates
         By which the coordinates are multiplied: how fast the strain changes with each.
+    by : module
     """
-    load, alpha, kappa, camber, speed, pressure = inputs.T
-    along = (1.0 + kappa) / np.cos(alpha) - 1.0
+    load, alpha, kappa, camber, speed, pressure, *rest = inputs
+    friction = rest[0] if rest else 1.0
+    along = (1.0 + kappa) / by.cos(alpha) - 1.0
     size = (load / LOAD) ** slip[2] * (pressure / PRESSURE) ** slip[3] / (1.0 + along)
-    u, w = slip[0] * along * size, slip[1] * np.tan(alpha) * size
-    total = np.hypot(u, w) + 1e-12
-    bent = np.tanh(total) / total
-    found: FloatArray = scales * np.stack((
-        np.sqrt(load / LOAD), camber / 0.1, speed / SPEED, pressure / PRESSURE, u * bent, w * bent,
-        along / 0.1, alpha / 0.1,
-    ), axis=1)  # fmt: skip
-    return found
+    u, w = slip[0] * along * size, slip[1] * by.tan(alpha) * size
+    total = by.hypot(u, w) + 1e-12
+    bent = friction * by.tanh(total / friction) / total
+    found = (
+        by.sqrt(load / LOAD), camber / 0.1, speed / SPEED, pressure / PRESSURE, u * bent, w * bent,
+        along / 0.1, alpha / 0.1, *rest,
+    )  # fmt: skip
+    return [scale * value for scale, value in zip(scales, found, strict=True)]
 
 
-def half_angle(square: FloatArray) -> FloatArray:
+def half_angle(square: Any, by: Any = np) -> Any:
     """Return half contact angles [rad] of squares that an interpolation may leave below zero."""
-    floor = SMALLEST**2
-    return np.asarray(np.sqrt(0.5 * (square + np.hypot(square, floor))))
+    return by.sqrt(0.5 * (square + by.hypot(square, SMALLEST**2)))
 
 
-def warped(angle: FloatArray, centre: FloatArray, half: FloatArray) -> FloatArray:
+def warped(angle: Any, centre: Any, half: Any, by: Any = np) -> Any:
     """Return the angle at which the common waveform shows what is seen at a wheel angle.
 
     s = t - (h - h_0) tanh(2 t / h) (1 - (t / pi)^2)^2, t = angle - centre: the edges of the contact
@@ -60,11 +69,23 @@ def warped(angle: FloatArray, centre: FloatArray, half: FloatArray) -> FloatArra
 
     Parameters
     ----------
-    angle : array, [rad]
+    angle : float or array, [rad]
         Any angle; it is wrapped.
-    centre, half : array, [rad]
+    centre, half : float or array, [rad]
         Middle and half of the contact; all three broadcast.
+    by : module
     """
-    t = (angle - centre + np.pi) % (2.0 * np.pi) - np.pi
-    pull = np.tanh(2.0 * t / half) * (1.0 - (t / np.pi) ** 2) ** 2
-    return np.asarray(t - (half - HALF) * pull)
+    t = (angle - centre + _PI) % (2.0 * _PI) - _PI
+    pull = by.tanh(2.0 * t / half) * (1.0 - (t / _PI) ** 2) ** 2
+    return t - (half - HALF) * pull
+
+
+def spline_weights(t: Any) -> tuple[Any, Any, Any, Any]:
+    """Return the four weights of a cubic B-spline at t, 0 .. 1 between its middle knots."""
+    s = 1.0 - t
+    return (
+        s * s * s / 6.0,
+        (t * t * (3.0 * t - 6.0) + 4.0) / 6.0,
+        (s * s * (3.0 * s - 6.0) + 4.0) / 6.0,
+        t * t * t / 6.0,
+    )

@@ -48,6 +48,11 @@ class Faults:
         for name, (value, low, high) in allowed.items():
             check(name, value, low, high)
 
+    @property
+    def none(self) -> bool:
+        """Whether the strain is always as it is."""
+        return not (self.dead_gage or self.saturation or self.drift)
+
     def of(self, strain: FloatArray, times: FloatArray) -> FloatArray:
         """Return the strain as it is seen.
 
@@ -70,6 +75,8 @@ class Faults:
 
     def words(self, time: float) -> list[str]:
         """Return the names of the faults that are there at a time."""
+        if self.none and not self.dropped:
+            return []
         given = {
             "dead_gage": self.dead_gage,
             "saturation": self.saturation,

@@ -13,10 +13,11 @@ from tirelib.fmu.build import DEFAULT_RATE, export, source_file
 from tirelib.fmu.handbook import html_table, page
 from tirelib.fmu.reference import FOLDER, Reference
 from tirelib.fmu.spec import SlaveSpec
-from tirelib.fmu.virtual.coordinates import INPUTS
+from tirelib.fmu.virtual.coordinates import FRICTION
+from tirelib.fmu.virtual.options import RATES, Options
 from tirelib.fmu.virtual.surface import Surface, read_surface
 from tirelib.fmu.virtual.table import START, inputs, outputs, parameters
-from tirelib.fmu.virtual.wheel import RATES, Options, VirtualWheel
+from tirelib.fmu.virtual.wheel import VirtualWheel
 from tirelib.parameters.tire_file import models_folder
 
 MODEL = "VirtualTire"
@@ -45,7 +46,7 @@ def build_virtual(
     sample_rate : float, [Hz]
         Start value of the parameter of that name.
     surface : path, optional
-        By default the numerical rig's reference tire.
+        By default the numerical rig's reference tire; `friction_surface` has friction as an input.
     progress : callable, optional
         Called with what was done.
 
@@ -63,6 +64,11 @@ def build_virtual(
 def default_surface() -> Path:
     """Return the file of the reference tire's surface."""
     return models_folder() / "virtual_tire" / "reference.npz"
+
+
+def friction_surface() -> Path:
+    """Return the file of the reference tire's surface that has friction as an input."""
+    return models_folder() / "virtual_tire" / "friction.npz"
 
 
 def virtual_tire(surface: str | Path, samples_per_step: int, sample_rate: float) -> SlaveSpec:
@@ -106,17 +112,19 @@ def virtual_reference(surface: Surface, rate: float, samples: int) -> Reference:
     """
     step = samples / rate
     phase: FloatArray = np.linspace(0.0, 2.0 * np.pi, STEPS, dtype=np.float64)
-    given: dict[str, FloatArray] = {name: np.full(STEPS, START[name]) for name in INPUTS}
+    given: dict[str, FloatArray] = {name: np.full(STEPS, START[name]) for name in surface.inputs}
     given["Fz"] = np.round(4000.0 + 1500.0 * np.sin(phase), 1)
     given["alpha"] = np.where(phase > 2.0, 0.05, 0.0)
     given["kappa"] = np.where(phase > 4.0, -0.03, 0.0)
     given["pressure"] = np.round(2.3e5 + 1e4 * np.sin(phase))
     given["camber"] = np.where((phase > 5.0) & (phase < 5.3), 0.5, 0.0)
+    if FRICTION in given:
+        given[FRICTION] = np.where(phase > 3.0, 0.5, START[FRICTION])
     wheel = VirtualWheel(surface, Options(rate=rate), samples)
-    wheel.begin([float(given[name][0]) for name in INPUTS])
+    wheel.begin([float(given[name][0]) for name in surface.inputs])
     rows = [_row(wheel)]
     for at in range(STEPS - 1):
-        wheel.step(step, [float(given[name][at]) for name in INPUTS])
+        wheel.step(step, [float(given[name][at]) for name in surface.inputs])
         rows.append(_row(wheel))
     names = [v.name for v in outputs(surface, samples) if v.kind != "String"]
     table = np.array(rows)
@@ -157,15 +165,14 @@ def _page(surface: Surface, table: list[Any], samples: int, rate: float) -> str:
 
 _SHOWN = {"Fz": (1e-3, "kN"), "alpha": (180.0 / math.pi, "deg"), "kappa": (100.0, "%"),
           "camber": (180.0 / math.pi, "deg"), "speed": (3.6, "km/h"),
-          "pressure": (1e-5, "bar")}  # fmt: skip
+          "pressure": (1e-5, "bar"), "friction": (1.0, "")}  # fmt: skip
 
 
 def _ranges(surface: Surface) -> str:
     rows = [
         (name, f"{factor * low:.4g}", f"{factor * high:.4g}", unit)
-        for (name, (factor, unit)), low, high in zip(
-            _SHOWN.items(), surface.low, surface.high, strict=True
-        )
+        for name, low, high in zip(surface.inputs, surface.low, surface.high, strict=True)
+        for factor, unit in (_SHOWN[name],)
     ]
     return html_table(("input", "from", "to", "unit"), rows) + (
         "<p>Outside, nothing is extrapolated: <code>frame_valid</code> is false, the last frame is "
@@ -199,8 +206,8 @@ _FRAMES = """<p>Samples are taken at whole multiples of the sample period. After
 holds the samples that were due in it, oldest first, the last one repeated to the frame's end; a
 step may have any length up to a full frame. Frames of any length hold the same samples.</p>"""
 _TRANSIENTS = """<p>Slip angle and slip ratio are felt after first-order relaxation over the way
-travelled; load, camber and pressure at once. Everything else is the steady rolling state of the
-numerical rig.</p>"""
+travelled; load, camber, pressure and friction at once. Everything else is the steady rolling state
+of the numerical rig.</p>"""
 _LIMITS = """<ul>
 <li>Steady rolling only, apart from the relaxation: no vibration, no uneven road.</li>
 <li>Gages are alike and exact but for the noise and the faults that are asked for.</li>

@@ -6,8 +6,9 @@ interpolated over the rig's solutions and their mirror images by radial basis fu
 
 import io
 import json
+import math
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -15,20 +16,19 @@ from typing import Any, Final
 
 import numpy as np
 from scipy.interpolate import RBFInterpolator
-from scipy.ndimage import spline_filter1d
 
 from tirelib.arrays import FloatArray
 from tirelib.errors import FormatError
 from tirelib.fmu.virtual.coordinates import (
+    FRICTION,
     INPUTS,
     LOAD,
     MIRRORED,
     PRESSURE,
     SPEED,
     coordinates,
-    half_angle,
-    warped,
 )  # fmt: skip
+from tirelib.fmu.virtual.waveform import Waveforms
 
 FORMAT = "tirelib-virtual-tire/2"
 FORCES = ("Fx", "Fy", "Mz", "loaded_radius")
@@ -47,11 +47,11 @@ class Surface:
     ----------
     lateral : array, shape (g,), [m]
         Lateral positions of the gages, y to the left; symmetric.
-    low, high : array, shape (6,)
-        Range of the inputs `INPUTS`, SI.
-    slip, scales : array, shapes (4,) and (8,)
+    low, high : array, shape (i,)
+        Range of the `inputs`, SI; i is 6, or 7 with friction.
+    slip, scales : array, shapes (4,) and (i + 2,)
         Of `coordinates`.
-    points : array, shape (n, 6)
+    points : array, shape (n, i)
         Conditions of the rig's solutions, SI.
     even, odd : array, shapes (n, a) and (n, b)
         Scores of the components that are alike in the mirror image, and of those that turn sign.
@@ -85,6 +85,11 @@ class Surface:
     about: Mapping[str, Any]
 
     @cached_property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs: `INPUTS`, and `FRICTION` where the surface knows it."""
+        return INPUTS if self.low.size == len(INPUTS) else (*INPUTS, FRICTION)
+
+    @cached_property
     def _interpolator(self) -> RBFInterpolator:
         n = len(self.points)
         mirror = self.edges[:, :, ::-1]
@@ -92,34 +97,47 @@ class Surface:
             np.hstack((self.even, self.odd, self.edges.reshape(n, -1), self.forces)),
             np.hstack((self.even, -self.odd, mirror.reshape(n, -1), self.forces * _FORCE_MIRROR)),
         ))  # fmt: skip
-        places = coordinates(
-            np.concatenate((self.points, self.points * MIRRORED)), self.slip.tolist(), self.scales
-        )
+        places = self._places(np.concatenate((self.points, mirrored(self.points))))
         return RBFInterpolator(places, values, kernel=KERNEL, degree=DEGREE)
 
+    def _places(self, inputs: FloatArray) -> FloatArray:
+        found = coordinates(list(inputs.T), *self._shape)
+        return np.stack(found, axis=1)
+
     @cached_property
-    def _spline(self) -> FloatArray:
-        """Coefficients of cubic B-splines of the components, the mean last, shape (m, g, k + 1)."""
-        both = np.concatenate((self.basis, self.mean[None]))
-        found = spline_filter1d(np.moveaxis(both, 0, 2), axis=0, mode="grid-wrap")
-        return np.ascontiguousarray(found)
+    def _shape(self) -> tuple[list[float], list[float]]:
+        return self.slip.tolist(), self.scales.tolist()
+
+    @cached_property
+    def _waveforms(self) -> Waveforms:
+        return Waveforms(self.mean, self.basis)
+
+    @cached_property
+    def _limits(self) -> list[tuple[str, float, float]]:
+        return list(zip(self.inputs, self.low.tolist(), self.high.tolist(), strict=True))
 
     def warm(self) -> "Surface":
         """Do now what would be done at the first use."""
-        _ = self._interpolator, self._spline
+        _ = self._interpolator, self._waveforms
         return self
 
-    def outside(self, inputs: FloatArray) -> tuple[str, ...]:
+    def outside(self, inputs: Sequence[float] | FloatArray) -> tuple[str, ...]:
         """Return the names of the inputs that are out of range, or no numbers."""
-        good = (inputs >= self.low) & (inputs <= self.high)
-        return tuple(name for name, fine in zip(INPUTS, good, strict=True) if not fine)
+        return tuple([
+            name for (name, low, high), value in zip(self._limits, inputs, strict=True)
+            if not low <= value <= high
+        ])  # fmt: skip
 
     def answers(self, inputs: FloatArray) -> FloatArray:
-        """Return scores, edges and forces of conditions, shape (n, 6), in one table with n rows.
+        """Return scores, edges and forces of conditions, shape (n, i), in one table with n rows.
 
         Nothing is checked: ask `outside` first.
         """
-        found: FloatArray = self._interpolator(coordinates(inputs, self.slip.tolist(), self.scales))
+        if len(inputs) == 1:
+            places = np.array([coordinates(inputs[0].tolist(), *self._shape, math)])
+        else:
+            places = self._places(inputs)
+        found: FloatArray = self._interpolator(places)
         return found
 
     def forces_of(self, answers: FloatArray) -> FloatArray:
@@ -134,11 +152,13 @@ class Surface:
         answers : array, shape (1, ...)
             Of `answers`.
         """
-        scores = answers[0, : len(self.basis)]
-        return np.asarray(self._spline[:, :, :-1] @ scores + self._spline[:, :, -1])
+        return self._waveforms.mixed(answers[0, : len(self.basis)])
 
     def strain(
-        self, answers: FloatArray, angle: FloatArray, waveform: FloatArray | None = None
+        self,
+        answers: FloatArray,
+        angle: FloatArray | list[float],
+        waveform: FloatArray | None = None,
     ) -> FloatArray:
         """Return the strain of every gage, shape (n, g).
 
@@ -146,25 +166,19 @@ class Surface:
         ----------
         answers : array, shape (n, ...) or (1, ...)
             Of `answers`; one row serves all angles.
-        angle : array, shape (n,), [rad]
+        angle : array or list, shape (n,), [rad]
             Wheel angle of the gages: 0 over the road, negative before.
         waveform : array, optional
             Of `waveform`, where there is one row: spares the sum over the components.
         """
         k, g = len(self.basis), self.lateral.size
-        edges = answers[:, k : k + 2 * g]
-        turned = warped(angle[:, None], edges[:, g:], half_angle(edges[:, :g]))
-        place = (turned + np.pi) * (len(self.mean) / (2.0 * np.pi))
-        first = np.floor(place)
-        rows = (first.astype(np.intp)[..., None] + np.arange(-1, 3)) % len(self.mean)
-        weights = _weights(place - first)
-        gage = np.arange(g)[:, None]
-        if waveform is not None:
-            return np.asarray((waveform[rows, gage] * weights).sum(axis=2))
-        scores = np.ones((len(answers), 1, k + 1))
-        scores[:, 0, :k] = answers[:, :k]
-        values = np.matmul(weights[..., None, :], self._spline[rows, gage])[..., 0, :]
-        return np.asarray((values * scores).sum(axis=2))
+        if waveform is None and len(angle) == 1:
+            row = answers[0]
+            edges = row[k : k + 2 * g].tolist()
+            seen = self._waveforms.one(row[:k], edges[:g], edges[g:], float(angle[0]))
+            return np.array([seen])
+        parts = answers[:, :k], answers[:, k : k + g], answers[:, k + g : k + 2 * g]
+        return self._waveforms.many(*parts, np.asarray(angle), waveform)
 
     @cached_property
     def _rolling(self) -> list[tuple[float, int, int, int]]:
@@ -175,7 +189,8 @@ class Surface:
     def rolling_radius(self, load: float, speed: float, pressure: float) -> float:
         """Return R_e [m]: a polynomial of third degree, see `radius_terms`."""
         x, y, z = (load / LOAD) ** 0.5, 0.5 * (speed / SPEED) ** 2, pressure / PRESSURE
-        return float(sum(value * x**a * y**b * z**c for value, a, b, c in self._rolling))
+        xs, ys, zs = (1.0, x, x * x, x**3), (1.0, y, y * y, y**3), (1.0, z, z * z, z**3)
+        return sum([value * xs[a] * ys[b] * zs[c] for value, a, b, c in self._rolling])
 
 
 POWERS = tuple((a, b, c) for a in range(4) for b in range(4 - a) for c in range(4 - a - b))
@@ -192,12 +207,9 @@ def radius_terms(inputs: FloatArray) -> FloatArray:
     return np.stack([x**a * y**b * z**c for a, b, c in POWERS], axis=1)
 
 
-def _weights(t: FloatArray) -> FloatArray:
-    """Return the four weights of a cubic B-spline, in a new last axis."""
-    s = 1.0 - t
-    return np.stack((
-        s**3, 3.0 * t**3 - 6.0 * t**2 + 4.0, 3.0 * s**3 - 6.0 * s**2 + 4.0, t**3
-    ), axis=-1) / 6.0  # fmt: skip
+def mirrored(inputs: FloatArray) -> FloatArray:
+    """Return the mirror images of conditions, shape (n, i), left for right."""
+    return np.asarray(inputs * MIRRORED[: inputs.shape[1]])
 
 
 _ARRAYS = tuple(name for name in Surface.__dataclass_fields__ if name != "about")

@@ -3,13 +3,12 @@
 import math
 
 from tirelib.fmu.variables import RIGHT, Variable
-from tirelib.fmu.virtual.coordinates import INPUTS
+from tirelib.fmu.virtual.options import RATES, Options
 from tirelib.fmu.virtual.surface import Surface
-from tirelib.fmu.virtual.wheel import RATES, Options
 
 NAN = math.nan
 START = {"Fz": 4000.0, "alpha": 0.0, "kappa": 0.0, "camber": 0.0, "speed": 20.0,
-         "pressure": 2.3e5}  # fmt: skip
+         "pressure": 2.3e5, "friction": 0.95}  # fmt: skip
 """Inputs before a host sets them."""
 
 
@@ -49,10 +48,10 @@ def parameters(sample_rate: float) -> list[Variable]:
 
 
 def inputs(surface: Surface) -> list[Variable]:
-    """Return the inputs, in the order of `INPUTS`."""
+    """Return the inputs of a surface, in its order."""
     range_ = {
         name: f"surface {low:.5g} .. {high:.5g}"
-        for name, low, high in zip(INPUTS, surface.low, surface.high, strict=True)
+        for name, low, high in zip(surface.inputs, surface.low, surface.high, strict=True)
     }
     rows = {
         "Fz": ("vertical load", "N", "kN", 1e3, -1e5, 1e5, "Force"),
@@ -62,11 +61,14 @@ def inputs(surface: Surface) -> list[Variable]:
                    "Angle"),
         "speed": ("travel speed", "m/s", "km/h", 10.0, -150.0, 150.0, "Speed"),
         "pressure": ("inflation pressure (gauge)", "Pa", "bar", 1e5, 0.0, 2e6, "Pressure"),
+        "friction": ("coefficient of friction of tread and road", "1", None, 1.0, 0.0, 5.0,
+                     "Ratio"),
     }  # fmt: skip
     return [
         Variable(name, "Real", "input", f"{meaning}; {range_[name]}", START[name], unit, display,
                  nominal, low, high, type=kind)
         for name, (meaning, unit, display, nominal, low, high, kind) in rows.items()
+        if name in range_
     ]  # fmt: skip
 
 

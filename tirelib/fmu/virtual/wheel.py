@@ -7,7 +7,6 @@ is taken up again change it.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -17,64 +16,22 @@ from tirelib.errors import ParameterError
 from tirelib.fmu.refusals import FAULT, StepError, told
 from tirelib.fmu.virtual.chance import chance, noise
 from tirelib.fmu.virtual.coordinates import INPUTS
-from tirelib.fmu.virtual.faults import Faults, check
+from tirelib.fmu.virtual.options import Options
+from tirelib.fmu.virtual.relaxation import Relaxation
 from tirelib.fmu.virtual.steady import SteadyRun, wrapped
 from tirelib.fmu.virtual.surface import FORCES, Surface
 
-RATES = (100.0, 100_000.0)
-"""Sample rates that are allowed [Hz]."""
 OUT_OF_RANGE, DROPPED, NO_INPUT = "out_of_range", "frame_dropped", "not_started"
 STANDSTILL, LOCKED = "standstill", "locked"
 LOCK = 1e-9
 """Slip ratios this near to -1 are those of a wheel that does not turn."""
 _UNUSED = {"": (), STANDSTILL: ("alpha", "kappa", "speed"), LOCKED: ("alpha", "kappa", "speed")}
 """Inputs that the held strain of a wheel that does not turn is not asked for."""
-SETTLED = 1e-10
-"""Rest of a relaxation that is dropped [rad], [1]."""
 _ROUNDING = 1e-6
 """How far a step may be from a whole sample and still end on it, in samples."""
 _ALPHA, _KAPPA, _SPEED = INPUTS.index("alpha"), INPUTS.index("kappa"), INPUTS.index("speed")
+_LOAD, _PRESSURE = INPUTS.index("Fz"), INPUTS.index("pressure")
 _LAGGED = [_ALPHA, _KAPPA]
-
-
-@dataclass(frozen=True, slots=True)
-class Options:
-    """What a host sets before the start.
-
-    Attributes
-    ----------
-    rate : float, [Hz]
-        Sample rate.
-    relaxation : tuple of two floats, [m]
-        Relaxation length of slip angle and slip ratio; 0: none.
-    noise : float
-        Standard deviation of the gages' noise, as strain.
-    seed : int
-        Of noise and dropped frames; the wheels of a car need different ones.
-    start_angle : float, [rad]
-        Wheel angle at the start.
-    faults : Faults
-
-    Raises
-    ------
-    ParameterError
-        If one is out of range.
-    """
-
-    rate: float = 10_000.0
-    relaxation: tuple[float, float] = (0.3, 0.1)
-    noise: float = 4e-6
-    seed: int = 0
-    start_angle: float = -math.pi
-    faults: Faults = field(default_factory=Faults)
-
-    def __post_init__(self) -> None:
-        check("sample_rate", self.rate, *RATES)
-        check("relaxation_length", self.relaxation[0], 0.0, 100.0)
-        check("relaxation_length_kappa", self.relaxation[1], 0.0, 100.0)
-        check("noise_std", self.noise, 0.0, 1.0)
-        check("seed", self.seed, 0, 2**31 - 1)
-        check("start_angle", self.start_angle, -math.pi, math.pi)
 
 
 class VirtualWheel:
@@ -96,8 +53,7 @@ class VirtualWheel:
                 "another number before the FMU is initialised"
             )
         self._surface, self._options, self.samples = surface.warm(), options, samples
-        self._lengths = np.array(options.relaxation)
-        self._slip: FloatArray | None = None  # alpha and kappa as the tire feels them
+        self._slip = Relaxation(options.relaxation)
         self._angle = options.start_angle
         self._omega, self._radius = 0.0, math.nan
         self._due = 0.0  # samples since the last one
@@ -105,7 +61,7 @@ class VirtualWheel:
         self._frame = np.zeros((samples, gages))
         self._force = [math.nan] * len(FORCES)
         self._new, self._valid, self._status = 0, False, NO_INPUT
-        self._asked: FloatArray | None = None  # inputs of the last single answer
+        self._asked: list[float] | None = None  # inputs of the last single answer
         self._answer: FloatArray | None = None
         self._waveform: FloatArray | None = None
         self._rolls: tuple[float, float, float] | None = None  # what the radius was found for
@@ -115,9 +71,9 @@ class VirtualWheel:
 
     def begin(self, inputs: Sequence[float]) -> None:
         """Take the first conditions: slip starts settled, the sample at time zero is given."""
-        given = np.asarray(inputs, dtype=np.float64)
         self._new = 1
-        self._take(given, np.zeros(1), 1)
+        self._take(list(inputs), 0.0, 1.0, 1)
+        self._count = 1
 
     def step(self, step: float, inputs: Sequence[float]) -> bool:
         """Go on by one communication step with constant conditions.
@@ -129,7 +85,7 @@ class VirtualWheel:
         ----------
         step : float, [s]
         inputs : sequence of float
-            In the order of `INPUTS`.
+            Those of the surface.
 
         Raises
         ------
@@ -152,12 +108,15 @@ class VirtualWheel:
                 f"up to {self.samples}, the frame's length; step by {self.samples / rate:g} s"
             )
         due, self._due, self._new = self._due, until - count, count
-        if self._run is not None and self._run.inputs == list(inputs):
-            self._go_on(self._run, step, count)
-        else:
-            self._run = None
-            times = (np.arange(1, count + 1) - due) / rate
-            self._take(np.asarray(inputs, dtype=np.float64), np.append(times, step), count)
+        given, reached = list(inputs), self._count + count
+        try:
+            if self._run is not None and self._run.inputs == given:
+                self._go_on(self._run, step, count)
+            else:
+                self._run = None
+                self._take(given, step, due, count)
+        finally:
+            self._count = reached  # time goes on after an error as well
         return True
 
     def _go_on(self, run: SteadyRun, step: float, n: int) -> None:
@@ -165,39 +124,35 @@ class VirtualWheel:
         self._angle = run.go_on(step)
         if n and not self._lost():
             self._show(run.samples(self._count, n))
-        self._count += n
 
-    def _take(self, given: FloatArray, times: FloatArray, n: int) -> None:
-        """Move on; the first n times [s] are samples, the last is the end of the step."""
+    def _take(self, given: list[float], step: float, due: float, n: int) -> None:
+        """Move on by a step [s] with n samples; the last one was `due` samples before."""
         still = _still(given)
         outside = self._surface.outside(given)
-        wrong = tuple(name for name in outside if name not in _UNUSED[still])
+        wrong = tuple([name for name in outside if name not in _UNUSED[still]])
         omega = 0.0 if still else self._turn_rate(given, wrong)
-        slips = self._relaxed(given, times)
-        angles = self._angle + omega * times
-        self._omega = omega
-        self._angle = wrapped(float(angles[-1]))
+        settled = self._slip.aim(given[_ALPHA : _KAPPA + 1], given[_SPEED])
+        first = (1.0 - due) / self._options.rate
         if not still:
             self._held = None
-            wrong = wrong or self._lag_outside(given, slips)
+            wrong = wrong or self._lag_outside(given, settled, first if n else step, step)
+        if not settled:
+            self._slip.go_on(step)
+        start, self._omega = self._angle, omega
+        self._angle = wrapped(start + omega * step)
         if wrong:
             self._valid, self._status = False, f"{OUT_OF_RANGE}: {', '.join(wrong)}"
         elif still:
             self._stand(still, n)
-        elif n:
-            self._measure(given, slips, angles, n)
-        self._count += n
-        steady = n and not wrong and not still and len(slips) == 1
-        if steady and self._waveform is not None and self._answers_to(given):
-            self._run = self._steady(given.tolist(), {})
-
-    def _answers_to(self, given: FloatArray) -> bool:
-        """Tell whether the last single answer is of this condition."""
-        return self._asked is not None and bool((self._asked[0] == given).all())
+        elif n and not self._lost():
+            self._measure(given, settled, start, first, n)
+        steady = n and not wrong and not still and settled
+        if steady and self._waveform is not None and self._asked == given:
+            self._run = self._steady(given, {"count": self._count + n})
 
     def _steady(self, inputs: list[float], place: dict[str, Any]) -> SteadyRun:
         """Return samples from now on, or from where a state says, if nothing changes."""
-        begin = {"angle": self._angle, "due": self._due, "count": self._count, **place}
+        begin = {"angle": self._angle, "due": self._due, **place}
         return SteadyRun(self._found, inputs, self._omega, self._options.rate, **begin)
 
     def _found(self, angles: FloatArray, first: int) -> FloatArray:
@@ -218,54 +173,49 @@ class VirtualWheel:
             words = (why, self._status) if self._status != "ok" else (why,)
             self._status = ";".join(words)
 
-    def _turn_rate(self, given: FloatArray, wrong: tuple[str, ...]) -> float:
+    def _turn_rate(self, given: list[float], wrong: tuple[str, ...]) -> float:
         """Return Omega = v (1 + kappa) / R_e; out of range R_e stays, without speed the rest."""
-        load, speed, pressure = (float(given[i]) for i in (0, _SPEED, 5))
+        load, speed, pressure = given[_LOAD], given[_SPEED], given[_PRESSURE]
         known = not {"Fz", "speed", "pressure"} & set(wrong)
         if known and self._rolls != (load, speed, pressure):
             self._rolls = load, speed, pressure
             self._radius = self._surface.rolling_radius(load, speed, pressure)
-        found = speed * (1.0 + float(given[_KAPPA])) / self._radius
+        found = speed * (1.0 + given[_KAPPA]) / self._radius
         return found if math.isfinite(found) else self._omega
 
-    def _relaxed(self, given: FloatArray, times: FloatArray) -> FloatArray:
-        """Return slip at these times, shape (n, 2): d s / d x = (s_given - s) / length."""
-        goal = given[_LAGGED]
-        if self._slip is None:
-            if not np.all(np.isfinite(goal)):
-                return np.full((times.size, 2), np.nan)
-            self._slip = goal.copy()
-        goal = np.where(np.isfinite(goal), goal, self._slip)
-        rest = self._slip - goal
-        rest[np.abs(rest) < SETTLED] = 0.0
-        if not rest.any():
-            self._slip = goal
-            return goal[None]
-        way = abs(float(given[_SPEED])) * times
-        way = np.where(np.isfinite(way), way, 0.0)[:, None]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            left = np.where(self._lengths > 0.0, np.exp(-way / self._lengths), 0.0)
-        found: FloatArray = goal + rest * left
-        self._slip = found[-1]
-        return found
-
-    def _lag_outside(self, given: FloatArray, slips: FloatArray) -> tuple[str, ...]:
+    def _lag_outside(
+        self, given: list[float], settled: bool, *times: float
+    ) -> tuple[str, ...]:  # fmt: skip
         """Return which of the relaxed inputs are still out of range; the ends of a step tell."""
         names: tuple[str, ...] = ()
-        if len(slips) == 1:
+        if settled:
             return names
-        for row in (slips[0], slips[-1]):
-            felt = given.copy()
-            felt[_LAGGED] = row
+        for time in times:
+            felt = self._felt(given, self._slip.at(time))
             names += tuple(name for name in self._surface.outside(felt) if name not in names)
         return names
 
-    def _measure(self, given: FloatArray, slips: FloatArray, angles: FloatArray, n: int) -> None:
-        """Fill the frame with n samples."""
-        if self._lost():
-            return
-        answers, waveform = self._answers(given, slips[:n])
-        strain = self._surface.strain(answers, angles[:n], waveform)
+    @staticmethod
+    def _felt(given: list[float], slip: list[float]) -> list[float]:
+        """Return a condition with the slip that is felt."""
+        return [*given[:_ALPHA], *slip, *given[_KAPPA + 1 :]]
+
+    def _measure(
+        self, given: list[float], settled: bool, start: float, first: float, n: int
+    ) -> None:
+        """Fill the frame with n samples, the first at a time [s] from the start angle on."""
+        if settled or n == 1:
+            felt = given if settled else self._felt(given, self._slip.at(first))
+            answers, waveform = self._answers(felt)
+        if n == 1:
+            strain = self._surface.strain(answers, [start + self._omega * first], waveform)
+        else:
+            times: FloatArray = first + np.arange(n) / self._options.rate
+            if not settled:
+                table = np.repeat(np.array(given)[None], n, axis=0)
+                table[:, _LAGGED] = self._slip.course(times)
+                answers, waveform = self._surface.answers(table), None
+            strain = self._surface.strain(answers, start + self._omega * times, waveform)
         self._show(self._seen(strain, self._count))
         self._force = self._surface.forces_of(answers)[-1].tolist()
         self._last = answers[-1:]
@@ -282,30 +232,28 @@ class VirtualWheel:
 
     def _seen(self, strain: FloatArray, first: int) -> FloatArray:
         """Return strain with noise and faults; the samples are numbered from `first` on."""
+        options = self._options
         n, gages = strain.shape
-        if self._options.noise > 0.0:
-            strain = strain + self._options.noise * noise(self._options.seed, first, n, gages)
-        return self._options.faults.of(strain, (first + np.arange(n)) / self._options.rate)
+        if options.noise > 0.0:
+            strain = strain + options.noise * noise(options.seed, first, n, gages)
+        if options.faults.none:
+            return strain
+        return options.faults.of(strain, (first + np.arange(n)) / options.rate)
 
     def _show(self, seen: FloatArray) -> None:
         """Put the next samples into the frame."""
         n = len(seen)
         self._frame[:n] = seen
-        self._frame[n:] = seen[-1]
+        if n < self.samples:
+            self._frame[n:] = seen[-1]
         words = self._options.faults.words((self._count + n - 1) / self._options.rate)
         self._valid, self._status = True, ";".join(words) or "ok"
 
-    def _answers(
-        self, given: FloatArray, slips: FloatArray
-    ) -> tuple[FloatArray, FloatArray | None]:
+    def _answers(self, condition: list[float]) -> tuple[FloatArray, FloatArray | None]:
         """Ask the surface; of a condition that stays, also the waveform, both once."""
-        table = np.repeat(given[None], len(slips), axis=0)
-        table[:, _LAGGED] = slips
-        if len(table) > 1:
-            return self._surface.answers(table), None
-        if self._asked is None or self._answer is None or (table != self._asked).any():
-            self._asked, self._waveform = table, None
-            self._answer = self._surface.answers(table)
+        if self._answer is None or self._asked != condition:
+            self._asked, self._waveform = condition, None
+            self._answer = self._surface.answers(np.array([condition]))
         elif self._waveform is None:
             self._waveform = self._surface.waveform(self._answer)
         return self._answer, self._waveform
@@ -317,7 +265,7 @@ class VirtualWheel:
 
     def outputs(self) -> tuple[list[float], tuple[Any, ...]]:
         """Return the values of the Real outputs and of the others, in the table's order."""
-        slip = [math.nan] * 2 if self._slip is None else self._slip.tolist()
+        slip = self._slip.slip or [math.nan] * 2
         reals = [
             *self._frame.ravel().tolist(), self._omega, self._angle, *slip, *self._force,
             self._radius,
@@ -327,11 +275,11 @@ class VirtualWheel:
     def state(self) -> dict[str, Any]:
         """Return everything that is remembered, as JSON knows it."""
         return {
-            "slip": None if self._slip is None else [x.hex() for x in self._slip.tolist()],
+            "slip": None if self._slip.slip is None else [x.hex() for x in self._slip.slip],
             "reals": [x.hex() for x in (self._angle, self._omega, self._radius, self._due)],
             "frame": [x.hex() for x in self._frame.ravel().tolist()],
             "force": [x.hex() for x in self._force],
-            "asked": None if self._asked is None else [x.hex() for x in self._asked[0].tolist()],
+            "asked": None if self._asked is None else [x.hex() for x in self._asked],
             "last": None if self._last is None else [x.hex() for x in self._last[0].tolist()],
             "held": None if self._held is None else [x.hex() for x in self._held[0].tolist()],
             "run": None if self._run is None else self._run.state(),
@@ -343,7 +291,7 @@ class VirtualWheel:
     def restore(self, state: dict[str, Any]) -> None:
         """Take up a state of a wheel with the same parameters."""
         slip = state["slip"]
-        self._slip = None if slip is None else np.array([float.fromhex(x) for x in slip])
+        self._slip.slip = None if slip is None else [float.fromhex(x) for x in slip]
         self._angle, self._omega, self._radius, self._due = map(float.fromhex, state["reals"])
         frame = [float.fromhex(x) for x in state["frame"]]
         self._frame = np.array(frame).reshape(self._frame.shape)
@@ -353,23 +301,22 @@ class VirtualWheel:
         self._rolls = self._waveform = self._asked = self._run = None
         self._last, self._held = _row(state["last"]), _row(state["held"])
         if state["asked"] is not None:
-            self._asked = _row(state["asked"])
-            self._answer = self._surface.answers(np.asarray(self._asked))
+            self._asked = [float.fromhex(x) for x in state["asked"]]
+            self._answer = self._surface.answers(np.array([self._asked]))
         run = state["run"]
         if run is not None and self._answer is not None and self._asked is not None:
             self._waveform = self._surface.waveform(self._answer)
             place = {name: float.fromhex(run[name]) for name in ("angle", "due", "time")}
-            inputs = self._asked[0].tolist()
-            self._run = self._steady(inputs, {**place, "count": run["count"]})
+            self._run = self._steady(self._asked, {**place, "count": run["count"]})
 
 
 def _row(values: list[str] | None) -> FloatArray | None:
     return None if values is None else np.array([[float.fromhex(x) for x in values]])
 
 
-def _still(given: FloatArray) -> str:
+def _still(given: list[float]) -> str:
     """Return why the wheel does not turn, or nothing."""
-    speed, kappa = float(given[_SPEED]), float(given[_KAPPA])
+    speed, kappa = given[_SPEED], given[_KAPPA]
     if speed == 0.0:
         return STANDSTILL
     return LOCKED if math.isfinite(speed) and speed > 0.0 and abs(kappa + 1.0) < LOCK else ""
