@@ -37,7 +37,7 @@ def parameters(variable: Callable[..., Any]) -> list[Any]:
         "start_speed": ("speed at the start", "m/s", "km/h", 10.0, "Speed"),
         "start_yaw": ("heading at the start", "rad", "deg", 1.0, "Angle"),
         "longest_step": ("longest step of the integration", "s", "ms", 1e-3, "Time"),
-        "sprung_mass": ("sprung mass in kg", None, None, 1e3, None),
+        "sprung_mass": ("sprung mass", "kg", None, 1e3, "Mass"),
         "height": ("centre of gravity of the sprung mass above the road, at rest", "m", "mm", 1.0,
                    "Length"),
     }  # fmt: skip
@@ -51,9 +51,9 @@ def parameters(variable: Callable[..., Any]) -> list[Any]:
 def inputs(variable: Callable[..., Any]) -> list[Any]:
     """Return the inputs, in the order of `INPUTS`."""
     rows = {
-        "drive": ("torque on the wheel in N m", 0.0, None, None, 1e3, -1e5, 1e5, None),
-        "brake": ("torque of the brake in N m, against the turn", 0.0, None, None, 1e3, 0.0, 1e5,
-                  None),
+        "drive": ("torque on the wheel", 0.0, "N m", "kN m", 1e3, -1e5, 1e5, "Moment"),
+        "brake": ("torque of the brake, against the turn", 0.0, "N m", "kN m", 1e3, 0.0, 1e5,
+                  "Moment"),
         "friction": ("scale of the road's friction", 1.0, "1", None, 1.0, 1e-3, 10.0, "Ratio"),
         "road": ("height of the road", 0.0, "m", "mm", 0.1, -1.0, 1.0, "Length"),
     }  # fmt: skip
@@ -75,7 +75,7 @@ _WHEEL_ROWS = {
     "Fz": ("vertical load", "N", "kN", 1e3, "Force"),
     "Fx": ("force of the road along the wheel's x", "N", "kN", 1e3, "Force"),
     "Fy": ("force of the road along the wheel's y", "N", "kN", 1e3, "Force"),
-    "Mz": ("aligning moment in N m", None, None, 1e2, None),
+    "Mz": ("aligning moment", "N m", "kN m", 1e2, "Moment"),
     "alpha": ("slip angle, ISO 8855", "rad", "deg", 0.1, "Angle"),
     "kappa": ("slip ratio, (omega R_e - speed) / speed; NaN: too slow", "1", "%", 0.1, "Ratio"),
     "camber": ("camber angle, top to the right positive", "rad", "deg", 0.1, "Angle"),
@@ -91,7 +91,7 @@ _BODY_ROWS = {
     **dict.fromkeys(("roll_rate", "pitch_rate", "yaw_rate"),
                     ("turn rate about the body's axis", "rad/s", None, 1.0, "TurnRate")),
     **dict.fromkeys(("ax", "ay", "az"), ("acceleration of the centre of gravity along the body's "
-                                         "axis in m/s^2", None, None, 1.0, None)),
+                                         "axis", "m/s2", None, 1.0, "Acceleration")),
 }  # fmt: skip
 
 

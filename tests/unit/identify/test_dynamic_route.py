@@ -64,7 +64,8 @@ def test_known_stiffness_lies_within_the_stated_intervals(found) -> None:
 def test_predicted_vertical_stiffness_is_that_of_the_rig(found) -> None:
     assert found.vertical is not None
     assert len(found.vertical.pressure) == 3
-    assert np.abs(found.vertical.error).max() < 0.05
+    # twice what the measured stiffness itself is known to at the lowest pressure, 3 %
+    assert np.abs(found.vertical.error).max() < 0.06
     # and it rises with pressure, as measured
     assert (np.diff(found.vertical.predicted) > 0).all()
 
@@ -272,7 +273,8 @@ def test_the_numerical_rig_s_damping_and_stiffness_come_back(tmp_path) -> None:
     assert found.damping is not None
     assert found.damping.without_angle.value == pytest.approx(0.07, abs=0.012)
     assert found.vertical is not None
-    assert np.abs(found.vertical.error).max() < 0.05
+    # twice what the measured stiffness itself is known to at the lowest pressure, 3 %
+    assert np.abs(found.vertical.error).max() < 0.06
 
 
 def test_a_damped_waveform_without_damping_is_symmetric() -> None:
