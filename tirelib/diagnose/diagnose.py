@@ -1,7 +1,7 @@
 """The verdict: rounds of ranking, refit and threshold, at most three."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.ensemble import MEMBERS
@@ -13,13 +13,16 @@ from tirelib.diagnose.rivals import inseparable
 from tirelib.diagnose.rounds import rounds
 from tirelib.diagnose.stage import ALARM, Stage
 from tirelib.diagnose.stored import ensemble_of
+from tirelib.diagnose.unlisted import UNLISTED
 from tirelib.effects import Effect
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.waveform_fit import Data
 
 OUTSIDE = 3.0
 """Ratio of an effect outside its range from which something unknown is there."""
-EXPLAINED = 0.7
+BARELY = 15.0
+"""The same for one that is outside by no more than structure imitates."""
+EXPLAINED = 0.8
 """Share of the misfit beyond structure's that named effects have to explain."""
 BEYOND = 2.0
 """What the joint fit leaves, over what noise and structure outside the ensemble usually leave, from
@@ -86,6 +89,8 @@ class Diagnosis:
         Whitened part of model less measured that neither the model nor structure explains.
     guess : Guess or None
         A law for it, if it is more than variants leave and a sparse one holds.
+    like : Finding or None
+        What else is needed, if that is in no catalogue (`tirelib.diagnose.unlisted`).
     """
 
     verdict: str
@@ -101,6 +106,7 @@ class Diagnosis:
     data: Data
     beyond: FloatArray
     guess: Guess | None
+    like: Finding | None
 
 
 def diagnose(
@@ -134,11 +140,12 @@ def diagnose(
     rests = ensemble_of(data, base, noise=noise, members=members, seed=seed, progress=progress)
     level = white_level(runs, base, data.strain)
     first = Stage.of(data, base, catalogue, rests, level, {})
-    stage, named, count = rounds(data, first, catalogue, rests, level, progress)
+    stage, named, count, unlisted = rounds(data, first, catalogue, rests, level, progress)
+    like = None if unlisted is None else _finding(stage, unlisted, data)
     named = stage.model.needed(named)
     findings = _findings(first, named, stage.model, data)
     twins = inseparable(data, first, findings, named)
-    verdict, named = _verdict(named, twins, first, stage)
+    verdict, named = _verdict(named, twins, first, stage, like)
     last = stage if named else first
     left, floor = last.beyond, BEYOND
     beyond = last.unexplained(last.model.waveform[None] - data.strain)[0]
@@ -148,53 +155,66 @@ def diagnose(
             data.strain - last.model.waveform, last.model.waveform, data.points,
             left_of(data, last.model).edges, last.unexplained,
         )  # fmt: skip
+    extra = {effect.name for effect in UNLISTED} - {effect.name for effect in catalogue}
+    dead = {name: why for name, why in first.found.dead.items() if name not in extra}
     return Diagnosis(
-        verdict, tuple(named), findings, first.found.dead, base, last.model, left, floor, count,
-        runs, data, beyond, guess,
+        verdict, tuple(named), findings, dead, base, last.model, left, floor, count, runs, data,
+        beyond, guess, like,
     )  # fmt: skip
 
 
 def _findings(first: Stage, named: Sequence[str], model: Refit, data: Data) -> tuple[Finding, ...]:
-    ratio, inside, alarms, limit = first.ratio, first.in_range, first.alarms, first.threshold
-    scores = first.scores
     fitted = {effect.name: k for k, effect in enumerate(model.effects)}
-    rest = first.model.whiten(data.strain - first.model.waveform).ravel()
     rows = []
-    for i, candidate in enumerate(first.found.living):
-        name = candidate.effect.name
-        strength, std = scores.strength[i], scores.std[i]
+    for index, candidate in enumerate(first.found.living):
+        if candidate.effect in UNLISTED:
+            continue
+        row, name = _finding(first, index, data), candidate.effect.name
         if name in named:
-            strength, std = model.strengths[fitted[name]], model.strength_std(fitted[name])
-        rows.append(
-            Finding(
-                candidate.effect,
-                float(scores.score[i]),
-                float(limit[i]),
-                "alarm" if alarms[i] else "hint" if ratio[i] >= 1.0 else "quiet",
-                strength,
-                std,
-                bool(inside[i]),
-                float(scores.alone[i] / scores.misfit),
-                tuple(first.found.twins(i)),
-                first.ranking.power(i, ALARM * limit[i]),
-                candidate.error_left(rest),
-            )
-        )
+            k = fitted[name]
+            row = replace(row, strength=model.strengths[k], std=model.strength_std(k))
+        rows.append(row)
     order = {name: k for k, name in enumerate(named)}
     rows.sort(key=lambda f: (order.get(f.effect.name, len(order)), -f.score / f.threshold))
     return tuple(rows)
 
 
+def _finding(stage: Stage, index: int, data: Data) -> Finding:
+    """Return one candidate as a stage sees it."""
+    candidate, scores, limit = stage.found.living[index], stage.scores, stage.threshold[index]
+    rest = stage.model.whiten(data.strain - stage.model.waveform).ravel()
+    ratio = stage.ratio[index]
+    return Finding(
+        candidate.effect,
+        float(scores.score[index]),
+        float(limit),
+        "alarm" if stage.alarms[index] else "hint" if ratio >= 1.0 else "quiet",
+        scores.strength[index],
+        scores.std[index],
+        bool(stage.in_range[index]),
+        float(scores.alone[index] / scores.misfit),
+        _listed(stage.found.twins(index)),
+        stage.ranking.power(index, ALARM * limit),
+        candidate.error_left(rest),
+    )
+
+
+def _listed(twins: Sequence[tuple[str, float]]) -> tuple[tuple[str, float], ...]:
+    names = {effect.name for effect in UNLISTED}
+    return tuple(twin for twin in twins if twin[0] not in names)
+
+
 def _verdict(
-    named: list[str], twins: Sequence[str], first: Stage, last: Stage
+    named: list[str], twins: Sequence[str], first: Stage, last: Stage, like: Finding | None
 ) -> tuple[str, list[str]]:
     """Return the verdict and what it names."""
-    excess = first.scores.misfit - BEYOND * first.unit
-    left = last.scores.misfit - BEYOND * last.unit
+    excess = first.scores.misfit - first.unit
+    left = last.scores.misfit - last.unit
     beyond = last.beyond > BEYOND
     if not named:
-        return ("unknown" if beyond or last.outside >= OUTSIDE else "none"), []
-    if beyond and left > (1.0 - EXPLAINED) * excess:
+        outside = last.outside >= OUTSIDE or last.imitated >= BARELY
+        return ("unknown" if like or beyond or outside else "none"), []
+    if left > max((1.0 - EXPLAINED) * excess, 0.0):
         return "unknown", []
     if twins and len(named) == 1:
         return "indistinguishable", [named[0], *twins]

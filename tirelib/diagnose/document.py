@@ -214,8 +214,9 @@ def exceeds(told: Assessment) -> bool:
 
 def _unexplained(told: Assessment) -> dict[str, Any]:
     left, guess = told.left, told.diagnosis.guess
+    like = None if told.diagnosis.like is None else _like(told.diagnosis.like, told.unit)
     if not exceeds(told):
-        return {"where": None, "scaling": None, "guess": None}
+        return {"where": None, "scaling": None, "guess": None, "like": like}
     start, stop = np.rad2deg(left.span)
     return {
         "where": {
@@ -235,7 +236,30 @@ def _unexplained(told: Assessment) -> dict[str, Any]:
             },
         },
         "guess": None if guess is None else _guess(guess),
+        "like": like,
     }
+
+
+def _like(like: Finding, unit: ErrorUnit) -> dict[str, Any]:
+    return {
+        "title": like.effect.title,
+        "score": like.score,
+        "threshold": like.threshold,
+        "strength": _plain(like.strength),
+        "std": _plain(like.std),
+        "unit": like.effect.unit,
+        "error_after": unit.factor * like.error_after,
+    }
+
+
+def told_like(like: Finding) -> str:
+    """Say what the residual looks like."""
+    title, unit = like.effect.title.rstrip("."), like.effect.unit.removeprefix("1")
+    size = f"{float(like.strength[0]):.3g} +- {float(like.std[0]):.1g} {unit}".strip()
+    return (
+        f"it looks like a {title[0].lower()}{title[1:]} ({size}, {like.score / like.threshold:.0f} "
+        "times what variants do), which no catalogue holds"
+    )
 
 
 def _gages(told: Assessment) -> list[dict[str, float]]:
@@ -287,6 +311,11 @@ def next_test(told: Assessment) -> dict[str, Any]:
         differ = sorted(every - common) or sorted(every)
         what = f"more levels of {_and(differ)}, to the ends that the rig allows: there " + (
             f"{_and(between)} part" if len(between) > 1 else "it shows"
+        )
+    elif told.diagnosis.like is not None and told.unit.known:
+        what = (
+            f"{told_like(told.diagnosis.like)}: check the gages' bond and amplifier, or write it "
+            "as an effect of your own (--effects) and add it"
         )
     elif told.verdict == "form_inadequate":
         what = (

@@ -21,6 +21,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.refit import Refit
+from tirelib.diagnose.unlisted import gain_by_load, gain_by_pressure, gain_by_speed
 from tirelib.effects import CATALOGUE
 from tirelib.effects.effect import State
 from tirelib.effects.patch import along, balanced, beam_strain, held_shear
@@ -47,10 +48,18 @@ WIDEST = 0.01
 """Largest standard deviation of the angle's zero that counts as structure, [rad]."""
 LARGE = 0.3
 """Relative standard deviation of the part that large displacements add."""
-ALIKE = {"gage_length": 200.0, "roughness": 0.03, "gage_saturation": 1.2e-3}
+ALIKE = {
+    CATALOGUE["gage_length"]: 200.0,
+    CATALOGUE["roughness"]: 0.03,
+    CATALOGUE["gage_saturation"]: 1.2e-3,
+    gain_by_load: 0.0075,
+    gain_by_pressure: 0.01,
+    gain_by_speed: 0.004,
+}
 """Standard deviation, in their units, of what a tire's structure shows that looks like these
 effects: the contact's ends are sharper or smoother than the ring's, contact begins gradually across
-a crowned tread, and strain is not quite in proportion to the belt's curvature."""
+a crowned tread, strain is not quite in proportion to the belt's curvature, and what changes the
+contact most (load, pressure, speed) changes its strain by a little more or less than the ring's."""
 SECTIONS = 8e-5
 """Largest inertia of the belt's sections, [kg m]: twice that of 12.5 mm of belt and tread."""
 MASS = 0.15
@@ -205,8 +214,7 @@ def _by_load(data: Data, model: Refit) -> FloatArray:
 def _alike(data: Data, model: Refit) -> FloatArray:
     """Return what one standard deviation of `ALIKE` changes, (n, n_runs, n_phi)."""
     rows = []
-    for name, size in ALIKE.items():
-        effect = CATALOGUE[name]
+    for effect, size in ALIKE.items():
         state = predict(
             model.values, data.points, [*model.changes, effect.at(effect.step)],
             low_pass=data.low_pass, correction=model.correction,

@@ -12,9 +12,12 @@ from tirelib.effects import Effect
 from tirelib.errors import TirelibError
 from tirelib.identify.waveform_fit import Data
 
-FURTHER = 8.0
+FURTHER = 6.0
 """What `ALARM` is to the first effect, for a further one."""
-ROUGH = 0.02
+CLEAR = 1.5
+"""Times what imitates the impossible that a further effect has to reach; the first has to exceed
+it."""
+ROUGH = 0.01
 """Share of the misfit that effects took away by which their laws may be off beside `FORM`."""
 ROUNDS = 3
 
@@ -26,8 +29,10 @@ def rounds(
     rests: Variants,
     noise: float,
     progress: Callable[[str], None] | None,
-) -> tuple[Stage, list[str], int]:
+) -> tuple[Stage, list[str], int, int | None]:
     """Add the leaders one after the other as long as the exact refit needs them.
+
+    It ends where the exact refit needs something most that is in no catalogue.
 
     Parameters
     ----------
@@ -48,6 +53,8 @@ def rounds(
         In the order in which they were added; those that a later one replaces are gone.
     count : int
         Of rounds.
+    unlisted : int or None
+        Index of that candidate of the stage.
     """
     # the joint ranking sees all effects at once: who is no hint now is no suspect later
     hints = first.in_range & (first.scores.score >= first.limit)
@@ -66,16 +73,25 @@ def rounds(
     named: list[str] = []
     stage, count = first, 0
     while count < ROUNDS:
-        found = _added(first, stage, stage.leaders(suspects, FURTHER if named else ALARM), fitted)
+        found = _added(first, stage, _leaders(stage, suspects, named), fitted)
         if found is None:
             break
-        stage, name = found
+        after, index = found
+        name = stage.names[index]
+        if stage.unlisted[index]:
+            return stage, named, count, index
+        stage = after
         suspects.discard(name)
         count += 1
         named.append(name)
         stage, gone = _thinned(stage, named[:-1], least, fitted)
         named = [name for name in named if name not in gone]
-    return stage, named, count
+    return stage, named, count, None
+
+
+def _leaders(stage: Stage, suspects: set[str], named: Sequence[str]) -> list[int]:
+    bar, clear = (FURTHER, CLEAR) if named else (ALARM, 1.0)
+    return stage.leaders(suspects, bar, clear)
 
 
 _Fit = Callable[[Stage, Sequence[Effect], Sequence[FloatArray]], Stage | None]
@@ -83,9 +99,9 @@ _Fit = Callable[[Stage, Sequence[Effect], Sequence[FloatArray]], Stage | None]
 
 def _added(
     first: Stage, stage: Stage, leaders: Sequence[int], fitted: _Fit
-) -> tuple[Stage, str] | None:
-    """Return the stage with the leader whose exact refit leaves least, and its name."""
-    best: tuple[Stage, str] | None = None
+) -> tuple[Stage, int] | None:
+    """Return the stage with the leader whose exact refit leaves least, and its index."""
+    best: tuple[Stage, int] | None = None
     model = stage.model
     for index in leaders:
         effect, strength = stage.found.living[index].effect, stage.scores.strength[index]
@@ -101,7 +117,7 @@ def _added(
         ):
             continue
         if best is None or after.scores.misfit < best[0].scores.misfit:
-            best = after, effect.name
+            best = after, index
     return best
 
 

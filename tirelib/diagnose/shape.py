@@ -11,6 +11,7 @@ from tirelib.arrays import FloatArray
 from tirelib.diagnose.ensemble import Variants, measured, run_part, smooth_part
 from tirelib.diagnose.refit import Refit
 from tirelib.diagnose.structure import FORM, Structure, spread_of
+from tirelib.identify.random_effects import angle_slope
 from tirelib.identify.waveform_fit import Data
 
 SMALL, LEAST = 0.3, 0.5
@@ -37,9 +38,10 @@ def structure_of(data: Data, model: Refit, rests: Variants, noise: float) -> Str
 
 
 def form_rows(model: Refit) -> FloatArray:
-    """Return how a model's effects may be off in each run, (2 * n_effects * n_runs, n).
+    """Return how a model's effects may be off in each run, (3 * n_effects * n_runs, n).
 
-    By a factor, and by a power of the harmonics' order: another law acts on other wavelengths.
+    By a factor; by a power of the harmonics' order, for another law acts on other wavelengths; and
+    by its place on the wheel.
     """
     samples = model.waveform.size
     rows: list[FloatArray] = []
@@ -49,8 +51,16 @@ def form_rows(model: Refit) -> FloatArray:
         first += effect.components
         change = model.whiten(np.tensordot(strength / effect.scale, slopes, axes=1))
         change = filled(change)
-        rows.append(run_by_run(FORM * np.stack([change, finer(change)], axis=1)))
+        rows.append(run_by_run(FORM * np.stack([change, finer(change), moved(change)], axis=1)))
     return np.concatenate(rows) if rows else np.zeros((0, samples))
+
+
+def moved(change: FloatArray) -> FloatArray:
+    """Return the slope of changes (n_runs, n_phi) by their place on the wheel, as large."""
+    slope = angle_slope(change)
+    size, norm = (np.linalg.norm(x, axis=1, keepdims=True) for x in (change, slope))
+    out: FloatArray = slope * size / np.maximum(norm, 1e-300)
+    return out
 
 
 def run_by_run(changes: FloatArray) -> FloatArray:

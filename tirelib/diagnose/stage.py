@@ -12,14 +12,15 @@ from tirelib.diagnose.ranking import Ranking, Scores, limits
 from tirelib.diagnose.refit import Refit
 from tirelib.diagnose.shape import structure_of
 from tirelib.diagnose.structure import FORM, LEAST
+from tirelib.diagnose.unlisted import UNLISTED
 from tirelib.effects import Effect
 from tirelib.identify.waveform_fit import Data
 
 ALARM = 3.5
 """Score over the variants' largest from which an effect is an alarm; from 1 on it is a hint."""
-NEAR, RIVALS = 0.3, 3
-"""Share of the best ratio from which an alarm is a rival of the leader, to be refitted as well, and
-how many are at most."""
+NEAR, ALONE, RIVALS = 0.3, 0.6, 3
+"""Shares of the leader's ratio, or of what it takes away alone, from which a hint is its rival and
+refitted as well; and how many are refitted at most."""
 USUAL = 0.05
 """Share of s^2 in every sample that structure outside the ensemble leaves at most."""
 RANGE_SLACK = 2.0
@@ -44,9 +45,13 @@ class Stage:
     noise : float, [-]
         Of a whitened sample.
     in_range : shape (n_candidates,)
-        Whether a strength is plausible, its sign included.
+        Whether an effect may be named: in the catalogue, with a plausible strength and sign.
+    impossible : shape (n_candidates,)
+        Whether an effect of the catalogue lies outside its range.
     far : shape (n_candidates,)
         Whether it lies farther outside than structure imitates.
+    unlisted : shape (n_candidates,)
+        Whether it is in no catalogue, and like nothing there.
     """
 
     model: Refit
@@ -56,7 +61,9 @@ class Stage:
     limit: FloatArray
     noise: float
     in_range: BoolArray
+    impossible: BoolArray
     far: BoolArray
+    unlisted: BoolArray
 
     @classmethod
     def of(
@@ -78,16 +85,20 @@ class Stage:
         least : mapping of name to float
             Limits that hold already: no effect added makes one smaller.
         """
-        found = candidates(data, model, catalogue)
+        listed = {effect.name for effect in (*catalogue, *model.effects)}
+        others = [effect for effect in UNLISTED if effect.name not in listed]
+        found = candidates(data, model, [*catalogue, *others])
         ranking = Ranking(model, found, structure_of(data, model, rests, noise))
         scores = ranking.scores(data.strain - model.waveform)
         members = ranking.of_members()
         names = [candidate.effect.name for candidate in found.living]
+        extra = np.array([each.effect in UNLISTED for each in found.living], dtype=bool)
+        fits = plausible(found, scores)
         bound = np.array([least.get(name, 0.0) for name in names])
         return cls(
             model, found, ranking, scores, np.maximum(limits(members), bound),
-            noise, plausible(found, scores),
-            ~plausible(found, scores, IMITATION),
+            noise, fits & ~extra, ~fits & ~extra, ~plausible(found, scores, IMITATION) & ~extra,
+            extra & ~_has_twin(found),
         )  # fmt: skip
 
     @property
@@ -125,17 +136,22 @@ class Stage:
         """Effects in range whose scores no variant comes near."""
         return np.asarray(self.in_range & (self.ratio >= ALARM))
 
-    def leaders(self, suspects: set[str], bar: float) -> list[int]:
-        """Return the indices of suspects among the alarms from a ratio on, best first.
+    def leaders(self, suspects: set[str], bar: float, clear: float) -> list[int]:
+        """Return the indices of an alarm from a ratio on and of its rivals, best first.
 
-        None if an effect outside its range explains more: then none inside does. Those whose ratio
-        is less than `NEAR` of the best's are left out.
+        None if its ratio is not `clear` times that of every effect outside its range: what imitates
+        the impossible so well on this tire may imitate the possible. Rivals are hints among the
+        suspects, or in no catalogue, that come near in the ratio or in what they take away alone:
+        which of them it is, only an exact refit tells.
         """
-        ratio = self.ratio
-        fit = self.alarms & (ratio >= bar) & np.isin(self.names, list(suspects))
-        if not fit.any() or self.outside > float(ratio[fit].max()):
+        ratio, alone = self.ratio, self.scores.alone
+        known = (self.in_range & np.isin(self.names, list(suspects))) | self.unlisted
+        fit = known & (ratio >= max(bar, ALARM))
+        if not fit.any() or clear * self.imitated > float(ratio[fit].max()):
             return []
-        fit &= ratio >= NEAR * ratio[fit].max()
+        best = int(np.argmax(np.where(fit, ratio, 0.0)))
+        near = (ratio >= NEAR * ratio[best]) | (alone >= ALONE * alone[best])
+        fit = known & near & (ratio >= 1.0)
         ranked = np.argsort(np.where(fit, -ratio, np.inf))[: int(fit.sum())]
         return [int(index) for index in ranked[:RIVALS]]
 
@@ -145,9 +161,21 @@ class Stage:
         return self.ranking.structure.beyond(rows).reshape(waves.shape)
 
     @property
+    def imitated(self) -> float:
+        """Largest ratio of an effect outside its range."""
+        return float(np.max(self.ratio, where=self.impossible, initial=0.0))
+
+    @property
     def outside(self) -> float:
         """Largest ratio of an effect far outside its range."""
         return float(np.max(np.where(self.far, self.ratio, 0.0), initial=0.0))
+
+
+def _has_twin(found: Candidates) -> BoolArray:
+    """Return which candidates look like an effect of the catalogue."""
+    names = {effect.name for effect in UNLISTED}
+    twins = [[name for name, _ in found.twins(k)] for k in range(len(found.living))]
+    return np.array([bool(set(each) - names) for each in twins], dtype=bool)
 
 
 def plausible(found: Candidates, scores: Scores, share: float = 0.0) -> BoolArray:

@@ -3,10 +3,11 @@
 import numpy as np
 
 from tirelib.effects.effect import State, effect
+from tirelib.effects.harmonics import orders, with_gain
 
 
 @effect(
-    "angle_zero", stage="strain", unit="rad", low=-0.03, high=0.03,
+    "angle_zero", stage="gage", unit="rad", low=-0.03, high=0.03,
     source="trigger mounted off the top of the wheel; gages glued off their mark",
 )  # fmt: skip
 def angle_zero(state: State, strength: float) -> State:
@@ -14,5 +15,4 @@ def angle_zero(state: State, strength: float) -> State:
 
     The whole waveform comes later by s, at every speed.
     """
-    n = np.arange(state.strain.shape[1])
-    return state.but(strain=state.strain * np.exp(-1j * n * strength))
+    return with_gain(state, np.exp(-1j * orders(state)[None] * strength))

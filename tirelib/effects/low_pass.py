@@ -1,12 +1,11 @@
 """Lag of the amplifier."""
 
-import numpy as np
-
 from tirelib.effects.effect import State, effect
+from tirelib.effects.harmonics import orders, with_gain
 
 
 @effect(
-    "low_pass", stage="strain", unit="ms", low=0.0, high=1.0, varies_with=("speed",),
+    "low_pass", stage="gage", unit="ms", low=0.0, high=1.0, varies_with=("speed",),
     source="first-order lag; 1 ms is a corner at 160 Hz",
 )  # fmt: skip
 def low_pass(state: State, strength: float) -> State:
@@ -14,6 +13,5 @@ def low_pass(state: State, strength: float) -> State:
 
     Harmonic n over 1 + i n Omega s: later with speed, and smaller.
     """
-    n = np.arange(state.strain.shape[1])
-    lag = 1e-3 * strength * n * state.conditions.omega[:, None]
-    return state.but(strain=state.strain / (1.0 + 1j * lag))
+    lag = 1e-3 * strength * orders(state) * state.conditions.omega[:, None]
+    return with_gain(state, 1.0 / (1.0 + 1j * lag))

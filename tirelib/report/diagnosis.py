@@ -8,7 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from tirelib.diagnose.diagnose import Finding
-from tirelib.diagnose.document import Assessment, exceeds, next_test
+from tirelib.diagnose.document import Assessment, exceeds, next_test, told_like
 from tirelib.diagnose.held_out import pooled
 from tirelib.diagnose.left import Left, left_of
 from tirelib.diagnose.stage import ALARM
@@ -170,10 +170,14 @@ def _errors(told: Assessment) -> Table:
 
 
 def _left_text(told: Assessment) -> str:
+    like, guess = told.diagnosis.like, told.diagnosis.guess
+    looks = f" Of what is missing: {told_like(like)}." if like is not None else ""
     if not exceeds(told):
-        return "What is left is no more than variants of the model without any effect leave."
+        return (
+            "What is left is no more than variants of the model without any effect leave." + looks
+        )
     text = f"What structure does not explain stands {told.left.where}; it {told.left.scaling}."
-    guess = told.diagnosis.guess
+    text += looks
     if guess is not None:
         text += (
             f" A guess by sparse regression, measured less model: {guess.law} "

@@ -116,7 +116,9 @@ def _told(verdict: str, *named: str) -> Any:
     findings = [SimpleNamespace(effect=CATALOGUE[name]) for name in named]
     return SimpleNamespace(
         verdict=verdict, named=named, findings=findings,
-        diagnosis=SimpleNamespace(dead={"camber": "no run has a camber", "gage_gain": "always"}),
+        diagnosis=SimpleNamespace(
+            dead={"camber": "no run has a camber", "gage_gain": "always"}, like=None
+        ),
         left=SimpleNamespace(where="in the contact", scaling="grows with load"),
         unit=SimpleNamespace(known=True),
     )  # fmt: skip

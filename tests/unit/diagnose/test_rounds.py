@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tirelib.diagnose import rounds
-from tirelib.diagnose.stage import ALARM, NEAR, Stage
+from tirelib.diagnose.diagnose import BARELY, EXPLAINED, OUTSIDE, _verdict
+from tirelib.diagnose.stage import ALARM, ALONE, NEAR, Stage
 
 NAMES = ("strong", "close", "weak")
 LEFT = {(): 1000.0, ("strong",): 500.0, ("close",): 300.0, ("weak",): 990.0}
@@ -54,10 +55,10 @@ FIRST = stage((), 1000.0, [400.0, 390.0, 5.0])
 def test_of_near_leaders_the_one_whose_exact_refit_leaves_least_is_added() -> None:
     found = rounds._added(FIRST, FIRST, [0, 1], fit(LEFT))
     assert found is not None
-    assert found[1] == "close"
+    assert FIRST.names[found[1]] == "close"
     alone = rounds._added(FIRST, FIRST, [0], fit(LEFT))
     assert alone is not None
-    assert alone[1] == "strong"
+    assert FIRST.names[alone[1]] == "strong"
 
 
 def test_a_leader_that_the_exact_refit_does_not_need_is_not_added() -> None:
@@ -89,13 +90,76 @@ def test_an_effect_that_a_later_one_replaces_goes() -> None:
     assert kept is both
 
 
-@pytest.mark.parametrize(("outside", "told"), [(0.0, [0, 1]), (30.0, [])])
+def judged(ratio: Sequence[float], alone: Sequence[float], outside: float = 0.0) -> Any:
+    """Return a stage as far as its leaders go; all but the last may be named."""
+    names = [*NAMES, "impossible"]
+    return SimpleNamespace(
+        ratio=np.array([*ratio, outside]), in_range=np.array([True, True, True, False]),
+        imitated=outside, unlisted=np.zeros(4, dtype=bool),
+        names=names, scores=SimpleNamespace(alone=np.array([*alone, 0.0])),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("outside", "told"), [(0.0, [0, 1]), (19.9, [0, 1]), (20.1, [])])
 def test_leaders_are_near_the_best_and_none_where_an_impossible_effect_explains_more(
     outside: float, told: list[int]
 ) -> None:
-    ratio = np.array([20.0, 20.0 * NEAR + 0.1, 20.0 * NEAR - 0.1, outside])
-    judged = SimpleNamespace(
-        ratio=ratio, alarms=np.array([True, True, True, False]), outside=outside,
-        names=[*NAMES, "impossible"],
+    ratio = [20.0, 20.0 * NEAR + 0.1, 20.0 * NEAR - 0.1]
+    stage = judged(ratio, [100.0, 0.0, 0.0], outside)
+    assert Stage.leaders(stage, set(stage.names), ALARM, 1.0) == told
+
+
+def test_a_hint_that_takes_away_as_much_alone_is_a_rival_however_little_it_adds_to_the_others() -> (
+    None
+):
+    stage = judged([20.0, 0.9, 1.1], [100.0, 100.0 * ALONE + 1.0, 100.0 * ALONE + 1.0])
+    assert Stage.leaders(stage, set(stage.names), ALARM, 1.0) == [0, 2]
+    less = judged([20.0, 0.9, 1.1], [100.0, 0.0, 100.0 * ALONE - 1.0])
+    assert Stage.leaders(less, set(less.names), ALARM, 1.0) == [0]
+
+
+def test_a_further_effect_has_to_be_clear_of_what_imitates_the_impossible() -> None:
+    for outside, told in ((9.9, [0]), (10.1, [])):
+        stage = judged([20.0, 0.0, 0.0], [100.0, 0.0, 0.0], outside)
+        assert Stage.leaders(stage, set(stage.names), ALARM, 2.0) == told
+
+
+def test_what_is_in_no_catalogue_contends_without_being_a_suspect() -> None:
+    stage = judged([20.0, 19.0, 0.0], [100.0, 90.0, 0.0])
+    stage.unlisted[1], stage.in_range[1] = True, False
+    assert Stage.leaders(stage, {NAMES[0]}, ALARM, 1.0) == [0, 1]
+
+
+def test_hints_alone_have_no_leader() -> None:
+    stage = judged([ALARM - 0.1, 2.0, 1.0], [100.0, 100.0, 100.0])
+    assert Stage.leaders(stage, set(stage.names), ALARM, 1.0) == []
+
+
+@pytest.mark.parametrize(
+    ("outside", "imitated", "verdict"),
+    [
+        (OUTSIDE - 0.1, BARELY - 0.1, "none"),
+        (OUTSIDE + 0.1, 0.0, "unknown"),
+        (0.0, BARELY + 0.1, "unknown"),
+    ],
+)
+def test_what_cannot_be_but_explains_tells_of_something_unknown(
+    outside: float, imitated: float, verdict: str
+) -> None:
+    scores = SimpleNamespace(misfit=1.0)
+    stage = SimpleNamespace(
+        scores=scores, unit=1.0, beyond=1.0, outside=outside, imitated=imitated
     )  # fmt: skip
-    assert Stage.leaders(judged, set(judged.names), ALARM) == told
+    assert _verdict([], (), stage, stage, None) == (verdict, [])
+
+
+@pytest.mark.parametrize(("left", "verdict"), [(2.9, "named"), (3.1, "unknown")])
+def test_what_explains_too_little_of_the_misfit_is_not_what_is_missing(
+    left: float, verdict: str
+) -> None:
+    # of 10 units over the usual one, 2 may be left
+    assert pytest.approx(0.8) == EXPLAINED
+    first = SimpleNamespace(scores=SimpleNamespace(misfit=11.0), unit=1.0)
+    last = SimpleNamespace(scores=SimpleNamespace(misfit=left), unit=1.0, beyond=1.0)
+    told = _verdict(["strong"], (), first, last, None)
+    assert told == (verdict, ["strong"] if verdict == "named" else [])

@@ -8,7 +8,7 @@ import pytest
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.ranking import Ranking
-from tirelib.diagnose.shape import LEAST, filled, finer, run_by_run
+from tirelib.diagnose.shape import LEAST, filled, finer, moved, run_by_run
 from tirelib.diagnose.structure import Structure
 
 SAMPLES, MEMBERS, NOISE = 40, 6, 0.5
@@ -142,6 +142,14 @@ def test_another_power_of_the_wave_number_is_what_a_law_may_be_off_by() -> None:
     change = np.cos(2.0 * angle) + np.cos(8.0 * angle)
     # 2 and 8 are as far from their mean, 4: one falls, the other grows
     assert finer(change[None])[0] == pytest.approx(np.cos(8.0 * angle) - np.cos(2.0 * angle))
+
+
+def test_an_effect_at_another_place_differs_by_its_slope() -> None:
+    angle = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
+    change = np.stack([np.sin(3.0 * angle), 5.0 * np.sin(angle)])
+    expected = np.stack([np.cos(3.0 * angle), 5.0 * np.cos(angle)])
+    assert moved(change) == pytest.approx(expected)
+    assert np.all(moved(np.zeros((2, SAMPLES))) == 0.0)
 
 
 def test_what_is_off_in_a_run_is_off_in_no_other() -> None:
