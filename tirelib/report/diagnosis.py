@@ -43,6 +43,8 @@ def answer_of(told: Assessment) -> str:
         f"the error falls from {number(told.error_before, 3)} to {number(told.error_after, 3)} "
         f"(floor {number(told.floor, 3)})"
     )
+    like = told.diagnosis.like
+    looks = "" if like is None else f" Here {told_like(like)}."
     return {
         "none": "No effect stands out: the error "
         f"{number(told.error_before, 3)} (floor {number(told.floor, 3)}) is no reason to name one.",
@@ -52,7 +54,7 @@ def answer_of(told: Assessment) -> str:
         "indistinguishable": f"One of {names} is missing; this campaign cannot tell which. With "
         f"{told.named[0] if told.named else 'it'} {fall}.",
         "unknown": "Something is missing that no effect of the catalogue explains; error "
-        f"{number(told.error_before, 3)} (floor {number(told.floor, 3)}).",
+        f"{number(told.error_before, 3)} (floor {number(told.floor, 3)}).{looks}",
     }[told.verdict]
 
 
@@ -171,7 +173,7 @@ def _errors(told: Assessment) -> Table:
 
 def _left_text(told: Assessment) -> str:
     like, guess = told.diagnosis.like, told.diagnosis.guess
-    looks = f" Of what is missing: {told_like(like)}." if like is not None else ""
+    looks = f" Of what is missing, {told_like(like)}." if like is not None else ""
     if not exceeds(told):
         return (
             "What is left is no more than variants of the model without any effect leave." + looks

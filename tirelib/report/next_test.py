@@ -161,7 +161,7 @@ def _map(test: NextTest, pair: PairForecast) -> Plot:
             go.Heatmap(
                 z=np.round(grid, 3), x=across, y=upward, customdata=np.round(chance),
                 coloraxis="coloraxis", hovertemplate=_hover(names[x], names[y]),
-                texttemplate="%{z:.2g}", textfont={"size": 11},
+                texttemplate="%{z:.2~r}", textfont={"size": 11},
             ),
             row=1, col=column,
         )  # fmt: skip
