@@ -224,7 +224,7 @@ def parse_conditions(document: Any, where: str) -> Conditions:
         runs = tuple(_mark(entry) for entry in document["runs"])
         loop = int(document["loop_us"])
         campaign = None if document.get("campaign") is None else dict(document["campaign"])
-    except (KeyError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, OverflowError, TypeError, ValueError) as error:
         raise DeviceError(
             f"{where}: {type(error).__name__} {error}; t_us, speed, pressure, camber, runs and "
             "loop_us are needed, lists of one length; write it anew with `tirebench emulate`"

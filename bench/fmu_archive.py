@@ -61,16 +61,9 @@ class FmuArchive:
                 "ASCII letters is needed; set TMPDIR"
             )
         try:
-            # zipfile raises NotImplementedError for a compression that it does not know
             with zipfile.ZipFile(io.BytesIO(self.content)) as archive:
                 archive.extractall(folder.name)
-        except (zipfile.BadZipFile, OSError, EOFError, ValueError, NotImplementedError) as error:
-            folder.cleanup()
-            raise FmuError(
-                f"{self.path}: it cannot be unpacked ({error}); a sound archive is needed; "
-                "build the FMU again"
-            ) from None
-        except Exception as error:  # zlib.error and others that damaged data provoke
+        except Exception as error:  # of zipfile, zlib, lzma ...: damage provokes each of them
             folder.cleanup()
             raise FmuError(
                 f"{self.path}: it cannot be unpacked ({error}); a sound archive is needed; "
@@ -96,7 +89,7 @@ def read_fmu(path: Path) -> FmuArchive:
             f"{path}: it cannot be read ({error.strerror}); an FMU of `tirelib fmu build` is "
             "needed; check the path"
         ) from None
-    except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:  # unknown compression
+    except (zipfile.BadZipFile, ValueError, RuntimeError) as error:  # the last: a newer format
         raise FmuError(
             f"{path}: it is no FMU ({error}); a zip archive is needed; build it with "
             "`tirelib fmu build`"

@@ -22,7 +22,7 @@ rig is steady at each of them: transients of the tire (relaxation) are not in it
 import csv
 import math
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -33,10 +33,10 @@ import numpy as np
 from bench.errors import DeviceError, cause
 from bench.rig.measure import Chain, gages
 from bench.rig.observe import forces, trace
-from bench.rig.solve import State, solve
+from bench.rig.solve import LIMITS, State, solve
 from bench.rig.tire import TIRES, Condition, RigTire
 from tirelib.arrays import FloatArray
-from tirelib.units import to_si
+from tirelib.units import from_si, to_si
 
 FORMAT = "tirebench-manoeuvre/1"
 COLUMNS: Mapping[str, tuple[str, str, str]] = {
@@ -122,7 +122,7 @@ def read_manoeuvre(path: Path) -> Manoeuvre:
     try:
         text = path.read_text(encoding="utf-8")
         if path.suffix.lower() == ".csv":
-            rows: list[dict[str, Any]] = list(csv.DictReader(text.splitlines()))
+            rows: list[Any] = list(csv.DictReader(text.splitlines()))
             tire = "reference"
         else:
             document = tomllib.loads(text)
@@ -142,44 +142,84 @@ def read_manoeuvre(path: Path) -> Manoeuvre:
     return Manoeuvre(TIRES[tire], _points(rows, str(path)))
 
 
-def _points(rows: Sequence[dict[str, Any]], where: str) -> dict[int | None, tuple[Point, ...]]:
+def _points(rows: Sequence[Any], where: str) -> dict[int | None, tuple[Point, ...]]:
     faults: list[str] = []
-    points: dict[int | None, list[Point]] = {}
-    for number, row in enumerate(rows, start=1):
-        here = f"{where}: point {number}"
-        given = {k: v for k, v in row.items() if v not in (None, "")}
-        for key in sorted(set(given) - {*COLUMNS, "t_s", "wheel"}):
-            faults.append(f"{here}: {key} is not known; t_s, wheel, {', '.join(COLUMNS)} are; "
-                          "correct the spelling")  # fmt: skip
-        for key in REQUIRED:
-            if key not in given:
-                faults.append(f"{here}: {key} is missing; a number is needed; write it")
-        try:
-            values = {k: float(v) for k, v in given.items() if k in COLUMNS or k == "t_s"}
-            wheel = int(given["wheel"]) if "wheel" in given else None
-        except (TypeError, ValueError) as error:
-            faults.append(f"{here}: {error}; numbers are needed; correct it")
-            continue
-        if any(not math.isfinite(x) for x in values.values()) or faults:
-            faults.append(f"{here}: {given}; finite numbers are needed; correct it")
-            continue
-        si = {name: float(to_si(values[key], unit, dimension))
-              for key, (name, unit, dimension) in COLUMNS.items() if key in values}  # fmt: skip
-        points.setdefault(wheel, []).append(Point(values["t_s"], Condition(**{**USUAL, **si})))
-    for wheel, own in points.items():
-        times = [point.time for point in own]
-        if len(own) < 2 or times[0] != 0.0 or any(b <= a for a, b in pairwise(times)):
-            faults.append(f"{where}: times {times[:5]} of wheel {wheel}; at least two are needed, "
-                          "growing from 0; correct them")  # fmt: skip
-        free = {point.condition.slip_ratio is None for point in own}
-        if len(free) > 1:
-            faults.append(f"{where}: slip_ratio of wheel {wheel} is given at some points only; all "
-                          "or none; complete it")  # fmt: skip
     if not rows:
         faults.append(f"{where}: there is no point; two at least are needed; write them")
+    points: dict[int | None, list[Point]] = {}
+    unknown: set[str] = set()
+    for number, row in enumerate(rows, start=1):
+        here = f"{where}: point {number}"
+        if not isinstance(row, dict):
+            faults.append(f"{here}: {row!r}; a table is needed; begin each with [[point]]")
+            continue
+        given = {str(k): v for k, v in row.items() if v not in (None, "")}
+        said = [_unknown(key, here) for key in given if key not in (*COLUMNS, "t_s", "wheel")
+                and key not in unknown]  # fmt: skip
+        unknown |= set(given)
+        said += [f"{here}: {key} is missing; a number is needed; write it"
+                 for key in REQUIRED if key not in given]  # fmt: skip
+        wheel, point = _point(given, here, said)
+        faults += said
+        if point is not None and not said:
+            points.setdefault(wheel, []).append(point)
+    if not faults:
+        faults = [fault for wheel, own in points.items() for fault in _order(wheel, own, where)]
     if faults:
         raise DeviceError(faults)
     return {wheel: tuple(own) for wheel, own in points.items()}
+
+
+def _unknown(key: str, here: str) -> str:
+    """Say that a column is none of ours, and which one means the same in another unit."""
+    if key == "None":
+        return f"{here}: more values than columns; as many are needed; correct the line"
+    meant = [column for column in COLUMNS if column.rpartition("_")[0] == key.rpartition("_")[0]]
+    hint = f"give {meant[0]}, in its unit" if meant else "correct the spelling"
+    return f"{here}: {key} is not known; t_s, wheel, {', '.join(COLUMNS)} are; {hint}"
+
+
+def _point(
+    given: Mapping[str, Any], here: str, faults: list[str]
+) -> tuple[int | None, Point | None]:
+    """Return wheel and point of a row; add what is wrong with its numbers to the faults."""
+    si: dict[str, float] = {}
+    for key in (key for key in given if key in COLUMNS):
+        name, unit, dimension = COLUMNS[key]
+        low, high = (float(from_si(limit, unit, dimension)) for limit in LIMITS[name])
+        value = _number(given[key])
+        if low <= value <= high:
+            si[name] = float(to_si(value, unit, dimension))
+        else:
+            faults.append(f"{here}: {key} = {given[key]}; a number from {low:g} to {high:g} is "
+                          "needed; correct it")  # fmt: skip
+    wheel, time = _number(given.get("wheel", -1.0)), _number(given.get("t_s", 0.0))
+    if not math.isfinite(time):
+        faults.append(f"{here}: t_s = {given['t_s']}; seconds are needed; correct it")
+    if not wheel.is_integer():
+        faults.append(f"{here}: wheel = {given['wheel']}; a whole number is needed; correct it")
+    if faults:
+        return None, None
+    return int(wheel) if "wheel" in given else None, Point(time, Condition(**{**USUAL, **si}))
+
+
+def _number(value: Any) -> float:
+    """Return a value of a file as a number; NaN where it is none."""
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        return math.nan
+
+
+def _order(wheel: int | None, points: Sequence[Point], where: str) -> Iterator[str]:
+    """Yield what is wrong with the points of a wheel together."""
+    of = "" if wheel is None else f" of wheel {wheel}"
+    times = [point.time for point in points]
+    if len(points) < 2 or times[0] != 0.0 or any(b <= a for a, b in pairwise(times)):
+        yield (f"{where}: times {times[:5]}{of}; at least two are needed, growing from 0; "
+               "correct them")  # fmt: skip
+    if len({point.condition.slip_ratio is None for point in points}) > 1:
+        yield f"{where}: slip_ratio{of} is given at some points only; all or none; complete it"
 
 
 def nodes(points: Sequence[Point]) -> tuple[Point, ...]:

@@ -20,7 +20,7 @@ metadata        ``end``              why the run ended
 
 import json
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -145,8 +145,8 @@ class Recorder:
             return
         try:
             self._writer.add_metadata("end", {"reason": reason})
-            # mcap leaves this one method without annotations
-            self._writer.finish()  # type: ignore[no-untyped-call]  # mcap states no types here
+            finish: Callable[[], None] = self._writer.finish  # mcap has no annotation here
+            finish()
             self._file.close()
         except OSError as error:
             raise _unwritable(self.path, error) from None

@@ -21,11 +21,11 @@ from typing import Any
 
 import numpy as np
 from bench_demo import ready_fmu
+from bench_limits import show
 from bench_page import address_of, fetch, launched
 from bench_processes import Listener, Meter, alive, end, roles
 from demo import PROGRAMS, ROOT, Steps
 from rich.console import Console
-from rich.table import Table
 
 from bench.recording import Recording
 
@@ -49,23 +49,26 @@ PLUGGED = 1.5
 """How long the cable is in, [s]."""
 PATIENCE = 120.0
 LEAVE = 20.0  # [s] for what a run has started to end after it was killed
+CHRT = ("chrt", "--rr", "5")
+"""Real-time priority for a wheel; a run asks for it itself."""
 LOST = ("lost_frames", "lost_samples", "crc_bad", "framing_bad", "overruns", "gaps", "resets")
 
 
 @dataclass
 class Bench:
-    """Starts programs in a folder, `before` in front of each; whatever is left is ended."""
+    """Starts programs in a folder, at real-time priority if asked; whatever is left is ended."""
 
     out: Path
     fmu: Path
-    before: tuple[str, ...] = ()
+    realtime: bool = False
     started: list["subprocess.Popen[bytes]"] = field(default_factory=list)
 
     def start(self, log: str, *arguments: object) -> "subprocess.Popen[bytes]":
         """Start ``tirebench`` with its output in a file."""
+        before = CHRT if self.realtime and arguments[0] == "emulate" else ()
         with (self.out / log).open("wb") as file:
             process = subprocess.Popen(
-                [*self.before, str(PROGRAMS / "tirebench"), *map(str, arguments)], cwd=ROOT,
+                [*before, str(PROGRAMS / "tirebench"), *map(str, arguments)], cwd=ROOT,
                 stdin=subprocess.DEVNULL, stdout=file, stderr=subprocess.STDOUT,
                 env={**os.environ, "PYTHONUNBUFFERED": "1"},
             )  # fmt: skip
@@ -76,7 +79,8 @@ class Bench:
         """Start ``tirebench run`` on a port."""
         return self.start(
             log, "run", "--port", port, "--fmu", self.fmu, "--trust", "--speed", 65,
-            "--pressure", 2.3, "--camber", 0, "--record", record, *more,
+            "--pressure", 2.3, "--camber", 0, "--record", record,
+            *(("--realtime",) if self.realtime else ()), *more,
         )  # fmt: skip
 
     def emulate(self, port_file: str, seconds: float, *more: object) -> tuple[Any, str]:
@@ -312,55 +316,24 @@ def after(bench: Bench, done: list[dict[str, Any]]) -> dict[str, Any]:
         recording = Recording(file)
         readable[file.name] = sum(len(data) for _, data in recording.raw()) > 0
         recording.close()
-    for one in done:
+    ends = [one["moment"] for one in done[1:]] + [np.inf]
+    for one, following in zip(done, ends, strict=True):
         arrivals = raw_arrivals([file for file in files if file.stem.startswith(
             Path(one["file"]).stem)])  # fmt: skip
         if one["role"] == "run":  # nothing comes after it: what is missing before
             before = arrivals[arrivals <= one["moment"] + 1.0]
             one["lost_s"] = max(0.0, one["moment"] - float(before[-1]))
             continue
-        near = arrivals[(arrivals > one["moment"] - 1.0) & (arrivals < one["moment"] + 30.0)]
-        one["lost_s"] = float(np.diff(near).max()) if len(near) > 1 else float("inf")
+        begins = arrivals[:-1]
+        near = (begins > one["moment"] - 1.0) & (begins < following)
+        one["lost_s"] = float(np.diff(arrivals)[near].max()) if near.any() else float("inf")
         if one["role"] == "reader":  # turns still come of what it had read
             one["back_s"] = one["lost_s"]
     return {"readable": readable}
 
 
-def show(results: dict[str, Any], console: Console) -> None:
-    """Print what was measured."""
-    table = Table(title="endurance")
-    for heading in ("what", "figure", "limit"):
-        table.add_column(heading)
-    for name in LINES:
-        one = results.get(name)
-        if one is None:
-            continue
-        lost = {key: n for key, n in one["lost"].items() if n} or 0
-        table.add_row(f"{name}, {one['minutes']:g} min: lost of {one['frames']} frames", str(lost),
-                      "0")  # fmt: skip
-        table.add_row("  byte in to estimate out, p50 / p99",
-                      f"{one['p50_ms']} / {one['p99_ms']} ms", "20 ms")  # fmt: skip
-        table.add_row("  CPU a second, without the browser", f"{one['cpu_per_second']:.2f} s",
-                      "1 s (1 wheel)")  # fmt: skip
-        table.add_row("  load average", f"{one['load_average']:.1f}", "")
-    if "plug" in results:
-        one = results["plug"]
-        table.add_row(f"{one['cycles']} times unplugged: back after p50 / longest",
-                      f"{one['back_p50_s']:.2f} / {one['back_max_s']:.2f} s", "2 s")  # fmt: skip
-    if "kill" in results:
-        one = results["kill"]
-        table.add_row(f"{len(one['kills'])} times kill -9 ({', '.join(one['processes'])}): lost",
-                      f"{one['lost_max_s']:.2f} s", "1 s")  # fmt: skip
-        table.add_row("  back after, at most", f"{one['back_max_s']:.1f} s", "")
-        alone = [k["all_gone_s"] for k in one["kills"] if k["role"] == "run"]
-        table.add_row("  the run killed: the others end after", ", ".join(
-            f"over {LEAVE:.0f} s" if t is None else f"{t:.1f} s" for t in alone), "")  # fmt: skip
-        table.add_row("  recordings readable", str(all(one["readable"].values())), "True")
-    console.print(table)
-
-
 def main() -> None:
-    """Run the parts that are asked for, store and show."""
+    """Run the parts that are asked for, store and show; fail if a figure is missed."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--part", action="append", choices=("line", "plug", "kill"))
     parser.add_argument("--minutes", type=float, default=10.0)
@@ -377,8 +350,7 @@ def main() -> None:
     file = out / "endurance.json"
     results: dict[str, Any] = {}
     with ExitStack() as stack:
-        before = ("chrt", "--rr", "5") if given.realtime else ()
-        bench = Bench(out, ready_fmu(Steps(console), out)[0], before)
+        bench = Bench(out, ready_fmu(Steps(console), out)[0], given.realtime)
         stack.callback(bench.close)
         jobs: dict[str, Callable[[], dict[str, Any]]] = {}
         if "line" in parts:
@@ -392,7 +364,7 @@ def main() -> None:
             with console.status(name):
                 results = {**(json.loads(file.read_text()) if file.exists() else {}), name: job()}
             file.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
-    show(results, console)
+    sys.exit(0 if show(results, set(jobs), console) else 1)
 
 
 if __name__ == "__main__":

@@ -109,6 +109,9 @@ def one_turn(run: Run) -> tuple[np.ndarray, float]:
 class Wire:
     """The bytes of a wheel that rolls on; see `bench.links.Link`.
 
+    Frames are struck read by read, so that what was done is never ahead of what was sent, and the
+    last ones are sound, so that what was lost before them shows.
+
     Attributes
     ----------
     moment : float, [s]
@@ -131,16 +134,17 @@ class Wire:
     def _made(self, counts: np.ndarray, faults: Faults, hours: float) -> Iterator[Read]:
         rng = np.random.default_rng(1)
         block = np.tile(counts, (BLOCK_TURNS, 1))
-        number, period_us = 0, SAMPLES * PERIOD / 10.0
-        while number * period_us < 3.6e9 * hours:
+        number, period_us, sound = 0, SAMPLES * PERIOD / 10.0, False
+        while not sound:
+            sound = number * period_us >= 3.6e9 * hours
             made = strain_frames(block, period=PERIOD, seq=number, t_us=round(number * period_us))
-            wire = faults.wire(encode(made))
-            for first in range(0, len(wire), READ_FRAMES):
-                data = b"".join(wire[first : first + READ_FRAMES])
-                last = number + min(first + READ_FRAMES, len(wire))
-                self.moment = last * period_us * 1e-6
+            frames = encode(made)
+            for first in range(0, len(frames), READ_FRAMES):
+                some = frames[first : first + READ_FRAMES]
+                self.moment = (number + first + len(some)) * period_us * 1e-6
                 host = 1000.0 + self.moment / (1.0 + 1e-6 * FAST)
                 late = LATENCY[0] + rng.exponential(LATENCY[1])
+                data = b"".join(some if sound else faults.wire(some))
                 yield Read(round(1e9 * (host + late)), data)
             number += len(made)
 
@@ -299,7 +303,7 @@ def run(
         chain, notes, due = ReplayChain(wire, wheels, estimation), Notes(wheels, faults), every
         while not chain.ended:
             notes.take(chain.poll(Deadline.never()).turns)
-            if wire.moment >= due:
+            if chain.ended or due <= wire.moment < 3600.0 * hours:
                 tell(notes.sample(wire.moment), console)
                 store({"hours": hours, "samples": [asdict(s) for s in notes.samples]}, out)
                 due += every

@@ -34,7 +34,8 @@ Examples:
 \b
 A campaign holds one wheel. Tire and gages come from the recording where a campaign was played, else
 from the campaign that --like names. Without told set points its runs are sweeps.
-Exit code: 0 done, 1 the recording breaks off (what is there is written), 2 bad input.
+Exit code: 0 done, 1 the recording breaks off (what is there is written) or has nothing of it, 2 bad
+input.
 """
 
 
@@ -90,7 +91,7 @@ def export(
     if json_file is not None:
         write_json(json_file, {"format": "tirebench-export/1", "out": str(out), what: count,
                                "complete": not damage})  # fmt: skip
-    context.exit(1 if damage else 0)
+    context.exit(0 if count and not damage else 1)
 
 
 def _header(recording: Recording, like: Path | None) -> CampaignHeader:

@@ -26,7 +26,12 @@ FORMATS = {"Fz": (".0f", "N"), "alpha": (".2f", "deg"), "kappa": (".4f", ""), "F
 UNITS = [f"{name} [{unit}]" if unit else name for name, (_, unit) in FORMATS.items()]
 HEADINGS = ("wheel", "run", "t [s]", *UNITS, "valid", "flags")
 LOSSES = ("crc_bad", "framing_bad", "lost_frames", "duplicates", "out_of_order", "resets",
-          "unplaced_samples", "overruns", "reconnects")  # fmt: skip
+          "unknown_type", "other_wheel", "unplaced_samples", "overruns", "reconnects")  # fmt: skip
+NOTHING = "no byte came: is the transmitter on, and is this its port?"
+NO_FRAME = (
+    "bytes came, but no frame of a wheel: check the rate (--baud; --bitrate and --data-bitrate), "
+    "the kind of port (PORT, slcan:PORT), and --map for another make"
+)
 
 
 class Screen:
@@ -86,13 +91,17 @@ class Screen:
 
 
 def counters(wheels: Wheels) -> str:
-    """Return the state of the line in one line; what is zero is left out but for the frames."""
+    """Return the state of the line in one line; what is zero is left out but for the frames.
+
+    Where no frame came at all, it says what to look at.
+    """
     counts = line_document(*wheels.counts)
     parts = [f"{counts['frames']} frames"]
     parts += [f"{counts[name]} {name}" for name in LOSSES if counts[name]]
     saturated = {f"gage {i}": n for i, n in enumerate(counts["saturated_samples"], 1) if n}
     parts += [f"{n} saturated samples of {gage}" for gage, n in saturated.items()]
-    return ", ".join(parts)
+    hint = "" if counts["frames"] else f"; {NO_FRAME if counts['bytes'] else NOTHING}"
+    return ", ".join(parts) + hint
 
 
 def _cells(turn: Turn) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ typed                        link
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 from bench.errors import DeviceError
@@ -19,6 +20,7 @@ from bench.protocols import CAN, SERIAL, SLCAN
 
 BITRATE = 500_000
 KINDS = ("slcan", "can")
+_MODULES = {SERIAL: "serial_port", SLCAN: "slcan_port", CAN: "can_bus"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +52,37 @@ class PortPlan:
         """What its bytes are, see `bench.protocols`."""
         return {"slcan": SLCAN, "can": CAN}.get(self.port.partition(":")[0], SERIAL)
 
+    def load(self) -> None:
+        """Import what `open` needs: python-can takes over half a second of CPU."""
+        import_module(f"bench.links.{_MODULES[self.encoding]}")
+
+    def check(self) -> None:
+        """Look at what was typed; nothing is opened.
+
+        Raises
+        ------
+        DeviceError
+            If it names no port.
+        """
+        kind, colon, rest = self.port.partition(":")
+        if self.port in KINDS or (colon and kind not in KINDS and "/" not in kind):
+            raise DeviceError(
+                f"--port {self.port}: {kind!r} is no {'name' if kind in KINDS else 'kind'} of a "
+                "port; a serial port such as /dev/ttyUSB0 or COM3, slcan:/dev/ttyACM0 or "
+                "can:INTERFACE:CHANNEL is needed; see `tirebench ports`"
+            )
+        if self.encoding == SLCAN and not rest:
+            raise DeviceError(
+                f"--port {self.port}: no serial port; slcan:PORT is needed, such as "
+                "slcan:/dev/ttyACM0; write it so, see `tirebench ports`"
+            )
+        if self.encoding == CAN and not all(rest.partition(":")):
+            raise DeviceError(
+                f"--port {self.port}: no channel; can:INTERFACE:CHANNEL is needed, such as "
+                "can:socketcan:can0; write it so"
+            )
+        bus_options(self.options)
+
     def open(self, *, transmit: bool = False) -> Link:
         """Return the open link.
 
@@ -60,31 +93,16 @@ class PortPlan:
         DeviceError
             If what was typed names no port.
         """
-        kind, colon, rest = self.port.partition(":")
-        if self.port in KINDS or (colon and kind not in KINDS and "/" not in kind):
-            raise DeviceError(
-                f"--port {self.port}: {kind!r} is no {'name' if kind in KINDS else 'kind'} of a "
-                "port; a serial port such as /dev/ttyUSB0 or COM3, slcan:/dev/ttyACM0 or "
-                "can:INTERFACE:CHANNEL is needed; see `tirebench ports`"
-            )
+        self.check()
+        rest = self.port.partition(":")[2]
         if self.encoding == SLCAN:
             from bench.links.slcan_port import SlcanLink
 
-            if not rest:
-                raise DeviceError(
-                    f"--port {self.port}: no serial port; slcan:PORT is needed, such as "
-                    "slcan:/dev/ttyACM0; write it so, see `tirebench ports`"
-                )
             return SlcanLink(rest, self.bitrate, self.data_bitrate, transmit=transmit)
         if self.encoding == CAN:
             from bench.links.can_bus import CanLink
 
             interface, _, channel = rest.partition(":")
-            if not interface or not channel:
-                raise DeviceError(
-                    f"--port {self.port}: no channel; {kind}:INTERFACE:CHANNEL is needed, such as "
-                    "can:socketcan:can0; write it so"
-                )
             return CanLink(
                 interface, channel, self.bitrate, self.data_bitrate, bus_options(self.options),
                 transmit=transmit,

@@ -19,7 +19,7 @@ from bench.fmu_model import FmuFile
 from bench.live.estimator import EstimatorPlan, Report, estimate
 from bench.live.exchange import FINISH, STOP, Exchange, woken
 from bench.live.kept import CONTEXT, Kept
-from bench.live.reader import LineState, ReaderPlan, read_port
+from bench.live.reader import LineState, ReaderPlan, load, read_port
 from bench.live.recorder import Order, RecorderState, record
 from bench.page.board import SIZE
 from bench.recording import RecordingHeader, jump_event
@@ -74,6 +74,7 @@ class LiveChain:
     live = True
 
     def __init__(self, plan: LivePlan) -> None:
+        plan.reader.port.check()  # before all that takes time
         self.ended = self.message = ""
         self.jumps: list[Jump] = []
         self._plan = plan
@@ -111,7 +112,7 @@ class LiveChain:
             self._wait(lambda: self.obeyed(Deadline.after(0.0)))
             # a port is opened last: from then on bytes come
             self._reader = Kept(
-                read_port, lambda _: (self._plan.reader, self._exchange.address), stand_by=True
+                read_port, lambda _: (self._plan.reader, self._exchange.address), stand_by=load
             )
             self._wait(lambda: bool(self._state.name))
             gc.collect()

@@ -1,7 +1,8 @@
 """A process that is started again when it dies or hangs, and how often that was.
 
 Python takes some tenths of a second of CPU to start, seconds on a busy machine. Where that costs
-data, a second process stands by with everything loaded and takes over.
+data, a second process stands by with everything loaded and takes over. The first that stands by is
+begun before the process itself, so that it is ready as soon as there is something to lose.
 """
 
 import gc
@@ -17,7 +18,7 @@ FIRST_PAUSE, LONGEST_PAUSE = 0.05, 10.0
 LIVED = 5.0
 """A process that lived longer starts over with the first pause, [s]."""
 STAND_BY = 0.5
-"""A process that has lived so long gets one that stands by, [s]."""
+"""A process that took over and has lived so long gets one that stands by, [s]."""
 GLANCE = 0.5
 """Time between two looks of one that stands by whether the run goes on, [s]."""
 CONTEXT: SpawnContext = get_context("spawn")
@@ -34,8 +35,9 @@ class Kept:
         Called before each start, with the number of starts (from 1); gives what the target gets.
     hangs : callable, optional
         Tells whether a process that lives has to be ended: it does nothing any more.
-    stand_by : bool
-        Whether another process, which gets the same arguments, stands by.
+    stand_by : callable, optional
+        Another process stands by, and runs this with the same arguments: it loads whatever the
+        target will need.
 
     Attributes
     ----------
@@ -48,7 +50,7 @@ class Kept:
         arguments: Callable[[int], tuple[Any, ...]],
         hangs: Callable[[], bool] | None = None,
         *,
-        stand_by: bool = False,
+        stand_by: Callable[..., None] | None = None,
     ) -> None:
         self.starts = 0
         self._stand_by = stand_by
@@ -59,8 +61,9 @@ class Kept:
         self._arguments = arguments
         self._hangs = hangs
         self._process: Any = None
-        self._started = self._due = 0.0
+        self._started = self._due = self._spare_begun = 0.0
         self._pause = FIRST_PAUSE
+        self._begin_spare()
         self.start()
 
     @property
@@ -74,8 +77,8 @@ class Kept:
         return self._process is not None and self._process.is_alive()
 
     def start(self) -> None:
-        """Start the process, or call the one that stands by."""
-        if self._spare is not None and self._spare.is_alive():
+        """Start the process; the next time, call the one that stands by."""
+        if self.starts and self._spare_alive:
             self._process, self._spare = self._spare, None
             self._called = self._call  # kept: it may not have been taken up yet
             self._called.release()
@@ -91,13 +94,11 @@ class Kept:
             if self._process.is_alive():
                 if self._hangs is not None and self._hangs():
                     self._process.kill()
-                elif self._stand_by and self._spare is None and now - self._started > STAND_BY:
-                    self._call = CONTEXT.Semaphore(0)
-                    given = self._arguments(self.starts + 1)
-                    self._spare = _begun(_on_call, (self._call, self._target, *given))
+                elif not self._spare_alive and now > self._spare_due:
+                    self._begin_spare()
                 return
             self._pause = FIRST_PAUSE if now - self._started > LIVED else self._pause
-            self._due = now + (self._pause if self._spare is None else 0.0)
+            self._due = now + (0.0 if self._spare_alive else self._pause)
             self._pause = min(2.0 * self._pause, LONGEST_PAUSE)
             self._process.join()
             self._process.close()
@@ -122,6 +123,25 @@ class Kept:
                 process.join(2.0)
         process.close()
 
+    @property
+    def _spare_alive(self) -> bool:
+        return self._spare is not None and self._spare.is_alive()
+
+    @property
+    def _spare_due(self) -> float:
+        """When the next one that stands by is begun: one that has died is not missed at once."""
+        return self._started + STAND_BY if self._spare is None else self._spare_begun + LIVED
+
+    def _begin_spare(self) -> None:
+        """Let another process stand by, if one is wanted."""
+        if self._spare is not None:
+            self._spare.close()
+        if self._stand_by is not None:
+            self._spare_begun = time.monotonic()
+            self._call = CONTEXT.Semaphore(0)
+            given = self._arguments(max(self.starts, 1) + 1)
+            self._spare = _begun(_on_call, (self._call, self._stand_by, self._target, *given))
+
 
 def _begun(target: Callable[..., None], arguments: tuple[Any, ...]) -> Any:
     """Return a new process that ignores Ctrl-C from its first moment."""
@@ -134,8 +154,11 @@ def _begun(target: Callable[..., None], arguments: tuple[Any, ...]) -> Any:
     return process
 
 
-def _on_call(call: Any, target: Callable[..., None], *arguments: Any) -> None:
-    """Stand by until called, or until the run is gone; what the target needs is loaded."""
+def _on_call(
+    call: Any, load: Callable[..., None], target: Callable[..., None], *arguments: Any
+) -> None:
+    """Load what the target needs, and stand by until called or until the run is gone."""
+    load(*arguments)
     while not call.acquire(timeout=GLANCE):
         if orphaned():
             return

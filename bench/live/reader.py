@@ -89,6 +89,12 @@ class LineState:
     error: tuple[str, str] | tuple[()] = ()
 
 
+def load(plan: ReaderPlan, _: Address) -> None:
+    """Import beforehand what `read_port` needs; whoever takes over has no time for it."""
+    plan.port.load()
+    settled()
+
+
 def read_port(plan: ReaderPlan, address: Address) -> None:
     """Read until the run ends; the target of the process."""
     exchange = Exchange(address)
@@ -122,11 +128,13 @@ class _Reader:
         self._raw_lost = 0  # bytes since the recorder was told of it
         self._overruns: int | None = None
         self._next_look = 0.0
-        self.state = LineState(Wheels(plan.protocol.decoder(), plan.devices, plan.wheels))
         saved = exchange.line.get()
         self.again = saved is not None
-        if saved is not None:
-            self.state = pickle.loads(saved)
+        self.state: LineState = (
+            LineState(Wheels(plan.protocol.decoder(), plan.devices, plan.wheels))
+            if saved is None
+            else pickle.loads(saved)
+        )
 
     def run(self, link: Link) -> None:
         """Go on until the end of the link or of the run."""

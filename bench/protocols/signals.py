@@ -9,6 +9,9 @@ from bench.can_batch import ByteArray
 from bench.frames import IntArray
 from tirelib.arrays import FloatArray
 
+_ANYBODY = "Vector__XXX"
+"""The DBC format's own word where a signal names no receiver."""
+
 
 @dataclass(frozen=True, slots=True)
 class Signal:
@@ -53,7 +56,7 @@ class Signal:
         return (
             f" SG_ {self.name} : {self.start}|{self.length}@{int(not self.big_endian)}"
             f"{'-' if self.signed else '+'} ({self.factor:.10g},{self.offset:.10g}) "
-            f'[{bounds[0]}|{bounds[1]}] "{self.unit}" Vector__XXX'
+            f'[{bounds[0]}|{bounds[1]}] "{self.unit}" {_ANYBODY}'
         )
 
     @property

@@ -36,7 +36,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.device import Device
-from bench.errors import DeviceError
+from bench.errors import DeviceError, cause
 from bench.frames import GAGES
 from bench.protocols.signals import Signal
 from tirelib.errors import TirelibError
@@ -126,8 +126,8 @@ def read_map(path: Path) -> UserMap:
             dbc = (path.parent / str(document["dbc"])).read_text(encoding="cp1252")
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise DeviceError(
-            f"{path}: it cannot be read ({error}); a map is TOML in UTF-8, its DBC stands beside "
-            "it; check path and line"
+            f"{path}: it cannot be read ({cause(error)}); a map is TOML in UTF-8, its DBC stands "
+            "beside it; check path and line"
         ) from None
     return parse_map(text, dbc, str(path))
 
@@ -163,8 +163,7 @@ class _Reader:
         if not isinstance(rate, int | float) or isinstance(rate, bool) or not 153 <= rate <= 2e5:
             self.fault("rate_hz", rate, "153 .. 200000 Hz is needed")
             rate = 1e3
-        tables = self.document.get("wheel", [])
-        tables = tables if isinstance(tables, list) else []
+        tables = self._tables("wheel")
         wheels = [w for table in tables if (w := self._wheel(table, messages, float(rate)))]
         if not tables:
             self.fault("wheel", tables, "at least one table [[wheel]] is needed", "write it")
@@ -175,6 +174,14 @@ class _Reader:
         if self.faults:
             raise DeviceError(self.faults)
         return UserMap(float(rate), tuple(wheels), device, speed, text)
+
+    def _tables(self, key: str) -> list[dict[str, Any]]:
+        """Return the tables of that name; whatever else has it is a fault."""
+        given = self.document.get(key, [])
+        found = [one for one in given if isinstance(one, dict)] if isinstance(given, list) else []
+        if not isinstance(given, list) or len(found) < len(given):
+            self.fault(key, given, f"tables [[{key}]] are needed")
+        return found
 
     def _of_dbc(self, dbc: str) -> dict[str, Message]:
         import cantools  # late: it takes a while, and few need it
@@ -204,7 +211,7 @@ class _Reader:
 
     def _of_tables(self) -> dict[str, Message]:
         messages = {}
-        for table in self.document.get("message", []):
+        for table in self._tables("message"):
             try:
                 signals = {s["name"]: _signal(s) for s in table["signals"]}
                 ways = {
@@ -230,7 +237,11 @@ class _Reader:
         what = f"wheel {table.get('wheel')!r}"
         message = self._message(f"{what}: message", table.get("message"), messages)
         rows = table.get("samples", [])
-        if not rows or not all(isinstance(r, list) and len(r) == GAGES for r in rows):
+        if (
+            not isinstance(rows, list)
+            or not rows
+            or not all(isinstance(r, list) and len(r) == GAGES for r in rows)
+        ):
             self.fault(f"{what}: samples", rows, f"lists of {GAGES} signals are needed, a list a "
                        "sample")  # fmt: skip
             return None
@@ -334,6 +345,9 @@ class _Reader:
     def _speed(self, messages: Mapping[str, Message]) -> tuple[Message, Signal, str] | None:
         table = self.document.get("speed")
         if table is None:
+            return None
+        if not isinstance(table, dict):
+            self.fault("speed", table, "a table [speed] is needed")
             return None
         message = self._message("speed: message", table.get("message"), messages)
         if message is None:

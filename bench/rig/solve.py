@@ -17,6 +17,15 @@ REUSE = 0.03
 """The factors are kept where a step with them cut the residual to this share."""
 FIRST_DEFLECTIONS = (0.002, 0.01)
 """Deflections on the way from the unloaded tire to the first load [m]."""
+LIMITS = {
+    "load": (200.0, 12000.0),
+    "pressure": (0.5e5, 5e5),
+    "speed": (0.1, 90.0),
+    "slip_angle": (-0.4, 0.4),
+    "camber": (-0.15, 0.15),
+    "slip_ratio": (-0.9, 2.0),
+}
+"""Lowest and highest condition that is solved, SI."""
 
 
 class SolverError(TirelibError, RuntimeError):
@@ -126,15 +135,8 @@ def solve(
 
 
 def _check(cond: Condition) -> None:
-    limits = {
-        "load": (cond.load, 200.0, 12000.0),
-        "pressure": (cond.pressure, 0.5e5, 5e5),
-        "speed": (cond.speed, 0.1, 90.0),
-        "slip_angle": (cond.slip_angle, -0.4, 0.4),
-        "camber": (cond.camber, -0.15, 0.15),
-        "slip_ratio": (cond.slip_ratio or 0.0, -0.9, 2.0),
-    }
-    for name, (value, low, high) in limits.items():
+    for name, (low, high) in LIMITS.items():
+        value = getattr(cond, name) or 0.0
         if not low <= value <= high:
             raise ParameterError(
                 f"rig condition, {name} = {value:g} (SI); allowed is {low:g} to {high:g}; "

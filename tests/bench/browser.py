@@ -11,6 +11,11 @@ from typing import Any
 import pytest
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+WITHOUT = "Playwright is not installed (`make` does it); only a real browser runs the page's script"
+WITHOUT_CHROMIUM = (
+    "there is no Chromium, and neither apt-get as root nor Playwright could install one (is there "
+    "a network?); only a real browser runs the page's script"
+)
 INSTALL = 240.0
 """Time that an installation may take, [s]."""
 
@@ -29,14 +34,14 @@ def _done(*command: str) -> bool:
 @contextmanager
 def chromium() -> Iterator[Any]:
     """Give a browser of Playwright's synchronous API; skip, with the reason, if none can be had."""
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    api = pytest.importorskip("playwright.sync_api", reason=WITHOUT)
     path = _found()
     if path is None and hasattr(os, "geteuid") and os.geteuid() == 0 and shutil.which("apt-get"):
         _done("apt-get", "update")
         _done("apt-get", "install", "-y", "--no-install-recommends", "chromium")
         path = _found()
     if path is None and not _done(sys.executable, "-m", "playwright", "install", "chromium"):
-        pytest.skip("no Chromium here, and neither apt nor Playwright could install one")
+        pytest.skip(WITHOUT_CHROMIUM)
     with api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
         yield browser

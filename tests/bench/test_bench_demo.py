@@ -18,9 +18,15 @@ from rich.console import Console
 
 import bench.cli
 import tirelib.cli
+from bench.deadline import Deadline
+from bench.device import Device
+from bench.faults import Faults
 from bench.fmu_archive import read_fmu
+from bench.links import Read
+from bench.protocols.plan import ProtocolPlan
 from bench.rig.measure import Chain
 from bench.trust import remember
+from bench.wheels import Wheels
 from tests.synthetic import cornering_runs, synthetic_run, write
 from tirelib.campaign import Run, check_campaign, read_campaign
 from tirelib.report.agreement import agreement, read_turns
@@ -169,6 +175,33 @@ def test_a_repeated_turn_has_no_edge(demo_module: Any) -> None:
     assert speed == pytest.approx(run.mean("speed") / stretch)
 
 
+class Nowhere:
+    """Takes no note of a read."""
+
+    def write(self, read: Read, moment: float) -> None:
+        pass
+
+
+def test_what_a_soak_has_struck_is_never_ahead_of_what_it_has_sent(demo_module: Any) -> None:
+    """At any read a doubled frame has been counted; in the end every other fault has."""
+    import bench_soak
+
+    faults = Faults(dict.fromkeys(bench_soak.RATES, 0.02), seed=1)
+    counts = np.zeros((16 * bench_soak.TURN_FRAMES, 5), np.int16)
+    wire = bench_soak.Wire(counts, faults, 0.002, Nowhere())
+    wheels = Wheels(ProtocolPlan().decoder(), {None: Device()})
+    struck = []
+    while (read := wire.receive(Deadline.never())) is not None:
+        wheels.push(read.data, read.arrival)
+        assert wheels.counts[1].duplicates == faults.done["dup"]
+        struck.append(sum(faults.done.values()))
+    line, wheel = wheels.counts
+    assert min(faults.done.values()) > 50
+    assert line.bad >= faults.done["flips"]
+    assert wheel.lost_frames >= faults.done["lost"] + faults.done["flips"]
+    assert struck[-1] == struck[-20]  # the end is quiet, so that nothing is on its way
+
+
 def sample(hours: float, **changes: Any) -> Any:
     import bench_soak
 
@@ -206,7 +239,10 @@ def test_a_soak_tells_each_drift(demo_module: Any, what: str, changes: dict[str,
     assert [name for name, good in drifted.items() if not good] == [what]
 
 
-@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
+@pytest.mark.skipif(
+    not Path("/proc/self/stat").exists(),
+    reason="the meter reads /proc, which only Linux has; nothing but `make endurance` needs it",
+)
 def test_a_meter_counts_the_processes_of_a_run_and_those_that_ended(demo_module: Any) -> None:
     import bench_processes
 

@@ -136,6 +136,13 @@ def test_a_recording_that_breaks_off_is_exported_up_to_there(serial: Path, tmp_p
     assert len(pd.read_parquet(tmp_path / "b.parquet")) > 5000
 
 
+def test_an_export_that_holds_nothing_is_no_success(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "a.mcap", RecordingHeader({}), Conditions.constant()) as recorder:
+        recorder.read(Read(1, b"no frame"))
+    code, said = invoke("export", tmp_path / "a.mcap", "--out", tmp_path / "a.csv")
+    assert (code, said.partition(" in")[0]) == (1, "0 samples")
+
+
 def test_a_recording_without_campaign_needs_one_like_it(
     campaign: Path, serial: Path, tmp_path: Path
 ) -> None:

@@ -93,6 +93,27 @@ def test_damaged_content_is_found_while_unpacking_and_leaves_nothing(tmp_path: P
         read_fmu(path).unpack()
 
 
+def changed(path: Path, header: bytes, offset: int, value: int) -> None:
+    """Set two bytes behind the beginning of every such header of an archive."""
+    data = bytearray(path.read_bytes())
+    place = data.find(header)
+    while place >= 0:
+        data[place + offset : place + offset + 2] = value.to_bytes(2, "little")
+        place = data.find(header, place + 1)
+    path.write_bytes(data)
+
+
+def test_an_archive_of_a_later_format_is_refused(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.fmu", ("resources/x", b"some text " * 50))
+    changed(path, b"PK\1\2", 10, 99)  # the way of compression, in the directory and in each entry
+    changed(path, b"PK\3\4", 8, 99)
+    with pytest.raises(FmuError, match=r"cannot be unpacked .*compression"):
+        read_fmu(path).unpack()
+    changed(path, b"PK\1\2", 6, 250)  # the version that is needed to read it
+    with pytest.raises(FmuError, match=r"it is no FMU .*version"):
+        read_fmu(path)
+
+
 def test_a_folder_that_would_crash_the_fmu_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

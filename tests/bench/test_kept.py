@@ -3,7 +3,7 @@
 import os
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -18,9 +18,14 @@ PATIENCE = 60.0
 
 
 def tell(news: Any, number: int) -> None:
-    """Say who it is, and wait."""
-    news.put((number, os.getpid()))
+    """Say who it is and what it had loaded before, and wait."""
+    news.put((number, os.getpid(), os.environ.get("LOADED", "")))
     time.sleep(PATIENCE)
+
+
+def load(news: Any, number: int) -> None:
+    """Take the place of what one that stands by loads."""
+    os.environ["LOADED"] = str(number)
 
 
 def until(true: Callable[[], bool], kept: Kept) -> None:
@@ -31,42 +36,51 @@ def until(true: Callable[[], bool], kept: Kept) -> None:
         time.sleep(0.01)
 
 
-def test_one_that_stands_by_takes_over_and_gets_a_successor(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+@pytest.fixture
+def told(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Any, Kept]]:
+    """What processes say, and one of them with another that stands by at once."""
     monkeypatch.setattr(kept_module, "STAND_BY", 0.0)
     news = CONTEXT.SimpleQueue()
-    kept = Kept(tell, lambda starts: (news, starts), stand_by=True)
-    spares = []
-    for number in (1, 2, 3):
-        until(lambda: not news.empty(), kept)
-        assert news.get() == (number, kept.process_id)
-        assert kept.starts == number
-        until(lambda: kept._spare is not None, kept)
-        spares.append(kept._spare.pid)
-        os.kill(kept.process_id or 0, signal.SIGKILL)
-        until(lambda: kept.starts > number, kept)  # noqa: B023
-        assert kept.process_id == spares[-1]
-    until(lambda: not news.empty(), kept)
-    assert news.get() == (4, spares[-1])
+    kept = Kept(tell, lambda starts: (news, starts), stand_by=load)
+    yield news, kept
     kept.wait(0.0)
     assert not kept.alive
 
 
+def test_one_that_stands_by_takes_over_and_gets_a_successor(told: tuple[Any, Kept]) -> None:
+    news, kept = told
+    assert kept._spare_alive
+    assert kept._spare_begun <= kept._started  # before there is anything to lose
+    spares = []
+    for number in (1, 2, 3):
+        until(lambda: not news.empty(), kept)
+        assert news.get() == (number, kept.process_id, str(number) if number > 1 else "")
+        assert kept.starts == number
+        until(lambda: kept._spare_alive, kept)
+        spares.append(kept._spare.pid)
+        os.kill(kept.process_id or 0, signal.SIGKILL)
+        until(lambda before=number: kept.starts > before, kept)
+        assert kept.process_id == spares[-1]
+    until(lambda: not news.empty(), kept)
+    assert news.get() == (4, spares[-1], "4")
+
+
 def test_where_the_one_that_stands_by_has_died_a_new_one_is_started(
-    monkeypatch: pytest.MonkeyPatch,
+    told: tuple[Any, Kept], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(kept_module, "STAND_BY", 0.0)
-    news = CONTEXT.SimpleQueue()
-    kept = Kept(tell, lambda starts: (news, starts), stand_by=True)
-    until(lambda: kept._spare is not None and not news.empty(), kept)
+    news, kept = told
+    monkeypatch.setattr(kept_module, "LIVED", PATIENCE)
+    until(lambda: not news.empty(), kept)
     assert news.get()[0] == 1
     spare = kept._spare
     os.kill(spare.pid, signal.SIGKILL)
     spare.join()
     os.kill(kept.process_id or 0, signal.SIGKILL)
     until(lambda: not news.empty(), kept)
-    assert news.get() == (2, kept.process_id)
+    assert news.get() == (2, kept.process_id, "")
+    assert kept._spare is spare  # not missed at once: what ends it may end others too
+    monkeypatch.setattr(kept_module, "LIVED", 0.0)
+    until(lambda: kept._spare_alive, kept)
     left = kept._spare
     kept.wait(0.0)
     if left is not None:
@@ -78,19 +92,18 @@ def refused(*_: object) -> None:
     raise PermissionError
 
 
-@pytest.mark.skipif(not hasattr(os, "sched_setscheduler"), reason="no real-time priority here")
 def test_real_time_priority_is_asked_for_and_its_refusal_is_told(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    asked: list[tuple[int, int]] = []
-    monkeypatch.setattr(
-        os, "sched_setscheduler", lambda _, kind, param: asked.append((kind, param.sched_priority))
-    )
+    asked: list[tuple[Any, Any]] = []
     niced: list[int] = []
-    monkeypatch.setattr(os, "nice", niced.append)
+    linux = {"SCHED_RR": "rr", "SCHED_OTHER": "other", "sched_param": int, "nice": niced.append,
+             "sched_setscheduler": lambda _, kind, param: asked.append((kind, param))}  # fmt: skip
+    for name, value in linux.items():  # other systems have none of them
+        monkeypatch.setattr(os, name, value, raising=False)
     realtime()
     below()
-    assert asked == [(os.SCHED_RR, PRIORITY), (os.SCHED_OTHER, 0)]
+    assert asked == [("rr", PRIORITY), ("other", 0)]
     assert niced == [BELOW]
     monkeypatch.setattr(os, "sched_setscheduler", refused)
     with pytest.raises(DeviceError, match=r"--realtime: .*limits\.conf"):

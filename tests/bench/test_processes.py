@@ -19,6 +19,7 @@ from bench.decoder import SerialDecoder
 from bench.device import Device
 from bench.document import flags, turn_document
 from bench.emulator import write_script
+from bench.errors import DeviceError
 from bench.estimation import Estimation, News
 from bench.faults import Faults
 from bench.fmu_archive import read_fmu
@@ -28,9 +29,9 @@ from bench.links.opening import PortPlan
 from bench.links.replay import ReplayLink
 from bench.live.chain import LiveChain, LivePlan
 from bench.live.estimator import EstimatorPlan, Report, _Estimator
-from bench.live.exchange import Exchange
+from bench.live.exchange import Address, Exchange
 from bench.live.kept import CONTEXT
-from bench.live.reader import ReaderPlan
+from bench.live.reader import ReaderPlan, load
 from bench.live.recorder import Order, RecorderState, _Recorder
 from bench.protocols.plan import ProtocolPlan
 from bench.recording import Recorder, Recording, RecordingHeader, jump_event
@@ -77,6 +78,22 @@ def plan_of(port: str, file: FmuFile | None, record: Path) -> LivePlan:
     return LivePlan(reader, file, STEADY, RecordingHeader({}), record)
 
 
+def test_a_port_that_is_none_is_told_before_anything_is_started(tmp_path: Path) -> None:
+    with pytest.raises(DeviceError, match=r"--port can:virtual: no channel"):
+        LiveChain(plan_of("can:virtual", None, tmp_path / "a.mcap"))
+
+
+def test_who_stands_by_has_its_port_loaded_and_its_garbage_collected(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    done: list[object] = []
+    monkeypatch.setattr(PortPlan, "load", lambda port: done.append(port))
+    monkeypatch.setattr("bench.live.reader.settled", lambda: done.append("settled"))
+    plan = ReaderPlan(PortPlan("p"), 60.0, ProtocolPlan(), {None: Device()})
+    load(plan, Address("", 0, (), None, 0))
+    assert done == [plan.port, "settled"]
+
+
 def test_each_process_may_be_killed_and_a_replay_gives_what_the_run_gave(
     spawn: Spawn, campaign: Path, file: FmuFile, tmp_path: Path
 ) -> None:
@@ -92,9 +109,9 @@ def test_each_process_may_be_killed_and_a_replay_gives_what_the_run_gave(
                 assert chain.counts()["raw"]["lost_bytes"] == 0
             os.kill(chain.process_ids[victim] or 0, signal.SIGKILL)
             seen = len(news.turns) + 8  # more than what may have been on its way
-            gathered(chain, news, lambda: chain.counts()["restarts"][victim] == 1)  # noqa: B023
+            gathered(chain, news, lambda one=victim: chain.counts()["restarts"][one] == 1)
             processes |= set(chain.process_ids.values())
-            gathered(chain, news, lambda: len(news.turns) > seen)  # noqa: B023
+            gathered(chain, news, lambda before=seen: len(news.turns) > before)
         news.add(chain.finish("stopped"))
         counts, wheels = chain.counts(), chain.wheels
     assert counts["restarts"] == {"reader": 1, "recorder": 1, "estimator 0": 1}
@@ -150,7 +167,7 @@ def test_a_cable_in_and_out_is_told_and_every_time_it_comes_back(
     with LiveChain(plan_of(str(tmp_path / "port"), None, tmp_path / "a.mcap")) as chain:
         lost = 0
         for _ in range(3):
-            gathered(chain, News(), lambda: chain.wheels.line.counts.reconnects > lost)  # noqa: B023
+            gathered(chain, News(), lambda seen=lost: chain.wheels.line.counts.reconnects > seen)
             lost = chain.wheels.line.counts.reconnects
         chain.finish("stopped")
     recording = Recording(tmp_path / "a.mcap")
@@ -191,11 +208,11 @@ def stepped(
             age = 10**10 if number in old else -(10**10)
             fresh = Block(block.wheel, now - age, block.first_us, block.content)
             assert exchange.samples[0].put(pickle.dumps(fresh))
-    plan = EstimatorPlan(None, STEADY, 0, laps=False, again=again)  # type: ignore[arg-type]
+    plan = EstimatorPlan(None, STEADY, 0, laps=False, again=again)
     worker = _Estimator(plan, exchange)
     model: Any = Turns()
     end = exchange.is_set
-    exchange.is_set = lambda flag: end(flag) or exchange.samples[0].waiting == 0  # type: ignore[method-assign]
+    exchange.is_set = lambda flag: end(flag) or exchange.samples[0].waiting == 0
     worker.run(model)
     news = News()
     while (message := exchange.news[0].read()) is not None:

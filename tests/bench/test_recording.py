@@ -3,13 +3,20 @@
 import math
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 
-from bench.conditions import Conditions, RunMark
+from bench.conditions import (
+    Conditions,
+    RunMark,
+    conditions_document,
+    parse_conditions,
+    read_conditions,
+)
 from bench.deadline import Deadline
 from bench.errors import DeviceError, RecordingError
 from bench.links import Read
@@ -137,8 +144,18 @@ def test_conditions_are_held_and_repeat_in_a_loop() -> None:
     ],
 )
 def test_a_wrong_sidecar_says_what_is_wrong(tmp_path: Path, text: str, message: str) -> None:
-    from bench.conditions import read_conditions
-
     (tmp_path / "c.json").write_text(text)
     with pytest.raises(DeviceError, match=message):
         read_conditions(tmp_path / "c.json")
+
+
+@pytest.mark.parametrize("change", [
+    {"loop_us": math.inf}, {"speed": 5}, {"speed": {"unit": "m/s", "values": 5}}, {"t_us": [{}]},
+    {"runs": [3]}, {"runs": [{"run": 1, "t_us": 0, "start_s": 0.0, "truth": [1]}]},
+    {"campaign": 7},
+])  # fmt: skip
+def test_a_sidecar_of_another_make_is_refused(change: dict[str, Any]) -> None:
+    sound = conditions_document(Conditions.constant(18.0))
+    assert parse_conditions(sound, "c.json").t_us == (0,)
+    with pytest.raises(DeviceError, match=r"c\.json: .* lists of one length"):
+        parse_conditions(sound | change, "c.json")

@@ -15,6 +15,7 @@ from bench.links import Read
 from bench.replay import ReplayChain
 from bench.session import Limits, Session
 from tests.bench.campaigns import tiny_runs
+from tests.bench.clocks import Clock
 from tests.bench.in_process import InProcess
 from tirelib.arrays import FloatArray
 
@@ -57,6 +58,15 @@ class Scripted:
 
     def overruns(self) -> int:
         return 0
+
+
+@pytest.fixture(autouse=True)
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    """Time that passes only where nothing comes any more."""
+    made = Clock()
+    for module in ("bench.session", "bench.replay", "bench.deadline", __name__):
+        monkeypatch.setattr(f"{module}.time", made)
+    return made
 
 
 @pytest.fixture(scope="module")

@@ -244,6 +244,9 @@ def test_what_is_held_is_bounded_and_the_newest_counts() -> None:
     (('strain_unit = "ustrain"', 'strain_unit = "N"'), "a unit of strain is needed"),
     (('unit = "km/h"', 'unit = "N"'), "a unit of speed is needed"),
     (("[speed]", "[sped]"), "sped is not known"),
+    (("[speed]", "[[speed]]"), r"speed = .*; a table \[speed\] is needed"),
+    (("[[wheel]]", "wheel = [1, 2]\n[other]"), r"wheel = \[1, 2\]; tables \[\[wheel\]\]"),
+    (('[["g1", "g2", "g3", "g4", "g5"]]', "1.5"), r"samples = 1.5; lists of 5 signals"),
 ])  # fmt: skip
 def test_a_wrong_map_says_what_is_wrong(change: tuple[str, str], message: str) -> None:
     if change[0] == 'time = "stamp"':

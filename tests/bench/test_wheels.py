@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.chain import Outputs
+from bench.cli.live import counters
 from bench.clock import ClockFit
 from bench.conditions import Condition, Conditions
 from bench.device import Device
@@ -13,6 +14,7 @@ from bench.document import document, wheel_document
 from bench.emulator import Player, record_tape
 from bench.faults import Faults, parse_faults
 from bench.protocols import SERIAL
+from bench.protocols.plan import ProtocolPlan
 from bench.transmitter import transmitter
 from bench.wheels import MOST, Wheels
 from tests.bench.campaigns import tiny_runs
@@ -53,6 +55,18 @@ def played(
         line.push(b"".join(piece.frames), round(1e9 * (1 + piece.due[-1])))
     line.finish()
     return line.wheels, made
+
+
+def test_a_line_without_a_frame_says_what_to_look_at() -> None:
+    wheels = Wheels(ProtocolPlan().decoder(), {None: Device()})
+    assert counters(wheels).endswith("0 frames; no byte came: is the transmitter on, and is this "
+                                     "its port?")  # fmt: skip
+    wheels.push(b"temperature 23.1\r\n" * 9)  # text: not even a bad frame
+    assert "--baud" in counters(wheels)
+    wheels, _ = played((0, 2), (5,))
+    assert counters(wheels).startswith(f"{wheels.line.counts.ok} frames, ")
+    assert f"{wheels.counts[1].other_wheel} other_wheel" in counters(wheels)
+    assert "--baud" not in counters(wheels)
 
 
 def test_each_wheel_has_its_own_estimator_device_and_counters() -> None:
