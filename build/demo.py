@@ -13,17 +13,34 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.rule import Rule
 
+sys.path.insert(0, str(Path(__file__).parent))
+from demo_live import (
+    PATIENCE,
+    RECORDING,
+    go_live,
+    judge,
+    require_terminal,
+    wait_for_port,
+    write_device,
+)
+
 if TYPE_CHECKING:
-    from tirelib.campaign import RunPlan
+    from bench.rig.plans import Plan
     from tirelib.report.live import LiveFiles
+
+__all__ = ["ROOT", "Steps", "judge", "require_terminal", "wait_for_port", "write_device"]
 
 ROOT = Path(__file__).resolve().parent.parent
 PROGRAMS = Path(sys.executable).parent
@@ -40,18 +57,30 @@ SHORTENED = {"set2": (-15, -12, -8, -6, -4, -2, 0, 2, 4, 6, 9, 12, 15)}
 """Plans of which only these slip angles [deg] are measured: what their figures need."""
 CALIBRATED = ("set1", "set2", "brake_drive")
 """Campaigns that the calibration sees, where they exist."""
-LIVE_ANGLES = (-3.0, 4.0, 0.0, -5.0, 2.0, -4.0)
-"""Slip angles [deg] of the runs that go over the line, the loads growing from one to the next."""
-PATIENCE = 30.0
-"""How long a program in the background gets to begin or to end, [s]."""
-NO_TERMINAL = (
-    "Error: make demo: this platform has no pseudo-terminal ({reason}); the part with the serial "
-    "line needs one, as Linux and macOS have; run it there, or leave that part out with --no-live"
+AT_ONCE = min(2, os.cpu_count() or 1)
+"""Commands that run side by side, where they do not need each other."""
+ALONE = os.environ | dict.fromkeys(
+    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"
 )
+"""Environment of a command: it computes on one core."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """A command to be run beside others.
+
+    `counted` is a folder whose files tell how far the command is, `total` how many it will hold.
+    """
+
+    what: str
+    words: tuple[str | Path, ...]
+    program: str = "tirelib"
+    counted: Path | None = None
+    total: int | None = None
 
 
 class Steps:
-    """Run commands one after the other, show them, and remember them for the page."""
+    """Run commands, show them, and remember them for the page."""
 
     def __init__(self, console: Console) -> None:
         self.console = console
@@ -61,8 +90,29 @@ class Steps:
         """Run a program with arguments; stop the demonstration where it fails."""
         self._announce(what, _shown(program, arguments))
         started = time.monotonic()
-        done = subprocess.run(_command(program, arguments), cwd=ROOT, check=False)
+        done = subprocess.run(_command(program, arguments), cwd=ROOT, env=ALONE, check=False)
         self._end(program, done.returncode)
+        self.console.print(f"[dim]{time.monotonic() - started:.0f} s[/]", highlight=False)
+
+    def together(self, jobs: Sequence[Job]) -> None:
+        """Run commands that do not need each other, `AT_ONCE` at a time; show each as it ends."""
+        started = time.monotonic()
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+        with (
+            TemporaryDirectory() as logs,
+            Progress(*columns, TimeElapsedColumn(), console=self.console, transient=True) as bar,
+            ThreadPoolExecutor(AT_ONCE) as pool,
+        ):
+            log = {job.what: Path(logs) / f"{number}.log" for number, job in enumerate(jobs)}
+            running = {pool.submit(_watched, bar, job, log[job.what]): job for job in jobs}
+            for ended in as_completed(running):
+                job = running[ended]
+                self._announce(job.what, _shown(job.program, job.words))
+                said = log[job.what].read_text(errors="replace").strip()
+                self.console.print(said, highlight=False, markup=False, soft_wrap=True)
+                if ended.result():
+                    pool.shutdown(wait=False, cancel_futures=True)
+                self._end(job.program, ended.result())
         self.console.print(f"[dim]{time.monotonic() - started:.0f} s[/]", highlight=False)
 
     @contextmanager
@@ -104,6 +154,27 @@ class Steps:
             sys.exit(code)
 
 
+def _watched(bar: Progress, job: Job, log: Path) -> int:
+    """Run a command with a line of its own in the bar; return its exit code."""
+    task, started = bar.add_task(job.what, total=job.total), time.time()
+    with log.open("wb") as file:
+        process = subprocess.Popen(
+            _command(job.program, job.words), cwd=ROOT, stdin=subprocess.DEVNULL, stdout=file,
+            stderr=subprocess.STDOUT, env=ALONE | {"COLUMNS": str(bar.console.width)},
+        )  # fmt: skip
+        try:
+            while process.poll() is None:
+                time.sleep(0.1)
+                if job.counted is not None:
+                    with suppress(FileNotFoundError):  # a file on its way to its name
+                        new = [p.stat().st_mtime >= started for p in job.counted.glob("*")]
+                        bar.update(task, completed=sum(new))
+        finally:
+            _stop(process)
+            bar.remove_task(task)
+    return process.returncode
+
+
 def _stop(process: "subprocess.Popen[bytes]") -> None:
     """End a process that still runs, politely first."""
     if process.poll() is None:
@@ -133,41 +204,52 @@ def _short(argument: str | Path) -> str:
 
 def measure(steps: Steps, folder: Path, fresh: bool) -> dict[str, Path]:
     """Let the rig measure every campaign that is not there yet."""
-    data = {}
+    from bench.rig.plans import with_repeats
+
+    jobs = []
     for name, (plan, seed, repeats) in PLANS.items():
         target = folder / name
         what = f"Measure {name} on the numerical rig"
         words: tuple[str | Path, ...] = (
             "rig", "--plan", plan, "--seed", str(seed), "--repeats", str(repeats),
-            "--out", target, "--force",
+            "--jobs", "1", "--out", target, "--force",
         )  # fmt: skip
         program = "tirelib"
         if plan in SHORTENED:
             what += ", some of its slip angles"
             program, words = "python", (ROOT / "build/demo.py", "--measure", name, target)
         if fresh or not (target / "truth.csv").exists():  # the rig writes it last
-            steps.run(what, *words, program=program)
+            runs = len(with_repeats(planned(plan), repeats))
+            jobs.append(Job(what, words, program, target / "runs", runs))
         else:
             steps.commands.append((what, _shown(program, words)))
             steps.console.print(f"{name}: measured before, used again (--fresh measures anew)")
-        data[name] = target
-    return data
+    if jobs:
+        steps.together(jobs)
+    return {name: folder / name for name in PLANS}
+
+
+def planned(name: str) -> "Plan":
+    """Return a plan of the rig with the slip angles that are asked for."""
+    from bench.rig.plans import Plan, plan
+
+    whole = plan(name)
+    if name not in SHORTENED:
+        return whole
+    angles = SHORTENED[name]
+    kept = tuple(c for c in whole.conditions if round(np.rad2deg(c.slip_angle)) in angles)
+    return Plan(whole.name, f"{whole.about}, {len(kept)} of its runs", kept)
 
 
 def measure_shortened(name: str, target: Path) -> None:
     """Measure the runs of a plan whose slip angles are asked for."""
     from bench.rig.campaign import run_plan
-    from bench.rig.plans import Plan, plan
     from bench.rig.tire import tire
 
-    plan_name, seed, repeats = PLANS[name]
-    whole = plan(plan_name)
-    angles = SHORTENED[plan_name]
-    kept = tuple(c for c in whole.conditions if round(np.rad2deg(c.slip_angle)) in angles)
-    short = Plan(whole.name, f"{whole.about}, {len(kept)} of its runs", kept)
-    truths = run_plan(short, tire("reference"), target, seed=seed, repeats=repeats, jobs=2,
-                      overwrite=True)  # fmt: skip
-    said = f"{len(truths)} runs of {plan_name} in {_short(target)} (axes iso, seed {seed})"
+    plan, seed, repeats = PLANS[name]
+    truths = run_plan(planned(plan), tire("reference"), target, seed=seed, repeats=repeats,
+                      jobs=1, overwrite=True)  # fmt: skip
+    said = f"{len(truths)} runs of {plan} in {_short(target)} (axes iso, seed {seed})"
     Console().print(said, highlight=False, soft_wrap=True)
 
 
@@ -181,107 +263,6 @@ def ready(folder: Path) -> dict[str, Path]:
             "of which set1 and set1-unseen are needed; put the folders there"
         )
     return found
-
-
-def choose_runs(plans: "Sequence[RunPlan]") -> list[int]:
-    """Return runs over all loads, each nearest to its own slip angle."""
-    straight = [plan for plan in plans if not plan.camber and not plan.slip_ratio]
-    loads = sorted({plan.load for plan in straight})
-    chosen: dict[int, None] = {}
-    places = np.linspace(0, len(loads) - 1, len(LIVE_ANGLES)).round().astype(int)
-    for place, angle in zip(places, LIVE_ANGLES, strict=True):
-        left = [p for p in straight if p.load == loads[place] and p.run not in chosen]
-        if left:
-            chosen[min(left, key=lambda p: abs(np.rad2deg(p.slip_angle) - angle)).run] = None
-    return list(chosen)
-
-
-def go_live(steps: Steps, out: Path, data: Path, calibration: Path, library: Path) -> "LiveFiles":
-    """Calibration to FMU, runs of a campaign over a serial line to the bench, and once more."""
-    from tirelib.campaign import read_campaign
-    from tirelib.report.live import LiveFiles
-
-    fmu, folder = out / "StrainTire.fmu", out / "live"
-    folder.mkdir(parents=True, exist_ok=True)
-    files = LiveFiles(library, out / "fmu.json", folder / "live.json", folder / "replay.json",
-                      folder / "conditions.json", folder / "device.toml")  # fmt: skip
-    port_file, record = folder / "port", folder / "live.mcap"
-    for old in (port_file, record, files.fmu, files.live, files.replay, files.conditions):
-        old.unlink(missing_ok=True)
-    campaign = read_campaign(data)
-    write_device(files.device, campaign.header.gage_lateral)
-    runs = [word for run in choose_runs(campaign.plans) for word in ("--run", str(run))]
-    steps.run("Build the FMU", "fmu", "build", "--calibration", calibration, "--out", fmu,
-              "--samples-per-step", "16")  # fmt: skip
-    steps.run("Estimate set1-unseen with the FMU", "fmu", "run", fmu, data, "--json", files.fmu)
-    with steps.beside(
-        "Play runs of it as a wheel on a serial port, in the background",
-        *("emulate", "--campaign", data, *runs, "--device", files.device),
-        *("--port-file", port_file, "--conditions", files.conditions),
-        program="tirebench", log=folder / "emulate.log",
-    ) as wheel:  # fmt: skip
-        port = wait_for_port(port_file, wheel, folder / "emulate.log")
-        steps.run(
-            "Read the port, step the FMU, record",
-            *("run", "--port", port, "--fmu", fmu, "--conditions", files.conditions),
-            *("--device", files.device, "--record", record, "--json", files.live),
-            *("--silence", "1", "--no-page"),
-            program="tirebench",
-        )
-    steps.run("Replay the recording", "run", "--replay", record, "--fmu", fmu, "--json",
-              files.replay, "--no-page", program="tirebench")  # fmt: skip
-    return files
-
-
-def write_device(file: Path, lateral: Sequence[float]) -> None:
-    """Write a device file whose count is the rig's own step of strain, so that nothing is lost."""
-    from bench.rig.measure import Chain
-
-    step = 2.0 * Chain().gage_range / 2 ** Chain().gage_bits
-    file.write_text(
-        'format = "tirebench-device/1"\nname = "numerical rig"\n\n'
-        f"[gages]\nlateral_m = {[float(y) for y in lateral]}\n\n"
-        f"[scale]\nstrain_per_count = {step!r}  # {Chain().gage_bits} bit over "
-        f"+-{1e6 * Chain().gage_range:.0f} microstrain\n",
-        encoding="utf-8",
-    )
-
-
-def wait_for_port(file: Path, wheel: "subprocess.Popen[bytes]", log: Path) -> str:
-    """Return the port that the emulator announces; stop where it does not."""
-    end = time.monotonic() + PATIENCE
-    while not file.exists():
-        if wheel.poll() is not None or time.monotonic() > end:
-            how = "still runs" if wheel.poll() is None else f"ended with {wheel.returncode}"
-            sys.exit(
-                f"Error: tirebench emulate: no port after {PATIENCE:.0f} s at most, it {how}; it "
-                f"should write {_short(file)}; it said:\n{log.read_text(errors='replace')}"
-            )
-        time.sleep(0.05)
-    return file.read_text(encoding="utf-8").strip()
-
-
-def require_terminal() -> None:
-    """Stop with a message where there is no pseudo-terminal."""
-    try:
-        for end in os.openpty():
-            os.close(end)
-    except (AttributeError, OSError) as error:
-        sys.exit(NO_TERMINAL.format(reason=str(error)))
-
-
-def judge(console: Console, live: "LiveFiles", data: Path) -> None:
-    """Stop loudly if library, FMU and bench do not tell the same numbers."""
-    from tirelib.campaign import read_campaign
-    from tirelib.report.live import find_faults
-
-    faults = find_faults(live, read_campaign(data))
-    if faults:
-        console.print(Rule("NOT EQUAL: library, FMU and bench differ", style="bold red"))
-        for fault in faults:
-            console.print(fault, style="bold red", highlight=False, markup=False, soft_wrap=True)
-        sys.exit(1)
-    console.print("[green]library = FMU = bench[/]: see the section Live", highlight=False)
 
 
 def main() -> None:
@@ -307,31 +288,37 @@ def main() -> None:
     console, started = Console(), time.monotonic()
     steps, out = Steps(console), given.out.resolve()
     data = ready(given.data.resolve()) if given.data else measure(steps, out / "data", given.fresh)
-    for name, folder in data.items():
-        steps.run(f"Check {name}", "campaign", "check", folder)
-    steps.run("Read the features of every turn", "features", data["set1"], "--out",
-              out / "features.parquet")  # fmt: skip
-    calibration = out / "calibration.toml"
-    steps.run(
-        "Calibrate",
-        "calibrate",
-        *[data[name] for name in CALIBRATED if name in data],
-        "--out",
-        calibration,
-        "--report",
-        out / "calibration",
-    )
-    reports = [("calibration", "calibration/index.html")]
-    for name in [name for name in data if name.endswith("-unseen")]:
-        steps.run(
-            f"Estimate {name}",
-            *("estimate", data[name], "--calibration", calibration),
-            *("--json", out / f"{name}.json", "--report", out / name),
-        )
-        reports.append((f"estimates of {name}", f"{name}/index.html"))
+    calibration, fmu = out / "calibration.toml", out / "StrainTire.fmu"
+    seen = [data[name] for name in CALIBRATED if name in data]
+    steps.together([
+        Job("Calibrate", ("calibrate", *seen, "--out", calibration, "--report",
+                          out / "calibration")),
+        *(Job(f"Check {name}", ("campaign", "check", folder)) for name, folder in data.items()),
+        Job("Read the features of every turn", ("features", data["set1"], "--out",
+                                                out / "features.parquet")),
+    ])  # fmt: skip
+    unseen = [name for name in data if name.endswith("-unseen")]
+    jobs = [
+        Job(f"Estimate {name}", ("estimate", data[name], "--calibration", calibration,
+                                 "--json", out / f"{name}.json", "--report", out / name))
+        for name in unseen
+    ]  # fmt: skip
+    if not given.no_live:
+        jobs.append(Job("Build the FMU", ("fmu", "build", "--calibration", calibration,
+                                          "--out", fmu, "--samples-per-step", "16")))  # fmt: skip
+    steps.together(jobs)
+    reports = [("calibration", "calibration/index.html"),
+               *((f"estimates of {name}", f"{name}/index.html") for name in unseen)]  # fmt: skip
     live = None
     if not given.no_live:
-        live = go_live(steps, out, data["set1-unseen"], calibration, out / "set1-unseen.json")
+        day = data["set1-unseen"]
+        live = go_live(steps, out, day, fmu, out / "set1-unseen.json")
+        record = live.live.with_name(RECORDING)
+        steps.together([
+            Job("Estimate set1-unseen with the FMU", ("fmu", "run", fmu, day, "--json", live.fmu)),
+            Job("Replay the recording", ("run", "--replay", record, "--fmu", fmu, "--json",
+                                         live.replay, "--no-page"), "tirebench"),
+        ])  # fmt: skip
     page = draw(console, out, data, calibration, live, steps, reports)
     console.print(Rule(f"done in {time.monotonic() - started:.0f} s", style="green"))
     for title, file in [("everything", page), *((t, out / f) for t, f in reports)]:

@@ -9,9 +9,7 @@ The virtual tire ends at 20 km/h and 12 % of slip: the way is measured down to `
 controller aims at half that slip.
 """
 
-import argparse
 import dataclasses
-import json
 import math
 import sys
 from collections.abc import Callable, Sequence
@@ -21,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from cosim.closed_loop_command import run_study
 from cosim.closed_loop_controller import SlipController
 from cosim.closed_loop_sources import STEP, OncePerTurn, OneTurnLate, Perfect, Source, Strain
 from cosim.vehicle14.files import make_vehicle
@@ -352,30 +351,22 @@ def study(
     return Study(tuple(outcomes), end_speed)
 
 
-def _say(text: str) -> None:
-    sys.stderr.write(f"{text}\n")
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study by the command line; write JSON and a page."""
     from cosim.closed_loop_report import parts, sentence
-    from tirelib.report.parts_page import write_parts_page
 
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--virtual", type=Path, required=True)
-    parser.add_argument("--strain", type=Path, required=True)
-    parser.add_argument("--out", type=Path, default=Path("build/out/closed_loop"))
-    told = parser.parse_args(arguments)
-    found = study(told.virtual, told.strain, progress=_say)
-    told.out.mkdir(parents=True, exist_ok=True)
-    text = json.dumps(found.document(), indent=1, allow_nan=False)
-    (told.out / "closed_loop.json").write_text(text + "\n", encoding="utf-8")
-    write_parts_page(
-        told.out, "index", parts(found), title="Slip control with strain tires",
-        summary="Four virtual tires and four strain tires under FMPy",
-        answer=sentence(found, ROADS[0].name), messages=[],
-    )  # fmt: skip
-    return 0
+    return run_study(
+        __doc__,
+        "closed_loop",
+        lambda virtual, strain, say: study(virtual, strain, progress=say),
+        Study.document,
+        lambda found: {
+            "parts": parts(found),
+            "title": "Slip control with strain tires",
+            "answer": sentence(found, ROADS[0].name),
+        },
+        arguments,
+    )
 
 
 if __name__ == "__main__":

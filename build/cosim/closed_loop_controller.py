@@ -16,7 +16,9 @@ class SlipController:
     u is the traction that is asked for; it is integrated over the way and not over time, so that
     the loop is as stable at low speed as at high, where knowledge comes once per turn. It rises
     from zero at `rise` after the brakes are put on. A wheel whose speed sensor shows a rim
-    deceleration above `guard` gives up traction, whatever is known of its slip. Slip angles take
+    deceleration above `guard` gives up traction, whatever is known of its slip; and so does one of
+    which no slip is known any more, since slip beyond the calibrated range is the likeliest reason:
+    held at the last torque it would lock and never be seen again. Slip angles take
     their share: the target is kappa_0 sqrt(1 - (alpha / alpha_0)^2), a tenth of kappa_0 at least,
     so that wheels keep what they need to hold the vehicle in a turn.
 
@@ -33,6 +35,8 @@ class SlipController:
     guard : float, [m/s^2]
     yield_ : float, [s/m]
         Traction given up per excess of rim speed, and so of time.
+    release : float, [1/s]
+        Rate at which traction is given up where the slip is not known any more.
     most : float
         Highest traction that may be asked for.
     """
@@ -45,6 +49,7 @@ class SlipController:
     rise: float = 5.0
     guard: float = 14.0
     yield_: float = 0.25
+    release: float = 2.5
     most: float = 1.3
     radius: float = 0.31
 
@@ -67,10 +72,12 @@ class SlipController:
         limit = self.rise * since
         share = 1.0 - (np.where(np.isnan(known.alpha), 0.0, known.alpha) / self.widest) ** 2
         target = self.target * np.sqrt(np.maximum(share, 0.01))
-        error = np.where(np.isnan(known.kappa), 0.0, known.kappa - target)
+        blind = np.isnan(known.kappa) | ~known.sure
+        error = np.where(blind, 0.0, known.kappa - target)
         excess = np.maximum(slowing - self.guard, 0.0)
         moving = limit > asked  # the integral waits for the brakes to rise
         change = self.integral * speed * error * moving - self.yield_ * excess
+        change -= self.release * (~known.sure & np.isfinite(known.kappa))
         asked = np.minimum(np.maximum(asked + change * STEP, 0.05), self.most)
         wanted = np.minimum(asked + self.proportional * error, limit)
         torque = self.radius * known.load * np.maximum(wanted, 0.0)

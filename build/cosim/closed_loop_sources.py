@@ -7,7 +7,7 @@ virtual tires.
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -24,11 +24,15 @@ READY = math.radians(35.0)
 
 @dataclass(frozen=True)
 class Known:
-    """What a controller knows of four wheels; NaN: nothing yet."""
+    """What a controller knows of four wheels; NaN: nothing yet.
+
+    `sure` is false where the slip ratio is an old one, because what came since could not be used.
+    """
 
     kappa: FloatArray
     load: FloatArray
     alpha: FloatArray
+    sure: BoolArray = field(default_factory=lambda: np.ones(4, dtype=np.bool_))
 
 
 class Source(Protocol):
@@ -132,6 +136,7 @@ class Strain:
             np.where(told.kappa_valid, told.kappa, self._known.kappa),
             np.where(told.Fz_valid, told.Fz, self._known.load),
             np.where(told.alpha_valid, told.alpha, self._known.alpha),
+            sure=told.kappa_valid,
         )
         return self._known
 

@@ -11,9 +11,7 @@ The virtual tire knows one friction: its strain is that of a dry road at the sam
 follow from it as they are, by kinematics, lateral forces do not; the controller asks for none.
 """
 
-import argparse
 import dataclasses
-import json
 import math
 import sys
 from collections.abc import Callable, Sequence
@@ -24,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from cosim.closed_loop import STARTS, YAW_RATE
+from cosim.closed_loop_command import run_study
 from cosim.closed_loop_sources import STEP, Known, OncePerTurn, OneTurnLate, Perfect, Source, Strain
 from cosim.vehicle14.files import make_vehicle
 from cosim.vehicle14.model import SPIN, Controls
@@ -256,30 +255,22 @@ def document(outcomes: Sequence[StabilityOutcome]) -> dict[str, Any]:
     }
 
 
-def _say(text: str) -> None:
-    sys.stderr.write(f"{text}\n")
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study by the command line; write JSON and a page."""
     from cosim.closed_loop_stability_report import part, sentence
-    from tirelib.report.parts_page import write_parts_page
 
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--virtual", type=Path, required=True)
-    parser.add_argument("--strain", type=Path, required=True)
-    parser.add_argument("--out", type=Path, default=Path("build/out/stability"))
-    told = parser.parse_args(arguments)
-    found = stability(told.virtual, told.strain, progress=_say)
-    told.out.mkdir(parents=True, exist_ok=True)
-    text = json.dumps(document(found), indent=1, allow_nan=False)
-    (told.out / "stability.json").write_text(text + "\n", encoding="utf-8")
-    write_parts_page(
-        told.out, "index", [part(found)], title="Stability control with strain tires",
-        summary="Four virtual tires and four strain tires under FMPy", answer=sentence(found),
-        messages=[],
-    )  # fmt: skip
-    return 0
+    return run_study(
+        __doc__,
+        "stability",
+        lambda virtual, strain, say: stability(virtual, strain, progress=say),
+        document,
+        lambda found: {
+            "parts": [part(found)],
+            "title": "Stability control with strain tires",
+            "answer": sentence(found),
+        },
+        arguments,
+    )
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """Slip control with four wheels: sources of knowledge, the controller, and a short stop."""
 
+import dataclasses
 import json
 import math
 from types import SimpleNamespace
@@ -10,7 +11,8 @@ import pytest
 from cosim import closed_loop, closed_loop_report
 from cosim.closed_loop import Study
 from cosim.closed_loop_controller import SlipController
-from cosim.closed_loop_sources import READY, STEP, Known, OncePerTurn, OneTurnLate, Perfect
+from cosim.closed_loop_sources import READY, STEP, Known, OncePerTurn, OneTurnLate, Perfect, Strain
+from cosim.wheels import FourWheels
 from scipy.integrate import cumulative_trapezoid
 
 from tests.cosim import fmus
@@ -75,6 +77,27 @@ def test_the_controller_does_not_brake_blindly() -> None:
     assert step(known(CONTROL.target), since=0.05)[1] == pytest.approx(
         CONTROL.rise * 0.05 * 4e3 * CONTROL.radius
     )
+
+
+def test_a_wheel_whose_slip_is_not_known_any_more_gives_up_traction() -> None:
+    """Whatever its last slip was: an old error is none. Before anything is known nothing rises."""
+    for error in (0.0, 0.05, -0.05):
+        lost = dataclasses.replace(known(CONTROL.target + error), sure=np.arange(4) > 0)
+        asked, torque = CONTROL.step(np.full(4, 0.8), lost, np.full(4, 8.0), 20.0, 1.0)
+        assert asked[0] == pytest.approx(0.8 - CONTROL.release * STEP)
+        assert torque[0] == pytest.approx(asked[0] * 4e3 * CONTROL.radius)
+        assert asked[1] == step(known(CONTROL.target + error))[0]
+    never = dataclasses.replace(known(math.nan), sure=np.zeros(4, dtype=np.bool_))
+    assert step(never)[0] == 0.8
+
+
+def test_a_wheel_that_slips_out_of_what_can_be_told_comes_back() -> None:
+    """On a split road the left wheels pass the calibrated slip; held there they would lock."""
+    with FourWheels(fmus.virtual(), fmus.strain(), start_angles=closed_loop.STARTS[0]) as four:
+        run = closed_loop.brake(closed_loop.ROADS[3], Strain(four), end_speed=24.5)
+    assert run.kappa[:, 2].min() < -0.08
+    assert run.kappa[run.time > 0.4].min() > -0.1
+    assert run.kappa[-1, 2] > -0.06
 
 
 @pytest.fixture(scope="module")

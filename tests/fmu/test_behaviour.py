@@ -1,63 +1,22 @@
 """Laws of the running FMU: it is the library, and no fault reaches the importer as a crash."""
 
-import gc
-import json
-import shutil
 import sys
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from fmpy import extract, read_model_description
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Slave
 
-from tests.fmu import live, virtual_host
+from tests.fmu import live
+from tests.fmu.player import CONDITIONS, play, play_from_start, same, strain
 from tirelib.errors import FormatError
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.flags import TurnFlag, flag_names
 from tirelib.fmu.run import LoadedFmu
 from tirelib.stream import StreamEstimator
 
-CONDITIONS = np.array([live.SPEED, live.PRESSURE, 0.0])
 QUANTITIES = ("Fz", "alpha", "kappa", "Fy")
-
-
-@pytest.fixture(scope="module", params=[1, 10])
-def fmu(request: pytest.FixtureRequest) -> Iterator[LoadedFmu]:
-    with LoadedFmu(live.fmu_file(request.param)) as loaded:
-        yield loaded
-
-
-@pytest.fixture(scope="module")
-def ten() -> Iterator[LoadedFmu]:
-    with LoadedFmu(live.fmu_file(10)) as loaded:
-        yield loaded
-
-
-def strain(load: float = 4e3, tilt: float = 0.05, turns: float = 3.4) -> np.ndarray:
-    found = live.strain_of(load, tilt, turns=turns)[0]
-    return found[:, : found.shape[1] // 10 * 10]
-
-
-def play(fmu: LoadedFmu, samples: np.ndarray, conditions: np.ndarray = CONDITIONS) -> list[Any]:
-    """Outputs after every step, to the last digit."""
-    seen = []
-    for first in range(0, samples.shape[1], fmu.samples):
-        fmu.step(samples[:, first : first + fmu.samples], conditions)
-        seen.append(fmu.read())
-    return seen
-
-
-def play_from_start(fmu: LoadedFmu, samples: np.ndarray) -> Any:
-    fmu.start(live.RATE)
-    return play(fmu, samples)[-1]
-
-
-def same(a: list[Any], b: list[Any]) -> bool:
-    return json.dumps(a) == json.dumps(b)
 
 
 def test_after_every_step_the_outputs_are_those_of_the_library(fmu: LoadedFmu) -> None:
@@ -148,60 +107,6 @@ def test_a_step_that_is_no_whole_number_of_samples_is_discarded_with_its_cause(
         ten.slave.doStep(ten.count / live.RATE, step / live.RATE)
     ten.step(samples[:, 1200:1210], CONDITIONS)
     assert same([ten.read()], [wanted])
-
-
-def test_four_instances_are_independent() -> None:
-    loads = (3e3, 3.5e3, 4.2e3, 5e3)
-    fmus = [LoadedFmu(live.fmu_file(10), name=f"wheel_{n}") for n in range(4)]
-    records = [strain(load) for load in loads]
-    try:
-        for fmu in fmus:
-            fmu.start(live.RATE)
-        n = min(record.shape[1] for record in records)
-        for first in range(0, n, 10):
-            for fmu, record in zip(fmus, records, strict=True):
-                fmu.step(record[:, first : first + 10], CONDITIONS)
-        together = [fmu.read() for fmu in fmus]
-        alone = []
-        for record in records:
-            fmus[0].start(live.RATE)
-            alone.append(play(fmus[0], record[:, :n])[-1])
-        assert same(together, alone)
-        assert len({values["Fz"] for values in together}) == 4
-    finally:
-        for fmu in fmus:
-            fmu.close()
-
-
-def test_reset_forgets_everything(fmu: LoadedFmu) -> None:
-    samples = strain()
-    fmu.start(live.RATE)
-    first = play(fmu, samples)
-    fmu.start(live.RATE)
-    assert fmu.read()["turn"] == 0
-    assert same(play(fmu, samples), first)
-
-
-def test_a_state_rolls_back_exactly_and_survives_reset_and_serialisation(fmu: LoadedFmu) -> None:
-    samples = strain()
-    fmu.start(live.RATE)
-    play(fmu, samples[:, :1130])
-    state = fmu.slave.getFMUState()
-    text = fmu.slave.serializeFMUState(state)
-    count, now = fmu.count, fmu.read()
-    wanted = play(fmu, samples[:, 1130:])
-    fmu.slave.setFMUState(state)
-    fmu.count = count
-    assert same([fmu.read()], [now])
-    assert same(play(fmu, samples[:, 1130:]), wanted)
-    fmu.start(live.RATE)
-    again = fmu.slave.deSerializeFMUstate(text)
-    fmu.slave.setFMUState(again)
-    fmu.count = count
-    assert same([fmu.read()], [now])
-    assert same(play(fmu, samples[:, 1130:]), wanted)
-    for used in (state, again):
-        fmu.slave.freeFMUState(used)
 
 
 def test_a_lost_frame_is_flagged_and_the_fmu_recovers(ten: LoadedFmu) -> None:
@@ -392,57 +297,3 @@ def test_an_unexpected_error_holds_the_values_invalid_and_the_fmu_recovers(
     assert recovered["valid"]
     assert recovered["turn"] > before["turn"]
     assert recovered["contact_time"] > before["contact_time"] + 0.2
-
-
-@pytest.mark.parametrize("file", [live.fmu_file, virtual_host.file])
-def test_instances_come_and_go_without_growth(file: Callable[[int], Path]) -> None:
-    description = read_model_description(str(file(10)))
-    folder = extract(str(file(10)))
-
-    def cycle() -> None:
-        slave = FMU2Slave(
-            guid=description.guid, unzipDirectory=folder, instanceName="cycle",
-            modelIdentifier=description.coSimulation.modelIdentifier,
-        )  # fmt: skip
-        slave.instantiate()
-        slave.setupExperiment(startTime=0.0)
-        slave.enterInitializationMode()
-        slave.exitInitializationMode()
-        slave.doStep(0.0, float(description.defaultExperiment.stepSize))
-        slave.freeInstance()
-
-    def left() -> tuple[int, int]:
-        gc.collect()
-        name = (Path(folder) / "resources" / "slavemodule.txt").read_text()
-        return len(gc.get_objects()), sys.getrefcount(vars(sys.modules[name]))
-
-    try:
-        for _ in range(3):
-            cycle()
-        before = left()
-        for _ in range(30):
-            cycle()
-        after = left()
-    finally:
-        shutil.rmtree(folder)
-    assert after[0] - before[0] < 15  # an empty slave of pythonfmu leaves 14 objects each time
-    assert after[1] == before[1]  # what pythonfmu gives up is what the launcher takes
-
-
-def test_a_freed_instance_leaves_at_once_with_its_memory() -> None:
-    def alive() -> int:
-        return sum(
-            type(thing).__name__ == "StrainTire" and thing.instance_name == "gone"
-            for thing in gc.get_objects()
-        )
-
-    gc.collect()
-    gc.disable()
-    try:
-        with LoadedFmu(live.fmu_file(10), name="gone") as fmu:
-            fmu.start(live.RATE)
-            play(fmu, strain(turns=1.0))
-            assert alive() >= 1
-        assert alive() == 0
-    finally:
-        gc.enable()

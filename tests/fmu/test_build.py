@@ -151,6 +151,8 @@ def test_a_place_that_cannot_be_written_is_told_before_the_work(tmp_path: Path) 
     for place in (tmp_path / "file" / "x.fmu", tmp_path):
         with pytest.raises(FormatError, match="cannot be written"):
             build_fmu(live.calibration_file(), place, progress=done.append)
+    with pytest.raises(FormatError, match=r"x\.txt: ends in '\.txt'; allowed is \.fmu"):
+        build_fmu(live.calibration_file(), tmp_path / "x.txt", progress=done.append)
     assert done == []
 
 

@@ -1,7 +1,6 @@
 """Laws of the virtual tire whose road may be slippery: the friction is an input of its surface."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,14 +8,20 @@ import pytest
 from click.testing import CliRunner
 from fmpy.validation import validate_fmu
 
-from bench.rig.observe import forces, trace
-from bench.rig.solve import solve
-from bench.rig.tire import Condition, tire
-from tests.fmu.virtual_host import TYPICAL, Host, file, friction, friction_file, surface
+from bench.rig.tire import tire
+from tests.fmu.virtual_host import (
+    TYPICAL,
+    Host,
+    file,
+    friction,
+    friction_file,
+    hold_against_rig,
+    hold_mirrored,
+    surface,
+)
 from tirelib.cli.fmu import fmu as command
 from tirelib.fmu.check import check_fmu
 from tirelib.fmu.virtual.coordinates import FRICTION, INPUTS
-from tirelib.fmu.virtual.surface import mirrored
 
 OWN = tire("reference").friction
 
@@ -44,19 +49,11 @@ def test_friction_is_an_input_of_this_surface_and_not_of_the_other(slippery: Hos
 
 
 def test_it_is_the_rig_at_another_friction_within_its_stated_error() -> None:
-    load, alpha, kappa, camber, speed, pressure, mu = 3500.0, 0.05, -0.03, 0.01, 22.0, 2.4e5, 0.45
-    slip = (1.0 + kappa) / np.cos(alpha) - 1.0
-    rolling = replace(tire("reference"), friction=mu)
-    state = solve(rolling, Condition(load, pressure, speed, alpha, camber, slip))
-    seen, force = trace(state, 1440), forces(state)
-    answers = friction().answers(np.array([[load, alpha, kappa, camber, speed, pressure, mu]]))
-    error = 1e6 * (friction().strain(answers, seen.phi) - seen.strain)
-    told = friction().about["left_out"]["friction 0.3 .. 0.5"]
-    assert np.sqrt(np.mean(error**2)) < told["strain_ustrain_rms"]
-    assert np.abs(error).max() < told["strain_ustrain_median_of_largest"]
-    given = friction().forces_of(answers)[0]
-    assert abs(given[0] - force.fx) < 2.0 * told["Fx_N_rms"]
-    assert abs(given[1] - force.fy) < 2.0 * told["Fy_N_rms"]
+    condition, part = (3500.0, 0.05, -0.03, 0.01, 22.0, 2.4e5, 0.45), "friction 0.3 .. 0.5"
+    _, apart = hold_against_rig(friction(), condition, part)
+    told = friction().about["left_out"][part]
+    assert abs(apart.fx) < 2.0 * told["Fx_N_rms"]
+    assert abs(apart.fy) < 2.0 * told["Fy_N_rms"]
 
 
 def test_at_the_friction_of_the_other_surface_both_say_the_same_within_their_errors() -> None:
@@ -83,12 +80,7 @@ def test_no_force_along_the_road_is_larger_than_friction_allows() -> None:
 
 
 def test_the_mirror_image_of_a_slippery_condition_has_the_mirror_image_of_its_strain() -> None:
-    inputs = conditions(20, 3)
-    angle = np.linspace(-np.pi, np.pi, 20)
-    here, there = (friction().answers(rows) for rows in (inputs, mirrored(inputs)))
-    np.testing.assert_allclose(
-        friction().strain(there, angle), friction().strain(here, angle)[:, ::-1], atol=1e-9
-    )
+    hold_mirrored(friction(), conditions(20, 3), np.linspace(-np.pi, np.pi, 20))
 
 
 def test_where_the_road_is_slippery_the_lateral_force_is_what_friction_leaves(

@@ -1,6 +1,8 @@
 """One virtual tire in FMPy, and a calibration made on its strain, for the tests."""
 
 import shutil
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -9,6 +11,9 @@ import numpy as np
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
+from bench.rig.observe import Forces, forces, trace
+from bench.rig.solve import State, solve
+from bench.rig.tire import Condition, tire
 from tests.fmu import live
 from tirelib.campaign import CampaignHeader, Run, RunPlan, TireGeometry, write_campaign
 from tirelib.campaign.read import read_campaign
@@ -16,7 +21,7 @@ from tirelib.estimators.calibration_file import write_calibration
 from tirelib.estimators.train import train
 from tirelib.fmu.run import keeping
 from tirelib.fmu.virtual.spec import build_virtual, default_surface, friction_surface
-from tirelib.fmu.virtual.surface import Surface, read_surface
+from tirelib.fmu.virtual.surface import Surface, mirrored, read_surface
 from tirelib.observations import observe
 
 RATE = 1e4
@@ -44,6 +49,40 @@ def friction_file() -> Path:
 @cache
 def file(samples: int) -> Path:
     return build_virtual(live.folder() / f"VirtualTire_{samples}.fmu", samples_per_step=samples)
+
+
+def hold_against_rig(known: Surface, condition: Sequence[float], part: str) -> tuple[State, Forces]:
+    """Solve the rig at a condition of a surface, and demand the errors stated for a part of it.
+
+    Returns
+    -------
+    State, Forces
+        The rig's, and what the surface says beyond its forces.
+    """
+    load, alpha, kappa, camber, speed, pressure, *friction = condition
+    rolling = replace(tire("reference"), friction=friction[0]) if friction else tire("reference")
+    slip = (1.0 + kappa) / np.cos(alpha) - 1.0
+    state = solve(rolling, Condition(load, pressure, speed, alpha, camber, slip))
+    seen, force = trace(state, 1440), forces(state)
+    answers = known.answers(np.array([condition]))
+    error = 1e6 * (known.strain(answers, seen.phi) - seen.strain)
+    told = known.about["left_out"][part]
+    assert np.sqrt(np.mean(error**2)) < told["strain_ustrain_rms"]
+    assert np.abs(error).max() < told["strain_ustrain_median_of_largest"]
+    given = known.forces_of(answers)[0]
+    return state, replace(force, fx=given[0] - force.fx, fy=given[1] - force.fy)
+
+
+def hold_mirrored(known: Surface, inputs: np.ndarray, angle: np.ndarray) -> None:
+    """Demand that mirror images of conditions have the mirror images of strain and forces."""
+    here, there = known.answers(inputs), known.answers(mirrored(inputs))
+    np.testing.assert_allclose(
+        known.strain(there, angle), known.strain(here, angle)[:, ::-1], atol=1e-9
+    )
+    signs = np.array([1.0, -1.0, -1.0, 1.0])
+    np.testing.assert_allclose(
+        known.forces_of(there), known.forces_of(here) * signs, rtol=1e-6, atol=1e-3
+    )
 
 
 class Host:

@@ -20,7 +20,7 @@ from tirelib.estimators.fit import Fit, fit_best, levels_of, mean_by
 from tirelib.estimators.floor import with_floor
 from tirelib.estimators.grow import grow
 from tirelib.estimators.laws import ConditionLaws
-from tirelib.estimators.polynomial import Polynomial
+from tirelib.estimators.polynomial import Polynomial, leverage
 from tirelib.estimators.ranges import with_ranges
 from tirelib.estimators.regressors import EVEN, ODD, compute_regressors
 from tirelib.observations import TRUTH, Observations
@@ -350,14 +350,14 @@ def _weighed(model: Polynomial, values: dict[str, FloatArray], error: FloatArray
     Maximum likelihood of ``variance = leverage + a + b s^2 + c s^4``, s the slope d alpha / d u.
     """
     x = model.design(values)
-    leverage = np.einsum("ij,jk,ik->i", x, model.covariance, x)
+    uncertain = leverage(x, model.covariance)
     steep = model.slope(values, "utilisation") ** 2
     typical = float(np.median(steep))
     unit = float(np.median(error**2)) + LEAST_ANGLE_ERROR**2 * 1e-3
     shape = np.stack((np.ones_like(steep), steep / typical, (steep / typical) ** 2))
 
     def surprise(logs: FloatArray) -> float:
-        variance = leverage + unit * (np.exp(logs) @ shape)
+        variance = uncertain + unit * (np.exp(logs) @ shape)
         return float(np.sum(np.log(variance) + error**2 / variance))
 
     best = minimize(

@@ -3,6 +3,7 @@
 Numbers keep all their digits, so an estimate from a file equals the one from memory.
 """
 
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -19,6 +20,7 @@ from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.polynomial import Cloud, Polynomial, Range, Variable
 
 FORMAT = "tirelib-calibration/1"
+_NUMBERS = re.compile(r"\[\n((?:\s+[-+.\w]+,\n)+)\s*\]")
 _MODEL_UNITS = {"Fz": "N", "R_eff": "m", "Fy": "N", "alpha": "rad"}
 
 
@@ -50,8 +52,21 @@ def write_calibration(
     target.parent.mkdir(parents=True, exist_ok=True)
     target.write_text(
         "# Calibration of strain estimators. SI units, ISO 8855 axes; missing_gage = 0: none.\n"
-        + tomli_w.dumps(document),
+        + rows_on_lines(tomli_w.dumps(document)),
         encoding="utf-8",
+    )
+
+
+def rows_on_lines(text: str) -> str:
+    r"""Join every list of plain numbers, which ``tomli_w`` writes number by number, on a line.
+
+    Examples
+    --------
+    >>> print(rows_on_lines("a = [\n    1.5,\n    -2,\n]"))
+    a = [1.5, -2]
+    """
+    return _NUMBERS.sub(
+        lambda found: "[" + " ".join(found.group(1).split()).removesuffix(",") + "]", text
     )
 
 

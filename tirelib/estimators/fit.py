@@ -6,19 +6,17 @@ out, never the outermost)? The second keeps a polynomial from bending between th
 measured.
 """
 
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from sklearn.exceptions import ConvergenceWarning
-from sklearn.linear_model import BayesianRidge
 from sklearn.model_selection import GroupKFold, LeaveOneGroupOut
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.errors import CalibrationError
 from tirelib.estimators.basis import Powers
-from tirelib.estimators.polynomial import Polynomial, Variable, design
+from tirelib.estimators.polynomial import Polynomial, Variable, design, leverage
+from tirelib.estimators.ridge import ridge_fit, ridge_fits
 
 LARGEST_SHARE = 0.7
 """Terms per distinct condition at the most."""
@@ -121,15 +119,15 @@ def fit_best(
         tried.append((len(terms), score))
         if best is not None and not score < 0.98 * best[0]:
             continue
-        coefficients, covariance, noise = _ridge(x, y, weights, centre)
+        found = ridge_fit(x, y, weights, centre)
         # held-out errors, not the fit's own residuals, say how large an error to expect
         inflation = max(1.0, float(np.sqrt(np.average((error / held_std) ** 2, weights=weights))))
         model = Polynomial(
             variables=variables,
             terms=exponents,
-            coefficients=coefficients,
-            covariance=covariance * inflation**2,
-            residual=noise * inflation,
+            coefficients=found.coefficients,
+            covariance=found.covariance * inflation**2,
+            residual=found.noise * inflation,
             floor=0.0,
         )
         best = (score, Fit(model, held_out, ()))
@@ -143,52 +141,6 @@ def fit_best(
     return Fit(best[1].model, best[1].held_out, tuple(tried))
 
 
-@dataclass(frozen=True, slots=True)
-class Ridge:
-    """A Bayesian ridge regression, with the scales in which it was solved.
-
-    Attributes
-    ----------
-    coefficients, covariance : arrays, shapes (k,) and (k, k), in the unit of y
-    noise : float, unit of y
-    size : array, shape (k,)
-        By which the columns of x were divided.
-    penalty : float
-        Of the squared coefficients in those columns, per unit of squared error of a row.
-    """
-
-    coefficients: FloatArray
-    covariance: FloatArray
-    noise: float
-    size: FloatArray
-    penalty: float
-
-
-def ridge_fit(x: FloatArray, y: FloatArray, weights: FloatArray, centre: bool) -> Ridge:
-    """Fit y by the columns of x; the first column is the constant."""
-    middle = float(np.average(y, weights=weights)) if centre else 0.0
-    spread = float(np.sqrt(np.average((y - middle) ** 2, weights=weights))) or 1.0
-    size = np.sqrt(np.mean(x**2, axis=0))
-    size[size == 0.0] = 1.0
-    ridge = BayesianRidge(fit_intercept=False, max_iter=500, tol=1e-5)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ConvergenceWarning)
-        ridge.fit(x / size, (y - middle) / spread, sample_weight=weights / weights.mean())
-    coefficients = ridge.coef_ * spread / size
-    covariance = ridge.sigma_ * spread**2 / np.outer(size, size)
-    coefficients[0] += middle
-    noise = spread / float(np.sqrt(ridge.alpha_))
-    return Ridge(coefficients, covariance, noise, size, float(ridge.lambda_ / ridge.alpha_))
-
-
-def _ridge(
-    x: FloatArray, y: FloatArray, weights: FloatArray, centre: bool
-) -> tuple[FloatArray, FloatArray, float]:
-    """Return coefficients, their covariance and the noise, in the unit of y."""
-    found = ridge_fit(x, y, weights, centre)
-    return found.coefficients, found.covariance, found.noise
-
-
 def _cross_validate(
     x: FloatArray, y: FloatArray, groups: IntArray, weights: FloatArray, centre: bool
 ) -> tuple[FloatArray, FloatArray]:
@@ -196,11 +148,11 @@ def _cross_validate(
     count = np.unique(groups).size
     splitter = LeaveOneGroupOut() if count <= MOST_FOLDS else GroupKFold(MOST_FOLDS)
     predicted, std = np.empty_like(y), np.empty_like(y)
-    for train, test in splitter.split(x, y, groups):
-        coefficients, covariance, noise = _ridge(x[train], y[train], weights[train], centre)
-        predicted[test] = x[test] @ coefficients
-        spread = np.einsum("ij,jk,ik->i", x[test], covariance, x[test])
-        std[test] = np.sqrt(noise**2 + spread)
+    left_out = [np.isin(np.arange(y.size), test) for _, test in splitter.split(x, y, groups)]
+    fits = ridge_fits(x, y, weights, centre, (~test for test in left_out))
+    for test, fit in zip(left_out, fits, strict=True):
+        predicted[test] = x[test] @ fit.coefficients
+        std[test] = np.sqrt(fit.noise**2 + leverage(x[test], fit.covariance))
     return predicted, std
 
 
@@ -244,10 +196,11 @@ def _inner_levels(
     x: FloatArray, y: FloatArray, level: IntArray, weights: FloatArray, centre: bool
 ) -> list[float]:
     """Return the mean square error at each inner level by a fit without it."""
+    levels = list(inner_levels(x, level))
+    fits = ridge_fits(x, y, weights, centre, (~test for test, _ in levels))
     squares = []
-    for test, inside in inner_levels(x, level):
-        coefficients, _, _ = _ridge(x[~test], y[~test], weights[~test], centre)
-        error = (y[test] - x[test] @ coefficients)[inside]
+    for (test, inside), fit in zip(levels, fits, strict=True):
+        error = (y[test] - x[test] @ fit.coefficients)[inside]
         squares.append(float(np.average(error**2, weights=weights[test][inside])))
     return squares
 

@@ -20,7 +20,8 @@ import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.estimators.basis import Powers
-from tirelib.estimators.fit import design_for, inner_levels, ridge_fit
+from tirelib.estimators.fit import design_for, inner_levels
+from tirelib.estimators.ridge import ridge_fit
 
 GAIN = 0.97
 """Ratio of held-out errors below which a family is worth its terms."""
@@ -58,9 +59,15 @@ def grow(
     families : mapping of term lists by name
     """
     most = SHARE * np.unique(groups).size
+    judged: dict[frozenset[frozenset[tuple[str, int]]], Errors] = {}
 
     def judge(terms: Sequence[Powers]) -> Errors:
-        return held_out_errors(design_for(values, terms, odd)[2], y, groups, level, centre)
+        """Judge terms in whatever order: candidates often grow to the same ones."""
+        same = frozenset(frozenset(term.items()) for term in terms)
+        if same not in judged:
+            x = design_for(values, terms, odd)[2]
+            judged[same] = held_out_errors(x, y, groups, level, centre)
+        return judged[same]
 
     grown = [
         _grown(list(terms), families, judge, most) for terms in candidates if len(terms) <= most
@@ -75,20 +82,19 @@ def _grown(
     most: float,
 ) -> tuple[Errors, list[Powers]]:
     """Take up one family after the other; return the terms with their errors."""
-    best, waiting = judge(terms), dict(families)
+    best = judge(terms)
     while True:
         found = []
-        for name, family in waiting.items():
+        for family in families.values():  # one that was taken up adds no term any more
             longer = [*terms, *(term for term in family if term not in terms)]
             if len(terms) < len(longer) <= most:
-                found.append((judge(longer), name, longer))
+                found.append((judge(longer), longer))
         if not found:
             return best, terms
-        errors, name, longer = min(found, key=lambda one: one[0].both)
+        errors, longer = min(found, key=lambda one: one[0].both)
         if errors.both > GAIN * best.both or errors.conditions > GAIN * best.conditions:
             return best, terms
         best, terms = errors, longer
-        del waiting[name]
 
 
 def held_out_errors(

@@ -142,8 +142,7 @@ class Polynomial:
     def predict(self, values: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
         """Return value and standard deviation (one turn), each of shape (n,)."""
         x = self.design(values)
-        spread = np.einsum("ij,jk,ik->i", x, self.covariance, x)
-        std = np.sqrt(self.residual**2 + self.floor**2 + spread)
+        std = np.sqrt(self.residual**2 + self.floor**2 + leverage(x, self.covariance))
         return x @ self.coefficients, std
 
     def slope(self, values: Mapping[str, FloatArray], name: str) -> FloatArray:
@@ -183,6 +182,11 @@ def _products(
     np.multiply.accumulate(powers, axis=2, out=powers)
     products = np.multiply.reduce(powers[:, np.arange(count), powers_of], axis=2)
     return np.asarray(products, dtype=np.float64)
+
+
+def leverage(x: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return the variance that uncertain coefficients leave in each row's value, shape (n,)."""
+    return np.asarray(np.einsum("ij,ij->i", x @ covariance, x), dtype=np.float64)
 
 
 def term_name(variables: Sequence[Variable], term: Term) -> str:

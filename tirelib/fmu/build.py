@@ -157,7 +157,7 @@ def export(spec: SlaveSpec, out: str | Path, progress: Callable[[str], None] | N
 
 
 def _check_writable(target: Path) -> None:
-    """Refuse a file that cannot be written before the work is done, not after."""
+    """Refuse a name that is no FMU's or cannot be written before the work is done, not after."""
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=target.parent):
@@ -166,6 +166,11 @@ def _check_writable(target: Path) -> None:
             raise IsADirectoryError(21, "is a folder")
     except OSError as error:
         raise _unwritable(target, error) from None
+    if target.suffix.lower() != ".fmu":
+        raise FormatError(
+            f"{target}: ends in {target.suffix!r}; allowed is .fmu, by which importers know an "
+            "FMU; choose another name"
+        )
 
 
 def _unwritable(target: Path, error: OSError) -> FormatError:

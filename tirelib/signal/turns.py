@@ -154,19 +154,35 @@ class TurnCutter:
             self._previous_period, self._previous_offset = np.nan, None
             return self._first_turn(contact)
         period = contact.middle - before.middle
-        step = 2.0 * np.pi / period
-        suits = self.low_pass.suits(self.rate / period, self.rate)
-        sigma = (self.low_pass if suits else LowPass()).sigma(self.rate / period)
-        stop = self._stop(contact, step, sigma)
+        step, sigma, stop = self._needs(contact, before)
         if stop > self._base + self._filled:
             return None
         self._waiting.popleft()
         contact = replace(contact, damaged=self._damaged(contact))
         self._previous = contact
-        turn = self._full_turn(contact, before, step, sigma if suits else None, stop)
+        turn = self._full_turn(contact, before, step, sigma, stop)
         self._previous_period = period
         self._previous_offset = turn.offset
         return turn
+
+    @property
+    def lacking(self) -> int | None:
+        """How many samples the contact that waits for those after it lacks; None: none waits."""
+        if not self._waiting or self._previous is None:
+            return None
+        stop = self._needs(self._waiting[0], self._previous)[2]
+        return stop - self._base - self._filled
+
+    def _needs(self, contact: Contact, before: Contact) -> tuple[float, float | None, int]:
+        """Return the angle of a sample, the filter's width [rad], and `_stop`, of a turn.
+
+        The width is None where the filter does not suit the turn.
+        """
+        period = contact.middle - before.middle
+        step = 2.0 * np.pi / period
+        suits = self.low_pass.suits(self.rate / period, self.rate)
+        sigma = (self.low_pass if suits else LowPass()).sigma(self.rate / period)
+        return step, sigma if suits else None, self._stop(contact, step, sigma)
 
     def _stop(self, contact: Contact, step: float, sigma: float) -> int:
         """Return the number of the sample after the last one that a turn needs."""

@@ -88,14 +88,13 @@ class Backlog:
 def quiet_range(cutter: TurnCutter) -> tuple[float, float, int] | None:
     """Return between which strains of the centre gage, and for how many samples, no turn can end.
 
-    None where that cannot be told: before the first contact, and while a contact waits for the
-    samples that follow it.
+    None where that cannot be told: before the first contact.
     """
     inside: dict[str, Any] = vars(cutter)
     finder: ContactFinder = inside["_finder"]
     known = vars(finder)
     level, tail = known["_level"], known["_tail"]
-    if level is None or inside["_waiting"] or tail.size < _MEDIAN:
+    if level is None or tail.size < _MEDIAN:
         return None
     jump = JUMP * known["_swing"] * _NEARLY
     lowest, highest = known["_lowest"], known["_highest"]
@@ -105,7 +104,8 @@ def quiet_range(cutter: TurnCutter) -> tuple[float, float, int] | None:
     else:
         low = max(known["_low_level"], highest - jump)
         high = min(lowest, low) + jump
-    room = min(MOST, finder._room() - _MEDIAN - 1)
+    lacking = cutter.lacking
+    room = min(MOST, finder._room() - _MEDIAN - 1, (MOST if lacking is None else lacking) - 1)
     if room < 1 or not (low <= float(tail.min()) and float(tail.max()) <= high):
         return None
     return low, high, room

@@ -11,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
-from tirelib.estimators.polynomial import Cloud
-from tirelib.estimators.ranges import MIRRORED
+from tirelib.estimators.polynomial import Cloud, Polynomial, Variable
+from tirelib.estimators.ranges import AROUND, MIRRORED, REACH, with_ranges
+from tirelib.estimators.regressors import SHAPE
 from tirelib.estimators.train import Trained
 
 NAMES = ("traction", "cp1_slope")
@@ -43,6 +44,11 @@ def test_what_lies_between_calibrated_combinations_counts() -> None:
     half = RING[[0, 1, 2, 3, 4]]
     assert inside(cloud(half, around=0.4), (0.0, 0.12), (0.0, -0.12)) == [True, False]
     assert inside(cloud(RING, around=0.4), (np.nan, 0.0)) == [False]
+    # the gap from the last direction round to the first counts as any other: 185 deg, 175 deg
+    for end, closed in ((95.0, False), (105.0, True)):
+        turn = np.deg2rad([-80.0, 0.0, end])
+        three = 0.3 * np.stack((np.cos(turn), np.sin(turn)), axis=1)
+        assert inside(cloud(three, around=0.4), (0.0, 0.0)) == [closed]
 
 
 @given(
@@ -100,6 +106,40 @@ def test_the_shape_of_the_contact_decides_where_a_model_uses_it(trained: Trained
             assert model is not None
             used = {v.name for v in model.variables} - {"pressure", "speed_squared", "camber"}
             assert used <= guarded
+
+
+def of_one(model: Polynomial | None, name: str) -> Polynomial:
+    """Return a model that uses one regressor only."""
+    assert model is not None
+    return replace(model, variables=(Variable(name, 0.0, 1.0),), terms=((1,),),
+                   coefficients=np.ones(1), covariance=np.eye(1))  # fmt: skip
+
+
+def test_what_an_estimate_is_made_from_decides_on_it(trained: Trained) -> None:
+    """The slip angle is made from load and lateral force, each with its regressors of the shape."""
+    chain, links = trained.calibration.chains[-1], trained.links
+    bare = replace(chain, load=of_one(chain.load, "fullness"), force=of_one(chain.force, "skew"))
+    ranges = with_ranges(bare, links.values, links.truth).guards
+    shape = {q: {limit.name for limit in ranges[q]} & set(SHAPE) for q in ranges}
+    assert shape == {"Fz": {"fullness"}, "Fy": {"skew"}, "alpha": {"fullness", "skew"},
+                     "kappa": set()}  # fmt: skip
+
+
+@pytest.mark.parametrize(("n", "reach"), [(35, REACH[0]), (22, 1.5 * 2.0 / 21), (9, REACH[1])])
+def test_near_is_half_as_far_again_as_calibrated_combinations_lie_apart(
+    trained: Trained, n: int, reach: float
+) -> None:
+    """Within bounds, in half ranges; what was calibrated on one side was on the other."""
+    chain, links = trained.calibration.chains[-1], trained.links
+    even = {"traction": np.linspace(-0.3, 0.3, n), "cp1_slope": np.zeros(n)}
+    values = {name: x[:n] for name, x in links.values.items()} | even
+    found = with_ranges(chain, values, links.truth).cloud
+    assert found is not None
+    assert found.reach == pytest.approx(reach)
+    assert (found.around, found.mirrored) == (AROUND, True)
+    np.testing.assert_allclose(found.scale, [0.3, 0.02])  # a floor where nothing varied
+    still = values | {"traction": 0.1 * even["traction"]}
+    assert with_ranges(chain, still, links.truth).cloud is None
 
 
 @pytest.mark.parametrize("count", [2, 3])

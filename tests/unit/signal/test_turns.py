@@ -53,6 +53,20 @@ def test_frames_of_any_length_give_the_same_turns_as_the_whole_record(
         assert_same(piece, turn)
 
 
+def test_a_turn_comes_with_the_last_of_the_samples_that_its_contact_lacks() -> None:
+    strain, _, _ = record(turns=4)
+    cutter, told = TurnCutter(LATERAL, RATE), 0
+    for i in range(strain.shape[1]):
+        lacking = cutter.lacking
+        turns = cutter.push(strain[:, i : i + 1], speed=18.0)
+        if lacking is not None:
+            assert lacking >= 1
+            assert bool(turns) == (lacking == 1)
+            assert turns or cutter.lacking == lacking - 1
+            told += bool(turns)
+    assert told == 3  # the first contact has no turn before it
+
+
 def test_a_turn_is_ready_twenty_degrees_and_half_the_filter_after_the_pulse() -> None:
     strain, _, omega = record(turns=4)
     cutter = TurnCutter(LATERAL, RATE)

@@ -1,0 +1,125 @@
+"""The part of the demonstration that goes over a serial line: wheel, port, bench."""
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from rich.console import Console
+from rich.rule import Rule
+
+if TYPE_CHECKING:
+    from demo import Steps
+
+    from tirelib.campaign import RunPlan
+    from tirelib.report.live import LiveFiles
+
+LIVE_ANGLES = (-3.0, 4.0, 0.0, -5.0, 2.0, -4.0)
+"""Slip angles [deg] of the runs that go over the line, the loads growing from one to the next."""
+RECORDING = "live.mcap"
+PATIENCE = 30.0
+"""How long a program in the background gets to begin or to end, [s]."""
+NO_TERMINAL = (
+    "Error: make demo: this platform has no pseudo-terminal ({reason}); the part with the serial "
+    "line needs one, as Linux and macOS have; run it there, or leave that part out with --no-live"
+)
+
+
+def choose_runs(plans: "Sequence[RunPlan]") -> list[int]:
+    """Return runs over all loads, each nearest to its own slip angle."""
+    straight = [plan for plan in plans if not plan.camber and not plan.slip_ratio]
+    loads = sorted({plan.load for plan in straight})
+    chosen: dict[int, None] = {}
+    places = np.linspace(0, len(loads) - 1, len(LIVE_ANGLES)).round().astype(int)
+    for place, angle in zip(places, LIVE_ANGLES, strict=True):
+        left = [p for p in straight if p.load == loads[place] and p.run not in chosen]
+        if left:
+            chosen[min(left, key=lambda p: abs(np.rad2deg(p.slip_angle) - angle)).run] = None
+    return list(chosen)
+
+
+def go_live(steps: "Steps", out: Path, data: Path, fmu: Path, library: Path) -> "LiveFiles":
+    """Send runs of a campaign over a serial line to the bench, which steps the FMU and records."""
+    from tirelib.campaign import read_campaign
+    from tirelib.report.live import LiveFiles
+
+    folder = out / "live"
+    folder.mkdir(parents=True, exist_ok=True)
+    files = LiveFiles(library, out / "fmu.json", folder / "live.json", folder / "replay.json",
+                      folder / "conditions.json", folder / "device.toml")  # fmt: skip
+    port_file, record = folder / "port", folder / RECORDING
+    for old in (port_file, record, files.fmu, files.live, files.replay, files.conditions):
+        old.unlink(missing_ok=True)
+    campaign = read_campaign(data)
+    write_device(files.device, campaign.header.gage_lateral)
+    runs = [word for run in choose_runs(campaign.plans) for word in ("--run", str(run))]
+    with steps.beside(
+        "Play runs of it as a wheel on a serial port, in the background",
+        *("emulate", "--campaign", data, *runs, "--device", files.device),
+        *("--port-file", port_file, "--conditions", files.conditions),
+        program="tirebench", log=folder / "emulate.log",
+    ) as wheel:  # fmt: skip
+        port = wait_for_port(port_file, wheel, folder / "emulate.log")
+        steps.run(
+            "Read the port, step the FMU, record",
+            *("run", "--port", port, "--fmu", fmu, "--conditions", files.conditions),
+            *("--device", files.device, "--record", record, "--json", files.live),
+            *("--silence", "1", "--no-page"),
+            program="tirebench",
+        )
+    return files
+
+
+def write_device(file: Path, lateral: Sequence[float]) -> None:
+    """Write a device file whose count is the rig's own step of strain, so that nothing is lost."""
+    from bench.rig.measure import Chain
+
+    step = 2.0 * Chain().gage_range / 2 ** Chain().gage_bits
+    file.write_text(
+        'format = "tirebench-device/1"\nname = "numerical rig"\n\n'
+        f"[gages]\nlateral_m = {[float(y) for y in lateral]}\n\n"
+        f"[scale]\nstrain_per_count = {step!r}  # {Chain().gage_bits} bit over "
+        f"+-{1e6 * Chain().gage_range:.0f} microstrain\n",
+        encoding="utf-8",
+    )
+
+
+def wait_for_port(file: Path, wheel: "subprocess.Popen[bytes]", log: Path) -> str:
+    """Return the port that the emulator announces; stop where it does not."""
+    end = time.monotonic() + PATIENCE
+    while not file.exists():
+        if wheel.poll() is not None or time.monotonic() > end:
+            how = "still runs" if wheel.poll() is None else f"ended with {wheel.returncode}"
+            sys.exit(
+                f"Error: tirebench emulate: no port after {PATIENCE:.0f} s at most, it {how}; it "
+                f"should write {file}; it said:\n{log.read_text(errors='replace')}"
+            )
+        time.sleep(0.05)
+    return file.read_text(encoding="utf-8").strip()
+
+
+def require_terminal() -> None:
+    """Stop with a message where there is no pseudo-terminal."""
+    try:
+        for end in os.openpty():
+            os.close(end)
+    except (AttributeError, OSError) as error:
+        sys.exit(NO_TERMINAL.format(reason=str(error)))
+
+
+def judge(console: Console, live: "LiveFiles", data: Path) -> None:
+    """Stop loudly if library, FMU and bench do not tell the same numbers."""
+    from tirelib.campaign import read_campaign
+    from tirelib.report.live import find_faults
+
+    faults = find_faults(live, read_campaign(data))
+    if faults:
+        console.print(Rule("NOT EQUAL: library, FMU and bench differ", style="bold red"))
+        for fault in faults:
+            console.print(fault, style="bold red", highlight=False, markup=False, soft_wrap=True)
+        sys.exit(1)
+    console.print("[green]library = FMU = bench[/]: see the section Live", highlight=False)
