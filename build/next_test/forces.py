@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from next_test.pair import REFERENCE, Pair, PairCase, look_alikes
 from tests.magic_sweep import _force
 from tirelib.arrays import FloatArray
 from tirelib.compare.force_model import ForceBench, ForceModel
@@ -49,21 +50,6 @@ ENVELOPE = MappingProxyType({
     "load": (500.0, 2900.0), "pressure": (0.65e5, 1.0e5), "speed": (SPEED, SPEED),
     "slip_angle": (np.deg2rad(-9.0), np.deg2rad(9.0)), "temperature": (315.0, 350.0),
 })  # fmt: skip
-REFERENCE = 1000
-"""Seed of the tire at which pairs are chosen."""
-A_PLAN = 3
-"""Pairs that each plan contributes."""
-
-
-@dataclass(frozen=True)
-class ForceTest:
-    """Who is planted on which tire, and who looks like it."""
-
-    seed: int
-    plan: str
-    truth: str
-    rival: str
-    visible: float
 
 
 @dataclass(frozen=True)
@@ -158,7 +144,7 @@ def case_of(data: ForceData) -> ForceCase:
     return ForceCase("steady", model, problem, NOISE, len(problem) // 2, ())
 
 
-def tire_of(test: ForceTest) -> Tire:
+def tire_of(test: PairCase) -> Tire:
     """Return the tire with the effect at the strength of the wanted visibility.
 
     That is the chi-square, in the metric of structure, that the effect adds to the tire without it.
@@ -183,35 +169,20 @@ def tire_of(test: ForceTest) -> Tire:
     return replace(none, strength=sign * step)
 
 
-def pairs() -> list[tuple[str, str, str]]:
-    """Return plan and two look-alikes: of each plan the closest that no plan before has."""
-    chosen: list[tuple[str, str, str]] = []
-    for plan, points in PLANS.items():
-        at = points.points(REFERENCE)
+def pairs() -> list[Pair]:
+    """Return plans and look-alikes there, by the angles that a diagnosis tells of a plain tire."""
+
+    def signatures(plan: str) -> tuple[list[str], FloatArray]:
+        at = PLANS[plan].points(REFERENCE)
         case = case_of(Tire(REFERENCE, float(at["time"].max()), DRIFTS[0], 0.0).measured(at, 0))
         base = fit_force(case.problem, case.model.values)
         found = force_candidates(case.problem, base, [CATALOGUE[name] for name in PLANTED])
-        names = found.names
-        order = sorted(
-            (float(found.angles[i, j]), *sorted((names[i], names[j])))
-            for i in range(len(names)) for j in range(i)
-        )  # fmt: skip
-        known = {(a, b) for _, a, b in chosen}
-        chosen += [(plan, a, b) for _, a, b in order if (a, b) not in known][:A_PLAN]
-    return chosen
+        return found.names, found.angles
+
+    return look_alikes(PLANS, signatures)
 
 
-def cases(first: int, count: int, visible: float) -> list[ForceTest]:
-    """Return cases: every pair on every tire, with the one and the other as the truth in turn."""
-    out = []
-    for seed in range(first, first + count):
-        for k, (plan, *names) in enumerate(pairs()):
-            truth, rival = names if (seed + k) % 2 else names[::-1]
-            out.append(ForceTest(seed, plan, truth, rival, visible))
-    return out
-
-
-def measured(test: ForceTest) -> dict[str, Any]:
+def measured(test: PairCase) -> dict[str, Any]:
     """Return what the campaign, a further point at random, and the advised one tell of a pair."""
     tire = tire_of(test)
     case = case_of(tire.measured(PLANS[test.plan].points(test.seed), 1))
@@ -221,13 +192,12 @@ def measured(test: ForceTest) -> dict[str, Any]:
     declared = {name: ends for name, ends in ENVELOPE.items() if name in axes}
     envelope = Envelope.of(case.problem.bench.conditions, axes, **declared)
     plan = force_next_test(case, base, suspects, envelope)
-    out: dict[str, Any] = {"strength": tire.strength, "before": gap_of(plan.trial, test)}
+    out: dict[str, Any] = {"strength": tire.strength, "before": test.gap(plan.trial)}
     if len(plan.trial.rivals) < 2:
         return out
-    random = np.random.default_rng([test.seed, 5])
-    for name, k in (("chosen", 0), ("random", int(random.integers(len(plan.points))))):
+    for name, k in (("chosen", 0), ("random", test.any_of(len(plan.points)))):
         trial = _tried(case, envelope, plan.points[k], tire, base, suspects)
-        out[name] = gap_of(trial, test) | {
+        out[name] = test.gap(trial) | {
             "at": envelope.text(plan.points[k]), "predicted": float(plan.score[k]),
             "chance": float(plan.probability[k]),
         }  # fmt: skip
@@ -249,10 +219,3 @@ def _tried(
     base = fit_force(problem, near.values)
     structure = structure_rows(problem, len(problem), base, MEMBERS, 0)
     return try_force_suspects(after, base, suspects, structure)
-
-
-def gap_of(trial: ForceTrial, test: ForceTest) -> Mapping[str, Any]:
-    """Return by how much the rival is worse than the truth, and who cannot be fitted."""
-    cost = {rival.name: rival.cost for rival in trial.rivals}
-    gap = cost[test.rival] - cost[test.truth] if len(cost) == 2 else None
-    return {"gap": gap, "left_out": dict(trial.left_out)}

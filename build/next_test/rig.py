@@ -35,8 +35,8 @@ from tirelib.planning.rivals import Trial, repeated_noise, try_suspects
 from tirelib.waveforms import Waveforms
 
 CACHE = Path(__file__).parents[1] / "out" / "next_test"
-VERSION = 4
-"""Of everything that decides a campaign's numbers."""
+VERSION = 5
+"""Of what decides a campaign's numbers beside its day."""
 REPEATS = 2
 """Runs of a campaign that are made twice."""
 CORRECTIONS = 3
@@ -56,12 +56,14 @@ PLANS: Mapping[str, tuple[Condition, ...]] = MappingProxyType({
                        (3000.0, 2.4, 65.0), (4500.0, 2.4, 65.0), (6000.0, 2.4, 65.0)),
     "one_pressure": _plan((3000.0, 2.1, 40.0), (6000.0, 2.1, 40.0), (4500.0, 2.1, 60.0),
                           (4500.0, 2.1, 80.0), (3000.0, 2.1, 100.0), (6000.0, 2.1, 100.0)),
-    "near_loads": _plan((4200.0, 1.8, 40.0), (5300.0, 2.4, 40.0), (4200.0, 2.1, 60.0),
-                        (5300.0, 2.1, 80.0), (4200.0, 2.4, 100.0), (5300.0, 1.8, 100.0)),
-    "corners": _plan((3000.0, 1.8, 40.0), (6000.0, 2.4, 40.0), (4500.0, 2.1, 60.0),
-                     (4500.0, 2.1, 80.0), (3000.0, 2.4, 100.0), (6000.0, 1.8, 100.0)),
+    "pressure_by_load": _plan((3000.0, 1.8, 40.0), (3000.0, 1.8, 100.0), (4500.0, 2.1, 60.0),
+                              (4500.0, 2.1, 80.0), (6000.0, 2.4, 40.0), (6000.0, 2.4, 100.0)),
+    "ever_faster": _plan((3000.0, 2.4, 40.0), (6000.0, 1.8, 52.0), (4500.0, 2.1, 64.0),
+                         (3000.0, 1.8, 76.0), (6000.0, 2.4, 88.0), (4500.0, 2.1, 100.0)),
 })  # fmt: skip
 """Six conditions each, in the order in which a hurried tester would choose them."""
+IN_ORDER = ("ever_faster",)
+"""Plans that are driven in that order; the others in one at random."""
 ENVELOPE = MappingProxyType({
     "load": (2000.0, 7500.0), "pressure": (1.6 * BAR, 2.7 * BAR), "speed": (20.0 * KMH, 130.0 * KMH)
 })  # fmt: skip
@@ -78,6 +80,11 @@ class SmallDay(Day):
     def place(self) -> FloatArray:
         """Place of each run in the campaign, beyond 1 for further runs."""
         return np.array(self.when)
+
+    @property
+    def key(self) -> str:
+        """Digest of everything that is drawn: what is kept of another day serves none."""
+        return _digest((VERSION, self))
 
 
 @dataclass(frozen=True)
@@ -110,14 +117,14 @@ class Made:
         return join(self.waves, self._further(np.asarray(point, dtype=float), repeats))
 
     def _further(self, point: FloatArray, repeats: int) -> Waveforms:
-        told = (VERSION, self.seed, self.plan, self.truth, f"{self.strength:.6e}",
+        told = (campaign_day(self.seed, self.plan).key, self.truth, f"{self.strength:.6e}",
                 np.round(point, 2).tolist(), repeats)  # fmt: skip
-        file = CACHE / "further" / f"{hashlib.sha256(repr(told).encode()).hexdigest()[:24]}.pkl"
+        file = CACHE / "further" / f"{_digest(told)}.pkl"
 
         def make() -> Waveforms:
             n = len(self.waves)
             later = [(n + k) / (n - 1.0) for k in range(repeats)]
-            number = 100 + int(hashlib.sha256(repr(told[5]).encode()).hexdigest()[:6], 16) % 9000
+            number = 100 + int(_digest(told[3])[:6], 16) % 9000
             today = small_day(
                 self.seed, [Condition(*point)] * repeats, range(repeats), later, number
             )
@@ -125,6 +132,10 @@ class Made:
             return waveforms(Plain(today, tuple(states)), states, shown, f"{told}")
 
         return _kept(file, make)
+
+
+def _digest(value: object) -> str:
+    return hashlib.sha256(repr(value).encode()).hexdigest()[:16]
 
 
 def _kept(file: Path, make: Callable[[], Any]) -> Any:
@@ -183,10 +194,12 @@ def _solved(today: SmallDay, condition: Condition, near: State | None) -> State:
 
 
 def campaign_day(seed: int, plan: str) -> SmallDay:
-    """Return the day of a plan: its conditions in a random order, two of them once more."""
+    """Return the day of a plan: its conditions in their order, two of them once more at the end."""
     random = np.random.default_rng([seed, 77, list(PLANS).index(plan)])
     n = len(PLANS[plan])
-    number = np.concatenate([random.permutation(n), random.choice(n, REPEATS, replace=False)])
+    first = np.arange(n) if plan in IN_ORDER else random.permutation(n)
+    again = random.choice(n, REPEATS, replace=False)
+    number = np.concatenate([first, np.sort(again)])
     conditions = [PLANS[plan][k] for k in number]
     return small_day(
         seed, conditions, number.tolist(), np.arange(number.size) / (number.size - 1.0)
@@ -213,9 +226,9 @@ class Bare:
 
 def bare(seed: int, plan: str) -> Bare:
     """Return a plan's campaign without any effect, from the cache if it is there."""
+    today = campaign_day(seed, plan)
 
     def make() -> Bare:
-        today = campaign_day(seed, plan)
         states, shown = traces(today, "", 0.0, None)
         waves = waveforms(Plain(today, tuple(states)), states, shown, plan)
         fit = base_fit(waves, today.held_out)
@@ -225,7 +238,7 @@ def bare(seed: int, plan: str) -> Bare:
         trial = try_suspects(data, fit, (), noise=repeated_noise(runs, data, fit))
         return Bare(slim, tuple(shown), waves, fit, trial)
 
-    found: Bare = _kept(CACHE / "bare" / f"{seed}-{plan}-{VERSION}.pkl", make)
+    found: Bare = _kept(CACHE / "bare" / f"{seed}-{plan}-{today.key}.pkl", make)
     return replace(found, states=tuple(replace(s, grid=_GRID) for s in found.states))
 
 
@@ -252,7 +265,8 @@ class Visible:
 
 def campaign(seed: int, plan: str, truth: str, visible: float) -> Made:
     """Return a campaign with an effect of a visibility, from the cache if it is there."""
-    file = CACHE / "campaigns" / f"{seed}-{plan}-{truth}-{visible:g}-{VERSION}.pkl"
+    key = campaign_day(seed, plan).key
+    file = CACHE / "campaigns" / f"{seed}-{plan}-{truth}-{visible:g}-{key}.pkl"
     found: Made = _kept(file, lambda: _campaign(seed, plan, truth, visible))
     return found
 

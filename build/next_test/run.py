@@ -25,23 +25,27 @@ from hidden.measured import keep
 
 import tirelib
 from next_test import forces, strain
+from next_test.pair import cases_of
 from next_test.rig import CACHE
 from tirelib.errors import TirelibError
 from tirelib.planning.criterion import RESOLVED
+from tirelib.planning.document import PROMISING
 
-VISIBLE = {"strain": 50.0, "Fy": 12.0}
+VISIBLE = {"strain": 30.0, "Fy": 12.0}
 """Chi-square by which the campaign alone shows the effect, against none, in the metric of
-structure: an alarm, and weak enough that look-alikes would serve."""
-_PARTS = ("diagnose", "effects", "identify", "model", "planning", "contact", "ring", "brush")
-STAGES = ("before", "random", "chosen")
+structure: about what an alarm takes, and weak enough that look-alikes would serve."""
+_PARTS = ("diagnose", "effects", "identify", "model", "planning", "contact", "ring", "strain",
+          "brush", "compare")  # fmt: skip
+STAGES = {"before": "before", "random": "random", "chosen": "advised"}
+"""Of a case, and as the table tells them."""
 Verdict = dict[str, Any]
 
 
 def fingerprint() -> str:
-    """Return a hash of the library's code that a verdict depends on."""
+    """Return a hash of the code that a verdict depends on, the library's and this one."""
     digest, root = hashlib.sha256(), Path(tirelib.__file__).parent
-    for part in _PARTS:
-        for file in sorted((root / part).rglob("*.py")):
+    for folder in (*(root / part for part in _PARTS), Path(__file__).parent):
+        for file in sorted(folder.rglob("*.py")):
             digest.update(file.read_bytes())
     return digest.hexdigest()[:12]
 
@@ -79,16 +83,23 @@ def shares(found: Sequence[Verdict], stage: str) -> str:
 
 
 def table(found: Sequence[Verdict]) -> str:
-    """Return the table in Markdown: by pair, all, and those that were open before."""
-    rows = ["| pair | before: right | wrong | random: right | wrong | advised: right | wrong |",
-            "|---|---|---|---|---|---|---|"]  # fmt: skip
+    """Return the table in Markdown: by pair, all, those open before, and what was foretold."""
+    able = [v for v in found if "error" not in v]
+    stages = {k: title for k, title in STAGES.items() if any(k in v for v in able)}
+    rows = ["| pair | " + " | ".join(f"{title}: right | wrong" for title in stages.values()) + " |",
+            "|---" * (1 + 2 * len(stages)) + "|"]  # fmt: skip
     by: dict[str, list[Verdict]] = {}
-    for v in found:
+    for v in able:
         by.setdefault(f"{v['plan']}: {', '.join(sorted((v['truth'], v['rival'])))}", []).append(v)
-    still = [v for v in found if state(v, "before") == "open"]
-    groups = [*by.items(), ("all", list(found)), ("open before", still)]
+    still = [v for v in able if state(v, "before") == "open"]
+    likely = [v for v in still if v.get("chosen", {}).get("chance", 0.0) >= PROMISING]
+    groups = [*by.items(), ("all", able), ("open before", still),
+              (f"of these, told a chance of {100 * PROMISING:.0f} % or more", likely)]  # fmt: skip
     for name, each in groups:
-        rows.append(f"| {name} | " + " | ".join(shares(each, stage) for stage in STAGES) + " |")
+        rows.append(f"| {name} | " + " | ".join(shares(each, stage) for stage in stages) + " |")
+    for v in found:
+        if "error" in v:
+            rows.append(f"\nleft out: {v['error']}")
     return "\n".join(rows)
 
 
@@ -107,11 +118,11 @@ def main() -> None:
     parser.add_argument("--visible", type=float, help="chi-square of the planted effect")
     given = parser.parse_args()
     visible = given.visible or VISIBLE[given.quantity]
-    maker = strain.cases if given.quantity == "strain" else forces.cases
+    pairs = (strain if given.quantity == "strain" else forces).pairs()
     code, found = fingerprint(), []
-    for case in [c for seed in seeds_of(given.seeds) for c in maker(seed, 1, visible)]:
+    for case in [c for seed in seeds_of(given.seeds) for c in cases_of(pairs, seed, visible)]:
         v = verdict(given.quantity, case, code)
-        said = {stage: v.get(stage, {}).get("gap") for stage in STAGES}
+        said = {name: v.get(stage, {}).get("gap") for stage, name in STAGES.items()}
         gaps = ", ".join(f"{k} {x:.1f}" if x is not None else f"{k} -" for k, x in said.items())
         _say(f"{case.seed} {case.plan} {case.truth} / {case.rival}: {gaps}")
         found.append(v)

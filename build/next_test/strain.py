@@ -1,14 +1,15 @@
 """One case on strain: two look-alikes, before, after a run at random and after the advised run."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from hidden.cases import base_fit
 
 from bench.rig.hidden import HIDDEN
+from next_test.pair import REFERENCE, Pair, PairCase, look_alikes
 from next_test.rig import ENVELOPE, PLANS, bare, campaign
+from tirelib.arrays import FloatArray
 from tirelib.diagnose.candidates import candidates
 from tirelib.diagnose.refit import Refit, refit
 from tirelib.effects import CATALOGUE
@@ -21,59 +22,27 @@ from tirelib.planning.rivals import Trial, repeated_noise, try_suspects
 from tirelib.planning.structure import Shapes
 from tirelib.waveforms import Waveforms
 
-A_PLAN = 3
-"""Pairs that each plan contributes."""
 LEVELS = {"load": 3, "pressure": 2, "speed": 3}
 """Of the envelope's grid: coarser than usual, for the best run lies at an end or near it."""
-REFERENCE = 1000
-"""Seed of the tire at which pairs are chosen."""
 
 
-@dataclass(frozen=True)
-class StrainCase:
-    """Who is planted, and who looks like it."""
+def pairs() -> list[Pair]:
+    """Return plans and look-alikes there, by the angles that a diagnosis tells of a plain tire."""
 
-    seed: int
-    plan: str
-    truth: str
-    rival: str
-    visible: float
-
-
-def pairs() -> list[tuple[str, str, str]]:
-    """Return plan and two look-alikes: of each plan the closest that no plan before has.
-
-    Close by the angle between signatures, as a diagnosis tells it, on one tire without any effect.
-    """
-    chosen: list[tuple[str, str, str]] = []
-    for plan in PLANS:
+    def signatures(plan: str) -> tuple[list[str], FloatArray]:
         none = bare(REFERENCE, plan)
         data = straight_runs(none.waves).data(with_deflection=False)
         able = [e for e in CATALOGUE.values() if e.name in HIDDEN]
         found = candidates(data, none.fit, able)
-        names = [candidate.effect.name for candidate in found.living]
-        order = sorted(
-            (float(found.angles[i, j]), *sorted((names[i], names[j])))
-            for i in range(len(names)) for j in range(i)
-        )  # fmt: skip
-        known = {(a, b) for _, a, b in chosen}
-        chosen += [(plan, a, b) for _, a, b in order if (a, b) not in known][:A_PLAN]
-    return chosen
+        return [candidate.effect.name for candidate in found.living], found.angles
+
+    return look_alikes(PLANS, signatures)
 
 
-def cases(first: int, count: int, visible: float) -> list[StrainCase]:
-    """Return cases: every pair on every tire, with the one and the other as the truth in turn."""
-    out = []
-    for seed in range(first, first + count):
-        for k, (plan, *names) in enumerate(pairs()):
-            truth, rival = names if (seed + k) % 2 else names[::-1]
-            out.append(StrainCase(seed, plan, truth, rival, visible))
-    return out
-
-
-def measured(case: StrainCase) -> dict[str, Any]:
+def measured(case: PairCase) -> dict[str, Any]:
     """Return what the campaign, a further run at random, and the advised one tell of a pair."""
     made = campaign(case.seed, case.plan, case.truth, case.visible)
+    case.check(made.visible)
     none = bare(case.seed, case.plan).fit
     base = base_fit(made.waves, np.zeros(len(made.waves), dtype=bool), none)
     runs = straight_runs(made.waves)
@@ -84,14 +53,13 @@ def measured(case: StrainCase) -> dict[str, Any]:
     test = next_test(data, base, suspects, _envelope(data), noise=noise)
     out: dict[str, Any] = {
         "strength": made.strength, "reached": made.visible, "ratio": made.ratio,
-        "before": gap_of(test.trial, case),
+        "before": case.gap(test.trial),
     }  # fmt: skip
     if len(test.trial.rivals) < 2:
         return out
-    random = np.random.default_rng([case.seed, 5])
-    for name, k in (("chosen", 0), ("random", int(random.integers(len(test.points))))):
+    for name, k in (("chosen", 0), ("random", case.any_of(len(test.points)))):
         trial = _tried(made.with_run(test.points[k]), base, test.trial, _ahead(test, k))
-        out[name] = gap_of(trial, case) | {
+        out[name] = case.gap(trial) | {
             "at": test.envelope.text(test.points[k]), "predicted": float(test.score[k]),
             "chance": float(test.probability[k]),
         }  # fmt: skip
@@ -119,10 +87,3 @@ def _tried(waves: Waveforms, near: Refit, before: Trial, point: int) -> Trial:
     shapes = Shapes(every, every[:, :0])
     noise = repeated_noise(runs, data, base)
     return try_suspects(data, base, suspects, noise=noise, shapes=shapes)
-
-
-def gap_of(trial: Trial, case: StrainCase) -> Mapping[str, Any]:
-    """Return by how much the rival is worse than the truth, and who cannot be fitted."""
-    cost = {rival.name: rival.cost for rival in trial.rivals}
-    gap = cost[case.rival] - cost[case.truth] if len(cost) == 2 else None
-    return {"gap": gap, "left_out": dict(trial.left_out)}

@@ -135,6 +135,8 @@ def test_bad_input_is_told(model: Path, tmp_path: Path, monkeypatch: pytest.Monk
     assert "cannot be read as JSON" in refused(*run, "--diagnosis", tmp_path / "D.json")
     (tmp_path / "D.json").write_text("[1]")
     assert "'tirelib-diagnosis/1' is needed" in refused(*run, "--diagnosis", tmp_path / "D.json")
+    other = diagnosis(tmp_path, campaign="another day")
+    assert "is of the campaign 'another day'" in refused(*run, "--diagnosis", other)
     other = diagnosis(tmp_path, has=["camber"])
     assert "diagnose this model" in refused(*run, "--diagnosis", other)
     force = diagnosis(tmp_path, quantity="Fy")

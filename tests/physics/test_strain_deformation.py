@@ -12,12 +12,11 @@ from tirelib.strain.deformation import (
     arc_condition,
     arc_nodes,
     contact_deformation,
-    full_ring_deformation,
     recomputed_strain,
     series_strain,
     symmetric_series,
-    untold_part,
 )
+from tirelib.strain.full_turn import full_ring_deformation, untold_part
 from tirelib.strain.relations import (
     BeltShape,
     bending_strain,

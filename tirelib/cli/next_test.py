@@ -135,7 +135,7 @@ def next_test(
             [name.strip() for name in names.split(",")], [e.name for e in effects], catalogue
         )
     elif told is not None:
-        _belongs(told, [e.name for e in effects], diagnosis_file)
+        _belongs(told, campaign, [e.name for e in effects], diagnosis_file)
         suspects = suspects_of(told, catalogue)
     with progress_bar("planning") as progress:
         runs = straight_runs(measure_waveforms(campaign, progress=progress))
@@ -192,7 +192,7 @@ def _for_force(
         case = force_case(campaign, file, catalogue, quantity)
         has = [effect.name for effect in case.effects]
         if told is not None:
-            _belongs(told, has, diagnosis_file)
+            _belongs(told, campaign, has, diagnosis_file)
             suspects = suspects_of(told, catalogue)
         else:
             given = [name.strip() for name in str(names).split(",")]
@@ -272,8 +272,13 @@ def _read_diagnosis(path: Path, quantity: str | None) -> dict[str, Any]:
     return dict(told)
 
 
-def _belongs(told: dict[str, Any], has: list[str], path: Path | None) -> None:
-    """Refuse a diagnosis of a model with other effects."""
+def _belongs(told: dict[str, Any], campaign: "Campaign", has: list[str], path: Path | None) -> None:
+    """Refuse a diagnosis of another campaign, or of a model with other effects."""
+    if told.get("campaign", campaign.header.name) != campaign.header.name:
+        raise ParameterError(
+            f"{path}: is of the campaign {told['campaign']!r}, and {campaign.header.name!r} is "
+            "planned; give that campaign, or its diagnosis"
+        )
     if "has" in told and sorted(told["has"]) != sorted(has):
         raise ParameterError(
             f"{path}: is of a model with the effects {', '.join(told['has']) or 'none'}, this one "

@@ -38,7 +38,9 @@ INEXTENSIBLE = 1e8
 """EA that stands for an inextensible belt, [N]: it stretches by less than 1e-4."""
 LONGEST_STEP = 0.01
 MAX_ITERATIONS = 60
-TOLERANCE = 2e-11
+TOLERANCE = 5e-13
+"""Last step, [m]: so small that the strain of a point does not tell which points were solved
+beside it; round-off is ten thousand times less."""
 NEAR = 3e-4
 """Step below which the next one keeps the matrix, [m]."""
 SLOW = 0.5

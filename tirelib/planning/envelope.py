@@ -80,13 +80,14 @@ class Envelope:
 
     def __post_init__(self) -> None:
         faults = [
-            f"{name} {low:.6g} to {high:.6g}"
+            f"{AXES[name].title} {AXES[name].told(low):.4g} to {AXES[name].told(high):.4g} "
+            f"{AXES[name].unit}"
             for name, (low, high) in self.ranges.items()
             if not (-np.inf < low <= high < np.inf) or (AXES[name].positive and low <= 0.0)
         ]
         if faults:
             raise ParameterError(
-                f"envelope, SI: {'; '.join(faults)}; numbers are needed, the lower first, loads, "
+                f"envelope: {'; '.join(faults)}; numbers are needed, the lower first, loads, "
                 "pressures and speeds positive; correct the range"
             )
 

@@ -3,12 +3,15 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.candidates import Candidates
 from tirelib.diagnose.noise import noise_in, white_level
 from tirelib.diagnose.refit import Refit
 from tirelib.diagnose.stage import ALARM, IMITATION, Stage, plausible
 from tirelib.diagnose.stored import ensemble_of
+from tirelib.diagnose.unlisted import UNLISTED
 from tirelib.effects import Effect
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.waveform_fit import Data
@@ -56,13 +59,16 @@ class FirstRound:
         return self.stage.found
 
     def first(self, rest: FloatArray) -> str:
-        """Return who comes first for a residual (n_runs, n_phi), empty without an alarm."""
+        """Return who comes first for a residual (n_runs, n_phi), empty without an alarm.
+
+        Empty as well if it is in no catalogue: that names nobody.
+        """
         scores = self.stage.ranking.scores(rest)
+        fits, near = (plausible(self.found, scores, share) for share in (0.0, IMITATION))
+        listed = np.array([each.effect not in UNLISTED for each in self.found.living], dtype=bool)
         judged = replace(
-            self.stage,
-            scores=scores,
-            in_range=plausible(self.found, scores),
-            far=~plausible(self.found, scores, IMITATION),
-        )
-        leaders = judged.leaders(set(judged.names), ALARM)
-        return judged.names[leaders[0]] if leaders else ""
+            self.stage, scores=scores, in_range=fits & listed, impossible=~fits & listed,
+            far=~near & listed,
+        )  # fmt: skip
+        leaders = judged.leaders(set(judged.names), ALARM, 1.0)
+        return judged.names[leaders[0]] if leaders and listed[leaders[0]] else ""

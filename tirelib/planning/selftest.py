@@ -168,18 +168,21 @@ def selftest(
     named, errors = judge(plain)
     floor = float(np.median(errors))
     plantings = []
-    for candidate in ranking.found.living:
+    known = {effect.name for effect in catalogue}
+    # a diagnosis ranks more beside them, which it never names
+    living = {k: candidate for k, candidate in enumerate(ranking.found.living)
+              if candidate.effect.name in known}  # fmt: skip
+    for candidate in living.values():
         if only and candidate.effect.name not in only:
             continue
         for ratio in ratios:
             if progress is not None:
                 progress(f"{candidate.effect.name} at {ratio:g}")
             plantings.append(_planted(candidate, ratio, floor, errors, judge))
-    living = ranking.found.living
     return SelfTest(
         tuple(plantings), named, ranking.found.dead,
-        {c.effect.name: ranking.found.twins(k) for k, c in enumerate(living)},
-        {c.effect.name: _ratio_at(c, _share_of_end(c), floor) for c in living},
+        {c.effect.name: ranking.found.twins(k) for k, c in living.items()},
+        {c.effect.name: _ratio_at(c, _share_of_end(c), floor) for c in living.values()},
         floor, size, noise, repeats, members, seed, runs.waves.header.name,
     )  # fmt: skip
 

@@ -17,7 +17,7 @@ from tirelib.arrays import FloatArray
 from tirelib.campaign import Tolerance
 from tirelib.diagnose.ensemble import smooth_part, variants
 from tirelib.diagnose.refit import Refit
-from tirelib.diagnose.shape import filled, finer, run_by_run
+from tirelib.diagnose.shape import filled, finer, moved, run_by_run
 from tirelib.diagnose.structure import FORM
 from tirelib.identify.identify import FITTED
 from tirelib.identify.random_effects import Whitening
@@ -99,10 +99,11 @@ def _form_part(data: Data, model: Refit, points: Operating, present: int) -> Flo
             model.values, points, others, low_pass=data.low_pass, correction=model.correction
         ).wave
         change = filled(model.waveform - without)
-        both = FORM * np.stack([change, finer(change)], axis=1)
-        each = np.zeros((2 * present + 2, len(points), GRID.size))
-        each[:-2, :present] = run_by_run(both[:present]).reshape(-1, present, GRID.size)
-        each[-2:, present:] = both[present:].swapaxes(0, 1)
+        ways = FORM * np.stack([change, finer(change), moved(change)], axis=1)
+        count = ways.shape[1]
+        each = np.zeros((count * (present + 1), len(points), GRID.size))
+        each[:-count, :present] = run_by_run(ways[:present]).reshape(-1, present, GRID.size)
+        each[-count:, present:] = ways[present:].swapaxes(0, 1)
         rows.append(each)
     return np.concatenate(rows)
 

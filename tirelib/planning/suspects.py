@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -126,7 +127,11 @@ def given_suspects(
         if names.count(name) > 1:
             faults.append(f"{name} is given {names.count(name)} times")
         if name not in catalogue:
-            faults.append(f"{name!r} is not known")
+            near = get_close_matches(name, catalogue, n=3)
+            hint = (
+                f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(catalogue)}"
+            )
+            faults.append(f"{name!r} is not known, {hint}")
         elif name in has:
             faults.append(f"the model has {name} already")
         elif name in IN_BASE:
@@ -140,10 +145,13 @@ def given_suspects(
     if not names or len(names) > MOST:
         faults.append(f"{len(names)} effects are given; 1 to {MOST} are allowed")
     if faults:
-        raise ParameterError(
-            f"suspects: {'; '.join(faults)}; give other names, known are {', '.join(catalogue)}"
-        )
+        raise ParameterError(f"suspects: {'; '.join(faults)}; correct --suspects")
     return _of(names, [], {}, catalogue, len(names) == 1, "given")
+
+
+def _nearest(name: str, catalogue: Mapping[str, Effect]) -> str:
+    near = get_close_matches(name, catalogue, n=3)
+    return f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(catalogue)}"
 
 
 def _known(name: str, catalogue: Mapping[str, Effect]) -> Effect:

@@ -1,12 +1,10 @@
-"""From measured strain back to the radial deformation of the belt, Eq. (35)-(40).
+"""From measured strain back to the radial deformation of the belt in the contact, Eq. (35)-(40).
 
 Eq. (35), u + u'' = -R^2 eps / y, is an ordinary differential equation for u. Its free solutions
 are cos phi and sin phi, the rigid shift of the belt: no strain tells it, and the mean of u goes
-with the gages' offset. So there are two ways back, and each says what it can not know:
-
-- in the contact, `contact_deformation`: the belt meets the road at both edges (38), which replaces
-  what the strain does not tell; finite differences of second order;
-- on the full ring, `full_ring_deformation`: harmonics 2, 3, ... are told, 0 and 1 are unknown.
+with the gages' offset. In the contact the belt meets the road at both edges (38), which replaces
+what the strain does not tell; finite differences of second order do the rest. A whole turn has no
+such help: `tirelib.strain.full_turn`.
 
 The right side of Eq. (39) is -eps_i - a u_1 (from (36)); the print lacks the minus sign.
 
@@ -47,27 +45,6 @@ class ContactDeformation:
     angle: FloatArray
     deformation: FloatArray
     condition: FloatArray
-
-
-@dataclass(frozen=True, slots=True)
-class RingDeformation:
-    """What the strain of a full turn tells about the radial deformation.
-
-    Attributes
-    ----------
-    told : array, shape (..., n), [m]
-        Sum of the harmonics 2, 3, ... of u on the grid of the strain.
-    cosine, sine : array, shape (..., n // 2 + 1), [m]
-        Coefficients of u by order, from the first sample's angle; NaN for the orders 0 and 1.
-    contradiction : array, shape (...)
-        Amplitude of the strain's first harmonic: Eq. (35) allows none, so it measures what the
-        equation lacks (stretch, drift, a grid that is not one turn).
-    """
-
-    told: FloatArray
-    cosine: FloatArray
-    sine: FloatArray
-    contradiction: FloatArray
 
 
 def arc_nodes(leading: npt.ArrayLike, trailing: npt.ArrayLike, count: int) -> FloatArray:
@@ -197,7 +174,7 @@ def contact_deformation(
     -0.02
     """
     eps = np.asarray(strain, dtype=np.float64)
-    _check_geometry(ring_radius, free_radius, liner_offset)
+    check_belt(ring_radius, free_radius, liner_offset)
     if eps.ndim == 0 or eps.shape[-1] < 5:
         raise ShapeError(
             f"contact deformation: strain has shape {eps.shape}; 5 nodes or more are needed as "
@@ -289,78 +266,12 @@ def recomputed_strain(
     ParameterError
         If R or y is out of range.
     """
-    _check_geometry(ring_radius, np.inf, liner_offset)
+    check_belt(ring_radius, np.inf, liner_offset)
     phi, u = (np.asarray(x, dtype=np.float64) for x in (angle, deformation))
     step = (phi[..., -1:] - phi[..., :1]) / (phi.shape[-1] - 1)
     second = (u[..., 2:] - 2.0 * u[..., 1:-1] + u[..., :-2]) / step**2
     strain: FloatArray = -liner_offset / ring_radius**2 * (u[..., 1:-1] + second)
     return strain
-
-
-def full_ring_deformation(
-    strain: npt.ArrayLike, *, ring_radius: float, liner_offset: float
-) -> RingDeformation:
-    """Invert Eq. (35) on a full turn: u_n = R^2 eps_n / [y (n^2 - 1)] for n >= 2.
-
-    Parameters
-    ----------
-    strain : array, shape (..., n)
-        Uniform samples over one turn, end not repeated.
-    ring_radius, liner_offset : float, [m]
-        R > 0 and y < 0.
-
-    Returns
-    -------
-    RingDeformation
-        Orders 0 and 1 are NaN: the mean goes with the offset, the shift strains nothing.
-
-    Raises
-    ------
-    ParameterError
-        If R or y is out of range or a sample is not finite.
-    ShapeError
-        If there are fewer than 8 samples.
-    """
-    eps = np.asarray(strain, dtype=np.float64)
-    _check_geometry(ring_radius, np.inf, liner_offset)
-    spectrum = _turn_spectrum("full-ring deformation", eps)
-    count = eps.shape[-1]
-    n = np.arange(spectrum.shape[-1], dtype=np.float64)
-    factor = np.zeros(n.size)
-    factor[2:] = ring_radius**2 / liner_offset / (n[2:] ** 2 - 1.0)
-    bent = factor * spectrum
-    scale = np.where((n == 0) | (2 * n == count), 1.0, 2.0) / count
-    coefficients = scale * bent
-    coefficients[..., :2] = complex(np.nan, np.nan)
-    return RingDeformation(
-        np.fft.irfft(bent, n=count),
-        np.real(coefficients),
-        -np.imag(coefficients),
-        2.0 / count * np.abs(spectrum[..., 1]),
-    )
-
-
-def untold_part(radial: npt.ArrayLike) -> FloatArray:
-    """Return the part of a full-turn deformation that no strain tells: mean and first harmonic.
-
-    Parameters
-    ----------
-    radial : array, shape (..., n), [m]
-        u on a uniform grid over one turn, 8 samples or more.
-
-    Returns
-    -------
-    array, shape (..., n), [m]
-
-    Raises
-    ------
-    ParameterError, ShapeError
-        As in `full_ring_deformation`.
-    """
-    u = np.asarray(radial, dtype=np.float64)
-    spectrum = _turn_spectrum("untold part", u)
-    spectrum[..., 2:] = 0.0
-    return np.fft.irfft(spectrum, n=u.shape[-1])
 
 
 def _tridiagonal(diagonal: FloatArray, right: FloatArray) -> FloatArray:
@@ -372,15 +283,6 @@ def _tridiagonal(diagonal: FloatArray, right: FloatArray) -> FloatArray:
     bands[1] = diagonal.reshape(-1)
     solved: FloatArray = solve_banded((1, 1), bands, right.reshape(-1))
     return solved.reshape(right.shape)
-
-
-def _turn_spectrum(where: str, samples: FloatArray) -> npt.NDArray[np.complex128]:
-    """Return the spectrum of one turn of finite samples."""
-    if samples.ndim == 0 or samples.shape[-1] < 8:
-        raise ShapeError(f"{where}: samples have shape {samples.shape}; one turn needs 8 or more")
-    if not np.isfinite(samples).all():
-        raise ParameterError(f"{where}: a sample is not finite; fill or drop the turn")
-    return np.fft.rfft(samples)
 
 
 def _check_sizes(strain: FloatArray, deflection: FloatArray, free_radius: float) -> None:
@@ -403,8 +305,8 @@ def _check_sizes(strain: FloatArray, deflection: FloatArray, free_radius: float)
         )
 
 
-def _check_geometry(ring_radius: float, free_radius: float, liner_offset: float) -> None:
-    """Raise ParameterError unless 0 < -y < R < R0."""
+def check_belt(ring_radius: float, free_radius: float, liner_offset: float) -> None:
+    """Raise ParameterError unless 0 < -y < R < R0, all in [m]."""
     if not 0.0 < ring_radius < free_radius:
         raise ParameterError(
             f"belt: ring_radius = {ring_radius:g} m, free_radius = {free_radius:g} m; "

@@ -26,6 +26,10 @@ SERIES: Sequence[Condition] = [
     )
     for load in loads
 ]  # fmt: skip
+FIVE_LOADS: Sequence[Condition] = [
+    (load, bar, 65.0) for bar in (1.7, 2.1, 2.5) for load in (1700, 2600, 4300, 6000, 6800)
+]
+"""At every pressure: a stiffness over three loads is itself known to 3 % only."""
 SPEEDS: Sequence[Condition] = [
     (load, 2.1, kmh) for kmh in (15.0, 65.0, 120.0) for load in (2400.0, 4800.0, 6800.0)
 ]

@@ -17,7 +17,7 @@ from tirelib.identify.static_route_problem import StrainProblem
 from tirelib.model.base import operating_points, smoothed
 from tirelib.ring.green import modal_response, pressed_shape
 from tirelib.signal import LowPass
-from tirelib.strain.deformation import full_ring_deformation
+from tirelib.strain.full_turn import full_ring_deformation
 from tirelib.waveforms import GRID
 
 EI, K_U, RATE, K_T = 12.0, 1.1e6, -4.0, 7.5e7

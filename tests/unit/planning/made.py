@@ -20,7 +20,9 @@ from tirelib.signal import LowPass
 
 NOISE = 4e-6
 PLANTED, TWIN = "temperature", "dynamic_stiffening"
-STRENGTH = 0.014
+STRENGTH, STRONG = 0.014, 0.030
+"""The six runs leave the first open. They tell the second from its twin by a chi-square of 87, in
+the metric in which a diagnosis weighs a ring's structure, and need no further run."""
 CONDITIONS = (
     (3000.0, 1.8e5, 11.0), (6000.0, 2.4e5, 11.0), (4500.0, 2.1e5, 17.0),
     (4500.0, 2.1e5, 22.0), (3000.0, 2.4e5, 28.0), (6000.0, 1.8e5, 28.0),
@@ -43,7 +45,7 @@ class Case:
 
 
 @cache
-def case() -> Case:
+def case(strength: float = STRENGTH) -> Case:
     points, random = points_at(CONDITIONS), np.random.default_rng(5)
     wave, _ = exact_waveform(TIRE, points)
     n = len(points)
@@ -54,7 +56,7 @@ def case() -> Case:
     model = refit(bench, values_of(TIRE))
     variants = draw_variants(1, 0.3, random)
     track = Track.of(variants, model, bench, points, noise=NOISE, random=random)
-    strain = track.measured([CATALOGUE[PLANTED].at(STRENGTH)], bench)[0]
+    strain = track.measured([CATALOGUE[PLANTED].at(strength)], bench)[0]
     data = replace(bench, strain=strain)
     return Case(data, refit(data, values_of(TIRE)), bench, model, variants)
 

@@ -147,5 +147,5 @@ def test_what_a_force_cannot_have_is_refused() -> None:
     at = made.problem.bench.conditions
     with pytest.raises(ParameterError, match="a range of camber is declared"):
         Envelope.of(at, force_axes(made), camber=(0.0, 0.1))
-    with pytest.raises(ParameterError, match=r"slip_angle 0\.1 to -0\.1"):
+    with pytest.raises(ParameterError, match=r"slip angle 5\.73 to -5\.73 deg"):
         Envelope.of(at, force_axes(made), slip_angle=(0.1, -0.1))

@@ -8,7 +8,10 @@ import pytest
 from tests.unit.diagnose.test_force_parts import VALUES
 from tests.unit.planning.drifting import NOISE, case
 from tirelib.diagnose.forces.fit import fit_force
+from tirelib.effects import CATALOGUE
+from tirelib.planning.criterion import Noise
 from tirelib.planning.force_noise import BlockWhitening, counted_noise, set_points
+from tirelib.planning.force_rivals import force_forecasts, structure_rows, try_force_suspects
 
 BLOCK = np.array([3, 1, 1, 3, 2, 3])
 TANGENTS = np.random.default_rng(2).standard_normal((6, 3))
@@ -50,3 +53,26 @@ def test_what_goes_together_in_a_block_beyond_its_set_points_is_more_noise() -> 
     _, alone = counted_noise(replace(made, problem=replace(
         rough, block=np.arange(block.size))), base, none)  # fmt: skip
     assert counted.excess > 1.2 * alone.excess
+
+
+def test_a_forecast_holds_what_the_present_points_tell_of_structure_and_set_points() -> None:
+    made = case("pressure", 0.1)
+    base, problem = fit_force(made.problem, VALUES), made.problem
+    structure = structure_rows(problem, len(problem), base, 8, 0)
+    suspects = [(CATALOGUE["friction_pressure"], np.zeros(1))]
+    trial = try_force_suspects(made, base, suspects, structure)
+    (rival,) = trial.rivals
+    (told,) = force_forecasts(trial, problem, structure)
+    left, plain = (trial.counted(problem.measured - wave)
+                   for wave in (told.wave[:, 0], rival.fit.predicted))  # fmt: skip
+    # the cost holds the priors as well; the fit alone knows nothing of structure
+    assert np.sum(left**2) < rival.cost < np.sum(plain**2)
+    exact = replace(trial, counted=replace(trial.counted, share=0.0))
+    rough = replace(trial, counted=replace(trial.counted, share=2.0))
+    other = told.wave + 10.0 * NOISE
+    sizes = [
+        force_forecasts(each, problem, structure)[0].separation(other, Noise(NOISE, 0.0), 1.0)
+        for each in (exact, rough)
+    ]
+    assert (sizes[0] > 1.05 * sizes[1]).mean() > 0.5
+    assert (sizes[0] >= sizes[1]).all()

@@ -7,7 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.unit.planning.made import NOISE, PLANTED, STRENGTH, TWIN, case, joined, measured, planned
+from tests.unit.planning.made import (
+    NOISE,
+    PLANTED,
+    STRENGTH,
+    STRONG,
+    TWIN,
+    case,
+    joined,
+    measured,
+    planned,
+)
 from tirelib.diagnose.refit import refit
 from tirelib.effects import CATALOGUE
 from tirelib.errors import ParameterError
@@ -101,6 +111,8 @@ def test_a_run_counts_by_what_it_does_if_the_likelier_one_is_right() -> None:
     assert resolving(clear, faint, 8.0)[0] > 0.95
     assert resolving(faint, clear, 8.0)[0] < 0.05
     assert resolving(clear, faint, 0.0)[0] == pytest.approx(0.5, abs=0.01)
+    # likelihoods are exp of minus half a chi-square: three to one
+    assert resolving(100.0 * clear, faint, 2.0 * np.log(3.0))[0] == pytest.approx(0.75, abs=0.01)
 
 
 def test_the_planted_effect_is_no_worse_than_its_twin_and_not_far_off() -> None:
@@ -141,6 +153,14 @@ def test_the_advised_run_tells_the_planted_effect_from_its_twin() -> None:
     after = try_suspects(data, refit(data, made.base.values), suspects, noise=NOISE)
     twin, planted = after.rivals
     assert twin.cost - planted.cost > RESOLVED
+
+
+def test_twice_the_effect_needs_no_further_run() -> None:
+    made = case(STRONG)
+    suspects = [(CATALOGUE[name], np.array([0.02])) for name in (TWIN, PLANTED)]
+    twin, planted = try_suspects(made.data, made.base, suspects, noise=NOISE).rivals
+    assert twin.cost - planted.cost > 4.0 * RESOLVED
+    assert planted.strength[0] == pytest.approx(STRONG, rel=0.5)
 
 
 def test_an_effect_never_fits_worse_than_none() -> None:

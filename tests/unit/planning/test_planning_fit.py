@@ -13,11 +13,12 @@ from tirelib.diagnose.ensemble import smooth_part
 from tirelib.diagnose.structure import FORM
 from tirelib.effects import CATALOGUE
 from tirelib.errors import ConvergenceError
+from tirelib.planning.candidate_runs import forecasts
 from tirelib.planning.criterion import NOTHING
-from tirelib.planning.fit import bounded
+from tirelib.planning.fit import Metric, bounded
 from tirelib.planning.on_trial import LOST, fitted_rivals
-from tirelib.planning.rivals import Rival, Trial, try_suspects
-from tirelib.planning.structure import structure_shapes
+from tirelib.planning.rivals import Rival, Trial, _whitening, try_suspects
+from tirelib.planning.structure import Shapes, structure_shapes
 
 ONE_SIDED = "roughness"
 
@@ -71,6 +72,39 @@ def test_a_strength_never_leaves_its_range_and_an_end_that_holds_it_is_told() ->
         assert rival.cost <= nothing.cost + LOST
 
 
+def test_what_even_all_suspects_leave_counts_as_more_noise_and_structure() -> None:
+    made, plain = case(), tried()
+    rough = 3.0 * plain.noise * np.random.default_rng(7).standard_normal(made.data.strain.shape)
+    data = replace(made.data, strain=made.data.strain + rough)
+    shapes = structure_shapes(made.data, made.base, members=6)
+    trial = try_suspects(data, made.base, [], noise=NOISE, shapes=shapes, with_nothing=True)
+    assert trial.size > 2.5 * max(plain.size, 1.0)
+    # as noise, and as every way in which structure may show
+    assert trial.noise / trial.size == pytest.approx(plain.noise / max(plain.size, 1.0))
+    np.testing.assert_allclose(trial.shapes.present, trial.size * shapes.present)
+    # then it is no more than usual: about one a sample
+    assert 0.3 < trial.rivals[0].cost / data.strain.size < 1.5
+
+
+def test_a_forecast_of_the_present_runs_leaves_no_more_than_the_fit_and_knows_no_less() -> None:
+    made, trial = case(), tried()
+    here = replace(trial, shapes=Shapes(trial.shapes.present, trial.shapes.present))
+    rival = trial.rivals[1]
+    (told,) = forecasts(replace(here, rivals=(rival,)), made.data, made.data.points)
+    metric = Metric(made.data, _whitening(made.data, made.base, trial.noise), trial.shapes.present)
+    left, plain = (metric.rest(wave) for wave in (
+        told.wave, rival.fitted.guess.solved(made.data, made.data.points).waveform))  # fmt: skip
+    # the cost holds the priors as well; the fit alone knows nothing of structure
+    assert left @ left < rival.cost < plain @ plain
+    # no way of structure is less known than before any run
+    structure = rival.fitted.covariance[rival.fitted.guess.z.size :, rival.fitted.guess.z.size :]
+    assert np.linalg.eigvalsh(structure).max() <= 1.0 + 1e-9
+    # load, pressure, gain and angle as far as the rig's tolerance goes
+    gain = told.tangents[..., 2] / rival.fitted.guess.solved(made.data, made.data.points).waveform
+    assert gain == pytest.approx(np.full(gain.shape, made.data.tolerance.gain))
+    assert told.tangents.shape[2] == 4
+
+
 def test_runs_of_one_condition_share_their_structure() -> None:
     made = case()
     found = structure_shapes(made.data, made.base, made.data.points, members=2)
@@ -95,14 +129,14 @@ def test_the_law_of_an_effect_that_the_model_has_may_be_off_in_each_run_by_itsel
     model = replace(made.base, effects=(effect,), strengths=(np.array([0.02]),))
     shapes = structure_shapes(made.data, model, made.data.points, members=1)
     plain = structure_shapes(made.data, made.base, made.data.points, members=1)
-    own = slice(len(plain.present), None)
-    assert len(shapes.present) - len(plain.present) == 2 * n + 2
+    own, ways = slice(len(plain.present), None), 3
+    assert len(shapes.present) - len(plain.present) == ways * (n + 1)
     acts = [np.any(part[own], axis=2) for part in (shapes.present, shapes.ahead)]
-    assert (acts[0].sum(axis=1) == [1] * (2 * n) + [0] * 2).all()
-    assert (acts[1].sum(axis=1) == [0] * (2 * n) + [n] * 2).all()
+    assert (acts[0].sum(axis=1) == [1] * (ways * n) + [0] * ways).all()
+    assert (acts[1].sum(axis=1) == [0] * (ways * n) + [n] * ways).all()
     # a law that is off in a run is off alike wherever that run stands
-    one = shapes.present[own].reshape(-1, n, 360)[np.arange(0, 2 * n, 2), np.arange(n)]
-    np.testing.assert_allclose(one, shapes.ahead[-2], rtol=1e-6, atol=1e-12)
+    one = shapes.present[own].reshape(-1, n, 360)[np.arange(0, ways * n, ways), np.arange(n)]
+    np.testing.assert_allclose(one, shapes.ahead[-ways], rtol=1e-6, atol=1e-12)
 
 
 def test_a_fit_that_fails_or_is_worse_than_none_is_left_out_with_the_reason() -> None:

@@ -61,6 +61,8 @@ def test_the_document_tells_chances_with_intervals_and_that_they_are_optimistic(
     summary = {entry["ratio"]: entry for entry in told["summary"]}
     assert summary[1.5]["effects"] == 1
     assert told["dead"]["camber"] == "no run has a camber"
+    # what a diagnosis ranks beside the catalogue can be planted no more than named
+    assert set(tested.largest) <= set(CATALOGUE)
 
 
 def test_variants_repeat_with_their_seed_and_differ_with_another() -> None:

@@ -79,6 +79,8 @@ def test_all_faults_of_given_names_are_told_at_once() -> None:
     for part in ("'oops' is not known", "cannot be tested", "has camber already",
                  "fits belt_extension", "4 effects are given"):  # fmt: skip
         assert part in str(error.value)
+    with pytest.raises(ParameterError, match=r"'low_pas' is not known, did you mean low_pass\?"):
+        given_suspects(["low_pas"], [], CATALOGUE)
     with pytest.raises(ParameterError, match="given 2 times"):
         given_suspects(["low_pass", "low_pass"], [], CATALOGUE)
 
@@ -100,6 +102,11 @@ def test_an_envelope_is_the_campaigns_wider_by_a_known_share_or_as_declared() ->
 def test_a_range_that_is_none_is_refused(load: tuple[float, float]) -> None:
     with pytest.raises(ParameterError, match="load"):
         Envelope.of(points_at(CONDITIONS), load=load)
+
+
+def test_a_range_that_is_none_is_told_in_the_unit_that_was_given() -> None:
+    with pytest.raises(ParameterError, match=r"pressure 2\.5 to 1\.5 bar; speed 90 to 36 km/h"):
+        Envelope.of(points_at(CONDITIONS), pressure=(2.5e5, 1.5e5), speed=(25.0, 10.0))
 
 
 def test_possible_runs_come_after_the_present_ones_and_roll_as_they_do() -> None:
