@@ -1,6 +1,7 @@
 """Shared by all tests: data outside the repository, one random seed per test."""
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -13,10 +14,28 @@ settings.load_profile("default")
 os.environ["TIRELIB_CACHE"] = "off"  # no ensemble of an earlier version, none left behind
 
 
+NOT_HERE = (
+    "no {0}: these measurements are not part of the repository, so the tests on them are checks "
+    "beside the others, which need nothing; TIRELIB_SHARED_DATA names the folder that holds them"
+)
+
+
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Measurement campaigns beside the repository, where there are any."""
     folder = Path(os.environ.get("TIRELIB_SHARED_DATA", Path(__file__).parents[2] / "shared/data"))
     if not folder.is_dir():
-        pytest.skip(f"no measurement campaigns at {folder} (set TIRELIB_SHARED_DATA)")
+        pytest.skip(NOT_HERE.format(folder))
     return folder
+
+
+@pytest.fixture(scope="session")
+def shared(shared_data: Path) -> Callable[[str], Path]:
+    """Give one of them by its name; skip without it."""
+
+    def one(name: str) -> Path:
+        if not (shared_data / name).exists():
+            pytest.skip(NOT_HERE.format(shared_data / name))
+        return shared_data / name
+
+    return one

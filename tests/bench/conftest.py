@@ -18,7 +18,16 @@ from tirelib.estimators.train import train
 from tirelib.observations import observe
 
 TOY = Path(__file__).with_name("toy_slave.py")
+BUILD = Path(__file__).parents[2] / "build"
 Spawn = Callable[..., "subprocess.Popen[str]"]
+
+
+@pytest.fixture(scope="module")
+def build_programs() -> Iterator[None]:
+    """Let a module's tests import the programs of `build/`."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(BUILD))
+        yield
 
 
 @pytest.fixture(scope="session")

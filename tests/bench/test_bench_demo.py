@@ -5,7 +5,6 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -31,16 +30,12 @@ from tests.synthetic import cornering_runs, synthetic_run, write
 from tirelib.campaign import Run, check_campaign, read_campaign
 from tirelib.report.agreement import agreement, read_turns
 
-BUILD = Path(__file__).parents[2] / "build"
-
 
 @pytest.fixture(scope="module")
-def demo_module() -> Iterator[Any]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(BUILD))
-        import bench_demo
+def demo_module(build_programs: None) -> Any:
+    import bench_demo
 
-        yield bench_demo
+    return bench_demo
 
 
 def as_the_rig_measures(run: Run) -> Run:

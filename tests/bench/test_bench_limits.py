@@ -1,23 +1,17 @@
 """The proof of endurance fails where one figure is missed, and tells which."""
 
 import io
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 from rich.console import Console
 
-BUILD = Path(__file__).parents[2] / "build"
-
 
 @pytest.fixture(scope="module")
-def limits() -> Iterator[Any]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(BUILD))
-        import bench_limits
+def limits(build_programs: None) -> Any:
+    import bench_limits
 
-        yield bench_limits
+    return bench_limits
 
 
 LINE = {

@@ -4,6 +4,7 @@ The tire is a Magic Formula with its own laws of load, pressure, temperature and
 """
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -255,11 +256,9 @@ def test_a_users_effect_joins_and_a_strength_out_of_range_is_flagged(
 
 
 def test_real_flat_belt_data_name_pressure_load_temperature_and_camber(
-    shared_data: Path, tmp_path: Path
+    shared: Callable[[str], Path], tmp_path: Path
 ) -> None:
-    source = shared_data / "real"
-    if not (source / "cornering.mat").is_file():
-        pytest.skip(f"no flat-belt data at {source}")
+    source = shared("real/cornering.mat").parent
     found = call("import", source / "cornering.mat", "--map", source / "cornering.map.toml",
                  "--out", tmp_path / "real")  # fmt: skip
     assert found.exit_code == 0, found.output

@@ -1,6 +1,7 @@
 """`tirelib identify` on forces: brush alone, with a given ring, sweeps, exit codes, messages."""
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -255,11 +256,9 @@ def test_a_header_without_free_radius_is_refused(campaign: Path, tmp_path: Path)
     assert "free_radius_m" in str(found.exception)
 
 
-def test_ring_and_brush_of_a_laboratory_tire(shared_data: Path, tmp_path: Path) -> None:
+def test_ring_and_brush_of_a_laboratory_tire(shared: Callable[[str], Path], tmp_path: Path) -> None:
     """Strain and forces together: the ring's pressure, not the parabola, gives the forces."""
-    source = shared_data / "lab-set1"
-    if not source.is_dir():
-        pytest.skip(f"no {source}")
+    source = shared("lab-set1")
     found = call(source, tmp_path / "o")
     assert found.exit_code == 0, found.output
     told = document(tmp_path / "o")

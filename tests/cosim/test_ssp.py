@@ -93,6 +93,7 @@ def test_another_engine_gives_the_same(engine: str) -> None:
     """Fixed step, Jacobi: the same sums in the same order, but for the rounding of time.
 
     The engine runs in a process of its own, as a crash of its library must not end the tests.
+    It is skipped where its binary does not load: there is none for every system.
     """
     if (reason := ssp_run.missing(engine)) is not None:
         pytest.skip(reason)

@@ -138,7 +138,7 @@ def test_energy_is_kept_without_dissipation() -> None:
 class _NoForce(BrushTires):
     """Tires on ice."""
 
-    def forces(self, load: FloatArray, *_: FloatArray) -> tuple[FloatArray, ...]:  # type: ignore[override]
+    def forces(self, load: FloatArray, *_: FloatArray) -> tuple[FloatArray, ...]:
         return np.zeros(4), np.zeros(4), np.zeros(4)
 
 

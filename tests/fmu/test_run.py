@@ -2,6 +2,7 @@
 
 import json
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -126,12 +127,12 @@ def test_the_checking_script_of_the_documentation_runs(
 
 
 @pytest.mark.shared
-def test_lab_data_give_the_numbers_of_estimate(tmp_path: Path, shared_data: Path) -> None:
+def test_lab_data_give_the_numbers_of_estimate(
+    tmp_path: Path, shared: Callable[[str], Path]
+) -> None:
     from tirelib.cli.calibrate import calibrate
 
-    folder = shared_data / "lab-set1"
-    if not folder.is_dir():
-        pytest.skip(f"no {folder}")
+    folder = shared("lab-set1")
     calibration, file = tmp_path / "cal.toml", tmp_path / "x.fmu"
     told(calibrate, str(folder), "--out", str(calibration))
     told(estimate, str(folder), "--calibration", str(calibration), "--json", str(tmp_path / "e"))

@@ -121,7 +121,7 @@ def test_a_step_against_an_empty_slave(benchmark: Any, tmp_path: Path) -> None:
         "ratio_of_means": round(float(np.mean(us["full"]) / np.mean(us["empty"])), 2),
     }
     benchmark.extra_info.update(told)
-    print(f"\nFMU step of {SAMPLES} samples, [empty, full]: {told}")  # noqa: T201 - what the run is for
+    print(f"\nFMU step of {SAMPLES} samples, [empty, full]: {told}")
     assert told["ratio_of_medians"] <= 3.0
     assert told["ratio_of_means"] <= 3.0
 
@@ -176,7 +176,7 @@ def test_four_wheels_against_real_time(benchmark: Any, samples: int, lists: bool
     told = [round(float(ratios[-1]), 2), round(float(np.median(ratios)), 2)]
     benchmark.extra_info["times_faster_than_real_time"] = told
     how = "setReal" if lists else "fmi2SetReal"
-    print(f"\nfour wheels, {samples} samples by {how}: [best, median] {told} times real time")  # noqa: T201 - what the run is for
+    print(f"\nfour wheels, {samples} samples by {how}: [best, median] {told} times real time")
 
 
 def wheel_step(
@@ -233,7 +233,7 @@ def test_a_virtual_tire_against_real_time(benchmark: Any, samples: int, changing
     told = [round(float(ratios[-1]), 2), round(float(np.median(ratios)), 2)]
     benchmark.extra_info["times_faster_than_real_time"] = told
     which = "change" if changing else "stay"
-    print(f"\nvirtual tire, {samples} samples, inputs {which}: {told} times real time")  # noqa: T201 - what the run is for
+    print(f"\nvirtual tire, {samples} samples, inputs {which}: {told} times real time")
 
 
 def test_memory_over_steps_and_instances(benchmark: Any) -> None:
@@ -262,4 +262,4 @@ def test_memory_over_steps_and_instances(benchmark: Any) -> None:
 
     benchmark.pedantic(run, rounds=1)
     benchmark.extra_info.update(told)
-    print(f"\nresident MB over {STEPS} steps, {CYCLES} instances: {told}")  # noqa: T201 - what the run is for
+    print(f"\nresident MB over {STEPS} steps, {CYCLES} instances: {told}")

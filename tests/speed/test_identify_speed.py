@@ -45,7 +45,7 @@ def test_identification_time_and_its_growth_with_runs(capsys: pytest.CaptureFixt
         times[count] = least(lambda runs=runs: estimated(runs))
     power = np.log(times[60] / times[19]) / np.log(60.0 / 19.0)
     with capsys.disabled():
-        print({n: f"{t:.2f} s" for n, t in times.items()}, f"grows with runs^{power:.2f}")  # noqa: T201 - the measurement
+        print({n: f"{t:.2f} s" for n, t in times.items()}, f"grows with runs^{power:.2f}")
     for count, goal in GOALS.items():
         assert times[count] < goal
     assert power < 1.5, "the cost per run must not grow"
@@ -63,7 +63,7 @@ def test_growth_with_free_parameters(capsys: pytest.CaptureFixture[str]) -> None
 
         times[len(free)] = least(work)
     with capsys.disabled():
-        print({n: f"{t:.2f} s" for n, t in times.items()}, "by free parameters")  # noqa: T201 - the measurement
+        print({n: f"{t:.2f} s" for n, t in times.items()}, "by free parameters")
     assert times[8] < 12.0 * times[1]
 
 
@@ -76,5 +76,5 @@ def test_a_correction_from_a_solution_nearby(capsys: pytest.CaptureFixture[str])
     anew = least(lambda: large_displacements(near, points))
     again = least(lambda: large_displacements(near, points, start=before))
     with capsys.disabled():
-        print(f"correction of 60 runs: {anew:.3f} s anew, {again:.3f} s from one nearby")  # noqa: T201 - the measurement
+        print(f"correction of 60 runs: {anew:.3f} s anew, {again:.3f} s from one nearby")
     assert again < 0.8 * anew

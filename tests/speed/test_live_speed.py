@@ -119,7 +119,7 @@ def test_an_estimate_comes_soon_after_its_bytes(
     benchmark.extra_info |= {"median_ms": 1e3 * middle, "p99_ms": 1e3 * high, "cores": share,
                              "load_average": os.getloadavg()[0]}  # fmt: skip
     benchmark(lambda: None)
-    print(f"{wheels} wheels over {line}: median {1e3 * middle:.1f} ms, "  # noqa: T201
+    print(f"{wheels} wheels over {line}: median {1e3 * middle:.1f} ms, "
           f"99 % {1e3 * high:.1f} ms, {share:.2f} cores")  # fmt: skip
     assert counts[1].lost_samples == 0
     assert high < LATENCY
@@ -138,9 +138,9 @@ def test_a_killed_process_costs_less_than_a_second_of_raw_bytes(
         gathered(chain, news, lambda: len(news.turns) > 3)
         for victim in ("estimator 0", "recorder", "reader"):
             os.kill(chain.process_ids[victim] or 0, signal.SIGKILL)
-            gathered(chain, news, lambda: chain.counts()["restarts"][victim] == 1)  # noqa: B023
+            gathered(chain, news, lambda victim=victim: chain.counts()["restarts"][victim] == 1)
             seen = len(news.turns) + 5
-            gathered(chain, news, lambda: len(news.turns) > seen)  # noqa: B023
+            gathered(chain, news, lambda seen=seen: len(news.turns) > seen)
         chain.finish("stopped")
     recording = Recording(tmp_path / "a.mcap")
     arrivals = [1e-9 * arrival for arrival, _ in recording.raw()]
@@ -148,7 +148,7 @@ def test_a_killed_process_costs_less_than_a_second_of_raw_bytes(
     longest = max(b - a for a, b in pairwise(arrivals))
     benchmark.extra_info["longest_gap_s"] = longest
     benchmark(lambda: None)
-    print(f"longest gap of the recording {longest:.2f} s")  # noqa: T201
+    print(f"longest gap of the recording {longest:.2f} s")
     assert longest < LOST_AT_MOST
 
 

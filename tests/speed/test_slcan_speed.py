@@ -81,11 +81,11 @@ def cost(reader: Callable[[PseudoTerminal], Callable[[], int]], fd: bool) -> flo
 @pytest.mark.parametrize("fd", [False, True])
 def test_bulk_reading_is_much_faster(benchmark: object, fd: bool) -> None:
     theirs, ours = cost(read_by_python_can, fd), cost(read_in_bulk, fd)
-    benchmark.extra_info |= {  # type: ignore[attr-defined]
+    benchmark.extra_info |= {
         "python_can_us": 1e6 * theirs, "ours_us": 1e6 * ours, "speed_up": theirs / ours,
     }  # fmt: skip
-    benchmark(lambda: None)  # type: ignore[operator]
-    print(f"fd={fd}: python-can {1e6 * theirs:.1f} us, ours {1e6 * ours:.1f} us a frame, "  # noqa: T201
+    benchmark(lambda: None)
+    print(f"fd={fd}: python-can {1e6 * theirs:.1f} us, ours {1e6 * ours:.1f} us a frame, "
           f"speed-up {theirs / ours:.0f}")  # fmt: skip
     assert theirs > (LEAST if fd else 2.0) * ours
 
@@ -106,10 +106,10 @@ def test_four_wheels_at_10_khz_decode_far_below_a_core(benchmark: object) -> Non
             decoder.push(read, 4_000_000 * number)
         return counts.ok
 
-    assert benchmark(decode) >= 6666  # type: ignore[operator]
+    assert benchmark(decode) >= 6666
     start = time.process_time()
     decode()
     share = time.process_time() - start
-    benchmark.extra_info["share_of_a_core"] = share  # type: ignore[attr-defined]
-    print(f"four wheels: {100 * share:.1f} % of a core")  # noqa: T201
+    benchmark.extra_info["share_of_a_core"] = share
+    print(f"four wheels: {100 * share:.1f} % of a core")
     assert share < 0.5

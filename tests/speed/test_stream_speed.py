@@ -41,7 +41,7 @@ def played(benchmark: Any, *, turn_ends: bool) -> None:
     for share in (50, 99):
         benchmark.extra_info[f"p{share}_us"] = round(float(np.percentile(times, share)), 1)
     what = "turn end" if turn_ends else "push of 10"
-    print(f"\n{what}: {dict(benchmark.extra_info)}")  # noqa: T201 - what the run is for
+    print(f"\n{what}: {dict(benchmark.extra_info)}")
 
 
 def test_push_of_ten_samples(benchmark: Any) -> None:

@@ -127,11 +127,7 @@ def given_suspects(
         if names.count(name) > 1:
             faults.append(f"{name} is given {names.count(name)} times")
         if name not in catalogue:
-            near = get_close_matches(name, catalogue, n=3)
-            hint = (
-                f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(catalogue)}"
-            )
-            faults.append(f"{name!r} is not known, {hint}")
+            faults.append(f"{name!r} is not known, {_nearest(name, catalogue)}")
         elif name in has:
             faults.append(f"the model has {name} already")
         elif name in IN_BASE:

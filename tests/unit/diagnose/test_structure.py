@@ -17,7 +17,7 @@ SAMPLES, MEMBERS, NOISE = 40, 6, 0.5
 @pytest.fixture
 def parts() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     random = np.random.default_rng(1)
-    return tuple(random.standard_normal((n, SAMPLES)) for n in (MEMBERS, 3, 2, 4))  # type: ignore[return-value]
+    return tuple(random.standard_normal((n, SAMPLES)) for n in (MEMBERS, 3, 2, 4))
 
 
 def dense(structure: Structure, without: int | None = None) -> FloatArray:
@@ -82,7 +82,7 @@ def ranking(
     )
     model = SimpleNamespace(whiten=lambda x: x, waveform=np.zeros((1, SAMPLES)))
     free, none = np.eye(1, SAMPLES, SAMPLES - 1), np.zeros((0, SAMPLES))
-    return Ranking(model, found, Structure(members, members, NOISE, free, none))  # type: ignore[arg-type]
+    return Ranking(model, found, Structure(members, members, NOISE, free, none))
 
 
 def test_the_score_is_the_misfit_that_returns_and_the_strength_is_found() -> None:

@@ -24,7 +24,7 @@ ARMS = np.array(
 
 
 def cloud(points: np.ndarray, **options: float | bool) -> Cloud:
-    return Cloud(NAMES, np.ones(2), points, 0.1, **options)  # type: ignore[arg-type]
+    return Cloud(NAMES, np.ones(2), points, 0.1, **options)
 
 
 def inside(of: Cloud, *places: tuple[float, float]) -> list[bool]:

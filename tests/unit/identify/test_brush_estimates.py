@@ -71,7 +71,7 @@ def test_a_brush_is_recognised_as_one() -> None:
 
 
 def told(data: ForceData, **options: object) -> tuple[Study, dict[str, str]]:
-    study = study_of(fit_brush(data, **options), data)  # type: ignore[arg-type]
+    study = study_of(fit_brush(data, **options), data)
     return study, advice(study)
 
 

@@ -29,7 +29,7 @@ def waves() -> Waveforms:
 
 def plan(run: int, load: float = 4000.0, kind: str = "free", **values: float) -> RunPlan:
     given = RunPlan(run, f"runs/{run}.mf4", kind, load, 2.1e5, 18.0, 0.0, 0.0, 0.0)
-    return replace(given, **values)  # type: ignore[arg-type]
+    return replace(given, **values)
 
 
 def with_condition(waves: Waveforms, name: str, values: np.ndarray) -> Waveforms:
