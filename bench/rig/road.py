@@ -83,18 +83,25 @@ def _spread(grid: Mesh, gradient: Array) -> Array:
     return np.asarray(out.reshape(*gradient.shape[:2], LOCAL))
 
 
-def add_forces(cond: Condition, grid: Mesh, c: Road, inner: Array, tangent: Array) -> None:
-    """Add the road's virtual work, and its derivative at constant shear, to the densities."""
+def add_forces(grid: Mesh, c: Road, inner: Array) -> None:
+    """Add the road's virtual work to the density of the residual."""
     k, at = c.kin, grid.contact
     per_phi = c.area / grid.weight[at][:, None]
     force = -per_phi[..., None] * (
         c.fx[..., None] * k.x_grad + c.fy[..., None] * k.y_grad + c.q[..., None] * k.z_grad
     )
+    for own, push in zip(OWN, force.swapaxes(0, 1), strict=True):
+        inner[at[:, None], own] += push
+
+
+def add_stiffness(cond: Condition, grid: Mesh, c: Road, tangent: Array) -> None:
+    """Add the derivative of the road's virtual work, at constant shear, to its density."""
+    k, at = c.kin, grid.contact
+    per_phi = c.area / grid.weight[at][:, None]
     stiff = (per_phi * c.stiff)[..., None, None]
     square = stiff * k.z_grad[..., :, None] * k.z_grad[..., None, :]
     square[..., 2, 2] -= per_phi * (c.fx * k.x_bend + _upward(cond, c) * k.zeta_bend)
-    for own, push, stiffness in zip(OWN, force.swapaxes(0, 1), square.swapaxes(0, 1), strict=True):
-        inner[at[:, None], own] += push
+    for own, stiffness in zip(OWN, square.swapaxes(0, 1), strict=True):
         tangent[at[:, None, None], own[:, None], own] += stiffness
 
 

@@ -1,5 +1,6 @@
 """Newton's method for steady rolling, with continuation in deflection and slip."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,9 +13,12 @@ from tirelib.errors import ParameterError, TirelibError
 
 TOLERANCE = 1e-9
 """Largest Newton step of a solved state: metres and radians."""
-MAX_STEPS = 25
-REUSE = 0.03
-"""The factors are kept where a step with them cut the residual to this share."""
+MAX_STEPS = 40
+REUSE = 0.3
+"""The factors are kept where a step with them cut the residual to this share: new ones cost as much
+as seven such steps."""
+SETTLED = 1e-6
+"""What is left of the right side where a derivative is found with old factors."""
 FIRST_DEFLECTIONS = (0.002, 0.01)
 """Deflections on the way from the unloaded tire to the first load [m]."""
 LIMITS = {
@@ -246,9 +250,7 @@ def _newton(
         height, rolling = height + scale * float(step[-2]), rolling + scale * float(step[-1])
         if largest < TOLERANCE:
             _check_zone(cond, now)
-            unit = np.zeros_like(now.residual)
-            unit[-2] = 1.0
-            by_load = apply(unit)
+            by_load = _by_load(now, apply)
             return State(
                 tire=tire,
                 condition=cond,
@@ -262,6 +264,21 @@ def _newton(
                 steps=count,
             )
     raise SolverError(f"Newton's method did not converge at {cond}; take smaller steps")
+
+
+def _by_load(state: Balance, apply: Callable[[Array], Array]) -> Array:
+    """Return the derivative of the unknowns with the load, from factors of a state nearby."""
+    unit = np.zeros_like(state.residual)
+    unit[-2] = 1.0
+    found, left = np.zeros_like(unit), unit
+    for _ in range(MAX_STEPS):
+        found = found + apply(left)
+        before, left = left, unit - state.times(found)
+        if np.linalg.norm(left) < SETTLED:
+            return found
+        if np.linalg.norm(left) > REUSE * np.linalg.norm(before):
+            apply = state.factor()
+    return found
 
 
 def _check_zone(cond: Condition, state: Balance) -> None:

@@ -8,20 +8,21 @@ Fz = load, and either no wheel torque (free rolling) or s = R_e / (1 + kappa).
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
-from bench.rig.belt import FIELDS, internal
+from bench.rig.belt import FIELDS, internal, internal_force
 from bench.rig.mesh import Mesh
 from bench.rig.road import (
     LOCAL,
     OWN,
     Road,
     add_forces,
+    add_stiffness,
     bristle_blocks,
     force_blocks,
     road,
@@ -35,16 +36,60 @@ Index = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class Balance:
-    """A linearised balance: residual of the belt's coefficients and of the two wheel equations.
+    """A balance: residual of the belt's coefficients and of the two wheel equations.
 
-    Coefficients, bristles, height and rolling radius stand in this order in `residual`; rows and
-    columns of `matrix` are theirs taken by `order`.
+    Coefficients, bristles, height and rolling radius stand in this order in `residual`.
+
+    Attributes
+    ----------
+    z : array, shape (n_gauss, 32)
+        Fields and derivatives at the Gauss points.
+    omega : float, [rad/s]
+    target, fixed_height
+        See `balance`.
     """
 
+    tire: RigTire
+    cond: Condition
+    grid: Mesh
+    z: Array
+    omega: float
+    target: float | None
+    fixed_height: float | None
     residual: Array
-    matrix: csc_matrix
-    order: Index
     road: Road
+
+    @property
+    def order(self) -> Index:
+        """Unknowns in the order of the rows and columns of `matrix`."""
+        return pattern(self.grid).order
+
+    @cached_property
+    def matrix(self) -> csc_matrix:
+        """Derivative of the residual, without that of laws of the belt that have none."""
+        lay, tire, cond, grid, contact = (
+            pattern(self.grid), self.tire, self.cond, self.grid, self.road,
+        )  # fmt: skip
+        _, tangent = internal(tire, cond, self.omega, self.z)
+        add_stiffness(cond, grid, contact, tangent)
+        data = [
+            _belt_blocks(lay, tangent),
+            *force_blocks(tire, grid, contact),
+            *bristle_blocks(cond, grid, contact),
+            *wheel_blocks(tire, cond, grid, contact),
+        ]
+        if self.fixed_height is not None:
+            data[9], data[10] = 0.0 * data[9], np.array([1e6])
+        if self.target is not None:
+            data[11:15] = [0.0 * b for b in data[11:14]] + [np.array([1e6])]
+        values = np.bincount(lay.place, np.concatenate([d.ravel() for d in data]), lay.count)
+        return csc_matrix((values, lay.rows, lay.starts), shape=(lay.size, lay.size))
+
+    def times(self, x: Array) -> Array:
+        """Return matrix @ x, both in the plain order."""
+        out = np.zeros_like(x)
+        out[self.order] = self.matrix @ x[self.order]
+        return out
 
     def factor(self) -> Callable[[Array], Array]:
         """Return the solver of matrix @ x = b, for b and x in the plain order.
@@ -57,7 +102,9 @@ class Balance:
             bristles[-2 - shear.e.size : -2] = True
             kept = np.flatnonzero(~bristles[order])
             order, matrix = order[kept], matrix[:, kept][kept]
-        lu = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=1e-3)
+        lu = splu(
+            matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
 
         def apply(right: Array) -> Array:
             out = np.zeros_like(right)
@@ -163,7 +210,7 @@ def balance(
     target: float | None,
     fixed_height: float | None = None,
 ) -> Balance:
-    """Residual and Jacobian of a state.
+    """Residual of a state, and what its derivative is made of.
 
     Parameters
     ----------
@@ -175,30 +222,18 @@ def balance(
     lay = pattern(grid)
     omega = cond.speed * float(np.cos(cond.slip_angle)) / rolling
     z = fields_at_points(grid, control)
-    inner, tangent = internal(tire, cond, omega, z)
+    inner = internal_force(tire, cond, omega, z)
     for law in tire.belt_laws:
         inner += law(tire, cond, omega, grid, z)
     contact = road(tire, cond, grid, z, height, rolling)
-    add_forces(cond, grid, contact, inner, tangent)
+    add_forces(grid, contact, inner)
     residual = np.zeros(lay.size)
     spread = np.einsum("p,ptf,pta->paf", lay.weights, inner.reshape(-1, 2, FIELDS), lay.shape)
     np.add.at(residual[: grid.n * FIELDS].reshape(grid.n, FIELDS), grid.control, spread)
-    data = [
-        _belt_blocks(lay, tangent),
-        *force_blocks(tire, grid, contact),
-        *bristle_blocks(cond, grid, contact),
-        *wheel_blocks(tire, cond, grid, contact),
-    ]
     load = float(np.sum(contact.area * contact.q))
     residual[-2] = load - cond.load if fixed_height is None else 1e6 * (height - fixed_height)
-    if fixed_height is not None:
-        data[9], data[10] = 0.0 * data[9], np.array([1e6])
     residual[-1] = wheel_torque(cond, contact) if target is None else 1e6 * (rolling - target)
-    if target is not None:
-        data[11:15] = [0.0 * b for b in data[11:14]] + [np.array([1e6])]
-    values = np.bincount(lay.place, np.concatenate([d.ravel() for d in data]), lay.count)
-    matrix = csc_matrix((values, lay.rows, lay.starts), shape=(lay.size, lay.size))
-    return Balance(residual, matrix, lay.order, contact)
+    return Balance(tire, cond, grid, z, omega, target, fixed_height, residual, contact)
 
 
 def _belt_blocks(lay: Pattern, tangent: Array) -> Array:

@@ -11,7 +11,7 @@ from tirelib.diagnose.noise import noise_in, white_level
 from tirelib.diagnose.refit import Refit, refit
 from tirelib.diagnose.rivals import inseparable
 from tirelib.diagnose.rounds import rounds
-from tirelib.diagnose.stage import ALARM, Stage
+from tirelib.diagnose.stage import ALARM, Stage, within
 from tirelib.diagnose.stored import ensemble_of
 from tirelib.diagnose.unlisted import UNLISTED
 from tirelib.effects import Effect
@@ -172,7 +172,13 @@ def _findings(first: Stage, named: Sequence[str], model: Refit, data: Data) -> t
         row, name = _finding(first, index, data), candidate.effect.name
         if name in named:
             k = fitted[name]
-            row = replace(row, strength=model.strengths[k], std=model.strength_std(k))
+            strength, std = model.strengths[k], model.strength_std(k)
+            inside = within(candidate.effect, strength, std)
+            alarm = inside and row.score >= ALARM * row.threshold
+            row = replace(
+                row, strength=strength, std=std, in_range=inside,
+                level="alarm" if alarm else row.level,
+            )  # fmt: skip
         rows.append(row)
     order = {name: k for k, name in enumerate(named)}
     rows.sort(key=lambda f: (order.get(f.effect.name, len(order)), -f.score / f.threshold))

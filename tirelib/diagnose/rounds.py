@@ -7,7 +7,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.ensemble import Variants
 from tirelib.diagnose.refit import refit
-from tirelib.diagnose.stage import ALARM, Stage
+from tirelib.diagnose.stage import ALARM, Stage, within
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
 from tirelib.identify.waveform_fit import Data
@@ -57,7 +57,7 @@ def rounds(
         Index of that candidate of the stage.
     """
     # the joint ranking sees all effects at once: who is no hint now is no suspect later
-    hints = first.in_range & (first.scores.score >= first.limit)
+    hints = (first.in_range | first.over) & (first.scores.score >= first.limit)
     suspects = {name for name, hint in zip(first.names, hints, strict=True) if hint}
     least = dict(zip(first.names, first.limit, strict=True))
 
@@ -73,7 +73,7 @@ def rounds(
     named: list[str] = []
     stage, count = first, 0
     while count < ROUNDS:
-        found = _added(first, stage, _leaders(stage, suspects, named), fitted)
+        found = _added(first, stage, suspects, bool(named), fitted)
         if found is None:
             break
         after, index = found
@@ -89,36 +89,55 @@ def rounds(
     return stage, named, count, None
 
 
-def _leaders(stage: Stage, suspects: set[str], named: Sequence[str]) -> list[int]:
-    bar, clear = (FURTHER, CLEAR) if named else (ALARM, 1.0)
-    return stage.leaders(suspects, bar, clear)
-
-
 _Fit = Callable[[Stage, Sequence[Effect], Sequence[FloatArray]], Stage | None]
 
 
 def _added(
-    first: Stage, stage: Stage, leaders: Sequence[int], fitted: _Fit
+    first: Stage, stage: Stage, suspects: set[str], further: bool, fitted: _Fit
 ) -> tuple[Stage, int] | None:
-    """Return the stage with the leader whose exact refit leaves least, and its index."""
-    best: tuple[Stage, int] | None = None
+    """Return the stage with the leader whose exact refit leaves least, and its index.
+
+    A leader that is too large for its range in the exact refit as well is barred, and so is what
+    it leads.
+    """
+    bar, clear = (FURTHER, CLEAR) if further else (ALARM, 1.0)
+    tried: dict[int, Stage | None] = {}
+    barred: set[str] = set()
+    while True:
+        leaders = stage.leaders(suspects, bar, clear, barred)
+        for index in leaders:
+            if index not in tried:
+                tried[index] = _trial(first, stage, index, fitted)
+        large = {
+            stage.names[index] for index in leaders if stage.over[index] and not _fits(tried[index])
+        }
+        if not large:
+            break
+        barred |= large
+    needed = [(after, index) for index in leaders if (after := tried[index]) is not None]
+    return min(needed, key=lambda pair: pair[0].scores.misfit, default=None)
+
+
+def _trial(first: Stage, stage: Stage, index: int, fitted: _Fit) -> Stage | None:
+    """Return the stage with one more effect, if the exact refit needs it."""
     model = stage.model
-    for index in leaders:
-        effect, strength = stage.found.living[index].effect, stage.scores.strength[index]
-        # the laws of those before are right but roughly: what they may be off by is no effect
-        if stage.scores.score[index] < ROUGH * (first.scores.misfit - stage.scores.misfit):
-            continue
-        after = fitted(
-            stage, [*model.effects, effect], [*model.strengths, _inside(effect, strength)]
-        )
-        # to first order only if the exact refit does not need it
-        if after is None or (
-            stage.scores.misfit - after.scores.misfit < ALARM * stage.limit[index]
-        ):
-            continue
-        if best is None or after.scores.misfit < best[0].scores.misfit:
-            best = after, index
-    return best
+    effect, strength = stage.found.living[index].effect, stage.scores.strength[index]
+    # the laws of those before are right but roughly: what they may be off by is no effect
+    if stage.scores.score[index] < ROUGH * (first.scores.misfit - stage.scores.misfit):
+        return None
+    after = fitted(stage, [*model.effects, effect], [*model.strengths, _inside(effect, strength)])
+    # to first order only if the exact refit does not need it
+    if after is None or stage.scores.misfit - after.scores.misfit < ALARM * stage.limit[index]:
+        return None
+    return after
+
+
+def _fits(after: Stage | None) -> bool:
+    """Return whether what was added last lies in its range."""
+    if after is None:
+        return False
+    model = after.model
+    return within(model.effects[-1], model.strengths[-1], model.strength_std(-1))
 
 
 def _thinned(

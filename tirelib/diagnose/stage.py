@@ -1,6 +1,6 @@
 """A model with its candidates scored, against what the same scores do without any effect."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,6 +48,9 @@ class Stage:
         Whether an effect may be named: in the catalogue, with a plausible strength and sign.
     impossible : shape (n_candidates,)
         Whether an effect of the catalogue lies outside its range.
+    over : shape (n_candidates,)
+        Whether it lies there by its size alone, not by its sign: the strength is of first order,
+        and only an exact refit tells where it is.
     far : shape (n_candidates,)
         Whether it lies farther outside than structure imitates.
     unlisted : shape (n_candidates,)
@@ -62,6 +65,7 @@ class Stage:
     noise: float
     in_range: BoolArray
     impossible: BoolArray
+    over: BoolArray
     far: BoolArray
     unlisted: BoolArray
 
@@ -93,12 +97,12 @@ class Stage:
         members = ranking.of_members()
         names = [candidate.effect.name for candidate in found.living]
         extra = np.array([each.effect in UNLISTED for each in found.living], dtype=bool)
-        fits = plausible(found, scores)
+        fits, signs = plausible(found, scores), plausible(found, scores, np.inf)
         bound = np.array([least.get(name, 0.0) for name in names])
         return cls(
             model, found, ranking, scores, np.maximum(limits(members), bound),
-            noise, fits & ~extra, ~fits & ~extra, ~plausible(found, scores, IMITATION) & ~extra,
-            extra & ~_has_twin(found),
+            noise, fits & ~extra, ~fits & ~extra, ~fits & signs & ~extra,
+            ~plausible(found, scores, imitation=IMITATION) & ~extra, extra & ~_has_twin(found),
         )  # fmt: skip
 
     @property
@@ -136,18 +140,23 @@ class Stage:
         """Effects in range whose scores no variant comes near."""
         return np.asarray(self.in_range & (self.ratio >= ALARM))
 
-    def leaders(self, suspects: set[str], bar: float, clear: float) -> list[int]:
+    def leaders(
+        self, suspects: set[str], bar: float, clear: float, barred: Collection[str] = ()
+    ) -> list[int]:
         """Return the indices of an alarm from a ratio on and of its rivals, best first.
 
         None if its ratio is not `clear` times that of every effect outside its range: what imitates
         the impossible so well on this tire may imitate the possible. Rivals are hints among the
         suspects, or in no catalogue, that come near in the ratio or in what they take away alone:
-        which of them it is, only an exact refit tells.
+        which of them it is, only an exact refit tells. What is too large for its range is among
+        them as long as it is not barred.
         """
         ratio, alone = self.ratio, self.scores.alone
-        known = (self.in_range & np.isin(self.names, list(suspects))) | self.unlisted
+        large = self.over & ~np.isin(self.names, list(barred))
+        known = ((self.in_range | large) & np.isin(self.names, list(suspects))) | self.unlisted
         fit = known & (ratio >= max(bar, ALARM))
-        if not fit.any() or clear * self.imitated > float(ratio[fit].max()):
+        imitated = float(np.max(ratio, where=self.impossible & ~large, initial=0.0))
+        if not fit.any() or clear * imitated > float(ratio[fit].max()):
             return []
         best = int(np.argmax(np.where(fit, ratio, 0.0)))
         near = (ratio >= NEAR * ratio[best]) | (alone >= ALONE * alone[best])
@@ -178,17 +187,34 @@ def _has_twin(found: Candidates) -> BoolArray:
     return np.array([bool(set(each) - names) for each in twins], dtype=bool)
 
 
-def plausible(found: Candidates, scores: Scores, share: float = 0.0) -> BoolArray:
-    """Return which strengths lie in their effects' ranges, to `RANGE_SLACK` and a share of them.
+def plausible(
+    found: Candidates, scores: Scores, form: float = FORM, imitation: float = 0.0
+) -> BoolArray:
+    """Return which strengths lie in their effects' ranges, to shares of them.
+
+    Parameters
+    ----------
+    form : float
+        Share by which an end other than zero may be off; infinite where only the sign counts.
+    imitation : float
+        Share by which any end may be.
+    """
+    good = [
+        within(candidate.effect, strength, std, form, imitation)
+        for candidate, strength, std in zip(found.living, scores.strength, scores.std, strict=True)
+    ]
+    return np.array(good, dtype=bool)
+
+
+def within(
+    effect: Effect, strength: FloatArray, std: FloatArray, form: float = FORM,
+    imitation: float = 0.0,
+) -> bool:  # fmt: skip
+    """Return whether a strength lies in its effect's range, to `RANGE_SLACK` and shares of it.
 
     An end other than zero is as uncertain as the law.
     """
-    good = []
-    for candidate, strength, std in zip(found.living, scores.strength, scores.std, strict=True):
-        effect = candidate.effect
-        slack = RANGE_SLACK * std + share * effect.scale
-        low = effect.low - slack - FORM * effect.scale * (effect.low < 0.0)
-        high = effect.high + slack + FORM * effect.scale * (effect.high > 0.0)
-        inside = (strength >= low) & (strength <= high)
-        good.append(bool(inside.all()))
-    return np.array(good, dtype=bool)
+    slack = RANGE_SLACK * std + imitation * effect.scale
+    low = effect.low - slack - (form * effect.scale if effect.low < 0.0 else 0.0)
+    high = effect.high + slack + (form * effect.scale if effect.high > 0.0 else 0.0)
+    return bool(((strength >= low) & (strength <= high)).all())

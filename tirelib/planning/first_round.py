@@ -64,11 +64,12 @@ class FirstRound:
         Empty as well if it is in no catalogue: that names nobody.
         """
         scores = self.stage.ranking.scores(rest)
-        fits, near = (plausible(self.found, scores, share) for share in (0.0, IMITATION))
+        fits, signs = plausible(self.found, scores), plausible(self.found, scores, np.inf)
+        near = plausible(self.found, scores, imitation=IMITATION)
         listed = np.array([each.effect not in UNLISTED for each in self.found.living], dtype=bool)
         judged = replace(
             self.stage, scores=scores, in_range=fits & listed, impossible=~fits & listed,
-            far=~near & listed,
+            over=~fits & signs & listed, far=~near & listed,
         )  # fmt: skip
         leaders = judged.leaders(set(judged.names), ALARM, 1.0)
         return judged.names[leaders[0]] if leaders and listed[leaders[0]] else ""

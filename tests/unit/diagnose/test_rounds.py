@@ -10,6 +10,7 @@ import pytest
 from tirelib.diagnose import rounds
 from tirelib.diagnose.diagnose import BARELY, EXPLAINED, OUTSIDE, _verdict
 from tirelib.diagnose.stage import ALARM, ALONE, NEAR, Stage
+from tirelib.diagnose.structure import FORM
 
 NAMES = ("strong", "close", "weak")
 LEFT = {(): 1000.0, ("strong",): 500.0, ("close",): 300.0, ("weak",): 990.0}
@@ -17,26 +18,42 @@ LEFT = {(): 1000.0, ("strong",): 500.0, ("close",): 300.0, ("weak",): 990.0}
 
 
 def effect(name: str) -> Any:
-    return SimpleNamespace(name=name, low=-1.0, high=1.0)
+    return SimpleNamespace(name=name, low=-1.0, high=1.0, scale=1.0)
 
 
-def stage(has: tuple[str, ...], misfit: float, score: Sequence[float]) -> Any:
-    """Return a stage whose model has some effects and scores the others."""
+def stage(
+    has: tuple[str, ...],
+    misfit: float,
+    score: Sequence[float],
+    leaders: Sequence[str] = (),
+    over: Sequence[str] = (),
+    strength: float = 0.5,
+) -> Any:
+    """Return a stage whose model has some effects and scores the others; with who leads there.
+
+    What is over its range is barred together with all that it leads.
+    """
     others = [name for name in NAMES if name not in has]
     return SimpleNamespace(
         names=others,
         model=SimpleNamespace(
-            effects=[effect(name) for name in has], strengths=[np.zeros(1) for _ in has]
+            effects=[effect(name) for name in has],
+            strengths=[np.full(1, strength) for _ in has],
+            strength_std=lambda _: np.full(1, 0.01),
         ),
         found=SimpleNamespace(living=[SimpleNamespace(effect=effect(name)) for name in others]),
         scores=SimpleNamespace(
             misfit=misfit, score=np.array(score), strength=[np.array([0.5])] * len(others)
         ),
         limit=np.full(len(others), 10.0),
+        over=np.isin(others, over),
+        leaders=lambda suspects, bar, clear, barred: (
+            [] if barred else [others.index(name) for name in leaders]
+        ),
     )
 
 
-def fit(left: dict[tuple[str, ...], float]) -> Callable[..., Any]:
+def fit(left: dict[tuple[str, ...], float], strength: float = 0.5) -> Callable[..., Any]:
     """Return a fit that leaves what a table says; the order of the names does not count."""
     by_set = {frozenset(names): misfit for names, misfit in left.items()}
 
@@ -44,39 +61,51 @@ def fit(left: dict[tuple[str, ...], float]) -> Callable[..., Any]:
         names = tuple(each.name for each in effects)
         misfit = by_set.get(frozenset(names))
         others = len(NAMES) - len(names)
-        return None if misfit is None else stage(names, misfit, [50.0] * others)
+        return None if misfit is None else stage(
+            names, misfit, [50.0] * others, strength=strength
+        )  # fmt: skip
 
     return fitted
 
 
-FIRST = stage((), 1000.0, [400.0, 390.0, 5.0])
+SCORE = [400.0, 390.0, 5.0]
+FIRST = stage((), 1000.0, SCORE)
+
+
+def added(now: Any, fitted: Callable[..., Any]) -> str:
+    """Return the name of what a round adds, empty if nothing."""
+    found = rounds._added(FIRST, now, set(NAMES), False, fitted)
+    return "" if found is None else now.names[found[1]]
 
 
 def test_of_near_leaders_the_one_whose_exact_refit_leaves_least_is_added() -> None:
-    found = rounds._added(FIRST, FIRST, [0, 1], fit(LEFT))
-    assert found is not None
-    assert FIRST.names[found[1]] == "close"
-    alone = rounds._added(FIRST, FIRST, [0], fit(LEFT))
-    assert alone is not None
-    assert FIRST.names[alone[1]] == "strong"
+    assert added(stage((), 1000.0, SCORE, ["strong", "close"]), fit(LEFT)) == "close"
+    assert added(stage((), 1000.0, SCORE, ["strong"]), fit(LEFT)) == "strong"
 
 
 def test_a_leader_that_the_exact_refit_does_not_need_is_not_added() -> None:
     needed = ALARM * FIRST.limit[2]
     assert 1000.0 - LEFT["weak",] < needed
-    assert rounds._added(FIRST, FIRST, [2], fit(LEFT)) is None
+    assert not added(stage((), 1000.0, SCORE, ["weak"]), fit(LEFT))
 
 
 def test_a_refit_that_does_not_settle_adds_nothing() -> None:
-    assert rounds._added(FIRST, FIRST, [0, 1], fit({})) is None
+    assert not added(stage((), 1000.0, SCORE, ["strong", "close"]), fit({}))
+
+
+@pytest.mark.parametrize(("strength", "name"), [(1.0 + FORM, "close"), (1.1 + FORM, "")])
+def test_what_is_too_large_to_first_order_is_named_where_its_exact_refit_is_not(
+    strength: float, name: str
+) -> None:
+    now = stage((), 1000.0, SCORE, ["strong", "close"], over=["close"])
+    assert added(now, fit(LEFT, strength)) == name
 
 
 def test_what_the_laws_before_may_be_off_by_is_no_effect() -> None:
-    later = stage(("strong",), 400.0, [rounds.ROUGH * 600.0 - 0.1, 0.0])
     left = {("strong", "close"): 300.0}
-    assert rounds._added(FIRST, later, [0], fit(left)) is None
-    enough = stage(("strong",), 400.0, [rounds.ROUGH * 600.0 + 0.1, 0.0])
-    assert rounds._added(FIRST, enough, [0], fit(left)) is not None
+    rough = rounds.ROUGH * 600.0
+    assert not added(stage(("strong",), 400.0, [rough - 0.1, 0.0], ["close"]), fit(left))
+    assert added(stage(("strong",), 400.0, [rough + 0.1, 0.0], ["close"]), fit(left)) == "close"
 
 
 def test_an_effect_that_a_later_one_replaces_goes() -> None:
@@ -95,7 +124,8 @@ def judged(ratio: Sequence[float], alone: Sequence[float], outside: float = 0.0)
     names = [*NAMES, "impossible"]
     return SimpleNamespace(
         ratio=np.array([*ratio, outside]), in_range=np.array([True, True, True, False]),
-        imitated=outside, unlisted=np.zeros(4, dtype=bool),
+        impossible=np.array([False, False, False, True]), over=np.zeros(4, dtype=bool),
+        unlisted=np.zeros(4, dtype=bool),
         names=names, scores=SimpleNamespace(alone=np.array([*alone, 0.0])),
     )  # fmt: skip
 
@@ -122,6 +152,13 @@ def test_a_further_effect_has_to_be_clear_of_what_imitates_the_impossible() -> N
     for outside, told in ((9.9, [0]), (10.1, [])):
         stage = judged([20.0, 0.0, 0.0], [100.0, 0.0, 0.0], outside)
         assert Stage.leaders(stage, set(stage.names), ALARM, 2.0) == told
+
+
+def test_what_is_too_large_leads_until_it_is_barred_and_then_bars_the_others() -> None:
+    stage = judged([20.0, 19.0, 0.0], [100.0, 90.0, 0.0], 40.0)
+    stage.over[3] = True
+    assert Stage.leaders(stage, set(stage.names), ALARM, 1.0) == [3, 0, 1]
+    assert Stage.leaders(stage, set(stage.names), ALARM, 1.0, {"impossible"}) == []
 
 
 def test_what_is_in_no_catalogue_contends_without_being_a_suspect() -> None:
