@@ -105,8 +105,8 @@ class Given:
 @click.option("--silence", metavar="S", type=click.FloatRange(min=0.0),
               help="End when nothing came for so long.")  # fmt: skip
 @click.option("--turns", metavar="N", type=click.IntRange(min=1), help="End after so many turns.")
-@click.option("--realtime", "asked", is_flag=True,
-              help="Go before all other programs (Linux; the right to it is needed).")  # fmt: skip
+@click.option("--realtime/--no-realtime", "asked", default=None,
+              help="Go before all other programs.  [default: where this user may]")  # fmt: skip
 @bridge_options
 @page_options
 @click.pass_context
@@ -135,7 +135,7 @@ def run(
     duration: float | None,
     silence: float | None,
     turns: int | None,
-    asked: bool,
+    asked: bool | None,
     estimates_out: str | None,
     plotjuggler: str | None,
     page: bool | None,
@@ -149,8 +149,7 @@ def run(
         raise click.UsageError("just one of --port and --replay is needed")
     if replay is not None and record is not None:
         raise click.UsageError("--record goes with --port: a recording is there already")
-    if asked:
-        realtime()
+    priority = realtime(asked) if replay is None else ""
     paced = replay is None or pace is not None
     choice = page_choice(page, host, network, page_port, tui, paced=paced)
     archive = read_fmu(fmu_file)
@@ -195,6 +194,8 @@ def run(
         else:
             source = _in_process(link, file, known, stack, laps=shown.anything)
         console.print(f"{source.name} -> {file.name}, {file.samples} samples a step")
+        if priority:
+            console.print(f"priority: {priority}", soft_wrap=True, markup=False)
         stack.enter_context(shown)
         shown.open(source, switch, fmu_file, calibration, known.devices)
         limits = Limits(duration, silence, turns)

@@ -16,10 +16,13 @@ from bench.protocols import SERIAL
 
 BAUD = 2_000_000
 """Default rate; 16 samples a frame at 10 kHz need 1.13 Mbaud."""
-GATHER = 0.003
-"""Time from one read to the next, [s]: fewer and larger batches cost less."""
-MUCH = 2048
-"""Bytes that are worth a batch at once: more could fill the system's buffer."""
+GATHER = 0.004
+"""Time from one batch to the next, [s]: fewer and larger ones cost less."""
+MUCH, NAP = 2048, 0.001
+"""Half of what the system holds for one read, [bytes]; where so much came at once, more waits
+behind it, and is fetched after a nap, [s]."""
+LARGE = 2**16
+"""A batch does not grow beyond this by gathering, [bytes]."""
 _TIOCGICOUNT = 0x545D
 """Linux: the counters of a UART."""
 _COUNTERS = struct.Struct("20i")
@@ -76,16 +79,28 @@ class SerialLink:
                 self._port.timeout = patience
             data = self._port.read(max(1, self._port.in_waiting))
             arrival = time.monotonic_ns()
-            if data and len(data) < MUCH:
-                soon = self._last + self._gather - 1e-9 * arrival
-                if soon > 0.0:
-                    time.sleep(min(soon, deadline.remaining))
-                data += self._port.read(self._port.in_waiting)
+            if data:
+                data += self._gathered(len(data), deadline)
             self._last = time.monotonic()
             return Read(arrival, bytes(data))
         except (OSError, serial.SerialException, TypeError) as error:
             # in_waiting raises OSError, read SerialException; TypeError: closed by another thread
             raise self._gone(error) from None
+
+    def _gathered(self, newest: int, deadline: Deadline) -> bytes:
+        """Return what comes until the next batch is due, after so many bytes at once.
+
+        A port that goes away meanwhile is noticed at the next batch: this one is not lost.
+        """
+        more, end = b"", deadline.sooner(self._last + self._gather - time.monotonic())
+        while not end.expired and len(more) < LARGE:
+            time.sleep(min(end.remaining, NAP) if newest >= MUCH else end.remaining)
+            try:
+                chunk = self._port.read(self._port.in_waiting)
+            except (OSError, serial.SerialException, TypeError):
+                break
+            more, newest = more + chunk, len(chunk)
+        return more
 
     def send(self, data: bytes) -> None:
         """Write bytes: commands to an adapter.

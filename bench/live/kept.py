@@ -13,6 +13,8 @@ from multiprocessing import get_context, parent_process
 from multiprocessing.context import SpawnContext
 from typing import Any
 
+from bench.live.priority import as_parent
+
 FIRST_PAUSE, LONGEST_PAUSE = 0.05, 10.0
 """Before a new start: it doubles while starts fail, [s]."""
 LIVED = 5.0
@@ -166,11 +168,15 @@ def _on_call(
 
 
 def settled() -> None:
-    """Prepare a process of the run: Ctrl-C is the run's, and what is there is no garbage."""
+    """Prepare a process of the run that has loaded what it needs.
+
+    Ctrl-C is the run's, what is there is no garbage, and from now on it goes first if the run does.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     gc.collect()
     gc.freeze()
+    as_parent()
 
 
 def orphaned() -> bool:

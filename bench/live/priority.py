@@ -5,37 +5,72 @@ import os
 from bench.errors import DeviceError
 
 PRIORITY = 5
-"""Real-time priority of a run that asks for it."""
+"""Real-time priority of a run."""
+_RIGHT = (
+    f"the right to it is needed, such as a line '* - rtprio {PRIORITY}' in "
+    "/etc/security/limits.conf (then log in anew)"
+)
 BELOW = 5
 """Niceness of what only shows."""
 
 
-def realtime() -> None:
-    """Ask for real-time priority, for this process and those that it starts from now on.
+def realtime(asked: bool | None) -> str:
+    """Ask for real-time priority. Processes that this one starts begin without (`as_parent`).
+
+    Parameters
+    ----------
+    asked : bool or None
+        None: where the system has it and this user may.
+
+    Returns
+    -------
+    What it is, in words.
 
     Raises
     ------
     DeviceError
-        If the system has none, or does not allow it.
+        If it was asked for and is not to be had.
+    """
+    if asked is False:
+        return "ordinary, as asked for"
+    try:
+        _set()
+    except AttributeError:
+        if asked:
+            raise DeviceError(
+                "--realtime: this system has no real-time priority that a program may ask for; "
+                "Linux is needed; leave it out"
+            ) from None
+        return "ordinary; this system has no other that a program may ask for"
+    except PermissionError:
+        if asked:
+            raise DeviceError(
+                f"--realtime: this user may not have real-time priority; {_RIGHT}; add it, or "
+                "leave --realtime out"
+            ) from None
+        return f"ordinary; for real-time {_RIGHT}"
+    return f"real-time {PRIORITY}"
+
+
+def as_parent() -> None:
+    """Take over real-time priority of the process that started this one, which has loaded by now.
+
+    To load takes a second of processor, and nothing should wait for that.
     """
     try:
-        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(PRIORITY))
-    except AttributeError:
-        raise DeviceError(
-            "--realtime: this system has no real-time priority that a program may ask for; Linux "
-            "is needed; leave it out"
-        ) from None
-    except PermissionError:
-        raise DeviceError(
-            "--realtime: this user may not have real-time priority; the right to it is needed, "
-            f"such as a line '* - rtprio {PRIORITY}' in /etc/security/limits.conf (then log in "
-            "anew); add it, or leave --realtime out"
-        ) from None
+        if os.sched_getscheduler(os.getppid()) & ~os.SCHED_RESET_ON_FORK == os.SCHED_RR:
+            _set()
+    except (AttributeError, OSError):
+        return  # another system, a parent that is gone, no right to it: it goes on as it is
+
+
+def _set() -> None:
+    os.sched_setscheduler(
+        0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(PRIORITY)
+    )  # fmt: skip
 
 
 def below() -> None:
     """Let all others go first: this process only shows what they do."""
-    if hasattr(os, "sched_setscheduler"):
-        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     if hasattr(os, "nice"):
         os.nice(BELOW)

@@ -1,6 +1,7 @@
 """Processes that are started again, one that stands by, and who goes first."""
 
 import os
+import re
 import signal
 import time
 from collections.abc import Callable, Iterator
@@ -12,7 +13,7 @@ from bench.deadline import Deadline
 from bench.errors import DeviceError
 from bench.live import kept as kept_module
 from bench.live.kept import CONTEXT, Kept
-from bench.live.priority import BELOW, PRIORITY, below, realtime
+from bench.live.priority import BELOW, PRIORITY, as_parent, below, realtime
 
 PATIENCE = 60.0
 
@@ -88,26 +89,56 @@ def test_where_the_one_that_stands_by_has_died_a_new_one_is_started(
             left.is_alive()
 
 
+class System:
+    """What a Linux system knows of priorities; the parent's is that of this process."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.policy, self.priority, self.nice = 0, 0, 0
+        linux = {"SCHED_RR": 2, "SCHED_RESET_ON_FORK": 0x4000_0000, "sched_param": int,
+                 "sched_setscheduler": self.set, "sched_getscheduler": lambda _: self.policy,
+                 "nice": self.be_nice}  # fmt: skip
+        for name, value in linux.items():  # other systems have none of them
+            monkeypatch.setattr(os, name, value, raising=False)
+
+    def set(self, _: int, policy: int, priority: int) -> None:
+        self.policy, self.priority = policy, priority
+
+    def be_nice(self, by: int) -> None:
+        self.nice += by
+
+
 def refused(*_: object) -> None:
     raise PermissionError
 
 
-def test_real_time_priority_is_asked_for_and_its_refusal_is_told(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    asked: list[tuple[Any, Any]] = []
-    niced: list[int] = []
-    linux = {"SCHED_RR": "rr", "SCHED_OTHER": "other", "sched_param": int, "nice": niced.append,
-             "sched_setscheduler": lambda _, kind, param: asked.append((kind, param))}  # fmt: skip
-    for name, value in linux.items():  # other systems have none of them
-        monkeypatch.setattr(os, name, value, raising=False)
-    realtime()
+def test_real_time_priority_is_taken_where_it_may_be_had(monkeypatch: pytest.MonkeyPatch) -> None:
+    system = System(monkeypatch)
+    assert realtime(False) == "ordinary, as asked for"
+    assert system.policy == 0
+    assert realtime(None) == f"real-time {PRIORITY}"
+    assert (system.policy, system.priority) == (0x4000_0002, PRIORITY)
+
+
+def test_processes_of_a_run_take_over_its_priority(monkeypatch: pytest.MonkeyPatch) -> None:
+    system = System(monkeypatch)
+    as_parent()
+    assert system.priority == 0
+    realtime(True)
+    system.priority = 0
+    as_parent()
+    assert system.priority == PRIORITY
     below()
-    assert asked == [("rr", PRIORITY), ("other", 0)]
-    assert niced == [BELOW]
+    assert system.nice == BELOW
+
+
+def test_the_refusal_of_real_time_priority_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    System(monkeypatch)
     monkeypatch.setattr(os, "sched_setscheduler", refused)
+    assert re.search(r"ordinary.*limits\.conf", realtime(None))
     with pytest.raises(DeviceError, match=r"--realtime: .*limits\.conf"):
-        realtime()
+        realtime(True)
     monkeypatch.delattr(os, "sched_setscheduler")
+    assert "no other" in realtime(None)
     with pytest.raises(DeviceError, match=r"Linux is needed"):
-        realtime()
+        realtime(True)
+    as_parent()

@@ -21,7 +21,7 @@ from bench.links.can_bus import CanLink, message_of
 from bench.links.opening import PortPlan
 from bench.links.pseudo import PseudoTerminal
 from bench.links.reconnecting import ReconnectingLink
-from bench.links.serial_port import MUCH, SerialLink
+from bench.links.serial_port import MUCH, NAP, SerialLink
 from bench.links.slcan_port import SlcanLink
 from bench.protocols.slcan import SlcanDecoder, encode
 from tests.bench.clocks import Clock
@@ -98,23 +98,53 @@ def test_a_serial_port_is_opened_once(terminal: PseudoTerminal) -> None:
     link.close()
 
 
-def test_bytes_that_fill_the_system_s_buffer_are_taken_at_once(
+def waiting(terminal: PseudoTerminal, link: SerialLink, size: int) -> None:
+    terminal.send(bytes(size))
+    end = Deadline.after(60.0)
+    while link._port.in_waiting < size and not end.expired:
+        threading.Event().wait(0.01)
+
+
+def test_few_bytes_are_waited_for_once_and_many_are_fetched_with_what_waits_behind_them(
     terminal: PseudoTerminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Few bytes are waited for to become a batch; many are one already."""
-    link, slept = SerialLink(terminal.path, gather=60.0), []
-    monkeypatch.setattr("bench.links.serial_port.time.sleep", slept.append)
-    for size, sleeps in ((1, 0), (MUCH, 0), (10, 1)):  # nothing was read before the first
-        terminal.send(bytes(size))
-        end = Deadline.after(60.0)
-        while link._port.in_waiting < size and not end.expired:
-            threading.Event().wait(0.01)
+    link, slept = SerialLink(terminal.path, gather=0.3), []
+    sleep = time.sleep
+
+    def asleep(seconds: float) -> None:
+        slept.append(seconds)
+        if len(slept) == 3:
+            waiting(terminal, link, 7)
+        sleep(seconds)
+
+    monkeypatch.setattr("bench.links.serial_port.time.sleep", asleep)
+    for size, more in ((1, 0), (10, 0), (MUCH, 7)):  # nothing was read before the first
+        waiting(terminal, link, size)
         read = link.receive(Deadline.after(5.0))
         assert read is not None
-        assert read.data == bytes(size)
-        assert len(slept) == sleeps
-    assert 0.0 < slept[0] <= 5.0
+        assert read.data == bytes(size + more)
+        if size == 10:
+            assert len(slept) == 1
+    few, many, then = slept
+    assert many == NAP
+    assert NAP < few <= 0.3
+    assert NAP < then <= 0.3  # when no more had come after the nap
     link.close()
+
+
+def test_a_port_that_goes_away_while_a_batch_is_gathered_loses_nothing_of_it(
+    terminal: PseudoTerminal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    link = SerialLink(terminal.path, gather=0.3)
+    waiting(terminal, link, 1)
+    assert link.receive(Deadline.after(5.0)) is not None
+    monkeypatch.setattr("bench.links.serial_port.time.sleep", lambda _: terminal.close())
+    waiting(terminal, link, 10)
+    read = link.receive(Deadline.after(5.0))
+    assert read is not None
+    assert read.data == bytes(10)
+    with pytest.raises(UnpluggedError):
+        link.receive(Deadline.after(5.0))
 
 
 def test_an_adapter_is_opened_to_listen_and_its_lines_are_read(terminal: PseudoTerminal) -> None:
