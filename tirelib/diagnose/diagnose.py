@@ -173,10 +173,9 @@ def _findings(first: Stage, named: Sequence[str], model: Refit, data: Data) -> t
         if name in named:
             k = fitted[name]
             strength, std = model.strengths[k], model.strength_std(k)
-            inside = within(candidate.effect, strength, std)
-            alarm = inside and row.score >= ALARM * row.threshold
+            alarm = row.score >= ALARM * row.threshold
             row = replace(
-                row, strength=strength, std=std, in_range=inside,
+                row, strength=strength, std=std, in_range=within(candidate.effect, strength, std),
                 level="alarm" if alarm else row.level,
             )  # fmt: skip
         rows.append(row)

@@ -102,11 +102,23 @@ def assess(
         messages.append(
             "nothing can be held out: three loads or two pressures, and four other runs, are needed"
         )
+    messages += [_too_large(finding) for finding in findings
+                 if finding.effect.name in named and not finding.in_range]  # fmt: skip
     return Assessment(
         found, unit, verdict, named, findings, unit.factor * found.base.error,
         unit.factor * final.error, floor, chosen, held_before, held_after,
         _left(found, data, final), tuple(messages),
     )  # fmt: skip
+
+
+def _too_large(finding: Finding) -> str:
+    effect = finding.effect
+    size = ", ".join(f"{x:.3g}" for x in finding.strength)
+    return (
+        f"{effect.name} explains it, but only at {size} {effect.unit}, and {effect.low:g} to "
+        f"{effect.high:g} is plausible: it is larger than thought, or something of the same kind; "
+        "measure it in another way before it is believed"
+    )
 
 
 def _hint(finding: Finding) -> Finding:

@@ -19,6 +19,9 @@ CLEAR = 1.5
 it."""
 ROUGH = 0.01
 """Share of the misfit that effects took away by which their laws may be off beside `FORM`."""
+LARGE = 1.0
+"""Share of its range by which an effect may be larger in the exact refit and yet be named, with a
+word that it is: a range is what is plausible, and what explains the misfit speaks for itself."""
 ROUNDS = 3
 
 
@@ -97,8 +100,8 @@ def _added(
 ) -> tuple[Stage, int] | None:
     """Return the stage with the leader whose exact refit leaves least, and its index.
 
-    A leader that is too large for its range in the exact refit as well is barred, and so is what
-    it leads.
+    A leader that is far too large for its range in the exact refit as well is barred, and so is
+    what it leads.
     """
     bar, clear = (FURTHER, CLEAR) if further else (ALARM, 1.0)
     tried: dict[int, Stage | None] = {}
@@ -133,11 +136,11 @@ def _trial(first: Stage, stage: Stage, index: int, fitted: _Fit) -> Stage | None
 
 
 def _fits(after: Stage | None) -> bool:
-    """Return whether what was added last lies in its range."""
+    """Return whether what was added last is not too large to be named."""
     if after is None:
         return False
     model = after.model
-    return within(model.effects[-1], model.strengths[-1], model.strength_std(-1))
+    return within(model.effects[-1], model.strengths[-1], model.strength_std(-1), LARGE)
 
 
 def _thinned(

@@ -9,8 +9,8 @@ import pytest
 
 from tirelib.diagnose import rounds
 from tirelib.diagnose.diagnose import BARELY, EXPLAINED, OUTSIDE, _verdict
+from tirelib.diagnose.rounds import LARGE
 from tirelib.diagnose.stage import ALARM, ALONE, NEAR, Stage
-from tirelib.diagnose.structure import FORM
 
 NAMES = ("strong", "close", "weak")
 LEFT = {(): 1000.0, ("strong",): 500.0, ("close",): 300.0, ("weak",): 990.0}
@@ -93,7 +93,7 @@ def test_a_refit_that_does_not_settle_adds_nothing() -> None:
     assert not added(stage((), 1000.0, SCORE, ["strong", "close"]), fit({}))
 
 
-@pytest.mark.parametrize(("strength", "name"), [(1.0 + FORM, "close"), (1.1 + FORM, "")])
+@pytest.mark.parametrize(("strength", "name"), [(1.0 + LARGE, "close"), (1.1 + LARGE, "")])
 def test_what_is_too_large_to_first_order_is_named_where_its_exact_refit_is_not(
     strength: float, name: str
 ) -> None:
