@@ -225,3 +225,11 @@ def same_tire(headers: Sequence[CampaignHeader]) -> None:
 def same_layout(a: Sequence[float], b: Sequence[float]) -> bool:
     """Tell whether two gage layouts are equal within a tenth of a millimetre."""
     return len(a) == len(b) and bool(np.allclose(a, b, atol=1e-4))
+
+
+def mean_by(unit: IntArray, values: FloatArray, rows: BoolArray) -> FloatArray:
+    """Return the mean of `values` over the chosen rows of each unit, in the order of the units."""
+    chosen = unit[rows]
+    count = np.bincount(chosen)
+    total = np.bincount(chosen, weights=values[rows])
+    return np.asarray(total[count > 0] / count[count > 0], dtype=np.float64)

@@ -14,10 +14,9 @@ from bench.rig.plans import Plan
 from bench.rig.tire import TIRES, Condition
 from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration import Estimates
-from tirelib.estimators.fit import mean_by
 from tirelib.estimators.result import estimate_document
 from tirelib.estimators.train import Trained, train
-from tirelib.observations import Observations, observe
+from tirelib.observations import Observations, mean_by, observe
 
 LOADS = (1500.0, 3000.0, 4500.0, 6000.0, 7500.0)
 ANGLES = (-4.0, -1.5, 1.5, 4.0)

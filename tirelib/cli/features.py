@@ -8,8 +8,7 @@ import click
 from tirelib.campaign import read_campaign
 from tirelib.cli.common import CAMPAIGN, FILE, low_pass_options, output, progress_bar, write_json
 from tirelib.errors import FormatError
-from tirelib.features import feature_frame
-from tirelib.features.table import units
+from tirelib.features.table import feature_frame, units
 from tirelib.flags import TurnFlag
 from tirelib.observations import Observations, observe
 from tirelib.signal import LowPass

@@ -16,14 +16,14 @@ from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.errors import CalibrationError
 from tirelib.estimators import basis
 from tirelib.estimators.chain import AngleModel, Chain
-from tirelib.estimators.fit import Fit, fit_best, levels_of, mean_by
+from tirelib.estimators.fit import Fit, fit_best, levels_of
 from tirelib.estimators.floor import with_floor
 from tirelib.estimators.grow import grow
 from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.polynomial import Polynomial, leverage
 from tirelib.estimators.ranges import with_ranges
 from tirelib.estimators.regressors import EVEN, ODD, compute_regressors
-from tirelib.observations import TRUTH, Observations
+from tirelib.observations import TRUTH, Observations, mean_by
 
 FEWEST_CONDITIONS = 5
 """Distinct conditions below which nothing is calibrated."""

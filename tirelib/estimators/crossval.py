@@ -9,10 +9,10 @@ from tirelib.arrays import BoolArray, FloatArray
 from tirelib.errors import CalibrationError
 from tirelib.estimators.calibrate import calibrate_chain
 from tirelib.estimators.dissertation import FREE, SMALL_ANGLE, UPRIGHT, Means
-from tirelib.estimators.fit import LARGEST_LEVEL, mean_by
+from tirelib.estimators.fit import LARGEST_LEVEL
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.train import Trained, take
-from tirelib.observations import Observations
+from tirelib.observations import Observations, mean_by
 
 LEVELS = {"load": (250.0, "N"), "pressure": (1e4, "bar"), "speed": (0.5 / 3.6, "km/h"),
           "camber": (0.01, "deg"), "slip_ratio": (0.005, "1")}  # fmt: skip

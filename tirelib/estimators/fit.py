@@ -203,11 +203,3 @@ def _inner_levels(
         error = (y[test] - x[test] @ fit.coefficients)[inside]
         squares.append(float(np.average(error**2, weights=weights[test][inside])))
     return squares
-
-
-def mean_by(unit: IntArray, values: FloatArray, rows: BoolArray) -> FloatArray:
-    """Return the mean of `values` over the chosen rows of each unit, in the order of the units."""
-    chosen = unit[rows]
-    count = np.bincount(chosen)
-    total = np.bincount(chosen, weights=values[rows])
-    return np.asarray(total[count > 0] / count[count > 0], dtype=np.float64)

@@ -10,9 +10,8 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.chain import QUANTITIES, Chain
-from tirelib.estimators.fit import mean_by
 from tirelib.flags import flag_names
-from tirelib.observations import Observations
+from tirelib.observations import Observations, mean_by
 
 FORMAT = "tirelib-estimate/1"
 EDGE_UNIT = {"Fz": ("N", 1.0), "alpha": ("deg", 180.0 / np.pi), "kappa": ("1", 1.0),

@@ -11,9 +11,8 @@ from tirelib.estimators.calibrate import Links, calibrate_chain, measured
 from tirelib.estimators.calibration import Calibration, Rolling
 from tirelib.estimators.cornering import CorneringTrend, cornering_trend
 from tirelib.estimators.dissertation import Means, Regression, fit_all, means_for_tables
-from tirelib.estimators.fit import mean_by
 from tirelib.estimators.regressors import compute_regressors
-from tirelib.observations import Observations
+from tirelib.observations import Observations, mean_by
 from tirelib.signal import LowPass
 
 ROLLING_SIGMAS = 4.0

@@ -11,8 +11,7 @@ import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.estimators.calibration import Estimates
-from tirelib.estimators.fit import mean_by
-from tirelib.observations import Observations
+from tirelib.observations import Observations, mean_by
 
 QUANTITIES = ("Fz", "alpha", "kappa", "Fy")
 TITLE = {
