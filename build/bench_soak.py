@@ -51,7 +51,7 @@ TURN_FRAMES = 67
 """Frames that one turn fills exactly: 1072 samples, 9.3 turns a second."""
 BLOCK_TURNS = 40
 READ_FRAMES = 40
-STEP = 64
+STEP = 256
 """Samples that the FMU takes a step; the estimates are those of any other number."""
 FAST = 50.0
 """The wheel's quartz against the host's, [ppm]."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.contact import radial
-from tirelib.model.state import State
+from tirelib.model.state import CONSTANTS, State
 from tirelib.ring.compliance import compliance
 from tirelib.signal import LowPass
 from tirelib.strain.innerliner import strain_harmonics
@@ -26,6 +26,8 @@ N_MODES = 60
 N_NODES = 24
 SETTLE = 30
 """Most passes that let constants follow the deflection that they cause."""
+FIRST_DEPTH = 0.02
+"""Deflection for which constants are computed at first, [m]."""
 SETTLED = 1e-9
 """Change of the deflection at which they have followed, [m]."""
 
@@ -37,7 +39,7 @@ def waveform(state: State, changes: Changes = (), *, low_pass: LowPass | None = 
     ----------
     state : State
         Constants at every operating point. `deflection` may hold that of the solution without
-        changes; else it is computed when a change needs it.
+        changes: a start for changes that need it.
     changes : sequence of (stage, change)
     low_pass : LowPass
         The filter of the measured waveform; the default is that of the signal chain.
@@ -48,26 +50,40 @@ def waveform(state: State, changes: Changes = (), *, low_pass: LowPass | None = 
         From ring and contact.
     """
     constants = [change for stage, change in changes if stage == "constants"]
-    if constants and np.isnan(state.deflection).any():
-        state = state.but(deflection=_press(state).deflection)
-    solved = state
-    for _ in range(SETTLE if constants else 1):
-        before = solved.deflection
-        changed = state.but(deflection=before)
-        for change in constants:
-            changed = change(changed)
-        contact = _press(changed)
-        solved = changed.but(
-            contact=contact, belt=contact.displacement, deflection=contact.deflection
-        )
-        if np.abs(contact.deflection - before).max() < SETTLED:
-            break
+    solved = _pressed(state, constants)
     solved = _apply(solved, changes, "contact")
     assert solved.belt is not None  # noqa: S101 - set above
     solved = solved.but(strain=strain_harmonics(solved.belt, solved.radius, solved.offset))
     solved = _apply(solved, changes, "strain")
     solved = solved.but(waveform=_filtered(solved, low_pass or LowPass()))
     return _apply(solved, changes, "gage")
+
+
+def _pressed(state: State, constants: Sequence[Change]) -> State:
+    """Return the state with its contact, whose deflection the constants follow."""
+    depth = np.where(np.isnan(state.deflection), FIRST_DEPTH, state.deflection)
+    changed = _changed(state, constants, depth)
+    for _ in range(SETTLE):
+        contact = _press(changed)
+        moved, depth = np.abs(contact.deflection - depth).max(), contact.deflection
+        following = _changed(state, constants, depth)
+        if moved < SETTLED or _alike(changed, following):
+            break
+        changed = following
+    return changed.but(contact=contact, belt=contact.displacement, deflection=depth)
+
+
+def _changed(state: State, constants: Sequence[Change], depth: FloatArray) -> State:
+    state = state.but(deflection=depth)
+    for change in constants:
+        state = change(state)
+    return state
+
+
+def _alike(a: State, b: State) -> bool:
+    """Tell whether two states have the same constants, whatever their deflections."""
+    pairs = [(getattr(a, name), getattr(b, name)) for name in CONSTANTS]
+    return all(x is y or np.array_equal(x, y, equal_nan=True) for x, y in pairs)
 
 
 def _press(state: State) -> radial.RadialContact:

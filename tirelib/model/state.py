@@ -5,7 +5,7 @@ its argument. All arrays have one row per operating point, SI, ISO signs.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -73,7 +73,7 @@ class State:
     lateral : float, [m]
         Position of the gage (ISO, left positive).
     deflection : shape (n_points,), [m]
-        d0 of the solution without effects; at the contact stage and later, of this one.
+        d0 that the constants follow; at the contact stage and later, that of the solution.
     contact : RadialContact or None
         From the contact stage on.
     belt : shape (n_points, n_modes + 1, 3)
@@ -198,3 +198,12 @@ class State:
     def tread(self) -> Tread:
         """The tread of every point."""
         return Tread(self.free_radius, self.k_t, self.thickness, self.hardening)
+
+
+CONSTANTS = tuple(
+    field.name
+    for field in fields(State)
+    if field.name
+    not in ("conditions", "phi", "deflection", "contact", "belt", "strain", "waveform")
+)
+"""Fields of a state that ring and tread are made of."""

@@ -147,15 +147,20 @@ def _general(ring: Ring, omega: float | FloatArray, n_modes: int) -> ComplexArra
     elif ring.unshearable:  # u and v are free, beta = (v - u') / R
         basis = _basis([one, zero, -1j * n / r + zero], [zero, one, one / r])
     else:
-        basis = np.broadcast_to(np.eye(3, dtype=complex), dynamic.shape)
+        return _inverse(dynamic)
     across = basis.conj().swapaxes(-1, -2)
-    reduced = across @ dynamic @ basis
-    _refuse_critical(
-        np.linalg.eigvalsh(0.5 * (reduced + reduced.conj().swapaxes(-1, -2))).min(axis=-1),
-        np.ones(reduced.shape[:2]),
-    )
-    out: ComplexArray = basis @ np.linalg.inv(reduced) @ across
+    out: ComplexArray = basis @ _inverse(across @ dynamic @ basis) @ across
     return out
+
+
+def _inverse(stiffness: ComplexArray) -> ComplexArray:
+    """Return the inverses of the harmonics' stiffness; refuse what does not hold the ring."""
+    held = 0.5 * (stiffness + stiffness.conj().swapaxes(-1, -2))
+    try:
+        np.linalg.cholesky(held)
+    except np.linalg.LinAlgError:  # some are not positive; which?
+        _refuse_critical(np.linalg.eigvalsh(held).min(axis=-1), np.ones(held.shape[:2]))
+    return np.asarray(np.linalg.inv(stiffness), dtype=np.complex128)
 
 
 def _unheld(ring: Ring, static: FloatArray) -> BoolArray:
