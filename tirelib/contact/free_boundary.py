@@ -33,6 +33,7 @@ _DEFLECTION_WEIGHT = 2e4
 """For sidewalls that soften: there a change of d0 counts in first order."""
 
 MAX_ITERATIONS = 40
+NEAR_ITERATIONS = 8
 
 _OUTWARD = np.array([-1.0, 1.0])
 
@@ -81,7 +82,7 @@ class _State:
         self.problem = problem
         self.constant = isinstance(problem.at, Constant)
         self.linear = problem.tread.linear
-        self.d0, self.edges = d0, edges
+        self.d0, self.edges = d0, edges.copy()
         self.patch = edges.copy()
         self.delta = np.zeros((d0.size, 0))
         self.secant = _Secant(d0)
@@ -131,8 +132,33 @@ class _State:
         self.d0[part] = wanted if free else self.secant.next(part, used, wanted)
 
 
-def solve(problem: Problem, deflection: FloatArray | None, n_nodes: int) -> Solution:
-    """Return where edges, deflection and compression settle, or where they stand at the limit."""
+@dataclass(frozen=True)
+class Start:
+    """Edges, deflection and compression of a solution nearby."""
+
+    edges: FloatArray
+    deflection: FloatArray
+    delta: FloatArray
+
+    def tiled(self, times: int) -> "Start":
+        """Return the points repeated one after the other."""
+        return Start(
+            np.tile(self.edges, (times, 1)), np.tile(self.deflection, times),
+            np.tile(self.delta, (times, 1)),
+        )  # fmt: skip
+
+
+def solve(
+    problem: Problem, deflection: FloatArray | None, n_nodes: int, start: Start | None = None
+) -> Solution:
+    """Return where edges, deflection and compression settle, or where they stand at the limit.
+
+    A start nearby saves time and changes nothing beyond the tolerance; a useless one is left.
+    """
+    if start is not None and deflection is None and start.deflection.size == len(problem.tread):
+        near = _from(problem, start, Nodes.of(n_nodes))
+        if near is not None:
+            return near
     nodes, coarse = Nodes.of(n_nodes), Nodes.of(min(COARSE_NODES, n_nodes))
     d0, edges = _start(problem, deflection)
     state = _State(problem, d0, edges)
@@ -145,6 +171,19 @@ def solve(problem: Problem, deflection: FloatArray | None, n_nodes: int) -> Solu
         state.secant = _Secant(state.d0)
         iterations += state.settle(coarse, COARSE_TOLERANCE, MAX_ITERATIONS)
     iterations += state.settle(nodes, TOLERANCE, MAX_ITERATIONS)
+    return Solution(state.edges, state.patch, state.d0, state.delta, iterations, state.change)
+
+
+def _from(problem: Problem, start: Start, nodes: Nodes) -> Solution | None:
+    """Return the solution near a start, or None if there is none."""
+    state = _State(problem, start.deflection.copy(), start.edges)
+    state.delta = start.delta
+    try:
+        iterations = state.settle(nodes, TOLERANCE, NEAR_ITERATIONS)
+    except ParameterError:
+        return None
+    if not (state.change < TOLERANCE).all():
+        return None
     return Solution(state.edges, state.patch, state.d0, state.delta, iterations, state.change)
 
 

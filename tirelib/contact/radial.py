@@ -37,6 +37,7 @@ from tirelib.contact.free_boundary import (
     Constant,
     Problem,
     Solution,
+    Start,
     refuse_point,
     solve,
 )
@@ -89,6 +90,11 @@ class RadialContact:
 
     def __len__(self) -> int:
         return int(self.deflection.shape[0])
+
+    @property
+    def start(self) -> Start:
+        """From where a contact nearby is found soon."""
+        return Start(self.edges, self.deflection, self.delta)
 
     @property
     def pressure(self) -> FloatArray:
@@ -192,6 +198,7 @@ def load(
     *,
     extra: ComplexArray | None = None,
     n_nodes: int = N_NODES,
+    start: Start | None = None,
 ) -> RadialContact:
     """Return the contact at given vertical loads Fz, Eq. (114).
 
@@ -200,6 +207,8 @@ def load(
     compliance, tread, extra, n_nodes
         As for `press`.
     vertical_load : float or shape (n_points,), [N]
+    start : Start, optional
+        Of a contact nearby, of as many points: saves time and changes nothing else.
 
     Raises
     ------
@@ -210,7 +219,7 @@ def load(
     """
     n_points = max(np.size(vertical_load), len(tread), _length(compliance))
     target = column("contact", vertical_load, n_points, "vertical load", "N", positive=True)
-    return _solve(compliance, tread, None, target, extra, n_nodes)
+    return _solve(compliance, tread, None, target, extra, n_nodes, start)
 
 
 def fit_edges(
@@ -270,6 +279,7 @@ def _solve(
     vertical_load: FloatArray | None,
     extra: ComplexArray | None,
     n_nodes: int,
+    start: Start | None = None,
 ) -> RadialContact:
     given = deflection if deflection is not None else vertical_load
     assert given is not None  # noqa: S101 - one of the two is always given
@@ -284,7 +294,7 @@ def _solve(
     check_radii("contact", problem.tread, first.radius)
     if extra is not None:
         _check_extra(extra, (given.size, first.n_modes + 1, 3))
-    found = solve(problem, deflection, n_nodes)
+    found = solve(problem, deflection, n_nodes, start)
     contact, d0, change = _contact(problem, found), found.deflection, found.change
     moving = np.flatnonzero(~(change < TOLERANCE))
     if moving.size:

@@ -261,7 +261,10 @@ def _variant(data: Data, model: Refit, random: np.random.Generator) -> FloatArra
         points.load / REFERENCE_LOAD
     ) ** random.uniform(-0.1, 0.2)
     large = 1.0 + LARGE * float(random.standard_normal())
-    correction = Correction(large * model.correction.waveform, large * model.correction.deflection)
+    correction = Correction(
+        large * model.correction.waveform, large * model.correction.deflection,
+        start=model.correction.start,
+    )  # fmt: skip
     return predict(
         values, points, [*model.changes, ("constants", _flung)], low_pass=data.low_pass,
         correction=correction,

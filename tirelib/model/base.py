@@ -7,6 +7,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.contact.exact import ExactContact, load_exact
+from tirelib.contact.free_boundary import Start
 from tirelib.model.chain import Changes, waveform
 from tirelib.model.state import Operating, State
 from tirelib.parameters import Tire
@@ -99,6 +100,7 @@ def predict(
     state = State.of(values, points, phi)
     if correction is None:
         return waveform(state, changes, low_pass=low_pass)
+    state = state.but(start=correction.start)
     state = waveform(state, [("gage", correction.change), *changes], low_pass=low_pass)
     return state.but(deflection=state.deflection + correction.deflection)
 
@@ -113,11 +115,14 @@ class Correction:
     deflection : shape (n_points,), [m]
     contact : ExactContact or None
         The solution behind it: a start for one nearby, and for slopes.
+    start : Start or None
+        Of the linear ring's contact.
     """
 
     waveform: FloatArray
     deflection: FloatArray
     contact: ExactContact | None = None
+    start: Start | None = None
 
     def change(self, state: State) -> State:
         """Add the correction to a waveform."""
@@ -125,7 +130,10 @@ class Correction:
 
     def tiled(self, times: int) -> "Correction":
         """Return the correction for points repeated one after the other."""
-        return Correction(np.tile(self.waveform, (times, 1)), np.tile(self.deflection, times))
+        return Correction(
+            np.tile(self.waveform, (times, 1)), np.tile(self.deflection, times),
+            start=self.start.tiled(times) if self.start else None,
+        )  # fmt: skip
 
 
 def large_displacements(
@@ -149,7 +157,10 @@ def large_displacements(
         start=start.contact if start else None,
     )  # fmt: skip
     strain = smoothed(exact.strain(state.offset, phi), points, low_pass or LowPass())
-    return Correction(strain - state.wave, exact.deflection - state.deflection, exact)
+    return Correction(
+        strain - state.wave, exact.deflection - state.deflection, exact,
+        state.contact.start if state.contact else None,
+    )  # fmt: skip
 
 
 def smoothed(strain: FloatArray, points: Operating, low_pass: LowPass) -> FloatArray:

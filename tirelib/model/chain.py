@@ -69,7 +69,7 @@ def _pressed(state: State, constants: Sequence[Change]) -> State:
         following = _changed(state, constants, depth)
         if moved < SETTLED or _alike(changed, following):
             break
-        changed = following
+        changed = following.but(start=contact.start)
     return changed.but(contact=contact, belt=contact.displacement, deflection=depth)
 
 
@@ -92,6 +92,7 @@ def _press(state: State) -> radial.RadialContact:
         state.tread,
         state.conditions.load,
         n_nodes=N_NODES,
+        start=state.start,
     )
 
 

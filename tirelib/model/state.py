@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from tirelib.arrays import FloatArray
+from tirelib.contact.free_boundary import Start
 from tirelib.contact.radial import RadialContact
 from tirelib.contact.tread import Tread
 from tirelib.errors import ParameterError
@@ -74,6 +75,8 @@ class State:
         Position of the gage (ISO, left positive).
     deflection : shape (n_points,), [m]
         d0 that the constants follow; at the contact stage and later, that of the solution.
+    start : Start or None
+        Of a contact nearby; it only saves time.
     contact : RadialContact or None
         From the contact stage on.
     belt : shape (n_points, n_modes + 1, 3)
@@ -108,6 +111,7 @@ class State:
     phi: FloatArray
     deflection: FloatArray
     lateral: float = 0.0
+    start: Start | None = None
     contact: RadialContact | None = None
     belt: ComplexArray | None = None
     strain: ComplexArray | None = None
@@ -204,6 +208,15 @@ CONSTANTS = tuple(
     field.name
     for field in fields(State)
     if field.name
-    not in ("conditions", "phi", "deflection", "contact", "belt", "strain", "waveform")
+    not in (
+        "conditions",
+        "phi",
+        "deflection",
+        "start",
+        "contact",
+        "belt",
+        "strain",
+        "waveform",
+    )
 )
 """Fields of a state that ring and tread are made of."""
