@@ -7,6 +7,7 @@ from scipy.optimize import fsolve
 
 from tests.physics.radial_case import TIRE, TREAD, contacts, on_a_grid, printed_response, ring
 from tirelib.contact.fourier import evaluate
+from tirelib.contact.free_boundary import Start
 from tirelib.contact.radial import RadialContact, fit_edges, load, press
 from tirelib.parameters import Tire
 
@@ -172,3 +173,18 @@ def dissertation_contact(
     half = 0.6 * np.arccos(1 - d0 / tire.free_radius)
     angles = fsolve(lambda x: solve(x)[0], np.array([-half, half]), xtol=1e-12)
     return angles, solve(angles)[1]
+
+
+@given(contacts())
+def test_a_start_nearby_or_useless_changes_nothing(contact: RadialContact) -> None:
+    """Edges within 1e-9 rad are what the tolerance of a solution leaves."""
+    plain = load(contact.compliance, contact.tread, 0.9 * contact.load)
+    nowhere = Start(contact.edges + 1.0, 9.0 * contact.deflection, np.nan * contact.delta)
+    two = contact.start.tiled(2)
+    for start in (contact.start, nowhere, two):
+        found = load(contact.compliance, contact.tread, 0.9 * contact.load, start=start)
+        np.testing.assert_allclose(found.edges, plain.edges, atol=5e-9)
+        np.testing.assert_allclose(found.deflection, plain.deflection, rtol=5e-9)
+        np.testing.assert_allclose(found.load, plain.load, rtol=5e-9)
+    again = load(contact.compliance, contact.tread, contact.load, start=contact.start)
+    assert again.iterations <= plain.iterations

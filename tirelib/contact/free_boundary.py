@@ -177,7 +177,7 @@ def solve(
 def _from(problem: Problem, start: Start, nodes: Nodes) -> Solution | None:
     """Return the solution near a start, or None if there is none."""
     state = _State(problem, start.deflection.copy(), start.edges)
-    state.delta = start.delta
+    state.delta = start.delta.copy()
     try:
         iterations = state.settle(nodes, TOLERANCE, NEAR_ITERATIONS)
     except ParameterError:

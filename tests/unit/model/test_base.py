@@ -8,6 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.unit.identify.model_waves import TIRE, operating
+from tirelib.effects import CATALOGUE
+from tirelib.model import chain
 from tirelib.model.base import (
     FREE,
     Coordinate,
@@ -136,3 +138,34 @@ def test_changes_act_at_their_stages_in_order() -> None:
     predict(VALUES, POINTS, [(s, note(s)) for s in ("gage", "strain", "contact", "constants")])
     assert seen[0] == "constants"
     assert seen[-3:] == ["contact", "strain", "gage"]
+
+
+def presses(monkeypatch: pytest.MonkeyPatch) -> list[State]:
+    """Return the states that are pressed from now on."""
+    seen: list[State] = []
+    press = chain._press
+    monkeypatch.setattr(chain, "_press", lambda state: (seen.append(state), press(state))[1])
+    return seen
+
+
+def test_a_law_that_does_not_follow_the_deflection_is_pressed_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen = presses(monkeypatch)
+    stiffer = predict(VALUES, POINTS, [CATALOGUE["sidewall_pressure"].at(0.3)])
+    assert len(seen) == 1
+    assert (stiffer.deflection != predict(VALUES, POINTS).deflection).all()
+
+
+def test_a_law_that_follows_the_deflection_holds_at_that_which_it_causes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen = presses(monkeypatch)
+    change = CATALOGUE["sidewall_load"].at(0.3)
+    found = predict(VALUES, POINTS, [change])
+    assert len(seen) > 2
+    plain = State.of(VALUES, POINTS, GRID)
+    assert found.k_u == pytest.approx(change[1](plain.but(deflection=found.deflection)).k_u)
+    for start in (0.005, 0.04):  # wherever it begins
+        state = plain.but(deflection=np.full(2, start))
+        assert chain.waveform(state, [change]).wave == pytest.approx(found.wave, rel=1e-6, abs=1e-9)
