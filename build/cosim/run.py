@@ -9,6 +9,7 @@ controller holds the vehicle. Everything lands in ``build/out/cosim``.
 import argparse
 import json
 import math
+import os
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -42,6 +43,8 @@ LONG = "closed_loop_split"
 """Half of the work: on a split road the way to a stop is long, and every source goes it."""
 OTHERS = {DRILL: 4.0, STABILITY: 15.0, **dict.fromkeys(BRAKING, 20.0)}
 """As long as a manoeuvre of so many seconds."""
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""One thread for each process: with more, processes wait for each other's most of the time."""
 EVERY = 10
 """The page shows every so many steps of the truth."""
 _EXAMPLES = """examples:
@@ -108,6 +111,7 @@ def reached(scores: Sequence[dict[str, Any]], checks: Sequence[dict[str, Any]]) 
 def run(parts: Mapping[str, Fmus], jobs: int) -> dict[str, Any]:
     """Run parts, each with its FMUs; return what each found."""
     found: dict[str, Any] = {}
+    os.environ.update({name: os.environ.get(name, "1") for name in THREADS})
     names = sorted(parts, key=_length, reverse=True)
     pool = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"))
     with progress_bar("co-simulation", len(names)) as advance, pool:
