@@ -86,7 +86,7 @@ def internal(tire: RigTire, cond: Condition, omega: float, z: Array) -> tuple[Ar
 
 
 def internal_force(tire: RigTire, cond: Condition, omega: float, z: Array) -> Array:
-    """Residual density of `internal`, at a fifth of its cost."""
+    """Residual density of `internal`, without the work for its derivative."""
     return _internal(tire, cond, omega, z, None)
 
 

@@ -29,7 +29,8 @@ from tirelib.campaign import (
 from tirelib.errors import ParameterError
 
 TRUTH_FILE = "truth.csv"
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""Environment of a process that shares the processors with others like it: one thread each."""
 
 
 @dataclass(frozen=True)
@@ -205,8 +206,8 @@ def run_plan(
 
 
 def _all(tire: RigTire, tasks: list[Job], jobs: int) -> Iterator[tuple[Recording, Truth]]:
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    before = {name: os.environ.get(name) for name in THREADS}
+    os.environ.update(dict.fromkeys(THREADS, "1"))
     try:
         start = references(tire, tuple(t.nominal for t in tasks))
         if jobs == 1:

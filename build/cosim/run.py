@@ -23,6 +23,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from rich.console import Console
 
+from bench.rig.campaign import THREADS
 from cosim import closed_loop, closed_loop_report, closed_loop_stability
 from cosim import closed_loop_stability_report as stability_report
 from cosim.calibrate import CALIBRATION
@@ -43,8 +44,6 @@ LONG = "closed_loop_split"
 """Half of the work: on a split road the way to a stop is long, and every source goes it."""
 OTHERS = {DRILL: 4.0, STABILITY: 15.0, **dict.fromkeys(BRAKING, 20.0)}
 """As long as a manoeuvre of so many seconds."""
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-"""One thread for each process: with more, processes wait for each other's most of the time."""
 EVERY = 10
 """The page shows every so many steps of the truth."""
 _EXAMPLES = """examples:
@@ -111,7 +110,8 @@ def reached(scores: Sequence[dict[str, Any]], checks: Sequence[dict[str, Any]]) 
 def run(parts: Mapping[str, Fmus], jobs: int) -> dict[str, Any]:
     """Run parts, each with its FMUs; return what each found."""
     found: dict[str, Any] = {}
-    os.environ.update({name: os.environ.get(name, "1") for name in THREADS})
+    for name in THREADS:  # with more, processes wait for each other's most of the time
+        os.environ.setdefault(name, "1")
     names = sorted(parts, key=_length, reverse=True)
     pool = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"))
     with progress_bar("co-simulation", len(names)) as advance, pool:

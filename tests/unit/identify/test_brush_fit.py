@@ -1,5 +1,6 @@
 """Brush parameters from forces: what is known comes back, what is not is said."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -332,12 +333,10 @@ def test_a_campaign_without_slip_angles_is_refused(tmp_path: Path) -> None:
         force_data(read_campaign(tmp_path / "c"))
 
 
-def test_real_flat_belt_run(shared_data: Path, tmp_path: Path) -> None:
+def test_real_flat_belt_run(shared: Callable[[str], Path], tmp_path: Path) -> None:
     """A racing tire on a real rig: the errors that a fit of its own found, 165 and 158 N."""
-    source = shared_data / "real/cornering.mat"
-    if not source.is_file():
-        pytest.skip(f"no {source}")
-    import_campaign([source], shared_data / "real/cornering.map.toml", tmp_path / "c")
+    source, names = shared("real/cornering.mat"), shared("real/cornering.map.toml")
+    import_campaign([source], names, tmp_path / "c")
     data = force_data(read_campaign(tmp_path / "c"))
     constant = {"load_power": 0.0, "slip_angle_offset": 0.0, "Fy_offset": 0.0}
     plain = fit_brush(data, forces=("Fy",), held=constant, robust=None)

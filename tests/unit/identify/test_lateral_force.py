@@ -1,5 +1,6 @@
 """The ring's pressure against the parabola: each wins on its own forces, and on the rig."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -211,10 +212,8 @@ def test_ring_pressure_serves_the_rig_better_at_one_load(tmp_path: Path) -> None
     assert found.ring < 60.0
 
 
-def test_ring_pressure_on_a_laboratory_campaign(shared_data: Path) -> None:
-    folder = shared_data / "lab-set1"
-    if not folder.is_dir():
-        pytest.skip(f"no {folder}")
+def test_ring_pressure_on_a_laboratory_campaign(shared: Callable[[str], Path]) -> None:
+    folder = shared("lab-set1")
     lab = replace(
         RIG, ring_radius=0.302, free_radius=0.3155, belt_width=0.165, tread_thickness=0.012,
         innerliner_offset=-0.0033, radial_stiffness=3.93e5, radial_pressure_slope=1.9,

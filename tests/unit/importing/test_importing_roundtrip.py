@@ -339,12 +339,10 @@ def test_an_old_campaign_goes_only_when_asked_for(imported: Importer, tmp_path: 
 
 
 @pytest.mark.shared
-def test_a_real_rig_recording_comes_in_sound(shared_data: Path, tmp_path: Path) -> None:
+def test_a_real_rig_recording_comes_in_sound(shared: Callable[[str], Path], tmp_path: Path) -> None:
     from tirelib.campaign.importing import import_campaign
 
-    folder = shared_data / "real"
-    if not (folder / "cornering.mat").is_file():
-        pytest.skip(f"no real recording at {folder}")
+    folder = shared("real/cornering.mat").parent
     report = import_campaign(
         [folder / "cornering.mat"], folder / "cornering.map.toml", tmp_path / "c"
     )
