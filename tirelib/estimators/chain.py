@@ -24,7 +24,7 @@ from tirelib.estimators.laws import (
     UNKNOWN_CAMBER,
     ConditionLaws,
 )
-from tirelib.estimators.polynomial import Cloud, Polynomial, Range
+from tirelib.estimators.polynomial import Cloud, Polynomial, Range, all_inside
 
 QUANTITIES = ("Fz", "alpha", "kappa", "Fy")
 
@@ -50,11 +50,14 @@ class AngleModel:
     blur: float
     bend: float
 
-    def predict(self, values: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
-        """Return slip angle and standard deviation, [rad]."""
+    def predict(
+        self, values: Mapping[str, FloatArray]
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return slip angle and standard deviation, [rad], and the slope over utilisation."""
         value, std = self.polynomial.predict(values)
         slope = self.polynomial.slope(values, "utilisation")
-        return value, np.sqrt(std**2 + (self.blur * slope) ** 2 + (self.bend * slope**2) ** 2)
+        std = np.sqrt(std**2 + (self.blur * slope) ** 2 + (self.bend * slope**2) ** 2)
+        return value, std, slope
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +109,9 @@ class Chain:
         values = dict(regressors)
         n = values["contact_angle"].shape[0]
         values["speed_squared"] = values["speed"] ** 2
-        extended = self.laws.allowed(values)
+        calibrated = self.laws.allowed(values)
+        if self.cloud is not None:
+            calibrated &= self.cloud.inside(values)
         result: dict[str, Estimate] = {}
         load = np.full(n, self.mean_load)
         if self.load is not None:
@@ -114,7 +119,7 @@ class Chain:
             correction, extra = self.laws.load_correction(values)
             load = load + correction
             std = np.hypot(std, extra + self.laws.spread(values, load))
-            result["Fz"] = Estimate(load, std, self._valid("Fz", values, load, std) & extended)
+            result["Fz"] = Estimate(load, std, self._valid("Fz", values, load, std) & calibrated)
         values["load"] = load
         radius = np.full(n, np.nan)
         values["slip_ratio"] = np.full(n, np.nan)
@@ -130,7 +135,7 @@ class Chain:
             result["kappa"] = Estimate(kappa, std, valid)
         values["slip_size"] = np.abs(values["slip_ratio"])
         if self.force is not None:
-            self._lateral(self.force, values, load, extended, result)
+            self._lateral(self.force, values, load, calibrated, result)
         return result, radius
 
     def _lateral(
@@ -138,25 +143,24 @@ class Chain:
         model: Polynomial,
         values: dict[str, FloatArray],
         load: FloatArray,
-        extended: BoolArray,
+        calibrated: BoolArray,
         result: dict[str, Estimate],
     ) -> None:
         """Add lateral force and slip angle to the result."""
         laws = self.force_laws
-        extended = extended & laws.allowed(values)
+        calibrated = calibrated & laws.allowed(values)
         force, std = model.predict(values)
         factor, doubt = laws.force_factor(values)
         tilted = np.where(np.isnan(values["camber"]), UNKNOWN_CAMBER * np.abs(load), 0.0)
         law = np.hypot(doubt * np.abs(force) + laws.spread(values, factor * force), tilted)
         force, std = factor * force, np.hypot(factor * std, law)
-        result["Fy"] = Estimate(force, std, self._valid("Fy", values, force, std) & extended)
+        result["Fy"] = Estimate(force, std, self._valid("Fy", values, force, std) & calibrated)
         with np.errstate(invalid="ignore", divide="ignore"):
             values["utilisation"] = force / load
         if self.angle is not None:
-            angle, std = self.angle.predict(values)
-            slope = self.angle.polynomial.slope(values, "utilisation")
+            angle, std, slope = self.angle.predict(values)
             std = np.hypot(std, np.abs(slope / load) * law)
-            valid = self._valid("alpha", values, angle, std) & extended
+            valid = self._valid("alpha", values, angle, std) & calibrated
             result["alpha"] = Estimate(angle, std, valid)
 
     def _rolling_radius(
@@ -191,9 +195,9 @@ class Chain:
         value: FloatArray,
         std: FloatArray,
     ) -> BoolArray:
-        inside = np.isfinite(value) & np.isfinite(std)
-        for guard in self.guards[quantity]:
-            inside &= guard.inside(value if guard.name == quantity else values[guard.name])
-        if self.cloud is not None and quantity != "kappa":
-            inside &= self.cloud.inside(values)
-        return inside
+        known = np.isfinite(value) & np.isfinite(std)
+        guards = self.guards[quantity]
+        if not guards:
+            return known
+        columns = [value if guard.name == quantity else values[guard.name] for guard in guards]
+        return known & all_inside(guards, columns)

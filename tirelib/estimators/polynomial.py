@@ -39,10 +39,21 @@ class Range:
     slack: float
     needed: bool = True
 
-    def inside(self, x: FloatArray) -> BoolArray:
-        """Tell where x lies in the range, with its slack."""
-        within = (x >= self.low - self.slack) & (x <= self.high + self.slack)
-        return within if self.needed else within | np.isnan(x)
+
+def all_inside(ranges: tuple[Range, ...], columns: Sequence[FloatArray]) -> BoolArray:
+    """Tell which rows lie in every range, shape (n,); one column of n values a range."""
+    low, high, optional = _limits(ranges)
+    x = np.array(columns)
+    within = (x >= low) & (x <= high)
+    return np.asarray((within | (optional & np.isnan(x))).all(axis=0), dtype=np.bool_)
+
+
+@lru_cache(maxsize=256)
+def _limits(ranges: tuple[Range, ...]) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Return lower and upper ends with their slack and what may be unknown, each (k, 1)."""
+    low = np.array([[known.low - known.slack] for known in ranges])
+    high = np.array([[known.high + known.slack] for known in ranges])
+    return low, high, np.array([[not known.needed] for known in ranges])
 
 
 @dataclass(frozen=True, slots=True)
