@@ -3,6 +3,7 @@
 import atexit
 import shutil
 import tempfile
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from tirelib.campaign.read import read_campaign
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
 from tirelib.estimators.train import train
+from tirelib.estimators.typical import typical_turn
 from tirelib.fmu.build import build_fmu
 from tirelib.observations import observe
 
@@ -88,8 +90,12 @@ def calibration_file() -> Path:
     """Return the calibration, made once."""
     path = folder() / "cal.toml"
     told = {"unit": "N", "n": 15, "conditions": 15, "cross_validated_rmse": 12.3, "r2": 0.99}
+    campaign = read_campaign(campaign_folder())
+    observations = observe([campaign])
+    trained = train(observations).calibration
+    turn = typical_turn([campaign], observations, trained)
     write_calibration(
-        train(observe([read_campaign(campaign_folder())])).calibration, path,
+        replace(trained, reference=turn), path,
         {"statistics": {"Fz": told}, "data": [{"name": "live"}]},
     )  # fmt: skip
     return path

@@ -1,5 +1,6 @@
 """``tirelib calibrate``: fit the regressions on campaigns of one tire."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ from tirelib.estimators.crossval import (
 from tirelib.estimators.dissertation import SMALL_ANGLE, Regression
 from tirelib.estimators.result import VARIED
 from tirelib.estimators.train import Trained, train
+from tirelib.estimators.typical import typical_turn
 from tirelib.observations import Observations, observe
 
 FORMAT = "tirelib-calibrate/1"
@@ -76,7 +78,8 @@ def calibrate(
         with progress_bar("cross-validating") as progress:
             held_out = leave_levels_out(observations, trained, progress)
     document = statistics(campaigns, observations, trained, held_out)
-    write_calibration(trained.calibration, target, _provenance(document))
+    turn = typical_turn(campaigns, observations, trained.calibration)
+    write_calibration(replace(trained.calibration, reference=turn), target, _provenance(document))
     console = output()
     _print(console, trained, document)
     console.print(f"written: {target}")

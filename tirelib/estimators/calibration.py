@@ -8,6 +8,7 @@ import numpy as np
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.errors import CalibrationError
 from tirelib.estimators.chain import QUANTITIES, Chain
+from tirelib.estimators.reference_turn import ReferenceTurn
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.features.extract import Features
 from tirelib.flags import INVALIDATING, TurnFlag
@@ -88,6 +89,8 @@ class Calibration:
         Cut-off of the low-pass with which the features were read.
     cut_off : float or None, [Hz]
         Fixed cut-off, where one was chosen.
+    reference : ReferenceTurn or None
+        A measured turn that the calibration takes for valid.
     """
 
     tire: str
@@ -96,6 +99,7 @@ class Calibration:
     rolling: Rolling
     order: float
     cut_off: float | None = None
+    reference: ReferenceTurn | None = None
 
     def check_layout(self, tire: str, lateral: tuple[float, ...], where: str) -> None:
         """Refuse data of another tire or gage layout.

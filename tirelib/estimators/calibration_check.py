@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from tirelib.estimators.reference_turn import CONDITIONS
 from tirelib.estimators.regressors import EVEN, ODD, SHAPE
 
 AXES = "iso"
@@ -18,6 +19,8 @@ REGRESSORS = frozenset(
 """Names that a polynomial or a range may use."""
 QUANTITIES = frozenset(("Fz", "alpha", "kappa", "Fy"))
 HIGHEST_POWER = 12
+FEWEST_POINTS = 64
+"""Of a reference turn."""
 
 
 def faults(document: Mapping[str, Any]) -> Iterator[str]:
@@ -39,6 +42,8 @@ def faults(document: Mapping[str, Any]) -> Iterator[str]:
         yield f"chain: missing_gage = {seen}; each once, and 0 (none missing) among them"
     for index, chain in enumerate(chains):
         yield from _chain(chain, f"chain[{index}]", len(lateral))
+    if "reference_turn" in document:
+        yield from _reference_turn(document["reference_turn"], len(lateral))
 
 
 def _chain(chain: Any, where: str, gages: int) -> Iterator[str]:
@@ -70,6 +75,32 @@ def _chain(chain: Any, where: str, gages: int) -> Iterator[str]:
         yield from _numbers(chain, "alpha", ("blur", "bend"), where)
     if "cloud" in chain:
         yield from _cloud(chain["cloud"], f"{where}.cloud")
+
+
+def _reference_turn(table: Any, gages: int) -> Iterator[str]:
+    where = "reference_turn"
+    if not isinstance(table, dict):
+        yield f"{where}: is no table"
+        return
+    for name in CONDITIONS:
+        if not _number(table.get(name)):
+            yield f"{where}.{name} = {table.get(name)!r}; a number is needed"
+    for name in ("omega", "strain_unit"):
+        if not _finite(table.get(name)) or not table[name] > 0.0:
+            yield f"{where}.{name} = {table.get(name)!r}; a finite number above 0 is needed"
+    if not isinstance(table.get("run"), str):
+        yield f"{where}.run = {table.get('run')!r}; a text is needed"
+    rows: Any = table.get("strain")
+    whole = isinstance(rows, list) and len(rows) == gages and all(map(_long, rows))
+    if not whole or len({len(row) for row in rows}) > 1:
+        yield (
+            f"{where}.strain: {gages} rows of equally many finite numbers, at least "
+            f"{FEWEST_POINTS}, are needed"
+        )
+
+
+def _long(row: Any) -> bool:
+    return isinstance(row, list) and len(row) >= FEWEST_POINTS and all(map(_finite, row))
 
 
 def _laws(table: Any, where: str) -> Iterator[str]:

@@ -18,6 +18,7 @@ from tirelib.estimators.calibration_check import faults
 from tirelib.estimators.chain import AngleModel, Chain
 from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.polynomial import Cloud, Polynomial, Range, Variable
+from tirelib.estimators.reference_turn import ReferenceTurn
 
 FORMAT = "tirelib-calibration/1"
 _NUMBERS = re.compile(r"\[\n((?:\s+[-+.\w]+,\n)+)\s*\]")
@@ -48,6 +49,8 @@ def write_calibration(
     }
     if calibration.cut_off is not None:
         document["filter"]["cut_off_hz"] = calibration.cut_off
+    if calibration.reference is not None:
+        document["reference_turn"] = calibration.reference.table()
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
     target.write_text(
@@ -107,6 +110,7 @@ def read_calibration(path: str | Path) -> Calibration:
 
 
 def _calibration(document: Mapping[str, Any]) -> Calibration:
+    turn = document.get("reference_turn")
     return Calibration(
         tire=str(document["tire"]),
         lateral=tuple(float(y) for y in document["lateral_m"]),
@@ -116,6 +120,7 @@ def _calibration(document: Mapping[str, Any]) -> Calibration:
         ),
         order=float(document["filter"]["order"]),
         cut_off=document["filter"].get("cut_off_hz"),
+        reference=None if turn is None else ReferenceTurn.from_table(turn),
     )
 
 

@@ -1,17 +1,22 @@
-"""Reference signals of ``StrainTire.fmu``: made-up strain in the middle of the calibrated range.
+"""Reference signals of ``StrainTire.fmu``: strain in the middle of the calibrated range.
 
-Three good turns, two lost samples, a lost frame, two good turns, then a wheel that stands: an
-estimate, a bridged gap, a gap and the watchdog are all met. What is expected is what the library
-says, not what an FMU said.
+It is that of the turn which the calibration carries, again and again; where it carries none (it was
+made by an older version, or had no valid turn), strain is made up, and may lie out of range. Three
+good turns, two lost samples, a lost frame, two good turns, then a wheel that stands: an estimate, a
+bridged gap, a gap and the watchdog are all met. What is expected is what the library says, not what
+an FMU said.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.estimators.calibration import Calibration
+from tirelib.estimators.reference_turn import ReferenceTurn
 from tirelib.fmu.reference import Reference, contact_strain
 from tirelib.fmu.variables import inputs, outputs
 from tirelib.fmu.wheel import Wheel
@@ -24,39 +29,44 @@ RESOLUTION = 1e-7
 SLIP = 0.01
 """Slip ratio of the made-up wheel; at zero, rounding would be all that is compared."""
 WAVE = 0.06
-"""How much the contact grows and shrinks, relative, over two turns."""
+"""How much a made-up contact grows and shrinks, relative, over two turns."""
+BREATH = 0.01
+"""As `WAVE`, of the measured turn."""
+PHASE = 0.7
+TILT = 0.02
+"""Relative growth of a made-up contact from the centre to the outermost gage."""
+SLOW = 0.01
+"""Largest wheel angle between two samples, [rad]."""
 _PASSES = 4
 
 
 @dataclass(frozen=True, slots=True)
 class _Scene:
-    """What the made-up strain is made of; SI."""
+    """What rolls; SI. `strain` is that of growing wheel angles, 0 over the road."""
 
-    half: float
-    dip: float
-    tension: float
     omega: float
     speed: float
     pressure: float
-    imbalance: float
+    camber: float
+    strain: Callable[[FloatArray], FloatArray]
 
 
 def strain_reference(
     calibration: Calibration, rate: float, samples: int, *, buffered: bool = False
 ) -> Reference:
     """Return input and expected output of an FMU with these properties."""
-    scene = _fitted(calibration, rate)
-    scene = replace(scene, omega=scene.omega * (1.0 + SLIP))
-    strain = _strain(calibration, rate, scene, TURNS)
+    turn = calibration.reference
+    scene = _made_up(calibration, rate) if turn is None else _measured(turn, rate)
+    strain = _strain(scene, rate, TURNS)
     still = int(STILL * 2.0 * math.pi / scene.omega * rate)
     strain = np.concatenate((strain, np.repeat(strain[:, -1:], still, axis=1)), axis=1)
-    turn = int(2.0 * math.pi / scene.omega * rate)
-    strain[:, int(2.6 * turn) : int(2.6 * turn) + 2] = np.nan
+    period = int(2.0 * math.pi / scene.omega * rate)
+    strain[:, int(2.6 * period) : int(2.6 * period) + 2] = np.nan
     counts = _counts(strain.shape[1], samples, buffered)
     firsts = np.concatenate(([0], np.cumsum(counts)))
     step = samples / rate
     given = _inputs(calibration, scene, strain, counts, samples, buffered=buffered)
-    lost = (firsts[:-1] > 3.40 * turn) & (firsts[:-1] < 3.44 * turn)
+    lost = (firsts[:-1] > 3.40 * period) & (firsts[:-1] < 3.44 * period)
     given["frame_valid"] = np.where(lost, 0.0, 1.0)
     wheel = Wheel(calibration, rate, samples)
     names = [v.name for v in outputs(calibration.lateral) if v.kind != "String"]
@@ -65,8 +75,8 @@ def strain_reference(
     frames = np.stack([given[name] for name in strains], axis=1)
     for at in range(counts.size - 1):
         wheel.step(
-            frames[at].tolist(), step, not lost[at], scene.speed, scene.pressure, 0.0, scene.omega,
-            count=int(counts[at]) if buffered else None,
+            frames[at].tolist(), step, not lost[at], scene.speed, scene.pressure, scene.camber,
+            scene.omega, count=int(counts[at]) if buffered else None,
         )  # fmt: skip
         rows.append(_row(wheel))
     table = np.array(rows)
@@ -97,7 +107,8 @@ def _inputs(
         frames[at, :count] = strain[:, first : first + count].T
         first += int(count)
     flat = frames.reshape(n, -1)
-    held = {"speed": scene.speed, "pressure": scene.pressure, "camber": 0.0, "omega": scene.omega}
+    names = ("speed", "pressure", "camber", "omega")
+    held = {name: getattr(scene, name) for name in names}
     given: dict[str, FloatArray] = {}
     for column, variable in enumerate(inputs(calibration.lateral, samples, buffered=buffered)):
         if variable.name in held:
@@ -118,7 +129,33 @@ def _middle(calibration: Calibration, name: str, otherwise: float) -> float:
     return otherwise
 
 
-def _fitted(calibration: Calibration, rate: float) -> _Scene:
+def _measured(turn: ReferenceTurn, rate: float) -> _Scene:
+    """Return the measured turn, again and again; slowed down where the rate asks for it."""
+    slow = min(1.0, SLOW * rate / turn.omega)
+
+    def strain(angle: FloatArray) -> FloatArray:
+        return turn.at(angle + BREATH * np.sin(0.5 * angle + PHASE) * np.sin(angle))
+
+    return _Scene(slow * turn.omega, slow * turn.speed, turn.pressure, turn.camber, strain)
+
+
+@dataclass(frozen=True, slots=True)
+class _Shape:
+    """What made-up strain is made of; SI."""
+
+    half: float
+    dip: float
+    tension: float
+    imbalance: float
+
+    def strain(self, angle: FloatArray, lateral: tuple[float, ...]) -> FloatArray:
+        half = self.half * (1.0 + WAVE * np.sin(0.5 * angle + PHASE))
+        return contact_strain(
+            angle, half, lateral, TILT, self.dip, self.tension, self.imbalance
+        )  # fmt: skip
+
+
+def _made_up(calibration: Calibration, rate: float) -> _Scene:
     """Return a scene whose features lie in the middle of the calibrated range."""
     angle = _middle(calibration, "contact_angle", 0.4)
     compression = abs(_middle(calibration, "compression", 0.3))
@@ -126,18 +163,17 @@ def _fitted(calibration: Calibration, rate: float) -> _Scene:
     tension = _middle(calibration, "tension", 8e-3)
     speed = _middle(calibration, "speed", 20.0)
     pressure = _middle(calibration, "pressure", 2.2e5)
-    scene = _Scene(
-        0.5 * angle,
-        compression * tension,
-        tension,
-        min(speed / 0.3, 0.01 * rate),
-        speed,
-        pressure,
-        -0.5 * traction / compression,
-    )
+    shape = _Shape(0.5 * angle, compression * tension, tension, -0.5 * traction / compression)
+    omega = min(speed / 0.3, SLOW * rate)
+
+    def scene() -> _Scene:
+        return _Scene(
+            omega, speed, pressure, 0.0, partial(shape.strain, lateral=calibration.lateral)
+        )
+
     for _ in range(_PASSES):
         estimator = StreamEstimator(calibration, rate)
-        strain = _strain(calibration, rate, scene, 3.4)
+        strain = _strain(scene(), rate, 3.4)
         estimator.push(strain, speed=speed, pressure=pressure, camber=0.0)
         latest = estimator.latest
         if latest is None:
@@ -152,22 +188,18 @@ def _fitted(calibration: Calibration, rate: float) -> _Scene:
         if not all(math.isfinite(x) and x > 0.0 for x in found):
             break
         radius = float(latest.estimates.radius[0])
-        scene = replace(
-            scene,
-            half=scene.half * angle / found[0],
-            dip=scene.dip * compression / found[1],
-            tension=scene.tension * tension / found[2],
-            omega=speed / radius if 0.1 < radius < 1.0 else scene.omega,
+        omega = speed / radius if 0.1 < radius < 1.0 else omega
+        shape = replace(
+            shape,
+            half=shape.half * angle / found[0],
+            dip=shape.dip * compression / found[1],
+            tension=shape.tension * tension / found[2],
         )
-    return scene
+    omega *= 1.0 + SLIP
+    return scene()
 
 
-def _strain(calibration: Calibration, rate: float, scene: _Scene, turns: float) -> FloatArray:
+def _strain(scene: _Scene, rate: float, turns: float) -> FloatArray:
     n = int(turns * 2.0 * math.pi / scene.omega * rate)
     angle: FloatArray = np.pi + np.arange(n) * np.float64(scene.omega / rate)
-    tilt = 0.02
-    half = scene.half * (1.0 + WAVE * np.sin(0.5 * angle + 0.7))
-    found = contact_strain(
-        angle, half, calibration.lateral, tilt, scene.dip, scene.tension, scene.imbalance
-    )  # fmt: skip
-    return np.round(found / RESOLUTION) * RESOLUTION
+    return np.round(scene.strain(angle) / RESOLUTION) * RESOLUTION

@@ -2,14 +2,17 @@
 
 import tomllib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import tomli_w
 
 from tirelib.errors import FormatError
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
+from tirelib.estimators.reference_turn import ReferenceTurn
 from tirelib.estimators.train import Trained
 
 Edit = Callable[[dict[str, Any]], None]
@@ -27,6 +30,7 @@ def put(*path: str | int, value: object) -> Edit:
 
 CLOUD = {"names": ["traction", "cp1_slope"], "scale": [1.0, 1.0], "points": [[0.0, 0.0]],
          "reach": 0.1}  # fmt: skip
+TURN = ReferenceTurn(np.zeros((5, 128)), 20.0, float("nan"), 0.0, 66.0, "somewhere, run 1")
 FZ = ("chain", 0, "Fz")
 FAULTS: dict[str, tuple[Edit, str]] = {
     "axes": (put("axes", value="sae"), "axes = 'sae'"),
@@ -50,6 +54,14 @@ FAULTS: dict[str, tuple[Edit, str]] = {
     "cloud's scale": (put("chain", 0, "cloud", value=CLOUD | {"scale": [1, 0]}), "numbers above 0"),
     "cloud's reach": (put("chain", 0, "cloud", value=CLOUD | {"reach": -1.0}), "reach = -1.0"),
     "cloud's points": (put("chain", 0, "cloud", value=CLOUD | {"points": [[1]]}), "pairs of"),
+    "turn": (put("reference_turn", value=1), "reference_turn: is no table"),
+    "turn's rate": (put("reference_turn", "omega", value=0.0), "reference_turn.omega = 0.0"),
+    "turn's unit": (put("reference_turn", "strain_unit", value="ppm"), "strain_unit = 'ppm'"),
+    "turn's speed": (put("reference_turn", "speed", value="fast"), "speed = 'fast'"),
+    "turn's run": (put("reference_turn", "run", value=3), "run = 3; a text"),
+    "turn's gages": (put("reference_turn", "strain", value=[[1] * 99]), "5 rows of equally many"),
+    "turn's hole": (put("reference_turn", "strain", 1, 7, value=float("nan")), "finite numbers"),
+    "turn's length": (put("reference_turn", "strain", 1, value=[1] * 99), "equally many"),
     "twice": (put("chain", 1, "missing_gage", value=0), "each once"),
 }  # fmt: skip
 
@@ -57,8 +69,15 @@ FAULTS: dict[str, tuple[Edit, str]] = {
 @pytest.fixture(scope="module")
 def sound(trained: Trained, tmp_path_factory: pytest.TempPathFactory) -> str:
     path = tmp_path_factory.mktemp("cal") / "cal.toml"
-    write_calibration(trained.calibration, path)
+    write_calibration(replace(trained.calibration, reference=TURN), path)
     return path.read_text()
+
+
+def test_what_is_optional_may_be_absent(sound: str, tmp_path: Path) -> None:
+    document = tomllib.loads(sound)
+    del document["reference_turn"]
+    (tmp_path / "cal.toml").write_text(tomli_w.dumps(document))
+    assert read_calibration(tmp_path / "cal.toml").reference is None
 
 
 @pytest.mark.parametrize("fault", FAULTS)
