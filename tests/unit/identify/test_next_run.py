@@ -140,3 +140,17 @@ def test_laboratory_tests_measure_what_they_say() -> None:
     modes = tests["a modal test", 8].rows
     assert (np.diff(modes[:, EI]) > 0.0).all(), "high orders tell EI"
     assert tests["a cut section", 1].rows[0, NAMES.index("innerliner_offset")] == pytest.approx(1.0)
+
+
+def test_no_test_is_proposed_where_the_fitted_sidewall_has_no_stiffness() -> None:
+    values = values_of(TIRE)
+    steep = dict(values)
+    steep["tangential_pressure_slope"] = 1.01 * TIRE.tangential_stiffness / (TIRE.pressure - 1e5)
+
+    def words(given: dict[str, float | np.ndarray]) -> list[str]:
+        return [t.words for t in laboratory_tests(given, FITTED, (1e5, 3e5))]
+
+    assert sum(" bar" in text for text in words(values)) == 2
+    left = words(steep)
+    assert not any(" bar" in text for text in left)
+    assert len(left) == len(words(values)) - 2
