@@ -80,8 +80,8 @@ class Diagnosis:
     base, final : Refit
         Without and with the named effects.
     left, floor : float
-        What the joint fit with the named effects leaves, over noise and `LEAST` in every sample,
-        and from where on it is more than structure.
+        What the joint fit with the named effects leaves, over what noise and structure outside the
+        ensemble usually do, and from where on it is more than structure.
     rounds : int
     runs : StraightRuns
     data : Data

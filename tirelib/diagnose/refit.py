@@ -7,7 +7,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.effects import Effect
-from tirelib.errors import ConvergenceError, TirelibError
+from tirelib.errors import ConvergenceError, ParameterError, TirelibError
 from tirelib.identify.identify import FITTED
 from tirelib.identify.random_effects import Whitening, whitening
 from tirelib.identify.waveform_fit import Data
@@ -27,6 +27,8 @@ STRENGTH_WIDTH = 1.0
 OUTER, MAX_STEPS = 3, 25
 SETTLED = (0.05, 0.05, 0.005)
 LONGEST = 0.4
+FLATTER = 0.9
+"""Share of the pressure slopes from which a fit starts that cannot start where it should."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,8 +124,14 @@ def refit(
     """
     start = [np.zeros(e.components) for e in effects] if not strengths else list(strengths)
     fitter = _Fitter(data, dict(values), tuple(effects), start, near)
-    for outer in range(OUTER):
+    try:
         fitter.refresh()
+    except ParameterError:  # another fit may have ended where the sidewall has no stiffness left
+        fitter = _Fitter(data, _flatter(values), tuple(effects), start, near)
+        fitter.refresh()
+    for outer in range(OUTER):
+        if outer:
+            fitter.refresh()
         for _ in range(MAX_STEPS):
             moved = fitter.step()
             if progress is not None:
@@ -139,6 +147,12 @@ def refit(
                 moved,
             )
     return fitter.result()
+
+
+def _flatter(values: Mapping[str, float | FloatArray]) -> dict[str, float | FloatArray]:
+    """Return values whose sidewall follows the pressure a little less."""
+    slopes = ("radial_pressure_slope", "tangential_pressure_slope")
+    return {**values, **{name: FLATTER * np.asarray(values[name]) for name in slopes}}
 
 
 class _Fitter:
@@ -223,15 +237,17 @@ class _Fitter:
             try:
                 wave = self._predict(move(self.start, z[: len(FITTED)], FITTED), z)
                 cost = self._cost(wave, z)
-            except TirelibError:
-                cost = np.inf
-            if cost <= self.cost * (1.0 + 1e-12):
-                better = self.cost - cost
+                better = cost <= self.cost * (1.0 + 1e-12)
+                if better:
+                    self._linearise(z)
+            except TirelibError:  # there, or within a difference of it, is no tire
+                better = False
+            if better:
+                gain = self.cost - cost
                 self.z, self.cost = z, cost
-                self._linearise(z)
                 self.damping = max(self.damping / 10.0, 1e-9)
                 # a valley that is flat to a millionth is the bottom
-                return 0.0 if better < 1e-5 * cost else float(np.abs(dz).max())
+                return 0.0 if gain < 1e-5 * cost else float(np.abs(dz).max())
             self.damping *= 10.0
         self.damping = 1e-3
         return 0.0

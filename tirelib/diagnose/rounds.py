@@ -12,13 +12,15 @@ from tirelib.effects import Effect
 from tirelib.errors import TirelibError
 from tirelib.identify.waveform_fit import Data
 
-FURTHER = 6.0
-"""What `ALARM` is to the first effect, for a further one."""
+BARS = (ALARM, 6.0, 12.0)
+"""Score over the variants' largest that the first, second and third effect have to reach: the laws
+of those before are right but roughly, and each leaves more that looks like something else."""
 CLEAR = 1.5
-"""Times what imitates the impossible that a further effect has to reach; the first has to exceed
-it."""
+"""Times what imitates the impossible that a further effect has to reach, unless it is independent;
+the first has to exceed it."""
 ROUGH = 0.01
-"""Share of the misfit that effects took away by which their laws may be off beside `FORM`."""
+"""Share of the misfit that effects took away by which their laws may be off beside `FORM`; what is
+independent of them has nothing to do with that."""
 LARGE = 1.0
 """Share of its range by which an effect may be larger in the exact refit and yet be named, with a
 word that it is: a range is what is plausible, and what explains the misfit speaks for itself."""
@@ -76,7 +78,7 @@ def rounds(
     named: list[str] = []
     stage, count = first, 0
     while count < ROUNDS:
-        found = _added(first, stage, suspects, bool(named), fitted)
+        found = _added(first, stage, suspects, len(named), fitted)
         if found is None:
             break
         after, index = found
@@ -96,18 +98,19 @@ _Fit = Callable[[Stage, Sequence[Effect], Sequence[FloatArray]], Stage | None]
 
 
 def _added(
-    first: Stage, stage: Stage, suspects: set[str], further: bool, fitted: _Fit
+    first: Stage, stage: Stage, suspects: set[str], before: int, fitted: _Fit
 ) -> tuple[Stage, int] | None:
     """Return the stage with the leader whose exact refit leaves least, and its index.
 
     A leader that is far too large for its range in the exact refit as well is barred, and so is
     what it leads.
     """
-    bar, clear = (FURTHER, CLEAR) if further else (ALARM, 1.0)
+    bar = BARS[min(before, len(BARS) - 1)]
+    clear = CLEAR if before else 1.0
     tried: dict[int, Stage | None] = {}
     barred: set[str] = set()
     while True:
-        leaders = stage.leaders(suspects, bar, clear, barred)
+        leaders = stage.leaders(suspects, bar, clear, barred, spared=before > 0)
         for index in leaders:
             if index not in tried:
                 tried[index] = _trial(first, stage, index, fitted)
@@ -126,7 +129,8 @@ def _trial(first: Stage, stage: Stage, index: int, fitted: _Fit) -> Stage | None
     model = stage.model
     effect, strength = stage.found.living[index].effect, stage.scores.strength[index]
     # the laws of those before are right but roughly: what they may be off by is no effect
-    if stage.scores.score[index] < ROUGH * (first.scores.misfit - stage.scores.misfit):
+    off = ROUGH * (first.scores.misfit - stage.scores.misfit)
+    if stage.scores.score[index] < off and not stage.independent[index]:
         return None
     after = fitted(stage, [*model.effects, effect], [*model.strengths, _inside(effect, strength)])
     # to first order only if the exact refit does not need it

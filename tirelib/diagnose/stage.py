@@ -21,6 +21,9 @@ ALARM = 3.5
 NEAR, ALONE, RIVALS = 0.3, 0.6, 3
 """Shares of the leader's ratio, or of what it takes away alone, from which a hint is its rival and
 refitted as well; and how many are refitted at most."""
+OWN = (0.8, 1.25)
+"""Misfit that an effect takes away beside all others, over what it takes alone, where it has little
+to do with them: no other could take it instead, and it needs none to take it."""
 USUAL = 0.05
 """Share of s^2 in every sample that structure outside the ensemble leaves at most."""
 RANGE_SLACK = 2.0
@@ -140,23 +143,35 @@ class Stage:
         """Effects in range whose scores no variant comes near."""
         return np.asarray(self.in_range & (self.ratio >= ALARM))
 
+    @property
+    def independent(self) -> BoolArray:
+        """Effects that take away as much beside all others as alone."""
+        low, high = OWN
+        score, alone = self.scores.score, self.scores.alone
+        return np.asarray((score >= low * alone) & (score <= high * alone))
+
     def leaders(
-        self, suspects: set[str], bar: float, clear: float, barred: Collection[str] = ()
-    ) -> list[int]:
+        self, suspects: set[str], bar: float, clear: float, barred: Collection[str] = (),
+        *, spared: bool = False,
+    ) -> list[int]:  # fmt: skip
         """Return the indices of an alarm from a ratio on and of its rivals, best first.
 
         None if its ratio is not `clear` times that of every effect outside its range: what imitates
-        the impossible so well on this tire may imitate the possible. Rivals are hints among the
-        suspects, or in no catalogue, that come near in the ratio or in what they take away alone:
-        which of them it is, only an exact refit tells. What is too large for its range is among
-        them as long as it is not barred.
+        the impossible so well on this tire may imitate the possible. Where `spared`, those that are
+        `independent` lead all the same: nothing else takes what they do. Rivals are hints among
+        the suspects, or in no catalogue, that come near in the ratio or in what they take away
+        alone: which of them it is, only an exact refit tells. What is too large for its range is
+        among them as long as it is not barred.
         """
         ratio, alone = self.ratio, self.scores.alone
         large = self.over & ~np.isin(self.names, list(barred))
         known = ((self.in_range | large) & np.isin(self.names, list(suspects))) | self.unlisted
         fit = known & (ratio >= max(bar, ALARM))
         imitated = float(np.max(ratio, where=self.impossible & ~large, initial=0.0))
-        if not fit.any() or clear * imitated > float(ratio[fit].max()):
+        if fit.any() and clear * imitated > float(ratio[fit].max()):
+            known = known & self.independent & spared
+            fit &= known
+        if not fit.any():
             return []
         best = int(np.argmax(np.where(fit, ratio, 0.0)))
         near = (ratio >= NEAR * ratio[best]) | (alone >= ALONE * alone[best])

@@ -9,8 +9,8 @@ import pytest
 
 from tirelib.diagnose import rounds
 from tirelib.diagnose.diagnose import BARELY, EXPLAINED, OUTSIDE, _verdict
-from tirelib.diagnose.rounds import LARGE
-from tirelib.diagnose.stage import ALARM, ALONE, NEAR, Stage
+from tirelib.diagnose.rounds import CLEAR, LARGE, ROUNDS
+from tirelib.diagnose.stage import ALARM, ALONE, NEAR, OWN, Stage
 
 NAMES = ("strong", "close", "weak")
 LEFT = {(): 1000.0, ("strong",): 500.0, ("close",): 300.0, ("weak",): 990.0}
@@ -28,6 +28,7 @@ def stage(
     leaders: Sequence[str] = (),
     over: Sequence[str] = (),
     strength: float = 0.5,
+    independent: bool = False,
 ) -> Any:
     """Return a stage whose model has some effects and scores the others; with who leads there.
 
@@ -47,7 +48,8 @@ def stage(
         ),
         limit=np.full(len(others), 10.0),
         over=np.isin(others, over),
-        leaders=lambda suspects, bar, clear, barred: (
+        independent=np.full(len(others), independent),
+        leaders=lambda suspects, bar, clear, barred, spared: (
             [] if barred else [others.index(name) for name in leaders]
         ),
     )
@@ -74,7 +76,7 @@ FIRST = stage((), 1000.0, SCORE)
 
 def added(now: Any, fitted: Callable[..., Any]) -> str:
     """Return the name of what a round adds, empty if nothing."""
-    found = rounds._added(FIRST, now, set(NAMES), False, fitted)
+    found = rounds._added(FIRST, now, set(NAMES), len(now.model.effects), fitted)
     return "" if found is None else now.names[found[1]]
 
 
@@ -106,6 +108,8 @@ def test_what_the_laws_before_may_be_off_by_is_no_effect() -> None:
     rough = rounds.ROUGH * 600.0
     assert not added(stage(("strong",), 400.0, [rough - 0.1, 0.0], ["close"]), fit(left))
     assert added(stage(("strong",), 400.0, [rough + 0.1, 0.0], ["close"]), fit(left)) == "close"
+    apart = stage(("strong",), 400.0, [rough - 0.1, 0.0], ["close"], independent=True)
+    assert added(apart, fit(left)) == "close", "it has nothing to do with those before"
 
 
 def test_an_effect_that_a_later_one_replaces_goes() -> None:
@@ -119,14 +123,24 @@ def test_an_effect_that_a_later_one_replaces_goes() -> None:
     assert kept is both
 
 
-def judged(ratio: Sequence[float], alone: Sequence[float], outside: float = 0.0) -> Any:
+def _independent(score: Sequence[float], alone: Sequence[float]) -> Any:
+    scores = SimpleNamespace(score=np.array([*score, 0.0]), alone=np.array([*alone, 0.0]))
+    return Stage.independent.__get__(SimpleNamespace(scores=scores))
+
+
+def judged(
+    ratio: Sequence[float], alone: Sequence[float], outside: float = 0.0,
+    score: Sequence[float] = (0.0, 0.0, 0.0),
+) -> Any:  # fmt: skip
     """Return a stage as far as its leaders go; all but the last may be named."""
     names = [*NAMES, "impossible"]
     return SimpleNamespace(
         ratio=np.array([*ratio, outside]), in_range=np.array([True, True, True, False]),
         impossible=np.array([False, False, False, True]), over=np.zeros(4, dtype=bool),
-        unlisted=np.zeros(4, dtype=bool),
-        names=names, scores=SimpleNamespace(alone=np.array([*alone, 0.0])),
+        unlisted=np.zeros(4, dtype=bool), independent=_independent(score, alone),
+        names=names, scores=SimpleNamespace(
+            alone=np.array([*alone, 0.0]), score=np.array([*score, 0.0])
+        ),
     )  # fmt: skip
 
 
@@ -152,6 +166,35 @@ def test_a_further_effect_has_to_be_clear_of_what_imitates_the_impossible() -> N
     for outside, told in ((9.9, [0]), (10.1, [])):
         stage = judged([20.0, 0.0, 0.0], [100.0, 0.0, 0.0], outside)
         assert Stage.leaders(stage, set(stage.names), ALARM, 2.0) == told
+
+
+@pytest.mark.parametrize(
+    ("share", "told"), [(OWN[0] - 0.01, []), (OWN[0] + 0.01, [1]), (OWN[1] - 0.01, [1]),
+                        (OWN[1] + 0.01, [])]
+)  # fmt: skip
+def test_what_nothing_else_could_take_is_no_imitation(share: float, told: list[int]) -> None:
+    stage = judged([20.0, 15.0, 0.0], [100.0, 90.0, 0.0], 19.0, [10.0, share * 90.0, 0.0])
+    names = set(stage.names)
+    assert Stage.leaders(stage, names, ALARM, CLEAR, spared=True) == told
+    assert Stage.leaders(stage, names, ALARM, CLEAR) == []
+    clear = judged([20.0, 15.0, 0.0], [100.0, 90.0, 0.0], 13.0, [10.0, share * 90.0, 0.0])
+    assert Stage.leaders(clear, names, ALARM, CLEAR, spared=True) == [0, 1]
+
+
+def test_each_further_effect_has_to_stand_out_more() -> None:
+    asked: list[tuple[float, float, bool]] = []
+
+    def leaders(_: set[str], bar: float, clear: float, __: set[str], *, spared: bool) -> list[int]:
+        asked.append((bar, clear, spared))
+        return []
+
+    now = stage((), 1000.0, SCORE)
+    now.leaders = leaders
+    for before in range(ROUNDS):
+        assert rounds._added(FIRST, now, set(NAMES), before, fit(LEFT)) is None
+    assert [bar for bar, _, _ in asked] == sorted({bar for bar, _, _ in asked})
+    assert asked[0] == (ALARM, 1.0, False)
+    assert [each[1:] for each in asked[1:]] == [(CLEAR, True)] * (ROUNDS - 1)
 
 
 def test_what_is_too_large_leads_until_it_is_barred_and_then_bars_the_others() -> None:

@@ -37,3 +37,15 @@ def test_a_start_nearby_is_used_and_changes_no_result(monkeypatch: pytest.Monkey
     # Newton's tolerance on displacements is far below a nanostrain
     np.testing.assert_allclose(near[0].waveform, cold_one[0].waveform, atol=1e-10)
     np.testing.assert_allclose(near[1], cold_one[1], rtol=1e-6)
+
+
+def test_a_start_without_stiffness_at_some_pressure_ends_where_another_does() -> None:
+    data = runs().data(with_deflection=False)
+    values = values_of(TIRE)
+    below = float(np.max(values["pressure"])) - float(data.points.pressure.min())
+    assert below > 0.0
+    edge = float(np.max(values["tangential_stiffness"])) / below
+    model = refit.refit(data, {**values, "tangential_pressure_slope": np.float64(1.02 * edge)})
+    plain = refit.refit(data, values)
+    apart = model.whiten(model.waveform - plain.waveform)
+    assert np.sqrt(np.mean(apart**2)) < 0.05, "a twentieth of the noise"
