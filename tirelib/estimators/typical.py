@@ -51,8 +51,7 @@ def typical_turn(
 def _by_distance(observations: Observations, calibration: Calibration) -> list[int]:
     """Return the numbers of the valid turns, the one nearest to the middle first."""
     found = calibration.estimate(observations.features)
-    good = found.turn_valid & (found.flags == 0) & ~observations.sweep
-    rows = np.flatnonzero(good)
+    rows = np.flatnonzero(found.turn_valid & (found.flags == 0))
     if not rows.size:
         return []
     apart = np.zeros(rows.size)
