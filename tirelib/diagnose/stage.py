@@ -158,10 +158,11 @@ class Stage:
 
         None if its ratio is not `clear` times that of every effect outside its range: what imitates
         the impossible so well on this tire may imitate the possible. Where `spared`, those that are
-        `independent` lead all the same: nothing else takes what they do. Rivals are hints among
-        the suspects, or in no catalogue, that come near in the ratio or in what they take away
-        alone: which of them it is, only an exact refit tells. What is too large for its range is
-        among them as long as it is not barred.
+        `independent` need only be clear of the impossible that is so as well: what shares its
+        score with others does not take what they take alone. Rivals are hints among the suspects,
+        or in no catalogue, that come near in the ratio or in what they take away alone: which of
+        them it is, only an exact refit tells. What is too large for its range is among them as long
+        as it is not barred.
         """
         ratio, alone = self.ratio, self.scores.alone
         large = self.over & ~np.isin(self.names, list(barred))
@@ -169,7 +170,9 @@ class Stage:
         fit = known & (ratio >= max(bar, ALARM))
         imitated = float(np.max(ratio, where=self.impossible & ~large, initial=0.0))
         if fit.any() and clear * imitated > float(ratio[fit].max()):
-            known = known & self.independent & spared
+            apart = self.independent
+            alike = float(np.max(ratio, where=self.impossible & ~large & apart, initial=0.0))
+            known = known & apart & spared & (ratio >= clear * alike)
             fit &= known
         if not fit.any():
             return []

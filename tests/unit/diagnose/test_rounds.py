@@ -123,24 +123,22 @@ def test_an_effect_that_a_later_one_replaces_goes() -> None:
     assert kept is both
 
 
-def _independent(score: Sequence[float], alone: Sequence[float]) -> Any:
-    scores = SimpleNamespace(score=np.array([*score, 0.0]), alone=np.array([*alone, 0.0]))
-    return Stage.independent.__get__(SimpleNamespace(scores=scores))
-
-
 def judged(
     ratio: Sequence[float], alone: Sequence[float], outside: float = 0.0,
-    score: Sequence[float] = (0.0, 0.0, 0.0),
+    score: Sequence[float] = (0.0, 0.0, 0.0), *, apart: bool = False,
 ) -> Any:  # fmt: skip
-    """Return a stage as far as its leaders go; all but the last may be named."""
-    names = [*NAMES, "impossible"]
+    """Return a stage as far as its leaders go; all but the last may be named.
+
+    `apart`: whether the last is independent.
+    """
+    scores = SimpleNamespace(
+        alone=np.array([*alone, 1.0]), score=np.array([*score, 1.0 if apart else 0.0])
+    )
     return SimpleNamespace(
         ratio=np.array([*ratio, outside]), in_range=np.array([True, True, True, False]),
         impossible=np.array([False, False, False, True]), over=np.zeros(4, dtype=bool),
-        unlisted=np.zeros(4, dtype=bool), independent=_independent(score, alone),
-        names=names, scores=SimpleNamespace(
-            alone=np.array([*alone, 0.0]), score=np.array([*score, 0.0])
-        ),
+        unlisted=np.zeros(4, dtype=bool), names=[*NAMES, "impossible"], scores=scores,
+        independent=Stage.independent.__get__(SimpleNamespace(scores=scores)),
     )  # fmt: skip
 
 
@@ -179,6 +177,17 @@ def test_what_nothing_else_could_take_is_no_imitation(share: float, told: list[i
     assert Stage.leaders(stage, names, ALARM, CLEAR) == []
     clear = judged([20.0, 15.0, 0.0], [100.0, 90.0, 0.0], 13.0, [10.0, share * 90.0, 0.0])
     assert Stage.leaders(clear, names, ALARM, CLEAR, spared=True) == [0, 1]
+
+
+@pytest.mark.parametrize(("outside", "told"), [(14.9, [0]), (15.1, [])])
+def test_what_is_independent_has_to_be_clear_of_the_impossible_that_is_so_too(
+    outside: float, told: list[int]
+) -> None:
+    stage = judged(
+        [CLEAR * 15.0, 0.0, 0.0], [100.0, 90.0, 0.0], outside, [100.0, 0.0, 0.0], apart=True
+    )
+    assert stage.independent[[0, 3]].all()
+    assert Stage.leaders(stage, set(stage.names), ALARM, CLEAR, spared=True) == told
 
 
 def test_each_further_effect_has_to_stand_out_more() -> None:
