@@ -32,7 +32,7 @@ BELT = frozenset({"belt_shear", "belt_extension"})
 HELD_OUT_BY = ("load", "pressure", "speed")
 _CODE = {
     "diagnose": ("candidates", "diagnose", "ensemble", "noise", "ranking", "refit", "rivals",
-                 "rounds", "shape", "stage", "structure", "unlisted"),
+                 "rounds", "secants", "shape", "sole", "stage", "structure", "unlisted", "variant"),
     "identify": ("campaign_data", "discrepancy", "identify", "noise", "random_effects", "structure",
                  "waveform_fit"),
     "effects": ("*",), "model": ("*",), "contact": ("*",), "ring": ("*",), "strain": ("*",),

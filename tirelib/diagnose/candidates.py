@@ -12,6 +12,7 @@ from scipy import linalg
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.refit import Refit
 from tirelib.effects import Effect
+from tirelib.effects.effect import Strength
 from tirelib.errors import ParameterError
 from tirelib.identify.waveform_fit import Data
 from tirelib.model.base import predict
@@ -104,7 +105,7 @@ def candidates(data: Data, model: Refit, catalogue: Sequence[Effect]) -> Candida
             dead[effect.name] = f"{', '.join(missing)} is not measured in every run"
             continue
         try:
-            rows = _rows(data, model, effect)
+            rows = signature(data, model, effect, effect.trials, effect.step)
         except ParameterError as error:
             dead[effect.name] = str(error)
             continue
@@ -126,15 +127,24 @@ def _still(data: Data, name: str, least: float) -> bool:
     return bool(np.abs(values).max() < least)
 
 
-def _rows(data: Data, model: Refit, effect: Effect) -> FloatArray:
-    """Return the whitened change per component and range, by a small step at the model."""
+def signature(
+    data: Data, model: Refit, effect: Effect, trials: Sequence[Strength], size: float
+) -> FloatArray:
+    """Return the whitened change per trial and range, (n_trials, n_runs * n_phi).
+
+    Parameters
+    ----------
+    trials : sequence of strength
+    size : float
+        Of each of them, in the effect's unit.
+    """
     rows = []
-    for trial in effect.trials:
+    for trial in trials:
         state = predict(
             model.values, data.points, [*model.changes, effect.at(trial)],
             low_pass=data.low_pass, correction=model.correction,
         )  # fmt: skip
-        change = (state.wave - model.waveform) * (effect.scale / effect.step)
+        change = (state.wave - model.waveform) * (effect.scale / size)
         rows.append(model.whiten(change).ravel())
     return np.array(rows)
 

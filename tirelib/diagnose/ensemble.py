@@ -14,7 +14,7 @@ two kinds of it.
 A measured variant has both, and noise.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,6 +22,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.refit import Refit
 from tirelib.diagnose.unlisted import gain_by_load, gain_by_pressure, gain_by_speed
+from tirelib.diagnose.variant import variant
 from tirelib.effects import CATALOGUE
 from tirelib.effects.effect import State
 from tirelib.effects.patch import along, balanced, beam_strain, held_shear
@@ -30,12 +31,10 @@ from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.identify import FITTED
 from tirelib.identify.random_effects import angle_slope, random_tangents, scales
 from tirelib.identify.waveform_fit import Data
-from tirelib.model.base import Correction, move, predict
-from tirelib.model.state import Operating
+from tirelib.model.base import move, predict
 from tirelib.waveforms import GRID
 
 MEMBERS = 100
-REFERENCE_LOAD = 4000.0
 MISFIT = Discrepancy(inside=0.002, outside=0.001, by_speed=0.25)
 """What no variant shows either: some thousandths of the strain, at any angle."""
 BACK_STEPS = 3
@@ -46,8 +45,6 @@ TIMING = 6e-5
 """Standard deviation of a common delay of the gages, [s]: uniform to a sample at 10 kHz."""
 WIDEST = 0.01
 """Largest standard deviation of the angle's zero that counts as structure, [rad]."""
-LARGE = 0.3
-"""Relative standard deviation of the part that large displacements add."""
 ALIKE = {
     CATALOGUE["gage_length"]: 200.0,
     CATALOGUE["roughness"]: 0.03,
@@ -60,10 +57,6 @@ ALIKE = {
 effects: the contact's ends are sharper or smoother than the ring's, contact begins gradually across
 a crowned tread, strain is not quite in proportion to the belt's curvature, and what changes the
 contact most (load, pressure, speed) changes its strain by a little more or less than the ring's."""
-SECTIONS = 8e-5
-"""Largest inertia of the belt's sections, [kg m]: twice that of 12.5 mm of belt and tread."""
-MASS = 0.15
-"""Relative standard deviation of the belt's mass, which no fit of straight runs tells."""
 RUN_OUT, ONCE = 1e-4, 3e-6
 """Standard deviation of a tire's run-out, [m], and of strain once per turn beside it, [-]."""
 
@@ -132,7 +125,7 @@ def variants(
     while len(rests) < members and attempts < 3 * members:
         attempts += 1
         try:
-            wave = _variant(data, model, random)
+            wave = variant(data, model, random)
             rest = np.subtract(wave, _refitted(data, model, wave, rows, inverse))
         except TirelibError:
             continue  # the draw is no tire
@@ -243,46 +236,6 @@ def _bent(data: Data, model: Refit) -> FloatArray:
         for change in (held, rear)
     ]  # fmt: skip
     return np.stack(waves) - model.waveform
-
-
-def _variant(data: Data, model: Refit, random: np.random.Generator) -> FloatArray:
-    """Return the waveforms of one variant."""
-    points = data.points
-    values = dict(model.values)
-    for name in (
-        "bending_stiffness", "radial_stiffness", "tangential_stiffness", "extension_stiffness",
-    ):  # fmt: skip
-        values[name] = values[name] * float(np.exp(0.1 * random.standard_normal()))
-    values["mass"] = values["mass"] * float(np.exp(MASS * random.standard_normal()))
-    values["shear_stiffness"] = 1e3 / random.uniform(0.001, 0.03) - _tension(values, points)
-    values["tread_hardening"] = random.uniform(0.0, 3.0)
-    values["rotary_inertia"] = random.uniform(0.0, SECTIONS)
-    values["tread_stiffness"] = values["tread_stiffness"] * (
-        points.load / REFERENCE_LOAD
-    ) ** random.uniform(-0.1, 0.2)
-    large = 1.0 + LARGE * float(random.standard_normal())
-    correction = Correction(
-        large * model.correction.waveform, large * model.correction.deflection,
-        start=model.correction.start,
-    )  # fmt: skip
-    return predict(
-        values, points, [*model.changes, ("constants", _flung)], low_pass=data.low_pass,
-        correction=correction,
-    ).wave  # fmt: skip
-
-
-def _flung(state: State) -> State:
-    """Return the state with the sidewalls' share of what spins off the belt that stretches."""
-    share = 1.0 / (1.0 + state.EA / (state.k_u * state.radius**2))
-    spin = state.mass * (state.radius * np.asarray(state.conditions.omega)) ** 2
-    return state.but(tension=state.tension - share * spin)
-
-
-def _tension(values: Mapping[str, float | FloatArray], points: Operating) -> FloatArray:
-    """Return the belt's tension, which a sheared section loses of its stiffness (Haringx), [N]."""
-    radius = values["ring_radius"]
-    spin = values["mass"] * (radius * np.asarray(points.omega)) ** 2
-    return np.asarray(points.pressure * values["belt_width"] * radius + spin)
 
 
 def _refitted(

@@ -7,6 +7,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.ensemble import Variants
 from tirelib.diagnose.refit import refit
+from tirelib.diagnose.sole import sole
 from tirelib.diagnose.stage import ALARM, Stage, within
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
@@ -24,6 +25,8 @@ independent of them has nothing to do with that."""
 LARGE = 1.0
 """Share of its range by which an effect may be larger in the exact refit and yet be named, with a
 word that it is: a range is what is plausible, and what explains the misfit speaks for itself."""
+IMITATED = 1.0
+"""Ratio of what cannot be from which first order is not trusted where it names nothing."""
 ROUNDS = 3
 
 
@@ -79,6 +82,9 @@ def rounds(
     stage, count = first, 0
     while count < ROUNDS:
         found = _added(first, stage, suspects, len(named), fitted)
+        if found is None and not named and first.imitated >= IMITATED:
+            listed = [effect.name for effect in catalogue]
+            found = sole(data, stage, listed, fitted)
         if found is None:
             break
         after, index = found

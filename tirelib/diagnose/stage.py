@@ -10,6 +10,7 @@ from tirelib.diagnose.candidates import Candidates, candidates
 from tirelib.diagnose.ensemble import Variants
 from tirelib.diagnose.ranking import Ranking, Scores, limits
 from tirelib.diagnose.refit import Refit
+from tirelib.diagnose.secants import with_secants
 from tirelib.diagnose.shape import structure_of
 from tirelib.diagnose.structure import FORM, LEAST
 from tirelib.diagnose.unlisted import UNLISTED
@@ -95,7 +96,9 @@ class Stage:
         listed = {effect.name for effect in (*catalogue, *model.effects)}
         others = [effect for effect in UNLISTED if effect.name not in listed]
         found = candidates(data, model, [*catalogue, *others])
-        ranking = Ranking(model, found, structure_of(data, model, rests, noise))
+        structure = structure_of(data, model, rests, noise)
+        found = with_secants(data, model, found, structure)
+        ranking = Ranking(model, found, structure)
         scores = ranking.scores(data.strain - model.waveform)
         members = ranking.of_members()
         names = [candidate.effect.name for candidate in found.living]

@@ -3,6 +3,7 @@
 import numpy as np
 
 from tirelib.effects.effect import State, effect
+from tirelib.errors import ParameterError
 
 REFERENCE = 5e-3
 """Strain at which the strength says what is lost, [-]."""
@@ -17,7 +18,13 @@ def gage_saturation(state: State, strength: float) -> State:
 
     eps / sqrt(1 + 2 s (eps / 5000 ustrain)^2), its mean over the turn taken off as measured.
     """
-    shown = state.waveform / np.sqrt(1.0 + 2.0 * strength * (state.waveform / REFERENCE) ** 2)
+    short = 1.0 + 2.0 * strength * (state.waveform / REFERENCE) ** 2
+    if np.min(short) <= 0.0:
+        raise ParameterError(
+            f"gage_saturation: at strength {strength:g} a gage would show more than any strain; "
+            "strengths are positive, a gage falls short"
+        )
+    shown = state.waveform / np.sqrt(short)
     if strength:
         shown = shown - shown.mean(axis=1, keepdims=True)
     return state.but(waveform=shown)
