@@ -116,9 +116,13 @@ def main() -> None:
     parser.add_argument("--quantity", choices=("strain", "Fy"), default="strain")
     parser.add_argument("--seeds", default="1000", help="such as 6000-6001; a tire each")
     parser.add_argument("--visible", type=float, help="chi-square of the planted effect")
+    parser.add_argument(
+        "--scattered", action="store_true", help="Fy: runs are single points, not sweeps"
+    )
     given = parser.parse_args()
     visible = given.visible or VISIBLE[given.quantity]
-    pairs = (strain if given.quantity == "strain" else forces).pairs()
+    sides = given.quantity == "Fy"
+    pairs = forces.pairs(scattered=given.scattered) if sides else strain.pairs()
     code, found = fingerprint(), []
     for case in [c for seed in seeds_of(given.seeds) for c in cases_of(pairs, seed, visible)]:
         v = verdict(given.quantity, case, code)
