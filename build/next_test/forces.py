@@ -146,9 +146,10 @@ class Tire:
         off = random.standard_normal((3, int(run.max()) + 1))[:, run]
         flat, nothing = np.zeros(n), np.full(n, np.nan)
         return ForceData(
-            at["load"] * (1.0 + LOAD_NOISE * off[0]), at["pressure"] * (1.0 + PRESSURE_NOISE * off[1]),
-            at["slip_angle"] + ANGLE_NOISE * off[2], flat, flat, nothing,
-            nothing, side, nothing, run, np.full(n, SPEED), at["temperature"], at["time"],
+            at["load"] * (1.0 + LOAD_NOISE * off[0]),
+            at["pressure"] * (1.0 + PRESSURE_NOISE * off[1]),
+            at["slip_angle"] + ANGLE_NOISE * off[2], flat, flat, nothing, nothing, side, nothing, run,
+            np.full(n, SPEED), at["temperature"], at["time"],
         )  # fmt: skip
 
 

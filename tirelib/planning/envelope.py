@@ -32,6 +32,8 @@ class Axis:
         Of the grid; a range of one value has one.
     positive : bool
         Whether only positive values make sense.
+    series : str
+        Key in JSON of the values that a sweep passes through; empty where there is no sweep of it.
     """
 
     title: str
@@ -41,6 +43,7 @@ class Axis:
     wider: float
     levels: int
     positive: bool = True
+    series: str = ""
 
     def told(self, value: Any) -> Any:
         """Return SI values in the unit."""
@@ -51,8 +54,9 @@ AXES: Mapping[str, Axis] = MappingProxyType({
     "load": Axis("load", "N", "force", "load_N", 0.25, 5),
     "pressure": Axis("pressure", "bar", "pressure", "pressure_bar", 0.15, 3),
     "speed": Axis("speed", "km/h", "speed", "speed_kmh", 0.25, 5),
-    "slip_angle": Axis("slip angle", "deg", "angle", "slip_angle_deg", 0.0, 7, False),
-    "slip_ratio": Axis("slip ratio", "1", "ratio", "slip_ratio", 0.0, 7, False),
+    "slip_angle": Axis("slip angle", "deg", "angle", "slip_angle_deg", 0.0, 7, False,
+                       "slip_angles_deg"),
+    "slip_ratio": Axis("slip ratio", "1", "ratio", "slip_ratio", 0.0, 7, False, "slip_ratios"),
     "camber": Axis("camber", "deg", "angle", "camber_deg", 0.0, 2, False),
     "temperature": Axis("tread temperature", "degC", "temperature", "temperature_degC", 0.0, 2),
 })  # fmt: skip
