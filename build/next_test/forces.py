@@ -148,8 +148,8 @@ class Tire:
         return ForceData(
             at["load"] * (1.0 + LOAD_NOISE * off[0]),
             at["pressure"] * (1.0 + PRESSURE_NOISE * off[1]),
-            at["slip_angle"] + ANGLE_NOISE * off[2], flat, flat, nothing, nothing, side, nothing, run,
-            np.full(n, SPEED), at["temperature"], at["time"],
+            at["slip_angle"] + ANGLE_NOISE * off[2], flat, flat, nothing, nothing, side, nothing,
+            run, np.full(n, SPEED), at["temperature"], at["time"],
         )  # fmt: skip
 
 
@@ -235,7 +235,10 @@ def _tried(
     at = joint.bench.conditions.take(np.arange(n, n + size))
     told = {name: getattr(at, name) for name in ("load", "pressure", "slip_angle", "temperature")}
     told |= {"time": tire.span + PAUSE + PACE * np.arange(size), "run": np.zeros(size)}
-    side = tire.measured(told, 2).Fy
+    # the model is told the set points, and the tire has others
+    off = tire.measured(told, 2)
+    told |= {name: getattr(off, name) for name in ("load", "pressure", "slip_angle")}
+    side = tire.measured(told, 3).Fy
     problem = replace(joint, measured=np.concatenate([case.problem.measured, side]))
     after = replace(case, problem=problem)
     base = fit_force(problem, near.values)
