@@ -233,7 +233,7 @@ def _candidate(test: NextTest, k: int) -> dict[str, Any]:
         **{AXES[name].key: float(AXES[name].told(value)) for name, value in conditions},
         **_slips(test.envelope),
         "separation": float(test.score[k]),
-        "separation_std": float(2.0 * np.sqrt(test.score[k])),
+        "separation_std": float(test.std[k]),
         "resolves_probability": float(test.probability[k]),
         "pair": list(test.pairs[test.hardest[k]].names),
     }

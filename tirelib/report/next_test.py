@@ -85,7 +85,7 @@ def _runs(test: NextTest) -> Table:
     for k in range(min(SHOWN, len(test.points))):
         rows.append([
             str(k + 1), *_told(test, test.points[k]), *swept,
-            number(test.score[k], 3), number(2.0 * float(np.sqrt(test.score[k])), 2),
+            number(test.score[k], 3), number(float(test.std[k]), 2),
             number(100.0 * test.probability[k], 2), _said(test.pairs[test.hardest[k]]),
         ])  # fmt: skip
     median = [

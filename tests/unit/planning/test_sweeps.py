@@ -135,8 +135,9 @@ def test_set_points_that_are_off_alike_cost_a_sweep_more_than_independent_ones()
     like_load, quiet = together.wave + load, Noise(1.0, 0.0)
     still = replace(together, covariance=1e-12 * together.covariance)
     each = replace(alone, covariance=still.covariance)
-    shared = still.separation(like_load, quiet, 1.0)[0]
-    apart = each.separation(like_load.reshape(-1, 1), quiet, 1.0)[:6].sum()
+    shared = still.missed(replace(still, wave=like_load), quiet, 1.0)[0][0]
+    one_by_one = replace(each, wave=like_load.reshape(-1, 1))
+    apart = each.missed(one_by_one, quiet, 1.0)[0][:6].sum()
     assert shared == pytest.approx(load @ load / (1.0 + load @ load), rel=0.05)
     assert shared < apart
 
