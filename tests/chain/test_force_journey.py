@@ -165,8 +165,10 @@ def test_the_next_test_of_forces_is_the_diagnosis_s_advice(
 
 
 def test_a_point_in_the_place_of_a_sweep_may_be_asked_for(place: Path) -> None:
-    words = ("next-test", place / "sweep", "--model", place / "M.toml", "--quantity", "Fy",
-             "--suspects", "friction_pressure,friction_drift", "--json", place / "P.json")  # fmt: skip
+    words = (
+        "next-test", place / "sweep", "--model", place / "M.toml", "--quantity", "Fy",
+        "--suspects", "friction_pressure,friction_drift", "--json", place / "P.json",
+    )  # fmt: skip
     found = call(*words)
     assert found.exit_code == 0, found.output
     assert " to " in found.output.split("hardest pair")[1]

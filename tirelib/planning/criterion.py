@@ -1,4 +1,4 @@
-"""The run that parts rivals best: a T-criterion over a grid of possible runs, parameters integrated.
+"""The run that parts rivals best: a T-criterion over possible runs, parameters integrated out.
 
 Every suspect is fitted to the present runs. At each possible run each of two rivals in turn is
 taken as true, with the numbers and the structural misfit that the present runs leave open, and the
@@ -267,7 +267,7 @@ def judged(
     stds = np.take_along_axis(spreads, smaller, axis=1)[:, 0]
     gaps = [rivals[j].cost - rivals[i].cost for i, j in pairs]
     chances = np.array([
-        resolving(*way, gap, tuple(spread))
+        resolving(way[0], way[1], gap, list(spread))
         for way, gap, spread in zip(ways, gaps, spreads, strict=True)
     ])  # fmt: skip
     counted = [k for k, gap in enumerate(gaps) if abs(gap) < RESOLVED] or list(range(len(gaps)))

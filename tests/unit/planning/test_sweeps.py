@@ -156,7 +156,8 @@ def test_a_sweep_adds_more_than_its_best_point_and_is_told_so() -> None:
     assert best["pressure_bar"] == pytest.approx(PRESSURES[0] / 1e5)
     assert document["envelope"]["slip_angle_deg"] == pytest.approx([-8.0, 8.0], abs=0.05)
     assert document["envelope"]["points_of_run"] == 6
-    assert "a sweep of 6 slip angles from -8.0 to 8.0 deg" in document["what"]
+    said = plan.test.envelope.text(plan.test.points[0])
+    assert said.endswith("a sweep of 6 slip angles from -8.0 to 8.0 deg")
 
 
 def test_what_suspects_do_is_no_noise() -> None:
