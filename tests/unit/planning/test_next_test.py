@@ -230,7 +230,7 @@ def test_the_document_holds_the_contracts_keys_in_engineers_units() -> None:
     assert best["load_N"] == pytest.approx(test.points[0, 0])
     assert best["pressure_bar"] == pytest.approx(1e-5 * test.points[0, 1])
     assert best["speed_kmh"] == pytest.approx(3.6 * test.points[0, 2])
-    assert best["separation_std"] == pytest.approx(2.0 * np.sqrt(best["separation"]))
+    assert best["separation_std"] == pytest.approx(test.std[0])
     assert best["pair"] == [TWIN, PLANTED]
     assert told["random_median"]["separation"] < best["separation"]
     assert told["envelope"]["declared"] == []
