@@ -189,7 +189,9 @@ def _map(test: NextTest, pair: PairForecast) -> Plot:
         row=1, col=int(np.searchsorted(panels, of_panel[0])) + 1,
     )  # fmt: skip
     figure.update_xaxes(title=_heading(names[x]))
-    figure.update_yaxes(title=_heading(names[y]) if y is not None else "any", col=1)
+    figure.update_yaxes(title=_heading(names[y]) if y is not None else "", col=1)
+    if len(ys) == 1:
+        figure.update_yaxes(tickvals=list(upward) if y is not None else [])
     styled_figure(
         figure, 420, coloraxis={"colorscale": "Viridis", "cmin": 0.0, "cmax": top,
                                 "colorbar": {"title": {"text": "separation"}}},

@@ -15,6 +15,7 @@ from tirelib.effects import CATALOGUE
 from tirelib.errors import ParameterError
 from tirelib.planning.criterion import Noise
 from tirelib.planning.document import Plan, plan_document, plan_force_test
+from tirelib.planning.envelope import Envelope
 from tirelib.planning.force_noise import counted_noise
 from tirelib.planning.force_rivals import (
     force_envelope,
@@ -25,7 +26,7 @@ from tirelib.planning.force_rivals import (
 )
 from tirelib.planning.suspects import given_suspects
 from tirelib.planning.sweep import campaign_sweep
-from tirelib.report.next_test import write_next_test
+from tirelib.report.next_test import parts_of, write_next_test
 
 PAIR = ["friction_pressure", "friction_drift"]
 DECLARED = {"speed": (20.0, 20.0), "pressure": (PRESSURES[0], PRESSURES[-1])}
@@ -176,3 +177,12 @@ def test_the_page_of_sweeps_tells_their_slips(tmp_path: object) -> None:
     page, words = write_next_test(planned(), Path(str(tmp_path)))
     assert "-8.0 to 8.0 deg" in words.read_text(encoding="utf-8")
     assert "Every run is a sweep" in page.read_text(encoding="utf-8")
+
+
+def test_a_map_of_sweeps_may_have_load_and_pressure_alone() -> None:
+    plan, sweep = planned(), force_envelope(case("pressure", 0.03), **DECLARED).sweep
+    envelope = Envelope({"load": (2e3, 6e3), "pressure": (PRESSURES[0], PRESSURES[-1])}, sweep=sweep)
+    other = plan_force_test(case("pressure", 0.03), plan.suspects, envelope)
+    (plot,) = next(part for part in parts_of(other) if part.plots).plots
+    assert [len(trace.y) for trace in plot.figure.data] == [1, 1, 1, 1]
+    assert len(plot.rows) == 5 * 3
