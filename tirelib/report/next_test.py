@@ -21,7 +21,8 @@ METHOD = (
     "Every suspect is fitted to the present runs, with what variants of the model do anyway among "
     "the unknowns. At each possible run one suspect is taken as true, with what the present runs "
     "leave open of it, and the other may adapt within what they leave open of its own; what it "
-    "still misses, in chi-square, is the separation. The smaller of both directions counts. A chi-square of "
+    "still misses, in chi-square, is the separation. The smaller of both directions counts. A "
+    "chi-square of "
     f"{RESOLVED:.0f} between two suspects rules the worse one out."
 )
 SOURCES = (

@@ -181,7 +181,9 @@ def test_the_page_of_sweeps_tells_their_slips(tmp_path: object) -> None:
 
 def test_a_map_of_sweeps_may_have_load_and_pressure_alone() -> None:
     plan, sweep = planned(), force_envelope(case("pressure", 0.03), **DECLARED).sweep
-    envelope = Envelope({"load": (2e3, 6e3), "pressure": (PRESSURES[0], PRESSURES[-1])}, sweep=sweep)
+    envelope = Envelope(
+        {"load": (2e3, 6e3), "pressure": (PRESSURES[0], PRESSURES[-1])}, sweep=sweep
+    )
     other = plan_force_test(case("pressure", 0.03), plan.suspects, envelope)
     (plot,) = next(part for part in parts_of(other) if part.plots).plots
     assert [len(trace.y) for trace in plot.figure.data] == [1, 1, 1, 1]
