@@ -1,9 +1,10 @@
-"""One case on side forces: two look-alikes, before, after a point at random and the advised one.
+"""One case on side forces: two look-alikes, before, after a run at random and the advised one.
 
 The tire is a Magic Formula whose constants are drawn anew (`tests.magic_sweep`), with other laws of
 load, pressure and temperature than the effects have. Wear that slows down and a polish by the root
 of time are planted here. Plans are such as happen: one pressure after the other, a tread that warms
-with load, small slip angles only.
+with load, small slip angles only. Runs are sweeps of the slip angle at one load, pressure and
+temperature, as on a flat belt; or single points, scattered.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,16 +31,19 @@ from tirelib.planning.force_rivals import (
     MEMBERS,
     ForceTrial,
     force_axes,
+    force_envelope,
     points_ahead,
     structure_rows,
     try_force_suspects,
 )
 from tirelib.planning.next_test import force_next_test
 
-NOISE, ANGLE_NOISE, LOAD_NOISE = 8.0, 2e-4, 0.003
-"""Of a point: side force [N], slip angle [rad], load (relative)."""
-SPEED, PAUSE = 11.0, 12.0
-"""[m/s], and [s] from point to point."""
+NOISE = 8.0
+"""Of a point's side force [N]."""
+ANGLE_NOISE, LOAD_NOISE, PRESSURE_NOISE = 2e-4, 0.003, 0.003
+"""Of a run, alike in all its points: slip angle [rad], load and pressure (relative)."""
+SPEED, PAUSE, PACE = 11.0, 12.0, 0.8
+"""[m/s], and [s] from run to run and from point to point of a sweep."""
 LOADS, PRESSURES = (700.0, 1500.0, 2300.0), (0.7e5, 0.83e5, 0.96e5)
 WIDE, SMALL = (-8.0, -5.0, -2.5, 2.5, 5.0, 8.0), (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)
 """Slip angles [deg]."""
@@ -54,7 +58,7 @@ ENVELOPE = MappingProxyType({
 
 @dataclass(frozen=True)
 class Plan:
-    """Steady points in the order of time; each is measured twice, one after the other.
+    """Points in the order of time; each set point is measured twice, one after the other.
 
     Attributes
     ----------
@@ -62,40 +66,54 @@ class Plan:
         Whether pressures follow each other; else all is in turn at random.
     heated : bool
         Whether the tread is as warm as the load makes it; else 335 K, give or take.
+    scattered : bool
+        Whether every point is a run of its own; else a run is a sweep, there and back, through the
+        slip angles at one load and pressure.
     """
 
     angles: Sequence[float]
     in_order: bool
     heated: bool
+    scattered: bool = False
 
     def points(self, seed: int) -> dict[str, FloatArray]:
-        """Return the conditions as set, by name, SI."""
+        """Return the conditions as set, by name, SI, and the number of the run."""
         random = np.random.default_rng([seed, 21])
         grid = np.meshgrid(PRESSURES, LOADS, np.deg2rad(self.angles), indexing="ij")
-        pressure, load, angle = (np.repeat(x.ravel(), 2) for x in grid)
-        n = load.size
-        order = np.arange(n).reshape(-1, 2)
-        if self.in_order:
-            blocks = order.reshape(len(PRESSURES), -1, 2)
-            order = np.concatenate([random.permutation(block) for block in blocks])
+        pressure, load, angle = (x.ravel() for x in grid)
+        index = np.arange(load.size)
+        if self.scattered:
+            visits = np.stack([index, index], axis=1)
         else:
-            order = random.permutation(order)
-        chosen = order.ravel()
+            each = index.reshape(-1, len(self.angles))
+            visits = np.concatenate([each, each[:, ::-1]], axis=1)
+        if self.in_order:
+            blocks = visits.reshape(len(PRESSURES), -1, visits.shape[1])
+            visits = np.concatenate([random.permutation(block) for block in blocks])
+        else:
+            visits = random.permutation(visits)
+        chosen = visits.ravel()
         pressure, load, angle = pressure[chosen], load[chosen], angle[chosen]
+        n = chosen.size
         warm = 320.0 + 25.0 * load / max(LOADS) if self.heated else np.full(n, 335.0)
+        run = np.arange(n) if self.scattered else np.arange(n) // visits.shape[1]
+        pace = 0.0 if self.scattered else PACE
         return {
             "load": load, "pressure": pressure, "slip_angle": angle,
-            "temperature": warm + 1.5 * random.standard_normal(n), "time": PAUSE * np.arange(n),
+            "temperature": warm + 1.5 * random.standard_normal(n),
+            "time": (PAUSE - pace) * run + pace * np.arange(n), "run": run,
         }  # fmt: skip
 
 
-PLANS: Mapping[str, Plan] = MappingProxyType(
+SWEEPS: Mapping[str, Plan] = MappingProxyType(
     {
         "pressures_in_order": Plan(WIDE, in_order=True, heated=False),
         "warmed_by_load": Plan(WIDE, in_order=False, heated=True),
         "small_angles": Plan(SMALL, in_order=False, heated=True),
     }
 )
+SCATTERED = {f"scattered_{k}": replace(plan, scattered=True) for k, plan in SWEEPS.items()}
+PLANS: Mapping[str, Plan] = MappingProxyType({**SWEEPS, **SCATTERED})
 
 
 @dataclass(frozen=True)
@@ -124,11 +142,14 @@ class Tire:
         """Return points as they are measured."""
         random, n = np.random.default_rng([self.seed, 23, draw]), at["load"].size
         side = self.side(at) + NOISE * random.standard_normal(n)
+        run = np.asarray(at["run"], dtype=np.int64)
+        off = random.standard_normal((3, int(run.max()) + 1))[:, run]
         flat, nothing = np.zeros(n), np.full(n, np.nan)
         return ForceData(
-            at["load"] * (1.0 + LOAD_NOISE * random.standard_normal(n)), at["pressure"],
-            at["slip_angle"] + ANGLE_NOISE * random.standard_normal(n), flat, flat, nothing,
-            nothing, side, nothing, np.arange(n), np.full(n, SPEED), at["temperature"], at["time"],
+            at["load"] * (1.0 + LOAD_NOISE * off[0]),
+            at["pressure"] * (1.0 + PRESSURE_NOISE * off[1]),
+            at["slip_angle"] + ANGLE_NOISE * off[2], flat, flat, nothing, nothing, side, nothing,
+            run, np.full(n, SPEED), at["temperature"], at["time"],
         )  # fmt: skip
 
 
@@ -169,7 +190,7 @@ def tire_of(test: PairCase) -> Tire:
     return replace(none, strength=sign * step)
 
 
-def pairs() -> list[Pair]:
+def pairs(*, scattered: bool = False) -> list[Pair]:
     """Return plans and look-alikes there, by the angles that a diagnosis tells of a plain tire."""
 
     def signatures(plan: str) -> tuple[list[str], FloatArray]:
@@ -179,18 +200,18 @@ def pairs() -> list[Pair]:
         found = force_candidates(case.problem, base, [CATALOGUE[name] for name in PLANTED])
         return found.names, found.angles
 
-    return look_alikes(PLANS, signatures)
+    return look_alikes(SCATTERED if scattered else SWEEPS, signatures)
 
 
 def measured(test: PairCase) -> dict[str, Any]:
-    """Return what the campaign, a further point at random, and the advised one tell of a pair."""
+    """Return what the campaign, a further run at random, and the advised one tell of a pair."""
     tire = tire_of(test)
     case = case_of(tire.measured(PLANS[test.plan].points(test.seed), 1))
     base = fit_force(case.problem, case.model.values)
     suspects = [(CATALOGUE[name], np.zeros(1)) for name in sorted((test.truth, test.rival))]
     axes = force_axes(case)
     declared = {name: ends for name, ends in ENVELOPE.items() if name in axes}
-    envelope = Envelope.of(case.problem.bench.conditions, axes, **declared)
+    envelope = force_envelope(case, **declared)
     plan = force_next_test(case, base, suspects, envelope)
     out: dict[str, Any] = {"strength": tire.strength, "before": test.gap(plan.trial)}
     if len(plan.trial.rivals) < 2:
@@ -208,12 +229,16 @@ def _tried(
     case: ForceCase, envelope: Envelope, point: FloatArray, tire: Tire, near: ForceFit,
     suspects: Sequence[Any],
 ) -> ForceTrial:  # fmt: skip
-    """Return the rivals on a campaign with one point more."""
+    """Return the rivals on a campaign with one run more."""
     joint = points_ahead(case, envelope, point[None])
-    n = len(case.problem)
-    at = joint.bench.conditions.take(np.array([n]))
+    n, size = len(case.problem), envelope.points
+    at = joint.bench.conditions.take(np.arange(n, n + size))
     told = {name: getattr(at, name) for name in ("load", "pressure", "slip_angle", "temperature")}
-    side = tire.measured(told | {"time": np.array([tire.span + PAUSE])}, 2).Fy
+    told |= {"time": tire.span + PAUSE + PACE * np.arange(size), "run": np.zeros(size)}
+    # the model is told the set points, and the tire has others
+    off = tire.measured(told, 2)
+    told |= {name: getattr(off, name) for name in ("load", "pressure", "slip_angle")}
+    side = tire.measured(told, 3).Fy
     problem = replace(joint, measured=np.concatenate([case.problem.measured, side]))
     after = replace(case, problem=problem)
     base = fit_force(problem, near.values)

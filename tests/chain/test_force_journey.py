@@ -4,6 +4,7 @@ The tire is a Magic Formula with its own laws of load, pressure, temperature and
 """
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -157,6 +158,25 @@ def test_the_next_test_of_forces_is_the_diagnosis_s_advice(
     assert (plan["quantity"], plan["verdict"]) == ("Fy", told["verdict"])
     # named effects whose twins are as good as ruled out are not in doubt
     assert plan["between"] == ["friction_pressure", "friction_drift"]
+    # the campaign is one of sweeps, and so is the advised run
+    angles = plan["best"]["slip_angles_deg"]
+    assert plan["best"]["slip_angle_deg"] is None
+    assert len(angles) == plan["envelope"]["points_of_run"] > 10
+    assert (min(angles), max(angles)) == pytest.approx((-9.0, 9.0), abs=0.6)
+
+
+def test_a_point_in_the_place_of_a_sweep_may_be_asked_for(place: Path) -> None:
+    words = (
+        "next-test", place / "sweep", "--model", place / "M.toml", "--quantity", "Fy",
+        "--suspects", "friction_pressure,friction_drift", "--json", place / "P.json",
+    )  # fmt: skip
+    found = call(*words)
+    assert found.exit_code == 0, found.output
+    assert re.search(r"-\d[\d.]* to", found.output), found.output
+    plan = done(*words, "--no-sweep")
+    assert "slip_angles_deg" not in plan["best"]
+    assert -9.5 < plan["best"]["slip_angle_deg"] < 9.5
+    assert plan["envelope"]["points_of_run"] == 1
 
 
 def test_undo_goes_back_to_the_digit_and_remove_fits_anew(

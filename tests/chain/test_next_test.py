@@ -73,6 +73,11 @@ def diagnosis(folder: Path, **changes: Any) -> Path:
     return file
 
 
+def test_a_sweep_is_for_forces(model: Path) -> None:
+    said = refused("next-test", "anywhere", "--model", model, "--suspects", EFFECT, "--sweep")
+    assert "--sweep and --no-sweep are for forces" in said
+
+
 def test_the_contracts_keys_are_there(planned: Any) -> None:
     told = planned.told
     assert told["format"] == "tirelib-next-test/1"

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from tirelib.effects import Effect
     from tirelib.parameters import TireFile
     from tirelib.planning.document import Plan
-    from tirelib.planning.envelope import Range
+    from tirelib.planning.envelope import Axis, Range
 
 _EXAMPLE = """\b
 Examples:
@@ -71,6 +71,9 @@ DIAGNOSIS = "tirelib-diagnosis/1"
 @click.option("--suspects", "names", metavar="A,B",
               help="Effects to tell apart; one alone stands against nothing.")  # fmt: skip
 @range_options
+@click.option("--sweep/--no-sweep", "sweep", default=None,
+              help="Forces: whether a further run is a sweep of the slip, or one point; by default "
+                   "as the campaign's runs are.")  # fmt: skip
 @click.option("--separation", "wanted", metavar="X", type=click.FloatRange(min=0, min_open=True),
               default=20.0, show_default=True,
               help="Separation for which repeats are counted.")  # fmt: skip
@@ -89,6 +92,7 @@ def next_test(
     quantity: str | None,
     diagnosis_file: Path | None,
     names: str | None,
+    sweep: bool | None,
     wanted: float,
     effect_files: tuple[Path, ...],
     members: int,
@@ -120,10 +124,15 @@ def next_test(
     if explains_forces(quantity, campaign.header, file):
         answer, force_plan = _for_force(
             campaign, file, catalogue, quantity, diagnosis_file, names, declared, members, seed,
-            wanted,
+            wanted, sweep,
         )  # fmt: skip
         _give(answer, force_plan, out, json_file)
         return
+    if sweep is not None:
+        raise ParameterError(
+            "--sweep and --no-sweep are for forces, and strain is planned; leave them out, or give "
+            "--quantity Fy"
+        )
     model = model_of(file, catalogue)
     used = [each for each in model.used if each.effect.hook != "brush"]
     effects = [each.effect for each in used]
@@ -173,12 +182,12 @@ def _for_force(
     members: int,
     seed: int,
     wanted: float,
+    sweep: bool | None,
 ) -> tuple[dict[str, Any], "Plan"]:
     """Return the next test of a force, as a document and as a plan."""
     from tirelib.diagnose.forces.assess import force_case
     from tirelib.planning.document import plan_document, plan_force_test
-    from tirelib.planning.envelope import Envelope
-    from tirelib.planning.force_rivals import force_axes
+    from tirelib.planning.force_rivals import force_envelope
     from tirelib.planning.suspects import given_suspects, suspects_of
 
     told: dict[str, Any] | None = None
@@ -197,8 +206,7 @@ def _for_force(
         else:
             given = [name.strip() for name in str(names).split(",")]
             suspects = given_suspects(given, has, catalogue, case.quantity)
-        at = case.problem.bench.conditions
-        envelope = Envelope.of(at, force_axes(case), **declared) if suspects.effects else None
+        envelope = force_envelope(case, sweep, **declared) if suspects.effects else None
         plan = plan_force_test(case, suspects, envelope, wanted=wanted, progress=progress)
     document = plan_document(plan)
     if told is not None:
@@ -286,6 +294,14 @@ def _belongs(told: dict[str, Any], campaign: "Campaign", has: list[str], path: P
         )
 
 
+def _condition(entry: dict[str, Any], axis: "Axis") -> str:
+    """Return a condition in its unit, the ends of it where the run is a sweep."""
+    if entry[axis.key] is not None:
+        return f"{entry[axis.key]:.4g}"
+    told = entry[axis.series]
+    return f"{min(told):.3g} to {max(told):.3g}"
+
+
 def _say(document: dict[str, Any]) -> None:
     from tirelib.planning.envelope import AXES
 
@@ -302,7 +318,7 @@ def _say(document: dict[str, Any]) -> None:
     table.add_column("hardest pair")
     for entry in document["candidates"][:SHOWN]:
         table.add_row(
-            *[f"{entry[axis.key]:.4g}" for axis in axes],
+            *[_condition(entry, axis) for axis in axes],
             f"{entry['separation']:.1f} +- {entry['separation_std']:.1f}",
             f"{100 * entry['resolves_probability']:.0f} %", " / ".join(entry["pair"]),
         )  # fmt: skip

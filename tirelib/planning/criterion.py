@@ -1,9 +1,10 @@
-"""The run that parts rivals best: a profiled T-criterion over a grid of possible runs.
+"""The run that parts rivals best: a T-criterion over possible runs, parameters integrated out.
 
 Every suspect is fitted to the present runs. At each possible run each of two rivals in turn is
-taken as true, and the other may adapt within what the present runs leave open of its numbers and of
-the structural misfit (Atkinson and Fedorov's criterion with the parameters integrated out). What it
-still misses, in chi-square, is the separation; the smaller of both directions counts.
+taken as true, with the numbers and the structural misfit that the present runs leave open, and the
+other may adapt within what they leave open of its own (Atkinson and Fedorov's criterion with the
+parameters integrated out as in Box and Hill's). What it still misses, in chi-square, is the
+separation; the smaller of both directions counts.
 
 Strain and forces differ in how rivals are fitted and foretell (`Rival`, `Trial`, `Forecast`), not
 in how runs are judged.
@@ -106,37 +107,49 @@ class Forecast:
     tangents: FloatArray
     covariance: FloatArray
 
-    def separation(self, other: FloatArray, noise: Noise, repeats: float) -> FloatArray:
-        """Return the chi-square by which this rival misses waveforms, after it adapts to them.
+    def spread(self, noise: Noise, repeats: float) -> FloatArray:
+        """Return the covariance of what this rival foretells, (n_points, n_samples, n_samples).
 
-        d' (S + J C J')^-1 d: S holds noise and set points, over the number of repeats, and what
-        repeats do not average; J C J' is what the present runs leave open of this rival.
+        S + J C J': S holds noise and set points, over the number of repeats, and what repeats do
+        not average; J C J' is what the present runs leave open of this rival.
+        """
+        root = np.linalg.cholesky(self.covariance)
+        open_ = np.einsum("kpn,kj->pnj", self.slopes, root, optimize=True)
+        low = np.concatenate([open_, self.tangents / np.sqrt(repeats)], axis=2)
+        white = noise.staying**2 + noise.random**2 / repeats
+        return np.asarray(low @ np.swapaxes(low, 1, 2) + white * np.eye(low.shape[1]))
+
+    def missed(
+        self, true: "Forecast", noise: Noise, repeats: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return by how much worse than the true rival this one gets: mean and variance.
+
+        With d the difference of both best guesses and V, W the covariances of what this rival and
+        the true one foretell, the mean is d' V^-1 d + tr(V^-1 W) - n, the variance
+        4 d' V^-1 W V^-1 d + 2 tr((V^-1 W - 1)^2). The trace is what the true rival may do beyond
+        its best guess: one whose strength is hardly known yet may be far from it.
 
         Parameters
         ----------
-        other : shape (n_points, n_samples)
+        true : Forecast
+            Of the same points.
         noise : Noise
         repeats : float
             Runs at each point.
 
         Returns
         -------
-        shape (n_points,), [-]
+        mean, variance : shape (n_points,), [-]
         """
-        root = np.linalg.cholesky(self.covariance)
-        open_ = np.einsum("kpn,kj->pnj", self.slopes, root, optimize=True)
-        low = np.concatenate([open_, self.tangents / np.sqrt(repeats)], axis=2)
-        white = noise.staying**2 + noise.random**2 / repeats
-        difference = other - self.wave
-        if low.shape[1] < low.shape[2]:
-            whole = low @ np.swapaxes(low, 1, 2) + white * np.eye(low.shape[1])
-            inside = np.linalg.solve(whole, difference[..., None])[..., 0]
-            return np.asarray(np.sum(difference * inside, axis=1))
-        inside = np.einsum("pnj,pn->pj", low, difference)
-        core = np.einsum("pnj,pnk->pjk", low, low, optimize=True) + white * np.eye(low.shape[2])
-        taken = np.einsum("pj,pj->p", inside, np.linalg.solve(core, inside[..., None])[..., 0])
-        out: FloatArray = (np.sum(difference**2, axis=1) - taken) / white
-        return np.maximum(out, 0.0)
+        mean, variance = np.zeros(len(self.wave)), np.zeros(len(self.wave))
+        for k in range(len(self.wave)):
+            own, other = (_at(each, k).spread(noise, repeats)[0] for each in (self, true))
+            difference = true.wave[k] - self.wave[k]
+            solved = np.linalg.solve(own, np.column_stack([difference, other - own]))
+            inside, more = solved[:, 0], solved[:, 1:]
+            mean[k] = difference @ inside + np.trace(more)
+            variance[k] = 4.0 * inside @ other @ inside + 2.0 * np.sum(more * more.T)
+        return mean, variance
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,8 +202,9 @@ class NextTest:
     envelope : Envelope
     points : shape (n, axes), SI
         The possible runs on the envelope's axes, best first.
-    score, probability : shape (n,)
-        Separation of the pair that is hardest there, and mean chance to rule a rival out.
+    score, std, probability : shape (n,)
+        Separation of the pair that is hardest there, its standard deviation, and mean chance to
+        rule a rival out.
     hardest : tuple of int
         Index of that pair, per run.
     pairs : tuple of PairForecast
@@ -205,6 +219,7 @@ class NextTest:
     envelope: Envelope
     points: FloatArray
     score: FloatArray
+    std: FloatArray
     probability: FloatArray
     hardest: tuple[int, ...]
     pairs: tuple[PairForecast, ...]
@@ -243,16 +258,22 @@ def judged(
     if len(rivals) < 2:
         empty = np.zeros(0)
         none = np.zeros((0, len(envelope.names)))
-        return NextTest(envelope, none, empty, empty, (), (), trial, dropped, noise)
+        return NextTest(envelope, none, empty, empty, empty, (), (), trial, dropped, noise)
     pairs = list(combinations(range(len(rivals)), 2))
-    ways = np.array([_both(rivals, told, pair, noise, 1.0) for pair in pairs])
-    sizes = ways.min(axis=1)
+    both = [_both(rivals, told, pair, noise, 1.0) for pair in pairs]
+    ways, spreads = (np.array([each[k] for each in both]) for k in (0, 1))
+    sizes = np.maximum(ways.min(axis=1), 0.0)
+    smaller = np.argmin(ways, axis=1)[:, None]
+    stds = np.take_along_axis(spreads, smaller, axis=1)[:, 0]
     gaps = [rivals[j].cost - rivals[i].cost for i, j in pairs]
-    chances = np.array([resolving(a, b, gap) for (a, b), gap in zip(ways, gaps, strict=True)])
+    chances = np.array([
+        resolving(way[0], way[1], gap, list(spread))
+        for way, gap, spread in zip(ways, gaps, spreads, strict=True)
+    ])  # fmt: skip
     counted = [k for k, gap in enumerate(gaps) if abs(gap) < RESOLVED] or list(range(len(gaps)))
     hardest = np.array(counted)[np.argmin(sizes[counted], axis=0)]
     chance = chances[counted].mean(axis=0)
-    score = sizes[hardest, np.arange(len(points))]
+    score, std = (x[hardest, np.arange(len(points))] for x in (sizes, stds))
     # where all pairs are parted already, a run can only add to that
     settled = all(abs(gap) >= RESOLVED for gap in gaps)
     order = np.lexsort((-score, 0.0 * chance if settled else -np.round(chance, 3)))
@@ -260,13 +281,13 @@ def judged(
     found = []
     for pair, size, gap, likely in zip(pairs, sizes, gaps, chances, strict=True):
         there = [_at(each, best) for each in told]
-        repeated = {n: float(_both(rivals, there, pair, noise, n).min()) for n in REPEATS}
+        repeated = {n: _least(rivals, there, pair, noise, n) for n in REPEATS}
         names = (rivals[pair[0]].name, rivals[pair[1]].name)
-        limit = float(_both(rivals, there, pair, noise, ENDLESS).min())
+        limit = _least(rivals, there, pair, noise, ENDLESS)
         found.append(PairForecast(names, gap, size[order], likely[order], repeated, limit))
     return NextTest(
-        envelope, points[order], score[order], chance[order], tuple(hardest[order].tolist()),
-        tuple(found), trial, dropped, noise,
+        envelope, points[order], score[order], std[order], chance[order],
+        tuple(hardest[order].tolist()), tuple(found), trial, dropped, noise,
     )  # fmt: skip
 
 
@@ -276,17 +297,27 @@ def _both(
     pair: tuple[int, int],
     noise: Noise,
     repeats: float,
-) -> FloatArray:
-    """Return the separations if the first is right and if the second is, (2, n_points).
+) -> tuple[FloatArray, FloatArray]:
+    """Return separations if the first is right and if the second is, and stds, (2, n_points).
 
     That nothing is missing is a special case of every effect: only the other direction counts.
     """
     i, j = pair
-    first = told[j].separation(told[i].wave, noise, repeats)
-    if rivals[j].name == NOTHING:
-        return np.array([first, first])
-    second = told[i].separation(told[j].wave, noise, repeats)
-    return np.array([second if rivals[i].name == NOTHING else first, second])
+    ways = [told[b].missed(told[a], noise, repeats)
+            for a, b in ((i, j), (j, i)) if rivals[a].name != NOTHING]  # fmt: skip
+    mean, variance = (np.array([way[k] for way in (ways[0], ways[-1])]) for k in (0, 1))
+    return mean, np.sqrt(np.maximum(variance, 0.0))
+
+
+def _least(
+    rivals: Sequence[Rival],
+    told: Sequence[Forecast],
+    pair: tuple[int, int],
+    noise: Noise,
+    repeats: float,
+) -> float:
+    """Return the separation at a single point, by repeats."""
+    return max(float(_both(rivals, told, pair, noise, repeats)[0].min()), 0.0)
 
 
 def _at(told: Forecast, index: int) -> Forecast:
@@ -295,12 +326,17 @@ def _at(told: Forecast, index: int) -> Forecast:
     return Forecast(told.wave[one], told.slopes[:, one], told.tangents[one], told.covariance)
 
 
-def resolving(first: FloatArray, second: FloatArray, gap: float) -> FloatArray:
+def resolving(
+    first: FloatArray,
+    second: FloatArray,
+    gap: float,
+    spreads: Sequence[FloatArray] | None = None,
+) -> FloatArray:
     """Return the chance that a run rules one of two rivals out.
 
-    The chi-square between them is normal about gap + separation with variance 4 separation if the
-    first is right, and about gap - separation if the second is. Each is right with the odds that
-    the present runs give.
+    The chi-square between them is taken as normal about gap + separation if the first is right,
+    and about gap - separation if the second is. Each is right with the odds that the present runs
+    give.
 
     Parameters
     ----------
@@ -308,6 +344,9 @@ def resolving(first: FloatArray, second: FloatArray, gap: float) -> FloatArray:
         Separation if that rival is right.
     gap : float
         Chi-square by which the second is worse now.
+    spreads : two arrays of shape (n,), optional
+        Standard deviations of the separations; by default 2 sqrt(separation), as of rivals whose
+        numbers are known.
 
     Examples
     --------
@@ -316,12 +355,14 @@ def resolving(first: FloatArray, second: FloatArray, gap: float) -> FloatArray:
     [0.0, 0.5, 0.99]
     """
     odds = 1.0 / (1.0 + np.exp(-np.clip(gap, -100.0, 100.0) / 2.0))
-    chance: FloatArray = odds * _parted(gap, first) + (1.0 - odds) * _parted(-gap, second)
+    if spreads is None:
+        spreads = [2.0 * np.sqrt(each) for each in (first, second)]
+    one, two = (np.maximum(spread, 1e-6) for spread in spreads)
+    chance: FloatArray = odds * _parted(gap, first, one) + (1.0 - odds) * _parted(-gap, second, two)
     return chance
 
 
-def _parted(gap: float, separation: FloatArray) -> FloatArray:
+def _parted(gap: float, separation: FloatArray, spread: FloatArray) -> FloatArray:
     """Return the chance that either comes out ahead by enough, if the one with the gap is right."""
-    spread = 2.0 * np.sqrt(np.maximum(separation, 1e-12))
     ahead = norm.sf((RESOLVED - gap - separation) / spread)
     return np.asarray(ahead + norm.sf((RESOLVED + gap + separation) / spread))

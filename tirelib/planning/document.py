@@ -120,7 +120,7 @@ def plan_force_test(
     ----------
     case : ForceCase
     envelope : Envelope or None
-        On the axes of `tirelib.planning.force_rivals.force_axes`; needed if there are suspects.
+        Of `tirelib.planning.force_rivals.force_envelope`; needed if there are suspects.
     """
     if not suspects.effects or envelope is None:
         return Plan(suspects, None, {}, wanted, case.name, case.quantity)
@@ -231,11 +231,21 @@ def _candidate(test: NextTest, k: int) -> dict[str, Any]:
     conditions = zip(test.envelope.names, test.points[k], strict=True)
     return {
         **{AXES[name].key: float(AXES[name].told(value)) for name, value in conditions},
+        **_slips(test.envelope),
         "separation": float(test.score[k]),
-        "separation_std": float(2.0 * np.sqrt(test.score[k])),
+        "separation_std": float(test.std[k]),
         "resolves_probability": float(test.probability[k]),
         "pair": list(test.pairs[test.hardest[k]].names),
     }
+
+
+def _slips(envelope: Envelope) -> dict[str, Any]:
+    """Return the slips of a run that is a sweep; the key of a single one is null then."""
+    if envelope.sweep is None:
+        return {}
+    axis = AXES[envelope.sweep.name]
+    told = [float(axis.told(value)) for value in envelope.sweep.values]
+    return {axis.key: None, axis.series: told}
 
 
 def _present(pair: PairForecast) -> dict[str, Any]:
@@ -268,12 +278,16 @@ def _envelope(envelope: Envelope) -> dict[str, Any]:
     told = {AXES[name].key: [float(AXES[name].told(x)) for x in ends]
             for name, ends in envelope.ranges.items()}  # fmt: skip
     free = [name for name in envelope.names if name not in envelope.declared]
+    if envelope.sweep is not None:
+        axis, values = AXES[envelope.sweep.name], envelope.sweep.values
+        told[axis.key] = [float(axis.told(x)) for x in (values.min(), values.max())]
     return {
         **told, "declared": list(envelope.declared),
         "widened_percent": {name: 100.0 * AXES[name].wider for name in free},
         "levels": {
             name: envelope.levels.get(name, AXES[name].levels) for name in envelope.names
         },
+        "points_of_run": envelope.points,
     }  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """The conditions that a rig allows, and a grid of possible runs in them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.errors import ParameterError
 from tirelib.model.state import Operating
+from tirelib.planning.sweep import Sweep
 from tirelib.units import from_si
 
 Range = tuple[float, float]
@@ -31,6 +32,8 @@ class Axis:
         Of the grid; a range of one value has one.
     positive : bool
         Whether only positive values make sense.
+    series : str
+        Key in JSON of the values that a sweep passes through; empty where there is no sweep of it.
     """
 
     title: str
@@ -40,6 +43,7 @@ class Axis:
     wider: float
     levels: int
     positive: bool = True
+    series: str = ""
 
     def told(self, value: Any) -> Any:
         """Return SI values in the unit."""
@@ -50,8 +54,9 @@ AXES: Mapping[str, Axis] = MappingProxyType({
     "load": Axis("load", "N", "force", "load_N", 0.25, 5),
     "pressure": Axis("pressure", "bar", "pressure", "pressure_bar", 0.15, 3),
     "speed": Axis("speed", "km/h", "speed", "speed_kmh", 0.25, 5),
-    "slip_angle": Axis("slip angle", "deg", "angle", "slip_angle_deg", 0.0, 7, False),
-    "slip_ratio": Axis("slip ratio", "1", "ratio", "slip_ratio", 0.0, 7, False),
+    "slip_angle": Axis("slip angle", "deg", "angle", "slip_angle_deg", 0.0, 7, False,
+                       "slip_angles_deg"),
+    "slip_ratio": Axis("slip ratio", "1", "ratio", "slip_ratio", 0.0, 7, False, "slip_ratios"),
     "camber": Axis("camber", "deg", "angle", "camber_deg", 0.0, 2, False),
     "temperature": Axis("tread temperature", "degC", "temperature", "temperature_degC", 0.0, 2),
 })  # fmt: skip
@@ -72,11 +77,14 @@ class Envelope:
         Which of them somebody gave; the others are the campaign's, widened.
     levels : mapping of axis to int
         Of the grid, where they are not the usual ones (`AXES`).
+    sweep : Sweep, optional
+        Slips that every run passes through (forces); they are then no axis of the grid.
     """
 
     ranges: Mapping[str, Range]
     declared: tuple[str, ...] = ()
     levels: Mapping[str, int] = field(default_factory=dict)
+    sweep: Sweep | None = None
 
     def __post_init__(self) -> None:
         faults = [
@@ -125,6 +133,24 @@ class Envelope:
         ranges = {name: given.get(name) or _campaigns(points, name) for name in axes}
         return cls(ranges, tuple(name for name in axes if name in given))
 
+    def swept(self, sweep: Sweep) -> "Envelope":
+        """Return the envelope of runs that are sweeps, over the declared range if there is one.
+
+        Raises
+        ------
+        ParameterError
+            If the range holds none of the slips.
+        """
+        if sweep.name in self.declared:
+            sweep = sweep.over(*self.ranges[sweep.name])
+        ranges = {name: ends for name, ends in self.ranges.items() if name != sweep.name}
+        return replace(self, ranges=ranges, sweep=sweep)
+
+    @property
+    def points(self) -> int:
+        """Number of points of a run: 1, or the slips of a sweep."""
+        return 1 if self.sweep is None else len(self.sweep)
+
     def grid(self) -> FloatArray:
         """Return all combinations of the levels, (n, axes)."""
         axes = []
@@ -145,13 +171,31 @@ class Envelope:
         said = []
         for name, value in zip(self.names, point, strict=True):
             axis = AXES[name]
-            number = float(axis.told(value))
-            digits = ".3g" if name in ("pressure", "slip_ratio") else ".0f"
-            digits = ".1f" if axis.dimension == "angle" else digits
-            unit = "" if axis.unit == "1" else f" {axis.unit}"
             label = f"{axis.title} " if axis.dimension in ("angle", "ratio", "temperature") else ""
-            said.append(f"{label}{number:{digits}}{unit}")
+            said.append(f"{label}{_number(name, value)}{_unit(axis)}")
+        if self.sweep is not None:
+            title = AXES[self.sweep.name].title
+            said.append(f"a sweep of {len(self.sweep)} {title}s from {self.slips}")
         return ", ".join(said)
+
+    @property
+    def slips(self) -> str:
+        """Ends of the sweep's slips in words, empty without a sweep."""
+        if self.sweep is None:
+            return ""
+        name, values = self.sweep.name, self.sweep.values
+        ends = " to ".join(_number(name, end) for end in (values.min(), values.max()))
+        return f"{ends}{_unit(AXES[name])}"
+
+
+def _number(name: str, value: float) -> str:
+    digits = ".3g" if name in ("pressure", "slip_ratio") else ".0f"
+    digits = ".1f" if AXES[name].dimension == "angle" else digits
+    return f"{float(AXES[name].told(value)):{digits}}"
+
+
+def _unit(axis: Axis) -> str:
+    return "" if axis.unit == "1" else f" {axis.unit}"
 
 
 def _campaigns(points: Any, name: str) -> Range:

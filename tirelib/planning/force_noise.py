@@ -75,18 +75,32 @@ class Counted:
         return self.whiten(rows) / self.excess
 
 
-def counted_noise(case: ForceCase, base: ForceFit, structure: FloatArray) -> tuple[Noise, Counted]:
+def counted_noise(
+    case: ForceCase, base: ForceFit, structure: FloatArray, suspected: FloatArray | None = None
+) -> tuple[Noise, Counted]:
     """Return the noise of a further point, and that which counts in the present ones.
 
     How far set points are off, the present points tell: the share that makes them likeliest.
-    What structure does not span is left by repeats. Where what is left goes together in a block
+    What neither structure nor all suspects together span is left by repeats: what an effect does
+    is no noise. Where what is left goes together in a block
     beyond its set points, noise counts as much larger as the square of their sum exceeds the sum of
     their squares; so does that of a further point, of which no more is known.
+
+    Parameters
+    ----------
+    case : ForceCase
+    base : ForceFit
+        The model without any of the suspects, fitted.
+    structure : shape (n_members, n)
+    suspected : shape (n_strengths, n), optional
+        Slopes by the strengths of all suspects, over their ranges.
     """
     problem = case.problem
     random = float(case.noise if np.isfinite(case.noise) else problem.scale)
     tangents = set_points(problem, base)
-    rest, rows = problem.measured - base.predicted, np.concatenate([base.slopes, structure])
+    rest = problem.measured - base.predicted
+    unknown = [base.slopes, structure] if suspected is None else [base.slopes, structure, suspected]
+    rows = np.concatenate(unknown)
     tried = [BlockWhitening(random, x * tangents, problem.block) for x in SHARES]
     lefts = [_left(whiten, rows, rest) for whiten in tried]
     likely = [float(np.sum(left**2)) + w.volume for w, left in zip(tried, lefts, strict=True)]

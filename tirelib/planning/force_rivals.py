@@ -9,6 +9,7 @@ to the noise, exactly.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from tirelib.planning.criterion import NOTHING, Forecast, Noise
 from tirelib.planning.envelope import Envelope
 from tirelib.planning.force_noise import Counted, counted_noise, set_points
 from tirelib.planning.on_trial import fitted_rivals
+from tirelib.planning.sweep import campaign_sweep
 
 MEMBERS = 60
 RANGE_SLACK = 2.0
@@ -103,17 +105,44 @@ def force_axes(case: ForceCase) -> tuple[str, ...]:
     return (*known, *slip, *other)
 
 
-def points_ahead(case: ForceCase, envelope: Envelope, wanted: FloatArray) -> Problem:
-    """Return the present points and, after them in time, wanted ones, as one problem.
+def force_envelope(case: ForceCase, sweep: bool | None = None, **declared: Any) -> Envelope:
+    """Return the envelope of further runs of a force: sweeps where the campaign's runs are such.
 
-    What is not planned is as in the present points, on average; rolling is steady.
+    Parameters
+    ----------
+    case : ForceCase
+    sweep : bool, optional
+        Whether a run is a sweep of the slip; by default as the campaign's runs are.
+    declared : (low, high) or None
+        By axis, SI, as for `Envelope.of`.
+
+    Raises
+    ------
+    ParameterError
+        As `Envelope.of`; or the declared range of the slip holds none of the campaign's slips.
     """
-    data, n = case.problem.bench.points.data, len(wanted)
-    columns = dict(zip(envelope.names, wanted.T, strict=True))
+    envelope = Envelope.of(case.problem.bench.conditions, force_axes(case), **declared)
+    name = "slip_ratio" if case.quantity == "Fx" else "slip_angle"
+    found = campaign_sweep(case.problem.bench.points, name, sweep)
+    return envelope if found is None else envelope.swept(found)
+
+
+def points_ahead(case: ForceCase, envelope: Envelope, wanted: FloatArray) -> Problem:
+    """Return the present points and, after them in time, those of wanted runs, as one problem.
+
+    What is not planned is as in the present points, on average; rolling is steady. The points of a
+    sweep follow each other and are one block, for a run's set points are off alike.
+    """
+    data, sweep, size = case.problem.bench.points.data, envelope.sweep, envelope.points
+    n, rate = len(wanted) * size, np.zeros(len(wanted) * size)
+    columns = dict(zip(envelope.names, np.repeat(wanted, size, axis=0).T, strict=True))
+    if sweep is not None:
+        columns[sweep.name] = np.tile(sweep.values, len(wanted))
+        rate = np.tile(sweep.rates, len(wanted))
     more = {}
     for field in fields(ForceData):
         if field.name == "block":
-            more["block"] = data.block.max() + 1 + np.arange(n)
+            more["block"] = data.block.max() + 1 + np.repeat(np.arange(len(wanted)), size)
         elif field.name in ("Fx", "Fy", "Mz"):
             more[field.name] = np.full(n, np.nan)
         else:
@@ -122,10 +151,10 @@ def points_ahead(case: ForceCase, envelope: Envelope, wanted: FloatArray) -> Pro
     points = case.problem.bench.points
     every = {k: np.concatenate([getattr(data, k), v]) for k, v in more.items()}
     joint = ForcePoints(
-        ForceData(**every), np.concatenate([points.slip_rate, np.zeros(n)]),
+        ForceData(**every), np.concatenate([points.slip_rate, rate]),
         np.concatenate([points.samples, np.ones(n, dtype=np.int64)]),
         np.concatenate([points.cell, points.cell.max() + 1 + np.arange(n)]),
-        np.concatenate([points.sweep, np.zeros(n, dtype=bool)]),
+        np.concatenate([points.sweep, np.full(n, bool(rate.any()))]),
     )  # fmt: skip
     bench = ForceBench.of(case.model, joint)
     order = np.concatenate([case.problem.bench.conditions.order, np.ones(n)])
@@ -196,7 +225,7 @@ def try_force_suspects(
         Whether the base itself is a rival.
     progress : callable, optional
     """
-    noise, white = counted_noise(case, base, structure)
+    noise, white = counted_noise(case, base, structure, _suspected(case, base, suspects))
     fits = {effect.name: partial(_with, case, base, effect, structure, white)
             for effect, _ in suspects}  # fmt: skip
     rivals, left_out = fitted_rivals(
@@ -206,6 +235,28 @@ def try_force_suspects(
     return ForceTrial(rivals, left_out, 1.0, noise, white)
 
 
+def _faint(case: ForceCase, base: ForceFit, effect: Effect) -> ForceFit:
+    """Return the base with an effect of strength zero, and the slopes there."""
+    zero = replace(
+        base, effects=(*base.effects, effect),
+        strengths=(*base.strengths, np.zeros(effect.components)),
+    )  # fmt: skip
+    return replace(zero, slopes=slopes_at(case.problem, zero))
+
+
+def _suspected(
+    case: ForceCase, base: ForceFit, suspects: Sequence[tuple[Effect, FloatArray]]
+) -> FloatArray:
+    """Return the slopes by the strengths of those suspects that can be computed."""
+    rows = [np.zeros((0, len(case.problem)))]
+    for effect, _ in suspects:
+        try:
+            rows.append(_faint(case, base, effect).slopes[len(base.slopes) :])
+        except TirelibError:
+            continue  # its fit will fail and say why
+    return np.concatenate(rows)
+
+
 def _with(
     case: ForceCase, base: ForceFit, effect: Effect, structure: FloatArray, white: Counted
 ) -> ForceRival:
@@ -213,12 +264,7 @@ def _with(
 
     The fit is the best without structure; beside it, it may be a worse place to start from.
     """
-    zero = replace(
-        base, effects=(*base.effects, effect),
-        strengths=(*base.strengths, np.zeros(effect.components)),
-    )  # fmt: skip
-    zero = replace(zero, slopes=slopes_at(case.problem, zero))
-    about = (with_effect(case.problem, base, effect), zero)
+    about = (with_effect(case.problem, base, effect), _faint(case, base, effect))
     found = [_rival(case, effect.name, fit, structure, white) for fit in about]
     return min(found, key=lambda rival: rival.cost)
 
@@ -244,16 +290,20 @@ def _rival(
     return rival
 
 
-def force_forecasts(trial: ForceTrial, ahead: Problem, structure: FloatArray) -> list[Forecast]:
-    """Return what every rival says of points ahead, each one sample.
+def force_forecasts(
+    trial: ForceTrial, ahead: Problem, structure: FloatArray, size: int = 1
+) -> list[Forecast]:
+    """Return what every rival says of runs ahead, each point of them one sample.
 
     Parameters
     ----------
     trial : ForceTrial
     ahead : Problem
-        Of these points.
+        Of their points, run after run.
     structure : shape (n_members, n)
         There.
+    size : int
+        Points of a run. Its set points are off alike in all of them.
 
     Raises
     ------
@@ -264,10 +314,11 @@ def force_forecasts(trial: ForceTrial, ahead: Problem, structure: FloatArray) ->
     for rival in trial.rivals:
         slopes = np.concatenate([slopes_at(ahead, rival.fit), structure])
         wave = ahead.predict(rival.fit.values, rival.fit.changes) + rival.weights @ slopes
+        off = set_points(ahead, rival.fit)
         told.append(
             Forecast(
-                wave[:, None], slopes[..., None],
-                trial.counted.share * set_points(ahead, rival.fit)[:, None], rival.covariance,
+                wave.reshape(-1, size), slopes.reshape(len(slopes), -1, size),
+                trial.counted.share * off.reshape(-1, size, off.shape[1]), rival.covariance,
             )
         )  # fmt: skip
     return told

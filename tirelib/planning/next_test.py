@@ -98,7 +98,7 @@ def force_next_test(
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
 ) -> NextTest:
-    """Judge further points of a force by how well they part suspects.
+    """Judge further runs of a force by how well they part suspects: points, or sweeps.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def force_next_test(
         The model without the suspects, fitted.
     suspects : sequence of (effect, start strength)
     envelope : Envelope
-        On the axes of `force_axes`.
+        Of `tirelib.planning.force_rivals.force_envelope`.
     with_nothing : bool
         Whether that nothing is missing is a rival too.
     members, seed : int
@@ -121,9 +121,9 @@ def force_next_test(
         If no point in the envelope has a solution.
     """
     tell = progress or (lambda label: None)
-    chosen, n = envelope.grid(), len(case.problem)
+    chosen, n, size = envelope.grid(), len(case.problem), envelope.points
     joint = points_ahead(case, envelope, chosen)
-    good = _solvable(joint, base, n)
+    good = _solvable(joint, base, n).reshape(-1, size).all(axis=1)
     if not good.any():
         raise _hopeless(len(chosen))
     points = chosen[good]
@@ -133,9 +133,9 @@ def force_next_test(
     trial = try_force_suspects(
         case, base, suspects, structure[:, :n], with_nothing=with_nothing, progress=progress
     )
-    tell(f"{len(points)} points")
-    ahead = joint.take(np.arange(n, n + len(points)))
-    told = force_forecasts(trial, ahead, structure[:, n:])
+    tell(f"{len(points)} runs")
+    ahead = joint.take(np.arange(n, len(joint)))
+    told = force_forecasts(trial, ahead, structure[:, n:], size)
     return judged(envelope, points, trial, told, len(chosen) - len(points), trial.noise)
 
 

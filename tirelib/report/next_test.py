@@ -19,9 +19,10 @@ from tirelib.report.style import BLUE, FAINT, RED
 TITLE = "Which run to measure next"
 METHOD = (
     "Every suspect is fitted to the present runs, with what variants of the model do anyway among "
-    "the unknowns. At each possible run one suspect is taken as true and the other may adapt "
-    "within what the present runs leave open of it; what it still misses, in chi-square, is the "
-    "separation. The smaller of both directions counts. A chi-square of "
+    "the unknowns. At each possible run one suspect is taken as true, with what the present runs "
+    "leave open of it, and the other may adapt within what they leave open of its own; what it "
+    "still misses, in chi-square, is the separation. The smaller of both directions counts. A "
+    "chi-square of "
     f"{RESOLVED:.0f} between two suspects rules the worse one out."
 )
 SOURCES = (
@@ -81,20 +82,20 @@ def _said(pair: PairForecast) -> str:
 
 def _runs(test: NextTest) -> Table:
     rows = []
-    names = test.envelope.names
+    names, swept = test.envelope.names, [test.envelope.slips] if test.envelope.sweep else []
     for k in range(min(SHOWN, len(test.points))):
         rows.append([
-            str(k + 1), *_told(test, test.points[k]),
-            number(test.score[k], 3), number(2.0 * float(np.sqrt(test.score[k])), 2),
+            str(k + 1), *_told(test, test.points[k]), *swept,
+            number(test.score[k], 3), number(float(test.std[k]), 2),
             number(100.0 * test.probability[k], 2), _said(test.pairs[test.hardest[k]]),
         ])  # fmt: skip
     median = [
-        "any run", *[""] * len(names), number(float(np.median(test.score)), 3), "",
+        "any run", *[""] * (len(names) + len(swept)), number(float(np.median(test.score)), 3), "",
         number(100.0 * float(np.mean(test.probability)), 2), "",
     ]  # fmt: skip
     return Table(
         "Possible runs",
-        ["rank", *[_heading(name) for name in names], "separation", "std",
+        ["rank", *[_heading(name) for name in names], *["sweep"] * len(swept), "separation", "std",
          "chance to resolve [%]", "hardest pair"],
         [*rows, median],
         note="Separation of the pair that is hardest there; the chance is a mean over the pairs in "
@@ -119,6 +120,10 @@ def _envelope_text(test: NextTest) -> str:
                  zip(*envelope.ranges.values(), strict=True))  # fmt: skip
     open_ = [n for n in envelope.names if n not in envelope.declared and AXES[n].wider > 0.0]
     text = f"Envelope: from {low} to {high}."
+    if envelope.sweep is not None:
+        name, values = envelope.sweep.name, envelope.sweep.values
+        slips = ", ".join(f"{AXES[name].told(value):.3g}" for value in values)
+        text += f" Every run is a sweep: {_heading(name)} {slips}."
     if open_:
         wider = ", ".join(f"{name} by {100 * AXES[name].wider:.0f} %" for name in open_)
         text += f" Not declared, so the campaign's range was widened to both sides: {wider}."
@@ -127,13 +132,20 @@ def _envelope_text(test: NextTest) -> str:
     return text
 
 
-def _plane(test: NextTest) -> tuple[int, int, int | None]:
-    """Return the columns of the points that a map shows: along, upward, and one panel each."""
-    names = test.envelope.names
+def _plane(test: NextTest) -> tuple[int, int | None, int | None]:
+    """Return the columns of the points that a map shows: along, upward, and one panel each.
+
+    Upward of sweeps is what they vary beside load and pressure, where there is such.
+    """
+    names, ranges = test.envelope.names, test.envelope.ranges
     slip = next((name for name in names if name.startswith("slip")), None)
-    along, up = ("load", "speed") if slip is None else (slip, "load")
     panel = names.index("pressure") if "pressure" in names else None
-    return names.index(along), names.index(up), panel
+    if slip is not None:
+        return names.index(slip), names.index("load"), panel
+    other = [name for name in names if name not in ("load", "pressure")]
+    varied = [name for name in other if ranges[name][1] > ranges[name][0]]
+    up = next(iter([*varied, *other]), None)
+    return names.index("load"), None if up is None else names.index(up), panel
 
 
 def _map(test: NextTest, pair: PairForecast) -> Plot:
@@ -142,11 +154,14 @@ def _map(test: NextTest, pair: PairForecast) -> Plot:
     names, best = test.envelope.names, test.points[0]
     others = [k for k in range(len(names)) if k not in (x, y, panel)]
     shown = np.flatnonzero((test.points[:, others] == best[others]).all(axis=1))
-    xs, ys = np.unique(test.points[shown, x]), np.unique(test.points[shown, y])
+    height = test.points[:, y] if y is not None else np.zeros(len(test.points))
+    xs, ys = np.unique(test.points[shown, x]), np.unique(height[shown])
     panels = np.unique(test.points[shown, panel]) if panel is not None else np.zeros(1)
     of_panel = test.points[:, panel] if panel is not None else np.zeros(len(test.points))
     top = max(float(pair.separation[shown].max()), 1.0)
-    across, upward = (np.round(AXES[names[k]].told(v), 2) for k, v in ((x, xs), (y, ys)))
+    across = np.round(AXES[names[x]].told(xs), 2)
+    upward = np.round(_upward(test, y, ys), 2)
+    hover = _hover(names[x], names[y] if y is not None else None)
     figure = make_subplots(
         cols=len(panels), shared_yaxes=True, horizontal_spacing=0.03,
         subplot_titles=[f"{AXES['pressure'].told(p):.3g} bar" for p in panels] if panel else None,
@@ -155,17 +170,17 @@ def _map(test: NextTest, pair: PairForecast) -> Plot:
         grid = np.full((len(ys), len(xs)), np.nan)
         chance = grid.copy()
         for k in shown[of_panel[shown] == level]:
-            at = np.searchsorted(ys, test.points[k, y]), np.searchsorted(xs, test.points[k, x])
+            at = np.searchsorted(ys, height[k]), np.searchsorted(xs, test.points[k, x])
             grid[at], chance[at] = pair.separation[k], 100.0 * pair.probability[k]
         figure.add_trace(
             go.Heatmap(
                 z=np.round(grid, 3), x=across, y=upward, customdata=np.round(chance),
-                coloraxis="coloraxis", hovertemplate=_hover(names[x], names[y]),
+                coloraxis="coloraxis", hovertemplate=hover,
                 texttemplate="%{z:.2~r}", textfont={"size": 11},
             ),
             row=1, col=column,
         )  # fmt: skip
-    at_best = AXES[names[x]].told(best[x]), AXES[names[y]].told(best[y])
+    at_best = AXES[names[x]].told(best[x]), float(_upward(test, y, height[0]))
     figure.add_trace(
         go.Scatter(
             x=[at_best[0]], y=[at_best[1]], mode="markers", showlegend=False,
@@ -175,7 +190,9 @@ def _map(test: NextTest, pair: PairForecast) -> Plot:
         row=1, col=int(np.searchsorted(panels, of_panel[0])) + 1,
     )  # fmt: skip
     figure.update_xaxes(title=_heading(names[x]))
-    figure.update_yaxes(title=_heading(names[y]), col=1)
+    figure.update_yaxes(title=_heading(names[y]) if y is not None else "", col=1)
+    if len(ys) == 1:
+        figure.update_yaxes(tickvals=list(upward) if y is not None else [])
     styled_figure(
         figure, 420, coloraxis={"colorscale": "Viridis", "cmin": 0.0, "cmax": top,
                                 "colorbar": {"title": {"text": "separation"}}},
@@ -193,9 +210,15 @@ def _map(test: NextTest, pair: PairForecast) -> Plot:
     )  # fmt: skip
 
 
-def _hover(x: str, y: str) -> str:
+def _upward(test: NextTest, y: int | None, values: FloatArray) -> FloatArray:
+    """Return a map's upward values in their unit."""
+    return np.asarray(values if y is None else AXES[test.envelope.names[y]].told(values))
+
+
+def _hover(x: str, y: str | None) -> str:
+    upward = "" if y is None else f", %{{y}} {AXES[y].unit}"
     return (
-        f"%{{x}} {AXES[x].unit}, %{{y}} {AXES[y].unit}: separation %{{z:.3g}}, chance "
+        f"%{{x}} {AXES[x].unit}{upward}: separation %{{z:.3g}}, chance "
         "%{customdata} %<extra></extra>"
     )
 

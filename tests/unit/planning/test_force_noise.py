@@ -69,10 +69,10 @@ def test_a_forecast_holds_what_the_present_points_tell_of_structure_and_set_poin
     assert np.sum(left**2) < rival.cost < np.sum(plain**2)
     exact = replace(trial, counted=replace(trial.counted, share=0.0))
     rough = replace(trial, counted=replace(trial.counted, share=2.0))
-    other = told.wave + 10.0 * NOISE
+    forecasts = [force_forecasts(each, problem, structure)[0] for each in (exact, rough)]
     sizes = [
-        force_forecasts(each, problem, structure)[0].separation(other, Noise(NOISE, 0.0), 1.0)
-        for each in (exact, rough)
+        each.missed(replace(each, wave=told.wave + 10.0 * NOISE), Noise(NOISE, 0.0), 1.0)[0]
+        for each in forecasts
     ]
     assert (sizes[0] > 1.05 * sizes[1]).mean() > 0.5
     assert (sizes[0] >= sizes[1]).all()

@@ -23,6 +23,9 @@ SAMPLES = 4
 ENVELOPE = Envelope({"load": (1e3, 5e3), "pressure": (2e5, 2e5), "speed": (20.0, 20.0)})
 
 
+SPREADS = [np.sqrt([4.0 * 0.36 + 2.0 * 0.9**2]), np.sqrt([4.0 * 360.0 + 2.0 * 9.0**2])]
+
+
 def rival(name: str, cost: float) -> Any:
     return SimpleNamespace(name=name, cost=cost, strength=np.zeros(1), in_range=True)
 
@@ -51,8 +54,8 @@ def test_the_smaller_of_both_directions_is_told() -> None:
     told = [forecast([6.0], adapts=3.0), forecast([0.0])]
     for pair in (told, told[::-1]):
         found = plan_of([rival("a", 0.0), rival("b", 0.0)], pair)
-        # 36 over a variance of 1 + 9, against 36
-        assert found.score == pytest.approx([3.6])
+        # 36 over a variance of 1 + 9, less what it gives away; against 36 and those 9
+        assert found.score == pytest.approx([3.6 - 0.9])
 
 
 def test_the_chance_weighs_the_direction_that_the_present_runs_favor() -> None:
@@ -61,7 +64,7 @@ def test_the_chance_weighs_the_direction_that_the_present_runs_favor() -> None:
     for gap in (6.0, -6.0):
         found = plan_of([rival("a", 0.0), rival("b", gap)], told)
         assert found.pairs[0].gap == gap
-        expected = resolving(np.array([3.6]), np.array([36.0]), gap)
+        expected = resolving(np.array([2.7]), np.array([45.0]), gap, SPREADS)
         assert found.probability == pytest.approx(expected)
     likely = [plan_of([rival("a", 0.0), rival("b", gap)], told).probability[0] for gap in (6, -6)]
     assert likely[1] > likely[0] + 0.1
@@ -74,7 +77,8 @@ def test_against_nothing_only_an_effect_that_exists_counts(first: bool) -> None:
     told = [forecast([0.0]), forecast([6.0], adapts=30.0)]
     order = slice(None) if first else slice(None, None, -1)
     found = plan_of(rivals[order], told[order])
-    assert found.score == pytest.approx([36.0])
+    # the effect's strength is open by 30 standard deviations
+    assert found.score == pytest.approx([36.0 + 900.0])
 
 
 def test_the_hardest_pair_is_the_least_parted_of_those_that_are_open() -> None:

@@ -34,6 +34,11 @@ from tirelib.planning.variants import Track
 SPLIT = Noise(random=2.0, staying=1.5)
 
 
+def missed(told: Forecast, wave: np.ndarray, repeats: float = 1.0) -> np.ndarray:
+    """Return by how much a rival misses another waveform that is as unsure as its own."""
+    return told.missed(replace(told, wave=wave), SPLIT, repeats)[0]
+
+
 def forecast(scale: float = 1.0) -> tuple[Forecast, np.ndarray]:
     random = np.random.default_rng(1)
     factor = random.standard_normal((3, 3))
@@ -49,7 +54,7 @@ def test_the_separation_is_the_squared_difference_in_the_metric_of_all_that_is_u
     repeats: float,
 ) -> None:
     told, other = forecast()
-    found = told.separation(other, SPLIT, repeats)
+    found = missed(told, other, repeats)
     for p in range(2):
         slopes, tangents = told.slopes[:, p], told.tangents[p]
         whole = (
@@ -65,23 +70,52 @@ def test_who_predicts_the_same_is_not_separated_and_twice_the_difference_counts_
     None
 ):
     told, other = forecast()
-    assert told.separation(told.wave, SPLIT, 1.0) == pytest.approx(0.0)
+    assert missed(told, told.wave) == pytest.approx(0.0)
     twice = told.wave + 2.0 * (other - told.wave)
-    once = told.separation(other, SPLIT, 1.0)
-    assert told.separation(twice, SPLIT, 1.0) == pytest.approx(4.0 * once)
+    assert missed(told, twice) == pytest.approx(4.0 * missed(told, other))
+
+
+def test_what_is_told_is_the_mean_and_the_variance_of_the_chi_square_between_rivals() -> None:
+    """By draws of the true one's forecast; the one that misses has numbers of its own."""
+    one, wave = forecast()
+    other = replace(
+        one, wave=wave, slopes=2.0 * one.slopes[::-1], tangents=0.5 * one.tangents,
+        covariance=1.5 * one.covariance,
+    )  # fmt: skip
+    mean, variance = one.missed(other, SPLIT, 2.0)
+    random = np.random.default_rng(6)
+    for p in range(2):
+        own, true = (each.spread(SPLIT, 2.0)[p] for each in (one, other))
+        drawn = random.multivariate_normal(other.wave[p], true, 40000)
+        costs = [
+            np.sum((drawn - each.wave[p]) * np.linalg.solve(v, (drawn - each.wave[p]).T).T, axis=1)
+            for each, v in ((one, own), (other, true))
+        ]
+        gap = costs[0] - costs[1]
+        assert mean[p] == pytest.approx(gap.mean(), abs=5.0 * gap.std() / 200.0)
+        assert variance[p] == pytest.approx(gap.var(), rel=0.1)
+
+
+def test_an_effect_whose_strength_is_open_may_be_far_from_its_best_guess() -> None:
+    """Two best guesses alike say nothing of a run at which one of them is hardly known."""
+    told, _ = forecast()
+    vague = replace(told, covariance=50.0 * told.covariance)
+    assert (told.missed(vague, SPLIT, 1.0)[0] > 10.0).all()
+    # the other way round it only gives away what it is unsure of
+    assert (vague.missed(told, SPLIT, 1.0)[0] < 0.0).all()
 
 
 def test_a_rival_that_knows_its_numbers_less_is_harder_to_catch() -> None:
     sharp, other = forecast(1e-6)
     vague, _ = forecast(100.0)
-    assert (vague.separation(other, SPLIT, 1.0) < sharp.separation(other, SPLIT, 1.0)).all()
+    assert (missed(vague, other) < missed(sharp, other)).all()
 
 
 @given(first=st.integers(1, 30), more=st.integers(1, 30))
 def test_repeats_never_harm_and_structure_limits_them(first: int, more: int) -> None:
     told, other = forecast()
-    few, many = (told.separation(other, SPLIT, n) for n in (first, first + more))
-    limit = told.separation(other, SPLIT, ENDLESS)
+    few, many = (missed(told, other, n) for n in (first, first + more))
+    limit = missed(told, other, ENDLESS)
     assert (few <= many).all()
     assert (many <= limit).all()
 
@@ -196,7 +230,7 @@ def test_the_document_holds_the_contracts_keys_in_engineers_units() -> None:
     assert best["load_N"] == pytest.approx(test.points[0, 0])
     assert best["pressure_bar"] == pytest.approx(1e-5 * test.points[0, 1])
     assert best["speed_kmh"] == pytest.approx(3.6 * test.points[0, 2])
-    assert best["separation_std"] == pytest.approx(2.0 * np.sqrt(best["separation"]))
+    assert best["separation_std"] == pytest.approx(test.std[0])
     assert best["pair"] == [TWIN, PLANTED]
     assert told["random_median"]["separation"] < best["separation"]
     assert told["envelope"]["declared"] == []
