@@ -1,4 +1,4 @@
-"""Three campaigns of the rig, stored: the verdict on what they hide."""
+"""Campaigns of the rig, stored: the verdict on what they hide."""
 
 from functools import cache
 from pathlib import Path
@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from hidden.cases import Case, load_case
 from hidden.judge import judge, outcome
+
+from tirelib.diagnose.stage import ALARM
 
 DATA = Path(__file__).parent / "data"
 MEMBERS = 16
@@ -49,6 +51,14 @@ def test_a_warm_up_with_another_law_is_named_and_its_addition_takes_the_error_aw
 def test_an_oval_tire_which_no_effect_tells_is_unknown() -> None:
     found = told("1000-oval_tire-1.50")
     assert (found["outcome"], found["verdict"], found["named"]) == ("flagged", "unknown", [])
+
+
+def test_shear_that_first_order_gives_to_others_is_named_and_its_addition_takes_the_error() -> None:
+    found = told("1700-belt_shear-1.20")
+    assert found["named"] == ["belt_shear"]
+    assert found["outcome"] == "right"
+    assert found["leaders"][0]["ratio"] < ALARM  # to first order it would not have been
+    assert found["error"]["after"] <= 1.05 * found["error"]["floor"]
 
 
 def test_a_stored_case_keeps_its_campaign() -> None:

@@ -42,7 +42,7 @@ class Finding:
     score, threshold : float
         Misfit that returns without it, and the largest such of the variants.
     level : str
-        alarm, hint or quiet.
+        alarm, hint or quiet; what is named is an alarm by its exact fit, whatever first order says.
     strength, std : shape (components,)
     in_range : bool
     share : float
@@ -176,10 +176,9 @@ def _findings(first: Stage, named: Sequence[str], model: Refit, data: Data) -> t
         if name in named:
             k = fitted[name]
             strength, std = model.strengths[k], model.strength_std(k)
-            alarm = row.score >= ALARM * row.threshold
             row = replace(
                 row, strength=strength, std=std, in_range=within(candidate.effect, strength, std),
-                level="alarm" if alarm else row.level,
+                level="alarm",
             )  # fmt: skip
         rows.append(row)
     order = {name: k for k, name in enumerate(named)}

@@ -113,7 +113,11 @@ def crowned(curvature: float) -> Change:
                 break
             depth = depth + wrong / slope
         else:
-            raise ConvergenceError("crowned tread: the load does not settle", pressed, 0.0)
+            raise ConvergenceError(
+                f"crowned tread of {curvature:g} 1/m: the strips' load is off by up to "
+                f"{np.abs(wrong).max():.2g} N after {PASSES} passes; draw another tire",
+                pressed, float(np.abs(wrong).max()),
+            )  # fmt: skip
         belt = pressed.displacement.reshape(strips, n, *state.belt.shape[1:])
         return state.but(belt=np.tensordot(SHARES, belt, axes=1), deflection=depth)
 

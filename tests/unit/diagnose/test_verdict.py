@@ -1,0 +1,43 @@
+"""What a verdict makes of an explanation: in the metric of structure, and in plain error."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from tirelib.diagnose.diagnose import BEYOND, EXPLAINED, FELL, HALVED, _verdict
+
+
+def stage(misfit: float, error: float, beyond: float = 1.0, **told: float) -> Any:
+    """Return what a verdict looks at of a stage."""
+    seen = {"outside": 0.0, "imitated": 0.0} | told
+    return SimpleNamespace(
+        scores=SimpleNamespace(misfit=misfit), unit=100.0, beyond=beyond,
+        model=SimpleNamespace(error=error), **seen,
+    )  # fmt: skip
+
+
+FIRST = stage(1100.0, 1.0, 5.0)
+
+
+def after(explained: float, fell: float, beyond: float = 1.0) -> Any:
+    return stage(100.0 + 1000.0 * (1.0 - explained), float((1.0 - fell) ** 0.5), beyond)
+
+
+@pytest.mark.parametrize(
+    ("explained", "fell", "beyond", "verdict"),
+    [
+        (EXPLAINED + 0.01, FELL + 0.01, 1.0, "named"),
+        (EXPLAINED - 0.01, FELL + 0.01, 1.0, "unknown"),
+        (0.0, HALVED + 0.01, 1.0, "named"),
+        (0.0, HALVED + 0.01, BEYOND + 0.1, "form_inadequate"),
+        (0.0, HALVED - 0.01, 1.0, "unknown"),
+        (EXPLAINED + 0.01, FELL - 0.01, 1.0, "unknown"),
+    ],
+)
+def test_what_is_named_takes_the_misfit_or_half_of_the_error_and_never_none_of_it(
+    explained: float, fell: float, beyond: float, verdict: str
+) -> None:
+    told, named = _verdict(["a"], [], FIRST, after(explained, fell, beyond), None)
+    assert told == verdict
+    assert named == (["a"] if verdict != "unknown" else [])
