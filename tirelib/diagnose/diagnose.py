@@ -10,7 +10,7 @@ from tirelib.diagnose.left import left_of
 from tirelib.diagnose.noise import noise_in, white_level
 from tirelib.diagnose.refit import Refit, refit
 from tirelib.diagnose.rivals import inseparable
-from tirelib.diagnose.rounds import rounds
+from tirelib.diagnose.rounds import FELL, HALVED, fall, rounds
 from tirelib.diagnose.stage import ALARM, Stage, within
 from tirelib.diagnose.stored import ensemble_of
 from tirelib.diagnose.unlisted import UNLISTED
@@ -22,11 +22,10 @@ OUTSIDE = 3.0
 """Ratio of an effect outside its range from which something unknown is there."""
 BARELY = 15.0
 """The same for one that is outside by no more than structure imitates."""
-EXPLAINED, HALVED = 0.8, 0.45
-"""Share of the misfit beyond structure's, or of the squared error, that named effects have to
-explain: another law of the same effect may leave what no structure does, but takes the error."""
-FELL = 0.05
-"""Least share of the squared error: what takes none of it stands for structure."""
+EXPLAINED = 0.8
+"""Share of the misfit beyond structure's that named effects have to explain, or `HALVED` of the
+squared error: another law of the same effect may leave what no structure does, but takes the error.
+"""
 BEYOND = 2.0
 """What the joint fit leaves, over what noise and structure outside the ensemble usually leave, from
 which on something unknown is there."""
@@ -221,9 +220,8 @@ def _verdict(
     if not named:
         outside = last.outside >= OUTSIDE or last.imitated >= BARELY
         return ("unknown" if like or beyond or outside else "none"), []
-    fell = 1.0 - (last.model.error / first.model.error) ** 2
-    explained = left <= max((1.0 - EXPLAINED) * excess, 0.0) or fell >= HALVED
-    if fell < FELL or not explained:
+    explained = left <= max((1.0 - EXPLAINED) * excess, 0.0) or fall(first, last) >= HALVED
+    if fall(first, last) < FELL or not explained:
         return "unknown", []
     if twins and len(named) == 1:
         return "indistinguishable", [named[0], *twins]

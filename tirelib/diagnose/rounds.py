@@ -25,6 +25,11 @@ independent of them has nothing to do with that."""
 LARGE = 1.0
 """Share of its range by which an effect may be larger in the exact refit and yet be named, with a
 word that it is: a range is what is plausible, and what explains the misfit speaks for itself."""
+FELL = 0.05
+"""Least share of the squared error that an effect has to take beside the others: what takes none of
+it stands for structure."""
+HALVED = 0.45
+"""Share of the squared error from which an effect is needed whatever imitates it."""
 IMITATED = 1.0
 """Ratio of what cannot be from which first order is not trusted where it names nothing."""
 ROUNDS = 3
@@ -127,7 +132,17 @@ def _added(
             break
         barred |= large
     needed = [(after, index) for index in leaders if (after := tried[index]) is not None]
+    if not needed and before:  # what imitates the impossible, but takes half of the error
+        for index in stage.leaders(suspects, bar, 0.0, barred):
+            after = tried[index] if index in tried else _trial(first, stage, index, fitted)
+            if after is not None and fall(stage, after) >= HALVED:
+                needed.append((after, index))
     return min(needed, key=lambda pair: pair[0].scores.misfit, default=None)
+
+
+def fall(before: Stage, after: Stage) -> float:
+    """Return the share of the squared error that is gone."""
+    return 1.0 - (after.model.error / before.model.error) ** 2
 
 
 def _trial(first: Stage, stage: Stage, index: int, fitted: _Fit) -> Stage | None:
@@ -142,7 +157,9 @@ def _trial(first: Stage, stage: Stage, index: int, fitted: _Fit) -> Stage | None
     # to first order only if the exact refit does not need it
     if after is None or stage.scores.misfit - after.scores.misfit < ALARM * stage.limit[index]:
         return None
-    return after
+    # the first may be hidden in the error by another that is to come
+    first_or_none = stage is first or stage.unlisted[index]
+    return after if first_or_none or fall(stage, after) >= FELL else None
 
 
 def _fits(after: Stage | None) -> bool:
@@ -164,7 +181,8 @@ def _thinned(
         without = fitted(stage, effects, [stage.model.strengths[k] for k in kept])
         if without is None:
             continue
-        if without.scores.misfit - stage.scores.misfit < ALARM * least[name]:
+        back = without.scores.misfit - stage.scores.misfit
+        if back < ALARM * least[name] or fall(without, stage) < FELL:
             stage = without
             gone.add(name)
     return stage, gone

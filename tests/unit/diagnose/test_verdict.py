@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from tirelib.diagnose.diagnose import BEYOND, EXPLAINED, FELL, HALVED, _verdict
+from tirelib.diagnose.diagnose import BEYOND, EXPLAINED, _verdict
+from tirelib.diagnose.rounds import FELL, HALVED
 
 
 def stage(misfit: float, error: float, beyond: float = 1.0, **told: float) -> Any:
