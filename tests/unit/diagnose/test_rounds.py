@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from tirelib.diagnose import rounds
-from tirelib.diagnose.diagnose import BARELY, EXPLAINED, OUTSIDE, _verdict
-from tirelib.diagnose.rounds import CLEAR, LARGE, ROUNDS
+from tirelib.diagnose.rounds import CLEAR, FELL, HALVED, LARGE, ROUNDS
 from tirelib.diagnose.stage import ALARM, ALONE, NEAR, OWN, Stage
 
 NAMES = ("strong", "close", "weak")
@@ -29,10 +28,13 @@ def stage(
     over: Sequence[str] = (),
     strength: float = 0.5,
     independent: bool = False,
+    error: float | None = None,
+    imitated: Sequence[str] = (),
 ) -> Any:
     """Return a stage whose model has some effects and scores the others; with who leads there.
 
-    What is over its range is barred together with all that it leads.
+    What is over its range is barred together with all that it leads. Those `imitated` lead only
+    where what cannot be does not count. The squared error goes with the misfit if it is not told.
     """
     others = [name for name in NAMES if name not in has]
     return SimpleNamespace(
@@ -41,7 +43,9 @@ def stage(
             effects=[effect(name) for name in has],
             strengths=[np.full(1, strength) for _ in has],
             strength_std=lambda _: np.full(1, 0.01),
+            error=float(np.sqrt(misfit / 1000.0)) if error is None else error,
         ),
+        unlisted=np.zeros(len(others), dtype=bool),
         found=SimpleNamespace(living=[SimpleNamespace(effect=effect(name)) for name in others]),
         scores=SimpleNamespace(
             misfit=misfit, score=np.array(score), strength=[np.array([0.5])] * len(others)
@@ -49,8 +53,10 @@ def stage(
         limit=np.full(len(others), 10.0),
         over=np.isin(others, over),
         independent=np.full(len(others), independent),
-        leaders=lambda suspects, bar, clear, barred, spared: (
-            [] if barred else [others.index(name) for name in leaders]
+        leaders=lambda suspects, bar, clear, barred, spared=False: (
+            []
+            if barred
+            else [others.index(name) for name in (leaders if clear else [*leaders, *imitated])]
         ),
     )
 
@@ -110,6 +116,35 @@ def test_what_the_laws_before_may_be_off_by_is_no_effect() -> None:
     assert added(stage(("strong",), 400.0, [rough + 0.1, 0.0], ["close"]), fit(left)) == "close"
     apart = stage(("strong",), 400.0, [rough - 0.1, 0.0], ["close"], independent=True)
     assert added(apart, fit(left)) == "close", "it has nothing to do with those before"
+
+
+@pytest.mark.parametrize(("gone", "name"), [(HALVED + 0.01, "close"), (HALVED - 0.01, "")])
+def test_what_takes_half_of_the_error_is_needed_whatever_imitates_it(
+    gone: float, name: str
+) -> None:
+    fitted = fit({("strong", "close"): 400.0 * (1.0 - gone)})
+    now = stage(("strong",), 400.0, [300.0, 0.0], imitated=["close"])
+    assert added(now, fitted) == name
+    alone = stage((), 400.0, [300.0, 0.0, 0.0], imitated=["close"])
+    assert not added(alone, fit({("close",): 100.0})), "the first is not spared so"
+
+
+@pytest.mark.parametrize(("gone", "name"), [(FELL + 0.01, "close"), (FELL - 0.01, "")])
+def test_a_further_effect_has_to_take_a_share_of_the_error(gone: float, name: str) -> None:
+    def fitted(before: Any, effects: Sequence[Any], strengths: Sequence[Any]) -> Any:
+        return stage(("strong", "close"), 300.0, [0.0], error=float(np.sqrt(1.0 - gone)))
+
+    now = stage(("strong",), 400.0, [300.0, 0.0], ["close"], error=1.0)
+    assert added(now, fitted) == name
+
+
+def test_an_effect_without_which_the_error_stays_goes() -> None:
+    both = stage(("strong", "close"), 290.0, [0.0], error=1.0)
+    least = dict.fromkeys(NAMES, 10.0)
+    for back, names in ((FELL - 0.01, {"strong"}), (FELL + 0.01, set())):
+        without = stage(("close",), 600.0, [0.0] * 2, error=float(np.sqrt(1.0 / (1.0 - back))))
+        _, gone = rounds._thinned(both, ["strong"], least, lambda *_, one=without: one)
+        assert gone == names
 
 
 def test_an_effect_that_a_later_one_replaces_goes() -> None:
@@ -193,8 +228,11 @@ def test_what_is_independent_has_to_be_clear_of_the_impossible_that_is_so_too(
 def test_each_further_effect_has_to_stand_out_more() -> None:
     asked: list[tuple[float, float, bool]] = []
 
-    def leaders(_: set[str], bar: float, clear: float, __: set[str], *, spared: bool) -> list[int]:
-        asked.append((bar, clear, spared))
+    def leaders(
+        _: set[str], bar: float, clear: float, __: set[str], *, spared: bool = False
+    ) -> list[int]:
+        if clear:
+            asked.append((bar, clear, spared))
         return []
 
     now = stage((), 1000.0, SCORE)
@@ -222,33 +260,3 @@ def test_what_is_in_no_catalogue_contends_without_being_a_suspect() -> None:
 def test_hints_alone_have_no_leader() -> None:
     stage = judged([ALARM - 0.1, 2.0, 1.0], [100.0, 100.0, 100.0])
     assert Stage.leaders(stage, set(stage.names), ALARM, 1.0) == []
-
-
-@pytest.mark.parametrize(
-    ("outside", "imitated", "verdict"),
-    [
-        (OUTSIDE - 0.1, BARELY - 0.1, "none"),
-        (OUTSIDE + 0.1, 0.0, "unknown"),
-        (0.0, BARELY + 0.1, "unknown"),
-    ],
-)
-def test_what_cannot_be_but_explains_tells_of_something_unknown(
-    outside: float, imitated: float, verdict: str
-) -> None:
-    scores = SimpleNamespace(misfit=1.0)
-    stage = SimpleNamespace(
-        scores=scores, unit=1.0, beyond=1.0, outside=outside, imitated=imitated
-    )  # fmt: skip
-    assert _verdict([], (), stage, stage, None) == (verdict, [])
-
-
-@pytest.mark.parametrize(("left", "verdict"), [(2.9, "named"), (3.1, "unknown")])
-def test_what_explains_too_little_of_the_misfit_is_not_what_is_missing(
-    left: float, verdict: str
-) -> None:
-    # of 10 units over the usual one, 2 may be left
-    assert pytest.approx(0.8) == EXPLAINED
-    first = SimpleNamespace(scores=SimpleNamespace(misfit=11.0), unit=1.0)
-    last = SimpleNamespace(scores=SimpleNamespace(misfit=left), unit=1.0, beyond=1.0)
-    told = _verdict(["strong"], (), first, last, None)
-    assert told == (verdict, ["strong"] if verdict == "named" else [])

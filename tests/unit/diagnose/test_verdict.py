@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from tirelib.diagnose.diagnose import BEYOND, EXPLAINED, _verdict
+from tirelib.diagnose.diagnose import BARELY, BEYOND, EXPLAINED, OUTSIDE, _verdict
 from tirelib.diagnose.rounds import FELL, HALVED
 
 
@@ -39,6 +39,25 @@ def after(explained: float, fell: float, beyond: float = 1.0) -> Any:
 def test_what_is_named_takes_the_misfit_or_half_of_the_error_and_never_none_of_it(
     explained: float, fell: float, beyond: float, verdict: str
 ) -> None:
+    assert pytest.approx(0.8) == EXPLAINED
     told, named = _verdict(["a"], [], FIRST, after(explained, fell, beyond), None)
     assert told == verdict
     assert named == (["a"] if verdict != "unknown" else [])
+
+
+@pytest.mark.parametrize(
+    ("outside", "imitated", "verdict"),
+    [
+        (OUTSIDE - 0.1, BARELY - 0.1, "none"),
+        (OUTSIDE + 0.1, 0.0, "unknown"),
+        (0.0, BARELY + 0.1, "unknown"),
+    ],
+)
+def test_what_cannot_be_but_explains_tells_of_something_unknown(
+    outside: float, imitated: float, verdict: str
+) -> None:
+    scores = SimpleNamespace(misfit=1.0)
+    stage = SimpleNamespace(
+        scores=scores, unit=1.0, beyond=1.0, outside=outside, imitated=imitated
+    )  # fmt: skip
+    assert _verdict([], (), stage, stage, None) == (verdict, [])
