@@ -5,6 +5,7 @@ be read or written is no fault: the ensemble is then computed.
 """
 
 import hashlib
+import inspect
 import os
 import tempfile
 from collections.abc import Callable
@@ -14,7 +15,7 @@ import numpy as np
 
 from tirelib import __version__
 from tirelib.arrays import FloatArray
-from tirelib.diagnose import ensemble
+from tirelib.diagnose import ensemble, variant
 from tirelib.diagnose.ensemble import MEMBERS, Variants, variants
 from tirelib.diagnose.refit import Refit
 from tirelib.identify.waveform_fit import Data
@@ -88,8 +89,8 @@ def key_of(data: Data, model: Refit, members: int, seed: int) -> str:
         add(name, np.asarray(model.values[name], dtype=float))
     for effect, strength in zip(model.effects, model.strengths, strict=True):
         add(effect.name, strength)
-    code = Path(ensemble.__file__).read_bytes()
-    told.update(code)
+    for module in (ensemble, variant):
+        told.update(inspect.getsource(module).encode())
     return told.hexdigest()
 
 

@@ -1,5 +1,6 @@
 """What a structural variant has beside other constants: a crown, and a belt that grows."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -7,10 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.unit.diagnose.planted import runs
 from tests.unit.identify.model_waves import TIRE
 from tirelib.arrays import FloatArray
 from tirelib.contact.layout import GAGES
-from tirelib.diagnose.variant import CARRIED, SHARES, STRIPS, crowned, flung, grown
+from tirelib.diagnose import variant as module
+from tirelib.diagnose.refit import refit
+from tirelib.diagnose.variant import CARRIED, CROWN, SHARES, STRIPS, crowned, flung, grown
 from tirelib.model.base import predict, values_of
 from tirelib.model.state import Operating, State
 from tirelib.waveforms import GRID
@@ -76,6 +80,38 @@ def test_what_a_crown_changes_grows_with_it(curvature: float) -> None:
         return float(np.sqrt(np.mean((wave(c) - wave(0.0)) ** 2)))
 
     assert size(curvature) > size(0.5 * curvature) > 0.0
+
+
+def test_every_variant_is_crowned_grown_and_flung(monkeypatch: pytest.MonkeyPatch) -> None:
+    straight = runs()
+    data = straight.data(with_deflection=False)
+    base = refit(data, values_of(TIRE))
+    seen: list[str] = []
+
+    def spy(name: str) -> Callable[[State], State]:
+        def change(state: State) -> State:
+            seen.append(name)
+            return state
+
+        return change
+
+    curvatures: list[float] = []
+
+    def crown(curvature: float) -> Callable[[State], State]:
+        curvatures.append(curvature)
+        return spy("crown")
+
+    monkeypatch.setattr(module, "crowned", crown)
+    monkeypatch.setattr(module, "grown", spy("grown"))
+    monkeypatch.setattr(module, "flung", spy("flung"))
+    random = np.random.default_rng(4)
+    for _ in range(3):
+        assert np.isfinite(module.variant(data, base, random)).all()
+    assert set(seen) == {"crown", "grown", "flung"}
+    # the sidewalls hold a part of what makes the belt grow, so growth comes first
+    assert seen.index("grown") < seen.index("flung") < seen.index("crown")
+    assert len(set(curvatures)) == 3
+    assert 0.0 <= min(curvatures) < max(curvatures) <= CROWN
 
 
 def test_the_belt_grows_with_pressure_and_speed_as_a_hoop_does() -> None:

@@ -16,7 +16,7 @@ from tirelib.planning.variants import Track, draw_variants
 @pytest.fixture(scope="module")
 def tested() -> SelfTest:
     return selftest(
-        runs(), values_of(TIRE), list(CATALOGUE.values()), only=("temperature", "gage_length"),
+        runs(), values_of(TIRE), list(CATALOGUE.values()), only=("temperature", "rotary_inertia"),
         ratios=(1.02, 1.5), repeats=4, members=16,
     )  # fmt: skip
 
@@ -39,11 +39,11 @@ def test_a_strong_effect_is_found_more_often_than_a_faint_one(tested: SelfTest) 
 
 
 def test_what_no_plausible_strength_reaches_is_not_planted(tested: SelfTest) -> None:
-    far = planting(tested, "gage_length", 1.5)
+    far = planting(tested, "rotary_inertia", 1.5)
     assert not far.reachable
     assert far.named == ()
-    assert tested.largest["gage_length"] < 1.5
-    assert abs(far.strength) > CATALOGUE["gage_length"].high
+    assert tested.largest["rotary_inertia"] < 1.5
+    assert abs(far.strength) > CATALOGUE["rotary_inertia"].high
 
 
 def test_the_document_tells_chances_with_intervals_and_that_they_are_optimistic(
@@ -52,7 +52,7 @@ def test_the_document_tells_chances_with_intervals_and_that_they_are_optimistic(
     told = selftest_document(tested)
     assert told["format"] == "tirelib-selftest/1"
     assert told["optimistic"] is True
-    assert [entry["effect"] for entry in told["effects"]] == ["temperature", "gage_length"]
+    assert [entry["effect"] for entry in told["effects"]] == ["temperature", "rotary_inertia"]
     strong = told["effects"][0]["results"][1]
     assert strong["found"] == planting(tested, "temperature", 1.5).right / 4
     assert strong["found_low"] < strong["found"] <= strong["found_high"]
