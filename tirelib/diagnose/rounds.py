@@ -6,7 +6,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.ensemble import Variants
-from tirelib.diagnose.refit import refit
+from tirelib.diagnose.refit import Refit, refit
 from tirelib.diagnose.sole import sole
 from tirelib.diagnose.stage import ALARM, Stage, within
 from tirelib.effects import Effect
@@ -74,14 +74,22 @@ def rounds(
     suspects = {name for name, hint in zip(first.names, hints, strict=True) if hint}
     least = dict(zip(first.names, first.limit, strict=True))
 
+    def refitted(
+        stage: Stage, effects: Sequence[Effect], strengths: Sequence[FloatArray]
+    ) -> Refit | None:
+        try:
+            return refit(data, stage.model.values, effects, strengths, progress=progress)
+        except TirelibError:
+            return None
+
+    def staged(model: Refit) -> Stage:
+        return Stage.of(data, model, catalogue, rests, noise, least)
+
     def fitted(
         stage: Stage, effects: Sequence[Effect], strengths: Sequence[FloatArray]
     ) -> Stage | None:
-        try:
-            model = refit(data, stage.model.values, effects, strengths, progress=progress)
-        except TirelibError:
-            return None
-        return Stage.of(data, model, catalogue, rests, noise, least)
+        model = refitted(stage, effects, strengths)
+        return None if model is None else staged(model)
 
     named: list[str] = []
     stage, count = first, 0
@@ -89,7 +97,7 @@ def rounds(
         found = _added(first, stage, suspects, len(named), fitted)
         if found is None and not named and first.imitated >= IMITATED:
             listed = [effect.name for effect in catalogue]
-            found = sole(data, stage, listed, fitted)
+            found = sole(data, stage, listed, refitted, staged)
         if found is None:
             break
         after, index = found
@@ -135,7 +143,8 @@ def _added(
     if not needed and before:  # what imitates the impossible, but takes half of the error
         for index in stage.leaders(suspects, bar, 0.0, barred):
             after = tried[index] if index in tried else _trial(first, stage, index, fitted)
-            if after is not None and fall(stage, after) >= HALVED:
+            fits = after is not None and (not stage.over[index] or _fits(after))
+            if after is not None and fits and fall(stage, after) >= HALVED:
                 needed.append((after, index))
     return min(needed, key=lambda pair: pair[0].scores.misfit, default=None)
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.candidates import Candidate, signature
+from tirelib.diagnose.refit import Refit
 from tirelib.diagnose.stage import ALARM, Stage, within
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
@@ -24,11 +25,15 @@ ERROR, MISFIT = 0.75, 0.6
 START = 0.5
 """Share of the range from which the exact fit starts."""
 
-Fit = Callable[[Stage, Sequence[Effect], Sequence[FloatArray]], Stage | None]
+Fit = Callable[[Stage, Sequence[Effect], Sequence[FloatArray]], Refit | None]
 
 
 def sole(
-    data: Data, stage: Stage, suspects: Sequence[str], fitted: Fit
+    data: Data,
+    stage: Stage,
+    suspects: Sequence[str],
+    refitted: Fit,
+    staged: Callable[[Refit], Stage],
 ) -> tuple[Stage, int] | None:
     """Return the stage with the one effect that explains nearly everything, and its index.
 
@@ -39,8 +44,10 @@ def sole(
         Of a model without it.
     suspects : sequence of str
         Effects that may be named.
-    fitted : callable
-        Return the stage of an exact fit with effects from strengths, None if it does not settle.
+    refitted : callable
+        Return an exact fit with effects from strengths, None if it does not settle.
+    staged : callable
+        Return the stage of a fit.
     """
     found: list[tuple[Stage, int]] = []
     for index, candidate in enumerate(stage.found.living):
@@ -48,8 +55,12 @@ def sole(
         if effect.name not in suspects or not _bent(data, stage, candidate):
             continue
         start = np.array([START * effect.toward])
-        after = fitted(stage, [*stage.model.effects, effect], [*stage.model.strengths, start])
-        if after is not None and _explains(stage, after):
+        model = refitted(stage, [*stage.model.effects, effect], [*stage.model.strengths, start])
+        # scores are dear, so the error comes first
+        if model is None or model.error**2 > (1.0 - ERROR) * stage.model.error**2:
+            continue
+        after = staged(model)
+        if _explains(stage, after):
             found.append((after, index))
     return min(found, key=lambda pair: pair[0].scores.misfit, default=None)
 
@@ -71,11 +82,10 @@ def _bent(data: Data, stage: Stage, candidate: Candidate) -> bool:
 
 
 def _explains(before: Stage, after: Stage) -> bool:
-    """Return whether the effect added last explains nearly everything, in its range."""
+    """Return whether what the effect added last takes is misfit too, with it in its range."""
     model = after.model
     return (
-        model.error**2 <= (1.0 - ERROR) * before.model.error**2
-        and after.scores.misfit <= (1.0 - MISFIT) * before.scores.misfit
+        after.scores.misfit <= (1.0 - MISFIT) * before.scores.misfit
         and after.imitated < ALARM
         and within(model.effects[-1], model.strengths[-1], model.strength_std(-1))
     )

@@ -129,6 +129,13 @@ def test_what_takes_half_of_the_error_is_needed_whatever_imitates_it(
     assert not added(alone, fit({("close",): 100.0})), "the first is not spared so"
 
 
+def test_half_of_the_error_is_not_enough_for_what_is_too_large_in_the_exact_refit_too() -> None:
+    left = {("strong", "close"): 100.0}
+    for strength, name in ((1.0 + LARGE, "close"), (1.1 + LARGE, "")):
+        now = stage(("strong",), 400.0, [300.0, 0.0], over=["close"], imitated=["close"])
+        assert added(now, fit(left, strength)) == name
+
+
 @pytest.mark.parametrize(("gone", "name"), [(FELL + 0.01, "close"), (FELL - 0.01, "")])
 def test_a_further_effect_has_to_take_a_share_of_the_error(gone: float, name: str) -> None:
     def fitted(before: Any, effects: Sequence[Any], strengths: Sequence[Any]) -> Any:

@@ -105,7 +105,10 @@ def test_only_what_explains_nearly_everything_in_its_range_is_taken(
     after = list(JUST)
 
     def told() -> Any:
-        return sole(None, before, ["belt_shear"], lambda *_: stage(*after))  # type: ignore[arg-type]
+        def refitted(*_: Any) -> Any:
+            return stage(*after).model
+
+        return sole(None, before, ["belt_shear"], refitted, lambda _: stage(*after))  # type: ignore[arg-type]
 
     assert told()[1] == 0
     after[place] = value
@@ -124,6 +127,6 @@ def test_only_what_first_order_cannot_tell_is_tried() -> None:
         tried.append(effects[-1].name)
         assert 0.0 < strengths[-1][0] < effects[-1].high
 
-    assert sole(data, here, [effect.name for effect in SOME], fitted) is None
+    assert sole(data, here, [effect.name for effect in SOME], fitted, lambda _: here) is None
     assert "belt_shear" in tried
     assert not {"gage_drift", "nonuniformity"} & set(tried)
