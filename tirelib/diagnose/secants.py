@@ -18,7 +18,7 @@ from tirelib.errors import TirelibError
 from tirelib.identify.waveform_fit import Data
 
 MUCH = 0.1
-"""Share of the misfit that an effect alone has to take away."""
+"""Share of the squared residual that an effect alone has to take away."""
 SMALL = 0.05
 """Strength, in ranges, up to which a tangent serves."""
 BEYOND = 2.0
@@ -39,7 +39,7 @@ def with_secants(data: Data, model: Refit, found: Candidates, structure: Structu
     found : Candidates
         With tangents at zero.
     structure : Structure
-        In whose metric a misfit counts.
+        Knows what the fitted numbers can do, which is no effect's.
     """
     rest = structure.projected(model.whiten(data.strain - model.waveform).ravel())
     living = tuple(_followed(data, model, each, structure, rest) for each in found.living)
