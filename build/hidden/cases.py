@@ -31,7 +31,7 @@ from tirelib.model.base import values_of
 from tirelib.waveforms import Waveforms
 
 NONE = "none"
-VERSION = 2
+VERSION = 4
 """Of everything that decides a case's numbers; raised when a law or the plan changes."""
 NODES = 1
 """The same of solved states with one effect."""
@@ -39,7 +39,7 @@ TOLERANCE = 0.1
 """Of ratio - 1, relative."""
 ACCEPTED = 0.25
 """The same after the last correction; the reached ratio stands in the case."""
-CORRECTIONS = 6
+CORRECTIONS = 10
 STRONGEST = 1.5
 """Error ratio near which effects of the tire are solved; weaker ones lie between it and none."""
 

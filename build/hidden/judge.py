@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import tirelib
-from hidden.cases import NONE, Case, base_fit, case_file, fitted_data, residual
+from hidden.cases import NONE, VERSION, Case, base_fit, case_file, fitted_data, residual
 from hidden.measured import CACHE, keep
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.candidates import candidates
@@ -31,8 +31,9 @@ BELT = frozenset({"belt_shear", "belt_extension"})
 """Right additions on a tire whose belt really shears and stretches; they may not hide another."""
 HELD_OUT_BY = ("load", "pressure", "speed")
 _CODE = {
-    "diagnose": ("candidates", "diagnose", "ensemble", "noise", "ranking", "refit", "rivals",
-                 "rounds", "secants", "shape", "sole", "stage", "structure", "unlisted", "variant"),
+    "diagnose": ("candidates", "delay", "diagnose", "ensemble", "noise", "ranking", "refit",
+                 "rivals", "rounds", "secants", "shape", "sole", "stage", "structure", "unlisted",
+                 "variant"),
     "identify": ("campaign_data", "discrepancy", "identify", "noise", "random_effects", "structure",
                  "waveform_fit"),
     "effects": ("*",), "model": ("*",), "contact": ("*",), "ring": ("*",), "strain": ("*",),
@@ -54,7 +55,7 @@ def fingerprint() -> str:
 def verdict_file(case: Case, members: int) -> Path:
     """Return where a verdict is kept."""
     name = case_file(case.seed, case.kind, case.wanted).with_suffix(".json").name
-    return CACHE / "verdicts" / f"{fingerprint()}-{members}" / name
+    return CACHE / "verdicts" / f"{fingerprint()}-{members}-{VERSION}" / name
 
 
 def judge(case: Case, members: int = MEMBERS) -> dict[str, Any]:

@@ -24,7 +24,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from hidden.cases import NONE, case_file, kinds, load_case, make_case
+from hidden.cases import NONE, VERSION, case_file, kinds, load_case, make_case
 from hidden.judge import fingerprint, judge, verdict_file
 from hidden.measured import CACHE, keep
 from hidden.table import figures, markdown
@@ -67,7 +67,7 @@ def _spread(names: Sequence[str], ratio: float, count: int, first: int) -> list[
 
 def _failure(want: Wanted) -> Path:
     """Return where is kept why a case cannot be made."""
-    return CACHE / "failed" / case_file(*want).with_suffix(".txt").name
+    return CACHE / f"failed-{VERSION}" / case_file(*want).with_suffix(".txt").name
 
 
 def run_one(want: Wanted, members: int, make: bool) -> dict[str, Any] | None:

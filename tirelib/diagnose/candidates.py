@@ -85,7 +85,7 @@ def candidates(data: Data, model: Refit, catalogue: Sequence[Effect]) -> Candida
     Effects that the model has, and those of the brush, are left out.
     """
     has = {effect.name for effect in model.effects}
-    nuisance = model.whiten(model.slopes).reshape(len(model.slopes), -1)
+    nuisance = model.whiten(model.own_slopes).reshape(len(model.own_slopes), -1)
     basis = np.linalg.qr(nuisance.T)[0]
     living: list[Candidate] = []
     dead: dict[str, str] = {}

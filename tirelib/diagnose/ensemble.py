@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tirelib.arrays import FloatArray
+from tirelib.diagnose.delay import STD, UNIT, by_delay
 from tirelib.diagnose.refit import Refit
 from tirelib.diagnose.unlisted import gain_by_load, gain_by_pressure, gain_by_speed
 from tirelib.diagnose.variant import variant
@@ -29,7 +30,7 @@ from tirelib.effects.patch import along, balanced, beam_strain, held_shear
 from tirelib.errors import TirelibError
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.identify import FITTED
-from tirelib.identify.random_effects import angle_slope, random_tangents, scales
+from tirelib.identify.random_effects import random_tangents, scales
 from tirelib.identify.waveform_fit import Data
 from tirelib.model.base import move, predict
 from tirelib.waveforms import GRID
@@ -41,8 +42,6 @@ BACK_STEPS = 3
 BENT = (0.0026, 0.017)
 """Standard deviations of the outward shear that bends the flat piece under the tread by itself, as
 in `tread_friction`, and of the friction that does so in the contact's rear."""
-TIMING = 6e-5
-"""Standard deviation of a common delay of the gages, [s]: uniform to a sample at 10 kHz."""
 WIDEST = 0.01
 """Largest standard deviation of the angle's zero that counts as structure, [rad]."""
 ALIKE = {
@@ -140,7 +139,7 @@ def smooth_part(data: Data, model: Refit) -> FloatArray:
     half = 0.6 * np.sqrt(2.0 * model.deflection / float(np.max(model.values["free_radius"])))
     swing = _by_load(data, model)
     turns = np.stack([np.cos(GRID), np.sin(GRID)])[:, None]
-    late = angle_slope(model.waveform) * np.asarray(data.points.omega)[:, None]
+    late = by_delay(model.waveform, data.points.omega)
     return np.concatenate(
         [
             MISFIT.columns(model.waveform, half, data.points, GRID),
@@ -148,7 +147,7 @@ def smooth_part(data: Data, model: Refit) -> FloatArray:
             _bent(data, model),
             RUN_OUT * turns * swing,
             ONCE * turns * np.ones_like(swing),
-            TIMING * late[None],
+            (STD / UNIT) * late[None],
         ]
     )
 

@@ -1,11 +1,16 @@
-"""The base model with some effects, fitted to the straight runs: values and strengths together."""
+"""The base model with some effects, fitted to the straight runs.
+
+Values of the tire, the delay of the day (`tirelib.diagnose.delay`) and strengths together.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tirelib.arrays import FloatArray
+from tirelib.diagnose.delay import STD, UNIT, by_delay, earlier, late
 from tirelib.effects import Effect
 from tirelib.errors import ConvergenceError, ParameterError, TirelibError
 from tirelib.identify.identify import FITTED
@@ -19,14 +24,25 @@ from tirelib.model.base import (
     predict,
 )
 from tirelib.model.chain import Changes
+from tirelib.model.state import Operating, State
 
 WIDTH = np.array([0.7, 0.7, 1.5, 1.0, 1.5, 0.9, 0.15, 0.7])
 """Prior standard deviation of the free coordinates: wide, since the campaign has informed them."""
+BASE = len(FITTED) + 1
+"""Coordinates before the strengths: those of the tire, then the delay."""
 STRENGTH_WIDTH = 1.0
 """Prior standard deviation of a strength, relative to its range."""
-OUTER, MAX_STEPS = 3, 25
-SETTLED = (0.05, 0.05, 0.005)
+OUTER, MAX_STEPS = 8, 25
+"""Most times that large displacements and whitening are brought up to date, and steps each time."""
+ROUGH, SETTLED = 0.05, 0.005
+"""Coordinate by which the last step moves: the first two times, and then."""
+FOLLOWED = 0.02
+"""Coordinate by which all steps together move where large displacements need no update."""
 LONGEST = 0.4
+FORETOLD = 0.8
+"""Share of the gain that slopes foretell from which on they serve for another step."""
+FLAT = 1e-5
+"""Gain of a step, over the cost, of one at the bottom."""
 FLATTER = 0.9
 """Share of the pressure slopes from which a fit starts that cannot start where it should."""
 
@@ -43,9 +59,11 @@ class Refit:
         That the model has.
     strengths : tuple of array
         One array of components per effect.
+    delay : float, [s]
+        Of the gages against the trigger.
     waveform : shape (n_runs, n_phi), [-]
     slopes : shape (n_free, n_runs, n_phi)
-        By base coordinates and by strengths in units of their range.
+        By base coordinates, the delay last of them, and by strengths in units of their range.
     correction : Correction
     whiten : Whitening
     covariance : shape (n_free, n_free)
@@ -56,6 +74,7 @@ class Refit:
     values: Mapping[str, float | FloatArray]
     effects: tuple[Effect, ...]
     strengths: tuple[FloatArray, ...]
+    delay: float
     waveform: FloatArray
     deflection: FloatArray
     slopes: FloatArray
@@ -66,12 +85,22 @@ class Refit:
 
     @property
     def changes(self) -> Changes:
-        """The effects at their strengths, for the chain."""
-        return changes_of(self.effects, self.strengths)
+        """The effects at their strengths and the delay, for the chain."""
+        return [*changes_of(self.effects, self.strengths), late(self.delay)]
+
+    @property
+    def own_slopes(self) -> FloatArray:
+        """Slopes by what belongs to the tire and its effects, shape (n_free - 1, ...)."""
+        return np.delete(self.slopes, BASE - 1, axis=0)
+
+    def on_time(self, points: Operating) -> "Refit":
+        """Return the model without the delay: as a day without any would show it."""
+        waveform = earlier(self.waveform, points.omega, self.delay)
+        return replace(self, delay=0.0, waveform=waveform)
 
     def strength_std(self, index: int) -> FloatArray:
         """Return standard deviations of an effect's strength, in its unit."""
-        first = len(FITTED) + sum(effect.components for effect in self.effects[:index])
+        first = BASE + sum(effect.components for effect in self.effects[:index])
         effect = self.effects[index]
         rows = slice(first, first + effect.components)
         deviation: FloatArray = effect.scale * np.sqrt(np.diag(self.covariance)[rows])
@@ -132,11 +161,12 @@ def refit(
     for outer in range(OUTER):
         if outer:
             fitter.refresh()
+        begin = fitter.z
         for _ in range(MAX_STEPS):
             moved = fitter.step()
             if progress is not None:
                 progress(f"refit, error {np.sqrt(fitter.cost / data.strain.size):.2f}")
-            if moved < SETTLED[outer]:
+            if moved < (ROUGH if outer < 2 else SETTLED):
                 break
         else:
             raise ConvergenceError(
@@ -146,6 +176,8 @@ def refit(
                 fitter.values,
                 moved,
             )
+        if outer >= 2 and float(np.abs(fitter.z - begin).max()) < FOLLOWED:
+            break
     return fitter.result()
 
 
@@ -168,10 +200,12 @@ class _Fitter:
     ) -> None:
         self.data, self.start, self.effects = data, values, effects
         scales = [np.full(e.components, e.scale) for e in effects]
-        self.scale = np.concatenate([np.ones(len(FITTED)), *scales])
-        self.z = np.concatenate([np.zeros(len(FITTED)), *strengths]) / self.scale
-        self.width = np.concatenate([WIDTH, np.full(self.z.size - len(FITTED), STRENGTH_WIDTH)])
+        self.scale = np.concatenate([np.ones(len(FITTED)), [UNIT], *scales])
+        self.z = np.concatenate([np.zeros(BASE), *strengths]) / self.scale
+        more = np.full(self.z.size - BASE, STRENGTH_WIDTH)
+        self.width = np.concatenate([WIDTH, [STD / UNIT], more])
         self.damping, self.cost = 1e-3, np.inf
+        self.fresh = self.follows = False
         self.correction = near
 
     @property
@@ -180,9 +214,17 @@ class _Fitter:
 
     def strengths(self, z: FloatArray) -> tuple[FloatArray, ...]:
         """Return the strengths in their units."""
-        flat = (z * self.scale)[len(FITTED) :]
+        flat = (z * self.scale)[BASE:]
         cuts = np.cumsum([e.components for e in self.effects])[:-1]
         return tuple(np.split(flat, cuts)) if self.effects else ()
+
+    def delay(self, z: FloatArray) -> float:
+        """Return the delay [s]."""
+        return float((z * self.scale)[BASE - 1])
+
+    def changes(self, z: FloatArray) -> Changes:
+        """Return effects and delay for the chain."""
+        return [*changes_of(self.effects, self.strengths(z)), late(self.delay(z))]
 
     def refresh(self) -> None:
         """Bring large displacements and whitening up to date."""
@@ -190,64 +232,82 @@ class _Fitter:
         self.correction = large_displacements(
             self.values, data.points, low_pass=data.low_pass, start=self.correction
         )
-        self._linearise(self.z)
+        if self.follows:  # what large displacements add changes no slope
+            self._take(self._predict(self.z))
+        else:
+            self._linearise(self.z)
         self.whiten = whitening(
             self.waveform, self.values, data.points, data.tolerance, data.angle_std, data.noise,
             data.low_pass,
         )  # fmt: skip
+        self.rows = self.whiten(self.slopes).reshape(self.z.size, -1)
         self.cost = self._cost(self.waveform, self.z)
+
+    def _take(self, state: State) -> None:
+        self.waveform, self.deflection, self.fresh = state.wave, state.deflection, False
 
     def _linearise(self, z: FloatArray) -> None:
         values = move(self.start, z[: len(FITTED)], FITTED)
-        changes = changes_of(self.effects, self.strengths(z))
         base = linearised(
-            values, self.data.points, FITTED, changes, low_pass=self.data.low_pass,
+            values, self.data.points, FITTED, self.changes(z), low_pass=self.data.low_pass,
             correction=self.correction,
         )  # fmt: skip
-        rows = [base.waveform_slopes]
-        for k in range(len(FITTED), z.size):
+        rows = [base.waveform_slopes, by_delay(base.waveform, self.data.points.omega)[None]]
+        for k in range(BASE, z.size):
             moved = z.copy()
             moved[k] += 1e-3 if z[k] <= 0.5 else -1e-3
-            wave = self._predict(values, moved)
+            wave = self._predict(moved).wave
             rows.append(((wave - base.waveform) / (moved[k] - z[k]))[None])
         self.waveform, self.deflection = base.waveform, base.deflection
         self.slopes = np.concatenate(rows)
+        self.fresh = self.follows = True
 
-    def _predict(self, values: Mapping[str, float | FloatArray], z: FloatArray) -> FloatArray:
-        state = predict(
-            values, self.data.points, changes_of(self.effects, self.strengths(z)),
+    def _predict(self, z: FloatArray) -> State:
+        return predict(
+            move(self.start, z[: len(FITTED)], FITTED), self.data.points, self.changes(z),
             low_pass=self.data.low_pass, correction=self.correction,
         )  # fmt: skip
-        return state.wave
 
     def _cost(self, waveform: FloatArray, z: FloatArray) -> float:
         rest = self.whiten(self.data.strain - waveform)
         return float(np.sum(rest**2) + np.sum((z / self.width) ** 2))
 
     def step(self) -> float:
-        """Take one step that lowers the cost; return its largest component."""
-        rows = self.whiten(self.slopes).reshape(self.z.size, -1)
+        """Take one step that lowers the cost; return its largest component.
+
+        The slopes serve as long as they foretell what a step gains.
+        """
         rest = self.whiten(self.data.strain - self.waveform).ravel()
-        normal = rows @ rows.T + np.diag(self.width**-2)
-        gradient = rows @ rest - self.z / self.width**2
+        normal = self.rows @ self.rows.T + np.diag(self.width**-2)
+        gradient = self.rows @ rest - self.z / self.width**2
         while self.damping < 1e8:
             dz = np.linalg.solve(normal + self.damping * np.diag(np.diag(normal)), gradient)
             dz = np.clip(dz, -LONGEST, LONGEST)
             z = self.z + dz
             try:
-                wave = self._predict(move(self.start, z[: len(FITTED)], FITTED), z)
-                cost = self._cost(wave, z)
+                state = self._predict(z)
+                cost = self._cost(state.wave, z)
                 better = cost <= self.cost * (1.0 + 1e-12)
-                if better:
+                gain = self.cost - cost
+                # a valley that is flat to a millionth is the bottom
+                flat = gain < FLAT * cost
+                foretold = float(dz @ (2.0 * gradient - normal @ dz))
+                if better and (gain < FORETOLD * foretold or (flat and not self.fresh)):
+                    flat = flat and self.fresh
                     self._linearise(z)
+                    self.rows = self.whiten(self.slopes).reshape(z.size, -1)
+                elif better:
+                    self._take(state)
             except TirelibError:  # there, or within a difference of it, is no tire
                 better = False
             if better:
-                gain = self.cost - cost
                 self.z, self.cost = z, cost
                 self.damping = max(self.damping / 10.0, 1e-9)
-                # a valley that is flat to a millionth is the bottom
-                return 0.0 if gain < 1e-5 * cost else float(np.abs(dz).max())
+                return 0.0 if flat else float(np.abs(dz).max())
+            if not self.fresh:
+                self._linearise(self.z)
+                self.rows = self.whiten(self.slopes).reshape(self.z.size, -1)
+                return self.step()
             self.damping *= 10.0
         self.damping = 1e-3
         return 0.0
@@ -255,12 +315,15 @@ class _Fitter:
     def result(self) -> Refit:
         """Return the fitted model."""
         assert self.correction is not None  # noqa: S101 - refresh has set it
+        if not self.fresh:
+            with suppress(TirelibError):  # within a difference of it is no tire
+                self._linearise(self.z)
         rows = self.whiten(self.slopes).reshape(self.z.size, -1)
         rest = self.whiten(self.data.strain - self.waveform)
         normal = rows @ rows.T + np.diag(self.width**-2)
         covariance = np.asarray(np.linalg.inv(normal), dtype=np.float64)
         return Refit(
-            self.values, self.effects, self.strengths(self.z), self.waveform, self.deflection,
-            self.slopes, self.correction, self.whiten, covariance,
-            float(np.sqrt(np.mean(rest**2))),
+            self.values, self.effects, self.strengths(self.z),
+            self.delay(self.z), self.waveform, self.deflection, self.slopes, self.correction,
+            self.whiten, covariance, float(np.sqrt(np.mean(rest**2))),
         )  # fmt: skip

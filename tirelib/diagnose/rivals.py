@@ -49,5 +49,5 @@ def _misfit(data: Data, first: "Stage", effect: Effect, strength: np.ndarray) ->
         model: Refit = refit(data, base.values, [*base.effects, effect], [*base.strengths, start])
     except TirelibError:
         return float("inf")
-    white = base.whiten(data.strain - model.waveform).ravel()
+    white = base.whiten(data.strain - model.on_time(data.points).waveform).ravel()
     return first.ranking.structure.normal(np.zeros((0, white.size)), white).square

@@ -31,7 +31,7 @@ def structure_of(data: Data, model: Refit, rests: Variants, noise: float) -> Str
     smooth, runs = smooth_part(data, model), run_part(data, model)
     spread = spread_of(noise, len(data.points))
     seen = measured(data, model, replace(rests, noise=spread * model.whiten.noise), smooth, runs)
-    free = model.whiten(model.slopes).reshape(len(model.slopes), -1)
+    free = model.whiten(model.own_slopes).reshape(len(model.own_slopes), -1)
     each = run_by_run(np.stack([model.whiten(runs[:, k]) for k in range(runs.shape[1])], axis=1))
     parts = [model.whiten(smooth).reshape(len(smooth), -1), each, form_rows(model)]
     return Structure(rests.rests, seen, spread, free, np.concatenate(parts))

@@ -99,7 +99,8 @@ class Stage:
         structure = structure_of(data, model, rests, noise)
         found = with_secants(data, model, found, structure)
         ranking = Ranking(model, found, structure)
-        scores = ranking.scores(data.strain - model.waveform)
+        # what the fitted delay took is weighed against the effects, as likely as delays are
+        scores = ranking.scores(data.strain - model.on_time(data.points).waveform)
         members = ranking.of_members()
         names = [candidate.effect.name for candidate in found.living]
         extra = np.array([each.effect in UNLISTED for each in found.living], dtype=bool)

@@ -98,8 +98,8 @@ def plan_test(
             [*base.strengths, *(strength for _, strength in suspects.beside)], progress=progress,
         )  # fmt: skip
     test = next_test(
-        data, base, suspects.effects, envelope, noise=noise, with_nothing=suspects.with_nothing,
-        progress=progress,
+        data, base.on_time(data.points), suspects.effects, envelope, noise=noise,
+        with_nothing=suspects.with_nothing, progress=progress,
     )  # fmt: skip
     return Plan(suspects, test, gains(test.trial, test.noise), wanted, campaign)
 

@@ -156,7 +156,7 @@ def selftest(
         If the model does not fit.
     """
     data = runs.data(with_deflection=False)
-    base = refit(data, values, effects, strengths, progress=progress)
+    base = refit(data, values, effects, strengths, progress=progress).on_time(data.points)
     noise = noise_in(runs)
     ranking = FirstRound.of(
         runs, data, base, catalogue, members=members, seed=seed, progress=progress

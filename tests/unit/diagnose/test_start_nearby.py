@@ -49,3 +49,16 @@ def test_a_start_without_stiffness_at_some_pressure_ends_where_another_does() ->
     plain = refit.refit(data, values)
     apart = model.whiten(model.waveform - plain.waveform)
     assert np.sqrt(np.mean(apart**2)) < 0.05, "a twentieth of the noise"
+
+
+@pytest.mark.parametrize("factor", [0.75, 1.3])
+def test_a_start_far_away_ends_where_one_nearby_does(factor: float) -> None:
+    data = runs().data(with_deflection=False)
+    near = values_of(TIRE)
+    moved = ("radial_stiffness", "radial_pressure_slope", "extension_stiffness", "tread_stiffness")
+    far = {**near, **{name: factor * np.asarray(near[name]) for name in moved}}
+    there, here = refit.refit(data, far), refit.refit(data, near)
+    # large displacements are brought up to date until they are those of the result
+    assert there.error == pytest.approx(here.error, rel=0.05)
+    apart = here.whiten(there.waveform - here.waveform)
+    assert np.sqrt(np.mean(apart**2)) < 0.3 * here.error
