@@ -220,8 +220,10 @@ def _verdict(
     if not named:
         outside = last.outside >= OUTSIDE or last.imitated >= BARELY
         return ("unknown" if like or beyond or outside else "none"), []
-    explained = left <= max((1.0 - EXPLAINED) * excess, 0.0) or fall(first, last) >= HALVED
-    if fall(first, last) < FELL or not explained:
+    explained = (
+        left <= max((1.0 - EXPLAINED) * excess, 0.0) or fall(first.model, last.model) >= HALVED
+    )
+    if fall(first.model, last.model) < FELL or not explained:
         return "unknown", []
     if twins and len(named) == 1:
         return "indistinguishable", [named[0], *twins]

@@ -41,6 +41,8 @@ FOLLOWED = 0.02
 LONGEST = 0.4
 FORETOLD = 0.8
 """Share of the gain that slopes foretell from which on they serve for another step."""
+POOR = 0.25
+"""The same below which steps get shorter."""
 FLAT = 1e-5
 """Gain of a step, over the cost, of one at the bottom."""
 FLATTER = 0.9
@@ -168,7 +170,7 @@ def refit(
                 progress(f"refit, error {np.sqrt(fitter.cost / data.strain.size):.2f}")
             if moved < (ROUGH if outer < 2 else SETTLED):
                 break
-        else:
+        if outer >= 2 and moved >= SETTLED:
             raise ConvergenceError(
                 f"refit with {', '.join(e.name for e in effects) or 'no effect'}: the parameters "
                 f"still move by {moved:.2e}; the model does not fit these runs: look at them with "
@@ -302,7 +304,10 @@ class _Fitter:
                 better = False
             if better:
                 self.z, self.cost = z, cost
-                self.damping = max(self.damping / 10.0, 1e-9)
+                if gain > FORETOLD * foretold:
+                    self.damping = max(self.damping / 10.0, 1e-9)
+                elif gain < POOR * foretold:  # it went too far
+                    self.damping = min(max(10.0 * self.damping, 1e-3), 1e2)
                 return 0.0 if flat else float(np.abs(dz).max())
             if not self.fresh:
                 self._linearise(self.z)

@@ -25,13 +25,13 @@ independent of them has nothing to do with that."""
 LARGE = 1.0
 """Share of its range by which an effect may be larger in the exact refit and yet be named, with a
 word that it is: a range is what is plausible, and what explains the misfit speaks for itself."""
-FELL = 0.05
-"""Least share of the squared error that an effect has to take beside the others: what takes none of
-it stands for structure."""
+FELL, FURTHER = 0.05, 0.12
+"""Least share of the squared error that an effect has to take beside the others, and that a further
+one has to take when it is added: what takes little of it stands for structure."""
 HALVED = 0.45
-"""Share of the squared error from which an effect is needed whatever imitates it."""
-IMITATED = 1.0
-"""Ratio of what cannot be from which first order is not trusted where it names nothing."""
+"""Share of the squared error from which a further alarm is needed whatever imitates it."""
+BELT = frozenset({"belt_shear"})
+"""What every tire has and the base has not: named, it raises no bar for what is hidden on top."""
 ROUNDS = 3
 
 
@@ -86,16 +86,19 @@ def rounds(
         return Stage.of(data, model, catalogue, rests, noise, least)
 
     def fitted(
-        stage: Stage, effects: Sequence[Effect], strengths: Sequence[FloatArray]
-    ) -> Stage | None:
+        stage: Stage, effects: Sequence[Effect], strengths: Sequence[FloatArray],
+        need: Callable[[Refit], bool] = lambda _: True,
+    ) -> Stage | None:  # fmt: skip
+        """Return the stage of an exact fit; None if it does not settle or is not needed."""
         model = refitted(stage, effects, strengths)
-        return None if model is None else staged(model)
+        return None if model is None or not need(model) else staged(model)
 
     named: list[str] = []
     stage, count = first, 0
     while count < ROUNDS:
-        found = _added(first, stage, suspects, len(named), fitted)
-        if found is None and not named and first.imitated >= IMITATED:
+        hidden = [name for name in named if name not in BELT]
+        found = _added(first, stage, suspects, len(hidden), fitted)
+        if found is None and not named:
             listed = [effect.name for effect in catalogue]
             found = sole(data, stage, listed, refitted, staged)
         if found is None:
@@ -113,7 +116,7 @@ def rounds(
     return stage, named, count, None
 
 
-_Fit = Callable[[Stage, Sequence[Effect], Sequence[FloatArray]], Stage | None]
+_Fit = Callable[..., Stage | None]
 
 
 def _added(
@@ -141,17 +144,17 @@ def _added(
         barred |= large
     needed = [(after, index) for index in leaders if (after := tried[index]) is not None]
     if not needed and before:  # what imitates the impossible, but takes half of the error
-        for index in stage.leaders(suspects, bar, 0.0, barred):
+        for index in stage.leaders(suspects, ALARM, 0.0, barred):
             after = tried[index] if index in tried else _trial(first, stage, index, fitted)
             fits = after is not None and (not stage.over[index] or _fits(after))
-            if after is not None and fits and fall(stage, after) >= HALVED:
+            if after is not None and fits and fall(stage.model, after.model) >= HALVED:
                 needed.append((after, index))
     return min(needed, key=lambda pair: pair[0].scores.misfit, default=None)
 
 
-def fall(before: Stage, after: Stage) -> float:
+def fall(before: Refit, after: Refit) -> float:
     """Return the share of the squared error that is gone."""
-    return 1.0 - (after.model.error / before.model.error) ** 2
+    return 1.0 - (after.error / before.error) ** 2
 
 
 def _trial(first: Stage, stage: Stage, index: int, fitted: _Fit) -> Stage | None:
@@ -162,13 +165,21 @@ def _trial(first: Stage, stage: Stage, index: int, fitted: _Fit) -> Stage | None
     off = ROUGH * (first.scores.misfit - stage.scores.misfit)
     if stage.scores.score[index] < off and not stage.independent[index]:
         return None
-    after = fitted(stage, [*model.effects, effect], [*model.strengths, _inside(effect, strength)])
+
+    def need(found: Refit) -> bool:
+        # the first may be hidden in the error by another that is to come
+        if stage is first or stage.unlisted[index]:
+            return True
+        # what the joint fit asks for may not be what the exact refit adds
+        other = effect.components == 1 and float(strength[0] * found.strengths[-1][0]) < 0.0
+        return not other and fall(model, found) >= FURTHER
+
+    start = [*model.strengths, _inside(effect, strength)]
+    after = fitted(stage, [*model.effects, effect], start, need)
     # to first order only if the exact refit does not need it
     if after is None or stage.scores.misfit - after.scores.misfit < ALARM * stage.limit[index]:
         return None
-    # the first may be hidden in the error by another that is to come
-    first_or_none = stage is first or stage.unlisted[index]
-    return after if first_or_none or fall(stage, after) >= FELL else None
+    return after
 
 
 def _fits(after: Stage | None) -> bool:
@@ -191,7 +202,7 @@ def _thinned(
         if without is None:
             continue
         back = without.scores.misfit - stage.scores.misfit
-        if back < ALARM * least[name] or fall(without, stage) < FELL:
+        if back < ALARM * least[name] or fall(without.model, stage.model) < FELL:
             stage = without
             gone.add(name)
     return stage, gone

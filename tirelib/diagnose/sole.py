@@ -1,8 +1,8 @@
-"""What first order does not see: an effect that by itself explains nearly everything.
+"""What the joint fit does not see: an effect that by itself explains most of the error.
 
-A belt's shear, a long gage or a lag change the waveform so far out of proportion that the joint
-fit, which is of first order, gives their part to others with strengths that cannot be. Where
-nothing can be named, those whose shape changes within their range are fitted exactly, one by one.
+A belt's shear, a long gage or friction change waveforms like much else together, or far out of
+proportion, so that the joint fit gives their part to others or to structure. Where it names
+nothing, those that take much of the plain error are fitted exactly, one by one.
 """
 
 from collections.abc import Callable, Sequence
@@ -10,20 +10,15 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.diagnose.candidates import Candidate, signature
 from tirelib.diagnose.refit import Refit
 from tirelib.diagnose.stage import ALARM, Stage, within
 from tirelib.effects import Effect
-from tirelib.errors import TirelibError
 from tirelib.identify.waveform_fit import Data
 
-BENT = 0.95
-"""Cosine between the change by a small step and by the whole range, below which first order does
-not tell the shape."""
-ERROR, MISFIT = 0.75, 0.6
+TRIED = 0.4
+"""Share of the squared error that an effect takes to first order from which it is fitted."""
+ERROR, MISFIT = 0.7, 0.2
 """Shares of the squared error and of the misfit in the metric of structure that have to go."""
-START = 0.5
-"""Share of the range from which the exact fit starts."""
 
 Fit = Callable[[Stage, Sequence[Effect], Sequence[FloatArray]], Refit | None]
 
@@ -35,7 +30,7 @@ def sole(
     refitted: Fit,
     staged: Callable[[Refit], Stage],
 ) -> tuple[Stage, int] | None:
-    """Return the stage with the one effect that explains nearly everything, and its index.
+    """Return the stage with the one effect that explains most, and its index.
 
     Parameters
     ----------
@@ -49,43 +44,32 @@ def sole(
     staged : callable
         Return the stage of a fit.
     """
-    found: list[tuple[Stage, int]] = []
+    model = stage.model
+    rest = model.whiten(data.strain - model.waveform).ravel()
+    found: list[tuple[Refit, int]] = []
     for index, candidate in enumerate(stage.found.living):
         effect = candidate.effect
-        if effect.name not in suspects or not _bent(data, stage, candidate):
+        left = (candidate.error_left(rest) / model.error) ** 2
+        if effect.name not in suspects or left > 1.0 - TRIED:
             continue
-        start = np.array([START * effect.toward])
-        model = refitted(stage, [*stage.model.effects, effect], [*stage.model.strengths, start])
-        # scores are dear, so the error comes first
-        if model is None or model.error**2 > (1.0 - ERROR) * stage.model.error**2:
-            continue
-        after = staged(model)
-        if _explains(stage, after):
+        weights = np.linalg.lstsq(candidate.own.T, rest, rcond=None)[0]
+        start = np.clip(weights * effect.scale, 0.9 * effect.low, 0.9 * effect.high)
+        after = refitted(stage, [*model.effects, effect], [*model.strengths, start])
+        if after is not None and after.error**2 <= (1.0 - ERROR) * model.error**2:
             found.append((after, index))
-    return min(found, key=lambda pair: pair[0].scores.misfit, default=None)
+    # scores are dear, so the error comes first
+    for after, index in sorted(found, key=lambda pair: pair[0].error):
+        with_it = staged(after)
+        if _explains(stage, with_it, float(stage.limit[index])):
+            return with_it, index
+    return None
 
 
-def _bent(data: Data, stage: Stage, candidate: Candidate) -> bool:
-    """Return whether an effect's shape at the end of its range is another than at its start."""
-    effect = candidate.effect
-    if effect.components > 1:
-        return False
-    ends = []
-    for size in (effect.step, effect.toward):
-        try:
-            rows = signature(data, stage.model, effect, [size], size)
-        except TirelibError:  # there is no tire with so much of it
-            return True
-        ends.append(stage.ranking.structure.projected(rows[0]))
-    start, end = ends
-    return float(start @ end) < BENT * float(np.linalg.norm(start) * np.linalg.norm(end))
-
-
-def _explains(before: Stage, after: Stage) -> bool:
+def _explains(before: Stage, after: Stage, limit: float) -> bool:
     """Return whether what the effect added last takes is misfit too, with it in its range."""
-    model = after.model
+    model, gone = after.model, before.scores.misfit - after.scores.misfit
     return (
-        after.scores.misfit <= (1.0 - MISFIT) * before.scores.misfit
+        gone >= max(MISFIT * before.scores.misfit, ALARM * limit)
         and after.imitated < ALARM
         and within(model.effects[-1], model.strengths[-1], model.strength_std(-1))
     )

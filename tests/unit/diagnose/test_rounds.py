@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tirelib.diagnose import rounds
-from tirelib.diagnose.rounds import CLEAR, FELL, HALVED, LARGE, ROUNDS
+from tirelib.diagnose.rounds import CLEAR, FELL, FURTHER, HALVED, LARGE, ROUNDS
 from tirelib.diagnose.stage import ALARM, ALONE, NEAR, OWN, Stage
 
 NAMES = ("strong", "close", "weak")
@@ -16,8 +16,15 @@ LEFT = {(): 1000.0, ("strong",): 500.0, ("close",): 300.0, ("weak",): 990.0}
 """Misfit that is left by the names that a made-up model has."""
 
 
+Need = Callable[[Any], bool]
+
+
+def always(_: Any) -> bool:
+    return True
+
+
 def effect(name: str) -> Any:
-    return SimpleNamespace(name=name, low=-1.0, high=1.0, scale=1.0)
+    return SimpleNamespace(name=name, low=-1.0, high=1.0, scale=1.0, components=1)
 
 
 def stage(
@@ -65,13 +72,15 @@ def fit(left: dict[tuple[str, ...], float], strength: float = 0.5) -> Callable[.
     """Return a fit that leaves what a table says; the order of the names does not count."""
     by_set = {frozenset(names): misfit for names, misfit in left.items()}
 
-    def fitted(before: Any, effects: Sequence[Any], strengths: Sequence[Any]) -> Any:
+    def fitted(
+        before: Any, effects: Sequence[Any], strengths: Sequence[Any], need: Need = always
+    ) -> Any:
         names = tuple(each.name for each in effects)
         misfit = by_set.get(frozenset(names))
-        others = len(NAMES) - len(names)
-        return None if misfit is None else stage(
-            names, misfit, [50.0] * others, strength=strength
-        )  # fmt: skip
+        if misfit is None:
+            return None
+        made = stage(names, misfit, [50.0] * (len(NAMES) - len(names)), strength=strength)
+        return made if need(made.model) else None
 
     return fitted
 
@@ -136,10 +145,18 @@ def test_half_of_the_error_is_not_enough_for_what_is_too_large_in_the_exact_refi
         assert added(now, fit(left, strength)) == name
 
 
-@pytest.mark.parametrize(("gone", "name"), [(FELL + 0.01, "close"), (FELL - 0.01, "")])
-def test_a_further_effect_has_to_take_a_share_of_the_error(gone: float, name: str) -> None:
-    def fitted(before: Any, effects: Sequence[Any], strengths: Sequence[Any]) -> Any:
-        return stage(("strong", "close"), 300.0, [0.0], error=float(np.sqrt(1.0 - gone)))
+@pytest.mark.parametrize(
+    ("gone", "strength", "name"),
+    [(FURTHER + 0.01, 0.5, "close"), (FURTHER - 0.01, 0.5, ""), (0.9, -0.5, "")],
+    ids=["enough", "too little", "of the other sign than the joint fit asks for"],
+)
+def test_a_further_effect_has_to_take_a_share_of_the_error_as_it_is_asked_to(
+    gone: float, strength: float, name: str
+) -> None:
+    def fitted(before: Any, effects: Any, strengths: Any, need: Need) -> Any:
+        error = float(np.sqrt(1.0 - gone))
+        made = stage(("strong", "close"), 300.0, [0.0], error=error, strength=strength)
+        return made if need(made.model) else None
 
     now = stage(("strong",), 400.0, [300.0, 0.0], ["close"], error=1.0)
     assert added(now, fitted) == name

@@ -1,8 +1,6 @@
 """Effects out of proportion: rows at the strength that a residual asks for, and exact fits."""
 
 from functools import cache
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,8 +13,6 @@ from tirelib.diagnose.noise import noise_in, white_level
 from tirelib.diagnose.refit import Refit, refit
 from tirelib.diagnose.secants import with_secants
 from tirelib.diagnose.shape import structure_of
-from tirelib.diagnose.sole import ERROR, MISFIT, sole
-from tirelib.diagnose.stage import ALARM, Stage
 from tirelib.diagnose.structure import Structure
 from tirelib.effects import CATALOGUE
 from tirelib.identify.waveform_fit import Data
@@ -79,59 +75,3 @@ def test_where_nothing_is_left_nothing_is_followed() -> None:
     for name in ("gage_length", "belt_shear"):
         tangent, same = found("", 0.0, name)
         assert same is tangent
-
-
-def stage(error: float, misfit: float, imitated: float, strength: float) -> Any:
-    """Return what is looked at of a stage."""
-    effect = CATALOGUE["belt_shear"]
-    model = SimpleNamespace(
-        error=error, effects=(effect,), strengths=(np.array([strength]),),
-        strength_std=lambda _: np.array([1e-4]),
-    )  # fmt: skip
-    return SimpleNamespace(
-        model=model, scores=SimpleNamespace(misfit=misfit), imitated=imitated,
-        found=SimpleNamespace(living=[SimpleNamespace(effect=effect)]),
-    )  # fmt: skip
-
-
-JUST = (float(np.sqrt(1.0 - ERROR)) - 0.01, 1.0 - MISFIT - 0.01, ALARM - 0.1, 0.03)
-
-
-@pytest.mark.parametrize(
-    ("place", "value"),
-    [(0, JUST[0] + 0.02), (1, JUST[1] + 0.02), (2, ALARM), (3, 0.06), (3, -0.02)],
-    ids=["error stays", "misfit stays", "the impossible stays", "too strong", "wrong sign"],
-)
-def test_only_what_explains_nearly_everything_in_its_range_is_taken(
-    monkeypatch: pytest.MonkeyPatch, place: int, value: float
-) -> None:
-    monkeypatch.setattr("tirelib.diagnose.sole._bent", lambda *_: True)
-    before = stage(1.0, 1.0, 5.0, 0.0)
-    after = list(JUST)
-
-    def told() -> Any:
-        def refitted(*_: Any) -> Any:
-            return stage(*after).model
-
-        return sole(None, before, ["belt_shear"], refitted, lambda _: stage(*after))
-
-    assert told()[1] == 0
-    after[place] = value
-    assert told() is None
-
-
-def test_only_what_first_order_cannot_tell_is_tried() -> None:
-    data, base, _ = case("", 0.0)
-    straight = runs("", 0.0)
-    rests = Variants(variants(data, base, members=6), noise_in(straight))
-    level = white_level(straight, base, data.strain)
-    here = Stage.of(data, base, SOME, rests, level, {})
-    tried: list[str] = []
-
-    def fitted(_: Stage, effects: Any, strengths: Any) -> None:
-        tried.append(effects[-1].name)
-        assert 0.0 < strengths[-1][0] < effects[-1].high
-
-    assert sole(data, here, [effect.name for effect in SOME], fitted, lambda _: here) is None
-    assert "belt_shear" in tried
-    assert not {"gage_drift", "nonuniformity"} & set(tried)
