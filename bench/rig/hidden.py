@@ -192,7 +192,7 @@ _EFFECTS = (
            600e-6, "1", signed=True, on_trace=shown.stiff_sector),
     Hidden("gage_length", "bond that carries less towards the ends", 0.02, 0.06, "m",
            on_trace=shown.bonded_window),
-    Hidden("low_pass", "amplifier of second order", 4e-4, 2e-3, "s",
+    Hidden("low_pass", "amplifier of second order", 3.5e-4, 2e-3, "s",
            on_trace=shown.second_order_filter),
     Hidden("gage_saturation", "glue that yields by a power of strain, more in compression", 0.03,
            1.0, "1", on_trace=shown.soft_clip),

@@ -157,6 +157,7 @@ def diagnosis_document(told: Assessment) -> dict[str, Any]:
         "error_after": told.error_after,
         "heldout_error_before": pooled(told.held_before, told.folds),
         "held_out": [{"condition": f.name, "runs": int(f.out.sum())} for f in told.folds],
+        "delay_us": 1e6 * found.final.delay,
         "misfit": found.left,
         "misfit_floor": found.floor,
         "verdict": told.verdict,

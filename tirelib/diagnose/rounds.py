@@ -98,9 +98,9 @@ def rounds(
     while count < ROUNDS:
         hidden = [name for name in named if name not in BELT]
         found = _added(first, stage, suspects, len(hidden), fitted)
-        if found is None and not named:
+        if not named and (found is None or _idle(stage, *found)):
             listed = [effect.name for effect in catalogue]
-            found = sole(data, stage, listed, refitted, staged)
+            found = sole(data, stage, listed, refitted, staged) or found
         if found is None:
             break
         after, index = found
@@ -155,6 +155,11 @@ def _added(
 def fall(before: Refit, after: Refit) -> float:
     """Return the share of the squared error that is gone."""
     return 1.0 - (after.error / before.error) ** 2
+
+
+def _idle(before: Stage, after: Stage, index: int) -> bool:
+    """Return whether an effect of the catalogue takes hardly any of the error."""
+    return not before.unlisted[index] and fall(before.model, after.model) < FELL
 
 
 def _trial(first: Stage, stage: Stage, index: int, fitted: _Fit) -> Stage | None:

@@ -41,6 +41,7 @@ def extension_document(done: Extension, file: TireFile) -> dict[str, Any]:
         "noise": 1e6 * done.unit.noise, "error_unit": done.unit.name,
         "error_before": done.unit.factor * done.before.error,
         "error_after": done.unit.factor * done.after.error, "floor": done.floor,
+        "delay_us": 1e6 * done.after.delay,
         "heldout_error_before": pooled(done.held_before, done.folds),
         "heldout_error_after": pooled(done.held_after, done.folds),
     }  # fmt: skip

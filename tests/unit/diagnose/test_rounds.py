@@ -284,3 +284,29 @@ def test_what_is_in_no_catalogue_contends_without_being_a_suspect() -> None:
 def test_hints_alone_have_no_leader() -> None:
     stage = judged([ALARM - 0.1, 2.0, 1.0], [100.0, 100.0, 100.0])
     assert Stage.leaders(stage, set(stage.names), ALARM, 1.0) == []
+
+
+@pytest.mark.parametrize(
+    ("gone", "sole", "named"),
+    [
+        (FELL - 0.01, True, ["close"]),
+        (FELL + 0.01, True, ["strong"]),
+        (FELL - 0.01, False, ["strong"]),
+        (None, True, ["close"]),
+    ],
+    ids=["takes nothing", "takes something", "nothing takes most", "no leader"],
+)
+def test_what_takes_most_of_the_error_is_looked_for_where_no_leader_takes_any(
+    monkeypatch: pytest.MonkeyPatch, gone: float | None, sole: bool, named: list[str]
+) -> None:
+    first = stage((), 1000.0, SCORE, error=1.0)
+    first.in_range = np.ones(3, dtype=bool)
+    leads = None
+    if gone is not None:
+        leads = stage(("strong",), 900.0, [0.0] * 2, error=float(np.sqrt(1.0 - gone))), 0
+    most = (stage(("close",), 300.0, [0.0] * 2, error=0.3), 1) if sole else None
+    found = iter([leads, None])
+    monkeypatch.setattr(rounds, "_added", lambda *_: next(found))
+    monkeypatch.setattr(rounds, "sole", lambda *_: most)
+    _, names, count, unlisted = rounds.rounds(None, first, [], None, 1e-6, None)
+    assert (names, count, unlisted) == (named, 1, None)
