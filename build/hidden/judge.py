@@ -159,9 +159,8 @@ def _with(data: Data, model: Refit, name: str) -> Refit:
     living = candidates(data, model, [effect]).living
     if not living:
         raise TirelibError(f"{name} is dead")
-    rest = model.whiten(data.strain - model.waveform).ravel()
-    weights = np.linalg.lstsq(living[0].own.T, rest, rcond=None)[0]
-    start = np.clip(weights * effect.scale, 0.9 * effect.low, 0.9 * effect.high)
+    strength, _ = living[0].alone(data, model)
+    start = np.clip(strength, 0.9 * effect.low, 0.9 * effect.high)
     return refit(data, model.values, [*model.effects, effect], [*model.strengths, start])
 
 

@@ -35,7 +35,7 @@ from tirelib.planning.rivals import Trial, repeated_noise, try_suspects
 from tirelib.waveforms import Waveforms
 
 CACHE = Path(__file__).parents[1] / "out" / "next_test"
-VERSION = 5
+VERSION = 6
 """Of what decides a campaign's numbers beside its day."""
 REPEATS = 2
 """Runs of a campaign that are made twice."""
@@ -235,7 +235,9 @@ def bare(seed: int, plan: str) -> Bare:
         slim = tuple(replace(state, grid=None) for state in states)
         runs = straight_runs(waves)
         data = runs.data(with_deflection=False)
-        trial = try_suspects(data, fit, (), noise=repeated_noise(runs, data, fit))
+        trial = try_suspects(
+            data, fit.on_time(data.points), (), noise=repeated_noise(runs, data, fit)
+        )
         return Bare(slim, tuple(shown), waves, fit, trial)
 
     found: Bare = _kept(CACHE / "bare" / f"{seed}-{plan}-{today.key}.pkl", make)
@@ -249,7 +251,7 @@ class Visible:
         data, trial = straight_runs(none.waves).data(with_deflection=False), none.trial
         white = whitening(none.fit.waveform, none.fit.values, data.points, data.tolerance,
                           data.angle_std, trial.noise, data.low_pass)  # fmt: skip
-        free = none.fit.slopes * WIDTH[:, None, None]
+        free = none.fit.own_slopes * WIDTH[:, None, None]
         self.whiten = white
         self.rows = white(np.concatenate([trial.shapes.present, free])).reshape(
             len(trial.shapes.present) + len(free), -1

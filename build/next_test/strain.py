@@ -50,7 +50,7 @@ def measured(case: PairCase) -> dict[str, Any]:
     noise = repeated_noise(runs, data, base)
     suspects = [(CATALOGUE[k], np.full(CATALOGUE[k].components, 0.1 * CATALOGUE[k].toward))
                 for k in sorted((case.truth, case.rival))]  # fmt: skip
-    test = next_test(data, base, suspects, _envelope(data), noise=noise)
+    test = next_test(data, base.on_time(data.points), suspects, _envelope(data), noise=noise)
     out: dict[str, Any] = {
         "strength": made.strength, "reached": made.visible, "ratio": made.ratio,
         "before": case.gap(test.trial),
@@ -86,4 +86,4 @@ def _tried(waves: Waveforms, near: Refit, before: Trial, point: int) -> Trial:
     every = np.concatenate([before.shapes.present, there], axis=1) / max(before.size, 1.0)
     shapes = Shapes(every, every[:, :0])
     noise = repeated_noise(runs, data, base)
-    return try_suspects(data, base, suspects, noise=noise, shapes=shapes)
+    return try_suspects(data, base.on_time(data.points), suspects, noise=noise, shapes=shapes)

@@ -47,10 +47,22 @@ class Candidate:
         """Norm of the own part at the end of the range."""
         return float(np.sqrt(np.sum(self.own**2)))
 
-    def error_left(self, rest: FloatArray) -> float:
-        """Return the rms of a whitened residual (n,) that would be left with it, to first order."""
-        weights = np.linalg.lstsq(self.own.T, rest, rcond=None)[0]
-        return float(np.sqrt(np.mean((rest - weights @ self.own) ** 2)))
+    def alone(self, data: Data, model: Refit) -> tuple[FloatArray, float]:
+        """Return what this effect alone does best beside the delay, to first order.
+
+        Returns
+        -------
+        strength : shape (components,)
+            In its unit.
+        error : float
+            Rms of the whitened residual that is left.
+        """
+        shape = (-1, *model.waveform.shape)
+        rest = model.beside_delay(model.whiten(data.strain - model.waveform)).ravel()
+        own = model.beside_delay(self.own.reshape(shape)).reshape(len(self.own), -1)
+        weights = np.linalg.lstsq(own.T, rest, rcond=None)[0]
+        left = float(np.sqrt(np.mean((rest - weights @ own) ** 2)))
+        return np.asarray(weights * self.effect.scale), left
 
 
 @dataclass(frozen=True, slots=True)

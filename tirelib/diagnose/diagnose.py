@@ -188,7 +188,6 @@ def _findings(first: Stage, named: Sequence[str], model: Refit, data: Data) -> t
 def _finding(stage: Stage, index: int, data: Data) -> Finding:
     """Return one candidate as a stage sees it."""
     candidate, scores, limit = stage.found.living[index], stage.scores, stage.threshold[index]
-    rest = stage.model.whiten(data.strain - stage.model.waveform).ravel()
     ratio = stage.ratio[index]
     return Finding(
         candidate.effect,
@@ -201,7 +200,7 @@ def _finding(stage: Stage, index: int, data: Data) -> Finding:
         float(scores.alone[index] / scores.misfit),
         _listed(stage.found.twins(index)),
         stage.ranking.power(index, ALARM * limit),
-        candidate.error_left(rest),
+        candidate.alone(data, stage.model)[1],
     )
 
 

@@ -67,5 +67,6 @@ def structural_floor(
     rests = structural_ensemble(
         data, model, noise=noise, members=members, seed=seed, progress=progress
     )
-    left = np.sqrt(np.mean(rests**2, axis=1)) if rests.size else np.array([np.nan])
+    white = model.beside_delay(rests.reshape(-1, *model.waveform.shape))  # as a fit would
+    left = np.sqrt(np.mean(white**2, axis=(1, 2))) if rests.size else np.array([np.nan])
     return unit.factor * float(np.median(left))

@@ -95,6 +95,15 @@ class Refit:
         """Slopes by what belongs to the tire and its effects, shape (n_free - 1, ...)."""
         return np.delete(self.slopes, BASE - 1, axis=0)
 
+    def beside_delay(self, white: FloatArray) -> FloatArray:
+        """Return whitened waveforms (..., n_runs, n_phi) without what a delay could take."""
+        late = self.whiten(self.slopes[BASE - 1])
+        size = float(np.sum(late**2))
+        if size == 0.0:
+            return white
+        share = np.sum(white * late, axis=(-2, -1), keepdims=True) / size
+        return np.asarray(white - share * late)
+
     def on_time(self, points: Operating) -> "Refit":
         """Return the model without the delay: as a day without any would show it."""
         waveform = earlier(self.waveform, points.omega, self.delay)
@@ -170,7 +179,7 @@ def refit(
                 progress(f"refit, error {np.sqrt(fitter.cost / data.strain.size):.2f}")
             if moved < (ROUGH if outer < 2 else SETTLED):
                 break
-        if outer >= 2 and moved >= SETTLED:
+        if outer == OUTER - 1 and moved >= SETTLED:
             raise ConvergenceError(
                 f"refit with {', '.join(e.name for e in effects) or 'no effect'}: the parameters "
                 f"still move by {moved:.2e}; the model does not fit these runs: look at them with "
@@ -307,15 +316,22 @@ class _Fitter:
                 if gain > FORETOLD * foretold:
                     self.damping = max(self.damping / 10.0, 1e-9)
                 elif gain < POOR * foretold:  # it went too far
-                    self.damping = min(max(10.0 * self.damping, 1e-3), 1e2)
+                    self.damping = max(10.0 * self.damping, 1e-3)
                 return 0.0 if flat else float(np.abs(dz).max())
-            if not self.fresh:
-                self._linearise(self.z)
-                self.rows = self.whiten(self.slopes).reshape(self.z.size, -1)
+            if not self.fresh and self._renewed():
                 return self.step()
             self.damping *= 10.0
         self.damping = 1e-3
         return 0.0
+
+    def _renewed(self) -> bool:
+        """Bring the slopes up to date; return whether there is a tire within their differences."""
+        try:
+            self._linearise(self.z)
+        except TirelibError:
+            return False
+        self.rows = self.whiten(self.slopes).reshape(self.z.size, -1)
+        return True
 
     def result(self) -> Refit:
         """Return the fitted model."""

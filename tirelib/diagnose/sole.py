@@ -45,15 +45,13 @@ def sole(
         Return the stage of a fit.
     """
     model = stage.model
-    rest = model.whiten(data.strain - model.waveform).ravel()
     found: list[tuple[Refit, int]] = []
     for index, candidate in enumerate(stage.found.living):
         effect = candidate.effect
-        left = (candidate.error_left(rest) / model.error) ** 2
-        if effect.name not in suspects or left > 1.0 - TRIED:
+        strength, left = candidate.alone(data, model)
+        if effect.name not in suspects or left**2 > (1.0 - TRIED) * model.error**2:
             continue
-        weights = np.linalg.lstsq(candidate.own.T, rest, rcond=None)[0]
-        start = np.clip(weights * effect.scale, 0.9 * effect.low, 0.9 * effect.high)
+        start = np.clip(strength, 0.9 * effect.low, 0.9 * effect.high)
         after = refitted(stage, [*model.effects, effect], [*model.strengths, start])
         if after is not None and after.error**2 <= (1.0 - ERROR) * model.error**2:
             found.append((after, index))

@@ -15,7 +15,7 @@ import numpy as np
 
 from tirelib import __version__
 from tirelib.arrays import FloatArray
-from tirelib.diagnose import ensemble, variant
+from tirelib.diagnose import delay, ensemble, variant
 from tirelib.diagnose.ensemble import MEMBERS, Variants, variants
 from tirelib.diagnose.refit import Refit
 from tirelib.identify.waveform_fit import Data
@@ -89,7 +89,7 @@ def key_of(data: Data, model: Refit, members: int, seed: int) -> str:
         add(name, np.asarray(model.values[name], dtype=float))
     for effect, strength in zip(model.effects, model.strengths, strict=True):
         add(effect.name, strength)
-    for module in (ensemble, variant):
+    for module in (delay, ensemble, variant):
         told.update(inspect.getsource(module).encode())
     return told.hexdigest()
 

@@ -150,12 +150,8 @@ class _Strain:
 
     def with_effect(self, before: Refit, effect: Effect) -> Refit:
         """Return the fit with one effect more, from what serves best to first order."""
-        own = candidates(self.data, before, [effect]).living[0].own
-        rest = before.whiten(self.data.strain - before.waveform).ravel()
-        weights = np.linalg.lstsq(own.T, rest, rcond=None)[0]
-        start: FloatArray = np.clip(
-            weights * effect.scale, START_INSIDE * effect.low, START_INSIDE * effect.high
-        )
+        strength, _ = candidates(self.data, before, [effect]).living[0].alone(self.data, before)
+        start: FloatArray = np.clip(strength, START_INSIDE * effect.low, START_INSIDE * effect.high)
         return refit(
             self.data, before.values, [*before.effects, effect], [*before.strengths, start],
             progress=self.progress,

@@ -221,7 +221,7 @@ class _Judge:
     def __call__(self, waves: FloatArray) -> tuple[tuple[str, ...], FloatArray]:
         """Return who comes first per tire, and the errors that the base leaves."""
         rests = waves - self._refitted(waves)
-        white = self.base.whiten(rests)
+        white = self.base.beside_delay(self.base.whiten(rests))
         errors: FloatArray = np.sqrt(np.mean(white**2, axis=(1, 2)))
         return tuple(self.ranking.first(rest) for rest in rests), errors
 

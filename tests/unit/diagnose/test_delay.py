@@ -5,11 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.unit.diagnose.planted import runs
+from tests.unit.diagnose.planted import model_file, runs
 from tests.unit.identify.model_waves import TIRE
 from tirelib.arrays import FloatArray
+from tirelib.compare.model import model_of
 from tirelib.diagnose.delay import UNIT, by_delay, earlier, late
+from tirelib.diagnose.floor import ErrorUnit, structural_floor
 from tirelib.diagnose.refit import Refit, refit
+from tirelib.effects import CATALOGUE
+from tirelib.extend.extension import _Strain
 from tirelib.identify.waveform_fit import Data
 from tirelib.model.base import predict, values_of
 from tirelib.model.state import State
@@ -87,3 +91,24 @@ def test_the_model_shows_the_delay_wherever_it_is_solved(
 def test_without_a_trigger_there_is_nothing_to_fit(data: Data) -> None:
     free = replace(data, strain=shown(data, DELAY), angle_std=np.full(len(data.points), np.inf))
     assert abs(refit(free, values_of(TIRE)).delay) < 1e-6
+
+
+def test_the_floor_is_of_fits_that_have_a_delay_too(
+    data: Data, fitted: tuple[Refit, Refit], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    unit = ErrorUnit(1.0, "noise", 1e-6)
+    told = structural_floor(data, fitted[0], unit, members=6)
+    monkeypatch.setattr("tirelib.diagnose.ensemble.STD", 1e-12)  # variants that are not late
+    # the draws are the same
+    assert told == pytest.approx(structural_floor(data, fitted[0], unit, members=6), rel=0.01)
+
+
+def test_an_effect_that_comes_late_is_added_from_what_no_delay_could_do() -> None:
+    planted = runs("low_pass", 0.2).data(with_deflection=False)
+    base = refit(planted, values_of(TIRE))
+    assert base.delay > 1e-4, "it looks like a delay at first"
+    subject = _Strain(runs("low_pass", 0.2), model_of(model_file()), None, 4)
+    after = subject.with_effect(base, CATALOGUE["low_pass"])
+    assert after.strengths[0][0] == pytest.approx(0.2, rel=0.05)
+    assert abs(after.delay) < 1e-5
+    assert after.error < 0.3 * base.error
