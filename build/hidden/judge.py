@@ -161,7 +161,9 @@ def _with(data: Data, model: Refit, name: str) -> Refit:
         raise TirelibError(f"{name} is dead")
     strength, _ = living[0].alone(data, model)
     start = np.clip(strength, 0.9 * effect.low, 0.9 * effect.high)
-    return refit(data, model.values, [*model.effects, effect], [*model.strengths, start])
+    return refit(
+        data, model.values, [*model.effects, effect], [*model.strengths, start], delay=model.delay
+    )
 
 
 def _held_out(waves: Waveforms, case: Case, model: Refit) -> list[float]:

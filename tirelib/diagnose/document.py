@@ -135,7 +135,10 @@ def _with_one(found: Diagnosis, name: str) -> Refit | None:
     start = np.clip(finding.strength, 0.9 * effect.low, 0.9 * effect.high)
     base = found.base
     try:
-        return refit(found.data, base.values, [*base.effects, effect], [*base.strengths, start])
+        return refit(
+            found.data, base.values, [*base.effects, effect], [*base.strengths, start],
+            delay=base.delay,
+        )  # fmt: skip
     except TirelibError:
         return None
 

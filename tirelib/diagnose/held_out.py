@@ -82,7 +82,7 @@ def held_out_errors(
         try:
             trained = refit(
                 part_of(data, ~fold.out), model.values, model.effects, model.strengths,
-                near=_near(model.correction, ~fold.out), progress=progress,
+                delay=model.delay, near=_near(model.correction, ~fold.out), progress=progress,
             )  # fmt: skip
             near = _near(model.correction, fold.out)
             errors.append(unit.factor * error_on(part_of(data, fold.out), trained, near))

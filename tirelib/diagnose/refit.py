@@ -36,7 +36,7 @@ OUTER, MAX_STEPS = 8, 25
 """Most times that large displacements and whitening are brought up to date, and steps each time."""
 ROUGH, SETTLED = 0.05, 0.005
 """Coordinate by which the last step moves: the first two times, and then."""
-FOLLOWED = 0.02
+FOLLOWED = 0.008
 """Coordinate by which all steps together move where large displacements need no update."""
 LONGEST = 0.4
 FORETOLD = 0.8
@@ -141,6 +141,7 @@ def refit(
     effects: Sequence[Effect] = (),
     strengths: Sequence[FloatArray] = (),
     *,
+    delay: float = 0.0,
     near: Correction | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Refit:
@@ -153,6 +154,8 @@ def refit(
         Start values of the tire.
     effects, strengths
         Effects of the model and their start strengths.
+    delay : float, [s]
+        From which it starts; that of the same runs is nearby, whatever effects there are.
     near : Correction, optional
         Of the same runs at values nearby: saves time, the result is the same.
     progress : callable, optional
@@ -163,11 +166,11 @@ def refit(
         If the steps do not settle; carries the last values.
     """
     start = [np.zeros(e.components) for e in effects] if not strengths else list(strengths)
-    fitter = _Fitter(data, dict(values), tuple(effects), start, near)
+    fitter = _Fitter(data, dict(values), tuple(effects), start, delay, near)
     try:
         fitter.refresh()
     except ParameterError:  # another fit may have ended where the sidewall has no stiffness left
-        fitter = _Fitter(data, _flatter(values), tuple(effects), start, near)
+        fitter = _Fitter(data, _flatter(values), tuple(effects), start, delay, near)
         fitter.refresh()
     for outer in range(OUTER):
         if outer:
@@ -207,12 +210,13 @@ class _Fitter:
         values: dict[str, float | FloatArray],
         effects: tuple[Effect, ...],
         strengths: list[FloatArray],
+        delay: float,
         near: Correction | None = None,
     ) -> None:
         self.data, self.start, self.effects = data, values, effects
         scales = [np.full(e.components, e.scale) for e in effects]
         self.scale = np.concatenate([np.ones(len(FITTED)), [UNIT], *scales])
-        self.z = np.concatenate([np.zeros(BASE), *strengths]) / self.scale
+        self.z = np.concatenate([np.zeros(len(FITTED)), [delay], *strengths]) / self.scale
         more = np.full(self.z.size - BASE, STRENGTH_WIDTH)
         self.width = np.concatenate([WIDTH, [STD / UNIT], more])
         self.damping, self.cost = 1e-3, np.inf

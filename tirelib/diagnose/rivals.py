@@ -46,7 +46,9 @@ def _misfit(data: Data, first: "Stage", effect: Effect, strength: np.ndarray) ->
     base = first.model
     start = np.clip(strength, 0.9 * effect.low, 0.9 * effect.high)
     try:
-        model: Refit = refit(data, base.values, [*base.effects, effect], [*base.strengths, start])
+        model: Refit = refit(
+            data, base.values, [*base.effects, effect], [*base.strengths, start], delay=base.delay
+        )
     except TirelibError:
         return float("inf")
     white = base.whiten(data.strain - model.on_time(data.points).waveform).ravel()

@@ -78,7 +78,10 @@ def rounds(
         stage: Stage, effects: Sequence[Effect], strengths: Sequence[FloatArray]
     ) -> Refit | None:
         try:
-            return refit(data, stage.model.values, effects, strengths, progress=progress)
+            model = stage.model
+            return refit(
+                data, model.values, effects, strengths, delay=model.delay, progress=progress
+            )
         except TirelibError:
             return None
 

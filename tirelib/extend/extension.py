@@ -154,14 +154,14 @@ class _Strain:
         start: FloatArray = np.clip(strength, START_INSIDE * effect.low, START_INSIDE * effect.high)
         return refit(
             self.data, before.values, [*before.effects, effect], [*before.strengths, start],
-            progress=self.progress,
+            delay=before.delay, progress=self.progress,
         )  # fmt: skip
 
     def without(self, before: Refit, kept: Sequence[int]) -> Refit:
         """Return the fit with some of the effects."""
         return refit(
             self.data, before.values, [before.effects[k] for k in kept],
-            [before.strengths[k] for k in kept], progress=self.progress,
+            [before.strengths[k] for k in kept], delay=before.delay, progress=self.progress,
         )  # fmt: skip
 
     def left_out(self) -> Sequence[Fold]:
