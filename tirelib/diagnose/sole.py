@@ -48,8 +48,10 @@ def sole(
     found: list[tuple[Refit, int]] = []
     for index, candidate in enumerate(stage.found.living):
         effect = candidate.effect
+        if effect.name not in suspects:
+            continue
         strength, left = candidate.alone(data, model)
-        if effect.name not in suspects or left**2 > (1.0 - TRIED) * model.error**2:
+        if left**2 > (1.0 - TRIED) * model.error**2:
             continue
         start = np.clip(strength, 0.9 * effect.low, 0.9 * effect.high)
         after = refitted(stage, [*model.effects, effect], [*model.strengths, start])
