@@ -27,7 +27,8 @@ from bench.rig.shown import Shown
 from bench.rig.solve import State, solve
 from bench.rig.tire import Condition
 from tirelib.arrays import FloatArray
-from tirelib.diagnose.refit import WIDTH, Refit
+from tirelib.diagnose.fitter import WIDTH
+from tirelib.diagnose.refit import Refit
 from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.random_effects import whitening

@@ -248,7 +248,7 @@ def _refitted(
         z = z + np.clip(step, -0.4, 0.4)
         state = predict(
             move(model.values, z, FITTED), data.points, model.changes, low_pass=data.low_pass,
-            correction=model.correction,
+            correction=model.correction.moved(z),
         )  # fmt: skip
         fitted = state.wave
     return fitted

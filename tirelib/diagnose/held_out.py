@@ -112,7 +112,9 @@ def error_on(data: Data, model: Refit, near: Correction | None = None) -> float:
     `near` is a correction of these runs at values nearby; it saves time.
     """
     points = data.points
-    correction = large_displacements(model.values, points, low_pass=data.low_pass, start=near)
+    correction = large_displacements(
+        model.values, points, low_pass=data.low_pass, start=near.contact if near else None
+    )
     wave = predict(
         model.values, points, model.changes, low_pass=data.low_pass, correction=correction
     ).wave

@@ -4,47 +4,31 @@ Values of the tire, the delay of the day (`tirelib.diagnose.delay`) and strength
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.diagnose.delay import STD, UNIT, by_delay, earlier, late
+from tirelib.diagnose.delay import earlier, late
+from tirelib.diagnose.fitter import BASE, Fitter, changes_of
 from tirelib.effects import Effect
-from tirelib.errors import ConvergenceError, ParameterError, TirelibError
-from tirelib.identify.identify import FITTED
-from tirelib.identify.random_effects import Whitening, whitening
+from tirelib.errors import ConvergenceError, ParameterError
+from tirelib.identify.random_effects import Whitening
 from tirelib.identify.waveform_fit import Data
-from tirelib.model.base import (
-    Correction,
-    large_displacements,
-    linearised,
-    move,
-    predict,
-)
+from tirelib.model.base import Correction
 from tirelib.model.chain import Changes
-from tirelib.model.state import Operating, State
+from tirelib.model.state import Operating
 
-WIDTH = np.array([0.7, 0.7, 1.5, 1.0, 1.5, 0.9, 0.15, 0.7])
-"""Prior standard deviation of the free coordinates: wide, since the campaign has informed them."""
-BASE = len(FITTED) + 1
-"""Coordinates before the strengths: those of the tire, then the delay."""
-STRENGTH_WIDTH = 1.0
-"""Prior standard deviation of a strength, relative to its range."""
-OUTER, MAX_STEPS = 8, 25
-"""Most times that large displacements and whitening are brought up to date, and steps each time."""
+OUTER, WEIGHED, MAX_STEPS = 8, 2, 25
+"""Most times that large displacements are brought up to date, those that weights are, which might
+swing from one to another for ever, and steps each time."""
+STILL = 5e-4
+"""Least share of the cost that another time has to gain."""
 ROUGH, SETTLED = 0.05, 0.005
-"""Coordinate by which the last step moves: the first two times, and then."""
-FOLLOWED = 0.008
-"""Coordinate by which all steps together move where large displacements need no update."""
-LONGEST = 0.4
-FORETOLD = 0.8
-"""Share of the gain that slopes foretell from which on they serve for another step."""
-POOR = 0.25
-"""The same below which steps get shorter."""
-FLAT = 1e-5
-"""Gain of a step, over the cost, of one at the bottom."""
+"""Coordinate by which the last step moves: the first time, and then."""
+FOLLOWED = 0.01
+"""Coordinate by which all steps together move where large displacements need no update: they follow
+to first order."""
 FLATTER = 0.9
 """Share of the pressure slopes from which a fit starts that cannot start where it should."""
 
@@ -127,14 +111,6 @@ class Refit:
         return sorted(kept, key=list(names).index)
 
 
-def changes_of(effects: Sequence[Effect], strengths: Sequence[FloatArray]) -> Changes:
-    """Return effects at strengths as changes of the chain."""
-    return [
-        effect.at(float(s[0]) if effect.components == 1 else tuple(float(x) for x in s))
-        for effect, s in zip(effects, strengths, strict=True)
-    ]
-
-
 def refit(
     data: Data,
     values: Mapping[str, float | FloatArray],
@@ -166,21 +142,25 @@ def refit(
         If the steps do not settle; carries the last values.
     """
     start = [np.zeros(e.components) for e in effects] if not strengths else list(strengths)
-    fitter = _Fitter(data, dict(values), tuple(effects), start, delay, near)
+    fitter = Fitter(data, dict(values), tuple(effects), start, delay, near)
     try:
         fitter.refresh()
     except ParameterError:  # another fit may have ended where the sidewall has no stiffness left
-        fitter = _Fitter(data, _flatter(values), tuple(effects), start, delay, near)
+        fitter = Fitter(data, _flatter(values), tuple(effects), start, delay, near)
         fitter.refresh()
+    last = np.inf
     for outer in range(OUTER):
         if outer:
-            fitter.refresh()
+            fitter.refresh(weigh=outer < WEIGHED)
+        if outer >= WEIGHED and fitter.cost > (1.0 - STILL) * last:
+            break
+        last = fitter.cost
         begin = fitter.z
         for _ in range(MAX_STEPS):
             moved = fitter.step()
             if progress is not None:
                 progress(f"refit, error {np.sqrt(fitter.cost / data.strain.size):.2f}")
-            if moved < (ROUGH if outer < 2 else SETTLED):
+            if moved < (SETTLED if outer else ROUGH):
                 break
         if outer == OUTER - 1 and moved >= SETTLED:
             raise ConvergenceError(
@@ -190,9 +170,12 @@ def refit(
                 fitter.values,
                 moved,
             )
-        if outer >= 2 and float(np.abs(fitter.z - begin).max()) < FOLLOWED:
+        if outer and float(np.abs(fitter.z - begin).max()) < FOLLOWED:
             break
-    return fitter.result()
+    if fitter.away > SETTLED:  # what is told is told of the whole model
+        fitter.refresh(weigh=False)
+    fitter.renew()
+    return _result(fitter)
 
 
 def _flatter(values: Mapping[str, float | FloatArray]) -> dict[str, float | FloatArray]:
@@ -201,154 +184,13 @@ def _flatter(values: Mapping[str, float | FloatArray]) -> dict[str, float | Floa
     return {**values, **{name: FLATTER * np.asarray(values[name]) for name in slopes}}
 
 
-class _Fitter:
-    """Levenberg-Marquardt on whitened residuals, base coordinates first, then strengths."""
-
-    def __init__(
-        self,
-        data: Data,
-        values: dict[str, float | FloatArray],
-        effects: tuple[Effect, ...],
-        strengths: list[FloatArray],
-        delay: float,
-        near: Correction | None = None,
-    ) -> None:
-        self.data, self.start, self.effects = data, values, effects
-        scales = [np.full(e.components, e.scale) for e in effects]
-        self.scale = np.concatenate([np.ones(len(FITTED)), [UNIT], *scales])
-        self.z = np.concatenate([np.zeros(len(FITTED)), [delay], *strengths]) / self.scale
-        more = np.full(self.z.size - BASE, STRENGTH_WIDTH)
-        self.width = np.concatenate([WIDTH, [STD / UNIT], more])
-        self.damping, self.cost = 1e-3, np.inf
-        self.fresh = self.follows = False
-        self.correction = near
-
-    @property
-    def values(self) -> dict[str, float | FloatArray]:
-        return move(self.start, self.z[: len(FITTED)], FITTED)
-
-    def strengths(self, z: FloatArray) -> tuple[FloatArray, ...]:
-        """Return the strengths in their units."""
-        flat = (z * self.scale)[BASE:]
-        cuts = np.cumsum([e.components for e in self.effects])[:-1]
-        return tuple(np.split(flat, cuts)) if self.effects else ()
-
-    def delay(self, z: FloatArray) -> float:
-        """Return the delay [s]."""
-        return float((z * self.scale)[BASE - 1])
-
-    def changes(self, z: FloatArray) -> Changes:
-        """Return effects and delay for the chain."""
-        return [*changes_of(self.effects, self.strengths(z)), late(self.delay(z))]
-
-    def refresh(self) -> None:
-        """Bring large displacements and whitening up to date."""
-        data = self.data
-        self.correction = large_displacements(
-            self.values, data.points, low_pass=data.low_pass, start=self.correction
-        )
-        if self.follows:  # what large displacements add changes no slope
-            self._take(self._predict(self.z))
-        else:
-            self._linearise(self.z)
-        self.whiten = whitening(
-            self.waveform, self.values, data.points, data.tolerance, data.angle_std, data.noise,
-            data.low_pass,
-        )  # fmt: skip
-        self.rows = self.whiten(self.slopes).reshape(self.z.size, -1)
-        self.cost = self._cost(self.waveform, self.z)
-
-    def _take(self, state: State) -> None:
-        self.waveform, self.deflection, self.fresh = state.wave, state.deflection, False
-
-    def _linearise(self, z: FloatArray) -> None:
-        values = move(self.start, z[: len(FITTED)], FITTED)
-        base = linearised(
-            values, self.data.points, FITTED, self.changes(z), low_pass=self.data.low_pass,
-            correction=self.correction,
-        )  # fmt: skip
-        rows = [base.waveform_slopes, by_delay(base.waveform, self.data.points.omega)[None]]
-        for k in range(BASE, z.size):
-            moved = z.copy()
-            moved[k] += 1e-3 if z[k] <= 0.5 else -1e-3
-            wave = self._predict(moved).wave
-            rows.append(((wave - base.waveform) / (moved[k] - z[k]))[None])
-        self.waveform, self.deflection = base.waveform, base.deflection
-        self.slopes = np.concatenate(rows)
-        self.fresh = self.follows = True
-
-    def _predict(self, z: FloatArray) -> State:
-        return predict(
-            move(self.start, z[: len(FITTED)], FITTED), self.data.points, self.changes(z),
-            low_pass=self.data.low_pass, correction=self.correction,
-        )  # fmt: skip
-
-    def _cost(self, waveform: FloatArray, z: FloatArray) -> float:
-        rest = self.whiten(self.data.strain - waveform)
-        return float(np.sum(rest**2) + np.sum((z / self.width) ** 2))
-
-    def step(self) -> float:
-        """Take one step that lowers the cost; return its largest component.
-
-        The slopes serve as long as they foretell what a step gains.
-        """
-        rest = self.whiten(self.data.strain - self.waveform).ravel()
-        normal = self.rows @ self.rows.T + np.diag(self.width**-2)
-        gradient = self.rows @ rest - self.z / self.width**2
-        while self.damping < 1e8:
-            dz = np.linalg.solve(normal + self.damping * np.diag(np.diag(normal)), gradient)
-            dz = np.clip(dz, -LONGEST, LONGEST)
-            z = self.z + dz
-            try:
-                state = self._predict(z)
-                cost = self._cost(state.wave, z)
-                better = cost <= self.cost * (1.0 + 1e-12)
-                gain = self.cost - cost
-                # a valley that is flat to a millionth is the bottom
-                flat = gain < FLAT * cost
-                foretold = float(dz @ (2.0 * gradient - normal @ dz))
-                if better and (gain < FORETOLD * foretold or (flat and not self.fresh)):
-                    flat = flat and self.fresh
-                    self._linearise(z)
-                    self.rows = self.whiten(self.slopes).reshape(z.size, -1)
-                elif better:
-                    self._take(state)
-            except TirelibError:  # there, or within a difference of it, is no tire
-                better = False
-            if better:
-                self.z, self.cost = z, cost
-                if gain > FORETOLD * foretold:
-                    self.damping = max(self.damping / 10.0, 1e-9)
-                elif gain < POOR * foretold:  # it went too far
-                    self.damping = max(10.0 * self.damping, 1e-3)
-                return 0.0 if flat else float(np.abs(dz).max())
-            if not self.fresh and self._renewed():
-                return self.step()
-            self.damping *= 10.0
-        self.damping = 1e-3
-        return 0.0
-
-    def _renewed(self) -> bool:
-        """Bring the slopes up to date; return whether there is a tire within their differences."""
-        try:
-            self._linearise(self.z)
-        except TirelibError:
-            return False
-        self.rows = self.whiten(self.slopes).reshape(self.z.size, -1)
-        return True
-
-    def result(self) -> Refit:
-        """Return the fitted model."""
-        assert self.correction is not None  # noqa: S101 - refresh has set it
-        if not self.fresh:
-            with suppress(TirelibError):  # within a difference of it is no tire
-                self._linearise(self.z)
-        rows = self.whiten(self.slopes).reshape(self.z.size, -1)
-        rest = self.whiten(self.data.strain - self.waveform)
-        normal = rows @ rows.T + np.diag(self.width**-2)
-        covariance = np.asarray(np.linalg.inv(normal), dtype=np.float64)
-        return Refit(
-            self.values, self.effects, self.strengths(self.z),
-            self.delay(self.z), self.waveform, self.deflection, self.slopes, self.correction,
-            self.whiten, covariance, float(np.sqrt(np.mean(rest**2))),
-        )  # fmt: skip
+def _result(fitter: Fitter) -> Refit:
+    """Return the fitted model."""
+    rest = fitter.whiten(fitter.data.strain - fitter.waveform)
+    normal = fitter.rows @ fitter.rows.T + np.diag(fitter.width**-2)
+    covariance = np.asarray(np.linalg.inv(normal), dtype=np.float64)
+    return Refit(
+        fitter.values, fitter.effects, fitter.strengths(fitter.z), fitter.delay(fitter.z),
+        fitter.waveform, fitter.deflection, fitter.slopes, fitter.large(fitter.z),
+        fitter.whiten, covariance, float(np.sqrt(np.mean(rest**2))),
+    )  # fmt: skip

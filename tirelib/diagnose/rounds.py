@@ -80,8 +80,9 @@ def rounds(
         try:
             model = stage.model
             return refit(
-                data, model.values, effects, strengths, delay=model.delay, progress=progress
-            )
+                data, model.values, effects, strengths,
+                delay=model.delay, near=model.correction, progress=progress,
+            )  # fmt: skip
         except TirelibError:
             return None
 

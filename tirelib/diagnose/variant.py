@@ -15,6 +15,7 @@ from tirelib.contact.radial import press
 from tirelib.diagnose.refit import Refit
 from tirelib.effects.effect import State
 from tirelib.errors import ConvergenceError
+from tirelib.identify.identify import FITTED
 from tirelib.identify.waveform_fit import Data
 from tirelib.model.base import Correction, predict
 from tirelib.model.chain import Change
@@ -61,15 +62,23 @@ def variant(data: Data, model: Refit, random: np.random.Generator) -> FloatArray
         points.load / REFERENCE_LOAD
     ) ** random.uniform(-0.1, 0.2)
     large = 1.0 + LARGE * float(random.standard_normal())
+    follows = model.correction.moved(_moves(model.values, values, len(points)))
     correction = Correction(
-        large * model.correction.waveform, large * model.correction.deflection,
-        start=model.correction.start,
-    )  # fmt: skip
+        large * follows.waveform, large * follows.deflection, start=follows.start
+    )
     crown = crowned(float(random.uniform(0.0, CROWN)))
     own = [("constants", grown), ("constants", flung), ("contact", crown)]
     return predict(
         values, points, [*model.changes, *own], low_pass=data.low_pass, correction=correction
     ).wave
+
+
+def _moves(
+    values: Mapping[str, float | FloatArray], others: Mapping[str, float | FloatArray], n: int
+) -> FloatArray:
+    """Return moves of the fitted coordinates from values to others, (n_free, n)."""
+    moves = [each.distance(values[each.name], others[each.name]) for each in FITTED]
+    return np.stack([np.broadcast_to(move, (n,)) for move in moves])
 
 
 def flung(state: State) -> State:

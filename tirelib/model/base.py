@@ -7,6 +7,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.contact.exact import ExactContact, load_exact
+from tirelib.contact.exact_slopes import ExactSlopes
 from tirelib.contact.free_boundary import Start
 from tirelib.model.chain import Changes, waveform
 from tirelib.model.state import Operating, State
@@ -33,6 +34,10 @@ class Coordinate:
     def moved(self, value: float | FloatArray, z: float | FloatArray) -> float | FloatArray:
         """Return the parameter's value after a move."""
         return value * np.exp(z) if self.unit == 0.0 else value + self.unit * z
+
+    def distance(self, value: float | FloatArray, other: float | FloatArray) -> float | FloatArray:
+        """Return the move z from a value to another."""
+        return np.log(other / value) if self.unit == 0.0 else (other - value) / self.unit
 
     def spread(self, value: float, std: float) -> float:
         """Return a standard deviation of z as one of the value."""
@@ -101,8 +106,27 @@ def predict(
     if correction is None:
         return waveform(state, changes, low_pass=low_pass)
     state = state.but(start=correction.start)
+    if correction.depth is not None:
+        state = state.but(deflection=correction.depth)
     state = waveform(state, [("gage", correction.change), *changes], low_pass=low_pass)
     return state.but(deflection=state.deflection + correction.deflection)
+
+
+@dataclass(frozen=True, slots=True)
+class CorrectionSlopes:
+    """How a correction changes with free coordinates, at those that it was made for.
+
+    Attributes
+    ----------
+    waveform : shape (n_free, n_points, n_phi), [-]
+    deflection : shape (n_free, n_points), [m]
+    contact : ExactSlopes
+        Of the exact ring; its last two directions are load and pressure.
+    """
+
+    waveform: FloatArray
+    deflection: FloatArray
+    contact: ExactSlopes
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,12 +141,18 @@ class Correction:
         The solution behind it: a start for one nearby, and for slopes.
     start : Start or None
         Of the linear ring's contact.
+    depth : shape (n_points,) or None, [m]
+        A deflection of the linear ring nearby, from which constants that follow it start.
+    slopes : CorrectionSlopes or None
+        By free coordinates (`tirelib.model.whole.with_slopes`).
     """
 
     waveform: FloatArray
     deflection: FloatArray
     contact: ExactContact | None = None
     start: Start | None = None
+    depth: FloatArray | None = None
+    slopes: CorrectionSlopes | None = None
 
     def change(self, state: State) -> State:
         """Add the correction to a waveform."""
@@ -133,7 +163,33 @@ class Correction:
         return Correction(
             np.tile(self.waveform, (times, 1)), np.tile(self.deflection, times),
             start=self.start.tiled(times) if self.start else None,
+            depth=None if self.depth is None else np.tile(self.depth, times),
         )  # fmt: skip
+
+    def moved(self, dz: FloatArray) -> "Correction":
+        """Return the correction after a move, to first order where it has slopes.
+
+        `dz` is of shape (n_free,), or (n_free, n_points) where points move by themselves.
+        """
+        if self.slopes is None:
+            return self
+        by, deeper = self.slopes.waveform, self.slopes.deflection
+        each = np.broadcast_to(dz.T, deeper.shape[::-1]).T
+        return replace(
+            self,
+            waveform=self.waveform + np.einsum("kp,kpn->pn", each, by),
+            deflection=self.deflection + np.sum(each * deeper, axis=0),
+        )
+
+    def guess(self, dz: FloatArray) -> ExactContact | None:
+        """Return a start for the contact after a move (n_free,)."""
+        if self.slopes is None or self.contact is None:
+            return self.contact
+        return self.slopes.contact.moved(self.contact, np.append(dz, [0.0, 0.0]))
+
+    def near(self, deflection: FloatArray) -> "Correction":
+        """Return the same for points whose deflection, with the correction's, is about this."""
+        return replace(self, depth=deflection - self.deflection)
 
 
 def large_displacements(
@@ -142,20 +198,19 @@ def large_displacements(
     *,
     low_pass: LowPass | None = None,
     phi: FloatArray = GRID,
-    start: Correction | None = None,
+    start: ExactContact | None = None,
 ) -> Correction:
     """Return the exact ring less the linear one, both static and undamped, at a tire's values.
 
-    It changes slowly with the parameters, so a fit brings it up to date a few times only; one
-    nearby for the same points as `start` saves most of the time and changes nothing else.
+    It changes slowly with the parameters, so a fit brings it up to date a few times only; a
+    contact nearby for the same points as `start` saves most of the time and changes nothing else.
     """
     still = dict(values)
     still["damping"] = 0.0
     state = waveform(State.of(still, points, phi), low_pass=low_pass)
     exact = load_exact(
-        replace(state.ring, shear_stiffness=np.inf), state.tread, points.load,
-        start=start.contact if start else None,
-    )  # fmt: skip
+        replace(state.ring, shear_stiffness=np.inf), state.tread, points.load, start=start
+    )
     strain = smoothed(exact.strain(state.offset, phi), points, low_pass or LowPass())
     return Correction(
         strain - state.wave, exact.deflection - state.deflection, exact,
@@ -204,7 +259,10 @@ def linearised(
     correction: Correction | None = None,
     step: float = 1e-4,
 ) -> Linear:
-    """Return the model and its slopes: one shifted copy per free coordinate, all in one batch."""
+    """Return the model and its slopes: one shifted copy per free coordinate, all in one batch.
+
+    A correction's slopes have to be by the same coordinates.
+    """
     n, k = len(points), len(free)
     columns = dict(values)
     for j, coordinate in enumerate(free):
@@ -219,4 +277,8 @@ def linearised(
     )  # fmt: skip
     waves = state.wave.reshape(k + 1, n, -1)
     depth = state.deflection.reshape(k + 1, n)
-    return Linear(waves[0], depth[0], (waves[1:] - waves[0]) / step, (depth[1:] - depth[0]) / step)
+    by_wave, by_depth = (waves[1:] - waves[0]) / step, (depth[1:] - depth[0]) / step
+    if correction is not None and correction.slopes is not None:
+        by_wave = by_wave + correction.slopes.waveform
+        by_depth = by_depth + correction.slopes.deflection
+    return Linear(waves[0], depth[0], by_wave, by_depth)

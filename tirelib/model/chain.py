@@ -30,6 +30,8 @@ FIRST_DEPTH = 0.02
 """Deflection for which constants are computed at first, [m]."""
 SETTLED = 1e-9
 """Change of the deflection at which they have followed, [m]."""
+STEEPEST = 0.9
+"""Largest slope of the deflection found by that assumed that a guess of where they meet trusts."""
 
 
 def waveform(state: State, changes: Changes = (), *, low_pass: LowPass | None = None) -> State:
@@ -63,14 +65,33 @@ def _pressed(state: State, constants: Sequence[Change]) -> State:
     """Return the state with its contact, whose deflection the constants follow."""
     depth = np.where(np.isnan(state.deflection), FIRST_DEPTH, state.deflection)
     changed = _changed(state, constants, depth)
+    before: tuple[FloatArray, FloatArray] | None = None
     for _ in range(SETTLE):
         contact = _press(changed)
-        moved, depth = np.abs(contact.deflection - depth).max(), contact.deflection
+        found = contact.deflection
+        if np.abs(found - depth).max() < SETTLED:
+            break
+        assumed, depth = depth, _crossing(depth, found, before)
+        before = assumed, found
         following = _changed(state, constants, depth)
-        if moved < SETTLED or _alike(changed, following):
+        if _alike(changed, following):
             break
         changed = following.but(start=contact.start)
-    return changed.but(contact=contact, belt=contact.displacement, deflection=depth)
+    return changed.but(contact=contact, belt=contact.displacement, deflection=found)
+
+
+def _crossing(
+    assumed: FloatArray, found: FloatArray, before: tuple[FloatArray, FloatArray] | None
+) -> FloatArray:
+    """Return where each point's found deflection will be the assumed one, by the last two."""
+    if before is None:
+        return found
+    step = assumed - before[0]
+    moves = np.abs(step) > SETTLED
+    slope = np.divide(found - before[1], step, out=np.zeros_like(step), where=moves)
+    slope = np.clip(slope, -STEEPEST, STEEPEST)
+    out: FloatArray = assumed + (found - assumed) / (1.0 - slope)
+    return out
 
 
 def _changed(state: State, constants: Sequence[Change], depth: FloatArray) -> State:

@@ -17,7 +17,7 @@ from tirelib.arrays import FloatArray
 from tirelib.contact.exact import ExactContact, load_exact
 from tirelib.contact.exact_slopes import ExactSlopes, exact_slopes
 from tirelib.errors import ParameterError
-from tirelib.model.base import Coordinate, predict, smoothed
+from tirelib.model.base import Coordinate, Correction, CorrectionSlopes, predict, smoothed
 from tirelib.model.chain import Changes
 from tirelib.model.state import Operating, State
 from tirelib.signal import LowPass
@@ -138,13 +138,68 @@ def whole_slopes(
         If a coordinate moves what the slopes of the exact ring take as given (`HELD`).
     """
     low_pass = low_pass or LowPass()
-    n, k = len(points), len(free) + 2
     if found.contact is None:
         return _differences(values, points, free, changes, low_pass)
+    slopes = _exact(found.contact, values, points, free, low_pass)
+    if not _lively(values, changes):
+        return slopes
+    full = _differences(values, points, free, changes, low_pass)
+    still = _differences(_still(values), points, free, (), low_pass)
+    return WholeSlopes(
+        slopes.waveform + full.waveform - still.waveform,
+        slopes.deflection + full.deflection - still.deflection,
+        slopes.contact,
+    )
+
+
+def with_slopes(
+    found: Correction,
+    values: Values,
+    points: Operating,
+    free: tuple[Coordinate, ...],
+    *,
+    low_pass: LowPass | None = None,
+) -> Correction:
+    """Return what large displacements add with its slopes by the free coordinates.
+
+    Parameters
+    ----------
+    found : Correction
+        `large_displacements` of the same values and points.
+    free : tuple of Coordinate
+
+    Raises
+    ------
+    ParameterError
+        If a coordinate moves what the slopes of the exact ring take as given (`HELD`), or the
+        correction is without its contact.
+    """
+    if found.contact is None:
+        raise ParameterError("model: a correction without its contact has no slopes; compute it")
+    low_pass, k = low_pass or LowPass(), len(free)
+    exact = _exact(found.contact, values, points, free, low_pass)
+    still = _differences(_still(values), points, free, (), low_pass)
+    assert exact.contact is not None  # noqa: S101 - of the exact ring
+    slopes = CorrectionSlopes(
+        exact.waveform[:k] - still.waveform[:k],
+        exact.deflection[:k] - still.deflection[:k],
+        exact.contact,
+    )
+    return replace(found, slopes=slopes)
+
+
+def _exact(
+    solved: ExactContact,
+    values: Values,
+    points: Operating,
+    free: tuple[Coordinate, ...],
+    low_pass: LowPass,
+) -> WholeSlopes:
+    """Return the slopes of the static exact ring, from its own equations."""
+    n, k = len(points), len(free) + 2
     columns, several = _shifted(values, points, free, FINE)
     state = State.of(columns, several, GRID)
     _check_held(state, free, k, n)
-    solved = found.contact
     constants = [
         state.EA, state.EI, state.tension_pressure * state.width, state.k_u, state.k_v, state.k_t,
         several.load, state.offset,
@@ -154,13 +209,7 @@ def whole_slopes(
     moves = (finite[1:] - finite[0]) / FINE
     by = exact_slopes(solved, moves[..., :-1])
     wave = smoothed(by.strain(solved, rows[0, :, -1], moves[..., -1], GRID), points, low_pass)
-    depth = by.deflection
-    if _lively(values, changes):
-        full = _differences(values, points, free, changes, low_pass)
-        still = _differences(_still(values), points, free, (), low_pass)
-        wave = wave + full.waveform - still.waveform
-        depth = depth + full.deflection - still.deflection
-    return WholeSlopes(wave, depth, by)
+    return WholeSlopes(wave, by.deflection, by)
 
 
 def _lively(values: Values, changes: Changes) -> bool:

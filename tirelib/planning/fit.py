@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
-from tirelib.diagnose.refit import STRENGTH_WIDTH, WIDTH, changes_of
+from tirelib.diagnose.fitter import STRENGTH_WIDTH, WIDTH, changes_of
 from tirelib.diagnose.structure import FORM
 from tirelib.effects import Effect
 from tirelib.errors import ConvergenceError, TirelibError

@@ -7,7 +7,7 @@ diagnosis judges what is left, by the same thresholds and without exact refits.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -253,9 +253,15 @@ class _Judge:
         for coordinate in FITTED:
             column = [float(np.max(moved[coordinate.name])) for moved in each]
             values[coordinate.name] = np.repeat(column, len(data.points))
+        large = [base.correction.moved(row) for row in z]
+        correction = replace(
+            base.correction.tiled(count),
+            waveform=np.concatenate([one.waveform for one in large]),
+            deflection=np.concatenate([one.deflection for one in large]),
+        )
         found = predict(
             values, data.points.tiled(count), base.changes, low_pass=data.low_pass,
-            correction=base.correction.tiled(count),
+            correction=correction,
         ).wave  # fmt: skip
         return found.reshape(count, len(data.points), -1)
 

@@ -24,6 +24,7 @@ from tirelib.identify.random_effects import Whitening
 from tirelib.identify.waveform_fit import Data
 from tirelib.model.base import large_displacements, linearised, predict
 from tirelib.model.state import Operating
+from tirelib.model.whole import with_slopes
 from tirelib.waveforms import GRID
 
 MEMBERS = 60
@@ -116,7 +117,10 @@ def joined(one: Operating, other: Operating) -> Operating:
 
 def _at(base: Refit, data: Data, points: Operating) -> Refit:
     """Return a fitted model at other points, whitened by noise alone; residuals as they are."""
-    correction = large_displacements(base.values, points, low_pass=data.low_pass)
+    correction = with_slopes(
+        large_displacements(base.values, points, low_pass=data.low_pass),
+        base.values, points, FITTED, low_pass=data.low_pass,
+    )  # fmt: skip
     found = linearised(
         base.values, points, FITTED, base.changes, low_pass=data.low_pass, correction=correction
     )

@@ -7,25 +7,26 @@ import pytest
 
 from tests.unit.diagnose.planted import runs
 from tests.unit.identify.model_waves import TIRE
-from tirelib.diagnose import held_out, refit
+from tirelib.contact.exact import ExactContact
+from tirelib.diagnose import fitter, held_out, refit
 from tirelib.diagnose.floor import ErrorUnit
 from tirelib.model.base import Correction, large_displacements, values_of
 
 
 def test_a_start_nearby_is_used_and_changes_no_result(monkeypatch: pytest.MonkeyPatch) -> None:
     data = runs().data(with_deflection=False)
-    starts: list[Correction | None] = []
+    starts: list[ExactContact | None] = []
 
-    def watched(*given: Any, start: Correction | None = None, **named: Any) -> Correction:
+    def watched(*given: Any, start: ExactContact | None = None, **named: Any) -> Correction:
         starts.append(start)
         return large_displacements(*given, start=start, **named)
 
-    def cold(*given: Any, start: Correction | None = None, **named: Any) -> Correction:
+    def cold(*given: Any, start: ExactContact | None = None, **named: Any) -> Correction:
         return large_displacements(*given, **named)
 
     found = {}
     for name, solve in (("near", watched), ("cold", cold)):
-        monkeypatch.setattr(refit, "large_displacements", solve)
+        monkeypatch.setattr(fitter, "large_displacements", solve)
         monkeypatch.setattr(held_out, "large_displacements", solve)
         model = refit.refit(data, values_of(TIRE))
         folds = held_out.folds(data)

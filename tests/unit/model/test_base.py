@@ -88,7 +88,7 @@ def test_the_corrected_model_is_the_exact_one() -> None:
 def test_a_solution_nearby_as_start_changes_nothing() -> None:
     near = large_displacements({**VALUES, "tangential_stiffness": 1.8e5}, POINTS)
     assert near.contact is not None
-    warm = large_displacements(VALUES, POINTS, start=near)
+    warm = large_displacements(VALUES, POINTS, start=near.contact)
     cold = large_displacements(VALUES, POINTS)
     # Newton stops at a nanometre
     assert warm.deflection == pytest.approx(cold.deflection, abs=2e-9)

@@ -13,7 +13,7 @@ from tirelib.identify.identify import FITTED
 from tirelib.model.base import Coordinate, large_displacements, move, predict, values_of
 from tirelib.model.chain import Changes
 from tirelib.model.state import State
-from tirelib.model.whole import solve_whole, whole_slopes
+from tirelib.model.whole import solve_whole, whole_slopes, with_slopes
 
 VALUES = values_of(TIRE)
 POINTS = operating(np.array([2500.0, 4500.0, 6500.0]), np.array([1.8e5, 2.1e5, 2.4e5]))
@@ -83,6 +83,37 @@ def test_a_start_along_the_slopes_is_near() -> None:
     assert start is not None
     moved = np.abs(there.deflection - found.deflection)
     assert (np.abs(start.deflection - there.deflection) < 0.1 * moved).all()
+
+
+def test_a_correction_follows_the_coordinates_to_first_order() -> None:
+    fix = with_slopes(large_displacements(VALUES, POINTS), VALUES, POINTS, FITTED)
+    way = np.array([0.05, -0.04, 0.1, 0.05, 0.1, -0.05, 0.02, 0.1])
+    off = []
+    for share in (1.0, 0.5):
+        there = large_displacements(move(VALUES, share * way, FITTED), POINTS)
+        moved, change = fix.moved(share * way), there.waveform - fix.waveform
+        off.append(float(np.abs(moved.waveform - there.waveform).max()))
+        assert off[-1] < 0.2 * np.abs(change).max()
+        assert (
+            np.abs(moved.deflection - there.deflection).max()
+            < 0.2 * np.abs(there.deflection - fix.deflection).max()
+        )
+    assert off[1] < 0.35 * off[0], "what is left goes with the square"
+
+
+def test_points_may_move_by_themselves() -> None:
+    fix = with_slopes(large_displacements(VALUES, POINTS), VALUES, POINTS, FITTED)
+    way = 0.05 * np.ones((len(FITTED), len(POINTS)))
+    way[:, 1:] = 0.0
+    moved, all_moved = fix.moved(way), fix.moved(way[:, 0])
+    np.testing.assert_array_equal(moved.waveform[0], all_moved.waveform[0])
+    np.testing.assert_array_equal(moved.waveform[1:], fix.waveform[1:])
+
+
+def test_a_correction_without_its_contact_has_no_slopes() -> None:
+    fix = replace(large_displacements(VALUES, POINTS), contact=None)
+    with pytest.raises(ParameterError, match="without its contact"):
+        with_slopes(fix, VALUES, POINTS, FITTED)
 
 
 def test_a_coordinate_that_moves_the_geometry_is_refused() -> None:
