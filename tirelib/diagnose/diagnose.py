@@ -8,9 +8,9 @@ from tirelib.diagnose.ensemble import MEMBERS
 from tirelib.diagnose.guess import Guess, guess_law
 from tirelib.diagnose.left import left_of
 from tirelib.diagnose.noise import noise_in, white_level
-from tirelib.diagnose.refit import Refit, refit
+from tirelib.diagnose.refit import FELL, Refit, fall, refit
 from tirelib.diagnose.rivals import inseparable
-from tirelib.diagnose.rounds import FELL, HALVED, fall, rounds
+from tirelib.diagnose.rounds import HALVED, Rounds, rounds
 from tirelib.diagnose.stage import ALARM, Stage, within
 from tirelib.diagnose.stored import ensemble_of
 from tirelib.diagnose.unlisted import UNLISTED
@@ -142,12 +142,13 @@ def diagnose(
     rests = ensemble_of(data, base, noise=noise, members=members, seed=seed, progress=progress)
     level = white_level(runs, base, data.strain)
     first = Stage.of(data, base, catalogue, rests, level, {})
-    stage, named, count, unlisted = rounds(data, first, catalogue, rests, level, progress)
-    like = None if unlisted is None else _finding(stage, unlisted, data)
-    named = stage.model.needed(named)
+    found = rounds(data, first, catalogue, rests, level, progress)
+    stage = found.stage
+    like = None if found.unlisted is None else _finding(stage, found.unlisted, data)
+    named = stage.model.needed(found.named)
     findings = _findings(first, named, stage.model, data)
     twins = inseparable(data, first, findings, named)
-    verdict, named = _verdict(named, twins, first, stage, like)
+    verdict, named = _verdict(named, twins, first, found, like)
     last = stage if named else first
     left, floor = last.beyond, BEYOND
     beyond = last.unexplained(last.model.waveform[None] - data.strain)[0]
@@ -160,8 +161,8 @@ def diagnose(
     extra = {effect.name for effect in UNLISTED} - {effect.name for effect in catalogue}
     dead = {name: why for name, why in first.found.dead.items() if name not in extra}
     return Diagnosis(
-        verdict, tuple(named), findings, dead, base, last.model, left, floor, count, runs, data,
-        beyond, guess, like,
+        verdict, tuple(named), findings, dead, base, last.model, left, floor, found.count, runs,
+        data, beyond, guess, like,
     )  # fmt: skip
 
 
@@ -210,9 +211,10 @@ def _listed(twins: Sequence[tuple[str, float]]) -> tuple[tuple[str, float], ...]
 
 
 def _verdict(
-    named: list[str], twins: Sequence[str], first: Stage, last: Stage, like: Finding | None
+    named: list[str], twins: Sequence[str], first: Stage, found: Rounds, like: Finding | None
 ) -> tuple[str, list[str]]:
     """Return the verdict and what it names."""
+    last = found.stage
     excess = first.scores.misfit - first.unit
     left = last.scores.misfit - last.unit
     beyond = last.beyond > BEYOND
@@ -220,7 +222,9 @@ def _verdict(
         outside = last.outside >= OUTSIDE or last.imitated >= BARELY
         return ("unknown" if like or beyond or outside else "none"), []
     explained = (
-        left <= max((1.0 - EXPLAINED) * excess, 0.0) or fall(first.model, last.model) >= HALVED
+        left <= max((1.0 - EXPLAINED) * excess, 0.0)
+        or fall(first.model, last.model) >= HALVED
+        or found.by_share
     )
     if fall(first.model, last.model) < FELL or not explained:
         return "unknown", []

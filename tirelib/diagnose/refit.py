@@ -29,6 +29,9 @@ ROUGH, SETTLED = 0.05, 0.005
 FOLLOWED = 0.01
 """Coordinate by which all steps together move where large displacements need no update: they follow
 to first order."""
+FELL = 0.05
+"""Least share of the squared error that an effect has to take: what takes less stands for
+structure."""
 FLATTER = 0.9
 """Share of the pressure slopes from which a fit starts that cannot start where it should."""
 
@@ -176,6 +179,11 @@ def refit(
         fitter.refresh(weigh=False)
     fitter.renew()
     return _result(fitter)
+
+
+def fall(before: Refit, after: Refit) -> float:
+    """Return the share of the squared error that is gone."""
+    return 1.0 - (after.error / before.error) ** 2
 
 
 def _flatter(values: Mapping[str, float | FloatArray]) -> dict[str, float | FloatArray]:

@@ -1,12 +1,14 @@
 """Rounds of a diagnosis: the leader is added, exactly refitted, and what it replaces is dropped."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from tirelib.arrays import FloatArray
+from tirelib.diagnose.beside_shear import beside_shear
 from tirelib.diagnose.ensemble import Variants
-from tirelib.diagnose.refit import Refit, refit
+from tirelib.diagnose.refit import FELL, Refit, fall, refit
 from tirelib.diagnose.sole import sole
 from tirelib.diagnose.stage import ALARM, Stage, within
 from tirelib.effects import Effect
@@ -25,14 +27,39 @@ independent of them has nothing to do with that."""
 LARGE = 1.0
 """Share of its range by which an effect may be larger in the exact refit and yet be named, with a
 word that it is: a range is what is plausible, and what explains the misfit speaks for itself."""
-FELL, FURTHER = 0.05, 0.12
-"""Least share of the squared error that an effect has to take beside the others, and that a further
-one has to take when it is added: what takes little of it stands for structure."""
+FURTHER, ON_TOP = 0.12, 0.3
+"""Least share of the squared error that a further effect has to take when it is added, and the
+first beside those of every belt, whose law leaves structure of its own."""
 HALVED = 0.45
 """Share of the squared error from which a further alarm is needed whatever imitates it."""
 BELT = frozenset({"belt_shear"})
 """What every tire has and the base has not: named, it raises no bar for what is hidden on top."""
 ROUNDS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Rounds:
+    """What the rounds found.
+
+    Attributes
+    ----------
+    stage : Stage
+        Of the model with the effects.
+    named : list of str
+        In the order in which they were added; those that a later one replaces are gone.
+    count : int
+        Of rounds.
+    unlisted : int or None
+        Index of the candidate of the stage in no catalogue that it needs most.
+    by_share : bool
+        Whether one was named by its share of the error beside the belt's shear.
+    """
+
+    stage: Stage
+    named: list[str]
+    count: int
+    unlisted: int | None
+    by_share: bool
 
 
 def rounds(
@@ -42,7 +69,7 @@ def rounds(
     rests: Variants,
     noise: float,
     progress: Callable[[str], None] | None,
-) -> tuple[Stage, list[str], int, int | None]:
+) -> Rounds:
     """Add the leaders one after the other as long as the exact refit needs them.
 
     It ends where the exact refit needs something most that is in no catalogue.
@@ -57,17 +84,6 @@ def rounds(
     noise : float, [-]
         Of a whitened sample.
     progress : callable or None
-
-    Returns
-    -------
-    stage : Stage
-        Of the model with them.
-    named : list of str
-        In the order in which they were added; those that a later one replaces are gone.
-    count : int
-        Of rounds.
-    unlisted : int or None
-        Index of that candidate of the stage.
     """
     # the joint ranking sees all effects at once: who is no hint now is no suspect later
     hints = (first.in_range | first.over) & (first.scores.score >= first.limit)
@@ -75,10 +91,9 @@ def rounds(
     least = dict(zip(first.names, first.limit, strict=True))
 
     def refitted(
-        stage: Stage, effects: Sequence[Effect], strengths: Sequence[FloatArray]
+        model: Refit, effects: Sequence[Effect], strengths: Sequence[FloatArray]
     ) -> Refit | None:
         try:
-            model = stage.model
             return refit(
                 data, model.values, effects, strengths,
                 delay=model.delay, near=model.correction, progress=progress,
@@ -94,30 +109,34 @@ def rounds(
         need: Callable[[Refit], bool] = lambda _: True,
     ) -> Stage | None:  # fmt: skip
         """Return the stage of an exact fit; None if it does not settle or is not needed."""
-        model = refitted(stage, effects, strengths)
+        model = refitted(stage.model, effects, strengths)
         return None if model is None or not need(model) else staged(model)
 
     named: list[str] = []
-    stage, count = first, 0
+    stage, count, by_share = first, 0, False
     while count < ROUNDS:
         hidden = [name for name in named if name not in BELT]
         found = _added(first, stage, suspects, len(hidden), fitted)
-        if not named and (found is None or _idle(stage, *found)):
-            listed = [effect.name for effect in catalogue]
-            found = sole(data, stage, listed, refitted, staged) or found
+        if not hidden and (found is None or _idle(stage, *found)):
+            clear = beside_shear(data, stage, catalogue, refitted, staged)
+            if clear is None and not named:
+                clear = sole(data, stage, sorted(BELT), refitted, staged)
+            else:
+                by_share = by_share or clear is not None
+            found = clear or found
         if found is None:
             break
         after, index = found
         name = stage.names[index]
         if stage.unlisted[index]:
-            return stage, named, count, index
+            return Rounds(stage, named, count, index, by_share)
         stage = after
         suspects.discard(name)
         count += 1
         named.append(name)
         stage, gone = _thinned(stage, named[:-1], least, fitted)
         named = [name for name in named if name not in gone]
-    return stage, named, count, None
+    return Rounds(stage, named, count, None, by_share)
 
 
 _Fit = Callable[..., Stage | None]
@@ -131,15 +150,17 @@ def _added(
     A leader that is far too large for its range in the exact refit as well is barred, and so is
     what it leads.
     """
-    bar = BARS[min(before, len(BARS) - 1)]
+    bar, least = BARS[min(before, len(BARS) - 1)], FURTHER if before else ON_TOP
     clear = CLEAR if before else 1.0
     tried: dict[int, Stage | None] = {}
     barred: set[str] = set()
     while True:
         leaders = stage.leaders(suspects, bar, clear, barred, spared=before > 0)
+        if not before and stage is not first:  # beside the belt's, a hint is no rival
+            leaders = [index for index in leaders if stage.ratio[index] >= ALARM]
         for index in leaders:
             if index not in tried:
-                tried[index] = _trial(first, stage, index, fitted)
+                tried[index] = _trial(first, stage, index, fitted, least)
         large = {
             stage.names[index] for index in leaders if stage.over[index] and not _fits(tried[index])
         }
@@ -149,16 +170,11 @@ def _added(
     needed = [(after, index) for index in leaders if (after := tried[index]) is not None]
     if not needed and before:  # what imitates the impossible, but takes half of the error
         for index in stage.leaders(suspects, ALARM, 0.0, barred):
-            after = tried[index] if index in tried else _trial(first, stage, index, fitted)
+            after = tried[index] if index in tried else _trial(first, stage, index, fitted, least)
             fits = after is not None and (not stage.over[index] or _fits(after))
             if after is not None and fits and fall(stage.model, after.model) >= HALVED:
                 needed.append((after, index))
     return min(needed, key=lambda pair: pair[0].scores.misfit, default=None)
-
-
-def fall(before: Refit, after: Refit) -> float:
-    """Return the share of the squared error that is gone."""
-    return 1.0 - (after.error / before.error) ** 2
 
 
 def _idle(before: Stage, after: Stage, index: int) -> bool:
@@ -166,8 +182,11 @@ def _idle(before: Stage, after: Stage, index: int) -> bool:
     return not before.unlisted[index] and fall(before.model, after.model) < FELL
 
 
-def _trial(first: Stage, stage: Stage, index: int, fitted: _Fit) -> Stage | None:
-    """Return the stage with one more effect, if the exact refit needs it."""
+def _trial(first: Stage, stage: Stage, index: int, fitted: _Fit, least: float) -> Stage | None:
+    """Return the stage with one more effect, if the exact refit needs it.
+
+    A further one has to take a least share of the squared error.
+    """
     model = stage.model
     effect, strength = stage.found.living[index].effect, stage.scores.strength[index]
     # the laws of those before are right but roughly: what they may be off by is no effect
@@ -181,7 +200,7 @@ def _trial(first: Stage, stage: Stage, index: int, fitted: _Fit) -> Stage | None
             return True
         # what the joint fit asks for may not be what the exact refit adds
         other = effect.components == 1 and float(strength[0] * found.strengths[-1][0]) < 0.0
-        return not other and fall(model, found) >= FURTHER
+        return not other and fall(model, found) >= least
 
     start = [*model.strengths, _inside(effect, strength)]
     after = fitted(stage, [*model.effects, effect], start, need)

@@ -1,8 +1,8 @@
 """What the joint fit does not see: an effect that by itself explains most of the error.
 
-A belt's shear, a long gage or friction change waveforms like much else together, or far out of
-proportion, so that the joint fit gives their part to others or to structure. Where it names
-nothing, those that take much of the plain error are fitted exactly, one by one.
+A belt's shear changes waveforms like much else together, so that the joint fit gives its part to
+others or to structure. Where nothing else is named, what takes much of the plain error is fitted
+exactly.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,7 +20,7 @@ TRIED = 0.4
 ERROR, MISFIT = 0.7, 0.2
 """Shares of the squared error and of the misfit in the metric of structure that have to go."""
 
-Fit = Callable[[Stage, Sequence[Effect], Sequence[FloatArray]], Refit | None]
+Fit = Callable[[Refit, Sequence[Effect], Sequence[FloatArray]], Refit | None]
 
 
 def sole(
@@ -54,7 +54,7 @@ def sole(
         if left**2 > (1.0 - TRIED) * model.error**2:
             continue
         start = np.clip(strength, 0.9 * effect.low, 0.9 * effect.high)
-        after = refitted(stage, [*model.effects, effect], [*model.strengths, start])
+        after = refitted(model, [*model.effects, effect], [*model.strengths, start])
         if after is not None and after.error**2 <= (1.0 - ERROR) * model.error**2:
             found.append((after, index))
     # scores are dear, so the error comes first

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tirelib.diagnose import rounds
-from tirelib.diagnose.rounds import CLEAR, FELL, FURTHER, HALVED, LARGE, ROUNDS
+from tirelib.diagnose.refit import FELL
+from tirelib.diagnose.rounds import CLEAR, FURTHER, HALVED, LARGE, ON_TOP, ROUNDS, Rounds
 from tirelib.diagnose.stage import ALARM, ALONE, NEAR, OWN, Stage
 
 NAMES = ("strong", "close", "weak")
@@ -91,7 +92,8 @@ FIRST = stage((), 1000.0, SCORE)
 
 def added(now: Any, fitted: Callable[..., Any]) -> str:
     """Return the name of what a round adds, empty if nothing."""
-    found = rounds._added(FIRST, now, set(NAMES), len(now.model.effects), fitted)
+    before = len(now.model.effects)
+    found = rounds._added(FIRST if before else now, now, set(NAMES), before, fitted)
     return "" if found is None else now.names[found[1]]
 
 
@@ -160,6 +162,25 @@ def test_a_further_effect_has_to_take_a_share_of_the_error_as_it_is_asked_to(
 
     now = stage(("strong",), 400.0, [300.0, 0.0], ["close"], error=1.0)
     assert added(now, fitted) == name
+
+
+@pytest.mark.parametrize(
+    ("gone", "ratio", "name"),
+    [(ON_TOP + 0.01, ALARM, "close"), (ON_TOP - 0.01, ALARM, ""), (0.9, ALARM - 0.1, "")],
+    ids=["enough", "too little", "a hint"],
+)
+def test_the_first_beside_the_belts_has_to_be_an_alarm_and_take_more(
+    gone: float, ratio: float, name: str
+) -> None:
+    now = stage(("belt_shear",), 400.0, [300.0, 300.0, 0.0], ["close"], error=1.0)
+    now.ratio = np.array([0.0, ratio, 0.0])
+    made = stage(("belt_shear", "close"), 300.0, [0.0], error=float(np.sqrt(1.0 - gone)))
+
+    def fitted(_: Any, effects: Any, strengths: Any, need: Need) -> Any:
+        return made if need(made.model) else None
+
+    found = rounds._added(FIRST, now, set(NAMES), 0, fitted)
+    assert (now.names[found[1]] if found else "") == name
 
 
 def test_an_effect_without_which_the_error_stays_goes() -> None:
@@ -287,26 +308,58 @@ def test_hints_alone_have_no_leader() -> None:
 
 
 @pytest.mark.parametrize(
-    ("gone", "sole", "named"),
+    ("gone", "clear", "sole", "named"),
     [
-        (FELL - 0.01, True, ["close"]),
-        (FELL + 0.01, True, ["strong"]),
-        (FELL - 0.01, False, ["strong"]),
-        (None, True, ["close"]),
+        (FELL - 0.01, "", "close", "close"),
+        (FELL + 0.01, "", "close", "strong"),
+        (FELL - 0.01, "", "", "strong"),
+        (None, "", "close", "close"),
+        (None, "weak", "close", "weak"),
+        (FELL + 0.01, "weak", "close", "strong"),
     ],
-    ids=["takes nothing", "takes something", "nothing takes most", "no leader"],
-)
+    ids=[
+        "takes nothing", "takes something", "nothing takes most", "no leader",
+        "one takes most beside the shear", "the joint fit goes first",
+    ],
+)  # fmt: skip
 def test_what_takes_most_of_the_error_is_looked_for_where_no_leader_takes_any(
-    monkeypatch: pytest.MonkeyPatch, gone: float | None, sole: bool, named: list[str]
+    monkeypatch: pytest.MonkeyPatch, gone: float | None, clear: str, sole: str, named: str
 ) -> None:
     first = stage((), 1000.0, SCORE, error=1.0)
     first.in_range = np.ones(3, dtype=bool)
     leads = None
     if gone is not None:
         leads = stage(("strong",), 900.0, [0.0] * 2, error=float(np.sqrt(1.0 - gone))), 0
-    most = (stage(("close",), 300.0, [0.0] * 2, error=0.3), 1) if sole else None
+
+    def told(name: str) -> Any:
+        return (stage((name,), 300.0, [0.0] * 2, error=0.3), NAMES.index(name)) if name else None
+
     found = iter([leads, None])
     monkeypatch.setattr(rounds, "_added", lambda *_: next(found))
-    monkeypatch.setattr(rounds, "sole", lambda *_: most)
-    _, names, count, unlisted = rounds.rounds(None, first, [], None, 1e-6, None)
-    assert (names, count, unlisted) == (named, 1, None)
+    monkeypatch.setattr(rounds, "beside_shear", lambda *_: told(clear))
+    monkeypatch.setattr(rounds, "sole", lambda *_: told(sole))
+    made = rounds.rounds(None, first, [], None, 1e-6, None)
+    assert made == Rounds(made.stage, [named], 1, None, named == "weak")
+
+
+def test_beside_the_shear_of_every_belt_another_is_looked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    first = stage((), 1000.0, SCORE, error=1.0)
+    first.names[2] = "belt_shear"
+    first.in_range = np.ones(3, dtype=bool)
+    sheared = stage(("belt_shear",), 400.0, [0.0] * 3, error=0.5)
+    both = stage(("belt_shear", "close"), 100.0, [0.0] * 2, error=0.3)
+    asked: list[Any] = []
+
+    def clear(_: Any, now: Any, *__: Any) -> Any:
+        asked.append(now)
+        return (both, 1) if now is sheared else None
+
+    monkeypatch.setattr(rounds, "_added", lambda *_: None)
+    monkeypatch.setattr(rounds, "beside_shear", clear)
+    monkeypatch.setattr(rounds, "sole", lambda *_: (sheared, 2))
+    monkeypatch.setattr(rounds, "_thinned", lambda now, *_: (now, set()))
+    made = rounds.rounds(None, first, [], None, 1e-6, None)
+    assert (made.named, made.by_share) == (["belt_shear", "close"], True)
+    assert asked == [first, sheared], "and with a third effect only the joint fit is asked"

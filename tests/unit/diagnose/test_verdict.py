@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 
 from tirelib.diagnose.diagnose import BARELY, BEYOND, EXPLAINED, OUTSIDE, _verdict
-from tirelib.diagnose.rounds import FELL, HALVED
+from tirelib.diagnose.refit import FELL
+from tirelib.diagnose.rounds import HALVED, Rounds
 
 
 def stage(misfit: float, error: float, beyond: float = 1.0, **told: float) -> Any:
@@ -25,6 +26,10 @@ def after(explained: float, fell: float, beyond: float = 1.0) -> Any:
     return stage(100.0 + 1000.0 * (1.0 - explained), float((1.0 - fell) ** 0.5), beyond)
 
 
+def told(last: Any, *, by_share: bool = False) -> Rounds:
+    return Rounds(last, ["a"], 1, None, by_share)
+
+
 @pytest.mark.parametrize(
     ("explained", "fell", "beyond", "verdict"),
     [
@@ -40,9 +45,16 @@ def test_what_is_named_takes_the_misfit_or_half_of_the_error_and_never_none_of_i
     explained: float, fell: float, beyond: float, verdict: str
 ) -> None:
     assert pytest.approx(0.8) == EXPLAINED
-    told, named = _verdict(["a"], [], FIRST, after(explained, fell, beyond), None)
-    assert told == verdict
+    said, named = _verdict(["a"], [], FIRST, told(after(explained, fell, beyond)), None)
+    assert said == verdict
     assert named == (["a"] if verdict != "unknown" else [])
+
+
+@pytest.mark.parametrize(("fell", "verdict"), [(FELL + 0.01, "named"), (FELL - 0.01, "unknown")])
+def test_what_takes_most_beside_the_shear_need_not_take_half_without_it(
+    fell: float, verdict: str
+) -> None:
+    assert _verdict(["a"], [], FIRST, told(after(0.0, fell), by_share=True), None)[0] == verdict
 
 
 @pytest.mark.parametrize(
@@ -60,4 +72,4 @@ def test_what_cannot_be_but_explains_tells_of_something_unknown(
     stage = SimpleNamespace(
         scores=scores, unit=1.0, beyond=1.0, outside=outside, imitated=imitated
     )  # fmt: skip
-    assert _verdict([], (), stage, stage, None) == (verdict, [])
+    assert _verdict([], (), stage, told(stage), None) == (verdict, [])
