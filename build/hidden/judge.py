@@ -31,11 +31,11 @@ BELT = frozenset({"belt_shear", "belt_extension"})
 """Right additions on a tire whose belt really shears and stretches; they may not hide another."""
 HELD_OUT_BY = ("load", "pressure", "speed")
 _CODE = {
-    "diagnose": ("beside_shear", "candidates", "delay", "diagnose", "ensemble", "fitter", "noise",
+    "diagnose": ("beside_shear", "candidates", "diagnose", "ensemble", "fitter", "noise",
                  "ranking", "refit", "rivals", "rounds", "secants", "shape", "sole", "stage",
                  "structure", "unlisted", "variant"),
-    "identify": ("campaign_data", "discrepancy", "identify", "noise", "random_effects", "structure",
-                 "waveform_fit"),
+    "identify": ("campaign_data", "delay", "discrepancy", "identify", "noise", "random_effects",
+                 "structure", "waveform_fit"),
     "effects": ("*",), "model": ("*",), "contact": ("*",), "ring": ("*",), "strain": ("*",),
 }  # fmt: skip
 """Modules of the library that a verdict depends on."""

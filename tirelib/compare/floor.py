@@ -52,6 +52,7 @@ def floor_of(
     prediction: Prediction,
     points: Operating,
     whiten: Whitening | None,
+    raw: float,
 ) -> Floor:
     """Return what is known of the floor.
 
@@ -66,6 +67,8 @@ def floor_of(
         Of the same runs.
     whiten : Whitening or None
         None without noise.
+    raw : float, [-]
+        Rms difference with the delay left in, as an identification leaves it.
     """
     value, source, rms = _from_file(model, data_hash)
     smooth, share = float("nan"), float("nan")
@@ -74,7 +77,7 @@ def floor_of(
         if before > LEAST_ERROR:
             share = (before**2 - smooth**2) / (before**2 - 1.0)
         if np.isfinite(rms) and not np.isfinite(value):
-            value = before * rms / float(np.sqrt(np.mean(rest**2)))
+            value = before * rms / raw
     return Floor(value, source, rms, smooth, share)
 
 

@@ -8,6 +8,7 @@ from scipy import special
 from tirelib.arrays import FloatArray, IntArray
 from tirelib.compare.floor import Floor, floor_of
 from tirelib.compare.gages import Gage, compare_gages, gage_sentences
+from tirelib.compare.lag import fitted_delay, lag_message, late_prediction
 from tirelib.compare.model import Model, Prediction, predict_runs
 from tirelib.compare.regions import SLIPS, Region, find_regions
 from tirelib.compare.runs import Chosen, choose
@@ -16,9 +17,10 @@ from tirelib.compare.sentences import sentences
 from tirelib.compare.set_points import NAMES, SetPoints, predict_set_points, tangents
 from tirelib.compare.track_words import track_sentences
 from tirelib.compare.tracks import Track, tracks
-from tirelib.identify.noise import RepeatNoise, repeat_noise
+from tirelib.identify.noise import LEAST_NOISE, RepeatNoise, repeat_noise
 from tirelib.identify.random_effects import scales, whitening_of
 from tirelib.model.base import operating_points
+from tirelib.model.state import Operating
 from tirelib.waveforms import Waveforms
 
 NO_FIT = 0.5
@@ -40,9 +42,9 @@ class Fit:
     error : float
         Rms whitened residual over noise; NaN without repeats.
     rms : float, [-]
-        Rms of model less measured, set points taken out.
+        Rms of model less measured, set points and delay taken out.
     raw_rms : float, [-]
-        The same with the set points left in.
+        The same with both left in.
     strain_rms : float, [-]
         Of the measurement.
     p : float
@@ -69,7 +71,10 @@ class Comparison:
     chosen : Chosen
         Runs, gages and conditions.
     model : Model
+    delay : float, [s]
+        Of the gages against the trigger, in all runs (`tirelib.compare.lag`).
     prediction : Prediction
+        With the delay.
     points : SetPoints
     noise : RepeatNoise
     difference : shape (n_runs, n_phi), [-]
@@ -96,6 +101,7 @@ class Comparison:
 
     chosen: Chosen
     model: Model
+    delay: float
     prediction: Prediction
     points: SetPoints
     noise: RepeatNoise
@@ -155,13 +161,16 @@ def compare_strain(waves: Waveforms, model: Model, data_hash: str = "") -> Compa
     if not repeats.known and not counted.all():
         repeats = repeat_noise(chosen.strain, waves.group, tangent)
     scale = scales(chosen.tolerance, waves.angle_std)
-    rest = chosen.strain - prediction.strain
+    raw = chosen.strain - prediction.strain
+    delay, delay_std = _delay(raw, tangent, scale, repeats.std, chosen, prediction, at)
+    prediction = late_prediction(prediction, at.omega, delay)
+    tangent, rest = tangents(prediction), chosen.strain - prediction.strain
     points = _set_points(rest, tangent, scale, repeats.std, chosen)
     difference = points.shift - rest
     whiten = None
     if repeats.known:
         whiten = whitening_of(tangent[counted], scale[counted], repeats.std)
-    fit = _fit(rest, difference, whiten, repeats, points, chosen)
+    fit = _fit(rest, difference, whiten, repeats, points, chosen, _rms(raw[counted]))
     sector = sectors_of(prediction.edges)
     regions: tuple[Region, ...] = ()
     if fit.verdict == "lack_of_fit":
@@ -180,6 +189,7 @@ def compare_strain(waves: Waveforms, model: Model, data_hash: str = "") -> Compa
     return Comparison(
         chosen,
         model,
+        delay,
         prediction,
         points,
         repeats,
@@ -189,14 +199,46 @@ def compare_strain(waves: Waveforms, model: Model, data_hash: str = "") -> Compa
         np.sqrt(np.mean(difference**2, axis=1)),
         fit,
         floor_of(
-            model, data_hash, rest[counted], _part(prediction, counted), at.take(counted), whiten
+            model,
+            data_hash,
+            rest[counted],
+            _part(prediction, counted),
+            at.take(counted),
+            whiten,
+            _rms(raw[counted]),
         ),
         cells(difference, sector, counted, chosen.factors, repeats, points),
         regions,
         said,
         followed,
         gages,
-        (*_messages(chosen, repeats, fit), *chosen.notes),
+        (
+            *_messages(chosen, repeats, fit),
+            *lag_message(delay, delay_std, at.omega[counted]),
+            *chosen.notes,
+        ),
+    )
+
+
+def _delay(
+    rest: FloatArray,
+    tangent: FloatArray,
+    scale: FloatArray,
+    noise: float,
+    chosen: Chosen,
+    prediction: Prediction,
+    at: Operating,
+) -> tuple[float, float]:
+    """Return the common delay of the straight runs and its standard deviation [s].
+
+    What is left beside the set points, misfit and all, counts as noise.
+    """
+    counted = chosen.straight
+    first = predict_set_points(rest[counted], tangent[counted], scale[counted], noise)
+    left = _rms(rest[counted] - first.shift)
+    whiten = whitening_of(tangent[counted], scale[counted], max(left, LEAST_NOISE))
+    return fitted_delay(
+        chosen.strain[counted], prediction.strain[counted], at.omega[counted], whiten
     )
 
 
@@ -227,6 +269,7 @@ def _fit(
     noise: RepeatNoise,
     points: SetPoints,
     chosen: Chosen,
+    raw: float,
 ) -> Fit:
     counted = chosen.straight
     rms = _rms(difference[counted])
@@ -240,7 +283,7 @@ def _fit(
     verdict = verdict_of(rms / strain_rms, p)
     if verdict == "fits" and beyond:
         verdict = "lack_of_fit"
-    return Fit(verdict, error, rms, _rms(rest[counted]), strain_rms, p, beyond)
+    return Fit(verdict, error, rms, raw, strain_rms, p, beyond)
 
 
 def verdict_of(share: float, p: float) -> str:

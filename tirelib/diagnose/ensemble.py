@@ -20,7 +20,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.diagnose.delay import STD, UNIT, by_delay
 from tirelib.diagnose.refit import Refit
 from tirelib.diagnose.unlisted import gain_by_load, gain_by_pressure, gain_by_speed
 from tirelib.diagnose.variant import variant
@@ -28,6 +27,7 @@ from tirelib.effects import CATALOGUE
 from tirelib.effects.effect import State
 from tirelib.effects.patch import along, balanced, beam_strain, held_shear
 from tirelib.errors import TirelibError
+from tirelib.identify.delay import STD, UNIT, by_delay
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.identify import FITTED
 from tirelib.identify.random_effects import random_tangents, scales

@@ -5,9 +5,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
-from tirelib.diagnose.delay import STD, UNIT, by_delay, late
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
+from tirelib.identify.delay import STD, UNIT, by_delay, late
 from tirelib.identify.identify import FITTED
 from tirelib.identify.random_effects import whitening
 from tirelib.identify.waveform_fit import Data

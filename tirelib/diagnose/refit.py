@@ -1,6 +1,6 @@
 """The base model with some effects, fitted to the straight runs.
 
-Values of the tire, the delay of the day (`tirelib.diagnose.delay`) and strengths together.
+Values of the tire, the delay of the day (`tirelib.identify.delay`) and strengths together.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.diagnose.delay import earlier, late
 from tirelib.diagnose.fitter import BASE, Fitter, changes_of
 from tirelib.effects import Effect
 from tirelib.errors import ConvergenceError, ParameterError
+from tirelib.identify.delay import earlier, late
 from tirelib.identify.random_effects import Whitening
 from tirelib.identify.waveform_fit import Data
 from tirelib.model.base import Correction

@@ -15,9 +15,10 @@ import numpy as np
 
 from tirelib import __version__
 from tirelib.arrays import FloatArray
-from tirelib.diagnose import delay, ensemble, variant
+from tirelib.diagnose import ensemble, variant
 from tirelib.diagnose.ensemble import MEMBERS, Variants, variants
 from tirelib.diagnose.refit import Refit
+from tirelib.identify import delay
 from tirelib.identify.waveform_fit import Data
 
 VARIABLE = "TIRELIB_CACHE"

@@ -9,11 +9,11 @@ from tests.unit.diagnose.planted import model_file, runs
 from tests.unit.identify.model_waves import TIRE
 from tirelib.arrays import FloatArray
 from tirelib.compare.model import model_of
-from tirelib.diagnose.delay import UNIT, by_delay, earlier, late
 from tirelib.diagnose.floor import ErrorUnit, structural_floor
 from tirelib.diagnose.refit import Refit, refit
 from tirelib.effects import CATALOGUE
 from tirelib.extend.extension import _Strain
+from tirelib.identify.delay import UNIT, by_delay, earlier, late
 from tirelib.identify.waveform_fit import Data
 from tirelib.model.base import predict, values_of
 from tirelib.model.state import State

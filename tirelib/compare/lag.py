@@ -1,0 +1,70 @@
+"""The common delay of the gages against the trigger, counted out of a comparison.
+
+It is a number of the day (`tirelib.identify.delay`), neither the tire's nor the model's, so it is
+fitted to the waveforms beside the set points and taken as part of what the model predicts.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.compare.model import Prediction
+from tirelib.identify.delay import STD, UNIT, by_delay, earlier
+from tirelib.identify.random_effects import Whitening
+
+PASSES = 3
+SEEN = 3.0
+"""Standard deviations of a delay from which it is told."""
+
+
+def fitted_delay(
+    measured: FloatArray, predicted: FloatArray, omega: FloatArray, whiten: Whitening
+) -> tuple[float, float]:
+    """Return the delay [s] and its standard deviation.
+
+    Parameters
+    ----------
+    measured, predicted : shape (n_runs, n_phi), [-]
+    omega : shape (n_runs,), [rad/s]
+    whiten : Whitening
+        By set points and what a good model leaves.
+    """
+    delay, information = 0.0, 1.0
+    for _ in range(PASSES):
+        late = earlier(predicted, omega, -delay)
+        row, rest = whiten(by_delay(late, omega)), whiten(measured - late)
+        information = float(np.sum(row**2)) + (UNIT / STD) ** 2
+        # the prior holds the whole delay near zero, not the step
+        gain = float(np.sum(row * rest)) - delay / UNIT * (UNIT / STD) ** 2
+        delay += UNIT * gain / information
+    return delay, UNIT / float(np.sqrt(information))
+
+
+def late_prediction(prediction: Prediction, omega: FloatArray, delay: float) -> Prediction:
+    """Return what gages that come later by a delay show."""
+
+    def late(waves: FloatArray) -> FloatArray:
+        return earlier(waves, omega, -delay)
+
+    gages = prediction.gages
+    return replace(
+        prediction,
+        strain=late(prediction.strain),
+        gages=np.stack([late(gages[:, k]) for k in range(gages.shape[1])], axis=1),
+        by_load=late(prediction.by_load),
+        by_pressure=late(prediction.by_pressure),
+    )
+
+
+def lag_message(delay: float, std: float, omega: FloatArray) -> tuple[str, ...]:
+    """Say a delay that is more than chance."""
+    if abs(delay) < SEEN * std:
+        return ()
+    side = "after" if delay > 0.0 else "before"
+    turn = np.rad2deg(abs(delay) * float(np.max(np.abs(omega))))
+    return (
+        f"The gages come {1e6 * abs(delay):.0f} microseconds {side} the trigger in all runs "
+        f"({turn:.2g} deg of the wheel in the fastest). That is no matter of the tire: it is "
+        "counted out of all errors.",
+    )
