@@ -128,6 +128,7 @@ def _addition(case: Case, found: Diagnosis) -> dict[str, Any]:
             model = _with(data, model, name)
     except TirelibError as error:
         return {"addition": str(error)}
+    sheared = _with_shear(data, model)
     plain = base_fit(case.floor_waves, case.held_out, found.base)
     floor_data = fitted_data(case.floor_waves, case.held_out)
     held = [
@@ -140,7 +141,7 @@ def _addition(case: Case, found: Diagnosis) -> dict[str, Any]:
         "added_strength": [np.ravel(s).tolist() for s in model.strengths],
         "error": {
             "before": residual(data, found.base), "after": residual(data, model),
-            "floor": residual(floor_data, plain),
+            "floor": residual(floor_data, plain), "with_shear": residual(data, sheared),
         },
         "white_error": {
             "before": found.base.error * data.noise, "after": model.error * data.noise,
@@ -151,6 +152,16 @@ def _addition(case: Case, found: Diagnosis) -> dict[str, Any]:
             for k, name in enumerate(HELD_OUT_BY)
         },
     }  # fmt: skip
+
+
+def _with_shear(data: Data, model: Refit) -> Refit:
+    """Return a model with the belt's shear as well, if it takes any."""
+    if "belt_shear" in [effect.name for effect in model.effects]:
+        return model
+    try:
+        return _with(data, model, "belt_shear")
+    except TirelibError:
+        return model
 
 
 def _with(data: Data, model: Refit, name: str) -> Refit:

@@ -28,6 +28,7 @@ def figures(rows: Rows) -> dict[str, Any]:
             "cases": len(none),
             "false_alarms": _share(none, "alarm"),
             "named_falsely": _mean([bool(r["outcome"] == "alarm" and r["named"]) for r in none]),
+            "belt": _mean([bool(r["outcome"] == "quiet" and r["named"]) for r in none]),
         },
         "single": {f"{x:g}": _single([r for r in single if r["wanted"] == x]) for x in ratios},
         "by_kind": {
@@ -90,6 +91,8 @@ def _addition(rows: Rows) -> dict[str, Any]:
             "at_floor": float(np.mean(after <= LIMIT * floor)),
             "removed": _removed(before, after, floor),
         }
+    sheared, floor = (np.array([r["error"][key] for r in done]) for key in ("with_shear", "floor"))
+    out["at_floor_with_shear"] = float(np.mean(sheared <= LIMIT * floor))
     for name in ("load", "pressure", "speed"):
         before, after, floor = (
             np.array([r["held_out"][name][key] for r in done])
@@ -138,6 +141,8 @@ def markdown(told: Mapping[str, Any]) -> str:
                           [_percent(a.get(key, {}).get("at_floor")) for a in added]))  # fmt: skip
         lines.append(_row(f"after adding, {words}: removable mean square gone, median",
                           [_percent(a.get(key, {}).get("removed")) for a in added]))  # fmt: skip
+    lines.append(_row(f"after adding the belt's shear too, plain residual: at most {LIMIT} floor",
+                      [_percent(a.get("at_floor_with_shear")) for a in added]))  # fmt: skip
     for name in ("load", "pressure", "speed"):
         lines.append(_row(f"held-out {name}: the same, median",
                           [_percent(a.get(f"held_out_{name}", {}).get("removed"))
@@ -150,6 +155,8 @@ def markdown(told: Mapping[str, Any]) -> str:
         f"| nothing hidden: false alarm (a name, or unknown) | {_percent(none['false_alarms'])} | "
         f"{none['cases']} |",
         f"| nothing hidden: a name | {_percent(none['named_falsely'])} | {none['cases']} |",
+        f"| nothing hidden: `belt_shear` alone, which every belt has | {_percent(none['belt'])} | "
+        f"{none['cases']} |",
         f"| in no catalogue: flagged unknown | {_percent(unknown['flagged'])} | "
         f"{unknown['cases']} ({unknown['kinds']} kinds) |",
         f"| in no catalogue: wrong name | {_percent(unknown['wrong_name'])} | {unknown['cases']} |",

@@ -17,14 +17,15 @@ def row(kind: str, outcome: str, wanted_ratio: float = 1.5, **more: object) -> d
 def added(before: float, after: float, floor: float) -> dict:
     errors = {"before": before, "after": after, "floor": floor}
     held = dict.fromkeys(("load", "pressure", "speed"), errors)
-    return {"addition": "done", "error": errors, "white_error": errors, "held_out": held}
+    plain = errors | {"with_shear": 0.98 * after}
+    return {"addition": "done", "error": plain, "white_error": errors, "held_out": held}
 
 
 ROWS = [
     row(NONE, "quiet"), row(NONE, "alarm", named=["tread_load"]), row(NONE, "alarm"),
-    row(NONE, "quiet"),
+    row(NONE, "quiet", named=["belt_shear"]),
     row("temperature", "right", **added(1.5, 1.0, 1.0)),
-    row("tread_load", "wrong", **added(1.5, 1.1, 1.0)),
+    row("tread_load", "wrong", **added(1.5, 1.06, 1.0)),
     row("gage_drift", "twins", **added(1.5, 1.04, 1.0)),
     row("gage_drift", "missed", 1.2), row("roughness", "failed"),
     row("oval_tire", "flagged"), row("flat_spot", "wrong"),
@@ -35,7 +36,7 @@ ROWS = [
 def test_shares_are_of_the_cases_that_ran() -> None:
     told = figures(ROWS)
     assert (told["cases"], told["failed"]) == (13, 1)
-    assert told["none"] == {"cases": 4, "false_alarms": 0.5, "named_falsely": 0.25}
+    assert told["none"] == {"cases": 4, "false_alarms": 0.5, "named_falsely": 0.25, "belt": 0.25}
     strong, weak = told["single"]["1.5"], told["single"]["1.2"]
     assert strong["cases"] == 3
     assert strong["right"] == strong["wrong"] == strong["with_twin"] == pytest.approx(1 / 3)
@@ -48,6 +49,7 @@ def test_what_an_addition_takes_away_is_held_against_what_could_be_taken() -> No
     told = figures(ROWS)["addition"]["1.5"]
     assert told["cases"] == 3
     assert told["error"]["at_floor"] == pytest.approx(2 / 3)
+    assert told["at_floor_with_shear"] == 1.0
     assert told["error"]["removed"] == pytest.approx((1.5**2 - 1.04**2) / (1.5**2 - 1.0))
     assert told["held_out_speed"]["fell"] == 1.0
 

@@ -57,11 +57,18 @@ def test_an_oval_tire_which_no_effect_tells_is_unknown() -> None:
     assert (found["outcome"], found["verdict"], found["named"]) == ("flagged", "unknown", [])
 
 
-def test_shear_that_first_order_gives_to_others_is_named_and_its_addition_takes_the_error() -> None:
+def test_shear_is_named_and_its_addition_takes_the_error() -> None:
     found = told("1700-belt_shear-1.50")
     assert found["named"] == ["belt_shear"]
     assert found["outcome"] == "right"
-    assert found["leaders"][0]["ratio"] < ALARM  # to first order it would not have been
+    assert found["error"]["after"] <= 1.05 * found["error"]["floor"]
+
+
+def test_a_tread_that_hardens_with_load_is_named_though_the_joint_fit_gives_it_to_others() -> None:
+    found = told("1721-tread_load-1.20")
+    assert found["named"] == ["tread_load"]
+    assert found["outcome"] == "right"
+    assert found["leaders"][0]["ratio"] < ALARM  # by the joint fit it would not have been
     assert found["error"]["after"] <= 1.05 * found["error"]["floor"]
 
 
