@@ -224,7 +224,7 @@ def _verdict(
     explained = (
         left <= max((1.0 - EXPLAINED) * excess, 0.0)
         or fall(first.model, last.model) >= HALVED
-        or found.by_share
+        or found.by_share in named
     )
     if fall(first.model, last.model) < FELL or not explained:
         return "unknown", []

@@ -26,7 +26,7 @@ from tirelib.diagnose.variant import variant
 from tirelib.effects import CATALOGUE
 from tirelib.effects.effect import State
 from tirelib.effects.patch import along, balanced, beam_strain, held_shear
-from tirelib.errors import TirelibError
+from tirelib.errors import ParameterError, TirelibError
 from tirelib.identify.delay import STD, UNIT, by_delay
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.identify import FITTED
@@ -114,6 +114,11 @@ def variants(
     members, seed : int
     progress : callable, optional
         Called after each variant.
+
+    Raises
+    ------
+    ParameterError
+        If none has a solution.
     """
     random = np.random.default_rng(seed)
     rows = model.whiten(model.slopes[: len(FITTED)]).reshape(len(FITTED), -1)
@@ -131,7 +136,12 @@ def variants(
         rests.append(model.whiten(rest).ravel())
         if progress is not None:
             progress(f"variant {len(rests)}")
-    return np.array(rests).reshape(len(rests), -1)
+    if not rests:
+        raise ParameterError(
+            f"structure: none of {attempts} variants of the model has a solution at these runs; "
+            "identify the model from them first, or correct its numbers"
+        )
+    return np.array(rests)
 
 
 def smooth_part(data: Data, model: Refit) -> FloatArray:

@@ -1,6 +1,10 @@
-"""Levenberg-Marquardt for the base model with effects, bounded where an effect has one sign."""
+"""Levenberg-Marquardt for the base model with effects.
+
+An effect of one sign whose law ends at zero is held there.
+"""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -110,7 +114,7 @@ class Fitter:
         )  # fmt: skip
         if self.follows and before is not None and before.slopes is not None:
             self._follow(before.slopes)
-            self._take(self._predict(self.z))
+            self._take(self._predict(self.z), self.z)
         else:
             self._linearise(self.z)
         if weigh:
@@ -143,15 +147,16 @@ class Fitter:
         away: FloatArray = (z - self.about)[: len(FITTED)]
         return away
 
-    def _take(self, state: State) -> None:
+    def _take(self, state: State, z: FloatArray) -> None:
         self.waveform, self.fresh = state.wave, False
-        self._at(state.deflection)
+        self._at(state.deflection, z)
 
-    def _at(self, deflection: FloatArray) -> None:
+    def _at(self, deflection: FloatArray, z: FloatArray) -> None:
         """Take a deflection, where constants that follow it start from now on."""
         self.deflection = deflection
-        if self.correction is not None:
-            self.correction = self.correction.near(deflection)
+        large = self.large(z)
+        assert self.correction is not None  # noqa: S101 - `large` has it
+        self.correction = replace(self.correction, depth=deflection - large.deflection)
 
     def _linearise(self, z: FloatArray) -> None:
         values = move(self.start, z[: len(FITTED)], FITTED)
@@ -161,12 +166,12 @@ class Fitter:
         )  # fmt: skip
         rows = [base.waveform_slopes, by_delay(base.waveform, self.data.points.omega)[None]]
         for k in range(BASE, z.size):
-            moved = z.copy()
-            moved[k] += 1e-3 if z[k] <= 0.5 else -1e-3
+            moved, side = z.copy(), -1.0 if self.sign[k] < 0.0 else 1.0
+            moved[k] += 1e-3 * side * (1.0 if side * z[k] <= 0.5 else -1.0)
             wave = self._predict(moved).wave
             rows.append(((wave - base.waveform) / (moved[k] - z[k]))[None])
         self.waveform = base.waveform
-        self._at(base.deflection)
+        self._at(base.deflection, z)
         self.slopes = np.concatenate(rows)
         self.fresh = self.follows = True
 
@@ -228,7 +233,7 @@ class Fitter:
                 self._linearise(z)
                 self.rows = self.whiten(self.slopes).reshape(z.size, -1)
             else:
-                self._take(state)
+                self._take(state, z)
         except TirelibError:  # there, or within a difference of it, is no tire
             return None
         self.z, self.cost = z, cost

@@ -51,15 +51,15 @@ class Rounds:
         Of rounds.
     unlisted : int or None
         Index of the candidate of the stage in no catalogue that it needs most.
-    by_share : bool
-        Whether one was named by its share of the error beside the belt's shear.
+    by_share : str
+        What was added for its share of the error beside the belt's shear; empty if nothing.
     """
 
     stage: Stage
     named: list[str]
     count: int
     unlisted: int | None
-    by_share: bool
+    by_share: str
 
 
 def rounds(
@@ -113,7 +113,7 @@ def rounds(
         return None if model is None or not need(model) else staged(model)
 
     named: list[str] = []
-    stage, count, by_share = first, 0, False
+    stage, count, by_share = first, 0, ""
     while count < ROUNDS:
         hidden = [name for name in named if name not in BELT]
         found = _added(first, stage, suspects, len(hidden), fitted)
@@ -121,8 +121,8 @@ def rounds(
             clear = beside_shear(data, stage, catalogue, refitted, staged)
             if clear is None and not named:
                 clear = sole(data, stage, sorted(BELT), refitted, staged)
-            else:
-                by_share = by_share or clear is not None
+            elif clear is not None:
+                by_share = stage.names[clear[1]]
             found = clear or found
         if found is None:
             break

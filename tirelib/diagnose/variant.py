@@ -77,8 +77,12 @@ def _moves(
     values: Mapping[str, float | FloatArray], others: Mapping[str, float | FloatArray], n: int
 ) -> FloatArray:
     """Return moves of the fitted coordinates from values to others, (n_free, n)."""
-    moves = [each.distance(values[each.name], others[each.name]) for each in FITTED]
-    return np.stack([np.broadcast_to(move, (n,)) for move in moves])
+    moves = np.zeros((len(FITTED), n))
+    for row, each in zip(moves, FITTED, strict=True):
+        value, other = values[each.name], others[each.name]
+        if np.isfinite(value).all():  # a belt that does not stretch has nowhere to go
+            row[:] = each.distance(value, other)
+    return moves
 
 
 def flung(state: State) -> State:

@@ -187,10 +187,6 @@ class Correction:
             return self.contact
         return self.slopes.contact.moved(self.contact, np.append(dz, [0.0, 0.0]))
 
-    def near(self, deflection: FloatArray) -> "Correction":
-        """Return the same for points whose deflection, with the correction's, is about this."""
-        return replace(self, depth=deflection - self.deflection)
-
 
 def large_displacements(
     values: Mapping[str, float | FloatArray],

@@ -12,6 +12,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.contact import radial
+from tirelib.errors import ConvergenceError
 from tirelib.model.state import CONSTANTS, State
 from tirelib.ring.compliance import compliance
 from tirelib.signal import LowPass
@@ -69,14 +70,19 @@ def _pressed(state: State, constants: Sequence[Change]) -> State:
     for _ in range(SETTLE):
         contact = _press(changed)
         found = contact.deflection
-        if np.abs(found - depth).max() < SETTLED:
+        off = float(np.abs(found - depth).max())
+        if off < SETTLED or _alike(changed, _changed(state, constants, found)):
             break
         assumed, depth = depth, _crossing(depth, found, before)
         before = assumed, found
-        following = _changed(state, constants, depth)
-        if _alike(changed, following):
-            break
-        changed = following.but(start=contact.start)
+        changed = _changed(state, constants, depth).but(start=contact.start)
+    else:
+        raise ConvergenceError(
+            f"model: after {SETTLE} passes, constants that follow the deflection still change it "
+            f"by {off:.2g} m; an effect follows it too steeply: use a smaller strength",
+            found,
+            off,
+        )
     return changed.but(contact=contact, belt=contact.displacement, deflection=found)
 
 
@@ -89,8 +95,7 @@ def _crossing(
     step = assumed - before[0]
     moves = np.abs(step) > SETTLED
     slope = np.divide(found - before[1], step, out=np.zeros_like(step), where=moves)
-    slope = np.clip(slope, -STEEPEST, STEEPEST)
-    out: FloatArray = assumed + (found - assumed) / (1.0 - slope)
+    out: FloatArray = assumed + (found - assumed) / (1.0 - np.minimum(slope, STEEPEST))
     return out
 
 

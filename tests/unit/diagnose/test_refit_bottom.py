@@ -9,6 +9,8 @@ from tirelib.arrays import FloatArray
 from tirelib.diagnose.fitter import WIDTH
 from tirelib.diagnose.refit import Refit, refit
 from tirelib.effects import CATALOGUE
+from tirelib.effects.effect import State, effect
+from tirelib.errors import ParameterError
 from tirelib.identify.identify import FITTED
 from tirelib.identify.waveform_fit import Data
 from tirelib.model.base import large_displacements, move, predict, values_of
@@ -58,3 +60,28 @@ def test_one_effect_more_leaves_no_more(lacking: tuple[Data, Refit], name: str) 
         more = refit(data, model.values, [effect], [start], delay=model.delay)
         left = model.whiten(data.strain - more.waveform)  # by the same weights
         assert np.sqrt(np.mean(left**2)) < 1.005 * model.error
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_law_that_ends_at_zero_is_fitted_from_there_and_held_there(
+    lacking: tuple[Data, Refit], side: float
+) -> None:
+    def softer(state: State, strength: float) -> State:
+        if side * strength < 0.0:
+            raise ParameterError("no such law")
+        return state.but(k_u=state.k_u * (1.0 - 0.5 * np.abs(strength) * state.deflection / 0.02))
+
+    low, high = sorted((0.0, 0.5 * side))
+    law = effect("softer", stage="stiffness", unit="1", low=low, high=high,
+                 varies_with=("load",), source="test")(softer)  # fmt: skip
+    data, model = lacking
+    found = refit(data, model.values, [law], delay=model.delay)  # it starts from zero
+    assert side * found.strengths[0][0] > 0.1
+    assert found.error < 0.7 * model.error
+    other = effect("harder", stage="stiffness", unit="1", low=low, high=high,
+                   varies_with=("load",), source="test")(
+        lambda state, strength: softer(state, strength).but(k_u=2.0 * state.k_u
+                                                            - softer(state, strength).k_u)
+    )  # fmt: skip
+    held = refit(data, model.values, [other], [np.array([0.1 * side])], delay=model.delay)
+    assert held.strengths[0][0] == pytest.approx(0.0, abs=1e-9)

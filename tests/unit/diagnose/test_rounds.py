@@ -339,7 +339,7 @@ def test_what_takes_most_of_the_error_is_looked_for_where_no_leader_takes_any(
     monkeypatch.setattr(rounds, "beside_shear", lambda *_: told(clear))
     monkeypatch.setattr(rounds, "sole", lambda *_: told(sole))
     made = rounds.rounds(None, first, [], None, 1e-6, None)
-    assert made == Rounds(made.stage, [named], 1, None, named == "weak")
+    assert made == Rounds(made.stage, [named], 1, None, named if named == "weak" else "")
 
 
 def test_beside_the_shear_of_every_belt_another_is_looked_for(
@@ -361,5 +361,5 @@ def test_beside_the_shear_of_every_belt_another_is_looked_for(
     monkeypatch.setattr(rounds, "sole", lambda *_: (sheared, 2))
     monkeypatch.setattr(rounds, "_thinned", lambda now, *_: (now, set()))
     made = rounds.rounds(None, first, [], None, 1e-6, None)
-    assert (made.named, made.by_share) == (["belt_shear", "close"], True)
+    assert (made.named, made.by_share) == (["belt_shear", "close"], "close")
     assert asked == [first, sheared], "and with a third effect only the joint fit is asked"

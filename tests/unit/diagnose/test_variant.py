@@ -12,9 +12,12 @@ from tests.unit.diagnose.planted import runs
 from tests.unit.identify.model_waves import TIRE
 from tirelib.arrays import FloatArray
 from tirelib.contact.layout import GAGES
+from tirelib.diagnose import ensemble
 from tirelib.diagnose import variant as module
+from tirelib.diagnose.ensemble import variants
 from tirelib.diagnose.refit import refit
 from tirelib.diagnose.variant import CARRIED, CROWN, SHARES, STRIPS, crowned, flung, grown
+from tirelib.errors import ParameterError
 from tirelib.model.base import predict, values_of
 from tirelib.model.state import Operating, State
 from tirelib.waveforms import GRID
@@ -144,3 +147,22 @@ def test_sidewalls_hold_a_part_of_what_spins() -> None:
     held = state.k_u * TIRE.ring_radius**2
     spin = TIRE.mass * (TIRE.ring_radius * run.omega) ** 2
     np.testing.assert_allclose(lost, spin * held / (held + 2e6), rtol=1e-9)
+
+
+@pytest.mark.parametrize("stretch", [np.inf, 2e6])
+def test_a_belt_that_does_not_stretch_has_variants_as_well(stretch: float) -> None:
+    data = runs().data(with_deflection=False)
+    model = refit(data, values_of(replace(TIRE, extension_stiffness=stretch)))
+    rests = variants(data, model, members=3)
+    assert rests.shape == (3, data.strain.size)
+    assert np.isfinite(rests).all()
+
+
+def test_no_variant_at_all_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(*_: object) -> FloatArray:
+        raise ParameterError("no tire")
+
+    monkeypatch.setattr(ensemble, "variant", none)
+    data = runs().data(with_deflection=False)
+    with pytest.raises(ParameterError, match="none of 6 variants of the model has a solution"):
+        variants(data, refit(data, values_of(TIRE)), members=2)

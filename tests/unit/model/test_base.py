@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from tests.unit.identify.model_waves import TIRE, operating
 from tirelib.effects import CATALOGUE
+from tirelib.errors import ConvergenceError
 from tirelib.model import chain
 from tirelib.model.base import (
     FREE,
@@ -169,3 +170,26 @@ def test_a_law_that_follows_the_deflection_holds_at_that_which_it_causes(
     for start in (0.005, 0.04):  # wherever it begins
         state = plain.but(deflection=np.full(2, start))
         assert chain.waveform(state, [change]).wave == pytest.approx(found.wave, rel=1e-6, abs=1e-9)
+
+
+def test_a_steep_law_is_followed_in_a_few_presses(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = presses(monkeypatch)
+
+    def stiffens(state: State) -> State:
+        return state.but(k_u=state.k_u * (1.0 + (state.deflection / 0.025) ** 8))
+
+    found = predict(VALUES, POINTS, [("constants", stiffens)])
+    assert len(seen) < 12
+    plain = State.of(VALUES, POINTS, GRID)
+    assert found.k_u == pytest.approx(stiffens(plain.but(deflection=found.deflection)).k_u)
+
+
+def test_a_law_that_no_deflection_satisfies_is_refused() -> None:
+    middle = float(predict(VALUES, POINTS).deflection[0])
+
+    def jumps(state: State) -> State:  # deep makes stiff, stiff makes flat, flat makes soft
+        return state.but(k_u=state.k_u * np.where(state.deflection > middle, 1.5, 0.7))
+
+    with pytest.raises(ConvergenceError, match="constants that follow the deflection") as caught:
+        predict(VALUES, POINTS, [("constants", jumps)])
+    assert caught.value.residual > chain.SETTLED
