@@ -46,6 +46,7 @@ def _strain(found: Comparison) -> dict[str, Any]:
         "residual_rms_raw": 1e6 * fit.raw_rms,
         "measured_rms": 1e6 * fit.strain_rms,
         "delay_us": 1e6 * found.delay,
+        "delay_std_us": 1e6 * found.delay_std,
         "floor": floor.value,
         "floor_source": floor.source or None,
         "smooth_floor": floor.smooth,

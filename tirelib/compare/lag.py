@@ -2,6 +2,7 @@
 
 It is a number of the day (`tirelib.identify.delay`), neither the tire's nor the model's, so it is
 fitted to the waveforms beside the set points and taken as part of what the model predicts.
+Damping of the sidewall or sliding comes late as well: a little of them goes with it.
 """
 
 from dataclasses import replace
@@ -11,7 +12,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.compare.model import Prediction
 from tirelib.identify.delay import STD, UNIT, by_delay, earlier
-from tirelib.identify.random_effects import Whitening
+from tirelib.identify.random_effects import Whitening, angle_slope
 
 PASSES = 3
 SEEN = 3.0
@@ -19,9 +20,16 @@ SEEN = 3.0
 
 
 def fitted_delay(
-    measured: FloatArray, predicted: FloatArray, omega: FloatArray, whiten: Whitening
+    measured: FloatArray,
+    predicted: FloatArray,
+    omega: FloatArray,
+    whiten: Whitening,
+    independent: float,
 ) -> tuple[float, float]:
-    """Return the delay [s] and its standard deviation.
+    """Return the delay [s] and its standard deviation, by what of it goes with the speed.
+
+    A zero of the wheel angle that is the same in all runs stands beside it, free: at one speed it
+    is all, and nothing is told of a delay.
 
     Parameters
     ----------
@@ -29,16 +37,22 @@ def fitted_delay(
     omega : shape (n_runs,), [rad/s]
     whiten : Whitening
         By set points and what a good model leaves.
+    independent : float
+        Samples in a turn of what is left that tell something of their own.
     """
-    delay, information = 0.0, 1.0
+    delay, information = 0.0, np.eye(2)
+    share = independent / measured.shape[1]
+    prior = np.array([(UNIT / STD) ** 2, 0.0])
     for _ in range(PASSES):
         late = earlier(predicted, omega, -delay)
-        row, rest = whiten(by_delay(late, omega)), whiten(measured - late)
-        information = float(np.sum(row**2)) + (UNIT / STD) ** 2
+        slopes = np.stack([by_delay(late, omega), angle_slope(late)])
+        rows = whiten(slopes).reshape(2, -1)
+        rest = whiten(measured - late).ravel()
+        information = share * rows @ rows.T + np.diag(prior)
         # the prior holds the whole delay near zero, not the step
-        gain = float(np.sum(row * rest)) - delay / UNIT * (UNIT / STD) ** 2
-        delay += UNIT * gain / information
-    return delay, UNIT / float(np.sqrt(information))
+        gain = share * rows @ rest - prior * np.array([delay / UNIT, 0.0])
+        delay += UNIT * float(np.linalg.solve(information, gain)[0])
+    return delay, UNIT * float(np.sqrt(np.linalg.inv(information)[0, 0]))
 
 
 def late_prediction(prediction: Prediction, omega: FloatArray, delay: float) -> Prediction:
@@ -65,6 +79,6 @@ def lag_message(delay: float, std: float, omega: FloatArray) -> tuple[str, ...]:
     turn = np.rad2deg(abs(delay) * float(np.max(np.abs(omega))))
     return (
         f"The gages come {1e6 * abs(delay):.0f} microseconds {side} the trigger in all runs "
-        f"({turn:.2g} deg of the wheel in the fastest). That is no matter of the tire: it is "
-        "counted out of all errors.",
+        f"({turn:.2g} deg of the wheel in the fastest): it is counted out of all errors. Effects "
+        "that act late as well are weighed against it by `tirelib diagnose`.",
     )

@@ -71,7 +71,7 @@ class Comparison:
     chosen : Chosen
         Runs, gages and conditions.
     model : Model
-    delay : float, [s]
+    delay, delay_std : float, [s]
         Of the gages against the trigger, in all runs (`tirelib.compare.lag`).
     prediction : Prediction
         With the delay.
@@ -102,6 +102,7 @@ class Comparison:
     chosen: Chosen
     model: Model
     delay: float
+    delay_std: float
     prediction: Prediction
     points: SetPoints
     noise: RepeatNoise
@@ -190,6 +191,7 @@ def compare_strain(waves: Waveforms, model: Model, data_hash: str = "") -> Compa
         chosen,
         model,
         delay,
+        delay_std,
         prediction,
         points,
         repeats,
@@ -238,8 +240,9 @@ def _delay(
     left = _rms(rest[counted] - first.shift)
     whiten = whitening_of(tangent[counted], scale[counted], max(left, LEAST_NOISE))
     return fitted_delay(
-        chosen.strain[counted], prediction.strain[counted], at.omega[counted], whiten
-    )
+        chosen.strain[counted], prediction.strain[counted], at.omega[counted], whiten,
+        first.independent,
+    )  # fmt: skip
 
 
 def _set_points(

@@ -22,8 +22,9 @@ from tirelib.report.comparison import strain_parts, write_comparison
 KEYS = {
     "format", "campaign", "model", "effects", "axes", "quantity", "unit", "verdict", "error", "p",
     "noise", "repeats", "residual_rms", "residual_rms_noise", "residual_rms_raw", "measured_rms",
-    "delay_us", "floor", "floor_source", "smooth_floor", "smooth_share", "statements", "regions",
-    "messages", "table", "set_points", "tracks", "gages", "curves", "runs", "ranked", "sources",
+    "delay_us", "delay_std_us", "floor", "floor_source", "smooth_floor", "smooth_share",
+    "statements", "regions", "messages", "table", "set_points", "tracks", "gages", "curves",
+    "runs", "ranked", "sources",
 }  # fmt: skip
 
 
