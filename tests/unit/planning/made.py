@@ -45,8 +45,8 @@ class Case:
 
 
 @cache
-def case(strength: float = STRENGTH) -> Case:
-    points, random = points_at(CONDITIONS), np.random.default_rng(5)
+def case(strength: float = STRENGTH, seed: int = 5) -> Case:
+    points, random = points_at(CONDITIONS), np.random.default_rng(seed)
     wave, _ = exact_waveform(TIRE, points)
     n = len(points)
     noise = float(np.hypot(NOISE, 0.016 * np.sqrt(np.mean(wave**2))))

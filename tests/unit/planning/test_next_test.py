@@ -149,17 +149,25 @@ def test_a_run_counts_by_what_it_does_if_the_likelier_one_is_right() -> None:
     assert resolving(100.0 * clear, faint, 2.0 * np.log(3.0))[0] == pytest.approx(0.75, abs=0.01)
 
 
-def test_the_planted_effect_is_no_worse_than_its_twin_and_not_far_off() -> None:
+def test_the_planted_effect_is_no_worse_than_its_twin() -> None:
     test = planned()
     assert [rival.name for rival in test.trial.rivals] == [TWIN, PLANTED]
     (pair,) = test.pairs
     # the second is planted: that the first is worse is a negative gap
     assert pair.gap < 0.0
     assert pair.better == PLANTED
-    planted = test.trial.rivals[1]
-    # in a tire unlike the model: the strength is right to a half
-    assert planted.strength[0] == pytest.approx(STRENGTH, rel=0.5)
-    assert planted.in_range
+    assert test.trial.rivals[1].in_range
+
+
+def test_over_tires_unlike_the_model_the_strength_is_right_to_a_third() -> None:
+    """One tire's structure takes or gives half of so faint an effect."""
+    found = []
+    for seed in (5, 6, 7):
+        made = case(STRENGTH, seed)
+        suspects = [(CATALOGUE[PLANTED], np.array([0.02]))]
+        (planted,) = try_suspects(made.data, made.base, suspects, noise=NOISE).rivals
+        found.append(float(planted.strength[0]))
+    assert np.mean(found) == pytest.approx(STRENGTH, rel=0.3)
 
 
 def test_runs_are_ranked_and_the_best_promises_more_than_any() -> None:
