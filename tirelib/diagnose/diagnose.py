@@ -93,6 +93,9 @@ class Diagnosis:
         A law for it, if it is more than variants leave and a sparse one holds.
     like : Finding or None
         What else is needed, if that is in no catalogue (`tirelib.diagnose.unlisted`).
+    by_share : str
+        What is named for its share of the error beside the belt's shear, whatever its score; empty
+        if nothing is.
     """
 
     verdict: str
@@ -109,6 +112,7 @@ class Diagnosis:
     beyond: FloatArray
     guess: Guess | None
     like: Finding | None
+    by_share: str
 
 
 def diagnose(
@@ -162,7 +166,7 @@ def diagnose(
     dead = {name: why for name, why in first.found.dead.items() if name not in extra}
     return Diagnosis(
         verdict, tuple(named), findings, dead, base, last.model, left, floor, found.count, runs,
-        data, beyond, guess, like,
+        data, beyond, guess, like, found.by_share if found.by_share in named else "",
     )  # fmt: skip
 
 

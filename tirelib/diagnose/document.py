@@ -104,6 +104,8 @@ def assess(
         )
     messages += [_too_large(finding) for finding in findings
                  if finding.effect.name in named and not finding.in_range]  # fmt: skip
+    if found.by_share in named:
+        messages.append(_by_share(found.by_share))
     return Assessment(
         found, unit, verdict, named, findings, unit.factor * found.base.error,
         unit.factor * final.error, floor, chosen, held_before, held_after,
@@ -118,6 +120,14 @@ def _too_large(finding: Finding) -> str:
         f"{effect.name} explains it, but only at {size} {effect.unit}, and {effect.low:g} to "
         f"{effect.high:g} is plausible: it is larger than thought, or something of the same kind; "
         "measure it in another way before it is believed"
+    )
+
+
+def _by_share(name: str) -> str:
+    return (
+        f"{name} is named for its share of the error: beside the shear that every belt has, it "
+        "takes most of what is left, and nothing else comes near. Its score may be low, for "
+        "structure of the ring looks alike in part; add it, then belt_shear, and see the error fall"
     )
 
 

@@ -32,6 +32,21 @@ def test_what_explains_all_is_named_and_told_to_be_too_large() -> None:
     assert f"0 to {high:g} is plausible" in told
 
 
+def test_what_is_named_for_its_share_is_told_to_be_so() -> None:
+    found = diagnose(
+        runs(EFFECT, STRENGTH), model_of(model_file()).values, [CATALOGUE[EFFECT], *OTHERS],
+        members=MEMBERS,
+    )  # fmt: skip
+    assert found.named == (EFFECT,)
+    assert found.by_share == "", "its score names it"
+    shares = [
+        [text for text in assess(one, members=4).messages if "share of the error" in text]
+        for one in (found, replace(found, by_share=EFFECT))
+    ]
+    assert shares[0] == []
+    assert shares[1][0].startswith(f"{EFFECT} is named for its share")
+
+
 def test_what_is_far_too_large_is_not_named() -> None:
     found = with_range(STRENGTH / 3.0)
     assert found.verdict == "unknown"
