@@ -36,7 +36,7 @@ from tirelib.planning.rivals import Trial, repeated_noise, try_suspects
 from tirelib.waveforms import Waveforms
 
 CACHE = Path(__file__).parents[1] / "out" / "next_test"
-VERSION = 6
+VERSION = 7
 """Of what decides a campaign's numbers beside its day."""
 REPEATS = 2
 """Runs of a campaign that are made twice."""
