@@ -10,9 +10,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.diagnose.candidates import candidates
 from tirelib.diagnose.refit import FELL, Refit, fall
+from tirelib.diagnose.sole import Fit
 from tirelib.diagnose.stage import Stage, within
 from tirelib.diagnose.unlisted import UNLISTED
 from tirelib.effects import CATALOGUE, Effect
@@ -26,8 +26,6 @@ APART = 0.8
 START = 0.25
 """Of its range, from which a shear is fitted."""
 SHEAR = CATALOGUE["belt_shear"]
-
-Fit = Callable[[Refit, Sequence[Effect], Sequence[FloatArray]], Refit | None]
 
 
 def beside_shear(

@@ -17,7 +17,6 @@ from tirelib.identify.random_effects import whitening
 from tirelib.identify.waveform_fit import Data
 from tirelib.model.base import (
     Correction,
-    CorrectionSlopes,
     large_displacements,
     linearised,
     move,
@@ -75,8 +74,8 @@ class Fitter:
         self.width = np.concatenate([WIDTH, [STD / UNIT], more])
         self.damping, self.cost = 1e-3, np.inf
         self.fresh = self.follows = False
-        self.about = self.z
-        self.correction = near
+        self.about, self.near = self.z, near
+        self.correction: Correction
         one_sign = [np.full(e.components, (e.low >= 0.0) - (e.high <= 0.0)) for e in effects]
         self.sign = np.concatenate([np.zeros(BASE), *one_sign])
         self.signed: BoolArray = self.sign != 0.0
@@ -103,7 +102,7 @@ class Fitter:
 
     def refresh(self, *, weigh: bool = True) -> None:
         """Bring large displacements up to date, and if asked for the weights."""
-        data, before = self.data, self.correction
+        data, before = self.data, self.correction if self.follows else self.near
         start = None if before is None else before.guess(self._away(self.z))
         self.about = self.z
         self.correction = with_slopes(
@@ -112,8 +111,8 @@ class Fitter:
             ),
             self.values, data.points, FITTED, low_pass=data.low_pass,
         )  # fmt: skip
-        if self.follows and before is not None and before.slopes is not None:
-            self._follow(before.slopes)
+        if self.follows and before is not None:
+            self._follow(before)
             self._take(self._predict(self.z), self.z)
         else:
             self._linearise(self.z)
@@ -125,16 +124,14 @@ class Fitter:
         self.rows = self.whiten(self.slopes).reshape(self.z.size, -1)
         self.cost = self._cost(self.waveform, self.z)
 
-    def _follow(self, before: CorrectionSlopes) -> None:
+    def _follow(self, before: Correction) -> None:
         """Bring what large displacements have in the slopes up to date."""
-        now = self.large(self.z).slopes
-        assert now is not None  # noqa: S101 - refresh computes them
-        by_base = self.slopes[: len(FITTED)] + now.waveform - before.waveform
-        self.slopes = np.concatenate([by_base, self.slopes[len(FITTED) :]])
+        by_base, others = np.split(self.slopes, [len(FITTED)])
+        by_base = by_base + self.correction.by_waveform - before.by_waveform
+        self.slopes = np.concatenate([by_base, others])
 
     def large(self, z: FloatArray) -> Correction:
         """Return what large displacements add at coordinates; `refresh` computes them."""
-        assert self.correction is not None  # noqa: S101 - not called before
         return self.correction.moved(self._away(z))
 
     @property
@@ -154,9 +151,8 @@ class Fitter:
     def _at(self, deflection: FloatArray, z: FloatArray) -> None:
         """Take a deflection, where constants that follow it start from now on."""
         self.deflection = deflection
-        large = self.large(z)
-        assert self.correction is not None  # noqa: S101 - `large` has it
-        self.correction = replace(self.correction, depth=deflection - large.deflection)
+        depth = deflection - self.large(z).deflection
+        self.correction = replace(self.correction, depth=depth)
 
     def _linearise(self, z: FloatArray) -> None:
         values = move(self.start, z[: len(FITTED)], FITTED)

@@ -166,6 +166,11 @@ class Correction:
             depth=None if self.depth is None else np.tile(self.depth, times),
         )  # fmt: skip
 
+    @property
+    def by_waveform(self) -> FloatArray:
+        """Slopes of the waveform (n_free, n_points, n_phi); one zero for all where it has none."""
+        return self.slopes.waveform if self.slopes else np.zeros((1, 1, 1))
+
     def moved(self, dz: FloatArray) -> "Correction":
         """Return the correction after a move, to first order where it has slopes.
 
