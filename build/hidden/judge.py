@@ -31,8 +31,8 @@ BELT = frozenset({"belt_shear", "belt_extension"})
 """Right additions on a tire whose belt really shears and stretches; they may not hide another."""
 HELD_OUT_BY = ("load", "pressure", "speed")
 _CODE = {
-    "diagnose": ("beside_shear", "candidates", "diagnose", "ensemble", "fitter", "noise",
-                 "ranking", "refit", "rivals", "rounds", "secants", "shape", "sole", "stage",
+    "diagnose": ("candidates", "diagnose", "ensemble", "fitter", "noise",
+                 "ranking", "refit", "rivals", "rounds", "secants", "shape", "shear", "stage",
                  "structure", "unlisted", "variant"),
     "identify": ("campaign_data", "delay", "discrepancy", "identify", "noise", "random_effects",
                  "structure", "waveform_fit"),

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.diagnose.beside_shear import beside_shear
 from tirelib.diagnose.ensemble import Variants
 from tirelib.diagnose.refit import FELL, Refit, fall, refit
-from tirelib.diagnose.sole import sole
+from tirelib.diagnose.shear import SHEAR, beside_shear, shear_itself, with_shear
 from tirelib.diagnose.stage import ALARM, Stage, within
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
@@ -32,7 +31,7 @@ FURTHER, ON_TOP = 0.12, 0.3
 first beside those of every belt, whose law leaves structure of its own."""
 HALVED = 0.45
 """Share of the squared error from which a further alarm is needed whatever imitates it."""
-BELT = frozenset({"belt_shear"})
+BELT = frozenset({SHEAR.name})
 """What every tire has and the base has not: named, it raises no bar for what is hidden on top."""
 ROUNDS = 3
 
@@ -118,11 +117,12 @@ def rounds(
         hidden = [name for name in named if name not in BELT]
         found = _added(first, stage, suspects, len(hidden), fitted)
         if not hidden and (found is None or _idle(stage, *found)):
-            clear = beside_shear(data, stage, catalogue, refitted, staged)
-            if clear is None and not named:
-                clear = sole(data, stage, sorted(BELT), refitted, staged)
-            elif clear is not None:
+            sheared = with_shear(stage.model, refitted)
+            clear = beside_shear(data, stage, sheared, catalogue, refitted, staged)
+            if clear is not None:
                 by_share = stage.names[clear[1]]
+            elif not named:
+                clear = shear_itself(stage, sheared, staged)
             found = clear or found
         if found is None:
             break

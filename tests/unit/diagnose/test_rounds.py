@@ -308,7 +308,7 @@ def test_hints_alone_have_no_leader() -> None:
 
 
 @pytest.mark.parametrize(
-    ("gone", "clear", "sole", "named"),
+    ("gone", "clear", "itself", "named"),
     [
         (FELL - 0.01, "", "close", "close"),
         (FELL + 0.01, "", "close", "strong"),
@@ -323,7 +323,7 @@ def test_hints_alone_have_no_leader() -> None:
     ],
 )  # fmt: skip
 def test_what_takes_most_of_the_error_is_looked_for_where_no_leader_takes_any(
-    monkeypatch: pytest.MonkeyPatch, gone: float | None, clear: str, sole: str, named: str
+    monkeypatch: pytest.MonkeyPatch, gone: float | None, clear: str, itself: str, named: str
 ) -> None:
     first = stage((), 1000.0, SCORE, error=1.0)
     first.in_range = np.ones(3, dtype=bool)
@@ -337,7 +337,8 @@ def test_what_takes_most_of_the_error_is_looked_for_where_no_leader_takes_any(
     found = iter([leads, None])
     monkeypatch.setattr(rounds, "_added", lambda *_: next(found))
     monkeypatch.setattr(rounds, "beside_shear", lambda *_: told(clear))
-    monkeypatch.setattr(rounds, "sole", lambda *_: told(sole))
+    monkeypatch.setattr(rounds, "with_shear", lambda *_: None)
+    monkeypatch.setattr(rounds, "shear_itself", lambda *_: told(itself))
     made = rounds.rounds(None, first, [], None, 1e-6, None)
     assert made == Rounds(made.stage, [named], 1, None, named if named == "weak" else "")
 
@@ -358,7 +359,8 @@ def test_beside_the_shear_of_every_belt_another_is_looked_for(
 
     monkeypatch.setattr(rounds, "_added", lambda *_: None)
     monkeypatch.setattr(rounds, "beside_shear", clear)
-    monkeypatch.setattr(rounds, "sole", lambda *_: (sheared, 2))
+    monkeypatch.setattr(rounds, "with_shear", lambda *_: None)
+    monkeypatch.setattr(rounds, "shear_itself", lambda *_: (sheared, 2))
     monkeypatch.setattr(rounds, "_thinned", lambda now, *_: (now, set()))
     made = rounds.rounds(None, first, [], None, 1e-6, None)
     assert (made.named, made.by_share) == (["belt_shear", "close"], "close")

@@ -1,4 +1,4 @@
-"""One effect that takes most of what is left beside the shear, on stages that are made up."""
+"""The belt's shear, and one effect that takes most beside it, on stages that are made up."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -6,9 +6,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tirelib.diagnose import beside_shear as module
-from tirelib.diagnose.beside_shear import APART, HINTED, SHARE, beside_shear
+from tirelib.diagnose import shear as module
 from tirelib.diagnose.refit import FELL
+from tirelib.diagnose.shear import (
+    APART,
+    ERROR,
+    HINTED,
+    MISFIT,
+    SHARE,
+    beside_shear,
+    shear_itself,
+    with_shear,
+)
+from tirelib.diagnose.stage import ALARM
 from tirelib.diagnose.unlisted import gain_by_load
 from tirelib.effects import CATALOGUE
 
@@ -93,7 +103,7 @@ def look(
     )  # fmt: skip
     monkeypatch.setattr(module, "candidates", candidates)
     found = beside_shear(
-        None, stage, list(CATALOGUE.values()), refitted,
+        None, stage, with_shear(base, refitted), list(CATALOGUE.values()), refitted,
         lambda one: SimpleNamespace(model=one, scores=SimpleNamespace(misfit=misfit)),
     )  # fmt: skip
     return ("" if found is None else others[found[1]]), made
@@ -155,3 +165,53 @@ def test_what_is_in_no_catalogue_is_told_unless_it_looks_like_an_effect(
     shares = {"gain_by_load": 0.8, "roughness": 0.2}
     assert look(monkeypatch, shares) == ("gain_by_load", [["belt_shear"]])
     assert look(monkeypatch, shares, listed=True)[0] == ""
+
+
+LIMIT = 0.01
+JUST = (float(np.sqrt(1.0 - ERROR)) - 0.01, 1.0 - MISFIT - 0.01, ALARM - 0.1, 0.5)
+"""Error, misfit, imitation and strength in its range, with which the shear just explains most."""
+
+
+def itself(
+    error: float, misfit: float, imitated: float, part: float, *, before: float = 1.0
+) -> int | None:
+    """Return the index of the shear, if it is named by itself."""
+    base, sheared = model(error=BASE), model("belt_shear", error=error, part=part)
+    stage = SimpleNamespace(
+        model=base, names=NAMES, scores=SimpleNamespace(misfit=before),
+        limit=np.array([1.0, 1.0, 1.0, LIMIT]),
+    )  # fmt: skip
+    after = SimpleNamespace(model=sheared, scores=SimpleNamespace(misfit=misfit), imitated=imitated)
+    found = shear_itself(stage, with_shear(base, lambda *_: sheared), lambda _: after)
+    assert found is None or found[0] is after
+    return None if found is None else found[1]
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [(0, JUST[0] + 0.02), (1, JUST[1] + 0.02), (2, ALARM), (3, 1.5), (3, -0.5)],
+    ids=["error stays", "misfit stays", "the impossible stays", "too strong", "wrong sign"],
+)
+def test_the_shear_is_named_only_where_it_explains_most_in_its_range(
+    place: int, value: float
+) -> None:
+    given = list(JUST)
+    assert itself(*given) == NAMES.index("belt_shear")
+    given[place] = value
+    assert itself(*given) is None
+
+
+def test_a_misfit_that_variants_have_as_well_is_not_enough() -> None:
+    assert MISFIT > ALARM * LIMIT, "the share is what counts for a large misfit"
+    error, _, _, part = JUST
+    assert itself(error, 1.0 - ALARM * LIMIT - 0.001, 0.0, part) is None
+    assert itself(error, 0.1 - ALARM * LIMIT - 0.001, 0.0, part, before=0.1) is not None
+    assert itself(error, 0.1 - ALARM * LIMIT + 0.001, 0.0, part, before=0.1) is None
+
+
+def test_a_shear_that_the_model_has_or_that_takes_nothing_is_not_named() -> None:
+    for base in (model("belt_shear", error=BASE), model(error=BASE)):
+        stage = SimpleNamespace(model=base, names=NAMES[: 4 - len(base.effects)])
+        same = with_shear(base, lambda *_: model("belt_shear", error=BASE))
+        assert same is base
+        assert shear_itself(stage, same, lambda _: pytest.fail("no stage is needed")) is None
