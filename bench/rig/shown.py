@@ -101,10 +101,10 @@ def bonded_window(shown: Shown, strength: float) -> Trace:
     return _filtered(shown.trace, gain.astype(np.complex128))
 
 
-def second_order_filter(shown: Shown, strength: float) -> Trace:
-    """Amplifier of second order, damped by 0.7; `strength` is 1 / omega_0 [s]."""
+def third_order_filter(shown: Shown, strength: float) -> Trace:
+    """Amplifier of third order, flat as Butterworth's; `strength` is 1 / omega_0 [s]."""
     s = 1j * _orders(shown.trace) * shown.omega * strength
-    gain = 1.0 / (1.0 + 1.4 * s + s**2)
+    gain = 1.0 / ((1.0 + s) * (1.0 + s + s**2))
     return _filtered(shown.trace, gain)
 
 

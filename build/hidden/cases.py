@@ -31,7 +31,7 @@ from tirelib.model.base import values_of
 from tirelib.waveforms import Waveforms
 
 NONE = "none"
-VERSION = 5
+VERSION = 6
 """Of everything that decides a case's numbers; raised when a law or the plan changes."""
 NODES = 1
 """The same of solved states with one effect."""

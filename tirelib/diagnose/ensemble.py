@@ -48,6 +48,7 @@ ALIKE = {
     CATALOGUE["gage_length"]: 200.0,
     CATALOGUE["roughness"]: 0.03,
     CATALOGUE["gage_saturation"]: 1.2e-3,
+    CATALOGUE["sidewall_load"]: 0.006,
     gain_by_load: 0.0075,
     gain_by_pressure: 0.01,
     gain_by_speed: 0.004,

@@ -11,11 +11,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy import stats
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.candidates import Candidates
 from tirelib.diagnose.refit import Refit
 from tirelib.diagnose.structure import Normal, Structure
+
+TAIL = 0.1
+"""Share of the members whose scores tell the largest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +142,22 @@ def _taken(normal: Normal, slot: slice) -> float:
     return float(2.0 * weights @ right - weights @ gram @ weights)
 
 
-def limits(members: Sequence[Scores]) -> FloatArray:
-    """Return the members' largest score of each candidate."""
-    largest: FloatArray = np.max([scores.score for scores in members], axis=0)
-    return largest
+def limits(members: Sequence[Scores], components: Sequence[int]) -> FloatArray:
+    """Return the largest score of each candidate that as many members are expected to have.
+
+    The largest of a hundred happens to be half or twice as large with other draws; the upper tenth
+    together tells it far better, in the ratios of a chi-square with the candidate's components.
+
+    Parameters
+    ----------
+    members : sequence of Scores
+    components : sequence of int
+        Of each candidate.
+    """
+    count = len(members)
+    top = max(1, round(TAIL * count))
+    ranks = (np.arange(1, top + 1) - 0.3) / (count + 0.4)  # median ranks, the largest first
+    usual = np.asarray(stats.chi2.isf(ranks[:, None], np.asarray(components)))
+    largest = np.sort([scores.score for scores in members], axis=0)[::-1][:top]
+    expected: FloatArray = np.mean(largest / usual, axis=0) * usual[0]
+    return expected

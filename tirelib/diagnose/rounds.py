@@ -8,7 +8,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.ensemble import Variants
 from tirelib.diagnose.refit import FELL, Refit, fall, refit
-from tirelib.diagnose.shear import SHEAR, beside_shear, shear_itself, with_shear
+from tirelib.diagnose.shear import SHEAR, beside_shear, on_top, shear_itself, with_shear
 from tirelib.diagnose.stage import ALARM, Stage, within
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
@@ -117,7 +117,7 @@ def rounds(
         hidden = [name for name in named if name not in BELT]
         found = _added(first, stage, suspects, len(hidden), fitted)
         if not hidden and (found is None or _idle(stage, *found)):
-            sheared = with_shear(stage.model, refitted)
+            sheared = with_shear(stage, refitted)
             clear = beside_shear(data, stage, sheared, catalogue, refitted, staged)
             if clear is not None:
                 by_share = stage.names[clear[1]]
@@ -130,12 +130,14 @@ def rounds(
         name = stage.names[index]
         if stage.unlisted[index]:
             return Rounds(stage, named, count, index, by_share)
-        stage = after
+        before, named = named, [*named, name, *_more(stage, after, name)]
         suspects.discard(name)
         count += 1
-        named.append(name)
-        stage, gone = _thinned(stage, named[:-1], least, fitted)
+        stage, gone = _thinned(after, before, least, fitted)
         named = [name for name in named if name not in gone]
+    if fall(first.model, stage.model) >= FELL:
+        last = on_top(stage, FURTHER, refitted, staged)
+        named, stage = [*named, *_more(stage, last)], last
     return Rounds(stage, named, count, None, by_share)
 
 
@@ -175,6 +177,12 @@ def _added(
             if after is not None and fits and fall(stage.model, after.model) >= HALVED:
                 needed.append((after, index))
     return min(needed, key=lambda pair: pair[0].scores.misfit, default=None)
+
+
+def _more(before: Stage, after: Stage, *names: str) -> list[str]:
+    """Return further effects that a stage has than those of another and some names."""
+    known = {effect.name for effect in before.model.effects} | set(names)
+    return [effect.name for effect in after.model.effects if effect.name not in known]
 
 
 def _idle(before: Stage, after: Stage, index: int) -> bool:

@@ -19,9 +19,11 @@ from tirelib.diagnose.unlisted import UNLISTED
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.identify.waveform_fit import Data
 
-SHARE, HINTED = 0.6, 0.5
-"""Shares of the squared error beside the shear that an effect has to take, and one that the joint
-fit hints at."""
+SHARE, HINTED, INDEPENDENT = 0.6, 0.5, 0.2
+"""Shares of the squared error beside the shear that an effect has to take, one that the joint fit
+hints at there, and one that it hints at clearly though nothing else has to do with it."""
+CLEARLY = 2.0
+"""Ratio of a clear hint."""
 APART = 0.8
 """Share of the leader's that the next may take."""
 START = 0.25
@@ -34,16 +36,18 @@ SHEAR = CATALOGUE["belt_shear"]
 Fit = Callable[[Refit, Sequence[Effect], Sequence[FloatArray]], Refit | None]
 
 
-def with_shear(base: Refit, refitted: Fit) -> Refit:
-    """Return a model with the belt's shear fitted, if that takes anything; else the model.
+def with_shear(stage: Stage, refitted: Fit) -> Refit:
+    """Return a stage's model with the belt's shear fitted, if that takes anything; else the model.
 
     Parameters
     ----------
-    base : Refit
+    stage : Stage
+        The shear is a candidate of, or nothing is fitted.
     refitted : callable
         Return an exact fit with effects from strengths, None if it does not settle.
     """
-    if SHEAR in base.effects:
+    base = stage.model
+    if SHEAR.name not in stage.names:
         return base
     start = np.array([START * SHEAR.high])
     found = refitted(base, [*base.effects, SHEAR], [*base.strengths, start])
@@ -64,7 +68,7 @@ def shear_itself(
     staged : callable
         Return the stage of a fit.
     """
-    if model is stage.model or SHEAR.name not in stage.names or fall(stage.model, model) < ERROR:
+    if model is stage.model or fall(stage.model, model) < ERROR:
         return None
     where, after = stage.names.index(SHEAR.name), staged(model)  # scores are dear
     gone = stage.scores.misfit - after.scores.misfit
@@ -84,7 +88,7 @@ def beside_shear(
     refitted: Fit,
     staged: Callable[[Refit], Stage],
 ) -> tuple[Stage, int] | None:
-    """Return the stage with the one effect that takes most beside the belt's shear, and its index.
+    """Return the stage with the shear and the one effect that takes most beside it, and its index.
 
     What is in no catalogue is returned with the stage as it is.
 
@@ -102,38 +106,62 @@ def beside_shear(
     staged : callable
         Return the stage of a fit.
     """
-    base = stage.model
-    index = {name: k for k, name in enumerate(stage.names)}
     rows = [
         (1.0 - (left / model.error) ** 2, each.effect, strength)
         for each in candidates(data, model, [*catalogue, *UNLISTED]).living
-        if each.effect.name in index
+        if each.effect.name in stage.names
         for strength, left in [each.alone(data, model)]
     ]
     rows.sort(key=lambda row: -row[0])
     if not rows:
         return None
     share, effect, strength = rows[0]
-    where = index[effect.name]
-    hinted = bool(stage.in_range[where]) and float(stage.ratio[where]) >= 1.0
-    least = HINTED if hinted else SHARE
-    if share < least or any(other > APART * share for other, _, _ in rows[1:2]):
+    if share < INDEPENDENT or any(other > APART * share for other, _, _ in rows[1:2]):
         return None
+    beside = stage if model is stage.model else staged(model)
+    least = _least(beside, effect.name)
+    if share < least:
+        return None
+    where = stage.names.index(effect.name)
     if effect in UNLISTED:
         return (stage, where) if stage.unlisted[where] else None
     start = np.clip(strength, 0.9 * effect.low, 0.9 * effect.high)
     both = refitted(model, [*model.effects, effect], [*model.strengths, start])
     if both is None or fall(model, both) < least or not _in_range(both):
         return None
-    alone = both
-    if model is not base:
-        given = [*base.strengths, both.strengths[-1]]
-        found = refitted(both, [*base.effects, effect], given)
-        if found is None or fall(base, found) < FELL or not _in_range(found):
-            return None
-        alone = found
-    after = staged(alone)
-    return (after, where) if after.scores.misfit < stage.scores.misfit else None
+    after = staged(both)
+    return (after, where) if after.scores.misfit < beside.scores.misfit else None
+
+
+def _least(beside: Stage, name: str) -> float:
+    """Return the share that an effect has to take, by what the joint fit says beside the shear."""
+    if name not in beside.names:
+        return SHARE
+    where = beside.names.index(name)
+    ratio = float(beside.ratio[where])
+    if not beside.in_range[where] or ratio < 1.0:
+        return SHARE
+    return INDEPENDENT if ratio >= CLEARLY and beside.independent[where] else HINTED
+
+
+def on_top(stage: Stage, least: float, refitted: Fit, staged: Callable[[Refit], Stage]) -> Stage:
+    """Return the stage with the belt's shear on top of what it has, if that is needed as well.
+
+    It has to take a share of the squared error, and must replace nothing.
+
+    Parameters
+    ----------
+    stage : Stage
+    least : float
+        Least share.
+    refitted, staged : callable
+        As above.
+    """
+    model, names = with_shear(stage, refitted), [effect.name for effect in stage.model.effects]
+    if fall(stage.model, model) < least or not _in_range(model) or model.needed(names) != names:
+        return stage
+    after = staged(model)
+    return after if after.scores.misfit < stage.scores.misfit else stage
 
 
 def _in_range(model: Refit) -> bool:

@@ -45,7 +45,7 @@ class Stage:
     ranking : Ranking
     scores : Scores
     limit : shape (n_candidates,)
-        Largest score of the variants.
+        Largest score of the variants (`tirelib.diagnose.ranking.limits`).
     noise : float, [-]
         Of a whitened sample.
     in_range : shape (n_candidates,)
@@ -106,8 +106,9 @@ class Stage:
         extra = np.array([each.effect in UNLISTED for each in found.living], dtype=bool)
         fits, signs = plausible(found, scores), plausible(found, scores, np.inf)
         bound = np.array([least.get(name, 0.0) for name in names])
+        limit = limits(members, [len(candidate.own) for candidate in found.living])
         return cls(
-            model, found, ranking, scores, np.maximum(limits(members), bound),
+            model, found, ranking, scores, np.maximum(limit, bound),
             noise, fits & ~extra, ~fits & ~extra, ~fits & signs & ~extra,
             ~plausible(found, scores, imitation=IMITATION) & ~extra, extra & ~_has_twin(found),
         )  # fmt: skip

@@ -8,6 +8,7 @@ from tests.synthetic import LATERAL
 from tests.unit.identify.model_waves import TIRE, made_waves
 from tirelib.compare.model import model_of
 from tirelib.effects import CATALOGUE
+from tirelib.effects.effect import Strength
 from tirelib.extend.extension import Extension, add_effect
 from tirelib.extend.model_file import extended_file
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
@@ -22,7 +23,7 @@ NOISE = 2e-6
 
 
 @cache
-def waves(effect: str = "", strength: float = 0.0, repeats: int = 2) -> Waveforms:
+def waves(effect: str = "", strength: Strength = 0.0, repeats: int = 2) -> Waveforms:
     """Return runs at two speeds, free of set-point errors; the model's own, with an effect."""
     plain = made_waves(
         loads=LOADS, pressures=PRESSURES, repeats=repeats, noise=NOISE, random=False, radius=False
@@ -42,7 +43,7 @@ def waves(effect: str = "", strength: float = 0.0, repeats: int = 2) -> Waveform
     return Waveforms(**(fields | {"conditions": fixed, "strain": strain}))
 
 
-def runs(effect: str = "", strength: float = 0.0, repeats: int = 2) -> StraightRuns:
+def runs(effect: str = "", strength: Strength = 0.0, repeats: int = 2) -> StraightRuns:
     """Return the straight runs of `waves`."""
     return straight_runs(waves(effect, strength, repeats))
 

@@ -365,3 +365,50 @@ def test_beside_the_shear_of_every_belt_another_is_looked_for(
     made = rounds.rounds(None, first, [], None, 1e-6, None)
     assert (made.named, made.by_share) == (["belt_shear", "close"], "close")
     assert asked == [first, sheared], "and with a third effect only the joint fit is asked"
+
+
+def test_the_shear_is_named_last_where_it_is_needed_as_well(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    first = stage((), 1000.0, SCORE, error=1.0)
+    first.in_range = np.ones(3, dtype=bool)
+    strong = stage(("strong",), 300.0, [0.0] * 2, error=0.5)
+    both = stage(("strong", "belt_shear"), 100.0, [0.0] * 2, error=0.4)
+    asked: list[Any] = []
+
+    def on_top(now: Any, least: float, *_: Any) -> Any:
+        asked.append((now, least))
+        return both
+
+    found = iter([(strong, 0), None])
+    monkeypatch.setattr(rounds, "_added", lambda *_: next(found))
+    monkeypatch.setattr(rounds, "on_top", on_top)
+    made = rounds.rounds(None, first, [], None, 1e-6, None)
+    assert made == Rounds(both, ["strong", "belt_shear"], 1, None, "")
+    assert asked == [(strong, FURTHER)]
+
+
+@pytest.mark.parametrize("gone", [0.0, FELL - 0.01])
+def test_where_nothing_is_named_that_takes_any_no_shear_comes_on_top(
+    monkeypatch: pytest.MonkeyPatch, gone: float
+) -> None:
+    first = stage((), 1000.0, SCORE, error=1.0)
+    first.in_range = np.ones(3, dtype=bool)
+    little = stage(("strong",), 900.0, [0.0] * 2, error=float(np.sqrt(1.0 - gone)))
+    found = iter([(little, 0) if gone else None, None])
+    monkeypatch.setattr(rounds, "_added", lambda *_: next(found))
+    for name in ("with_shear", "beside_shear", "shear_itself"):
+        monkeypatch.setattr(rounds, name, lambda *_: None)
+    monkeypatch.setattr(rounds, "on_top", lambda *_: pytest.fail("not asked"))
+    assert rounds.rounds(None, first, [], None, 1e-6, None).named == ["strong"] * (gone > 0.0)
+
+
+def test_what_stands_out_beside_the_shear_is_named_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    first = stage((), 1000.0, SCORE, error=1.0)
+    first.in_range = np.ones(3, dtype=bool)
+    both = stage(("belt_shear", "close"), 100.0, [0.0] * 2, error=0.3)
+    monkeypatch.setattr(rounds, "_added", lambda *_: None)
+    monkeypatch.setattr(rounds, "with_shear", lambda *_: None)
+    monkeypatch.setattr(rounds, "beside_shear", lambda *_: (both, 1))
+    made = rounds.rounds(None, first, [], None, 1e-6, None)
+    assert made == Rounds(both, ["close", "belt_shear"], 1, None, "close")

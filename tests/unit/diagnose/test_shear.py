@@ -10,11 +10,14 @@ from tirelib.diagnose import shear as module
 from tirelib.diagnose.refit import FELL
 from tirelib.diagnose.shear import (
     APART,
+    CLEARLY,
     ERROR,
     HINTED,
+    INDEPENDENT,
     MISFIT,
     SHARE,
     beside_shear,
+    on_top,
     shear_itself,
     with_shear,
 )
@@ -35,18 +38,31 @@ def model(*names: str, error: float, part: float = 0.5) -> Any:
     )  # fmt: skip
 
 
+def stage_of(one: Any, misfit: float, ratio: float, **more: Any) -> Any:
+    """Return what is looked at of the stage of a model."""
+    has = {effect.name for effect in one.effects}
+    names = [name for name in NAMES if name not in has]
+    each = {"in_range": True, "independent": False} | more
+    return SimpleNamespace(
+        model=one, names=names, ratio=np.full(len(names), ratio),
+        scores=SimpleNamespace(misfit=misfit),
+        unlisted=np.array([name == "gain_by_load" for name in names]),
+        **{key: np.full(len(names), value) for key, value in each.items()},
+    )  # fmt: skip
+
+
 def look(
     monkeypatch: pytest.MonkeyPatch,
     shares: dict[str, float],
     *,
     exact: float | None = None,
-    ratio: float = 0.0,
     sheared: float | None = SHEARED,
     part: float = 0.5,
-    alone: float = 0.7,
-    misfit: float = 900.0,
+    misfit: float = 800.0,
+    ratio: float = 0.0,
     listed: bool = False,
     has: tuple[str, ...] = (),
+    **more: Any,
 ) -> tuple[str, list[list[str]]]:
     """Return who is named (empty if nobody), and what has been fitted.
 
@@ -56,31 +72,30 @@ def look(
         Of the squared error beside the shear, to first order.
     exact : float, optional
         Of the leader, in the exact fit.
-    ratio : float
-        Of all scores to thresholds.
-    sheared, alone : float
-        Errors with the shear, and with the leader without it; None does not settle.
+    sheared : float
+        Error with the shear; None does not settle.
     part : float
         Of the range, where the leader ends.
     misfit : float
-        Of the leader alone.
+        With the leader; it is 900 with the shear.
+    ratio, more
+        Of all beside the shear.
     listed : bool
         Whether what is unlisted has a twin in the catalogue.
     has : names
         That the model has.
     """
     leader = max(shares, key=lambda name: shares[name])
-    base = model(*has, error=BASE)
-    others = [name for name in NAMES if name not in has]
     made: list[list[str]] = []
 
     def candidates(_: Any, at: Any, effects: Any) -> Any:
-        def alone(_: Any, here: Any, share: float) -> Any:
-            return np.array([0.3]), here.error * float(np.sqrt(1.0 - share))
-
         living = [
-            SimpleNamespace(effect=EFFECTS[name],
-                            alone=lambda d, m, share=share: alone(d, m, share))
+            SimpleNamespace(
+                effect=EFFECTS[name],
+                alone=lambda _, here, left=1.0 - share: (
+                    np.array([0.3]), here.error * float(np.sqrt(left))
+                ),
+            )
             for name, share in shares.items()
         ]  # fmt: skip
         return SimpleNamespace(living=living)
@@ -90,31 +105,31 @@ def look(
         made.append(names)
         if names[-1] == "belt_shear":
             return None if sheared is None else model(*names, error=sheared)
-        if "belt_shear" in names:
-            left = shares[leader] if exact is None else exact
-            size = SHEARED if sheared is None else sheared
-            return model(*names, error=size * float(np.sqrt(1.0 - left)), part=part)
-        return model(*names, error=alone, part=part)
+        left = 1.0 - (shares[leader] if exact is None else exact)
+        size = SHEARED if "belt_shear" in made[0] and sheared == SHEARED else BASE
+        return model(*names, error=size * float(np.sqrt(left)), part=part)
 
-    stage = SimpleNamespace(
-        model=base, names=others, in_range=np.ones(len(others), dtype=bool),
-        ratio=np.full(len(others), ratio), scores=SimpleNamespace(misfit=1000.0),
-        unlisted=np.array([name == "gain_by_load" and not listed for name in others]),
-    )  # fmt: skip
+    def staged(one: Any) -> Any:
+        last = one.effects[-1].name
+        return stage_of(one, 900.0 if last == "belt_shear" else misfit, ratio, **more)
+
+    stage = stage_of(model(*has, error=BASE), 900.0 if has else 1000.0, ratio, **more)
+    stage.unlisted &= not listed
     monkeypatch.setattr(module, "candidates", candidates)
-    found = beside_shear(
-        None, stage, with_shear(base, refitted), list(CATALOGUE.values()), refitted,
-        lambda one: SimpleNamespace(model=one, scores=SimpleNamespace(misfit=misfit)),
-    )  # fmt: skip
-    return ("" if found is None else others[found[1]]), made
+    with_it = with_shear(stage, refitted)
+    found = beside_shear(None, stage, with_it, list(CATALOGUE.values()), refitted, staged)
+    if found is None:
+        return "", made
+    after, where = found
+    if not stage.unlisted[where]:
+        assert [effect.name for effect in after.model.effects] == made[-1]
+    return stage.names[where], made
 
 
-def test_who_takes_most_is_named_and_fitted_without_the_shear_too(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_who_takes_most_is_named_beside_the_shear(monkeypatch: pytest.MonkeyPatch) -> None:
     named, made = look(monkeypatch, {"gage_length": SHARE + 0.01, "roughness": 0.2})
     assert named == "gage_length"
-    assert made == [["belt_shear"], ["belt_shear", "gage_length"], ["gage_length"]]
+    assert made == [["belt_shear"], ["belt_shear", "gage_length"]]
 
 
 @pytest.mark.parametrize(
@@ -124,12 +139,10 @@ def test_who_takes_most_is_named_and_fitted_without_the_shear_too(
         {"shares": {"gage_length": 0.7, "roughness": 0.7 * APART + 0.01}},
         {"exact": SHARE - 0.01},
         {"part": 1.5},
-        {"alone": float(np.sqrt(1.0 - FELL)) + 0.01},
-        {"misfit": 1000.1},
+        {"misfit": 900.1},
     ],
-    ids=["too little", "another is near", "not exactly", "too strong", "none of the base's error",
-         "more misfit"],
-)  # fmt: skip
+    ids=["too little", "another is near", "not exactly", "too strong", "more misfit"],
+)
 def test_nothing_is_named_where_it_does_not_stand_out(
     monkeypatch: pytest.MonkeyPatch, changed: dict[str, Any]
 ) -> None:
@@ -138,17 +151,31 @@ def test_nothing_is_named_where_it_does_not_stand_out(
     assert look(monkeypatch, {"gage_length": 0.8})[0] == "gage_length"
 
 
-@pytest.mark.parametrize(("ratio", "named"), [(1.0, "gage_length"), (0.99, "")])
-def test_a_hint_needs_less(monkeypatch: pytest.MonkeyPatch, ratio: float, named: str) -> None:
-    assert look(monkeypatch, {"gage_length": HINTED + 0.01}, ratio=ratio)[0] == named
-    assert look(monkeypatch, {"gage_length": HINTED - 0.01}, ratio=ratio)[0] == ""
+@pytest.mark.parametrize(
+    ("ratio", "independent", "least"),
+    [
+        (0.99, True, SHARE),
+        (1.0, True, HINTED),
+        (CLEARLY - 0.01, True, HINTED),
+        (CLEARLY, True, INDEPENDENT),
+        (CLEARLY, False, HINTED),
+    ],
+)
+def test_a_hint_needs_less_and_a_clear_one_that_nothing_imitates_least(
+    monkeypatch: pytest.MonkeyPatch, ratio: float, independent: bool, least: float
+) -> None:
+    given: dict[str, Any] = {"ratio": ratio, "independent": independent}
+    assert look(monkeypatch, {"gage_length": least + 0.01}, **given)[0] == "gage_length"
+    assert look(monkeypatch, {"gage_length": least - 0.01}, **given)[0] == ""
+    given["in_range"] = False
+    assert look(monkeypatch, {"gage_length": SHARE - 0.01}, **given)[0] == ""
 
 
 @pytest.mark.parametrize("sheared", [None, float(np.sqrt(1.0 - FELL)) + 0.01])
 def test_a_shear_that_takes_nothing_is_left_out(
     monkeypatch: pytest.MonkeyPatch, sheared: float | None
 ) -> None:
-    named, made = look(monkeypatch, {"gage_length": 0.8}, sheared=sheared, alone=0.4)
+    named, made = look(monkeypatch, {"gage_length": 0.8}, sheared=sheared)
     assert named == "gage_length"
     assert made == [["belt_shear"], ["gage_length"]]
 
@@ -157,6 +184,25 @@ def test_a_shear_that_the_model_has_is_not_fitted_again(monkeypatch: pytest.Monk
     named, made = look(monkeypatch, {"gage_length": 0.8}, has=("belt_shear",))
     assert named == "gage_length"
     assert made == [["belt_shear", "gage_length"]]
+
+
+def top(share: float, *, part: float = 0.5, misfit: float = 800.0, kept: bool = True) -> bool:
+    """Return whether the shear is added to a stage with an effect."""
+    now = stage_of(model("gage_length", error=BASE), 900.0, 0.0)
+    both = model("gage_length", "belt_shear", error=float(np.sqrt(1.0 - share)), part=part)
+    both.needed = lambda names: [name for name in names if kept]
+    after = stage_of(both, misfit, 0.0)
+    found = on_top(now, 0.12, lambda *_: both, lambda _: after)
+    assert found is after or found is now
+    return found is after
+
+
+def test_the_shear_comes_on_top_where_it_takes_enough_and_replaces_nothing() -> None:
+    assert top(0.13)
+    assert not top(0.11)
+    assert not top(0.5, part=1.5), "too strong"
+    assert not top(0.5, misfit=901.0), "more misfit"
+    assert not top(0.5, kept=False), "it would replace what is named"
 
 
 def test_what_is_in_no_catalogue_is_told_unless_it_looks_like_an_effect(
@@ -177,12 +223,9 @@ def itself(
 ) -> int | None:
     """Return the index of the shear, if it is named by itself."""
     base, sheared = model(error=BASE), model("belt_shear", error=error, part=part)
-    stage = SimpleNamespace(
-        model=base, names=NAMES, scores=SimpleNamespace(misfit=before),
-        limit=np.array([1.0, 1.0, 1.0, LIMIT]),
-    )  # fmt: skip
+    stage = stage_of(base, before, 0.0, limit=LIMIT)
     after = SimpleNamespace(model=sheared, scores=SimpleNamespace(misfit=misfit), imitated=imitated)
-    found = shear_itself(stage, with_shear(base, lambda *_: sheared), lambda _: after)
+    found = shear_itself(stage, with_shear(stage, lambda *_: sheared), lambda _: after)
     assert found is None or found[0] is after
     return None if found is None else found[1]
 
@@ -211,7 +254,7 @@ def test_a_misfit_that_variants_have_as_well_is_not_enough() -> None:
 
 def test_a_shear_that_the_model_has_or_that_takes_nothing_is_not_named() -> None:
     for base in (model("belt_shear", error=BASE), model(error=BASE)):
-        stage = SimpleNamespace(model=base, names=NAMES[: 4 - len(base.effects)])
-        same = with_shear(base, lambda *_: model("belt_shear", error=BASE))
+        stage = stage_of(base, 1.0, 0.0)
+        same = with_shear(stage, lambda *_: model("belt_shear", error=BASE))
         assert same is base
         assert shear_itself(stage, same, lambda _: pytest.fail("no stage is needed")) is None

@@ -265,10 +265,10 @@ def harmonics(waveform: FloatArray) -> ComplexArray:
 
 
 @pytest.mark.parametrize(
-    ("name", "strength"), [("gage_length", 400.0), ("low_pass", 0.5), ("angle_zero", 0.01)]
+    ("name", "strength"), [("gage_length", 400.0), ("low_pass", (0.5, 0.05)), ("angle_zero", 0.01)]
 )
 def test_what_acts_on_the_gages_signal_acts_on_what_large_displacements_add_to_it(
-    name: str, strength: float
+    name: str, strength: float | tuple[float, ...]
 ) -> None:
     points = PLAN.points.take(np.arange(0, 60, 7))
     fix = large_displacements(VALUES, points)
@@ -296,13 +296,18 @@ def test_a_long_gage_takes_the_mean_over_its_length() -> None:
     np.testing.assert_allclose(evaluate(seen, phi), mean, atol=1e-12)
 
 
-def test_a_lagging_amplifier_obeys_its_differential_equation() -> None:
+@pytest.mark.parametrize("damped", [np.inf, np.sqrt(0.5)], ids=["first order", "Butterworth"])
+def test_a_lagging_amplifier_obeys_its_differential_equation(damped: float) -> None:
+    # x + 2 d T x' + T^2 x'' = strain, or of first order
     tau = 0.5e-3
-    strain, seen = harmonics(BASE), harmonics(at("low_pass", 1e3 * tau).waveform)
-    rate = evaluate(seen, GRID, 1) * PLAN.points.omega[:, None]
-    np.testing.assert_allclose(
-        evaluate(seen, GRID) + tau * rate, evaluate(strain, GRID), atol=1e-12
-    )
+    square = 0.0 if np.isinf(damped) else (0.5 * tau / damped) ** 2
+    strength = (1e3 * tau - 1e6 * square, 1e6 * square)
+    strain, seen = harmonics(BASE), harmonics(at("low_pass", strength).waveform)
+    left = evaluate(seen, GRID)
+    for order, weight in ((1, tau), (2, square)):
+        rate = evaluate(seen, GRID, order) * PLAN.points.omega[:, None] ** order
+        left = left + weight * rate
+    np.testing.assert_allclose(left, evaluate(strain, GRID), atol=1e-12)
 
 
 def test_gain_is_the_innerliner_offset_and_saturation_takes_from_large_strain_only() -> None:

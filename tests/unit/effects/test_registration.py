@@ -54,7 +54,7 @@ def test_the_documents_effects_are_accepted_and_have_at_most_15_lines(
 
 
 def test_a_copy_of_an_effect_is_its_twin() -> None:
-    copy = made(CATALOGUE["low_pass"].law, stage="gage", unit="ms", high=1.0)
+    copy = made(CATALOGUE["low_pass"].law, stage="gage", unit="ms", high=1.0, components=2)
     twins = register(copy).twins
     assert twins[0][0] == "low_pass"
     assert twins[0][1] < 0.1
