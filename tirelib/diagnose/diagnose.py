@@ -93,9 +93,8 @@ class Diagnosis:
         A law for it, if it is more than variants leave and a sparse one holds.
     like : Finding or None
         What else is needed, if that is in no catalogue (`tirelib.diagnose.unlisted`).
-    by_share : str
-        What is named for its share of the error beside the belt's shear, whatever its score; empty
-        if nothing is.
+    by_share : tuple of str
+        What is named for its share of the error beside the belt's shear, whatever its score.
     """
 
     verdict: str
@@ -112,7 +111,7 @@ class Diagnosis:
     beyond: FloatArray
     guess: Guess | None
     like: Finding | None
-    by_share: str
+    by_share: tuple[str, ...]
 
 
 def diagnose(
@@ -166,7 +165,7 @@ def diagnose(
     dead = {name: why for name, why in first.found.dead.items() if name not in extra}
     return Diagnosis(
         verdict, tuple(named), findings, dead, base, last.model, left, floor, found.count, runs,
-        data, beyond, guess, like, found.by_share if found.by_share in named else "",
+        data, beyond, guess, like, tuple(name for name in found.by_share if name in named),
     )  # fmt: skip
 
 
@@ -228,7 +227,7 @@ def _verdict(
     explained = (
         left <= max((1.0 - EXPLAINED) * excess, 0.0)
         or fall(first.model, last.model) >= HALVED
-        or found.by_share in named
+        or any(name in named for name in found.by_share)
     )
     if fall(first.model, last.model) < FELL or not explained:
         return "unknown", []

@@ -104,8 +104,7 @@ def assess(
         )
     messages += [_too_large(finding) for finding in findings
                  if finding.effect.name in named and not finding.in_range]  # fmt: skip
-    if found.by_share in named:
-        messages.append(_by_share(found.by_share))
+    messages += [_by_share(name) for name in found.by_share if name in named]
     return Assessment(
         found, unit, verdict, named, findings, unit.factor * found.base.error,
         unit.factor * final.error, floor, chosen, held_before, held_after,
@@ -126,7 +125,7 @@ def _too_large(finding: Finding) -> str:
 def _by_share(name: str) -> str:
     return (
         f"{name} is named for its share of the error: beside the shear that every belt has, it "
-        "takes most of what is left, and nothing else comes near. Its score may be low, for "
+        "takes more of what is left than anything else by far. Its score may be low, for "
         "structure of the ring looks alike in part; add it, then belt_shear, and see the error fall"
     )
 

@@ -50,15 +50,15 @@ class Rounds:
         Of rounds.
     unlisted : int or None
         Index of the candidate of the stage in no catalogue that it needs most.
-    by_share : str
-        What was added for its share of the error beside the belt's shear; empty if nothing.
+    by_share : tuple of str
+        What was added for its share of the error beside the belt's shear.
     """
 
     stage: Stage
     named: list[str]
     count: int
     unlisted: int | None
-    by_share: str
+    by_share: tuple[str, ...]
 
 
 def rounds(
@@ -112,15 +112,17 @@ def rounds(
         return None if model is None or not need(model) else staged(model)
 
     named: list[str] = []
-    stage, count, by_share = first, 0, ""
+    by_share: tuple[str, ...] = ()
+    stage, count, sheared = first, 0, None
     while count < ROUNDS:
         hidden = [name for name in named if name not in BELT]
         found = _added(first, stage, suspects, len(hidden), fitted)
-        if not hidden and (found is None or _idle(stage, *found)):
+        if found is None or (not hidden and _idle(stage, *found)):
             sheared = with_shear(stage, refitted)
-            clear = beside_shear(data, stage, sheared, catalogue, refitted, staged)
+            among = suspects if hidden else None
+            clear = beside_shear(data, stage, sheared, catalogue, refitted, staged, among)
             if clear is not None:
-                by_share = stage.names[clear[1]]
+                by_share = (*by_share, stage.names[clear[1]])
             elif not named:
                 clear = shear_itself(stage, sheared, staged)
             found = clear or found
@@ -134,9 +136,9 @@ def rounds(
         suspects.discard(name)
         count += 1
         stage, gone = _thinned(after, before, least, fitted)
-        named = [name for name in named if name not in gone]
+        named, sheared = [name for name in named if name not in gone], None
     if fall(first.model, stage.model) >= FELL:
-        last = on_top(stage, FURTHER, refitted, staged)
+        last = on_top(stage, sheared or with_shear(stage, refitted), FURTHER, staged)
         named, stage = [*named, *_more(stage, last)], last
     return Rounds(stage, named, count, None, by_share)
 

@@ -7,13 +7,13 @@ leaves nothing of which one effect could take much; an effect that is there take
 comes near.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.candidates import candidates
-from tirelib.diagnose.refit import FELL, Refit, fall
+from tirelib.diagnose.refit import Refit, fall
 from tirelib.diagnose.stage import ALARM, Stage, within
 from tirelib.diagnose.unlisted import UNLISTED
 from tirelib.effects import CATALOGUE, Effect
@@ -21,9 +21,9 @@ from tirelib.identify.waveform_fit import Data
 
 SHARE, HINTED, INDEPENDENT = 0.6, 0.5, 0.2
 """Shares of the squared error beside the shear that an effect has to take, one that the joint fit
-hints at there, and one that it hints at clearly though nothing else has to do with it."""
-CLEARLY = 2.0
-"""Ratio of a clear hint."""
+hints at there, and such a one that nothing else has to do with."""
+TAKES = 0.01
+"""Share of the squared error from which on the shear is fitted beside others."""
 APART = 0.8
 """Share of the leader's that the next may take."""
 START = 0.25
@@ -37,7 +37,7 @@ Fit = Callable[[Refit, Sequence[Effect], Sequence[FloatArray]], Refit | None]
 
 
 def with_shear(stage: Stage, refitted: Fit) -> Refit:
-    """Return a stage's model with the belt's shear fitted, if that takes anything; else the model.
+    """Return a stage's model with the belt's shear fitted if it takes anything, else the model.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def with_shear(stage: Stage, refitted: Fit) -> Refit:
         return base
     start = np.array([START * SHEAR.high])
     found = refitted(base, [*base.effects, SHEAR], [*base.strengths, start])
-    return found if found is not None and fall(base, found) >= FELL else base
+    return found if found is not None and fall(base, found) >= TAKES else base
 
 
 def shear_itself(
@@ -87,6 +87,7 @@ def beside_shear(
     catalogue: Sequence[Effect],
     refitted: Fit,
     staged: Callable[[Refit], Stage],
+    among: Collection[str] | None = None,
 ) -> tuple[Stage, int] | None:
     """Return the stage with the shear and the one effect that takes most beside it, and its index.
 
@@ -105,6 +106,8 @@ def beside_shear(
         Return an exact fit with effects from strengths, None if it does not settle.
     staged : callable
         Return the stage of a fit.
+    among : collection of str, optional
+        Who may be returned, if not everybody.
     """
     rows = [
         (1.0 - (left / model.error) ** 2, each.effect, strength)
@@ -116,6 +119,8 @@ def beside_shear(
     if not rows:
         return None
     share, effect, strength = rows[0]
+    if among is not None and effect.name not in among:
+        return None
     if share < INDEPENDENT or any(other > APART * share for other, _, _ in rows[1:2]):
         return None
     beside = stage if model is stage.model else staged(model)
@@ -141,10 +146,10 @@ def _least(beside: Stage, name: str) -> float:
     ratio = float(beside.ratio[where])
     if not beside.in_range[where] or ratio < 1.0:
         return SHARE
-    return INDEPENDENT if ratio >= CLEARLY and beside.independent[where] else HINTED
+    return INDEPENDENT if beside.independent[where] else HINTED
 
 
-def on_top(stage: Stage, least: float, refitted: Fit, staged: Callable[[Refit], Stage]) -> Stage:
+def on_top(stage: Stage, model: Refit, least: float, staged: Callable[[Refit], Stage]) -> Stage:
     """Return the stage with the belt's shear on top of what it has, if that is needed as well.
 
     It has to take a share of the squared error, and must replace nothing.
@@ -152,12 +157,14 @@ def on_top(stage: Stage, least: float, refitted: Fit, staged: Callable[[Refit], 
     Parameters
     ----------
     stage : Stage
+    model : Refit
+        `with_shear` of it.
     least : float
         Least share.
-    refitted, staged : callable
-        As above.
+    staged : callable
+        Return the stage of a fit.
     """
-    model, names = with_shear(stage, refitted), [effect.name for effect in stage.model.effects]
+    names = [effect.name for effect in stage.model.effects]
     if fall(stage.model, model) < least or not _in_range(model) or model.needed(names) != names:
         return stage
     after = staged(model)

@@ -7,7 +7,7 @@ import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.diagnose.candidates import Candidates, candidates
-from tirelib.diagnose.ensemble import Variants
+from tirelib.diagnose.ensemble import ALIKE, Variants
 from tirelib.diagnose.ranking import Ranking, Scores, limits
 from tirelib.diagnose.refit import Refit
 from tirelib.diagnose.secants import with_secants
@@ -31,7 +31,7 @@ RANGE_SLACK = 2.0
 """Standard deviations by which a strength may leave its range."""
 IMITATION = 0.05
 """Share of the range by which structure may imitate an effect that cannot be: it cannot be named,
-but tells of nothing unknown."""
+but tells of nothing unknown. What the metric has as structure is not imitated beyond that."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +110,7 @@ class Stage:
         return cls(
             model, found, ranking, scores, np.maximum(limit, bound),
             noise, fits & ~extra, ~fits & ~extra, ~fits & signs & ~extra,
-            ~plausible(found, scores, imitation=IMITATION) & ~extra, extra & ~_has_twin(found),
+            _far(found, scores) & ~extra, extra & ~_has_twin(found),
         )  # fmt: skip
 
     @property
@@ -201,6 +201,13 @@ class Stage:
     def outside(self) -> float:
         """Largest ratio of an effect far outside its range."""
         return float(np.max(np.where(self.far, self.ratio, 0.0), initial=0.0))
+
+
+def _far(found: Candidates, scores: Scores) -> BoolArray:
+    """Return which strengths lie outside their ranges by more than structure imitates."""
+    alike = np.array([candidate.effect in ALIKE for candidate in found.living], dtype=bool)
+    near = plausible(found, scores, imitation=IMITATION)
+    return np.asarray(~np.where(alike, plausible(found, scores), near), dtype=np.bool_)
 
 
 def _has_twin(found: Candidates) -> BoolArray:

@@ -336,11 +336,13 @@ def test_what_takes_most_of_the_error_is_looked_for_where_no_leader_takes_any(
 
     found = iter([leads, None])
     monkeypatch.setattr(rounds, "_added", lambda *_: next(found))
-    monkeypatch.setattr(rounds, "beside_shear", lambda *_: told(clear))
-    monkeypatch.setattr(rounds, "with_shear", lambda *_: None)
+    monkeypatch.setattr(
+        rounds, "beside_shear", lambda _, now, *__: told(clear) if now is first else None
+    )
+    monkeypatch.setattr(rounds, "with_shear", lambda now, _: now.model)
     monkeypatch.setattr(rounds, "shear_itself", lambda *_: told(itself))
     made = rounds.rounds(None, first, [], None, 1e-6, None)
-    assert made == Rounds(made.stage, [named], 1, None, named if named == "weak" else "")
+    assert made == Rounds(made.stage, [named], 1, None, ("weak",) if named == "weak" else ())
 
 
 def test_beside_the_shear_of_every_belt_another_is_looked_for(
@@ -353,18 +355,19 @@ def test_beside_the_shear_of_every_belt_another_is_looked_for(
     both = stage(("belt_shear", "close"), 100.0, [0.0] * 2, error=0.3)
     asked: list[Any] = []
 
-    def clear(_: Any, now: Any, *__: Any) -> Any:
-        asked.append(now)
+    def clear(_: Any, now: Any, *given: Any) -> Any:
+        asked.append((now, given[-1]))
         return (both, 1) if now is sheared else None
 
     monkeypatch.setattr(rounds, "_added", lambda *_: None)
     monkeypatch.setattr(rounds, "beside_shear", clear)
-    monkeypatch.setattr(rounds, "with_shear", lambda *_: None)
+    monkeypatch.setattr(rounds, "with_shear", lambda now, _: now.model)
     monkeypatch.setattr(rounds, "shear_itself", lambda *_: (sheared, 2))
     monkeypatch.setattr(rounds, "_thinned", lambda now, *_: (now, set()))
     made = rounds.rounds(None, first, [], None, 1e-6, None)
-    assert (made.named, made.by_share) == (["belt_shear", "close"], "close")
-    assert asked == [first, sheared], "and with a third effect only the joint fit is asked"
+    assert (made.named, made.by_share) == (["belt_shear", "close"], ("close",))
+    # beside an effect that hides, only the other hints of the first joint fit
+    assert asked == [(first, None), (sheared, None), (both, {"strong"})]
 
 
 def test_the_shear_is_named_last_where_it_is_needed_as_well(
@@ -376,16 +379,20 @@ def test_the_shear_is_named_last_where_it_is_needed_as_well(
     both = stage(("strong", "belt_shear"), 100.0, [0.0] * 2, error=0.4)
     asked: list[Any] = []
 
-    def on_top(now: Any, least: float, *_: Any) -> Any:
-        asked.append((now, least))
+    def on_top(now: Any, model: Any, least: float, _: Any) -> Any:
+        asked.append((now, model, least))
         return both
 
     found = iter([(strong, 0), None])
     monkeypatch.setattr(rounds, "_added", lambda *_: next(found))
+    made_once: list[Any] = []
+    monkeypatch.setattr(rounds, "with_shear", lambda now, _: made_once.append(now) or both.model)
+    monkeypatch.setattr(rounds, "beside_shear", lambda *_: None)
     monkeypatch.setattr(rounds, "on_top", on_top)
     made = rounds.rounds(None, first, [], None, 1e-6, None)
-    assert made == Rounds(both, ["strong", "belt_shear"], 1, None, "")
-    assert asked == [(strong, FURTHER)]
+    assert made == Rounds(both, ["strong", "belt_shear"], 1, None, ())
+    assert asked == [(strong, both.model, FURTHER)]
+    assert made_once == [strong], "the shear is fitted once beside what is named"
 
 
 @pytest.mark.parametrize("gone", [0.0, FELL - 0.01])
@@ -397,7 +404,8 @@ def test_where_nothing_is_named_that_takes_any_no_shear_comes_on_top(
     little = stage(("strong",), 900.0, [0.0] * 2, error=float(np.sqrt(1.0 - gone)))
     found = iter([(little, 0) if gone else None, None])
     monkeypatch.setattr(rounds, "_added", lambda *_: next(found))
-    for name in ("with_shear", "beside_shear", "shear_itself"):
+    monkeypatch.setattr(rounds, "with_shear", lambda now, _: now.model)
+    for name in ("beside_shear", "shear_itself"):
         monkeypatch.setattr(rounds, name, lambda *_: None)
     monkeypatch.setattr(rounds, "on_top", lambda *_: pytest.fail("not asked"))
     assert rounds.rounds(None, first, [], None, 1e-6, None).named == ["strong"] * (gone > 0.0)
@@ -408,7 +416,32 @@ def test_what_stands_out_beside_the_shear_is_named_with_it(monkeypatch: pytest.M
     first.in_range = np.ones(3, dtype=bool)
     both = stage(("belt_shear", "close"), 100.0, [0.0] * 2, error=0.3)
     monkeypatch.setattr(rounds, "_added", lambda *_: None)
-    monkeypatch.setattr(rounds, "with_shear", lambda *_: None)
-    monkeypatch.setattr(rounds, "beside_shear", lambda *_: (both, 1))
+    monkeypatch.setattr(rounds, "with_shear", lambda now, _: now.model)
+    monkeypatch.setattr(
+        rounds, "beside_shear", lambda _, now, *__: (both, 1) if now is first else None
+    )
     made = rounds.rounds(None, first, [], None, 1e-6, None)
-    assert made == Rounds(both, ["close", "belt_shear"], 1, None, "close")
+    assert made == Rounds(both, ["close", "belt_shear"], 1, None, ("close",))
+
+
+def test_beside_what_is_named_a_suspect_may_stand_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    first = stage((), 1000.0, SCORE, error=1.0)
+    first.in_range = np.ones(3, dtype=bool)
+    first.limit = np.array([1e-3, 1e-3, 1e9])
+    first.scores.score = np.ones(3)
+    strong = stage(("strong",), 300.0, [0.0] * 2, error=0.5)
+    both = stage(("strong", "close"), 100.0, [0.0], error=0.3)
+    asked: list[Any] = []
+
+    def clear(_: Any, now: Any, *given: Any) -> Any:
+        asked.append(set(given[-1]))
+        return (both, 0) if now is strong else None
+
+    found = iter([(strong, 0), None, None])
+    monkeypatch.setattr(rounds, "_added", lambda *_: next(found))
+    monkeypatch.setattr(rounds, "_thinned", lambda now, *_: (now, set()))
+    monkeypatch.setattr(rounds, "with_shear", lambda now, _: now.model)
+    monkeypatch.setattr(rounds, "beside_shear", clear)
+    made = rounds.rounds(None, first, [], None, 1e-6, None)
+    assert made == Rounds(both, ["strong", "close"], 2, None, ("close",))
+    assert asked == [{"close"}, set()], "no hint, no suspect"

@@ -38,10 +38,10 @@ def test_what_is_named_for_its_share_is_told_to_be_so() -> None:
         members=MEMBERS,
     )  # fmt: skip
     assert found.named == (EFFECT,)
-    assert found.by_share == "", "its score names it"
+    assert found.by_share == (), "its score names it"
     shares = [
         [text for text in assess(one, members=4).messages if "share of the error" in text]
-        for one in (found, replace(found, by_share=EFFECT))
+        for one in (found, replace(found, by_share=(EFFECT,)))
     ]
     assert shares[0] == []
     assert shares[1][0].startswith(f"{EFFECT} is named for its share")

@@ -26,7 +26,7 @@ def after(explained: float, fell: float, beyond: float = 1.0) -> Any:
     return stage(100.0 + 1000.0 * (1.0 - explained), float((1.0 - fell) ** 0.5), beyond)
 
 
-def told(last: Any, *, by_share: str = "") -> Rounds:
+def told(last: Any, *, by_share: tuple[str, ...] = ()) -> Rounds:
     return Rounds(last, ["a"], 1, None, by_share)
 
 
@@ -55,8 +55,8 @@ def test_what_takes_most_beside_the_shear_need_not_take_half_without_it(
     fell: float, verdict: str
 ) -> None:
     last = after(0.0, fell)
-    assert _verdict(["a"], [], FIRST, told(last, by_share="a"), None)[0] == verdict
-    assert _verdict(["a"], [], FIRST, told(last, by_share="gone"), None)[0] == "unknown"
+    assert _verdict(["a"], [], FIRST, told(last, by_share=("a",)), None)[0] == verdict
+    assert _verdict(["a"], [], FIRST, told(last, by_share=("gone",)), None)[0] == "unknown"
 
 
 @pytest.mark.parametrize(
