@@ -22,6 +22,8 @@ from tirelib.identify.waveform_fit import Data
 SHARE, HINTED, INDEPENDENT = 0.6, 0.5, 0.2
 """Shares of the squared error beside the shear that an effect has to take, one that the joint fit
 hints at there, and such a one that nothing else has to do with."""
+FURTHER = 0.5
+"""The same for such a one beside others that are named, whose laws are right but roughly."""
 TAKES = 0.01
 """Share of the squared error from which on the shear is fitted beside others."""
 APART = 0.8
@@ -124,7 +126,7 @@ def beside_shear(
     if share < INDEPENDENT or any(other > APART * share for other, _, _ in rows[1:2]):
         return None
     beside = stage if model is stage.model else staged(model)
-    least = _least(beside, effect.name)
+    least = _least(beside, effect.name, first=among is None)
     if share < least:
         return None
     where = stage.names.index(effect.name)
@@ -138,7 +140,7 @@ def beside_shear(
     return (after, where) if after.scores.misfit < beside.scores.misfit else None
 
 
-def _least(beside: Stage, name: str) -> float:
+def _least(beside: Stage, name: str, *, first: bool) -> float:
     """Return the share that an effect has to take, by what the joint fit says beside the shear."""
     if name not in beside.names:
         return SHARE
@@ -146,7 +148,10 @@ def _least(beside: Stage, name: str) -> float:
     ratio = float(beside.ratio[where])
     if not beside.in_range[where] or ratio < 1.0:
         return SHARE
-    return INDEPENDENT if beside.independent[where] else HINTED
+    independent = bool(beside.independent[where])
+    if not first:
+        return FURTHER if independent else SHARE
+    return INDEPENDENT if independent else HINTED
 
 
 def on_top(stage: Stage, model: Refit, least: float, staged: Callable[[Refit], Stage]) -> Stage:

@@ -10,6 +10,7 @@ from tirelib.diagnose import shear as module
 from tirelib.diagnose.shear import (
     APART,
     ERROR,
+    FURTHER,
     HINTED,
     INDEPENDENT,
     MISFIT,
@@ -184,6 +185,18 @@ def test_a_shear_that_the_model_has_is_not_fitted_again(monkeypatch: pytest.Monk
     named, made = look(monkeypatch, {"gage_length": 0.8}, has=("belt_shear",))
     assert named == "gage_length"
     assert made == [["belt_shear", "gage_length"]]
+
+
+@pytest.mark.parametrize(
+    ("ratio", "independent", "least"),
+    [(0.99, True, SHARE), (1.0, True, FURTHER), (1.0, False, SHARE)],
+)
+def test_beside_what_is_named_more_is_needed(
+    monkeypatch: pytest.MonkeyPatch, ratio: float, independent: bool, least: float
+) -> None:
+    given: dict[str, Any] = {"ratio": ratio, "independent": independent, "among": ("gage_length",)}
+    assert look(monkeypatch, {"gage_length": least + 0.01}, **given)[0] == "gage_length"
+    assert look(monkeypatch, {"gage_length": least - 0.01}, **given)[0] == ""
 
 
 def test_only_who_may_be_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
