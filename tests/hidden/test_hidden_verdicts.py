@@ -39,7 +39,7 @@ def test_where_nothing_is_hidden_only_the_shear_of_a_flexible_belt_is_named() ->
 
 def test_a_warm_up_with_another_law_is_named_and_its_addition_takes_the_error_away() -> None:
     found = told("1000-temperature-1.20")
-    assert found["named"] == ["temperature"]
+    assert found["named"] == ["temperature", "belt_shear"], "the belt shears as well"
     assert found["outcome"] == "right"
     error = found["error"]
     assert error["before"] / error["floor"] == pytest.approx(case("1000-temperature-1.20").ratio,
@@ -66,10 +66,23 @@ def test_shear_is_named_and_its_addition_takes_the_error() -> None:
 
 def test_a_tread_that_hardens_with_load_is_named_though_the_joint_fit_gives_it_to_others() -> None:
     found = told("1721-tread_load-1.20")
-    assert found["named"] == ["tread_load"]
+    assert found["named"] == ["tread_load", "belt_shear"]
     assert found["outcome"] == "right"
     assert found["leaders"][0]["ratio"] < ALARM  # by the joint fit it would not have been
     assert found["error"]["after"] <= 1.05 * found["error"]["floor"]
+
+
+def test_a_faint_angle_that_nothing_imitates_is_named_for_its_share() -> None:
+    found = told("1742-angle_zero-1.05")
+    assert found["named"] == ["angle_zero", "belt_shear"]
+    assert found["outcome"] == "right"
+    assert 1.0 <= found["leaders"][0]["ratio"] < ALARM
+
+
+def test_a_second_effect_that_stands_out_beside_the_first_is_named() -> None:
+    found = told("1742-sidewall_load+nonuniformity-1.50")
+    assert found["named"] == ["sidewall_load", "nonuniformity"]
+    assert found["outcome"] == "right"
 
 
 def test_a_stored_case_keeps_its_campaign() -> None:

@@ -11,6 +11,7 @@ from tirelib.diagnose.noise import noise_in, white_level
 from tirelib.diagnose.refit import FELL, Refit, fall, refit
 from tirelib.diagnose.rivals import inseparable
 from tirelib.diagnose.rounds import HALVED, Rounds, rounds
+from tirelib.diagnose.shear import BELT
 from tirelib.diagnose.stage import ALARM, Stage, within
 from tirelib.diagnose.stored import ensemble_of
 from tirelib.diagnose.unlisted import UNLISTED
@@ -39,7 +40,7 @@ class Finding:
     ----------
     effect : Effect
     score, threshold : float
-        Misfit that returns without it, and the largest such of the variants.
+        Misfit that returns without it, and the largest such that variants are expected to have.
     level : str
         alarm, hint or quiet; what is named is an alarm by its exact fit, whatever first order says.
     strength, std : shape (components,)
@@ -231,6 +232,7 @@ def _verdict(
     )
     if fall(first.model, last.model) < FELL or not explained:
         return "unknown", []
-    if twins and len(named) == 1:
-        return "indistinguishable", [named[0], *twins]
+    if twins:
+        leader = next((name for name in named if name not in BELT), named[0])
+        return "indistinguishable", [leader, *twins]
     return ("form_inadequate" if beyond else "named"), named

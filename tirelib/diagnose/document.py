@@ -125,8 +125,8 @@ def _too_large(finding: Finding) -> str:
 def _by_share(name: str) -> str:
     return (
         f"{name} is named for its share of the error: beside the shear that every belt has, it "
-        "takes more of what is left than anything else by far. Its score may be low, for "
-        "structure of the ring looks alike in part; add it, then belt_shear, and see the error fall"
+        "takes more of what is left than anything else does, and more than tires without it show. "
+        "Its score may be low, for structure of the ring looks alike in part"
     )
 
 

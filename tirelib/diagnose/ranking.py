@@ -84,21 +84,25 @@ class Ranking:
         """Return the scores of the measured variants."""
         return tuple(self._scores(normal) for normal in self.normals)
 
-    def planted(self, index: int, strength: float) -> FloatArray:
+    def planted(self, index: int, strength: float, component: int = 0) -> FloatArray:
         """Return scores of the members with one effect planted, in shares of its range."""
         slot = self.slots[index]
         out = []
         for normal in self.normals:
-            column = normal.gram[:, slot.start]
+            column = normal.gram[:, slot.start + component]
             moved = Normal(normal.gram, normal.right + strength * column, normal.square)
             out.append(self._score(moved, index)[0])
         return np.array(out)
 
     def power(self, index: int, alarm: float) -> float:
-        """Return in which share of the variants a third of the range would reach a score."""
+        """Return in which share of the variants a third of the range would reach a score.
+
+        Of several components, of the one that shows best.
+        """
         effect = self.found.living[index].effect
         third = effect.toward / effect.scale / 3.0
-        return float(np.mean(self.planted(index, third) >= alarm))
+        each = [self.planted(index, third, k) for k in range(effect.components)]
+        return float(max(np.mean(scores >= alarm) for scores in each))
 
     def _scores(self, normal: Normal) -> Scores:
         score, alone, strength, std = [], [], [], []
@@ -146,7 +150,8 @@ def limits(members: Sequence[Scores], components: Sequence[int]) -> FloatArray:
     """Return the largest score of each candidate that as many members are expected to have.
 
     The largest of a hundred happens to be half or twice as large with other draws; the upper tenth
-    together tells it far better, in the ratios of a chi-square with the candidate's components.
+    together tells it better. Their ratios are taken to be those of a chi-square with the
+    candidate's components, which heavier tails exceed a little.
 
     Parameters
     ----------
@@ -159,5 +164,5 @@ def limits(members: Sequence[Scores], components: Sequence[int]) -> FloatArray:
     ranks = (np.arange(1, top + 1) - 0.3) / (count + 0.4)  # median ranks, the largest first
     usual = np.asarray(stats.chi2.isf(ranks[:, None], np.asarray(components)))
     largest = np.sort([scores.score for scores in members], axis=0)[::-1][:top]
-    expected: FloatArray = np.mean(largest / usual, axis=0) * usual[0]
+    expected: FloatArray = usual[0] * largest.sum(axis=0) / usual.sum(axis=0)
     return expected

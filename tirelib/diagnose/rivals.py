@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tirelib.diagnose.refit import Refit, refit
-from tirelib.effects import Effect
+from tirelib.diagnose.shear import BELT
 from tirelib.errors import TirelibError
 from tirelib.identify.waveform_fit import Data
 
@@ -23,31 +23,35 @@ def inseparable(
 ) -> list[str]:
     """Return twins of the leader, in range, whose exact refit is no worse.
 
-    No worse is by less than the leader's own threshold: what variants without any effect do.
+    No worse is by less than the leader's own threshold: what variants without any effect do. The
+    belt's shear beside the leader is no rival, and stands beside its twins as well.
     """
-    if len(named) != 1:
+    hidden = [name for name in named if name not in BELT] or list(named)
+    if len(hidden) != 1:
         return []
     by_name = {finding.effect.name: finding for finding in findings}
-    leader = by_name[named[0]]
+    leader = by_name[hidden[0]]
+    beside = [by_name[name] for name in named if name not in hidden]
     twins = [by_name[name] for name, _ in leader.twins]
     rivals = [twin for twin in twins if twin.in_range and twin.level == "alarm"]
     if not rivals:
         return []
-    mine = _misfit(data, first, leader.effect, leader.strength)
+    mine = _misfit(data, first, [*beside, leader])
     return [
         rival.effect.name
         for rival in rivals[:MOST]
-        if _misfit(data, first, rival.effect, rival.strength) < mine + leader.threshold
+        if _misfit(data, first, [*beside, rival]) < mine + leader.threshold
     ]
 
 
-def _misfit(data: Data, first: "Stage", effect: Effect, strength: np.ndarray) -> float:
-    """Return the misfit with one effect more; infinite if the refit fails."""
+def _misfit(data: Data, first: "Stage", more: Sequence["Finding"]) -> float:
+    """Return the misfit with some effects more; infinite if the refit fails."""
     base = first.model
-    start = np.clip(strength, 0.9 * effect.low, 0.9 * effect.high)
+    start = [np.clip(f.strength, 0.9 * f.effect.low, 0.9 * f.effect.high) for f in more]
+    effects = [*base.effects, *(f.effect for f in more)]
     try:
         model: Refit = refit(
-            data, base.values, [*base.effects, effect], [*base.strengths, start], delay=base.delay
+            data, base.values, effects, [*base.strengths, *start], delay=base.delay
         )
     except TirelibError:
         return float("inf")

@@ -8,7 +8,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.ensemble import Variants
 from tirelib.diagnose.refit import FELL, Refit, fall, refit
-from tirelib.diagnose.shear import SHEAR, beside_shear, on_top, shear_itself, with_shear
+from tirelib.diagnose.shear import BELT, SHEAR, beside_shear, on_top, shear_itself, with_shear
 from tirelib.diagnose.stage import ALARM, Stage, within
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
@@ -31,8 +31,6 @@ FURTHER, ON_TOP = 0.12, 0.3
 first beside those of every belt, whose law leaves structure of its own."""
 HALVED = 0.45
 """Share of the squared error from which a further alarm is needed whatever imitates it."""
-BELT = frozenset({SHEAR.name})
-"""What every tire has and the base has not: named, it raises no bar for what is hidden on top."""
 ROUNDS = 3
 
 
@@ -111,6 +109,10 @@ def rounds(
         model = refitted(stage.model, effects, strengths)
         return None if model is None or not need(model) else staged(model)
 
+    def with_its_shear(stage: Stage) -> Refit:
+        known = SHEAR.name in first.names
+        return with_shear(stage, refitted) if known else stage.model
+
     named: list[str] = []
     by_share: tuple[str, ...] = ()
     stage, count, sheared = first, 0, None
@@ -118,11 +120,11 @@ def rounds(
         hidden = [name for name in named if name not in BELT]
         found = _added(first, stage, suspects, len(hidden), fitted)
         if found is None or (not hidden and _idle(stage, *found)):
-            sheared = with_shear(stage, refitted)
+            sheared = with_its_shear(stage)
             among = suspects if hidden else None
             clear = beside_shear(data, stage, sheared, catalogue, refitted, staged, among)
             if clear is not None:
-                by_share = (*by_share, stage.names[clear[1]])
+                by_share = tuple(dict.fromkeys((*by_share, stage.names[clear[1]])))
             elif not named:
                 clear = shear_itself(stage, sheared, staged)
             found = clear or found
@@ -138,7 +140,7 @@ def rounds(
         stage, gone = _thinned(after, before, least, fitted)
         named, sheared = [name for name in named if name not in gone], None
     if fall(first.model, stage.model) >= FELL:
-        last = on_top(stage, sheared or with_shear(stage, refitted), FURTHER, staged)
+        last = on_top(stage, sheared or with_its_shear(stage), FURTHER, staged)
         named, stage = [*named, *_more(stage, last)], last
     return Rounds(stage, named, count, None, by_share)
 

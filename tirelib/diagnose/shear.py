@@ -13,7 +13,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.candidates import candidates
-from tirelib.diagnose.refit import Refit, fall
+from tirelib.diagnose.refit import FELL, Refit, fall
 from tirelib.diagnose.stage import ALARM, Stage, within
 from tirelib.diagnose.unlisted import UNLISTED
 from tirelib.effects import CATALOGUE, Effect
@@ -34,6 +34,8 @@ ERROR, MISFIT = 0.7, 0.2
 """Shares of the squared error and of the misfit in the metric of structure that the shear by itself
 has to take."""
 SHEAR = CATALOGUE["belt_shear"]
+BELT = frozenset({SHEAR.name})
+"""What every tire has and the base has not: named, it raises no bar for what is hidden beside."""
 
 Fit = Callable[[Refit, Sequence[Effect], Sequence[FloatArray]], Refit | None]
 
@@ -137,7 +139,16 @@ def beside_shear(
     if both is None or fall(model, both) < least or not _in_range(both):
         return None
     after = staged(both)
-    return (after, where) if after.scores.misfit < beside.scores.misfit else None
+    if after.scores.misfit >= beside.scores.misfit:
+        return None
+    base = stage.model
+    if model is base or (fall(base, model) >= FELL and _has_shear(both)):
+        return after, where
+    # what shear there is stands for structure, so the effect has to do without
+    alone = refitted(both, [*base.effects, effect], [*base.strengths, both.strengths[-1]])
+    if alone is None or fall(base, alone) < least or not _in_range(alone):
+        return None
+    return staged(alone), where
 
 
 def _least(beside: Stage, name: str, *, first: bool) -> float:
@@ -170,10 +181,19 @@ def on_top(stage: Stage, model: Refit, least: float, staged: Callable[[Refit], S
         Return the stage of a fit.
     """
     names = [effect.name for effect in stage.model.effects]
-    if fall(stage.model, model) < least or not _in_range(model) or model.needed(names) != names:
+    if fall(stage.model, model) < least or not _has_shear(model):
+        return stage
+    if model.needed(names) != stage.model.needed(names):
         return stage
     after = staged(model)
     return after if after.scores.misfit < stage.scores.misfit else stage
+
+
+def _has_shear(model: Refit) -> bool:
+    """Return whether a model needs its shear, and that is in its range."""
+    where = model.effects.index(SHEAR)
+    fits = within(SHEAR, model.strengths[where], model.strength_std(where))
+    return fits and model.needed([SHEAR.name]) == [SHEAR.name]
 
 
 def _in_range(model: Refit) -> bool:

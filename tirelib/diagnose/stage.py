@@ -53,8 +53,8 @@ class Stage:
     impossible : shape (n_candidates,)
         Whether an effect of the catalogue lies outside its range.
     over : shape (n_candidates,)
-        Whether it lies there by its size alone, not by its sign: the strength is of first order,
-        and only an exact refit tells where it is.
+        Whether it lies there by its size alone, not by its sign, or has several components, which
+        first order may mix: only an exact refit tells where it is.
     far : shape (n_candidates,)
         Whether it lies farther outside than structure imitates.
     unlisted : shape (n_candidates,)
@@ -105,6 +105,7 @@ class Stage:
         names = [candidate.effect.name for candidate in found.living]
         extra = np.array([each.effect in UNLISTED for each in found.living], dtype=bool)
         fits, signs = plausible(found, scores), plausible(found, scores, np.inf)
+        signs |= np.array([each.effect.components > 1 for each in found.living], dtype=bool)
         bound = np.array([least.get(name, 0.0) for name in names])
         limit = limits(members, [len(candidate.own) for candidate in found.living])
         return cls(

@@ -20,6 +20,8 @@ from tirelib.model.state import State
 from tirelib.waveforms import GRID
 
 DELAY = 4e-5
+LAG = (0.2, 0.02)
+"""Of first order: s_2 = s_1^2 / 2, [ms]."""
 
 
 def shown(data: Data, delay: float) -> FloatArray:
@@ -104,11 +106,11 @@ def test_the_floor_is_of_fits_that_have_a_delay_too(
 
 
 def test_an_effect_that_comes_late_is_added_from_what_no_delay_could_do() -> None:
-    planted = runs("low_pass", (0.2, 0.0)).data(with_deflection=False)
+    planted = runs("low_pass", LAG).data(with_deflection=False)
     base = refit(planted, values_of(TIRE))
     assert base.delay > 1e-4, "it looks like a delay at first"
-    subject = _Strain(runs("low_pass", (0.2, 0.0)), model_of(model_file()), None, 4)
+    subject = _Strain(runs("low_pass", LAG), model_of(model_file()), None, 4)
     after = subject.with_effect(base, CATALOGUE["low_pass"])
-    assert after.strengths[0] == pytest.approx([0.2, 0.0], abs=0.01)
+    assert after.strengths[0] == pytest.approx(LAG, abs=0.01)
     assert abs(after.delay) < 1e-5
     assert after.error < 0.3 * base.error

@@ -41,6 +41,13 @@ def test_it_depends_on_the_draws_half_as_much(told: tuple[np.ndarray, np.ndarray
     assert (limit.std(axis=0) < 0.65 * largest.std(axis=0)).all()
 
 
+def test_heavier_tails_exceed_it_by_little() -> None:
+    random = np.random.default_rng(9)
+    draws = random.standard_t(10, (400, MEMBERS, 1)) ** 2
+    limit = np.array([limits(members(x), (1,)) for x in draws])
+    assert 0.8 < np.median(limit) / np.median(draws.max(axis=1)) < 1.0
+
+
 def test_it_goes_with_the_scores_and_not_with_their_order() -> None:
     scores = drawn(1)
     limit = limits(members(scores), COMPONENTS)

@@ -374,6 +374,7 @@ def test_the_shear_is_named_last_where_it_is_needed_as_well(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     first = stage((), 1000.0, SCORE, error=1.0)
+    first.names[2] = "belt_shear"
     first.in_range = np.ones(3, dtype=bool)
     strong = stage(("strong",), 300.0, [0.0] * 2, error=0.5)
     both = stage(("strong", "belt_shear"), 100.0, [0.0] * 2, error=0.4)
@@ -445,3 +446,16 @@ def test_beside_what_is_named_a_suspect_may_stand_out(monkeypatch: pytest.Monkey
     made = rounds.rounds(None, first, [], None, 1e-6, None)
     assert made == Rounds(both, ["strong", "close"], 2, None, ("close",))
     assert asked == [{"close"}, set()], "no hint, no suspect"
+
+
+def test_a_shear_that_the_first_joint_fit_does_not_know_is_not_fitted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    first = stage((), 1000.0, SCORE, error=1.0)
+    first.in_range = np.ones(3, dtype=bool)
+    strong = stage(("strong",), 300.0, [0.0] * 2, error=0.5)
+    found = iter([(strong, 0), None])
+    monkeypatch.setattr(rounds, "_added", lambda *_: next(found))
+    monkeypatch.setattr(rounds, "with_shear", lambda *_: pytest.fail("no finding would tell it"))
+    monkeypatch.setattr(rounds, "beside_shear", lambda *_: None)
+    assert rounds.rounds(None, first, [], None, 1e-6, None).named == ["strong"]

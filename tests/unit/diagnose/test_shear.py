@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tirelib.diagnose import shear as module
+from tirelib.diagnose.refit import FELL
 from tirelib.diagnose.shear import (
     APART,
     ERROR,
@@ -28,13 +29,14 @@ from tirelib.effects import CATALOGUE
 NAMES = ("gage_length", "roughness", "gain_by_load", "belt_shear")
 EFFECTS = {name: CATALOGUE.get(name, gain_by_load) for name in NAMES}
 BASE, SHEARED = 1.0, 0.8
+SLIGHT = float(np.sqrt(1.0 - FELL)) + 0.001
 
 
 def model(*names: str, error: float, part: float = 0.5) -> Any:
     effects = [EFFECTS[name] for name in names]
     return SimpleNamespace(
         error=error, effects=effects, strengths=[np.array([part * e.high]) for e in effects],
-        strength_std=lambda k: np.array([1e-3 * effects[k].high]),
+        strength_std=lambda k: np.array([1e-3 * effects[k].high]), needed=list,
     )  # fmt: skip
 
 
@@ -57,6 +59,8 @@ def look(
     *,
     exact: float | None = None,
     sheared: float | None = SHEARED,
+    alone: float = 0.5,
+    shear: dict[str, Any] | None = None,
     part: float = 0.5,
     misfit: float = 800.0,
     ratio: float = 0.0,
@@ -75,6 +79,10 @@ def look(
         Of the leader, in the exact fit.
     sheared : float
         Error with the shear; None does not settle.
+    alone : float
+        Error with the leader without the shear.
+    shear : mapping, optional
+        What the shear is beside the leader: its `part` of the range, and whether it is `needed`.
     part : float
         Of the range, where the leader ends.
     misfit : float
@@ -109,8 +117,14 @@ def look(
         if names[-1] == "belt_shear":
             return None if sheared is None else model(*names, error=sheared)
         left = 1.0 - (shares[leader] if exact is None else exact)
-        size = SHEARED if "belt_shear" in made[0] and sheared == SHEARED else BASE
-        return model(*names, error=size * float(np.sqrt(left)), part=part)
+        if "belt_shear" in names and not has:
+            both = model(*names, error=(sheared or BASE) * float(np.sqrt(left)), part=part)
+            each = {"part": 0.5, "needed": True} | (shear or {})
+            both.strengths[0] = np.array([each["part"] * EFFECTS["belt_shear"].high])
+            both.needed = lambda asked: [name for name in asked if each["needed"]]
+            return both
+        size = alone if len(made) > 2 else float(np.sqrt(left))
+        return model(*names, error=size, part=part)
 
     def staged(one: Any) -> Any:
         last = one.effects[-1].name
@@ -181,6 +195,20 @@ def test_a_shear_that_takes_nothing_is_left_out(
     assert made == [["belt_shear"], ["gage_length"]]
 
 
+@pytest.mark.parametrize(
+    "without",
+    [{"shear": {"part": 1.5}}, {"shear": {"needed": False}}, {"sheared": SLIGHT}],
+    ids=["out of its range", "not needed beside it", "too little"],
+)
+def test_a_shear_that_stands_for_structure_is_not_named_with_it(
+    monkeypatch: pytest.MonkeyPatch, without: dict[str, Any]
+) -> None:
+    named, made = look(monkeypatch, {"gage_length": 0.8}, **without)
+    assert named == "gage_length"
+    assert made == [["belt_shear"], ["belt_shear", "gage_length"], ["gage_length"]]
+    assert look(monkeypatch, {"gage_length": 0.8}, alone=0.9, **without)[0] == ""
+
+
 def test_a_shear_that_the_model_has_is_not_fitted_again(monkeypatch: pytest.MonkeyPatch) -> None:
     named, made = look(monkeypatch, {"gage_length": 0.8}, has=("belt_shear",))
     assert named == "gage_length"
@@ -206,11 +234,17 @@ def test_only_who_may_be_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     assert look(monkeypatch, {"gain_by_load": 0.8}, among=("roughness",))[0] == ""
 
 
-def top(share: float, *, part: float = 0.5, misfit: float = 800.0, kept: bool = True) -> bool:
-    """Return whether the shear is added to a stage with an effect."""
+def top(
+    share: float, *, part: float = 0.5, misfit: float = 800.0, lost: str = "", idle: str = ""
+) -> bool:
+    """Return whether the shear is added to a stage with an effect.
+
+    What is lost is needed no longer beside it, and what is idle neither with nor without it.
+    """
     now = stage_of(model("gage_length", error=BASE), 900.0, 0.0)
+    now.model.needed = lambda names: [name for name in names if name != idle]
     both = model("gage_length", "belt_shear", error=float(np.sqrt(1.0 - share)), part=part)
-    both.needed = lambda names: [name for name in names if kept]
+    both.needed = lambda names: [name for name in names if name not in (lost, idle)]
     after = stage_of(both, misfit, 0.0)
     found = on_top(now, both, 0.12, lambda _: after)
     assert found is after or found is now
@@ -222,7 +256,9 @@ def test_the_shear_comes_on_top_where_it_takes_enough_and_replaces_nothing() -> 
     assert not top(0.11)
     assert not top(0.5, part=1.5), "too strong"
     assert not top(0.5, misfit=901.0), "more misfit"
-    assert not top(0.5, kept=False), "it would replace what is named"
+    assert not top(0.5, lost="gage_length"), "it would replace what is named"
+    assert not top(0.5, lost="belt_shear"), "it is not needed itself"
+    assert top(0.5, idle="gage_length"), "what the model had for nothing is no reason"
 
 
 def test_what_is_in_no_catalogue_is_told_unless_it_looks_like_an_effect(

@@ -301,7 +301,8 @@ def test_a_lagging_amplifier_obeys_its_differential_equation(damped: float) -> N
     # x + 2 d T x' + T^2 x'' = strain, or of first order
     tau = 0.5e-3
     square = 0.0 if np.isinf(damped) else (0.5 * tau / damped) ** 2
-    strength = (1e3 * tau - 1e6 * square, 1e6 * square)
+    strength = (1e3 * tau, 1e6 * (0.5 * tau**2 - square))
+    assert (strength[1] == 0.0) is not np.isinf(damped)
     strain, seen = harmonics(BASE), harmonics(at("low_pass", strength).waveform)
     left = evaluate(seen, GRID)
     for order, weight in ((1, tau), (2, square)):
