@@ -87,16 +87,24 @@ def rounds(
     suspects = {name for name, hint in zip(first.names, hints, strict=True) if hint}
     least = dict(zip(first.names, first.limit, strict=True))
 
+    fits: list[tuple[Refit, list[str], Refit]] = []
+
     def refitted(
         model: Refit, effects: Sequence[Effect], strengths: Sequence[FloatArray]
     ) -> Refit | None:
+        names = [effect.name for effect in effects]
+        for start, added, found in fits:  # the bottom is the same whatever the strengths start from
+            if start is model and added == names:
+                return found
         try:
-            return refit(
+            found = refit(
                 data, model.values, effects, strengths,
                 delay=model.delay, near=model.correction, progress=progress,
             )  # fmt: skip
         except TirelibError:
             return None
+        fits.append((model, names, found))
+        return found
 
     def staged(model: Refit) -> Stage:
         return Stage.of(data, model, catalogue, rests, noise, least)

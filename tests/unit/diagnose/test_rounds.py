@@ -459,3 +459,30 @@ def test_a_shear_that_the_first_joint_fit_does_not_know_is_not_fitted(
     monkeypatch.setattr(rounds, "with_shear", lambda *_: pytest.fail("no finding would tell it"))
     monkeypatch.setattr(rounds, "beside_shear", lambda *_: None)
     assert rounds.rounds(None, first, [], None, 1e-6, None).named == ["strong"]
+
+
+def test_the_same_effects_are_fitted_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    first = stage((), 1000.0, SCORE, error=1.0)
+    first.names[2] = "belt_shear"
+    first.in_range = np.ones(3, dtype=bool)
+    made: list[list[str]] = []
+
+    def refit(_: Any, values: Any, effects: Any, *__: Any, **___: Any) -> Any:
+        made.append([effect.name for effect in effects])
+        return object()
+
+    def twice(now: Any, refitted: Any) -> Any:
+        effects = [effect("strong"), effect("close")]
+        one, other = (refitted(now.model, effects, [np.array([s])] * 2) for s in (0.1, 0.2))
+        assert one is other
+        assert refitted(now.model, effects[:1], [np.array([0.1])]) is not one
+        return now.model
+
+    first.model.values, first.model.delay, first.model.correction = {}, 0.0, None
+    monkeypatch.setattr(rounds, "refit", refit)
+    monkeypatch.setattr(rounds, "_added", lambda *_: None)
+    monkeypatch.setattr(rounds, "with_shear", twice)
+    for name in ("beside_shear", "shear_itself"):
+        monkeypatch.setattr(rounds, name, lambda *_: None)
+    rounds.rounds(None, first, [], None, 1e-6, None)
+    assert made == [["strong", "close"], ["strong"]]
