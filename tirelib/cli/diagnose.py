@@ -28,7 +28,8 @@ Examples:
 \b
 Verdicts: none, named, form_inadequate (right effect, wrong law), indistinguishable (several would
 do), unknown (something that no effect of the catalogue explains). An effect is an alarm when its
-score is 3.5 times the largest of variants of the model without any effect; a hint from once on.
+score is 3.5 times the largest that variants of the model without any effect have; a hint from
+once on.
 Exit code: 0 whatever the verdict, 2 bad input.
 """
 SHOWN = 8

@@ -7,9 +7,9 @@ two kinds of it.
   load, sections with inertia, displacements whose large part is other than computed. The base model
   is fitted to each as it is to the data, and what that leaves is a sample of what structure does.
 - What adds to a waveform in proportion: a smooth misfit that goes with strain, load, pressure and
-  speed, sharper ends of the contact, shear of the tread that bends the flat piece, run-out, a late
-  trigger, set points, gain and angle that are off in a run. Its covariance is known, so it needs no
-  sample (`smooth_part`, `run_part`).
+  speed, sharper ends of the contact, shear of the tread that bends the flat piece, a sidewall that
+  softens a little as it is pressed, run-out, a late trigger, set points, gain and angle that are
+  off in a run. Its covariance is known, so it needs no sample (`smooth_part`, `run_part`).
 
 A measured variant has both, and noise.
 """
@@ -55,7 +55,8 @@ ALIKE = {
 }
 """Standard deviation, in their units, of what a tire's structure shows that looks like these
 effects: the contact's ends are sharper or smoother than the ring's, contact begins gradually across
-a crowned tread, strain is not quite in proportion to the belt's curvature, and what changes the
+a crowned tread, strain is not quite in proportion to the belt's curvature, a sidewall is not quite
+linear (plain tires of finite elements and of the rig show up to 0.025), and what changes the
 contact most (load, pressure, speed) changes its strain by a little more or less than the ring's."""
 RUN_OUT, ONCE = 1e-4, 3e-6
 """Standard deviation of a tire's run-out, [m], and of strain once per turn beside it, [-]."""

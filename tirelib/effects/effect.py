@@ -64,7 +64,7 @@ class Effect:
         (state, strength) -> changed state.
     components : int
         How many numbers the strength has; more than one where a phase is unknown as well
-        (cosine, sine). The law then takes a sequence.
+        (cosine, sine), or a form. The law then takes a sequence.
     needs : tuple of str
         Fields of the conditions that must be measured, for instance side_force.
     untestable : str

@@ -31,7 +31,8 @@ METHOD_TEXT = (
     "All effects of the catalogue are fitted at once, in the metric of what variants of the model "
     "that differ in structure and lack no effect leave by themselves: what structure does often "
     "counts little. An effect's score is the misfit that returns when it alone is taken out. The "
-    "threshold is the largest score among the variants, each judged by the others. From "
+    "threshold is the largest score that so many variants are expected to have, each judged by "
+    "the others. From "
     f"{ALARM:g} times it on an effect in its plausible range is an alarm, from once on a hint."
 )
 
