@@ -12,6 +12,7 @@ from tirelib.diagnose.guess import Guess
 from tirelib.diagnose.held_out import Fold, folds, held_out_errors, pooled
 from tirelib.diagnose.left import Left, left_of, told_powers
 from tirelib.diagnose.refit import Refit, refit
+from tirelib.diagnose.shear import BELT
 from tirelib.errors import TirelibError
 from tirelib.identify.waveform_fit import Data
 
@@ -95,7 +96,7 @@ def assess(
     held_before = held_out_errors(data, found.base, chosen, unit, progress=progress)
     held_after = {
         name: held_out_errors(data, single, chosen, unit, progress=progress)
-        for name in named
+        for name in [name for name in named if name not in BELT] or named
         if (single := _with_one(found, name)) is not None
     }
     if named and not chosen:
@@ -146,7 +147,7 @@ def _with_one(found: Diagnosis, name: str) -> Refit | None:
     try:
         return refit(
             found.data, base.values, [*base.effects, effect], [*base.strengths, start],
-            delay=base.delay,
+            delay=base.delay, near=base.correction,
         )  # fmt: skip
     except TirelibError:
         return None
