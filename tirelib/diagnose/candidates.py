@@ -14,6 +14,7 @@ from tirelib.diagnose.refit import Refit
 from tirelib.effects import Effect
 from tirelib.effects.effect import Strength
 from tirelib.errors import ParameterError
+from tirelib.identify.span import span
 from tirelib.identify.waveform_fit import Data
 from tirelib.model.base import predict
 
@@ -98,7 +99,7 @@ def candidates(data: Data, model: Refit, catalogue: Sequence[Effect]) -> Candida
     """
     has = {effect.name for effect in model.effects}
     nuisance = model.whiten(model.own_slopes).reshape(len(model.own_slopes), -1)
-    basis = np.linalg.qr(nuisance.T)[0]
+    basis = span(nuisance.T)
     living: list[Candidate] = []
     dead: dict[str, str] = {}
     for effect in catalogue:

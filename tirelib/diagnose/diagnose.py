@@ -8,7 +8,7 @@ from tirelib.diagnose.ensemble import MEMBERS
 from tirelib.diagnose.guess import Guess, guess_law
 from tirelib.diagnose.left import left_of
 from tirelib.diagnose.noise import noise_in, white_level
-from tirelib.diagnose.refit import FELL, Refit, fall, refit
+from tirelib.diagnose.refit import FELL, Refit, Refits, fall, refit
 from tirelib.diagnose.rivals import inseparable
 from tirelib.diagnose.rounds import HALVED, Rounds, rounds
 from tirelib.diagnose.shear import BELT
@@ -96,6 +96,8 @@ class Diagnosis:
         What else is needed, if that is in no catalogue (`tirelib.diagnose.unlisted`).
     by_share : tuple of str
         What is named for its share of the error beside the belt's shear, whatever its score.
+    refitted : Refits
+        Fits of these data, made so far and to come.
     """
 
     verdict: str
@@ -113,6 +115,7 @@ class Diagnosis:
     guess: Guess | None
     like: Finding | None
     by_share: tuple[str, ...]
+    refitted: Refits
 
 
 def diagnose(
@@ -146,12 +149,13 @@ def diagnose(
     rests = ensemble_of(data, base, noise=noise, members=members, seed=seed, progress=progress)
     level = white_level(runs, base, data.strain)
     first = Stage.of(data, base, catalogue, rests, level, {})
-    found = rounds(data, first, catalogue, rests, level, progress)
+    refitted = Refits(data, progress)
+    found = rounds(data, first, catalogue, rests, level, refitted)
     stage = found.stage
     like = None if found.unlisted is None else _finding(stage, found.unlisted, data)
     named = stage.model.needed(found.named)
     findings = _findings(first, named, stage.model, data)
-    twins = inseparable(data, first, findings, named)
+    twins = inseparable(data, first, findings, named, refitted)
     verdict, named = _verdict(named, twins, first, found, like)
     last = stage if named else first
     left, floor = last.beyond, BEYOND
@@ -167,6 +171,7 @@ def diagnose(
     return Diagnosis(
         verdict, tuple(named), findings, dead, base, last.model, left, floor, found.count, runs,
         data, beyond, guess, like, tuple(name for name in found.by_share if name in named),
+        refitted,
     )  # fmt: skip
 
 

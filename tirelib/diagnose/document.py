@@ -11,9 +11,8 @@ from tirelib.diagnose.floor import FLOOR_MEMBERS, ErrorUnit, structural_floor
 from tirelib.diagnose.guess import Guess
 from tirelib.diagnose.held_out import Fold, folds, held_out_errors, pooled
 from tirelib.diagnose.left import Left, left_of, told_powers
-from tirelib.diagnose.refit import Refit, refit
+from tirelib.diagnose.refit import Refit, inside
 from tirelib.diagnose.shear import BELT
-from tirelib.errors import TirelibError
 from tirelib.identify.waveform_fit import Data
 
 FORMAT = "tirelib-diagnosis/1"
@@ -142,15 +141,8 @@ def _with_one(found: Diagnosis, name: str) -> Refit | None:
         return found.final
     finding = next(f for f in found.findings if f.effect.name == name)
     effect = finding.effect
-    start = np.clip(finding.strength, 0.9 * effect.low, 0.9 * effect.high)
-    base = found.base
-    try:
-        return refit(
-            found.data, base.values, [*base.effects, effect], [*base.strengths, start],
-            delay=base.delay, near=base.correction,
-        )  # fmt: skip
-    except TirelibError:
-        return None
+    base, start = found.base, inside(effect, finding.strength)
+    return found.refitted(base, [*base.effects, effect], [*base.strengths, start])
 
 
 def diagnosis_document(told: Assessment) -> dict[str, Any]:

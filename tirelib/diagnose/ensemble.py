@@ -31,6 +31,7 @@ from tirelib.identify.delay import STD, UNIT, by_delay
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.identify import FITTED
 from tirelib.identify.random_effects import random_tangents, scales
+from tirelib.identify.span import span
 from tirelib.identify.waveform_fit import Data
 from tirelib.model.base import move, predict
 from tirelib.waveforms import GRID
@@ -193,7 +194,7 @@ def measured(
     """
     random = np.random.default_rng(len(found.rests))
     free = model.whiten(model.slopes[: len(FITTED)]).reshape(len(FITTED), -1)
-    basis = np.linalg.qr(free.T)[0]
+    basis = span(free.T)
     rests = []
     for rest in found.rests:
         wave = np.tensordot(random.standard_normal(len(smooth)), smooth, axes=1)

@@ -6,6 +6,7 @@ from tirelib.arrays import FloatArray
 from tirelib.diagnose.refit import Refit
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.noise import independent
+from tirelib.identify.span import span
 
 UNKNOWN_NOISE = 3e-6
 """Noise that variants get where no runs were repeated, [-]."""
@@ -39,7 +40,7 @@ def white_level(runs: StraightRuns, model: Refit, strain: FloatArray) -> float:
         rest = strain[member] - strain[member].mean(axis=0)
         # neighbours of equal set points have nearly equal slopes
         both = np.concatenate([basis[member[0]], model.slopes[:, member[0]].T], axis=1)
-        slopes = np.linalg.qr(both)[0]
+        slopes = span(both)
         rest = rest - (rest @ slopes) @ slopes.T
         rows.append(rest)
         square += float(np.sum(rest**2))

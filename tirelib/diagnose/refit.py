@@ -11,7 +11,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.fitter import BASE, Fitter, changes_of
 from tirelib.effects import Effect
-from tirelib.errors import ConvergenceError, ParameterError
+from tirelib.errors import ConvergenceError, ParameterError, TirelibError
 from tirelib.identify.delay import earlier, late
 from tirelib.identify.random_effects import Whitening
 from tirelib.identify.waveform_fit import Data
@@ -32,6 +32,8 @@ to first order."""
 FELL = 0.05
 """Least share of the squared error that an effect has to take: what takes less stands for
 structure."""
+WITHIN = 0.9
+"""Share of a range in which a fit starts."""
 FLATTER = 0.9
 """Share of the pressure slopes from which a fit starts that cannot start where it should."""
 
@@ -179,6 +181,46 @@ def refit(
         fitter.refresh(weigh=False)
     fitter.renew()
     return _result(fitter)
+
+
+class Refits:
+    """Fits of one campaign with effects added to a model, each made once.
+
+    The bottom is the same whatever the strengths start from.
+
+    Parameters
+    ----------
+    data : Data
+    progress : callable, optional
+    """
+
+    def __init__(self, data: Data, progress: Callable[[str], None] | None = None) -> None:
+        self.data, self.progress = data, progress
+        self._made: list[tuple[Refit, list[str], Refit | None]] = []
+
+    def __call__(
+        self, model: Refit, effects: Sequence[Effect], strengths: Sequence[FloatArray]
+    ) -> Refit | None:
+        """Return the fit with effects from a fitted model; None if it does not settle."""
+        names = [effect.name for effect in effects]
+        for start, added, found in self._made:
+            if start is model and added == names:
+                return found
+        try:
+            made = refit(
+                self.data, model.values, effects, strengths,
+                delay=model.delay, near=model.correction, progress=self.progress,
+            )  # fmt: skip
+        except TirelibError:
+            made = None
+        self._made.append((model, names, made))
+        return made
+
+
+def inside(effect: Effect, strength: FloatArray) -> FloatArray:
+    """Return a start for a fit within an effect's range."""
+    start: FloatArray = np.clip(strength, WITHIN * effect.low, WITHIN * effect.high)
+    return start
 
 
 def fall(before: Refit, after: Refit) -> float:

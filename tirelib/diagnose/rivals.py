@@ -5,9 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tirelib.diagnose.refit import Refit, refit
+from tirelib.diagnose.refit import Refits, inside
 from tirelib.diagnose.shear import BELT
-from tirelib.errors import TirelibError
 from tirelib.identify.waveform_fit import Data
 
 if TYPE_CHECKING:
@@ -19,8 +18,9 @@ MOST = 2
 
 
 def inseparable(
-    data: Data, first: "Stage", findings: Sequence["Finding"], named: Sequence[str]
-) -> list[str]:
+    data: Data, first: "Stage", findings: Sequence["Finding"], named: Sequence[str],
+    refitted: Refits,
+) -> list[str]:  # fmt: skip
     """Return twins of the leader, in range, whose exact refit is no worse.
 
     No worse is by less than the leader's own threshold: what variants without any effect do. The
@@ -36,24 +36,21 @@ def inseparable(
     rivals = [twin for twin in twins if twin.in_range and twin.level == "alarm"]
     if not rivals:
         return []
-    mine = _misfit(data, first, [*beside, leader])
+    mine = _misfit(data, first, [*beside, leader], refitted)
     return [
         rival.effect.name
         for rival in rivals[:MOST]
-        if _misfit(data, first, [*beside, rival]) < mine + leader.threshold
+        if _misfit(data, first, [*beside, rival], refitted) < mine + leader.threshold
     ]
 
 
-def _misfit(data: Data, first: "Stage", more: Sequence["Finding"]) -> float:
+def _misfit(data: Data, first: "Stage", more: Sequence["Finding"], refitted: Refits) -> float:
     """Return the misfit with some effects more; infinite if the refit fails."""
     base = first.model
-    start = [np.clip(f.strength, 0.9 * f.effect.low, 0.9 * f.effect.high) for f in more]
+    start = [inside(finding.effect, finding.strength) for finding in more]
     effects = [*base.effects, *(f.effect for f in more)]
-    try:
-        model: Refit = refit(
-            data, base.values, effects, [*base.strengths, *start], delay=base.delay
-        )
-    except TirelibError:
+    model = refitted(base, effects, [*base.strengths, *start])
+    if model is None:
         return float("inf")
     white = base.whiten(data.strain - model.on_time(data.points).waveform).ravel()
     return first.ranking.structure.normal(np.zeros((0, white.size)), white).square

@@ -1,17 +1,15 @@
 """Rounds of a diagnosis: the leader is added, exactly refitted, and what it replaces is dropped."""
 
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.ensemble import Variants
-from tirelib.diagnose.refit import FELL, Refit, fall, refit
+from tirelib.diagnose.refit import FELL, Refit, Refits, fall, inside
 from tirelib.diagnose.shear import BELT, SHEAR, beside_shear, on_top, shear_itself, with_shear
 from tirelib.diagnose.stage import ALARM, Stage, within
 from tirelib.effects import Effect
-from tirelib.errors import TirelibError
 from tirelib.identify.waveform_fit import Data
 
 BARS = (ALARM, 6.0, 12.0)
@@ -32,6 +30,8 @@ first beside those of every belt, whose law leaves structure of its own."""
 HALVED = 0.45
 """Share of the squared error from which a further alarm is needed whatever imitates it."""
 ROUNDS = 3
+LATEST = 4
+"""Stages that are kept, in case that the same model is asked for again: each is large."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ def rounds(
     catalogue: Sequence[Effect],
     rests: Variants,
     noise: float,
-    progress: Callable[[str], None] | None,
+    refitted: Refits,
 ) -> Rounds:
     """Add the leaders one after the other as long as the exact refit needs them.
 
@@ -80,38 +80,25 @@ def rounds(
     rests : Variants
     noise : float, [-]
         Of a whitened sample.
-    progress : callable or None
+    refitted : Refits
     """
     # the joint ranking sees all effects at once: who is no hint now is no suspect later
     hints = (first.in_range | first.over) & (first.scores.score >= first.limit)
     suspects = {name for name, hint in zip(first.names, hints, strict=True) if hint}
     least = dict(zip(first.names, first.limit, strict=True))
 
-    fits: list[tuple[Refit, list[str], Refit]] = []
-
-    def refitted(
-        model: Refit, effects: Sequence[Effect], strengths: Sequence[FloatArray]
-    ) -> Refit | None:
-        names = [effect.name for effect in effects]
-        for start, added, found in fits:  # the bottom is the same whatever the strengths start from
-            if start is model and added == names:
-                return found
-        try:
-            found = refit(
-                data, model.values, effects, strengths,
-                delay=model.delay, near=model.correction, progress=progress,
-            )  # fmt: skip
-        except TirelibError:
-            return None
-        fits.append((model, names, found))
-        return found
+    stages: deque[Stage] = deque(maxlen=LATEST)
 
     def staged(model: Refit) -> Stage:
-        return Stage.of(data, model, catalogue, rests, noise, least)
+        for known in stages:
+            if known.model is model:
+                return known
+        stages.append(Stage.of(data, model, catalogue, rests, noise, least))
+        return stages[-1]
 
     def fitted(
         stage: Stage, effects: Sequence[Effect], strengths: Sequence[FloatArray],
-        need: Callable[[Refit], bool] = lambda _: True,
+        need: Callable[[Refit], bool],
     ) -> Stage | None:  # fmt: skip
         """Return the stage of an exact fit; None if it does not settle or is not needed."""
         model = refitted(stage.model, effects, strengths)
@@ -153,7 +140,9 @@ def rounds(
     return Rounds(stage, named, count, None, by_share)
 
 
-_Fit = Callable[..., Stage | None]
+_Fit = Callable[
+    [Stage, Sequence[Effect], Sequence[FloatArray], Callable[[Refit], bool]], Stage | None
+]
 
 
 def _added(
@@ -222,7 +211,7 @@ def _trial(first: Stage, stage: Stage, index: int, fitted: _Fit, least: float) -
         other = effect.components == 1 and float(strength[0] * found.strengths[-1][0]) < 0.0
         return not other and fall(model, found) >= least
 
-    start = [*model.strengths, _inside(effect, strength)]
+    start = [*model.strengths, inside(effect, strength)]
     after = fitted(stage, [*model.effects, effect], start, need)
     # to first order only if the exact refit does not need it
     if after is None or stage.scores.misfit - after.scores.misfit < ALARM * stage.limit[index]:
@@ -246,7 +235,8 @@ def _thinned(
     for name in before:
         kept = [k for k, effect in enumerate(stage.model.effects) if effect.name != name]
         effects = [stage.model.effects[k] for k in kept]
-        without = fitted(stage, effects, [stage.model.strengths[k] for k in kept])
+        strengths = [stage.model.strengths[k] for k in kept]
+        without = fitted(stage, effects, strengths, lambda _: True)
         if without is None:
             continue
         back = without.scores.misfit - stage.scores.misfit
@@ -254,9 +244,3 @@ def _thinned(
             stage = without
             gone.add(name)
     return stage, gone
-
-
-def _inside(effect: Effect, strength: FloatArray) -> FloatArray:
-    """Return a start for a refit within the range."""
-    start: FloatArray = np.clip(strength, 0.9 * effect.low, 0.9 * effect.high)
-    return start

@@ -32,27 +32,27 @@ def structure_of(data: Data, model: Refit, rests: Variants, noise: float) -> Str
     spread = spread_of(noise, len(data.points))
     seen = measured(data, model, replace(rests, noise=spread * model.whiten.noise), smooth, runs)
     free = model.whiten(model.own_slopes).reshape(len(model.own_slopes), -1)
-    each = run_by_run(np.stack([model.whiten(runs[:, k]) for k in range(runs.shape[1])], axis=1))
-    parts = [model.whiten(smooth).reshape(len(smooth), -1), each, form_rows(model)]
-    return Structure(rests.rests, seen, spread, free, np.concatenate(parts))
+    parts = model.whiten(smooth).reshape(len(smooth), -1)
+    each = [model.whiten(runs.swapaxes(0, 1)).swapaxes(0, 1), form_part(model)]
+    return Structure(rests.rests, seen, spread, free, parts, np.concatenate(each, axis=1))
 
 
-def form_rows(model: Refit) -> FloatArray:
-    """Return how a model's effects may be off in each run, (3 * n_effects * n_runs, n).
+def form_part(model: Refit) -> FloatArray:
+    """Return how a model's effects may be off in each run, (n_runs, 3 * n_effects, n_phi).
 
     By a factor; by a power of the harmonics' order, for another law acts on other wavelengths; and
     by its place on the wheel.
     """
-    samples = model.waveform.size
-    rows: list[FloatArray] = []
+    runs, samples = model.waveform.shape
+    rows: list[FloatArray] = [np.zeros((runs, 0, samples))]
     first = len(model.slopes) - sum(effect.components for effect in model.effects)
     for effect, strength in zip(model.effects, model.strengths, strict=True):
         slopes = model.slopes[first : first + effect.components]
         first += effect.components
         change = model.whiten(np.tensordot(strength / effect.scale, slopes, axes=1))
         change = filled(change)
-        rows.append(run_by_run(FORM * np.stack([change, finer(change), moved(change)], axis=1)))
-    return np.concatenate(rows) if rows else np.zeros((0, samples))
+        rows.append(FORM * np.stack([change, finer(change), moved(change)], axis=1))
+    return np.concatenate(rows, axis=1)
 
 
 def moved(change: FloatArray) -> FloatArray:

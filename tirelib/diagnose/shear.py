@@ -13,7 +13,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.candidates import candidates
-from tirelib.diagnose.refit import FELL, Refit, fall
+from tirelib.diagnose.refit import FELL, Refit, fall, inside
 from tirelib.diagnose.stage import ALARM, Stage, within
 from tirelib.diagnose.unlisted import UNLISTED
 from tirelib.effects import CATALOGUE, Effect
@@ -93,9 +93,10 @@ def beside_shear(
     staged: Callable[[Refit], Stage],
     among: Collection[str] | None = None,
 ) -> tuple[Stage, int] | None:
-    """Return the stage with the shear and the one effect that takes most beside it, and its index.
+    """Return the stage with the one effect that takes most beside the shear, and its index.
 
-    What is in no catalogue is returned with the stage as it is.
+    The stage has the shear as well, where that is needed beside the effect. What is in no catalogue
+    is returned with the stage as it is.
 
     Parameters
     ----------
@@ -134,7 +135,7 @@ def beside_shear(
     where = stage.names.index(effect.name)
     if effect in UNLISTED:
         return (stage, where) if stage.unlisted[where] else None
-    start = np.clip(strength, 0.9 * effect.low, 0.9 * effect.high)
+    start = inside(effect, strength)
     both = refitted(model, [*model.effects, effect], [*model.strengths, start])
     if both is None or fall(model, both) < least or not _in_range(both):
         return None

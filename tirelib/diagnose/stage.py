@@ -1,7 +1,7 @@
 """A model with its candidates scored, against what the same scores do without any effect."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -103,16 +103,20 @@ class Stage:
         scores = ranking.scores(data.strain - model.on_time(data.points).waveform)
         members = ranking.of_members()
         names = [candidate.effect.name for candidate in found.living]
-        extra = np.array([each.effect in UNLISTED for each in found.living], dtype=bool)
-        fits, signs = plausible(found, scores), plausible(found, scores, np.inf)
-        signs |= np.array([each.effect.components > 1 for each in found.living], dtype=bool)
         bound = np.array([least.get(name, 0.0) for name in names])
         limit = limits(members, [len(candidate.own) for candidate in found.living])
         return cls(
-            model, found, ranking, scores, np.maximum(limit, bound),
-            noise, fits & ~extra, ~fits & ~extra, ~fits & signs & ~extra,
-            _far(found, scores) & ~extra, extra & ~_has_twin(found),
+            model, found, ranking, scores, np.maximum(limit, bound), noise,
+            *_ranges(found, scores), ~_listed(found) & ~_has_twin(found),
         )  # fmt: skip
+
+    def of_residual(self, residual: FloatArray) -> "Stage":
+        """Return the stage as it would be with another residual (n_runs, n_phi)."""
+        scores = self.ranking.scores(residual)
+        in_range, impossible, over, far = _ranges(self.found, scores)
+        return replace(
+            self, scores=scores, in_range=in_range, impossible=impossible, over=over, far=far
+        )
 
     @property
     def names(self) -> list[str]:
@@ -204,11 +208,19 @@ class Stage:
         return float(np.max(np.where(self.far, self.ratio, 0.0), initial=0.0))
 
 
-def _far(found: Candidates, scores: Scores) -> BoolArray:
-    """Return which strengths lie outside their ranges by more than structure imitates."""
-    alike = np.array([candidate.effect in ALIKE for candidate in found.living], dtype=bool)
-    near = plausible(found, scores, imitation=IMITATION)
-    return np.asarray(~np.where(alike, plausible(found, scores), near), dtype=np.bool_)
+def _ranges(found: Candidates, scores: Scores) -> tuple[BoolArray, BoolArray, BoolArray, BoolArray]:
+    """Return which strengths are in range, impossible, over and far (`Stage`)."""
+    living, listed = found.living, _listed(found)
+    fits, signs = plausible(found, scores), plausible(found, scores, np.inf)
+    signs |= np.array([each.effect.components > 1 for each in living], dtype=bool)
+    alike = np.array([each.effect in ALIKE for each in living], dtype=bool)
+    near = np.where(alike, fits, plausible(found, scores, imitation=IMITATION)).astype(bool)
+    return fits & listed, ~fits & listed, ~fits & signs & listed, ~near & listed
+
+
+def _listed(found: Candidates) -> BoolArray:
+    """Return which candidates are in the catalogue."""
+    return np.array([each.effect not in UNLISTED for each in found.living], dtype=bool)
 
 
 def _has_twin(found: Candidates) -> BoolArray:

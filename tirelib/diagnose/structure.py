@@ -14,10 +14,15 @@ A measured variant is judged by the covariance without it, as a residual is by t
 """
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
+from scipy import linalg
 
 from tirelib.arrays import FloatArray
+from tirelib.diagnose.spread import Spread
+from tirelib.identify.span import span
 
 LEAST, ALIKE = 0.1, 15
 """Least s, in whitened samples, for no ensemble spans everything that structure does; and the
@@ -64,20 +69,21 @@ class Structure:
     nuisance : shape (n_free, n)
         Whitened slopes of the model's fitted numbers.
     parts : shape (n_parts, n)
-        Whitened rows d_k and f_i.
+        Whitened rows d_k over all runs.
+    each : shape (n_runs, n_each, n_phi)
+        Whitened rows d_k and f_i of one run each.
     """
 
     def __init__(
         self, variants: FloatArray, measured: FloatArray, noise: float, nuisance: FloatArray,
-        parts: FloatArray,
+        parts: FloatArray, each: FloatArray,
     ) -> None:  # fmt: skip
-        self.basis = np.linalg.qr(nuisance.T)[0]
+        self.basis = span(nuisance.T)
         self.variance = noise**2
         self.members = self.projected(measured)
-        self.spread = self.projected(
-            np.concatenate([variants / np.sqrt(max(len(variants), 1)), parts])
-        )
-        self.overlap = self.spread @ self.spread.T
+        shared = np.concatenate([variants / np.sqrt(max(len(variants), 1)), parts])
+        # rows as they are: their products with what is projected are those of projected ones
+        self.spread = Spread(shared, each)
 
     def projected(self, rows: FloatArray) -> FloatArray:
         """Return rows (..., n) without what the fitted numbers can do."""
@@ -87,8 +93,8 @@ class Structure:
     def normal(self, rows: FloatArray, residual: FloatArray) -> Normal:
         """Return the normal equations of rows (k, n) and a residual (n,)."""
         own, rest = self.projected(rows), self.projected(residual)
-        across, mutual = self.spread @ own.T, self.spread @ rest
-        turned = np.linalg.solve(self._inner, np.column_stack([across, mutual]))
+        across, mutual = self.spread.onto(own), self.spread.onto(rest[None])[:, 0]
+        turned = linalg.cho_solve(self._inner, np.column_stack([across, mutual]))
         return Normal(
             (own @ own.T - across.T @ turned[:, :-1]) / self.variance,
             (own @ rest - across.T @ turned[:, -1]) / self.variance,
@@ -101,14 +107,14 @@ class Structure:
         The best linear prediction of structure, given the rows, is taken off.
         """
         own = self.projected(rows)
-        out: FloatArray = own - np.linalg.solve(self._inner, self.spread @ own.T).T @ self.spread
-        return out
+        weights = linalg.cho_solve(self._inner, self.spread.onto(own))
+        return own - self.projected(self.spread.mixed(weights))
 
     def of_members(self, rows: FloatArray) -> list[Normal]:
         """Return the same for every measured variant, each by the covariance without it."""
         own = self.projected(rows)
-        across, mutual = self.spread @ own.T, self.spread @ self.members.T
-        inverse = np.asarray(np.linalg.inv(self._inner), dtype=np.float64)
+        across, mutual = self.spread.onto(own), self.spread.onto(self.members)
+        inverse = linalg.cho_solve(self._inner, np.eye(len(self.spread)))
         turned, met = inverse @ across, inverse @ mutual
         gram = own @ own.T - across.T @ turned
         right = own @ self.members.T - across.T @ met
@@ -126,7 +132,11 @@ class Structure:
             )
         return found
 
-    @property
-    def _inner(self) -> FloatArray:
-        """What the matrix inversion lemma inverts in place of C."""
-        return np.asarray(self.overlap + self.variance * np.eye(len(self.spread)))
+    @cached_property
+    def _inner(self) -> tuple[Any, bool]:
+        """Cholesky factor of what the matrix inversion lemma inverts in place of C."""
+        taken = self.spread.onto(self.basis.T)
+        inner = self.spread.products() - taken @ taken.T
+        inner[np.diag_indices_from(inner)] += self.variance
+        factor, lower = linalg.cho_factor(inner, lower=True)
+        return factor, lower

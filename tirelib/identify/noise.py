@@ -6,6 +6,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray, IntArray
 from tirelib.identify.random_effects import tangents
+from tirelib.identify.span import span
 from tirelib.waveforms import Waveforms
 
 SMOOTH = 5
@@ -70,7 +71,7 @@ def repeat_noise(strain: FloatArray, group: IntArray, tangent: FloatArray) -> Re
         member = np.flatnonzero(group == number)
         if member.size < 2:
             continue
-        basis = _span(tangent[member].mean(axis=0))
+        basis = span(tangent[member].mean(axis=0))
         rest = strain[member] - strain[member].mean(axis=0)
         rest = rest - (rest @ basis) @ basis.T
         rows.append(rest * np.sqrt(member.size / (member.size - 1)))
@@ -134,13 +135,6 @@ def _neighbour_slopes(
     step = np.where(found, apart[row, nearest], 1.0)
     slope: FloatArray = (strain[nearest] - strain) * (found / step)[:, None]
     return slope
-
-
-def _span(columns: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the columns that are not zero, (n_phi, <= k)."""
-    size = np.sqrt(np.sum(columns**2, axis=0))
-    basis: FloatArray = np.linalg.qr(columns[:, size > 0.0] / size[size > 0.0])[0]
-    return basis
 
 
 def independent(waves: FloatArray) -> float:

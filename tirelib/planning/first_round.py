@@ -1,17 +1,14 @@
 """The first round of a diagnosis, as a judge of any residual."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import dataclass
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.candidates import Candidates
 from tirelib.diagnose.noise import noise_in, white_level
 from tirelib.diagnose.refit import Refit
-from tirelib.diagnose.stage import ALARM, IMITATION, Stage, plausible
+from tirelib.diagnose.stage import ALARM, Stage
 from tirelib.diagnose.stored import ensemble_of
-from tirelib.diagnose.unlisted import UNLISTED
 from tirelib.effects import Effect
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.waveform_fit import Data
@@ -63,13 +60,6 @@ class FirstRound:
 
         Empty as well if it is in no catalogue: that names nobody.
         """
-        scores = self.stage.ranking.scores(rest)
-        fits, signs = plausible(self.found, scores), plausible(self.found, scores, np.inf)
-        near = plausible(self.found, scores, imitation=IMITATION)
-        listed = np.array([each.effect not in UNLISTED for each in self.found.living], dtype=bool)
-        judged = replace(
-            self.stage, scores=scores, in_range=fits & listed, impossible=~fits & listed,
-            over=~fits & signs & listed, far=~near & listed,
-        )  # fmt: skip
+        judged = self.stage.of_residual(rest)
         leaders = judged.leaders(set(judged.names), ALARM, 1.0)
-        return judged.names[leaders[0]] if leaders and listed[leaders[0]] else ""
+        return judged.names[leaders[0]] if leaders and not judged.unlisted[leaders[0]] else ""

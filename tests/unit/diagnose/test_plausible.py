@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tirelib.diagnose.ensemble import ALIKE
-from tirelib.diagnose.stage import IMITATION, RANGE_SLACK, _far
+from tirelib.diagnose.stage import IMITATION, RANGE_SLACK, _ranges
 from tirelib.effects import CATALOGUE
 
 STD = 1e-3
@@ -20,7 +20,7 @@ def far(name: str, strength: float) -> bool:
     scores: Any = SimpleNamespace(
         strength=[np.full(effect.components, strength)], std=[np.full(effect.components, STD)]
     )
-    return bool(_far(found, scores)[0])
+    return bool(_ranges(found, scores)[-1][0])
 
 
 @pytest.mark.parametrize("name", ["sidewall_damping", "hydroplaning"])

@@ -2,15 +2,16 @@
 
 from collections.abc import Callable, Sequence
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from tirelib.diagnose import rounds
-from tirelib.diagnose.refit import FELL
+from tirelib.diagnose.refit import FELL, Refits
 from tirelib.diagnose.rounds import CLEAR, FURTHER, HALVED, LARGE, ON_TOP, ROUNDS, Rounds
 from tirelib.diagnose.stage import ALARM, ALONE, NEAR, OWN, Stage
+from tirelib.errors import ConvergenceError
 
 NAMES = ("strong", "close", "weak")
 LEFT = {(): 1000.0, ("strong",): 500.0, ("close",): 300.0, ("weak",): 990.0}
@@ -462,27 +463,25 @@ def test_a_shear_that_the_first_joint_fit_does_not_know_is_not_fitted(
 
 
 def test_the_same_effects_are_fitted_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    first = stage((), 1000.0, SCORE, error=1.0)
-    first.names[2] = "belt_shear"
-    first.in_range = np.ones(3, dtype=bool)
     made: list[list[str]] = []
 
     def refit(_: Any, values: Any, effects: Any, *__: Any, **___: Any) -> Any:
         made.append([effect.name for effect in effects])
+        if len(effects) > 2:
+            raise ConvergenceError("it does not settle", None, 1.0)
         return object()
 
-    def twice(now: Any, refitted: Any) -> Any:
-        effects = [effect("strong"), effect("close")]
-        one, other = (refitted(now.model, effects, [np.array([s])] * 2) for s in (0.1, 0.2))
-        assert one is other
-        assert refitted(now.model, effects[:1], [np.array([0.1])]) is not one
-        return now.model
-
-    first.model.values, first.model.delay, first.model.correction = {}, 0.0, None
-    monkeypatch.setattr(rounds, "refit", refit)
-    monkeypatch.setattr(rounds, "_added", lambda *_: None)
-    monkeypatch.setattr(rounds, "with_shear", twice)
-    for name in ("beside_shear", "shear_itself"):
-        monkeypatch.setattr(rounds, name, lambda *_: None)
-    rounds.rounds(None, first, [], None, 1e-6, None)
-    assert made == [["strong", "close"], ["strong"]]
+    monkeypatch.setattr("tirelib.diagnose.refit.refit", refit)
+    nothing: Any = None
+    model, other = (
+        cast("Any", SimpleNamespace(values={}, delay=0.0, correction=None)) for _ in range(2)
+    )
+    refitted, effects = Refits(nothing), [effect("strong"), effect("close")]
+    one, same = (refitted(model, effects, [np.array([s])] * 2) for s in (0.1, 0.2))
+    assert one is same
+    assert refitted(model, effects[:1], [np.array([0.1])]) is not one
+    assert refitted(other, effects, [np.array([0.1])] * 2) is not one
+    three = [*effects, effect("far")]
+    assert [refitted(model, three, [np.array([0.1])] * 3) for _ in range(2)] == [None, None]
+    both = ["strong", "close"]
+    assert made == [both, ["strong"], both, [*both, "far"]]

@@ -12,23 +12,29 @@ from tirelib.diagnose.shape import LEAST, filled, finer, moved, run_by_run
 from tirelib.diagnose.structure import Structure
 
 SAMPLES, MEMBERS, NOISE = 40, 6, 0.5
+NONE = np.zeros((1, 0, SAMPLES))
 
 
 @pytest.fixture
-def parts() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def parts() -> tuple[FloatArray, ...]:
+    """Return variants, slopes, parts, candidates' rows, and parts of four runs each."""
     random = np.random.default_rng(1)
-    return tuple(random.standard_normal((n, SAMPLES)) for n in (MEMBERS, 3, 2, 4))
+    rows = [random.standard_normal((n, SAMPLES)) for n in (MEMBERS, 3, 2, 4)]
+    return (*rows, random.standard_normal((4, 2, SAMPLES // 4)))
 
 
 def dense(structure: Structure, without: int | None = None) -> FloatArray:
     """Return C as a matrix."""
-    rows = structure.spread if without is None else np.delete(structure.spread, without, axis=0)
+    spread = structure.spread
+    rows = structure.projected(spread.mixed(np.eye(len(spread))))
+    if without is not None:
+        rows = np.delete(rows, without, axis=0)
     return NOISE**2 * np.eye(SAMPLES) + rows.T @ rows
 
 
 def test_normal_equations_are_those_of_the_whole_covariance(parts: Any) -> None:
-    members, free, form, rows = parts
-    structure = Structure(members, members, NOISE, free, form)
+    members, free, form, rows, each = parts
+    structure = Structure(members, members, NOISE, free, form, each)
     residual = np.random.default_rng(2).standard_normal(SAMPLES)
     normal = structure.normal(rows, residual)
     inverse = np.linalg.inv(dense(structure))
@@ -40,15 +46,15 @@ def test_normal_equations_are_those_of_the_whole_covariance(parts: Any) -> None:
 
 
 def test_what_the_fitted_numbers_can_do_counts_nothing(parts: Any) -> None:
-    members, free, form, rows = parts
-    structure = Structure(members, members, NOISE, free, form)
+    members, free, form, rows, each = parts
+    structure = Structure(members, members, NOISE, free, form, each)
     assert structure.normal(rows, free[0] - 2.0 * free[2]).square == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_measured_variant_is_judged_by_the_others(parts: Any) -> None:
-    members, free, form, rows = parts
+    members, free, form, rows, each = parts
     measured = members + np.random.default_rng(6).standard_normal(members.shape)
-    structure = Structure(members, measured, NOISE, free, form)
+    structure = Structure(members, measured, NOISE, free, form, each)
     third = structure.of_members(rows)[2]
     inverse = np.linalg.inv(dense(structure, 2))
     rest = structure.projected(measured[2])
@@ -62,7 +68,7 @@ def test_more_of_what_structure_does_costs_less_than_the_same_of_what_it_never_d
     never = np.roll(often, 1)
     empty = np.zeros((0, SAMPLES))
     variants = 10.0 * np.tile(often, (MEMBERS, 1))
-    structure = Structure(variants, variants, NOISE, np.eye(1, SAMPLES, 30), empty)
+    structure = Structure(variants, variants, NOISE, np.eye(1, SAMPLES, 30), empty, NONE)
     assert structure.normal(empty, never).square == pytest.approx(1.0 / NOISE**2)
     assert structure.normal(empty, often).square == pytest.approx(1.0 / (NOISE**2 + 100.0))
 
@@ -82,7 +88,7 @@ def ranking(
     )
     model = SimpleNamespace(whiten=lambda x: x, waveform=np.zeros((1, SAMPLES)))
     free, none = np.eye(1, SAMPLES, SAMPLES - 1), np.zeros((0, SAMPLES))
-    return Ranking(model, found, Structure(members, members, NOISE, free, none))
+    return Ranking(model, found, Structure(members, members, NOISE, free, none, NONE))
 
 
 def test_the_score_is_the_misfit_that_returns_and_the_strength_is_found() -> None:
