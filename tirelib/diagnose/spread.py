@@ -50,8 +50,8 @@ class Spread:
 
     def mixed(self, weights: FloatArray) -> FloatArray:
         """Return sums of the rows by weights (len, m), of shape (m, n)."""
-        first, (runs, k, _) = len(self.every), self.each.shape
+        first, (runs, k, samples) = len(self.every), self.each.shape
         by_run = weights[first:].reshape(runs, k, weights.shape[1]).transpose(0, 2, 1)
-        apart = (by_run @ self.each).swapaxes(0, 1).reshape(weights.shape[1], -1)
+        apart = (by_run @ self.each).swapaxes(0, 1).reshape(weights.shape[1], runs * samples)
         out: FloatArray = weights[:first].T @ self.every + apart
         return out
