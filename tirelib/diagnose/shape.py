@@ -63,15 +63,6 @@ def moved(change: FloatArray) -> FloatArray:
     return out
 
 
-def run_by_run(changes: FloatArray) -> FloatArray:
-    """Return k changes of each run, (n_runs, k, n_phi), as rows that act on it alone."""
-    runs, k, samples = changes.shape
-    each = np.zeros((runs, k, runs, samples))
-    every = np.arange(runs)
-    each[every, :, every] = changes
-    return each.reshape(runs * k, -1)
-
-
 def filled(change: FloatArray) -> FloatArray:
     """Return an effect's change per run, nowhere much smaller than it typically is.
 

@@ -17,7 +17,7 @@ from tirelib.arrays import FloatArray
 from tirelib.campaign import Tolerance
 from tirelib.diagnose.ensemble import smooth_part, variants
 from tirelib.diagnose.refit import Refit
-from tirelib.diagnose.shape import filled, finer, moved, run_by_run
+from tirelib.diagnose.shape import filled, finer, moved
 from tirelib.diagnose.structure import FORM
 from tirelib.identify.identify import FITTED
 from tirelib.identify.random_effects import Whitening
@@ -107,6 +107,15 @@ def _form_part(data: Data, model: Refit, points: Operating, present: int) -> Flo
         each[-count:, present:] = ways[present:].swapaxes(0, 1)
         rows.append(each)
     return np.concatenate(rows)
+
+
+def run_by_run(changes: FloatArray) -> FloatArray:
+    """Return k changes of each run, (n_runs, k, n_phi), as rows that act on it alone."""
+    runs, k, samples = changes.shape
+    each = np.zeros((runs, k, runs, samples))
+    every = np.arange(runs)
+    each[every, :, every] = changes
+    return each.reshape(runs * k, runs * samples)
 
 
 def joined(one: Operating, other: Operating) -> Operating:

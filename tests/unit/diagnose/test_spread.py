@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tirelib.arrays import FloatArray
-from tirelib.diagnose.shape import run_by_run
 from tirelib.diagnose.spread import Spread
+from tirelib.planning.structure import run_by_run
 
 SIZES = st.tuples(st.integers(0, 4), st.integers(1, 5), st.integers(0, 3), st.integers(1, 4))
 
@@ -34,3 +34,11 @@ def test_products_and_sums_are_those_of_the_whole_rows(
     assert spread.products() == pytest.approx(whole @ whole.T)
     weights = random.standard_normal((len(whole), m))
     assert spread.mixed(weights) == pytest.approx(weights.T @ whole)
+
+
+def test_what_is_off_in_a_run_is_off_in_no_other() -> None:
+    changes = np.arange(12.0).reshape(2, 2, 3) + 1.0
+    rows = run_by_run(changes).reshape(2, 2, 2, 3)
+    for run in range(2):
+        assert np.array_equal(rows[run, :, run], changes[run])
+        assert not rows[run, :, 1 - run].any()

@@ -8,7 +8,7 @@ import pytest
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.ranking import Ranking
-from tirelib.diagnose.shape import LEAST, filled, finer, moved, run_by_run
+from tirelib.diagnose.shape import LEAST, filled, finer, moved
 from tirelib.diagnose.structure import Structure
 
 SAMPLES, MEMBERS, NOISE = 40, 6, 0.5
@@ -156,11 +156,3 @@ def test_an_effect_at_another_place_differs_by_its_slope() -> None:
     expected = np.stack([np.cos(3.0 * angle), 5.0 * np.cos(angle)])
     assert moved(change) == pytest.approx(expected)
     assert np.all(moved(np.zeros((2, SAMPLES))) == 0.0)
-
-
-def test_what_is_off_in_a_run_is_off_in_no_other() -> None:
-    changes = np.arange(12.0).reshape(2, 2, 3) + 1.0
-    rows = run_by_run(changes).reshape(2, 2, 2, 3)
-    for run in range(2):
-        assert np.array_equal(rows[run, :, run], changes[run])
-        assert not rows[run, :, 1 - run].any()
