@@ -32,10 +32,10 @@ BELT = frozenset({"belt_shear", "belt_extension"})
 HELD_OUT_BY = ("load", "pressure", "speed")
 _CODE = {
     "diagnose": ("candidates", "diagnose", "ensemble", "fitter", "noise",
-                 "ranking", "refit", "rivals", "rounds", "secants", "shape", "shear", "stage",
-                 "structure", "unlisted", "variant"),
+                 "ranking", "refit", "rivals", "rounds", "secants", "shape", "shear", "spread",
+                 "stage", "structure", "unlisted", "variant"),
     "identify": ("campaign_data", "delay", "discrepancy", "identify", "noise", "random_effects",
-                 "structure", "waveform_fit"),
+                 "span", "structure", "waveform_fit"),
     "effects": ("*",), "model": ("*",), "contact": ("*",), "ring": ("*",), "strain": ("*",),
 }  # fmt: skip
 """Modules of the library that a verdict depends on."""

@@ -7,7 +7,7 @@ from tirelib.arrays import FloatArray
 from tirelib.diagnose.ensemble import MEMBERS
 from tirelib.diagnose.guess import Guess, guess_law
 from tirelib.diagnose.left import left_of
-from tirelib.diagnose.noise import noise_in, white_level
+from tirelib.diagnose.noise import noise_in, white_noise
 from tirelib.diagnose.refit import FELL, Refit, Refits, fall, refit
 from tirelib.diagnose.rivals import inseparable
 from tirelib.diagnose.rounds import HALVED, Rounds, rounds
@@ -27,7 +27,7 @@ EXPLAINED = 0.8
 """Share of the misfit beyond structure's that named effects have to explain, or `HALVED` of the
 squared error: another law of the same effect may leave what no structure does, but takes the error.
 """
-BEYOND = 2.0
+BEYOND = 4.0
 """What the joint fit leaves, over what noise and structure outside the ensemble usually leave, from
 which on something unknown is there."""
 
@@ -147,7 +147,7 @@ def diagnose(
     base = refit(data, values, effects, strengths, progress=progress)
     noise = noise_in(runs)
     rests = ensemble_of(data, base, noise=noise, members=members, seed=seed, progress=progress)
-    level = white_level(runs, base, data.strain)
+    level = white_noise(runs, base, data.strain)
     first = Stage.of(data, base, catalogue, rests, level, {})
     refitted = Refits(data, progress)
     found = rounds(data, first, catalogue, rests, level, refitted)
@@ -235,9 +235,10 @@ def _verdict(
         or fall(first.model, last.model) >= HALVED
         or any(name in named for name in found.by_share)
     )
-    if fall(first.model, last.model) < FELL or not explained:
+    hidden = [name for name in named if name not in BELT]
+    # the shear that every belt has does not explain what is in no catalogue
+    if fall(first.model, last.model) < FELL or not explained or (like and not hidden):
         return "unknown", []
     if twins:
-        leader = next((name for name in named if name not in BELT), named[0])
-        return "indistinguishable", [leader, *twins]
+        return "indistinguishable", [*(hidden or named)[:1], *twins]
     return ("form_inadequate" if beyond else "named"), named

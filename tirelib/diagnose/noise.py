@@ -1,5 +1,7 @@
 """Noise of the waveforms of straight runs, from repeats, as a diagnosis needs it."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from tirelib.arrays import FloatArray
@@ -12,18 +14,33 @@ UNKNOWN_NOISE = 3e-6
 """Noise that variants get where no runs were repeated, [-]."""
 
 
+@dataclass(frozen=True, slots=True)
+class WhiteNoise:
+    """Standard deviations of whitened noise.
+
+    Attributes
+    ----------
+    sample : float, [-]
+        Of a sample.
+    smooth : float, [-]
+        Of white noise that meets a smooth shape as the noise does, which is smooth itself: n_e
+        independent samples in a turn of n meet it with n / n_e times the variance of a sample.
+    """
+
+    sample: float
+    smooth: float
+
+
 def noise_in(runs: StraightRuns) -> float:
     """Return the standard deviation of a sample of a run's waveform, [-]."""
     return runs.noise.std if np.isfinite(runs.noise.std) else UNKNOWN_NOISE
 
 
-def white_level(runs: StraightRuns, model: Refit, strain: FloatArray) -> float:
-    """Return the standard deviation of whitened white noise as strong as the repeats' is.
+def white_noise(runs: StraightRuns, model: Refit, strain: FloatArray) -> WhiteNoise:
+    """Return the whitened noise of the repeats.
 
     What set points, the angle's zero or other numbers of the tire explain of the repeats'
-    differences is no noise: a tire that warms up or wears between them is not noisy. Repeats
-    differ by smooth noise, n_e independent samples in a turn of n: a shape that is smooth as well
-    meets n / n_e times the variance of a sample.
+    differences is no noise: a tire that warms up or wears between them is not noisy.
 
     Parameters
     ----------
@@ -46,7 +63,8 @@ def white_level(runs: StraightRuns, model: Refit, strain: FloatArray) -> float:
         square += float(np.sum(rest**2))
         free += (member.size - 1) * (rest.shape[1] - slopes.shape[1])
     if not rows:
-        return UNKNOWN_NOISE / model.whiten.noise
+        return WhiteNoise(*[UNKNOWN_NOISE / model.whiten.noise] * 2)
     every = np.concatenate(rows)
+    sample = float(np.sqrt(square / free)) / model.whiten.noise
     smooth = every.shape[1] / max(independent(every), 2.0)
-    return float(np.sqrt(square / free * smooth)) / model.whiten.noise
+    return WhiteNoise(sample, sample * float(np.sqrt(smooth)))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.ensemble import Variants
+from tirelib.diagnose.noise import WhiteNoise
 from tirelib.diagnose.refit import FELL, Refit, Refits, fall, inside
 from tirelib.diagnose.shear import BELT, SHEAR, beside_shear, on_top, shear_itself, with_shear
 from tirelib.diagnose.stage import ALARM, Stage, within
@@ -64,7 +65,7 @@ def rounds(
     first: Stage,
     catalogue: Sequence[Effect],
     rests: Variants,
-    noise: float,
+    noise: WhiteNoise,
     refitted: Refits,
 ) -> Rounds:
     """Add the leaders one after the other as long as the exact refit needs them.
@@ -78,8 +79,7 @@ def rounds(
         Of the model without any.
     catalogue : sequence of Effect
     rests : Variants
-    noise : float, [-]
-        Of a whitened sample.
+    noise : WhiteNoise
     refitted : Refits
     """
     # the joint ranking sees all effects at once: who is no hint now is no suspect later

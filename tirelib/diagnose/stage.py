@@ -8,11 +8,12 @@ import numpy as np
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.diagnose.candidates import Candidates, candidates
 from tirelib.diagnose.ensemble import ALIKE, Variants
+from tirelib.diagnose.noise import WhiteNoise
 from tirelib.diagnose.ranking import Ranking, Scores, limits
 from tirelib.diagnose.refit import Refit
 from tirelib.diagnose.secants import with_secants
 from tirelib.diagnose.shape import structure_of
-from tirelib.diagnose.structure import FORM, LEAST
+from tirelib.diagnose.structure import FORM, LEAST, spread_of
 from tirelib.diagnose.unlisted import UNLISTED
 from tirelib.effects import Effect
 from tirelib.identify.waveform_fit import Data
@@ -46,8 +47,7 @@ class Stage:
     scores : Scores
     limit : shape (n_candidates,)
         Largest score of the variants (`tirelib.diagnose.ranking.limits`).
-    noise : float, [-]
-        Of a whitened sample.
+    noise : WhiteNoise
     in_range : shape (n_candidates,)
         Whether an effect may be named: in the catalogue, with a plausible strength and sign.
     impossible : shape (n_candidates,)
@@ -66,7 +66,7 @@ class Stage:
     ranking: Ranking
     scores: Scores
     limit: FloatArray
-    noise: float
+    noise: WhiteNoise
     in_range: BoolArray
     impossible: BoolArray
     over: BoolArray
@@ -80,7 +80,7 @@ class Stage:
         model: Refit,
         catalogue: Sequence[Effect],
         rests: Variants,
-        noise: float,
+        noise: WhiteNoise,
         least: Mapping[str, float],
     ) -> "Stage":
         """Return the stage of a model.
@@ -88,15 +88,14 @@ class Stage:
         Parameters
         ----------
         rests : Variants
-        noise : float, [-]
-            Of a whitened sample.
+        noise : WhiteNoise
         least : mapping of name to float
             Limits that hold already: no effect added makes one smaller.
         """
         listed = {effect.name for effect in (*catalogue, *model.effects)}
         others = [effect for effect in UNLISTED if effect.name not in listed]
         found = candidates(data, model, [*catalogue, *others])
-        structure = structure_of(data, model, rests, noise)
+        structure = structure_of(data, model, rests, noise.smooth)
         found = with_secants(data, model, found, structure)
         ranking = Ranking(model, found, structure)
         # what the fitted delay took is weighed against the effects, as likely as delays are
@@ -126,13 +125,19 @@ class Stage:
     @property
     def unit(self) -> float:
         """Misfit that noise and structure outside the ensemble leave together."""
-        usual = self.noise**2 + USUAL * LEAST**2
+        usual = self.noise.smooth**2 + USUAL * LEAST**2
         return self.model.waveform.size * usual / self.ranking.structure.variance
 
     @property
     def beyond(self) -> float:
-        """What the joint fit leaves, in this unit."""
-        return self.scores.after / self.unit
+        """What the joint fit leaves, over what noise and structure outside the ensemble leave then.
+
+        It takes what is smooth, so that of the noise the variance of a sample is left.
+        """
+        usual = self.noise.sample**2 + USUAL * spread_of(0.0, len(self.model.waveform)) ** 2
+        return (
+            self.scores.after * self.ranking.structure.variance / (self.model.waveform.size * usual)
+        )
 
     @property
     def threshold(self) -> FloatArray:

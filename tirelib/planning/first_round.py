@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.candidates import Candidates
-from tirelib.diagnose.noise import noise_in, white_level
+from tirelib.diagnose.noise import noise_in, white_noise
 from tirelib.diagnose.refit import Refit
 from tirelib.diagnose.stage import ALARM, Stage
 from tirelib.diagnose.stored import ensemble_of
@@ -47,7 +47,7 @@ class FirstRound:
         rests = ensemble_of(
             data, base, noise=noise_in(runs), members=members, seed=seed, progress=progress
         )
-        level = white_level(runs, base, data.strain)
+        level = white_noise(runs, base, data.strain)
         return cls(Stage.of(data, base, catalogue, rests, level, {}))
 
     @property

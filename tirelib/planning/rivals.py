@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.diagnose.noise import white_level
+from tirelib.diagnose.noise import white_noise
 from tirelib.diagnose.refit import Refit
 from tirelib.diagnose.stage import USUAL
 from tirelib.diagnose.structure import LEAST, spread_of
@@ -95,7 +95,7 @@ def repeated_noise(runs: StraightRuns, data: Data, base: Refit) -> float:
     """
     if not np.isfinite(runs.noise.std):
         return float("nan")
-    return white_level(runs, base, data.strain) * base.whiten.noise
+    return white_noise(runs, base, data.strain).smooth * base.whiten.noise
 
 
 def try_suspects(

@@ -9,7 +9,7 @@ from tests.unit.diagnose.planted import TIRE, runs
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.candidates import Candidate, candidates
 from tirelib.diagnose.ensemble import Variants, variants
-from tirelib.diagnose.noise import noise_in, white_level
+from tirelib.diagnose.noise import noise_in, white_noise
 from tirelib.diagnose.refit import Refit, refit
 from tirelib.diagnose.secants import with_secants
 from tirelib.diagnose.shape import structure_of
@@ -28,7 +28,8 @@ def case(effect: str, strength: float) -> tuple[Data, Refit, Structure]:
     data = straight.data(with_deflection=False)
     base = refit(data, values_of(TIRE))
     rests = Variants(variants(data, base, members=6), noise_in(straight))
-    return data, base, structure_of(data, base, rests, white_level(straight, base, data.strain))
+    noise = white_noise(straight, base, data.strain)
+    return data, base, structure_of(data, base, rests, noise.smooth)
 
 
 def found(effect: str, strength: float, name: str) -> tuple[Candidate, Candidate]:

@@ -75,3 +75,16 @@ def test_what_cannot_be_but_explains_tells_of_something_unknown(
         scores=scores, unit=1.0, beyond=1.0, outside=outside, imitated=imitated
     )  # fmt: skip
     assert _verdict([], (), stage, told(stage), None) == (verdict, [])
+
+
+@pytest.mark.parametrize(
+    ("named", "verdict"),
+    [(["belt_shear"], "unknown"), (["a"], "named"), (["a", "belt_shear"], "named")],
+)
+def test_the_shear_of_every_belt_does_not_explain_what_no_catalogue_holds(
+    named: list[str], verdict: str
+) -> None:
+    last: Any = after(EXPLAINED + 0.01, FELL + 0.01)
+    like: Any = SimpleNamespace(effect=SimpleNamespace(name="gain_by_load"))
+    assert _verdict(named, [], FIRST, told(last), None) == ("named", named)
+    assert _verdict(named, [], FIRST, told(last), like)[0] == verdict
