@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from next_test.pair import REFERENCE, Pair, PairCase, look_alikes
+from next_test.pair import REFERENCE, Pair, PairCase, look_alikes, open_still
 from tests.magic_sweep import _force
 from tirelib.arrays import FloatArray
 from tirelib.compare.force_model import ForceBench, ForceModel
@@ -26,6 +26,7 @@ from tirelib.effects import CATALOGUE
 from tirelib.identify.brush_fit import fit_brush
 from tirelib.identify.brush_model import BrushModel
 from tirelib.identify.force_data import ForceData
+from tirelib.planning.criterion import NextTest
 from tirelib.planning.envelope import Envelope
 from tirelib.planning.force_rivals import (
     MEMBERS,
@@ -204,7 +205,11 @@ def pairs(*, scattered: bool = False) -> list[Pair]:
 
 
 def measured(test: PairCase) -> dict[str, Any]:
-    """Return what the campaign, a further run at random, and the advised one tell of a pair."""
+    """Return what the campaign, and one further run or two tell of a pair.
+
+    That is a run at random, the advised one, and where that leaves the pair open, the one that is
+    advised then.
+    """
     tire = tire_of(test)
     case = case_of(tire.measured(PLANS[test.plan].points(test.seed), 1))
     base = fit_force(case.problem, case.model.values)
@@ -216,31 +221,47 @@ def measured(test: PairCase) -> dict[str, Any]:
     out: dict[str, Any] = {"strength": tire.strength, "before": test.gap(plan.trial)}
     if len(plan.trial.rivals) < 2:
         return out
-    for name, k in (("chosen", 0), ("random", test.any_of(len(plan.points)))):
-        trial = _tried(case, envelope, plan.points[k], tire, base, suspects)
-        out[name] = test.gap(trial) | {
-            "at": envelope.text(plan.points[k]), "predicted": float(plan.score[k]),
-            "chance": float(plan.probability[k]),
-        }  # fmt: skip
+    for name, k in (("random", test.any_of(len(plan.points))), ("chosen", 0)):
+        after = _with_run(case, envelope, plan.points[k], tire, 0)
+        fitted = fit_force(after.problem, base.values)
+        out[name] = test.gap(_tried(after, fitted, suspects)) | _told(plan, k)
+    out["second"] = out["chosen"]
+    if open_still(out["chosen"]["gap"]):
+        more = force_next_test(after, fitted, suspects, force_envelope(after, **declared))
+        if len(more.trial.rivals) == 2:
+            both = _with_run(after, more.envelope, more.points[0], tire, 1)
+            again = fit_force(both.problem, fitted.values)
+            out["second"] = test.gap(_tried(both, again, suspects)) | _told(more, 0)
     return out
 
 
-def _tried(
-    case: ForceCase, envelope: Envelope, point: FloatArray, tire: Tire, near: ForceFit,
-    suspects: Sequence[Any],
-) -> ForceTrial:  # fmt: skip
-    """Return the rivals on a campaign with one run more."""
+def _told(plan: NextTest, rank: int) -> dict[str, Any]:
+    """Return a run of a rank, and what is foretold of it."""
+    return {
+        "at": plan.envelope.text(plan.points[rank]), "predicted": float(plan.score[rank]),
+        "chance": float(plan.probability[rank]),
+    }  # fmt: skip
+
+
+def _with_run(
+    case: ForceCase, envelope: Envelope, point: FloatArray, tire: Tire, before: int
+) -> ForceCase:
+    """Return a campaign with one run more, after so many further ones."""
     joint = points_ahead(case, envelope, point[None])
     n, size = len(case.problem), envelope.points
     at = joint.bench.conditions.take(np.arange(n, n + size))
     told = {name: getattr(at, name) for name in ("load", "pressure", "slip_angle", "temperature")}
-    told |= {"time": tire.span + PAUSE + PACE * np.arange(size), "run": np.zeros(size)}
+    later = tire.span + (1 + before) * PAUSE + before * PACE * size
+    told |= {"time": later + PACE * np.arange(size), "run": np.zeros(size)}
     # the model is told the set points, and the tire has others
-    off = tire.measured(told, 2)
+    off = tire.measured(told, 2 + 2 * before)
     told |= {name: getattr(off, name) for name in ("load", "pressure", "slip_angle")}
-    side = tire.measured(told, 3).Fy
-    problem = replace(joint, measured=np.concatenate([case.problem.measured, side]))
-    after = replace(case, problem=problem)
-    base = fit_force(problem, near.values)
-    structure = structure_rows(problem, len(problem), base, MEMBERS, 0)
-    return try_force_suspects(after, base, suspects, structure)
+    side = tire.measured(told, 3 + 2 * before).Fy
+    measured = np.concatenate([case.problem.measured, side])
+    return replace(case, problem=replace(joint, measured=measured))
+
+
+def _tried(case: ForceCase, base: ForceFit, suspects: Sequence[Any]) -> ForceTrial:
+    """Return the rivals on a campaign."""
+    structure = structure_rows(case.problem, len(case.problem), base, MEMBERS, 0)
+    return try_force_suspects(case, base, suspects, structure)

@@ -9,7 +9,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.errors import CalibrationError
-from tirelib.planning.criterion import Trial
+from tirelib.planning.criterion import RESOLVED, Trial
 
 A_PLAN = 3
 """Pairs that each plan contributes at most."""
@@ -61,6 +61,11 @@ class PairCase:
                 f"{self.truth} in {self.plan}, seed {self.seed}: planted with a chi-square of "
                 f"{reached:.3g}, {low:g} to {high:g} are wanted; the case is left out"
             )
+
+
+def open_still(gap: float | None) -> bool:
+    """Return whether a gap rules nobody out."""
+    return gap is None or abs(gap) < RESOLVED
 
 
 def look_alikes(

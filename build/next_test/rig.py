@@ -113,22 +113,23 @@ class Made:
     ratio: float
     waves: Waveforms
 
-    def with_run(self, point: FloatArray, repeats: int = 1) -> Waveforms:
-        """Return the campaign with further runs at a load, a pressure and a speed, SI."""
-        return join(self.waves, self._further(np.asarray(point, dtype=float), repeats))
+    def with_runs(self, points: FloatArray) -> Waveforms:
+        """Return the campaign with further runs at loads, pressures and speeds (n, 3), SI."""
+        waves = self.waves
+        for before, point in enumerate(np.asarray(points, dtype=float)):
+            waves = join(waves, self._further(point, before))
+        return waves
 
-    def _further(self, point: FloatArray, repeats: int) -> Waveforms:
+    def _further(self, point: FloatArray, before: int) -> Waveforms:
         told = (campaign_day(self.seed, self.plan).key, self.truth, f"{self.strength:.6e}",
-                np.round(point, 2).tolist(), repeats)  # fmt: skip
+                np.round(point, 2).tolist(), before)  # fmt: skip
         file = CACHE / "further" / f"{_digest(told)}.pkl"
 
         def make() -> Waveforms:
             n = len(self.waves)
-            later = [(n + k) / (n - 1.0) for k in range(repeats)]
-            number = 100 + int(_digest(told[3])[:6], 16) % 9000
-            today = small_day(
-                self.seed, [Condition(*point)] * repeats, range(repeats), later, number
-            )
+            number = 100 + int(_digest(told[3:])[:6], 16) % 9000
+            later = [(n + before) / (n - 1.0)]
+            today = small_day(self.seed, [Condition(*point)], [0], later, number)
             states, shown = traces(today, self.truth, self.strength, None)
             return waveforms(Plain(today, tuple(states)), states, shown, f"{told}")
 

@@ -1,4 +1,4 @@
-"""Print how often a further run tells look-alikes apart: one at random, and the advised one.
+"""Print how often a further run tells look-alikes apart: one at random, the advised, and another.
 
     python build/next_test/run.py --seeds 6100-6101
     python build/next_test/run.py --quantity Fy --seeds 6100-6103
@@ -26,10 +26,9 @@ from hidden.measured import keep
 
 import tirelib
 from next_test import forces, strain
-from next_test.pair import cases_of
+from next_test.pair import cases_of, open_still
 from next_test.rig import CACHE
 from tirelib.errors import TirelibError
-from tirelib.planning.criterion import RESOLVED
 from tirelib.planning.document import PROMISING
 
 VISIBLE = {"strain": 15.0, "Fy": 17.0}
@@ -37,7 +36,9 @@ VISIBLE = {"strain": 15.0, "Fy": 17.0}
 structure: that at which a run at random parts about 45 % of the pairs, on seeds from 1400 on."""
 _PARTS = ("diagnose", "effects", "identify", "model", "planning", "contact", "ring", "strain",
           "brush", "compare")  # fmt: skip
-STAGES = {"before": "before", "random": "random", "chosen": "advised"}
+STAGES = {
+    "before": "before", "random": "random", "chosen": "advised", "second": "advised, one or two",
+}  # fmt: skip
 """Of a case, and as the table tells them."""
 Verdict = dict[str, Any]
 
@@ -72,7 +73,7 @@ def verdict(quantity: str, case: Any, code: str) -> Verdict:
 def state(found: Verdict, stage: str) -> str:
     """Return right, wrong or open: whether one of the two is ruled out, and which."""
     gap = found.get(stage, {}).get("gap")
-    if gap is None or abs(gap) < RESOLVED:
+    if gap is None or open_still(gap):
         return "open"
     return "right" if gap > 0.0 else "wrong"
 

@@ -1,5 +1,6 @@
 """One case on strain: two look-alikes, before, after a run at random and after the advised run."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -7,12 +8,12 @@ import numpy as np
 from hidden.cases import base_fit
 
 from bench.rig.hidden import HIDDEN
-from next_test.pair import REFERENCE, Pair, PairCase, look_alikes
+from next_test.pair import REFERENCE, Pair, PairCase, look_alikes, open_still
 from next_test.rig import ENVELOPE, PLANS, bare, campaign
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.candidates import candidates
 from tirelib.diagnose.refit import Refit, refit
-from tirelib.effects import CATALOGUE
+from tirelib.effects import CATALOGUE, Effect
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.waveform_fit import Data
 from tirelib.planning.criterion import NextTest
@@ -40,7 +41,11 @@ def pairs() -> list[Pair]:
 
 
 def measured(case: PairCase) -> dict[str, Any]:
-    """Return what the campaign, a further run at random, and the advised one tell of a pair."""
+    """Return what the campaign, and one further run or two tell of a pair.
+
+    That is a run at random, the advised one, and where that leaves the pair open, the one that is
+    advised then.
+    """
     made = campaign(case.seed, case.plan, case.truth, case.visible)
     case.check(made.visible)
     none = bare(case.seed, case.plan).fit
@@ -50,7 +55,7 @@ def measured(case: PairCase) -> dict[str, Any]:
     noise = repeated_noise(runs, data, base)
     suspects = [(CATALOGUE[k], np.full(CATALOGUE[k].components, 0.1 * CATALOGUE[k].toward))
                 for k in sorted((case.truth, case.rival))]  # fmt: skip
-    test = next_test(data, base.on_time(data.points), suspects, _envelope(data), noise=noise)
+    test = _advice(data, base, suspects, noise)
     out: dict[str, Any] = {
         "strength": made.strength, "reached": made.visible, "ratio": made.ratio,
         "before": case.gap(test.trial),
@@ -58,12 +63,33 @@ def measured(case: PairCase) -> dict[str, Any]:
     if len(test.trial.rivals) < 2:
         return out
     for name, k in (("chosen", 0), ("random", case.any_of(len(test.points)))):
-        trial = _tried(made.with_run(test.points[k]), base, test.trial, _ahead(test, k))
-        out[name] = case.gap(trial) | {
-            "at": test.envelope.text(test.points[k]), "predicted": float(test.score[k]),
-            "chance": float(test.probability[k]),
-        }  # fmt: skip
+        trial = _tried(made.with_runs(test.points[[k]]), base, test.trial, _ahead(test, k))
+        out[name] = case.gap(trial) | _told(test, k)
+    out["second"] = out["chosen"]
+    if open_still(out["chosen"]["gap"]):
+        runs = straight_runs(made.with_runs(test.points[:1]))
+        data = runs.data(with_deflection=False)
+        base = refit(data, base.values)
+        more = _advice(data, base, suspects, repeated_noise(runs, data, base))
+        if len(more.trial.rivals) == 2:
+            both = made.with_runs(np.stack([test.points[0], more.points[0]]))
+            trial = _tried(both, base, more.trial, _ahead(more, 0))
+            out["second"] = case.gap(trial) | _told(more, 0)
     return out
+
+
+def _advice(
+    data: Data, base: Refit, suspects: Sequence[tuple[Effect, FloatArray]], noise: float
+) -> NextTest:
+    return next_test(data, base.on_time(data.points), suspects, _envelope(data), noise=noise)
+
+
+def _told(test: NextTest, rank: int) -> dict[str, Any]:
+    """Return a run of a rank, and what is foretold of it."""
+    return {
+        "at": test.envelope.text(test.points[rank]), "predicted": float(test.score[rank]),
+        "chance": float(test.probability[rank]),
+    }  # fmt: skip
 
 
 def _envelope(data: Data) -> Envelope:
