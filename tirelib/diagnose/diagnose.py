@@ -83,8 +83,9 @@ class Diagnosis:
     base, final : Refit
         Without and with the named effects.
     left, floor : float
-        What the joint fit with the named effects leaves, over what noise and structure outside the
-        ensemble usually do, and from where on it is more than structure.
+        What the joint fit with the named effects leaves (without any, if nothing is named), over
+        what noise and structure outside the ensemble usually do, and from where on it is more than
+        structure.
     rounds : int
     runs : StraightRuns
     data : Data
@@ -152,11 +153,13 @@ def diagnose(
     refitted = Refits(data, progress)
     found = rounds(data, first, catalogue, rests, level, refitted)
     stage = found.stage
-    like = None if found.unlisted is None else _finding(stage, found.unlisted, data)
+    like = None if found.unlisted is None else _like(first, stage, found.unlisted, data)
     named = stage.model.needed(found.named)
     findings = _findings(first, named, stage.model, data)
     twins = inseparable(data, first, findings, named, refitted)
     verdict, named = _verdict(named, twins, first, found, like)
+    if not named:
+        findings = _findings(first, (), first.model, data)
     last = stage if named else first
     left, floor = last.beyond, BEYOND
     beyond = last.unexplained(last.model.waveform[None] - data.strain)[0]
@@ -212,6 +215,15 @@ def _finding(stage: Stage, index: int, data: Data) -> Finding:
         stage.ranking.power(index, ALARM * limit),
         candidate.alone(data, stage.model)[1],
     )
+
+
+def _like(first: Stage, stage: Stage, index: int, data: Data) -> Finding:
+    """Return what a stage needs in no catalogue, with the error that it leaves the first alone."""
+    found = _finding(stage, index, data)
+    alone = [each for each in first.found.living if each.effect == found.effect]
+    if not alone:
+        return found
+    return replace(found, error_after=alone[0].alone(data, first.model)[1])
 
 
 def _listed(twins: Sequence[tuple[str, float]]) -> tuple[tuple[str, float], ...]:

@@ -25,6 +25,7 @@ class WhiteNoise:
     smooth : float, [-]
         Of white noise that meets a smooth shape as the noise does, which is smooth itself: n_e
         independent samples in a turn of n meet it with n / n_e times the variance of a sample.
+        Without repeats it is that of a sample.
     """
 
     sample: float

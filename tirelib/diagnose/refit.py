@@ -186,7 +186,7 @@ def refit(
 class Refits:
     """Fits of one campaign with effects added to a model, each made once.
 
-    The bottom is the same whatever the strengths start from.
+    The bottom is the same whatever the strengths start from; whether a fit gets there is not.
 
     Parameters
     ----------
@@ -196,15 +196,14 @@ class Refits:
 
     def __init__(self, data: Data, progress: Callable[[str], None] | None = None) -> None:
         self.data, self.progress = data, progress
-        self._made: list[tuple[Refit, list[str], Refit | None]] = []
+        self._made: list[tuple[Refit, tuple[Effect, ...], Refit]] = []
 
     def __call__(
         self, model: Refit, effects: Sequence[Effect], strengths: Sequence[FloatArray]
     ) -> Refit | None:
         """Return the fit with effects from a fitted model; None if it does not settle."""
-        names = [effect.name for effect in effects]
         for start, added, found in self._made:
-            if start is model and added == names:
+            if start is model and added == tuple(effects):
                 return found
         try:
             made = refit(
@@ -212,8 +211,8 @@ class Refits:
                 delay=model.delay, near=model.correction, progress=self.progress,
             )  # fmt: skip
         except TirelibError:
-            made = None
-        self._made.append((model, names, made))
+            return None
+        self._made.append((model, tuple(effects), made))
         return made
 
 

@@ -110,7 +110,10 @@ class Stage:
         )  # fmt: skip
 
     def of_residual(self, residual: FloatArray) -> "Stage":
-        """Return the stage as it would be with another residual (n_runs, n_phi)."""
+        """Return the stage with another residual (n_runs, n_phi), free of delay.
+
+        Candidates and limits stay: effects are followed as far as the campaign's residual asks.
+        """
         scores = self.ranking.scores(residual)
         in_range, impossible, over, far = _ranges(self.found, scores)
         return replace(
@@ -124,7 +127,10 @@ class Stage:
 
     @property
     def unit(self) -> float:
-        """Misfit that noise and structure outside the ensemble leave together."""
+        """Misfit that noise and structure outside the ensemble leave at most, before a joint fit.
+
+        Noise is taken to be such everywhere as smooth shapes meet it.
+        """
         usual = self.noise.smooth**2 + USUAL * LEAST**2
         return self.model.waveform.size * usual / self.ranking.structure.variance
 
@@ -132,7 +138,7 @@ class Stage:
     def beyond(self) -> float:
         """What the joint fit leaves, over what noise and structure outside the ensemble leave then.
 
-        It takes what is smooth, so that of the noise the variance of a sample is left.
+        Of the noise that is at most the variance of a sample.
         """
         usual = self.noise.sample**2 + USUAL * spread_of(0.0, len(self.model.waveform)) ** 2
         return (

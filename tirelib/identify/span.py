@@ -24,5 +24,5 @@ def span(columns: FloatArray) -> FloatArray:
     size = np.sqrt(np.sum(columns**2, axis=0))
     if not size.any():
         return np.zeros((len(columns), 0))
-    basis: FloatArray = linalg.orth(columns[:, size > 0.0] / size[size > 0.0], rcond=KNOWN)
+    basis: FloatArray = linalg.orth(columns[:, size != 0.0] / size[size != 0.0], rcond=KNOWN)
     return basis

@@ -30,3 +30,8 @@ def test_what_depends_on_others_but_for_errors_of_differences_adds_no_direction(
 
 def test_nothing_spans_nothing() -> None:
     assert span(np.zeros((5, 2))).shape == (5, 0)
+
+
+def test_what_is_no_number_is_not_dropped() -> None:
+    with pytest.raises(ValueError, match="infs or NaNs"):
+        span(np.array([[1.0, np.nan], [2.0, 1.0]]))
