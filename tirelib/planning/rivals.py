@@ -14,7 +14,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.noise import white_noise
-from tirelib.diagnose.refit import Refit
+from tirelib.diagnose.refit import Refit, inside
 from tirelib.diagnose.stage import USUAL
 from tirelib.diagnose.structure import LEAST, spread_of
 from tirelib.effects import Effect
@@ -164,7 +164,7 @@ def _left(metric: Metric, plain: Guess, guesses: Sequence[Guess]) -> float:
 
 def _start(effect: Effect, strength: FloatArray) -> FloatArray:
     """Return a start inside the range, and off zero."""
-    start: FloatArray = np.clip(strength, 0.9 * effect.low, 0.9 * effect.high)
+    start = inside(effect, strength)
     return start if np.any(start) else np.full(effect.components, FAINT * effect.toward)
 
 
