@@ -57,6 +57,11 @@ def test_an_oval_tire_which_no_effect_tells_is_unknown() -> None:
     assert (found["outcome"], found["verdict"], found["named"]) == ("flagged", "unknown", [])
 
 
+def test_a_gain_that_no_catalogue_holds_is_unknown_though_the_belt_shears_as_well() -> None:
+    found = told("1750-pressure_sensitive_gage-1.50")
+    assert (found["outcome"], found["verdict"], found["named"]) == ("flagged", "unknown", [])
+
+
 def test_shear_is_named_and_its_addition_takes_the_error() -> None:
     found = told("1700-belt_shear-1.50")
     assert found["named"] == ["belt_shear"]
