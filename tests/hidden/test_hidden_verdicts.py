@@ -58,8 +58,10 @@ def test_an_oval_tire_which_no_effect_tells_is_unknown() -> None:
 
 
 def test_a_gain_that_no_catalogue_holds_is_unknown_though_the_belt_shears_as_well() -> None:
-    found = told("1750-pressure_sensitive_gage-1.50")
+    found = told("1750-pressure_sensitive_gage-1.50", 100)  # with fewer the shear is not named
     assert (found["outcome"], found["verdict"], found["named"]) == ("flagged", "unknown", [])
+    # nothing is named, so that nobody is an alarm by an exact fit
+    assert all(each["ratio"] >= ALARM for each in found["leaders"] if each["level"] == "alarm")
 
 
 def test_shear_is_named_and_its_addition_takes_the_error() -> None:

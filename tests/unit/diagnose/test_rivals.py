@@ -11,8 +11,6 @@ from tirelib.diagnose.rivals import inseparable
 from tirelib.diagnose.rounds import Rounds
 from tirelib.effects import CATALOGUE
 
-NAMES = ("temperature", "tread_wear", "gage_drift", "belt_shear")
-
 
 def finding(name: str, twins: tuple[str, ...] = (), level: str = "alarm") -> Any:
     return SimpleNamespace(
