@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from next_test.pair import REFERENCE, Pair, PairCase, look_alikes, open_still
+from next_test.pair import REFERENCE, Pair, PairCase, foretold, look_alikes, open_still
 from tests.magic_sweep import _force
 from tirelib.arrays import FloatArray
 from tirelib.compare.force_model import ForceBench, ForceModel
@@ -26,7 +26,6 @@ from tirelib.effects import CATALOGUE
 from tirelib.identify.brush_fit import fit_brush
 from tirelib.identify.brush_model import BrushModel
 from tirelib.identify.force_data import ForceData
-from tirelib.planning.criterion import NextTest
 from tirelib.planning.envelope import Envelope
 from tirelib.planning.force_rivals import (
     MEMBERS,
@@ -224,23 +223,15 @@ def measured(test: PairCase) -> dict[str, Any]:
     for name, k in (("random", test.any_of(len(plan.points))), ("chosen", 0)):
         after = _with_run(case, envelope, plan.points[k], tire, 0)
         fitted = fit_force(after.problem, base.values)
-        out[name] = test.gap(_tried(after, fitted, suspects)) | _told(plan, k)
+        out[name] = test.gap(_tried(after, fitted, suspects)) | foretold(plan, k)
     out["second"] = out["chosen"]
     if open_still(out["chosen"]["gap"]):
         more = force_next_test(after, fitted, suspects, force_envelope(after, **declared))
         if len(more.trial.rivals) == 2:
             both = _with_run(after, more.envelope, more.points[0], tire, 1)
             again = fit_force(both.problem, fitted.values)
-            out["second"] = test.gap(_tried(both, again, suspects)) | _told(more, 0)
+            out["second"] = test.gap(_tried(both, again, suspects)) | foretold(more, 0)
     return out
-
-
-def _told(plan: NextTest, rank: int) -> dict[str, Any]:
-    """Return a run of a rank, and what is foretold of it."""
-    return {
-        "at": plan.envelope.text(plan.points[rank]), "predicted": float(plan.score[rank]),
-        "chance": float(plan.probability[rank]),
-    }  # fmt: skip
 
 
 def _with_run(

@@ -9,7 +9,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.errors import CalibrationError
-from tirelib.planning.criterion import RESOLVED, Trial
+from tirelib.planning.criterion import RESOLVED, NextTest, Trial
 
 A_PLAN = 3
 """Pairs that each plan contributes at most."""
@@ -66,6 +66,14 @@ class PairCase:
 def open_still(gap: float | None) -> bool:
     """Return whether a gap rules nobody out."""
     return gap is None or abs(gap) < RESOLVED
+
+
+def foretold(test: NextTest, rank: int) -> dict[str, Any]:
+    """Return a run of a rank, and what is foretold of it."""
+    return {
+        "at": test.envelope.text(test.points[rank]), "predicted": float(test.score[rank]),
+        "chance": float(test.probability[rank]),
+    }  # fmt: skip
 
 
 def look_alikes(

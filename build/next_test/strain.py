@@ -1,4 +1,4 @@
-"""One case on strain: two look-alikes, before, after a run at random and after the advised run."""
+"""One case on strain: two look-alikes, before, after a run at random and after the advised ones."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -8,7 +8,7 @@ import numpy as np
 from hidden.cases import base_fit
 
 from bench.rig.hidden import HIDDEN
-from next_test.pair import REFERENCE, Pair, PairCase, look_alikes, open_still
+from next_test.pair import REFERENCE, Pair, PairCase, foretold, look_alikes, open_still
 from next_test.rig import ENVELOPE, PLANS, bare, campaign
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.candidates import candidates
@@ -64,7 +64,7 @@ def measured(case: PairCase) -> dict[str, Any]:
         return out
     for name, k in (("chosen", 0), ("random", case.any_of(len(test.points)))):
         trial = _tried(made.with_runs(test.points[[k]]), base, test.trial, _ahead(test, k))
-        out[name] = case.gap(trial) | _told(test, k)
+        out[name] = case.gap(trial) | foretold(test, k)
     out["second"] = out["chosen"]
     if open_still(out["chosen"]["gap"]):
         runs = straight_runs(made.with_runs(test.points[:1]))
@@ -74,7 +74,7 @@ def measured(case: PairCase) -> dict[str, Any]:
         if len(more.trial.rivals) == 2:
             both = made.with_runs(np.stack([test.points[0], more.points[0]]))
             trial = _tried(both, base, more.trial, _ahead(more, 0))
-            out["second"] = case.gap(trial) | _told(more, 0)
+            out["second"] = case.gap(trial) | foretold(more, 0)
     return out
 
 
@@ -82,14 +82,6 @@ def _advice(
     data: Data, base: Refit, suspects: Sequence[tuple[Effect, FloatArray]], noise: float
 ) -> NextTest:
     return next_test(data, base.on_time(data.points), suspects, _envelope(data), noise=noise)
-
-
-def _told(test: NextTest, rank: int) -> dict[str, Any]:
-    """Return a run of a rank, and what is foretold of it."""
-    return {
-        "at": test.envelope.text(test.points[rank]), "predicted": float(test.score[rank]),
-        "chance": float(test.probability[rank]),
-    }  # fmt: skip
 
 
 def _envelope(data: Data) -> Envelope:

@@ -8,8 +8,9 @@ two kinds of it.
   is fitted to each as it is to the data, and what that leaves is a sample of what structure does.
 - What adds to a waveform in proportion: a smooth misfit that goes with strain, load, pressure and
   speed, sharper ends of the contact, shear of the tread that bends the flat piece, a sidewall that
-  softens a little as it is pressed, run-out, a late trigger, set points, gain and angle that are
-  off in a run. Its covariance is known, so it needs no sample (`smooth_part`, `run_part`).
+  softens a little as it is pressed, blocks that turn with the sections, run-out, a late trigger,
+  set points, gain and angle that are off in a run. Its covariance is known, so it needs no sample
+  (`smooth_part`, `run_part`).
 
 A measured variant has both, and noise.
 """
@@ -23,7 +24,7 @@ from tirelib.arrays import FloatArray
 from tirelib.diagnose.refit import Refit
 from tirelib.diagnose.unlisted import gain_by_load, gain_by_pressure, gain_by_speed
 from tirelib.diagnose.variant import variant
-from tirelib.effects import CATALOGUE
+from tirelib.effects import CATALOGUE, Effect
 from tirelib.effects.effect import State
 from tirelib.effects.patch import along, balanced, beam_strain, held_shear
 from tirelib.errors import ParameterError, TirelibError
@@ -50,6 +51,7 @@ ALIKE = {
     CATALOGUE["roughness"]: 0.03,
     CATALOGUE["gage_saturation"]: 1.2e-3,
     CATALOGUE["sidewall_load"]: 0.006,
+    CATALOGUE["rotary_inertia"]: 5e-5,
     gain_by_load: 0.0075,
     gain_by_pressure: 0.01,
     gain_by_speed: 0.004,
@@ -57,8 +59,20 @@ ALIKE = {
 """Standard deviation, in their units, of what a tire's structure shows that looks like these
 effects: the contact's ends are sharper or smoother than the ring's, contact begins gradually across
 a crowned tread, strain is not quite in proportion to the belt's curvature, a sidewall is not quite
-linear (plain tires of finite elements and of the rig show up to 0.025), and what changes the
+linear (plain tires of finite elements and of the rig show up to 0.025), blocks and cords turn with
+the belt's sections (plain tires of finite elements show 1.5e-4 to 3e-4 kg m), and what changes the
 contact most (load, pressure, speed) changes its strain by a little more or less than the ring's."""
+SHOWN = {
+    **{effect: (size,) for effect, size in ALIKE.items()},
+    CATALOGUE["gage_saturation"]: (0.007,),
+    CATALOGUE["tread_friction"]: (0.03, BENT[0]),
+}
+"""The same of what is left beside a fitted shear of the belt. Plain tires of finite elements show
+up to 0.01 and, without bending the flat piece, up to 0.045 there. As a part of the covariance that
+would hide the friction of a tread that only pulls the ring."""
+ALONE, BESIDE = 3.0, 6.0
+"""Standard deviations up to which such a strength may be structure's: of one effect alone, and of
+one beside others, whose laws are right but roughly."""
 RUN_OUT, ONCE = 1e-4, 3e-6
 """Standard deviation of a tire's run-out, [m], and of strain once per turn beside it, [-]."""
 
@@ -202,6 +216,23 @@ def measured(
         white = model.whiten(wave + found.noise * random.standard_normal(wave.shape)).ravel()
         rests.append(rest + white - basis @ (basis.T @ white))
     return np.array(rests).reshape(found.rests.shape)
+
+
+def usual(effect: Effect, strength: FloatArray, *, beside: bool) -> bool:
+    """Return whether structure may show a strength (components,) where the effect is none.
+
+    Parameters
+    ----------
+    effect : Effect
+    strength : shape (components,)
+        Beside a fitted shear of the belt.
+    beside : bool
+        Whether other effects are there as well.
+    """
+    sizes = SHOWN.get(effect)
+    if sizes is None:
+        return False
+    return float(np.linalg.norm(strength / np.array(sizes))) < (BESIDE if beside else ALONE)
 
 
 def _by_load(data: Data, model: Refit) -> FloatArray:

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.diagnose.ensemble import structural_ensemble
+from tirelib.diagnose.noise import UNKNOWN_NOISE
 from tirelib.diagnose.refit import Refit
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.waveform_fit import Data
 
 FLOOR_MEMBERS = 20
-UNKNOWN_NOISE = 3e-6
-"""Noise that variants get where no runs were repeated, [-]."""
 
 
 @dataclass(frozen=True, slots=True)

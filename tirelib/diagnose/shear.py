@@ -13,9 +13,10 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.candidates import candidates
+from tirelib.diagnose.ensemble import usual
 from tirelib.diagnose.refit import FELL, Refit, fall, inside
 from tirelib.diagnose.stage import ALARM, Stage, within
-from tirelib.diagnose.unlisted import UNLISTED
+from tirelib.diagnose.unlisted import UNLISTED, with_unlisted
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.identify.waveform_fit import Data
 
@@ -96,7 +97,7 @@ def beside_shear(
     """Return the stage with the one effect that takes most beside the shear, and its index.
 
     The stage has the shear as well, where that is needed beside the effect. What is in no catalogue
-    is returned with the stage as it is.
+    is returned with the stage as it is. Nothing is returned that structure may show by itself.
 
     Parameters
     ----------
@@ -116,7 +117,7 @@ def beside_shear(
     """
     rows = [
         (1.0 - (left / model.error) ** 2, each.effect, strength)
-        for each in candidates(data, model, [*catalogue, *UNLISTED]).living
+        for each in candidates(data, model, with_unlisted([*catalogue, *model.effects])).living
         if each.effect.name in stage.names
         for strength, left in [each.alone(data, model)]
     ]
@@ -134,10 +135,13 @@ def beside_shear(
         return None
     where = stage.names.index(effect.name)
     if effect in UNLISTED:
-        return (stage, where) if stage.unlisted[where] else None
+        needed = stage.unlisted[where] and not usual(effect, strength, beside=among is not None)
+        return (stage, where) if needed else None
     start = inside(effect, strength)
     both = refitted(model, [*model.effects, effect], [*model.strengths, start])
     if both is None or fall(model, both) < least or not _in_range(both):
+        return None
+    if usual(effect, both.strengths[-1], beside=among is not None):
         return None
     after = staged(both)
     if after.scores.misfit >= beside.scores.misfit:

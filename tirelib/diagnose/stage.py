@@ -14,7 +14,7 @@ from tirelib.diagnose.refit import Refit
 from tirelib.diagnose.secants import with_secants
 from tirelib.diagnose.shape import structure_of
 from tirelib.diagnose.structure import FORM, LEAST, spread_of
-from tirelib.diagnose.unlisted import UNLISTED
+from tirelib.diagnose.unlisted import UNLISTED, with_unlisted
 from tirelib.effects import Effect
 from tirelib.identify.waveform_fit import Data
 
@@ -92,9 +92,7 @@ class Stage:
         least : mapping of name to float
             Limits that hold already: no effect added makes one smaller.
         """
-        listed = {effect.name for effect in (*catalogue, *model.effects)}
-        others = [effect for effect in UNLISTED if effect.name not in listed]
-        found = candidates(data, model, [*catalogue, *others])
+        found = candidates(data, model, with_unlisted([*catalogue, *model.effects]))
         structure = structure_of(data, model, rests, noise.smooth)
         found = with_secants(data, model, found, structure)
         ranking = Ranking(model, found, structure)

@@ -4,6 +4,8 @@ Each is ranked beside the effects, so that what it explains is not taken for one
 never named: a residual that it explains better than any effect lacks none of these.
 """
 
+from collections.abc import Sequence
+
 from tirelib.arrays import FloatArray
 from tirelib.effects.effect import Effect, State, effect
 from tirelib.identify.discrepancy import REFERENCE_LOAD, REFERENCE_OMEGA, REFERENCE_PRESSURE
@@ -42,3 +44,9 @@ def gain_by_speed(state: State, strength: float) -> State:
 
 UNLISTED: tuple[Effect, ...] = (gain_by_load, gain_by_pressure, gain_by_speed)
 """Every one of them."""
+
+
+def with_unlisted(effects: Sequence[Effect]) -> list[Effect]:
+    """Return effects and, behind them, those in no catalogue whose names are not taken."""
+    names = {effect.name for effect in effects}
+    return [*effects, *(each for each in UNLISTED if each.name not in names)]

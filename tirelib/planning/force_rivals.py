@@ -20,6 +20,7 @@ from tirelib.diagnose.forces.assess import ForceCase
 from tirelib.diagnose.forces.candidates import varies
 from tirelib.diagnose.forces.ensemble import variant
 from tirelib.diagnose.forces.fit import WIDTH, ForceFit, Problem, slopes_at, with_effect
+from tirelib.diagnose.stage import RANGE_SLACK
 from tirelib.effects import Effect
 from tirelib.errors import CalibrationError, TirelibError
 from tirelib.identify.force_data import ForceData
@@ -30,8 +31,6 @@ from tirelib.planning.on_trial import fitted_rivals
 from tirelib.planning.sweep import campaign_sweep
 
 MEMBERS = 60
-RANGE_SLACK = 2.0
-"""Standard deviations by which a strength may leave its range."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,13 +12,12 @@ import numpy as np
 from scipy import linalg
 
 from tirelib.arrays import FloatArray
+from tirelib.diagnose.candidates import TWIN_ANGLE
 from tirelib.diagnose.forces.fit import ForceFit, Problem
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
 from tirelib.model.brush import BrushConditions
 
-TWIN_ANGLE = np.deg2rad(30.0)
-"""Signatures closer than this are called twins."""
 LEAST_SIGNAL = 3.0
 """An effect at the end of its range that changes scaled forces by less is dead."""
 LEAST_OWN = 0.02

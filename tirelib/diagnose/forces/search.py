@@ -8,6 +8,8 @@ from tirelib.arrays import BoolArray, FloatArray
 from tirelib.diagnose.forces.candidates import ForceCandidates, force_candidates
 from tirelib.diagnose.forces.fit import ForceFit, Problem, fit_force
 from tirelib.diagnose.forces.ranking import ForceRanking, ForceScores
+from tirelib.diagnose.refit import inside
+from tirelib.diagnose.stage import RANGE_SLACK
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
 
@@ -20,8 +22,6 @@ LEAST_SHARE = 0.03
 LAW = 0.2
 """Share by which the law of an effect may be off: a twin has to explain more than its square."""
 ROUNDS = 3
-RANGE_SLACK = 2.0
-"""Standard deviations by which a strength may leave its range."""
 
 
 class Search:
@@ -64,7 +64,7 @@ class Search:
                 continue
             self.tried.add(effect.name)
             tell(f"refit with {effect.name}")
-            start = _inside(effect, self.now.strength[int(index)])
+            start = inside(effect, self.now.strength[int(index)])
             try:
                 trial = fit_force(
                     self.problem, self.model.values, [*self.model.effects, effect],
@@ -132,9 +132,3 @@ def alarms(found: ForceCandidates, scores: ForceScores, limits: Mapping[str, flo
     ratio = ratio_of(found, scores, limits)
     out: BoolArray = scores.inside & (ratio >= ALARM) & (scores.share >= LEAST_SHARE)
     return out
-
-
-def _inside(effect: Effect, strength: FloatArray) -> FloatArray:
-    """Return a start for a refit within the range."""
-    start: FloatArray = np.clip(strength, 0.9 * effect.low, 0.9 * effect.high)
-    return start
