@@ -32,8 +32,8 @@ BELT = frozenset({"belt_shear", "belt_extension"})
 HELD_OUT_BY = ("load", "pressure", "speed")
 _CODE = {
     "diagnose": ("candidates", "diagnose", "ensemble", "fitter", "noise",
-                 "ranking", "refit", "rivals", "rounds", "secants", "shape", "shear", "spread",
-                 "stage", "structure", "unlisted", "variant"),
+                 "plain", "ranking", "refit", "rivals", "rounds", "secants", "shape", "shear",
+                 "spread", "stage", "structure", "unlisted", "variant"),
     "identify": ("campaign_data", "delay", "discrepancy", "identify", "noise", "random_effects",
                  "span", "structure", "waveform_fit"),
     "effects": ("*",), "model": ("*",), "contact": ("*",), "ring": ("*",), "strain": ("*",),

@@ -8,10 +8,10 @@ from tirelib.diagnose.ensemble import MEMBERS
 from tirelib.diagnose.guess import Guess, guess_law
 from tirelib.diagnose.left import left_of
 from tirelib.diagnose.noise import noise_in, white_noise
+from tirelib.diagnose.plain import BELT, usual
 from tirelib.diagnose.refit import FELL, Refit, Refits, fall, refit
 from tirelib.diagnose.rivals import inseparable
 from tirelib.diagnose.rounds import HALVED, Rounds, rounds
-from tirelib.diagnose.shear import BELT
 from tirelib.diagnose.stage import ALARM, Stage, within
 from tirelib.diagnose.stored import ensemble_of
 from tirelib.diagnose.unlisted import UNLISTED
@@ -42,7 +42,8 @@ class Finding:
     score, threshold : float
         Misfit that returns without it, and the largest such that variants are expected to have.
     level : str
-        alarm, hint or quiet; what is named is an alarm by its exact fit, whatever first order says.
+        alarm, hint or quiet; what is named is an alarm by its exact fit, whatever first order says,
+        and what plain tires show no more than a hint.
     strength, std : shape (components,)
     in_range : bool
     share : float
@@ -201,13 +202,14 @@ def _findings(first: Stage, named: Sequence[str], model: Refit, data: Data) -> t
 def _finding(stage: Stage, index: int, data: Data) -> Finding:
     """Return one candidate as a stage sees it."""
     candidate, scores, limit = stage.found.living[index], stage.scores, stage.threshold[index]
-    ratio = stage.ratio[index]
+    ratio, strength = stage.ratio[index], scores.strength[index]
+    alarm = stage.alarms[index] and not usual(stage.model.effects, candidate.effect, strength)
     return Finding(
         candidate.effect,
         float(scores.score[index]),
         float(limit),
-        "alarm" if stage.alarms[index] else "hint" if ratio >= 1.0 else "quiet",
-        scores.strength[index],
+        "alarm" if alarm else "hint" if ratio >= 1.0 else "quiet",
+        strength,
         scores.std[index],
         bool(stage.in_range[index]),
         float(scores.alone[index] / scores.misfit),

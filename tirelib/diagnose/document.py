@@ -11,8 +11,8 @@ from tirelib.diagnose.floor import FLOOR_MEMBERS, ErrorUnit, structural_floor
 from tirelib.diagnose.guess import Guess
 from tirelib.diagnose.held_out import Fold, folds, held_out_errors, pooled
 from tirelib.diagnose.left import Left, left_of, told_powers
+from tirelib.diagnose.plain import BELT
 from tirelib.diagnose.refit import Refit, inside
-from tirelib.diagnose.shear import BELT
 from tirelib.identify.waveform_fit import Data
 
 FORMAT = "tirelib-diagnosis/1"

@@ -24,7 +24,7 @@ from tirelib.arrays import FloatArray
 from tirelib.diagnose.refit import Refit
 from tirelib.diagnose.unlisted import gain_by_load, gain_by_pressure, gain_by_speed
 from tirelib.diagnose.variant import variant
-from tirelib.effects import CATALOGUE, Effect
+from tirelib.effects import CATALOGUE
 from tirelib.effects.effect import State
 from tirelib.effects.patch import along, balanced, beam_strain, held_shear
 from tirelib.errors import ParameterError, TirelibError
@@ -62,17 +62,6 @@ a crowned tread, strain is not quite in proportion to the belt's curvature, a si
 linear (plain tires of finite elements and of the rig show up to 0.025), blocks and cords turn with
 the belt's sections (plain tires of finite elements show 1.5e-4 to 3e-4 kg m), and what changes the
 contact most (load, pressure, speed) changes its strain by a little more or less than the ring's."""
-SHOWN = {
-    **{effect: (size,) for effect, size in ALIKE.items()},
-    CATALOGUE["gage_saturation"]: (0.007,),
-    CATALOGUE["tread_friction"]: (0.03, BENT[0]),
-}
-"""The same of what is left beside a fitted shear of the belt. Plain tires of finite elements show
-up to 0.01 and, without bending the flat piece, up to 0.045 there. As a part of the covariance that
-would hide the friction of a tread that only pulls the ring."""
-ALONE, BESIDE = 3.0, 6.0
-"""Standard deviations up to which such a strength may be structure's: of one effect alone, and of
-one beside others, whose laws are right but roughly."""
 RUN_OUT, ONCE = 1e-4, 3e-6
 """Standard deviation of a tire's run-out, [m], and of strain once per turn beside it, [-]."""
 
@@ -216,23 +205,6 @@ def measured(
         white = model.whiten(wave + found.noise * random.standard_normal(wave.shape)).ravel()
         rests.append(rest + white - basis @ (basis.T @ white))
     return np.array(rests).reshape(found.rests.shape)
-
-
-def usual(effect: Effect, strength: FloatArray, *, beside: bool) -> bool:
-    """Return whether structure may show a strength (components,) where the effect is none.
-
-    Parameters
-    ----------
-    effect : Effect
-    strength : shape (components,)
-        Beside a fitted shear of the belt.
-    beside : bool
-        Whether other effects are there as well.
-    """
-    sizes = SHOWN.get(effect)
-    if sizes is None:
-        return False
-    return float(np.linalg.norm(strength / np.array(sizes))) < (BESIDE if beside else ALONE)
 
 
 def _by_load(data: Data, model: Refit) -> FloatArray:

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tirelib.diagnose.plain import BELT
 from tirelib.diagnose.refit import Refits, inside
-from tirelib.diagnose.shear import BELT
 from tirelib.identify.waveform_fit import Data
 
 if TYPE_CHECKING:

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.ensemble import Variants
 from tirelib.diagnose.noise import WhiteNoise
+from tirelib.diagnose.plain import BELT, SHEAR, usual
 from tirelib.diagnose.refit import FELL, Refit, Refits, fall, inside
-from tirelib.diagnose.shear import BELT, SHEAR, beside_shear, on_top, shear_itself, with_shear
+from tirelib.diagnose.shear import beside_shear, on_top, shear_itself, with_shear
 from tirelib.diagnose.stage import ALARM, Stage, within
 from tirelib.effects import Effect
 from tirelib.identify.waveform_fit import Data
@@ -194,7 +195,8 @@ def _idle(before: Stage, after: Stage, index: int) -> bool:
 def _trial(first: Stage, stage: Stage, index: int, fitted: _Fit, least: float) -> Stage | None:
     """Return the stage with one more effect, if the exact refit needs it.
 
-    A further one has to take a least share of the squared error.
+    A further one has to take a least share of the squared error, and to be more than a plain tire
+    shows.
     """
     model = stage.model
     effect, strength = stage.found.living[index].effect, stage.scores.strength[index]
@@ -204,6 +206,8 @@ def _trial(first: Stage, stage: Stage, index: int, fitted: _Fit, least: float) -
         return None
 
     def need(found: Refit) -> bool:
+        if usual(model.effects, effect, found.strengths[-1]):
+            return False
         # the first may be hidden in the error by another that is to come
         if stage is first or stage.unlisted[index]:
             return True

@@ -13,11 +13,11 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.candidates import candidates
-from tirelib.diagnose.ensemble import usual
+from tirelib.diagnose.plain import SHEAR, usual
 from tirelib.diagnose.refit import FELL, Refit, fall, inside
 from tirelib.diagnose.stage import ALARM, Stage, within
 from tirelib.diagnose.unlisted import UNLISTED, with_unlisted
-from tirelib.effects import CATALOGUE, Effect
+from tirelib.effects import Effect
 from tirelib.identify.waveform_fit import Data
 
 SHARE, HINTED, INDEPENDENT = 0.6, 0.5, 0.2
@@ -34,9 +34,6 @@ START = 0.25
 ERROR, MISFIT = 0.7, 0.2
 """Shares of the squared error and of the misfit in the metric of structure that the shear by itself
 has to take."""
-SHEAR = CATALOGUE["belt_shear"]
-BELT = frozenset({SHEAR.name})
-"""What every tire has and the base has not: named, it raises no bar for what is hidden beside."""
 
 Fit = Callable[[Refit, Sequence[Effect], Sequence[FloatArray]], Refit | None]
 
@@ -97,7 +94,7 @@ def beside_shear(
     """Return the stage with the one effect that takes most beside the shear, and its index.
 
     The stage has the shear as well, where that is needed beside the effect. What is in no catalogue
-    is returned with the stage as it is. Nothing is returned that structure may show by itself.
+    is returned with the stage as it is. Nothing is returned that a plain tire may show.
 
     Parameters
     ----------
@@ -135,13 +132,13 @@ def beside_shear(
         return None
     where = stage.names.index(effect.name)
     if effect in UNLISTED:
-        needed = stage.unlisted[where] and not usual(effect, strength, beside=among is not None)
+        needed = stage.unlisted[where] and not usual(model.effects, effect, strength)
         return (stage, where) if needed else None
     start = inside(effect, strength)
     both = refitted(model, [*model.effects, effect], [*model.strengths, start])
     if both is None or fall(model, both) < least or not _in_range(both):
         return None
-    if usual(effect, both.strengths[-1], beside=among is not None):
+    if usual(model.effects, effect, both.strengths[-1]):
         return None
     after = staged(both)
     if after.scores.misfit >= beside.scores.misfit:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tirelib.diagnose import shear as module
-from tirelib.diagnose.ensemble import ALONE, BESIDE, SHOWN, usual
+from tirelib.diagnose.plain import BESIDE, BY_ITSELF, SHOWN
 from tirelib.diagnose.refit import FELL
 from tirelib.diagnose.shear import (
     APART,
@@ -29,7 +29,7 @@ from tirelib.effects import CATALOGUE
 
 NAMES = ("gage_length", "roughness", "gain_by_load", "belt_shear")
 EFFECTS = {name: CATALOGUE.get(name, gain_by_load) for name in NAMES}
-FAINT = ALONE * SHOWN[EFFECTS["gage_length"]][0] / EFFECTS["gage_length"].high
+FAINT = BY_ITSELF * SHOWN[EFFECTS["gage_length"]][0] / EFFECTS["gage_length"].high
 """Part of its range up to which structure shows what the gage's length does."""
 BASE, SHEARED = 1.0, 0.8
 SLIGHT = float(np.sqrt(1.0 - FELL)) + 0.001
@@ -236,38 +236,16 @@ def test_beside_what_is_named_more_is_needed(
 def test_a_strength_that_structure_may_show_is_not_named(monkeypatch: pytest.MonkeyPatch) -> None:
     assert look(monkeypatch, {"gage_length": 0.8}, part=1.01 * FAINT)[0] == "gage_length"
     assert look(monkeypatch, {"gage_length": 0.8}, part=0.99 * FAINT)[0] == ""
-    edge = ALONE * SHOWN[gain_by_load][0]
+    edge = BY_ITSELF * SHOWN[gain_by_load][0]
     assert look(monkeypatch, {"gain_by_load": 0.8}, first=1.01 * edge)[0] == "gain_by_load"
     assert look(monkeypatch, {"gain_by_load": 0.8}, first=0.99 * edge)[0] == ""
 
 
 def test_beside_others_structure_may_show_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    among, twice = ("gage_length",), BESIDE / ALONE * FAINT
-    assert look(monkeypatch, {"gage_length": 0.8}, part=1.01 * twice, among=among)[0]
-    assert not look(monkeypatch, {"gage_length": 0.8}, part=0.99 * twice, among=among)[0]
-
-
-@pytest.mark.parametrize(
-    ("name", "shown"),
-    [("tread_friction", (0.045, 0.0)), ("gage_saturation", (0.01,)), ("rotary_inertia", (1e-4,))],
-)
-def test_what_plain_tires_show_beside_their_shear_is_usual(
-    name: str, shown: tuple[float, ...]
-) -> None:
-    effect, strength = CATALOGUE[name], np.array(shown)
-    assert usual(effect, strength, beside=False)
-    assert not usual(effect, 2.3 * strength, beside=False)
-    assert usual(effect, 2.3 * strength, beside=True)
-    assert not usual(effect, 4.6 * strength, beside=True)
-
-
-def test_friction_that_bends_the_flat_piece_is_more_than_structure() -> None:
-    friction = CATALOGUE["tread_friction"]
-    pulled, bent = SHOWN[friction]
-    assert not usual(friction, np.array([0.0, -1.01 * ALONE * bent]), beside=False)
-    assert not usual(friction, 0.8 * ALONE * np.array([pulled, bent]), beside=False), "together"
-    assert usual(friction, 0.7 * ALONE * np.array([pulled, bent]), beside=False)
-    assert not usual(CATALOGUE["sidewall_damping"], np.zeros(1), beside=True), "none looks like it"
+    twice, has = BESIDE / BY_ITSELF * FAINT, ("belt_shear", "roughness")
+    assert look(monkeypatch, {"gage_length": 0.8}, part=1.01 * twice, has=has)[0]
+    assert not look(monkeypatch, {"gage_length": 0.8}, part=0.99 * twice, has=has)[0]
+    assert look(monkeypatch, {"gage_length": 0.8}, part=0.99 * twice, has=has[:1])[0]
 
 
 def test_only_who_may_be_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
