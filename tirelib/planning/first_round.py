@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.candidates import Candidates
 from tirelib.diagnose.noise import noise_in, white_noise
+from tirelib.diagnose.plain import usual
 from tirelib.diagnose.refit import Refit
 from tirelib.diagnose.stage import ALARM, Stage
 from tirelib.diagnose.stored import ensemble_of
@@ -58,8 +59,13 @@ class FirstRound:
     def first(self, rest: FloatArray) -> str:
         """Return who comes first for a residual (n_runs, n_phi), empty without an alarm.
 
-        Empty as well if it is in no catalogue: that names nobody.
+        Empty as well if it is in no catalogue, which names nobody, or no more than plain tires
+        show beside the effects of the model.
         """
         judged = self.stage.of_residual(rest)
         leaders = judged.leaders(set(judged.names), ALARM, 1.0)
-        return judged.names[leaders[0]] if leaders and not judged.unlisted[leaders[0]] else ""
+        if not leaders or judged.unlisted[leaders[0]]:
+            return ""
+        effect = judged.found.living[leaders[0]].effect
+        strength = judged.scores.strength[leaders[0]]
+        return "" if usual(judged.model.effects, effect, strength) else effect.name

@@ -1,0 +1,51 @@
+"""With all added that a diagnosis named, the next one names nothing more."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hidden.cases import load_case
+
+from tirelib.campaign import read_campaign
+from tirelib.diagnose.diagnose import Diagnosis, diagnose
+from tirelib.diagnose.plain import SHEAR
+from tirelib.diagnose.stage import ALARM
+from tirelib.effects import CATALOGUE
+from tirelib.identify.campaign_data import StraightRuns, straight_runs
+from tirelib.identify.identify import estimated
+from tirelib.waveforms import measure_waveforms
+
+DATA = Path(__file__).parent / "data"
+
+
+def twice(runs: StraightRuns, members: int) -> tuple[Diagnosis, Diagnosis]:
+    """Return the diagnosis of the base, and that of the model which it ends with."""
+    catalogue = list(CATALOGUE.values())
+    first = diagnose(runs, estimated(runs)[1].values, catalogue, members=members)
+    model = first.final
+    second = diagnose(
+        runs, model.values, catalogue, effects=model.effects, strengths=model.strengths,
+        members=members,
+    )  # fmt: skip
+    return first, second
+
+
+def test_nothing_more_is_named_on_the_rig() -> None:
+    case = load_case(DATA / "1000-temperature-1.20.npz")
+    first, second = twice(straight_runs(case.waves.take(~case.held_out)), 16)
+    assert first.named == ("temperature", "belt_shear")
+    assert (second.verdict, second.named) == ("none", ())
+    assert second.base.error == pytest.approx(first.final.error, rel=1e-3)
+
+
+def test_nothing_more_is_named_on_a_tire_of_finite_elements(
+    shared: Callable[[str], Path],
+) -> None:
+    """Such a tire shows friction and sections with inertia by itself, beside the belt's shear."""
+    waves = measure_waveforms(read_campaign(shared("puzzle-b")))
+    first, second = twice(straight_runs(waves), 100)
+    assert first.named[-1] == SHEAR.name
+    assert (second.verdict, second.named) == ("none", ())
+    friction = next(each for each in second.findings if each.effect.name == "tread_friction")
+    assert friction.score >= ALARM * friction.threshold, "by the joint fit it would be named"
+    assert friction.level == "hint"
