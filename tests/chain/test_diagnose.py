@@ -10,6 +10,7 @@ from click.testing import CliRunner, Result
 
 from tests.unit.diagnose.planted import EFFECT, STRENGTH, added, model_file, waves
 from tirelib.cli import program
+from tirelib.cli.diagnose import SHOWN
 from tirelib.diagnose.stage import ALARM
 from tirelib.errors import TirelibError
 from tirelib.parameters import read_tire, write_tire
@@ -194,3 +195,27 @@ def test_a_campaign_with_too_few_runs_gets_no_verdict(
     target = tmp_path / "D.json"
     assert "at least 4" in refused("diagnose", "x", "--model", model, "--json", target)
     assert not target.exists()
+
+
+@pytest.mark.parametrize("verb", ["diagnose", "next-test"])
+def test_a_seed_below_zero_is_refused(verb: str, model: Path) -> None:
+    found = call(verb, "anywhere", "--model", model, "--seed", -1)
+    assert found.exit_code == 2
+    assert "-1 is not in the range x>=0" in found.output
+
+
+def test_names_of_effects_are_told_in_full(planted: Any) -> None:
+    names = [entry["effect"] for entry in planted.told["candidates"][:SHOWN]]
+    assert max(map(len, names)) > 12
+    assert all(name in planted.said for name in names)
+
+
+def test_alarms_that_an_exact_fit_does_not_need_are_told(planted: Any) -> None:
+    found = planted.told
+    others = [
+        entry["effect"]
+        for entry in found["candidates"]
+        if entry["level"] == "alarm" and entry["effect"] not in found["named"]
+    ]
+    told = [text for text in found["messages"] if "is not named" in text]
+    assert [text.split(" stands out")[0] for text in told] == [", ".join(others)] * bool(others)

@@ -53,7 +53,7 @@ QUANTITIES = ("strain", "Fy", "Fx", "Mz")
     show_default=True,
     help="Variants of the model that the threshold is from.",
 )
-@click.option("--seed", metavar="N", type=int, default=0, show_default=True,
+@click.option("--seed", metavar="N", type=click.IntRange(min=0), default=0, show_default=True,
               help="Of the variants.")  # fmt: skip
 @click.option("--out", "out", metavar="DIR", type=click.Path(path_type=Path, file_okay=False),
               help="Write diagnosis.html, diagnosis.md and diagnosis.json.")  # fmt: skip
@@ -210,10 +210,13 @@ def _say(document: dict[str, Any]) -> None:
 
 def _table(candidates: list[dict[str, Any]]) -> Table:
     table = Table(box=SIMPLE_HEAD)
+    longest = max((len(entry["effect"]) for entry in candidates), default=0)
     for column in ("effect", "level", "score/threshold", "strength", "std", "unit", "in range",
                    "error after", "held out", "twins"):  # fmt: skip
         words = column in ("effect", "level", "unit", "in range", "twins")
-        table.add_column(column, justify="left" if words else "right")
+        # a name that is cut short cannot be added
+        width = longest if column == "effect" else None
+        table.add_column(column, justify="left" if words else "right", min_width=width)
     for entry in candidates:
         held = entry["heldout_error_after"]
         table.add_row(

@@ -81,7 +81,7 @@ DIAGNOSIS = "tirelib-diagnosis/1"
               help="Effects of your own; may be given again.")  # fmt: skip
 @click.option("--members", metavar="N", type=click.IntRange(min=4), default=100,
               show_default=True, help="Variants of the model, if diagnosed here.")  # fmt: skip
-@click.option("--seed", metavar="N", type=int, default=0, show_default=True,
+@click.option("--seed", metavar="N", type=click.IntRange(min=0), default=0, show_default=True,
               help="Of the variants.")  # fmt: skip
 @click.option("--out", "out", metavar="DIR", type=click.Path(path_type=Path, file_okay=False),
               help="Write next_test.html, next_test.md and next_test.json.")  # fmt: skip

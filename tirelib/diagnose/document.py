@@ -105,6 +105,9 @@ def assess(
     messages += [_too_large(finding) for finding in findings
                  if finding.effect.name in named and not finding.in_range]  # fmt: skip
     messages += [_by_share(name) for name in found.by_share if name in named]
+    others = [f.effect.name for f in findings if f.level == "alarm" and f.effect.name not in named]
+    if others and verdict in ("none", "named"):
+        messages.append(_not_needed(others))
     return Assessment(
         found, unit, verdict, named, findings, unit.factor * found.base.error,
         unit.factor * final.error, floor, chosen, held_before, held_after,
@@ -119,6 +122,14 @@ def _too_large(finding: Finding) -> str:
         f"{effect.name} explains it, but only at {size} {effect.unit}, and {effect.low:g} to "
         f"{effect.high:g} is plausible: it is larger than thought, or something of the same kind; "
         "measure it in another way before it is believed"
+    )
+
+
+def _not_needed(names: Sequence[str]) -> str:
+    return (
+        f"{', '.join(names)} stands out in the joint fit, but is not named: it takes too little of "
+        "the error in an exact one, shares it with what is named, or what cannot be stands out as "
+        "clearly"
     )
 
 
