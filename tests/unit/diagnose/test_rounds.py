@@ -109,6 +109,12 @@ def test_a_leader_that_the_exact_refit_does_not_need_is_not_added() -> None:
     assert not added(stage((), 1000.0, SCORE, ["weak"]), fit(LEFT))
 
 
+def test_what_a_plain_tire_shows_is_not_added(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rounds, "usual", lambda has, each, strength: each.name == "close")
+    assert added(stage((), 1000.0, SCORE, ["strong", "close"]), fit(LEFT)) == "strong"
+    assert not added(stage((), 1000.0, SCORE, ["close"]), fit(LEFT))
+
+
 def test_a_refit_that_does_not_settle_adds_nothing() -> None:
     assert not added(stage((), 1000.0, SCORE, ["strong", "close"]), fit({}))
 
