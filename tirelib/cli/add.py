@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tirelib.campaign import read_campaign
-from tirelib.cli.common import CAMPAIGN, FILE, output, progress_bar, write_json
+from tirelib.cli.common import CAMPAIGN, FILE, NEW_FILE, output, progress_bar, write_json
 from tirelib.cli.diagnose import QUANTITIES
 from tirelib.errors import ParameterError
 
@@ -46,8 +46,12 @@ FORMAT = "tirelib-model/1"
 @click.option("--quantity", metavar="strain|Fy|Fx|Mz",
               help="Measured quantity to fit; default: strain, and for an effect of the brush the "
                    "force of the last step, else the one that it helps most.")  # fmt: skip
-@click.option("--out", "out", metavar="M2.toml", type=FILE, required=True, help="New model file.")
-@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write the numbers as JSON.")
+@click.option(
+    "--out", "out", metavar="M2.toml", type=NEW_FILE, required=True, help="New model file."
+)
+@click.option(
+    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
+)
 def add(
     effect_name: str | None,
     model_name: str,

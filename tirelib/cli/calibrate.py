@@ -12,7 +12,15 @@ from rich.table import Table
 
 from tirelib import __version__
 from tirelib.campaign import Campaign, read_campaign
-from tirelib.cli.common import CAMPAIGN, FILE, low_pass_options, output, progress_bar, write_json
+from tirelib.cli.common import (
+    CAMPAIGN,
+    NEW_FILE,
+    NEW_FOLDER,
+    low_pass_options,
+    output,
+    progress_bar,
+    write_json,
+)
 from tirelib.cli.features import make_low_pass
 from tirelib.errors import CalibrationError
 from tirelib.estimators.calibration_file import write_calibration
@@ -46,13 +54,15 @@ Several campaigns must be of the same tire and gages. More conditions in the dat
 
 @click.command(epilog=_EXAMPLE)
 @click.argument("folders", metavar="DIR...", type=CAMPAIGN, nargs=-1, required=True)
-@click.option("--out", "target", metavar="CAL.toml", type=FILE, required=True,
+@click.option("--out", "target", metavar="CAL.toml", type=NEW_FILE, required=True,
               help="Calibration to write.")  # fmt: skip
-@click.option("--report", metavar="FOLDER", type=click.Path(path_type=Path),
+@click.option("--report", metavar="FOLDER", type=NEW_FOLDER,
               help="Write statistics and residual plots as HTML.")  # fmt: skip
 @click.option("--quick", is_flag=True, help="Leave out the cross-validation by level.")
 @low_pass_options
-@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write statistics as JSON.")
+@click.option(
+    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write statistics as JSON."
+)
 def calibrate(
     folders: tuple[Path, ...],
     target: Path,

@@ -14,6 +14,7 @@ from rich.table import Table
 
 from tirelib.campaign.problem import Problem
 from tirelib.campaign.read import Campaign, read_campaign
+from tirelib.cli.common import NEW_FILE, NEW_FOLDER
 from tirelib.errors import FormatError
 
 CHECK_FORMAT = "tirelib-campaign-check/1"
@@ -55,7 +56,7 @@ Exit code: 0 no error (warnings are allowed), 1 errors were found,
 
 @campaign.command(epilog=_CHECK_EXAMPLE)
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-@click.option("--json", "json_file", metavar="FILE", type=click.Path(path_type=Path),
+@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE,
               help="Write the problems as JSON.")  # fmt: skip
 @click.pass_context
 def check(context: click.Context, folder: Path, json_file: Path | None) -> None:
@@ -121,9 +122,9 @@ Example:
 
 @campaign.command(epilog=_SHOW_EXAMPLE)
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-@click.option("--out", metavar="DIR", type=click.Path(path_type=Path),
+@click.option("--out", metavar="DIR", type=NEW_FOLDER,
               help="Folder for the overview plot; default build/out/show-NAME.")  # fmt: skip
-@click.option("--json", "json_file", metavar="FILE", type=click.Path(path_type=Path),
+@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE,
               help="Write header and runs as JSON.")  # fmt: skip
 def show(folder: Path, out: Path | None, json_file: Path | None) -> None:
     """Show header, runs with set points and measured means, and an overview plot of DIR."""

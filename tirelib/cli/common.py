@@ -3,7 +3,9 @@
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from errno import ENOTDIR
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 import click
@@ -13,8 +15,37 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from tirelib.errors import FormatError
 
+
+class NewPath(click.Path):
+    """A file or folder that a verb writes, refused before any work where it cannot be written."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Return the path; nothing is left behind by the trial."""
+        path = Path(super().convert(value, param, ctx))
+        place = path
+        while not place.exists() and place != place.parent:
+            place = place.parent
+        try:
+            if place.is_dir():
+                TemporaryFile(dir=place).close()
+            elif place != path:
+                raise NotADirectoryError(ENOTDIR, f"{place} is a file")
+            elif path.is_file():  # a device or a pipe is left alone until it is written
+                path.open("ab").close()
+        except OSError as error:
+            self.fail(
+                f"{path}: it cannot be written ({error.strerror}); a place in a folder that may be "
+                "written is needed; choose another one",
+                param,
+                ctx,
+            )
+        return path
+
+
 CAMPAIGN = click.Path(path_type=Path)
 FILE = click.Path(path_type=Path, dir_okay=False)
+NEW_FILE = NewPath(path_type=Path, dir_okay=False)
+NEW_FOLDER = NewPath(path_type=Path, file_okay=False)
 WIDTH = 120
 
 

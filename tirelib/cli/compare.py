@@ -5,7 +5,15 @@ from pathlib import Path
 import click
 
 from tirelib.campaign import read_campaign
-from tirelib.cli.common import CAMPAIGN, FILE, output, progress_bar, write_json
+from tirelib.cli.common import (
+    CAMPAIGN,
+    FILE,
+    NEW_FILE,
+    NEW_FOLDER,
+    output,
+    progress_bar,
+    write_json,
+)
 
 _EXAMPLE = """\b
 Examples:
@@ -29,9 +37,11 @@ words and numbers. Errors are in units of the noise between repeated runs. Exit 
                    "worst.")  # fmt: skip
 @click.option("--effects", "effect_files", metavar="FILE.py", type=FILE, multiple=True,
               help="Effects of your own that the model has; may be given again.")  # fmt: skip
-@click.option("--out", "out", metavar="DIR", type=click.Path(path_type=Path, file_okay=False),
+@click.option("--out", "out", metavar="DIR", type=NEW_FOLDER,
               help="Write the page, comparison.md and comparison.json.")  # fmt: skip
-@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write the numbers as JSON.")
+@click.option(
+    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
+)
 def compare(
     folder: Path,
     model: str,

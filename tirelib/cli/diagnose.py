@@ -10,7 +10,15 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from tirelib.campaign import Campaign, CampaignHeader, read_campaign
-from tirelib.cli.common import CAMPAIGN, FILE, output, progress_bar, write_json
+from tirelib.cli.common import (
+    CAMPAIGN,
+    FILE,
+    NEW_FILE,
+    NEW_FOLDER,
+    output,
+    progress_bar,
+    write_json,
+)
 from tirelib.errors import CalibrationError, ParameterError, TirelibError
 
 if TYPE_CHECKING:
@@ -55,9 +63,11 @@ QUANTITIES = ("strain", "Fy", "Fx", "Mz")
 )
 @click.option("--seed", metavar="N", type=click.IntRange(min=0), default=0, show_default=True,
               help="Of the variants.")  # fmt: skip
-@click.option("--out", "out", metavar="DIR", type=click.Path(path_type=Path, file_okay=False),
+@click.option("--out", "out", metavar="DIR", type=NEW_FOLDER,
               help="Write diagnosis.html, diagnosis.md and diagnosis.json.")  # fmt: skip
-@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write the numbers as JSON.")
+@click.option(
+    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
+)
 def diagnose(
     folder: Path,
     model_name: str,

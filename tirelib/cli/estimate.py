@@ -8,7 +8,15 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from tirelib.campaign import read_campaign
-from tirelib.cli.common import CAMPAIGN, FILE, output, progress_bar, write_json
+from tirelib.cli.common import (
+    CAMPAIGN,
+    FILE,
+    NEW_FILE,
+    NEW_FOLDER,
+    output,
+    progress_bar,
+    write_json,
+)
 from tirelib.errors import CalibrationError
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.estimators.result import estimate_document
@@ -29,9 +37,11 @@ cannot be told. Exit code 1: not one turn is valid.
 @click.argument("folder", metavar="DIR", type=CAMPAIGN)
 @click.option("--calibration", "calibration_file", metavar="CAL.toml", type=FILE, required=True,
               help="Made by `tirelib calibrate`.")  # fmt: skip
-@click.option("--report", metavar="FOLDER", type=click.Path(path_type=Path),
+@click.option("--report", metavar="FOLDER", type=NEW_FOLDER,
               help="Write accuracy and figures as HTML.")  # fmt: skip
-@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write every turn as JSON.")
+@click.option(
+    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write every turn as JSON."
+)
 @click.pass_context
 def estimate(
     context: click.Context,

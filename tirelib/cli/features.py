@@ -6,7 +6,14 @@ from typing import Any
 import click
 
 from tirelib.campaign import read_campaign
-from tirelib.cli.common import CAMPAIGN, FILE, low_pass_options, output, progress_bar, write_json
+from tirelib.cli.common import (
+    CAMPAIGN,
+    NEW_FILE,
+    low_pass_options,
+    output,
+    progress_bar,
+    write_json,
+)
 from tirelib.errors import FormatError
 from tirelib.features.table import feature_frame, units
 from tirelib.flags import TurnFlag
@@ -27,10 +34,10 @@ gage's contact, ISO 8855 axes. FILE may end in .parquet or .csv.
 
 @click.command(epilog=_EXAMPLE)
 @click.argument("folder", metavar="DIR", type=CAMPAIGN)
-@click.option("--out", "target", metavar="FILE", type=FILE, required=True,
+@click.option("--out", "target", metavar="FILE", type=NEW_FILE, required=True,
               help="Table to write: .parquet or .csv.")  # fmt: skip
 @low_pass_options
-@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write a summary as JSON.")
+@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write a summary as JSON.")
 def features(
     folder: Path, target: Path, order: float | None, cut_off: float | None, json_file: Path | None
 ) -> None:

@@ -7,7 +7,15 @@ from typing import Any
 import click
 
 from tirelib.campaign import read_campaign
-from tirelib.cli.common import CAMPAIGN, FILE, output, progress_bar, write_json
+from tirelib.cli.common import (
+    CAMPAIGN,
+    FILE,
+    NEW_FILE,
+    NEW_FOLDER,
+    output,
+    progress_bar,
+    write_json,
+)
 from tirelib.cli.estimate import print_document
 from tirelib.cli.fmu_virtual import virtual
 from tirelib.errors import FormatError
@@ -65,7 +73,7 @@ fmu.add_command(virtual)
 @fmu.command(epilog=_BUILD)
 @click.option("--calibration", metavar="CAL.toml", type=FILE, required=True,
               help="Made by `tirelib calibrate`; it is embedded.")  # fmt: skip
-@click.option("--out", metavar="X.fmu", type=FILE, required=True, help="The FMU to write.")
+@click.option("--out", metavar="X.fmu", type=NEW_FILE, required=True, help="The FMU to write.")
 @click.option("--samples-per-step", metavar="K", type=int, default=1, show_default=True,
               help="Samples of every gage that one communication step brings.")  # fmt: skip
 @click.option("--sample-rate", metavar="HZ", type=float, default=DEFAULT_RATE, show_default=True,
@@ -98,7 +106,9 @@ def build(
 @fmu.command(epilog=_RUN)
 @click.argument("file", metavar="X.fmu", type=FILE)
 @click.argument("folder", metavar="DIR", type=CAMPAIGN)
-@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write every turn as JSON.")
+@click.option(
+    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write every turn as JSON."
+)
 @click.pass_context
 def run(context: click.Context, file: Path, folder: Path, json_file: Path | None) -> None:
     """Step the FMU through every run of DIR with FMPy, and compare with the rig."""
@@ -117,8 +127,10 @@ def run(context: click.Context, file: Path, folder: Path, json_file: Path | None
 @click.argument("file", metavar="X.fmu", type=FILE)
 @click.option("--reference", metavar="DIR", type=CAMPAIGN,
               help="Reference signals, where the FMU holds none.")  # fmt: skip
-@click.option("--out", metavar="REPORT", type=CAMPAIGN, help="Folder for the page.")
-@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write the result as JSON.")
+@click.option("--out", metavar="REPORT", type=NEW_FOLDER, help="Folder for the page.")
+@click.option(
+    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the result as JSON."
+)
 @click.pass_context
 def check(
     context: click.Context, file: Path, reference: Path | None, out: Path | None,

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from tirelib.cli.common import FILE, output, progress_bar
+from tirelib.cli.common import FILE, NEW_FILE, output, progress_bar
 from tirelib.errors import ParameterError
 from tirelib.fmu.build import DEFAULT_RATE
 from tirelib.fmu.virtual.spec import build_virtual, default_surface, friction_surface
@@ -22,7 +22,7 @@ for StrainTire.fmu with the same samples per step. Needs CPython with numpy and 
 
 
 @click.command(epilog=_EPILOG)
-@click.option("--out", metavar="X.fmu", type=FILE, required=True, help="The FMU to write.")
+@click.option("--out", metavar="X.fmu", type=NEW_FILE, required=True, help="The FMU to write.")
 @click.option("--samples-per-step", metavar="K", type=int, default=10, show_default=True,
               help="Most samples of every gage that one communication step brings.")  # fmt: skip
 @click.option("--sample-rate", metavar="HZ", type=float, default=DEFAULT_RATE, show_default=True,

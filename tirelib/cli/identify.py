@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from tirelib.campaign import read_campaign
-from tirelib.cli.common import CAMPAIGN, FILE, output, progress_bar, write_json
+from tirelib.cli.common import CAMPAIGN, NEW_FILE, output, progress_bar, write_json
 
 MOST_ROWS = 12
 """Rows of the table of contact angles on the screen."""
@@ -33,9 +33,11 @@ nothing could be identified, or no ring although the plan holds straight runs fo
 @click.argument("folder", metavar="DIR", type=CAMPAIGN)
 @click.option("--tire", "tire_file", metavar="T.toml|NAME",
               help="Start and priors (default: the campaign's geometry, literature).")  # fmt: skip
-@click.option("--out", "out", metavar="M.toml", type=FILE, required=True,
+@click.option("--out", "out", metavar="M.toml", type=NEW_FILE, required=True,
               help="The identified model; the other verbs read it.")  # fmt: skip
-@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write the numbers as JSON.")
+@click.option(
+    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
+)
 @click.pass_context
 def identify(
     context: click.Context,

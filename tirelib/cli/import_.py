@@ -12,7 +12,7 @@ from tirelib.campaign.importing.delimited import CsvOptions
 from tirelib.campaign.importing.importer import ImportReport, import_campaign
 from tirelib.campaign.importing.mapfile import parse_map
 from tirelib.campaign.importing.suggest import list_columns, suggest_map
-from tirelib.cli.common import FILE, output, progress_bar, write_json
+from tirelib.cli.common import FILE, NEW_FILE, NEW_FOLDER, output, progress_bar, write_json
 
 FORMAT = "tirelib-import/1"
 LIST_FORMAT = "tirelib-import-list/1"
@@ -45,12 +45,12 @@ Exit code: 0 done, 2 bad input (all faults are listed, nothing is written).
 @click.command("import", epilog=_EXAMPLE)
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE)
 @click.option("--map", "map_file", metavar="MAP.toml", type=FILE, help="The import map.")
-@click.option("--out", metavar="DIR", type=click.Path(path_type=Path, file_okay=False),
+@click.option("--out", metavar="DIR", type=NEW_FOLDER,
               help="Campaign folder.")  # fmt: skip
 @click.option("--force", is_flag=True, help="Replace the campaign that is in DIR.")
 @click.option("--list", "show_list", is_flag=True, help="List the columns of each FILE, then stop.")
 @click.option("--suggest", is_flag=True, help="Print a draft of the map for FILE, then stop.")
-@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write a summary as JSON.")
+@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write a summary as JSON.")
 def import_(
     files: tuple[Path, ...],
     map_file: Path | None,

@@ -11,7 +11,15 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from tirelib.campaign import read_campaign
-from tirelib.cli.common import CAMPAIGN, FILE, output, progress_bar, write_json
+from tirelib.cli.common import (
+    CAMPAIGN,
+    FILE,
+    NEW_FILE,
+    NEW_FOLDER,
+    output,
+    progress_bar,
+    write_json,
+)
 from tirelib.cli.diagnose import explains_forces, of_forces
 from tirelib.errors import FormatError, ParameterError
 
@@ -83,9 +91,11 @@ DIAGNOSIS = "tirelib-diagnosis/1"
               show_default=True, help="Variants of the model, if diagnosed here.")  # fmt: skip
 @click.option("--seed", metavar="N", type=click.IntRange(min=0), default=0, show_default=True,
               help="Of the variants.")  # fmt: skip
-@click.option("--out", "out", metavar="DIR", type=click.Path(path_type=Path, file_okay=False),
+@click.option("--out", "out", metavar="DIR", type=NEW_FOLDER,
               help="Write next_test.html, next_test.md and next_test.json.")  # fmt: skip
-@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write the numbers as JSON.")
+@click.option(
+    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
+)
 def next_test(
     folder: Path,
     model_name: str,

@@ -7,7 +7,7 @@ import click
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from tirelib.cli.common import output, progress_bar, write_json
+from tirelib.cli.common import NEW_FILE, NEW_FOLDER, output, progress_bar, write_json
 
 if TYPE_CHECKING:
     from bench.rig.campaign import Truth
@@ -26,7 +26,7 @@ the noise-free forces, slip, contact lengths and edges of each run, in SI and IS
 
 @click.command(epilog=_EXAMPLE)
 @click.option("--plan", "plan_name", metavar="NAME", help="The test plan, see --list.")
-@click.option("--out", metavar="DIR", type=click.Path(path_type=Path), help="Campaign folder.")
+@click.option("--out", metavar="DIR", type=NEW_FOLDER, help="Campaign folder.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0),
               help="The day: other noise and set-point errors, same tire and gages.")  # fmt: skip
 @click.option("--repeats", type=click.IntRange(min=0), metavar="K",
@@ -39,7 +39,7 @@ the noise-free forces, slip, contact lengths and edges of each run, in SI and IS
               help="Processes.")  # fmt: skip
 @click.option("--force", is_flag=True, help="Write into a folder that is not empty.")
 @click.option("--list", "show_list", is_flag=True, help="List plans and tires, then stop.")
-@click.option("--json", "json_file", metavar="FILE", type=click.Path(path_type=Path),
+@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE,
               help="Write a summary as JSON.")  # fmt: skip
 def rig(
     plan_name: str | None,

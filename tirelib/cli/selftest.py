@@ -9,7 +9,15 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from tirelib.campaign import read_campaign
-from tirelib.cli.common import CAMPAIGN, FILE, output, progress_bar, write_json
+from tirelib.cli.common import (
+    CAMPAIGN,
+    FILE,
+    NEW_FILE,
+    NEW_FOLDER,
+    output,
+    progress_bar,
+    write_json,
+)
 from tirelib.errors import ParameterError
 
 _EXAMPLE = """\b
@@ -42,9 +50,11 @@ Exit code: 0 done, 2 bad input.
               show_default=True, help="Variants that the thresholds are from.")  # fmt: skip
 @click.option("--seed", metavar="N", type=click.IntRange(min=0), default=0, show_default=True,
               help="Of the variants.")  # fmt: skip
-@click.option("--out", "out", metavar="DIR", type=click.Path(path_type=Path, file_okay=False),
+@click.option("--out", "out", metavar="DIR", type=NEW_FOLDER,
               help="Write selftest.html, selftest.md and selftest.json.")  # fmt: skip
-@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write the numbers as JSON.")
+@click.option(
+    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
+)
 def selftest(
     folder: Path,
     model_name: str,

@@ -10,7 +10,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from tirelib.arrays import FloatArray
-from tirelib.cli.common import FILE, output, write_json
+from tirelib.cli.common import NEW_FILE, NEW_FOLDER, output, write_json
 from tirelib.errors import ConvergenceError, ParameterError
 from tirelib.parameters import Tire, TireFile, read_tire
 from tirelib.report.simulation import (
@@ -71,8 +71,10 @@ def _numbers(
               help="Tread springs: along the radius, or pressed and sheared.")  # fmt: skip
 @click.option("--damping", metavar="LAMBDA", type=float,
               help="lambda of c_n = 2 lambda sqrt(m_n k_n); default: tire's.")  # fmt: skip
-@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write the results as JSON.")
-@click.option("--out", "folder", metavar="DIR", type=click.Path(path_type=Path, file_okay=False),
+@click.option(
+    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the results as JSON."
+)
+@click.option("--out", "folder", metavar="DIR", type=NEW_FOLDER,
               help="Write simulation.png, .svg, .csv (curves) and .json.")  # fmt: skip
 def simulate(
     model: str,
