@@ -1,6 +1,7 @@
 """What several verbs share: progress bars, JSON files, tables."""
 
 import json
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from errno import ENOTDIR
@@ -21,7 +22,7 @@ class NewPath(click.Path):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         """Return the path; nothing is left behind by the trial."""
-        path = Path(super().convert(value, param, ctx))
+        path = Path(os.fsdecode(super().convert(value, param, ctx)))
         place = path
         while not place.exists() and place != place.parent:
             place = place.parent
