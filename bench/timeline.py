@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from bench.device import Device
 from bench.frames import GAGES, TICK, FrameFlag, Frames, select
+from bench.rate_check import RateCheck
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 
 LONGEST_FILL = 1.0
@@ -127,9 +128,16 @@ class Timeline:
         self._samples = 0  # in the last frame
         self._period = 0  # ticks
         self._flagged = False  # last frame had the time-reset flag
+        self._rate = RateCheck()
 
     def push(self, frames: Frames) -> list[Samples]:
-        """Take frames in the order of the wire and return what they add."""
+        """Take frames in the order of the wire and return what they add.
+
+        Raises
+        ------
+        DeviceError
+            If their clock contradicts the sample period.
+        """
         if self.wheel is None and len(frames):
             self.wheel = int(frames.wheel[0])
         mine = frames.wheel == self.wheel
@@ -230,9 +238,12 @@ class Timeline:
         """Join frames that follow each other, and remember the last one."""
         if why:
             time = self._time
+            if why != "clock_back":  # a period that is said too long looks like this
+                self._rate.restart()
         else:
             time = self._time + _signed_one(int(frames.t_us[0]) - self._wire_time, TIME_RANGE)
         self._period = int(frames.period[0])
+        self._rate.push(int(frames.wheel[0]), frames)
         strain, saturated = self._device.strain(frames.counts, frames.flags)
         if saturated.any():
             seen = saturated.sum(axis=0).tolist()

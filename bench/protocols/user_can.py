@@ -8,7 +8,6 @@ from bench.can_batch import CanBatch
 from bench.conditions import Measured
 from bench.frames import GAGES, CountArray, Frames
 from bench.line_counts import LineCounts
-from bench.protocols.rate_check import RateCheck
 from bench.protocols.signals import Signal, raw_values, real_values
 from bench.protocols.user_map import Message, UserMap, WheelMap
 from bench.protocols.wheel_can import period_of
@@ -74,7 +73,6 @@ class _Wheel:
             2**time.length if time else 2 ** (counter.length if counter else 1),
             1e6 * wheel.tick if time else self._frame_us,
         )
-        self._check = RateCheck(wheel.wheel, self._frame_us, wheel.samples)
 
     def frames(self, batch: CanBatch, arrival: int) -> Frames:
         """Return the frames of a batch of this wheel's message."""
@@ -84,8 +82,6 @@ class _Wheel:
             raise AssertionError("a map without counter and time is refused when it is read")
         raw = raw_values(batch.data, [first, second])
         seq, t_us = self._wide.widen(raw[:, 0], raw[:, 1], arrival)
-        if wheel.time is not None:
-            self._check.push(seq, t_us)
         m = len(batch)
         counts: CountArray
         if wheel.strain[0].real:

@@ -9,7 +9,6 @@ from bench.frames import TICK, FrameFlag, Frames, IntArray
 from bench.line_counts import LineCounts
 from bench.protocols import layouts
 from bench.protocols.layouts import HEALTH, LAYOUTS, RAW12, RAW12C, RAW16, SYNC, WHEELS, Health
-from bench.protocols.rate_check import RateCheck
 from bench.protocols.single_samples import SingleSamples
 from bench.protocols.widening import Widener
 from tirelib.arrays import BoolArray
@@ -55,8 +54,7 @@ class WheelCan:
     Parameters
     ----------
     rate : float, [Hz]
-        Sample rate: RAW16, RAW12 and RAW12C do not say it. A wrong one is refused once the device
-        clock has shown it.
+        Sample rate: RAW16, RAW12 and RAW12C do not say it.
     counts : LineCounts
         Of the line; `ok`, `unknown` and `unplaced` are kept here.
 
@@ -73,7 +71,6 @@ class WheelCan:
         self._kind: dict[int, str] = {}
         self._wide: dict[int, Widener] = {}
         self._single: dict[int, SingleSamples] = {}
-        self._checks: dict[int, RateCheck] = {}
 
     def push(self, batch: CanBatch, arrival: int) -> list[Frames]:
         """Return the strain frames of a batch, those of each wheel in order."""
@@ -129,10 +126,7 @@ class WheelCan:
         if wheel not in self._single:
             self._single[wheel] = SingleSamples(wheel, self._period, self._counts)
         taken = np.flatnonzero(rows[RAW12C] | rows[SYNC])
-        done = self._single[wheel].push(rows[SYNC][taken], batch.data[taken, :8], state[taken])
-        for frames in done:
-            self._check(wheel, 1).push(frames.seq, frames.t_us)
-        return done
+        return self._single[wheel].push(rows[SYNC][taken], batch.data[taken, :8], state[taken])
 
     def _frames(
         self, wheel: int, kind: str, batch: CanBatch, rows: BoolArray, state: IntArray,
@@ -145,7 +139,6 @@ class WheelCan:
         if wheel not in self._wide:
             self._wide[wheel] = Widener(samples * self._period / 10.0)
         seq, t_us = self._wide[wheel].widen(raw.seq, raw.t_us, arrival)
-        self._check(wheel, samples).push(seq, t_us)
         m = len(seq)
         held = state[rows]
         return [
@@ -160,11 +153,6 @@ class WheelCan:
                 counts=raw.counts,
             )
         ]
-
-    def _check(self, wheel: int, samples: int) -> RateCheck:
-        if wheel not in self._checks:
-            self._checks[wheel] = RateCheck(wheel, samples * self._period / 10.0, samples)
-        return self._checks[wheel]
 
 
 def _none(rows: npt.NDArray[np.int8]) -> BoolArray:

@@ -1,5 +1,6 @@
 """Laws of the CAN frames: round trips, agreement with cantools, no doubt about what wrapped."""
 
+from collections import deque
 from pathlib import Path
 
 import cantools
@@ -9,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.can_batch import CanBatch, joined, pack, same_kind, unpack
+from bench.device import Device
 from bench.errors import DeviceError
 from bench.frames import FrameFlag, Frames
 from bench.line_counts import LineCounts
@@ -196,8 +198,10 @@ def test_single_samples_without_sync_are_counted_not_guessed() -> None:
 @pytest.mark.parametrize("kind", [RAW16, RAW12C])
 def test_a_wrong_sample_rate_is_refused_with_the_right_one(kind: str) -> None:
     sent = CanTransmitter(kind).send(record_of(4800, period=2000), 0, 4800).frames
+    frames = WheelCan(1e4, LineCounts()).push(sent, 0)
+    timeline = Timeline(Device())
     with pytest.raises(DeviceError, match=r"5000 samples a second, 10000 were said.*--rate 5000"):
-        WheelCan(1e4, LineCounts()).push(sent, 0)
+        deque(map(timeline.push, frames), 0)
 
 
 def test_health_flags_hold_for_the_frames_after_them() -> None:

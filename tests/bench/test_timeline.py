@@ -1,12 +1,19 @@
 """Laws of the line of samples: time goes on, losses are counted, nothing is invented."""
 
+from collections import deque
+from dataclasses import replace
+from itertools import chain
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bench.decoder import SerialDecoder
 from bench.device import Device
-from bench.frames import FrameFlag, Frames, select, strain_frames
+from bench.errors import DeviceError
+from bench.frames import FrameFlag, Frames, encode, select, strain_frames
+from bench.rate_check import JUDGED
 from bench.timeline import LATE, Samples, Timeline
 
 PERIOD = 1000  # ticks: 10 kHz
@@ -146,3 +153,41 @@ def test_a_sample_clock_that_is_a_little_off_loses_nothing() -> None:
     timeline = Timeline(Device())
     assert joined(timeline.push(drifted)).size == 8000
     assert timeline.counts.gaps == 0
+
+
+def paced(count: int, error: float, *, t_us: int = 0) -> Frames:
+    """Frames that say 10 kHz, of a wheel whose clock shows `error` more time a sample."""
+    frames = line_of(count)
+    time = t_us + np.rint(np.arange(count) * 1600.0 * (1.0 + error)).astype(np.int64)
+    return replace(frames, t_us=time % 2**32)
+
+
+@pytest.mark.parametrize("error", [-0.5, -0.1, -0.03, -0.006, 0.006, 0.03, 0.1, 1.0])
+@pytest.mark.parametrize("lost", [0.0, 0.2])
+@pytest.mark.parametrize("a_read", [1, 3, 50])
+def test_a_clock_that_contradicts_the_period_is_refused(
+    error: float, lost: float, a_read: int
+) -> None:
+    count = 6 * JUDGED
+    kept = np.random.default_rng(5).random(count) >= lost
+    wire = encode(select(paced(count, error, t_us=2**32 - 10**5), kept))
+    reads = [b"".join(wire[first : first + a_read]) for first in range(0, len(wire), a_read)]
+    frames = chain.from_iterable(map(SerialDecoder().push, reads))
+    timeline = Timeline(Device())
+    with pytest.raises(DeviceError, match=f"{1e4 / (1.0 + error):.0f} samples a second, 10000 w"):
+        deque(map(timeline.push, frames), 0)
+
+
+@given(
+    error=st.floats(-0.0045, 0.0045),
+    jump=st.integers(-(10**6), 10**7),
+    at=st.integers(1, 5 * JUDGED),
+    restarts=st.booleans(),
+)
+def test_a_clock_that_agrees_is_taken_whatever_else_happens(
+    error: float, jump: int, at: int, restarts: bool
+) -> None:
+    frames = paced(5 * JUDGED + 1, error, t_us=2**31)
+    after = np.arange(len(frames)) >= at
+    seq = np.where(after & restarts, frames.seq - at, frames.seq)
+    Timeline(Device()).push(replace(frames, t_us=frames.t_us + jump * after, seq=seq))
