@@ -160,6 +160,8 @@ QUANTITIES = MappingProxyType(
         "loaded_radius": "length",
         "effective_radius": "length",
         "deflection": "length",
+        "friction": "ratio",
+        "tread_depth": "length",
         "load": "force",
         "trigger": "ratio",
     }

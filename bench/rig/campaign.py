@@ -17,7 +17,7 @@ from bench.rig.observe import Forces, edges, forces, trace
 from bench.rig.plans import Plan, kind, with_repeats
 from bench.rig.shown import Shown, fixed_angle
 from bench.rig.solve import State, solve
-from bench.rig.tire import Array, Condition, RigTire
+from bench.rig.tire import NEW_DEPTH, Array, Condition, RigTire, on_road
 from tirelib.campaign import (
     CampaignHeader,
     Run,
@@ -75,7 +75,7 @@ class Truth:
 
 @dataclass(frozen=True)
 class Job:
-    """A run to be made."""
+    """A run to be made; `friction` is the tire's own, for roads that do not say another."""
 
     run: int
     nominal: Condition
@@ -83,6 +83,7 @@ class Job:
     chain: Chain
     planted: tuple[tuple[str, float], ...] = ()
     place: float = 0.0
+    friction: float = np.nan
 
 
 class _Worker:
@@ -99,7 +100,7 @@ def _prepare(references: tuple[State, ...]) -> None:
 def _make(job: Job) -> tuple[Recording, Truth]:
     cond = settle(job.nominal, job.chain, job.seed, job.run)
     start = min(_Worker.references, key=lambda s: abs(s.condition.load - cond.load))
-    tire = start.tire
+    tire = on_road(start.tire, cond)
     for name, strength in job.planted:
         tire = hidden(name).tire(tire, cond, job.place, strength)
     lower = tire.free_radius - start.tire.free_radius
@@ -133,7 +134,7 @@ def references(tire: RigTire, conditions: tuple[Condition, ...]) -> tuple[State,
     """
     first, out, state = conditions[0], [], None
     for load in sorted({c.load for c in conditions}):
-        cond = Condition(load, first.pressure, first.speed)
+        cond = Condition(load, first.pressure, first.speed)  # the tire's own friction, new
         state = solve(tire, cond, state)
         out.append(state)
     return tuple(out)
@@ -186,7 +187,7 @@ def run_plan(
     conditions = with_repeats(plan, plan.repeats if repeats is None else repeats)
     effects = tuple((hidden(name).name, strength) for name, strength in (planted or {}).items())
     tasks = [
-        Job(i, c, seed, chain, effects, i / max(len(conditions) - 1, 1))
+        Job(i, c, seed, chain, effects, i / max(len(conditions) - 1, 1), tire.friction)
         for i, c in enumerate(conditions)
     ]
     truths: list[Truth] = []
@@ -239,6 +240,8 @@ def _run(job: Job, recording: Recording) -> Run:
         camber=c.camber,
         slip_ratio=c.slip_ratio or 0.0,
         start=job.run * job.chain.run_spacing,
+        friction=job.friction if c.friction is None else c.friction,
+        tread_depth=NEW_DEPTH if c.tread_depth is None else c.tread_depth,
     )
     return Run(
         plan=plan,

@@ -5,7 +5,7 @@ Loads in percent refer to `REFERENCE_LOAD`. Table 3-1 is `set1`, Table 3-2 `set2
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -56,6 +56,13 @@ def with_repeats(plan: Plan, repeats: int) -> tuple[Condition, ...]:
         )
     again = [plan.conditions[int((i + 0.5) * n / repeats)] for i in range(repeats)]
     return plan.conditions + tuple(again)
+
+
+def on_one_road(plan: Plan, friction: float | None, tread_depth: float | None) -> Plan:
+    """Return the plan on a road of this friction [1] with this tread left [m]; None: as it was."""
+    given = {"friction": friction, "tread_depth": tread_depth}
+    changed = {name: value for name, value in given.items() if value is not None}
+    return replace(plan, conditions=tuple(replace(c, **changed) for c in plan.conditions))
 
 
 def _at(

@@ -8,7 +8,7 @@ import numpy as np
 from bench.rig.belt import FIELDS, U
 from bench.rig.mesh import Mesh, mesh
 from bench.rig.system import Balance, balance
-from bench.rig.tire import Array, Condition, RigTire
+from bench.rig.tire import NEW_DEPTH, Array, Condition, RigTire
 from tirelib.errors import ParameterError, TirelibError
 
 TOLERANCE = 1e-9
@@ -28,6 +28,8 @@ LIMITS = {
     "slip_angle": (-0.4, 0.4),
     "camber": (-0.15, 0.15),
     "slip_ratio": (-0.9, 2.0),
+    "friction": (0.05, 1.5),
+    "tread_depth": (0.0005, NEW_DEPTH),
 }
 """Lowest and highest condition that is solved, SI."""
 
@@ -140,8 +142,8 @@ def solve(
 
 def _check(cond: Condition) -> None:
     for name, (low, high) in LIMITS.items():
-        value = getattr(cond, name) or 0.0
-        if not low <= value <= high:
+        value = getattr(cond, name)
+        if value is not None and not low <= value <= high:
             raise ParameterError(
                 f"rig condition, {name} = {value:g} (SI); allowed is {low:g} to {high:g}; "
                 "change the plan"

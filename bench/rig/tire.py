@@ -7,7 +7,7 @@ the measurement (`bench.rig.measure`).
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -202,6 +202,10 @@ class Condition:
         tan(slip angle) = v_y / v_x; a positive camber leans the top to the right [rad].
     slip_ratio : float or None
         kappa = (Omega R_e - v_x) / v_x; None lets the wheel roll freely (no torque).
+    friction : float or None
+        Coulomb coefficient of this road [1]; None is the tire's own.
+    tread_depth : float or None
+        Depth of the grooves that is left of `NEW_DEPTH` [m]; None is a new tread.
     """
 
     load: float
@@ -210,6 +214,37 @@ class Condition:
     slip_angle: float = 0.0
     camber: float = 0.0
     slip_ratio: float | None = None
+    friction: float | None = None
+    tread_depth: float | None = None
+
+
+NEW_DEPTH = 0.008
+"""Depth of the grooves of a new tread; what is below them does not wear [m]."""
+TREAD_DENSITY = 800.0
+"""Of the tread that wears, its grooves included: 1,150 kg/m^3 of rubber on 70 % of it [kg/m^3]."""
+
+
+def on_road(tire: RigTire, cond: Condition) -> RigTire:
+    """Return the tire with the friction of the road and the tread that is left of it.
+
+    The bristles' stiffness is a modulus over their height: a worn tread is stiffer, thinner and
+    lighter.
+    """
+    if cond.friction is not None:
+        tire = replace(tire, friction=cond.friction)
+    if cond.tread_depth is None:
+        return tire
+    worn = NEW_DEPTH - cond.tread_depth
+    left = tire.tread_thickness - worn
+    stiffer = tire.tread_thickness / left
+    return replace(
+        tire,
+        tread_thickness=left,
+        tread_normal=tire.tread_normal * stiffer,
+        tread_shear_x=tire.tread_shear_x * stiffer,
+        tread_shear_y=tire.tread_shear_y * stiffer,
+        mass=tire.mass - TREAD_DENSITY * tire.belt_width * worn,
+    )
 
 
 TIRES: Mapping[str, RigTire] = MappingProxyType(

@@ -87,6 +87,8 @@ class RunPlan:
 
     A set point is NaN where the row leaves it empty, which only a ``sweep`` may. `load` is a
     magnitude, positive in every axis system. `start` is the start on the campaign's clock, s.
+    Friction of the road [1], tread depth left [m] and tread temperature [K] are NaN where nobody
+    wrote them down.
     """
 
     run: int
@@ -100,6 +102,9 @@ class RunPlan:
     slip_ratio: float
     start: float | None = None
     extra: Mapping[str, float | str] = field(default_factory=dict)
+    friction: float = float("nan")
+    tread_depth: float = float("nan")
+    tread_temperature: float = float("nan")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

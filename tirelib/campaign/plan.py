@@ -33,8 +33,16 @@ SET_POINTS: tuple[_Column, ...] = (
 )
 """The columns of the set points: quantity, column, unit, dimension and what is plausible."""
 
+ROAD: tuple[_Column, ...] = (
+    _Column("friction", "friction", "1", "ratio", 0.0, 2.0),
+    _Column("tread_depth", "tread_depth_mm", "mm", "length", 0.0, 30.0),
+    _Column("tread_temperature", "tread_temperature_degC", "degC", "temperature", -60.0, 200.0),
+)
+"""Columns that need not be there: what is known of road and tread, of sweeps too."""
+
 REQUIRED = ("run", "file", "kind", *(column.name for column in SET_POINTS))
 _START = "start_s"
+_NO_EXTRA = frozenset((*REQUIRED, _START, *(column.name for column in ROAD)))
 
 
 def parse_plans(folder: Path, axes: str) -> tuple[tuple[RunPlan, ...], list[Problem]]:
@@ -140,14 +148,13 @@ def _parse_row(
     points = {
         c.quantity: _set_point(where, row[c.name], kind, c, axes, problems) for c in SET_POINTS
     }
+    points |= {
+        c.quantity: _set_point(where, row.get(c.name, ""), "sweep", c, axes, problems) for c in ROAD
+    }
     start = _number(f"{where}, {_START}", row.get(_START, ""), problems)
     if problems or run is None:
         return None, problems
-    extra = {
-        name: _extra(cell)
-        for name, cell in row.items()
-        if name not in REQUIRED and name != _START and cell
-    }
+    extra = {name: _extra(cell) for name, cell in row.items() if name not in _NO_EXTRA and cell}
     plan = RunPlan(
         run=run,
         file=file,
@@ -276,17 +283,19 @@ def write_plans(path: Path, plans: Iterable[RunPlan], axes: str) -> None:
     rows = list(plans)
     extras = list(dict.fromkeys(name for plan in rows for name in plan.extra))
     starts = [_START] if any(plan.start is not None for plan in rows) else []
+    road = [c for c in ROAD if any(not math.isnan(getattr(plan, c.quantity)) for plan in rows)]
+    given = [column.name for column in road]
     with path.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.DictWriter(stream, [*REQUIRED, *starts, *extras], lineterminator="\n")
+        writer = csv.DictWriter(stream, [*REQUIRED, *starts, *given, *extras], lineterminator="\n")
         writer.writeheader()
-        writer.writerows(_plan_row(plan, axes, bool(starts), extras) for plan in rows)
+        writer.writerows(_plan_row(plan, axes, road, bool(starts), extras) for plan in rows)
 
 
 def _plan_row(
-    plan: RunPlan, axes: str, with_start: bool, extras: list[str]
+    plan: RunPlan, axes: str, road: list[_Column], with_start: bool, extras: list[str]
 ) -> Mapping[str, int | float | str]:
     row: dict[str, int | float | str] = {"run": plan.run, "file": plan.file, "kind": plan.kind}
-    for column in SET_POINTS:
+    for column in (*SET_POINTS, *road):
         value: float = getattr(plan, column.quantity)
         given = sign(column.quantity, axes) * from_si(value, column.unit, column.dimension) + 0.0
         row[column.name] = "" if math.isnan(value) else float(f"{given:.12g}")

@@ -33,6 +33,10 @@ the noise-free forces, slip, contact lengths and edges of each run, in SI and IS
               help="Runs repeated at the end.  [default: the plan's own]")  # fmt: skip
 @click.option("--tire", "tire_name", default="reference", show_default=True, metavar="NAME",
               help="The virtual tire, see --list.")  # fmt: skip
+@click.option("--friction", type=float, metavar="MU",
+              help="Friction of the road in every run.  [default: the tire's own]")  # fmt: skip
+@click.option("--tread-depth", "tread_depth_mm", type=float, metavar="MM",
+              help="Depth of the grooves; 8 mm is a new tread.  [default: 8]")  # fmt: skip
 @click.option("--axes", default="iso", show_default=True, metavar="NAME",
               help="Axis system of the files: iso, sae or adapted_sae.")  # fmt: skip
 @click.option("--jobs", default=2, show_default=True, type=click.IntRange(min=1),
@@ -47,6 +51,8 @@ def rig(
     seed: int,
     repeats: int | None,
     tire_name: str,
+    friction: float | None,
+    tread_depth_mm: float | None,
     axes: str,
     jobs: int,
     force: bool,
@@ -60,10 +66,11 @@ def rig(
     if plan_name is None or out is None:
         raise click.UsageError("--plan and --out are needed; --list shows the plans")
     from bench.rig.campaign import run_plan
-    from bench.rig.plans import plan, with_repeats
+    from bench.rig.plans import on_one_road, plan, with_repeats
     from bench.rig.tire import tire
 
-    chosen = plan(plan_name)
+    depth = None if tread_depth_mm is None else 1e-3 * tread_depth_mm
+    chosen = on_one_road(plan(plan_name), friction, depth)
     count = len(with_repeats(chosen, chosen.repeats if repeats is None else repeats))
     with progress_bar(f"rig {plan_name}", count) as advance:
         truths = run_plan(

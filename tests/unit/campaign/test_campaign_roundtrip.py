@@ -125,11 +125,48 @@ def test_a_campaign_comes_back_run_by_run(write: Write, sound_runs: tuple[Run, .
 
 def test_extra_columns_are_kept(write: Write, sound_runs: tuple[Run, ...]) -> None:
     def add(run: Run) -> Run:
-        return replace(run, plan=replace(run.plan, extra={"tread_depth_mm": 7.5, "rim": "A/b, c"}))
+        return replace(run, plan=replace(run.plan, extra={"rim_width_mm": 7.5, "rim": "A/b, c"}))
 
     plan = read_campaign(write(changed(sound_runs[:2], 1, add))).plans
     assert plan[0].extra == {}
-    assert plan[1].extra == {"tread_depth_mm": 7.5, "rim": "A/b, c"}
+    assert plan[1].extra == {"rim_width_mm": 7.5, "rim": "A/b, c"}
+
+
+def test_what_is_known_of_road_and_tread_comes_back(
+    write: Write, sound_runs: tuple[Run, ...]
+) -> None:
+    def known(run: Run) -> Run:
+        return replace(
+            run,
+            plan=replace(run.plan, friction=0.4, tread_depth=0.0065, tread_temperature=313.15),
+            rig={**run.rig, "friction": np.full(run.rig["Fz"].size, 0.41)},
+        )
+
+    folder = write(changed(sound_runs[:2], 1, known))
+    header, first, second = (folder / "runs.csv").read_text().splitlines()
+    assert header.endswith("friction,tread_depth_mm,tread_temperature_degC")
+    assert first.endswith(",,,")
+    assert second.endswith("0.4,6.5,40.0")
+    campaign = read_campaign(folder)
+    plan = campaign.plans[1]
+    assert (plan.friction, plan.tread_depth) == pytest.approx((0.4, 0.0065))
+    assert plan.tread_temperature == pytest.approx(313.15)
+    assert np.isnan(campaign.plans[0].friction)
+    assert campaign.load(plan).mean("friction") == pytest.approx(0.41)
+
+
+@pytest.mark.parametrize("cell", ["-0.1", "wet", "3"])
+def test_a_friction_that_cannot_be_is_refused(
+    write: Write, sound_runs: tuple[Run, ...], cell: str
+) -> None:
+    def known(run: Run) -> Run:
+        return replace(run, plan=replace(run.plan, friction=0.25))
+
+    folder = write(changed(sound_runs[:2], 1, known))
+    file = folder / "runs.csv"
+    file.write_text(file.read_text().replace("0.25", cell))
+    with pytest.raises(FormatError, match="line 3, friction"):
+        read_campaign(folder)
 
 
 def test_forces_alone_make_a_campaign(tmp_path: Path) -> None:

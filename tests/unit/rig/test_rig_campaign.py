@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from bench.rig.campaign import run_plan
-from bench.rig.plans import Plan
+from bench.rig.plans import Plan, on_one_road
 from bench.rig.tire import Condition, RigTire
 from tirelib.campaign import read_campaign
 from tirelib.cli.rig import rig
@@ -76,6 +76,17 @@ def test_processes_do_not_change_the_data(folder: Path, tmp_path: Path) -> None:
         assert one.strain is not None
         assert two.strain is not None
         np.testing.assert_array_equal(one.strain, two.strain)
+
+
+def test_a_plan_runs_on_a_slippery_road_with_a_worn_tread(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "wet"
+    run_plan(on_one_road(PLAN, 0.3, 0.006), RigTire(), out, seed=1, repeats=0, jobs=1)
+    here, there = read_campaign(folder), read_campaign(out)
+    assert {(p.friction, p.tread_depth) for p in here.plans} == {(0.95, 0.008)}
+    assert {(p.friction, p.tread_depth) for p in there.plans} == {(0.3, 0.006)}
+    row = truth(out)[1]
+    assert abs(row["Fy_N"]) < 0.3 * row["Fz_N"]
+    assert row["R_e_m"] < truth(folder)[1]["R_e_m"] - 3e-4
 
 
 def test_a_folder_that_is_not_empty_is_refused(folder: Path) -> None:
