@@ -1,6 +1,6 @@
-"""What the wheel does not send: travel speed, pressure, camber, over device time.
+"""What the wheel does not send: travel speed, pressure, camber, turn rate, over device time.
 
-They come from options (one value each) or from a sidecar (``tirebench-conditions/1``, JSON) that
+They come from options (one value each) or from a sidecar (``tirebench-conditions/2``, JSON) that
 the emulator writes, and are held from one value to the next. A sidecar also tells where in device
 time each run of the campaign was played and what the rig measured, so that estimates can be
 compared.
@@ -16,22 +16,34 @@ from pathlib import Path
 from typing import Any
 
 from bench.errors import DeviceError, cause
+from tirelib.held import HELD
 from tirelib.units import from_si, to_si
 
-FORMAT = "tirebench-conditions/1"
-QUANTITIES = {"speed": ("km/h", "speed"), "pressure": ("bar", "pressure"),
-              "camber": ("deg", "angle")}  # fmt: skip
-"""Unit in files and dimension of each condition."""
+FORMAT = "tirebench-conditions/2"
+FIRST_FORMAT = "tirebench-conditions/1"
+"""Which knew speed, pressure and camber."""
+UNITS = {"speed": ("km/h", "speed"), "pressure": ("bar", "pressure"), "camber": ("deg", "angle"),
+         "omega": ("rad/s", "angular_speed")}  # fmt: skip
+QUANTITIES = {name: UNITS[name] for name in HELD}
+"""Unit in files and dimension of each condition, in the order of `tirelib.held.HELD`."""
 TRUTH = {"Fz": ("N", "force"), "alpha": ("deg", "angle"), "kappa": ("1", "ratio"),
          "Fy": ("N", "force")}  # fmt: skip
 ROUNDING = 0.6
 """Device time is a whole number of microseconds; a condition this close has begun, [us]."""
 LONGEST_MEMORY = 256
 """Changes of what a bus tells that are remembered; the chain is a few samples behind, no more."""
-UNKNOWN = (math.nan, math.nan, math.nan)
+UNKNOWN = (math.nan,) * len(HELD)
 
-Condition = tuple[float, float, float]
-"""speed [m/s], pressure [Pa], camber [rad]; NaN where unknown."""
+Condition = tuple[float, ...]
+"""In the order of `tirelib.held.HELD`, SI; NaN where unknown."""
+
+
+def condition(*values: float, **known: float) -> Condition:
+    """Return a condition from what is known of it, SI, by order or name."""
+    if unknown := known.keys() - set(HELD):
+        raise TypeError(f"no condition: {', '.join(sorted(unknown))}")
+    given = {**dict(zip(HELD, values, strict=False)), **known}
+    return tuple(given.get(name, math.nan) for name in HELD)
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,11 +94,9 @@ class Conditions:
     campaign: dict[str, Any] | None = None
 
     @classmethod
-    def constant(
-        cls, speed: float = math.nan, pressure: float = math.nan, camber: float = math.nan
-    ) -> "Conditions":
-        """Return conditions that do not change, SI."""
-        return cls((0,), ((speed, pressure, camber),))
+    def constant(cls, *values: float, **known: float) -> "Conditions":
+        """Return conditions that do not change, SI, by order or name."""
+        return cls((0,), (condition(*values, **known),))
 
     def at(self, t_us: float) -> Condition:
         """Return what holds at a device time."""
@@ -124,7 +134,7 @@ class Measured:
     Attributes
     ----------
     name : str
-        ``speed``, ``pressure`` or ``camber``.
+        One of `tirelib.held.HELD`.
     value : float, SI
     """
 
@@ -160,7 +170,7 @@ class Held:
             if moment > t_us + ROUNDING:
                 break
             values[index] = value
-        return values[0], values[1], values[2]
+        return tuple(values)
 
     def next_change(self, t_us: float) -> float:
         """Return the device time of the next change after `t_us`; infinite if none is known."""
@@ -212,22 +222,29 @@ def parse_conditions(document: Any, where: str) -> Conditions:
         If it is not what this program writes.
     """
     given = document.get("format") if isinstance(document, dict) else type(document).__name__
-    if given != FORMAT:
+    if given not in (FIRST_FORMAT, FORMAT):
         raise DeviceError(
-            f"{where}: format = {given!r}; {FORMAT!r} is understood here; "
+            f"{where}: format = {given!r}; {FIRST_FORMAT!r} and {FORMAT!r} are understood "
+            "here; "
             "take the file that `tirebench emulate --conditions` wrote"
         )
     try:
         times = tuple(int(t) for t in document["t_us"])
-        columns = [_column(document[name], *row) for name, row in QUANTITIES.items()]
+        columns = [
+            [math.nan] * len(times)
+            if given == FIRST_FORMAT and name not in document
+            else _column(document[name], *row)
+            for name, row in QUANTITIES.items()
+        ]
         values = tuple(zip(*columns, strict=True))
         runs = tuple(_mark(entry) for entry in document["runs"])
         loop = int(document["loop_us"])
         campaign = None if document.get("campaign") is None else dict(document["campaign"])
     except (AttributeError, KeyError, OverflowError, TypeError, ValueError) as error:
         raise DeviceError(
-            f"{where}: {type(error).__name__} {error}; t_us, speed, pressure, camber, runs and "
-            "loop_us are needed, lists of one length; write it anew with `tirebench emulate`"
+            f"{where}: {type(error).__name__} {error}; t_us, {', '.join(QUANTITIES)}, "
+            "runs and loop_us are needed, lists of one length; write it anew with "
+            "`tirebench emulate`"
         ) from None
     if len(values) != len(times) or not times or list(times) != sorted(times):
         raise DeviceError(

@@ -25,6 +25,7 @@ from bench.transmitter import ANNOUNCED, WHOLE, Record, Sent, SerialTransmitter,
 from tirelib.arrays import FloatArray
 from tirelib.campaign import CampaignHeader, Run
 from tirelib.campaign.header import header_document
+from tirelib.held import HELD
 
 PAUSE = 0.1
 """Device time between two runs, [s]."""
@@ -283,16 +284,16 @@ def _samples(run: Run) -> int:
 def _conditions(run: Run) -> Iterator[tuple[float, Condition]]:
     """Yield time [s, the run's clock] and conditions wherever the rig measured them."""
     times: FloatArray = run.rig_time if run.rig_time is not None else np.array([run.start_time])
-    columns = [run.rig.get(name) for name in ("speed", "pressure", "camber")]
+    columns = [run.rig.get(name) for name in HELD]
     first = int(np.searchsorted(times, run.start_time, side="right")) - 1
     if first < 0:
         yield run.start_time, UNKNOWN
     for index in range(max(first, 0), len(times)):
-        speed, pressure, camber = (
+        values = (
             float("nan") if column is None or not column.size else float(column[index])
             for column in columns
         )
-        yield max(float(times[index]), run.start_time), (speed, pressure, camber)
+        yield max(float(times[index]), run.start_time), tuple(values)
 
 
 def _plan(run: Run) -> dict[str, float | str]:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from bench.can_batch import CanBatch, unpack
-from bench.conditions import Condition, Conditions, Measured, RunMark
+from bench.conditions import QUANTITIES, UNKNOWN, Condition, Conditions, Measured, RunMark
 from bench.device import Device
 from bench.errors import RecordingError
 from bench.frames import GAGES
@@ -26,6 +26,8 @@ from bench.recording import Recording
 from bench.timeline import Samples, Timeline
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.campaign import CampaignHeader, Run, RunPlan, write_campaign
+from tirelib.held import HELD
+from tirelib.units import from_si
 
 SHORTEST = 0.05
 """A segment shorter than this becomes no run of a campaign, [s]."""
@@ -131,13 +133,17 @@ def write_campaign_of(
     return len(runs)
 
 
+_SPELLED = {"km/h": "kmh", "bar": "bar", "deg": "deg", "rad/s": "rad_s"}
+"""Units as a column's name spells them."""
+
+
 def sample_table(segment: Segment, conditions: Conditions) -> dict[str, Any]:
     """Return the columns of a segment, units in the names."""
     strain = segment.strain
     n = len(strain)
     t_us = segment.t_us + 1e6 * segment.period * np.arange(n)
     index = np.searchsorted(np.asarray(conditions.t_us), t_us + 0.6, side="right") - 1
-    held = np.array([*conditions.values, (np.nan,) * 3])[index]  # -1: nothing is known yet
+    held = np.array([*conditions.values, UNKNOWN])[index]  # -1: nothing is known yet
     known = conditions.run_at(segment.t_us)
     return {
         "wheel": np.full(n, segment.wheel, np.int16),
@@ -146,9 +152,10 @@ def sample_table(segment: Segment, conditions: Conditions) -> dict[str, Any]:
         "t_s": 1e-6 * t_us,
         **{f"strain_{g + 1}_ustrain": 1e6 * strain[:, g] for g in range(GAGES)},
         "lost": segment.lost,
-        "speed_kmh": 3.6 * held[:, 0],
-        "pressure_bar": 1e-5 * held[:, 1],
-        "camber_deg": np.degrees(held[:, 2]),
+        **{
+            f"{name}_{_SPELLED[unit]}": from_si(held[:, column], unit, dimension)
+            for column, (name, (unit, dimension)) in enumerate(QUANTITIES.items())
+        },
     }
 
 
@@ -257,11 +264,7 @@ def _rig(
         moment = conditions.next_change(moment)
     times = np.array([time for time, _ in rows])
     values = np.array([value for _, value in rows])
-    rig = {
-        name: values[:, i]
-        for i, name in enumerate(("speed", "pressure", "camber"))
-        if np.isfinite(values[:, i]).all()
-    }
+    rig = {name: values[:, i] for i, name in enumerate(HELD) if np.isfinite(values[:, i]).all()}
     for name, channel in RIG_TRUTH.items():
         if name in mark.truth:
             rig[channel] = np.full(len(times), mark.truth[name])

@@ -30,11 +30,11 @@ from bench.fmu_archive import FmuArchive
 from bench.frames import GAGES
 from tirelib.arrays import FloatArray
 from tirelib.errors import FormatError
+from tirelib.held import HELD
 
 if TYPE_CHECKING:
     from tirelib.estimators.calibration import Calibration
 
-CONDITIONS = ("speed", "pressure", "camber")
 RATE = "sample_rate"
 """Name of the parameter that holds the sample rate, [Hz]."""
 LONGEST_CAUSE = 400
@@ -224,8 +224,8 @@ class FmuModel:
             strain = [
                 f"strain_{i}_{g}" for i in range(1, self.samples + 1) for g in range(1, GAGES + 1)
             ]
-        present = [name for name in CONDITIONS if name in self._variables]
-        self._held = [CONDITIONS.index(name) for name in present]
+        present = [name for name in HELD if name in self._variables]
+        self._held = [HELD.index(name) for name in present]
         self._inputs = self._ports([*strain, *present])
         self._strain = self._inputs.values[: len(strain)]
         self._conditions = self._inputs.values[len(strain) :]
@@ -279,7 +279,7 @@ class FmuModel:
         ----------
         strain : array, shape (n, 5), n up to k
             Oldest first, NaN where unknown.
-        conditions : speed [m/s], pressure [Pa], camber [rad]
+        conditions : Condition
         valid : bool
             False when no sample of the step arrived.
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from bench.can_batch import unpack
-from bench.conditions import Conditions, RunMark
+from bench.conditions import Conditions, RunMark, condition
 from bench.device import Device
 from bench.emulator import Script, Tape
 from bench.errors import DeviceError
@@ -70,16 +70,21 @@ def manoeuvre_tape(
         records.append(Record(wheel, 0, period, struck, bits))
         motions[wheel] = motion
     duration = max(len(record.counts) for record in records) * period * TICK
-    return Tape(tuple(records), _conditions(motions[wheels[0]]), duration + 0.1), motions
+    told = _conditions(motions[wheels[0]], alone=len(wheels) == 1)
+    return Tape(tuple(records), told, duration + 0.1), motions
 
 
-def _conditions(motion: Motion) -> Conditions:
+def _conditions(motion: Motion, *, alone: bool) -> Conditions:
+    """Return what is told along a motion; the turn rate only of a wheel that plays alone."""
     time = np.arange(0.0, motion.time[-1], CONDITION_STEP)
-    columns = [
-        np.interp(time, motion.time, [getattr(c, name) for c in motion.conditions]).tolist()
+    columns = {
+        name: np.interp(time, motion.time, [getattr(c, name) for c in motion.conditions]).tolist()
         for name in ("speed", "pressure", "camber")
-    ]
-    values = tuple(zip(*columns, strict=True))
+    }
+    if alone:
+        columns["omega"] = np.interp(time, motion.time, motion.omega).tolist()
+    rows = zip(*columns.values(), strict=True)
+    values = tuple(condition(**dict(zip(columns, row, strict=True))) for row in rows)
     steady = len(set(motion.conditions)) == 1
     truth = {name: float(values[0]) for name, values in motion.truth.items() if name != "Fx"}
     mark = RunMark(1, 0, 0.0, truth if steady else {})

@@ -13,6 +13,7 @@ from pythonfmu import Fmi2Slave
 from tirelib.fmu.slave import GuardedSlave
 from tirelib.fmu.variables import MISSING, Variable, inputs, outputs, parameters
 from tirelib.fmu.wheel import Wheel, check_missing, embedded_calibration, load_wheel
+from tirelib.held import HELD
 from tirelib.stream.estimator import RATES
 
 
@@ -32,7 +33,7 @@ class StrainTire(GuardedSlave, Fmi2Slave):
         self._missing = [v.name for v in fixed].index(MISSING)
         first, strains = len(fixed), self._samples * len(lateral)
         self._frame = slice(first, first + strains)
-        self._conditions = slice(first + strains, first + strains + 4)
+        self._conditions = slice(first + strains, first + strains + len(HELD))
         self._age = first + len(given) + [v.name for v in taken].index("age")
         return [*fixed, *given, *taken]
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from tirelib.campaign import Campaign, CampaignHeader, Run
 from tirelib.errors import CalibrationError
 from tirelib.features.extract import Features, extract_features
 from tirelib.flags import INVALIDATING
+from tirelib.held import HELD
 from tirelib.signal import LowPass, cut_turns
 
 TRUTH = ("Fx", "Fy", "Fz", "Mz", "slip_angle", "slip_ratio")
@@ -79,7 +81,7 @@ def measure_run(
             "strain_1 .. strain_N are needed"
         )
     times = run.time()
-    held = {name: _held(run, name, times) for name in ("speed", "pressure", "camber")}
+    held: Any = {name: _held(run, name, times) for name in HELD}
     turns = cut_turns(
         run.strain,
         run.rate,
@@ -103,7 +105,7 @@ def _held(run: Run, name: str, times: FloatArray) -> FloatArray | float:
     """
     values = run.hold(name, times)
     if values is None or run.rig_time is None:
-        return float(getattr(run.plan, name))
+        return float(getattr(run.plan, name, np.nan))
     step = float(np.median(np.diff(run.rig_time))) if run.rig_time.size > 1 else np.inf
     return np.where(times > run.rig_time[-1] + LATE * step, np.nan, values)
 

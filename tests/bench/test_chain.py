@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bench.chain import Outputs, Turn
-from bench.conditions import Condition, Conditions
+from bench.conditions import Condition, Conditions, condition
 from bench.device import Device
 from bench.document import document
 from bench.emulator import Script, write_script
@@ -22,6 +22,7 @@ from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.result import estimate_document
 from tirelib.flags import TurnFlag
+from tirelib.held import HELD
 from tirelib.observations import observe
 from tirelib.stream import StreamEstimator
 
@@ -39,8 +40,7 @@ class StandIn:
         self._stream = StreamEstimator(self._calibration, 1.0 / period)
 
     def step(self, strain: FloatArray, conditions: Condition, valid: bool) -> Outputs | None:
-        speed, pressure, camber = conditions
-        done = self._stream.push(strain.T, speed=speed, pressure=pressure, camber=camber)
+        done = self._stream.push(strain.T, **dict(zip(HELD, conditions, strict=True)))
         if not done:
             return None
         turn = done[-1]
@@ -59,7 +59,7 @@ def script() -> Script:
 
 def constant(script: Script) -> Conditions:
     """Conditions that do not change, with the runs of the script."""
-    return Conditions((0,), ((18.0, 2.3e5, 0.0),), script.conditions.runs)
+    return Conditions((0,), (condition(18.0, 2.3e5, 0.0),), script.conditions.runs)
 
 
 def estimates(

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.conditions import Conditions
+from bench.conditions import Conditions, condition
 from bench.device import Device
 from bench.emulator import write_script
 from bench.errors import FmuError
@@ -48,7 +48,7 @@ def test_a_fresh_start_forgets(toy_fmus: dict[int, Path]) -> None:
         seen = []
         for _ in range(2):
             model.start(1e-4)
-            steps = [model.step(strain, (18.0, 2.3e5, 0.0), True) for _ in range(3)]
+            steps = [model.step(strain, condition(18.0, 2.3e5, 0.0), True) for _ in range(3)]
             seen.append([None if out is None else (out[0]["turn"], out[0]["age"]) for out in steps])
     assert seen[0] == seen[1]
     assert seen[0][0] is not None

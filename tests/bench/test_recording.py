@@ -13,6 +13,7 @@ from mcap.reader import make_reader
 from bench.conditions import (
     Conditions,
     RunMark,
+    condition,
     conditions_document,
     parse_conditions,
     read_conditions,
@@ -25,7 +26,11 @@ from bench.recording import Recorder, Recording, RecordingHeader
 
 CONDITIONS = Conditions(
     (0, 10_000, 20_000),
-    ((18.0, 2.3e5, 0.01), (math.nan, 2.3e5, -0.01), (18.1, math.nan, 0.0)),
+    (
+        condition(18.0, 2.3e5, 0.01),
+        condition(math.nan, 2.3e5, -0.01, 59.5),
+        condition(18.1, math.nan, 0.0),
+    ),
     (RunMark(7, 0, 0.25, {"Fz": 3000.0, "alpha": 0.02}),),
     30_000,
 )
@@ -129,7 +134,7 @@ def test_conditions_are_held_and_repeat_in_a_loop() -> None:
     assert math.isnan(CONDITIONS.at(10_000.0)[0])
     assert CONDITIONS.at(60_000.0 + 25_000.0)[0] == 18.1
     assert CONDITIONS.run_at(61_000.0) == (CONDITIONS.runs[0], 60_000)
-    later = Conditions((5000, 6000), ((1.0, 2.0, 3.0),) * 2)
+    later = Conditions((5000, 6000), (condition(1.0, 2.0, 3.0),) * 2)
     assert math.isnan(later.at(4000.0)[0])
     assert later.run_at(7000.0) is None
 
@@ -159,3 +164,13 @@ def test_a_sidecar_of_another_make_is_refused(change: dict[str, Any]) -> None:
     assert parse_conditions(sound, "c.json").t_us == (0,)
     with pytest.raises(DeviceError, match=r"c\.json: .* lists of one length"):
         parse_conditions(sound | change, "c.json")
+
+
+def test_a_sidecar_of_the_first_format_knows_no_turn_rate() -> None:
+    document = conditions_document(Conditions.constant(18.0, 2.3e5, 0.01, 59.5))
+    assert parse_conditions(document, "a").values[0] == pytest.approx((18.0, 2.3e5, 0.01, 59.5))
+    del document["omega"]
+    with pytest.raises(DeviceError, match="KeyError 'omega'"):
+        parse_conditions(document, "a")
+    first = parse_conditions({**document, "format": "tirebench-conditions/1"}, "a")
+    assert first.values[0] == pytest.approx((18.0, 2.3e5, 0.01, math.nan), nan_ok=True)

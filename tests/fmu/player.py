@@ -8,7 +8,7 @@ import numpy as np
 from tests.fmu import live
 from tirelib.fmu.run import LoadedFmu
 
-CONDITIONS = np.array([live.SPEED, live.PRESSURE, 0.0])
+CONDITIONS = np.array([live.SPEED, live.PRESSURE, 0.0, np.nan])
 
 
 def strain(load: float = 4e3, tilt: float = 0.05, turns: float = 3.4) -> np.ndarray:

@@ -14,9 +14,10 @@ from tests.synthetic import frames as cut
 from tests.synthetic import record
 from tirelib.flags import TurnFlag
 from tirelib.fmu.run import LoadedFmu
+from tirelib.held import HELD
 
 RATE = 1e4
-CONDITIONS = np.array([live.SPEED, live.PRESSURE, 0.0])
+CONDITIONS = np.array([live.SPEED, live.PRESSURE, 0.0, np.nan])
 ESTIMATES = ("Fz", "alpha", "kappa", "Fy", "Fz_std", "alpha_std", "kappa_std", "Fy_std",
              *(f"contact_length_{g}" for g in range(1, 6)), "rolling_radius", "turn_rate",
              "contact_time")  # fmt: skip
@@ -96,7 +97,7 @@ def push(fmu: LoadedFmu, frame: np.ndarray, step: float) -> None:
     """A buffered step of any length."""
     names = [f"strain_{s}_{g}" for s in range(1, frame.shape[1] + 1) for g in range(1, 6)]
     at = fmu.references
-    fmu.slave.setReal([at[n] for n in (*names, "speed", "pressure", "camber")],
+    fmu.slave.setReal([at[n] for n in (*names, *HELD)],
                       [*frame.T.ravel().tolist(), *CONDITIONS.tolist()])  # fmt: skip
     fmu.slave.setInteger([at["samples"]], [frame.shape[1]])
     fmu.slave.doStep(0.0, step)

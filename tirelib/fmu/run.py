@@ -19,9 +19,8 @@ from tirelib.estimators.chain import QUANTITIES
 from tirelib.features.extract import Features
 from tirelib.flags import INVALIDATING, flag_names
 from tirelib.fmu.build import embedded_calibration
+from tirelib.held import HELD
 from tirelib.observations import SET_POINTS, TRUTH, Observations, truth_of
-
-CONDITIONS = ("speed", "pressure", "camber")
 
 
 def keeping(messages: list[str]) -> Any:
@@ -86,7 +85,7 @@ class LoadedFmu:
             raise FormatError(
                 f"{path}: cannot be instantiated: {'; '.join(self.messages) or error}"
             ) from None
-        self._frame = self._buffer(*strains, *CONDITIONS)
+        self._frame = self._buffer(*strains, *HELD)
         self.buffered = "samples" in self.references
 
     def __enter__(self) -> "LoadedFmu":
@@ -183,7 +182,7 @@ def play_run(fmu: LoadedFmu, run: Run) -> Iterator[dict[str, Any]]:
         raise CalibrationError(f"run {run.plan.run}: the file holds no strain; strain_1 .. "
                                "strain_N are needed")  # fmt: skip
     times = run.time()
-    held = [run.hold(name, times) for name in CONDITIONS]
+    held = [run.hold(name, times) for name in HELD]
     table = np.stack([np.full(times.size, np.nan) if x is None else x for x in held])
     fmu.start(run.rate)
     turns = 0

@@ -109,7 +109,7 @@ class Wheel:
         valid : bool
             False when the frame was lost; its samples are missing then.
         *conditions : float
-            Speed, pressure, camber, omega; NaN, like infinity, where unknown.
+            In the order of `HELD`; NaN, like infinity, where unknown.
         count : int, optional
             How many samples of the frame are new, whatever the step: time is counted in samples. A
             step without any lets the estimate age.
@@ -121,14 +121,8 @@ class Wheel:
         """
         n = self.samples_in(step) if count is None else self._counted(step, count)
         if n:
-            speed, pressure, camber, omega = conditions
-            turns = self._estimator.take(
-                self._strain(frame, n, valid),
-                speed=speed if math.isfinite(speed) else math.nan,
-                pressure=pressure if math.isfinite(pressure) else math.nan,
-                camber=camber if math.isfinite(camber) else math.nan,
-                omega=omega,
-            )
+            known = [value if math.isfinite(value) else math.nan for value in conditions]
+            turns = self._estimator.take(self._strain(frame, n, valid), known)
             if turns:
                 self._fault, self._held = False, None
         else:

@@ -14,12 +14,14 @@ the same code, so they agree.
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Unpack
 
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.errors import ParameterError, ShapeError
 from tirelib.flags import TurnFlag
+from tirelib.held import HELD, Held
 from tirelib.signal.contacts import Contact, ContactFinder
 from tirelib.signal.lowpass import LowPass, half_width, smooth_to_angle
 from tirelib.signal.quality import UNUSABLE, inspect
@@ -39,7 +41,6 @@ NEAR_EDGE = 3
 DRIFT_SHARE = 0.05
 LONGEST_TURN = 3.0
 """A turn that lasts longer is standstill, [s]."""
-_HELD = ("speed", "pressure", "camber")
 
 
 class TurnCutter:
@@ -69,7 +70,7 @@ class TurnCutter:
         self._finder = ContactFinder(longest)
         self._keep = 2 * longest
         # rows: gages, then the held conditions, then the trigger
-        self._buffer = np.full((self._gages + len(_HELD) + 1, 2 * self._keep), np.nan)
+        self._buffer = np.full((self._gages + len(HELD) + 1, 2 * self._keep), np.nan)
         self._filled = 0
         self._base = 0  # sample number of the buffer's first column
         self._waiting: deque[Contact] = deque()
@@ -81,10 +82,8 @@ class TurnCutter:
         self,
         strain: FloatArray,
         *,
-        speed: FloatArray | float = np.nan,
-        pressure: FloatArray | float = np.nan,
-        camber: FloatArray | float = np.nan,
         trigger: BoolArray | None = None,
+        **held: Unpack[Held],
     ) -> list[Turn]:
         """Take a frame and return the turns that it completes.
 
@@ -92,10 +91,10 @@ class TurnCutter:
         ----------
         strain : array, shape (n_gages, n), [-]
             Raw strain, oldest first; a lost sample is NaN, so that time goes on.
-        speed, pressure, camber : array of shape (n,) or a number, [m/s], [Pa], [rad]
-            Conditions, held until changed.
         trigger : array of bool, shape (n,)
             True at the sample at which the gages pass the top of the wheel; None if there is none.
+        **held : array of shape (n,) or a number
+            Conditions, see `Held`; those that are not given are unknown.
         """
         if strain.ndim != 2 or strain.shape[0] != self._gages:
             raise ShapeError(f"strain has shape {strain.shape}; ({self._gages}, n) is needed")
@@ -105,9 +104,9 @@ class TurnCutter:
             n = part.stop - part.start
             columns = self._room(n)
             self._buffer[: self._gages, columns] = strain[:, part]
-            for row, value in enumerate((speed, pressure, camber), start=self._gages):
-                held = value[part] if isinstance(value, np.ndarray) else value
-                self._buffer[row, columns] = held
+            for row, name in enumerate(HELD, start=self._gages):
+                value = held.get(name, np.nan)
+                self._buffer[row, columns] = value[part] if isinstance(value, np.ndarray) else value
             self._buffer[-1, columns] = np.nan if trigger is None else trigger[part]
             self._waiting.extend(self._finder.push(strain[self._centre, part]))
             while self._waiting:
@@ -250,10 +249,10 @@ class TurnCutter:
             swing -= np.fmin.reduce(strain, axis=1, initial=0.0)
             gage_flags[moved > DRIFT_SHARE * swing] |= int(TurnFlag.DRIFT)
         conditions, _ = self._mean(
-            slice(self._gages, self._gages + len(_HELD)), before.middle, contact.middle
+            slice(self._gages, self._gages + len(HELD)), before.middle, contact.middle
         )
-        speed, pressure, _ = (float(value) for value in conditions)
-        camber = self._in_contact(self._gages + _HELD.index("camber"), contact)
+        speed, pressure = (float(conditions[HELD.index(name)]) for name in ("speed", "pressure"))
+        camber = self._in_contact(self._gages + HELD.index("camber"), contact)
         if not np.isfinite(speed) or speed == 0.0:
             flags |= TurnFlag.NO_SPEED
             speed = np.nan  # a wheel that turns does not stand
@@ -343,13 +342,11 @@ def cut_turns(
     rate: float,
     lateral: Sequence[float],
     *,
-    speed: FloatArray | float = np.nan,
-    pressure: FloatArray | float = np.nan,
-    camber: FloatArray | float = np.nan,
     trigger: BoolArray | None = None,
     low_pass: LowPass | None = None,
+    **held: Unpack[Held],
 ) -> Turns:
     """Cut a whole record into turns; parameters as in `TurnCutter` and its `push`."""
     cutter = TurnCutter(lateral, rate, low_pass)
-    turns = cutter.push(strain, speed=speed, pressure=pressure, camber=camber, trigger=trigger)
+    turns = cutter.push(strain, trigger=trigger, **held)
     return stack_turns(turns, cutter.lateral, rate)

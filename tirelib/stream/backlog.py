@@ -5,6 +5,7 @@ finder knows, nothing can be found, so short frames need no work of their own. W
 does not change: neither finder nor cutter depend on how samples are cut into frames.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -41,7 +42,7 @@ class Backlog:
         """Forget everything."""
         self._values: list[float] = []
         self._counts: list[int] = []
-        self._held: list[tuple[float, float, float]] = []
+        self._held: list[Sequence[float]] = []
         self.count = 0
         self.forget_range()
 
@@ -50,7 +51,7 @@ class Backlog:
         self._range: tuple[float, float, int] | None = None
         self._asked = False
 
-    def keep(self, values: list[float], n: int, held: tuple[float, float, float]) -> bool:
+    def keep(self, values: list[float], n: int, held: Sequence[float]) -> bool:
         """Keep a frame if it cannot end a turn; tell whether it was kept.
 
         Parameters
@@ -58,8 +59,8 @@ class Backlog:
         values : list of float, length n x gages
             Strain, sample by sample.
         n : int
-        held : tuple of three floats
-            Speed, pressure, camber during the frame.
+        held : sequence of float
+            What held during the frame, in the order of `HELD`.
         """
         if not self._asked:
             self._range, self._asked = quiet_range(self._cutter), True
@@ -78,7 +79,7 @@ class Backlog:
         return True
 
     def drained(self) -> tuple[FloatArray, FloatArray]:
-        """Return strain, shape (n_gages, n), and what was held, shape (3, n); forget them."""
+        """Return strain, shape (n_gages, n), and what was held, shape (k, n); forget them."""
         strain = np.array(self._values).reshape(-1, self._gages).T
         held = np.repeat(np.array(self._held).T, self._counts, axis=1)
         self.clear()

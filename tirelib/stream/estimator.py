@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -12,17 +12,19 @@ from tirelib.errors import FormatError, ParameterError
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.features.extract import Features, extract_features
 from tirelib.flags import TurnFlag
+from tirelib.held import HELD, Held
 from tirelib.signal.lowpass import LowPass
 from tirelib.signal.quality import UNUSABLE
 from tirelib.signal.turns import LONGEST_TURN, Turn, TurnCutter, stack_turns
 from tirelib.stream.backlog import Backlog
 from tirelib.stream.snapshot import from_plain, restore_cutter, snapshot_cutter, to_plain
 
-STATE_FORMAT = "tirelib-stream-state/3"
+STATE_FORMAT = "tirelib-stream-state/4"
 WATCHDOG_TURNS = 2.0
 """Turns after the middle of the last contact at which an estimate ceases to be valid."""
 STANDSTILL = 0.05
 """Turn rate below which a wheel whose rate is measured counts as standing, [rad/s]."""
+_OMEGA = HELD.index("omega")
 RATES = (100.0, 1e5)
 """Sample rates that are taken, [Hz]; an estimator holds 12 s of samples."""
 
@@ -147,11 +149,8 @@ class StreamEstimator:
         self,
         frame: FloatArray,
         *,
-        speed: FloatArray | float = math.nan,
-        pressure: FloatArray | float = math.nan,
-        camber: FloatArray | float = math.nan,
         trigger: BoolArray | None = None,
-        omega: FloatArray | float = math.nan,
+        **held: Unpack[Held],
     ) -> list[TurnEstimate]:
         """Take the next samples and return the estimates of the turns that they complete.
 
@@ -159,12 +158,10 @@ class StreamEstimator:
         ----------
         frame : array, shape (n_gages, n), [-]
             Raw strain, oldest first; lost samples are NaN, so that time goes on.
-        speed, pressure, camber : array of shape (n,) or a number, [m/s], [Pa], [rad]
-            Conditions, held until changed; NaN where unknown.
         trigger : array of bool, shape (n,), optional
             True at the sample at which the gages pass the top of the wheel; it only checks.
-        omega : array of shape (n,) or a number, [rad/s]
-            Measured turn rate; only a standing wheel is read from it, estimates use the contacts.
+        **held : array of shape (n,) or a number
+            Conditions, see `Held`; those that are not given are unknown.
 
         Raises
         ------
@@ -172,49 +169,41 @@ class StreamEstimator:
             If the frame has another number of gages.
         """
         turns = self._caught_up()
-        turns += self._cutter.push(
-            frame, speed=speed, pressure=pressure, camber=camber, trigger=trigger
-        )
+        turns += self._cutter.push(frame, trigger=trigger, **held)
         self._backlog.forget_range()
-        self._watch(omega, frame.shape[1])
+        self._watch(held.get("omega", math.nan), frame.shape[1])
         if frame.shape[1]:
             self._idle = 0.0
         self._count += frame.shape[1]
         return [self._estimate(turn) for turn in turns] if turns else []
 
-    def take(
-        self,
-        samples: list[float],
-        *,
-        speed: float = math.nan,
-        pressure: float = math.nan,
-        camber: float = math.nan,
-        omega: float = math.nan,
-    ) -> list[TurnEstimate]:
+    def take(self, samples: list[float], conditions: Sequence[float]) -> list[TurnEstimate]:
         """Do as `push`, for short frames of plain numbers; what cannot end a turn waits.
 
         Parameters
         ----------
         samples : list of float
             Raw strain, sample by sample, oldest first.
-        speed, pressure, camber, omega : float
-            As in `push`.
+        conditions : sequence of float
+            What holds during the frame, in the order of `HELD`; NaN where unknown.
         """
         n = len(samples) // self.gages
-        standing = -STANDSTILL < omega < STANDSTILL
-        if not standing and self._backlog.keep(samples, n, (speed, pressure, camber)):
+        standing = -STANDSTILL < conditions[_OMEGA] < STANDSTILL
+        if not standing and self._backlog.keep(samples, n, conditions):
             self._idle = 0.0
             self._count += n
             return []
         frame: FloatArray = np.array(samples, dtype=np.float64).reshape(n, self.gages).T
-        return self.push(frame, speed=speed, pressure=pressure, camber=camber, omega=omega)
+        held: Any = dict(zip(HELD, conditions, strict=True))
+        return self.push(frame, **held)
 
     def _caught_up(self) -> list[Turn]:
         """Give the cutter what waits; no turn ends in it."""
         if not self._backlog.count:
             return []
-        strain, (speed, pressure, camber) = self._backlog.drained()
-        return self._cutter.push(strain, speed=speed, pressure=pressure, camber=camber)
+        strain, rows = self._backlog.drained()
+        held: Any = dict(zip(HELD, rows, strict=True))
+        return self._cutter.push(strain, **held)
 
     def wait(self, time: float) -> None:
         """Let time [s] go by in which no samples came; they may still come later.
