@@ -83,7 +83,7 @@ def _wet_patch(way: float) -> FloatArray:
 
 
 def _split(_: float) -> FloatArray:
-    """Return less friction under the left wheels; the virtual tire does not know of it."""
+    """Return less friction under the left wheels."""
     return np.array([0.6, 1.0, 0.6, 1.0])
 
 

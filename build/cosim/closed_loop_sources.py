@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from cosim.vehicle14.model import Wheels
-from cosim.wheels import FourWheels, WheelStates
+from cosim.wheels import OWN_FRICTION, FourWheels, WheelStates
 from tirelib.arrays import BoolArray, FloatArray
 
 STEP = 2e-3
@@ -144,5 +144,5 @@ class Strain:
 def _states(wheels: Wheels, omega: FloatArray) -> WheelStates:
     return WheelStates(
         load=wheels.Fz, alpha=wheels.alpha, kappa=wheels.kappa, camber=wheels.camber,
-        speed=wheels.speed, omega=omega,
+        speed=wheels.speed, omega=omega, friction=OWN_FRICTION * wheels.friction,
     )  # fmt: skip

@@ -7,8 +7,7 @@ controller knows the slip angles and loads of the wheels from one of the sources
 `closed_loop_sources`; a gyroscope it has none. Where the rear axle's slip angle exceeds a
 threshold it brakes the front wheel on the outside of the turn.
 
-The virtual tire knows one friction: its strain is that of a dry road at the same slip. Slip angles
-follow from it as they are, by kinematics, lateral forces do not; the controller asks for none.
+The virtual tires have the friction under their wheels; the calibration is that of a dry road.
 """
 
 import dataclasses

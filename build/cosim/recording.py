@@ -11,8 +11,8 @@ from cosim.vehicle import Motion, Vehicle
 from cosim.wheels import NAMES, WHEELS, FourWheels, WheelStates
 from tirelib.arrays import FloatArray
 from tirelib.fmu.build import build_fmu
-from tirelib.fmu.virtual.coordinates import INPUTS
-from tirelib.fmu.virtual.spec import build_virtual
+from tirelib.fmu.virtual.coordinates import FRICTION, INPUTS
+from tirelib.fmu.virtual.spec import build_virtual, friction_surface
 
 STEP = 1e-3
 """Communication step [s]."""
@@ -20,6 +20,8 @@ RATE = 1e4
 """Sample rate of the gages [Hz]."""
 VEHICLE = 3
 """Parameter set whose wheel loads lie best in the virtual tire's range."""
+STATES = (*INPUTS, FRICTION)
+"""What a virtual tire is given."""
 MOTION = ("speed", "steer", "heading", "yaw_rate", "roll", "side_slip")
 
 
@@ -32,7 +34,7 @@ class Recording:
     name : str
     time : array, shape (n,), [s]
     truth : dict of arrays, shape (n, 4)
-        True wheel states by the names of `INPUTS`, held over the step; SI, ISO 8855.
+        True wheel states by the names of `STATES`, held over the step; SI, ISO 8855.
     told : dict of arrays, shape (n, 4)
         Everything of `cosim.wheels.Estimates`, at the end of the step.
     motion : dict of arrays, shape (n,)
@@ -57,11 +59,14 @@ def build_fmus(folder: Path, calibration: Path, step: float = STEP) -> tuple[Pat
     samples = round(step * RATE)
     folder.mkdir(parents=True, exist_ok=True)
     return (
-        build_virtual(folder / "VirtualTire.fmu", samples_per_step=samples, sample_rate=RATE),
+        build_virtual(
+            folder / "VirtualTire.fmu", samples_per_step=samples, sample_rate=RATE,
+            surface=friction_surface(),
+        ),
         build_fmu(
             calibration, folder / "StrainTire.fmu", samples_per_step=samples, sample_rate=RATE
         ),
-    )
+    )  # fmt: skip
 
 
 def drive(manoeuvre: Manoeuvre, number: int = VEHICLE) -> Iterator[Motion]:
@@ -82,7 +87,7 @@ def record(manoeuvre: Manoeuvre, wheels: FourWheels, number: int = VEHICLE) -> R
     return Recording(
         name=manoeuvre.name,
         time=STEP * np.arange(1.0, len(motions) + 1.0, dtype=np.float64),
-        truth={name: truth[:, :, at] for at, name in enumerate(INPUTS)},
+        truth={name: truth[:, :, at] for at, name in enumerate(STATES)},
         told=told,
         motion={name: np.array([getattr(m, name) for m in motions]) for name in MOTION},
         vehicle_fy=np.array([motion.fy for motion in motions]),

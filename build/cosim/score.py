@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from cosim.calibrate import ALPHA, CAMBER, DRIVING, KAPPA, LOAD, SPEED
-from cosim.recording import STEP, Recording
-from cosim.wheels import WHEELS
+from cosim.recording import STATES, STEP, Recording
+from cosim.wheels import OWN_FRICTION, WHEELS
 from tirelib.arrays import BoolArray, FloatArray, IntArray
-from tirelib.fmu.virtual.coordinates import INPUTS, half_angle
-from tirelib.fmu.virtual.spec import default_surface
+from tirelib.fmu.virtual.coordinates import FRICTION, half_angle
+from tirelib.fmu.virtual.spec import friction_surface
 from tirelib.fmu.virtual.surface import Surface, read_surface
 from tirelib.signal.lowpass import DEFAULT_ORDER, HALF_POWER, SUPPORT
 
@@ -34,6 +34,10 @@ WITHIN: Mapping[str, float] = MappingProxyType({"alpha": np.radians(6.0), "kappa
 """Truth up to which the figures bind."""
 LEAST_PEAK = 0.1
 """A peak of Fy below this share of the static load is no cornering; this share stands for it."""
+COVERED = 0.9
+"""Share of turns that the 95 % interval must hold on a road of another friction."""
+INTERVAL = 1.96
+"""Half-width of the 95 % interval in standard deviations."""
 AFTER = np.radians(20.0)
 FILTER = SUPPORT * HALF_POWER / DEFAULT_ORDER
 """Half-width of the low-pass [rad]."""
@@ -56,8 +60,8 @@ class Turns:
         Row of the recording at whose end the estimate came.
     contact : array, shape (n,), [s]
         Middle of the contact.
-    told, truth : dict of arrays, shape (n,)
-        Estimate and truth of Fz [N], alpha [rad], kappa [1], Fy [N].
+    told, std, truth : dict of arrays, shape (n,)
+        Estimate, its standard deviation, and truth of Fz [N], alpha [rad], kappa [1], Fy [N].
     valid : dict of bool arrays, shape (n,)
         Whether each quantity may be used.
     steady : bool array, shape (n,)
@@ -70,6 +74,7 @@ class Turns:
     row: IntArray
     contact: FloatArray
     told: dict[str, FloatArray]
+    std: dict[str, FloatArray]
     truth: dict[str, FloatArray]
     valid: dict[str, BoolArray]
     steady: BoolArray
@@ -79,7 +84,7 @@ class Turns:
 
 @cache
 def _surface() -> Surface:
-    return read_surface(default_surface())
+    return read_surface(friction_surface())
 
 
 def turns_of(recording: Recording, wheel: int) -> Turns:
@@ -108,6 +113,7 @@ def turns_of(recording: Recording, wheel: int) -> Turns:
         row=rows,
         contact=contact,
         told={name: told[name][rows] for name in LIMITS},
+        std={name: told[f"{name}_std"][rows] for name in LIMITS},
         truth={
             "Fz": truth["Fz"][at], "alpha": truth["alpha"][at], "kappa": np.array(means),
             "Fy": told["tire_fy"][at],
@@ -122,9 +128,9 @@ def turns_of(recording: Recording, wheel: int) -> Turns:
 def _lag(recording: Recording, wheel: int, at: IntArray, rows: IntArray) -> FloatArray:
     """Return the wheel angle from the trailing edge of the virtual tire to the output."""
     surface = _surface()
-    felt = np.stack([recording.truth[name][at, wheel] for name in INPUTS], axis=1)
-    felt[:, INPUTS.index("alpha")] = recording.told["tire_alpha"][at, wheel]
-    felt[:, INPUTS.index("kappa")] = recording.told["tire_kappa"][at, wheel]
+    felt = np.stack([recording.truth[name][at, wheel] for name in STATES], axis=1)
+    felt[:, STATES.index("alpha")] = recording.told["tire_alpha"][at, wheel]
+    felt[:, STATES.index("kappa")] = recording.told["tire_kappa"][at, wheel]
     lag = np.full(rows.size, np.nan)
     known = [i for i, state in enumerate(felt) if not surface.outside(state)]
     if known:
@@ -173,7 +179,29 @@ def score(recording: Recording) -> dict[str, Any]:
     }
     whole = _figures(turns, off) | _validity(recording, list(range(len(WHEELS))))
     held = _held(recording, peak)
-    return {"name": recording.name, "peak_Fy_N": peak, "all": whole | held, "wheels": wheels}
+    return {
+        "name": recording.name, "peak_Fy_N": peak, "least_friction": least_friction(recording),
+        "all": whole | held, "wheels": wheels,
+    }  # fmt: skip
+
+
+def least_friction(recording: Recording) -> float:
+    """Return the least friction under any wheel, as a factor of the calibrated road's."""
+    return float(recording.truth[FRICTION].min() / OWN_FRICTION)
+
+
+def covered(turns: list[Turns]) -> dict[str, dict[str, float]]:
+    """Return for each quantity the share of valid turns, and of those that the interval holds."""
+    found = {}
+    for name in LIMITS:
+        valid = np.concatenate([t.valid[name] for t in turns])
+        off = np.concatenate([np.abs(t.told[name] - t.truth[name]) / t.std[name] for t in turns])
+        found[name] = {
+            "valid": float(valid.mean()) if valid.size else np.nan,
+            "covered": float((off[valid] <= INTERVAL).mean()) if valid.any() else np.nan,
+            "worst": float(off[valid].max()) if valid.any() else np.nan,
+        }
+    return found
 
 
 def _figures(turns: list[Turns], off: list[dict[str, FloatArray]]) -> dict[str, Any]:
@@ -192,6 +220,7 @@ def _figures(turns: list[Turns], off: list[dict[str, FloatArray]]) -> dict[str, 
             for name, values in every.items()
         }
     return found | {
+        "interval": covered(turns),
         "age_ms": 1e3 * float(np.median(age)) if age.size else np.nan,
         "lag_deg": float(np.degrees(np.nanmax(lag))) if np.isfinite(lag).any() else np.nan,
         "over_deg": float(np.degrees(np.nanmax(over))) if np.isfinite(over).any() else np.nan,

@@ -24,7 +24,7 @@ from vehiclemodels import vehicle_dynamics_mb as model
 from vehiclemodels.init_mb import init_mb
 from vehiclemodels.vehicle_parameters import setup_vehicle_parameters
 
-from cosim.wheels import WheelStates
+from cosim.wheels import OWN_FRICTION, WheelStates
 from tirelib.arrays import FloatArray
 from tirelib.axes import sign
 from tirelib.errors import ParameterError
@@ -257,6 +257,7 @@ class Vehicle:
                 kappa=(1.0 - slip) * np.cos(alpha) - 1.0,
                 camber=camber,
                 speed=along / np.cos(alpha),
+                friction=OWN_FRICTION * np.array(self._friction),
             ),
             fx=fx,
             fy=_LATERAL * fy,

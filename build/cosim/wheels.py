@@ -24,12 +24,15 @@ from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.errors import ParameterError
 from tirelib.estimators.chain import QUANTITIES
 from tirelib.fmu.run import LoadedFmu
-from tirelib.fmu.virtual.coordinates import INPUTS
+from tirelib.fmu.virtual.coordinates import FRICTION, INPUTS
+from tirelib.fmu.virtual.table import START
 
 WHEELS = ("FL", "FR", "RL", "RR")
 """Order of the wheels in every array: front left, front right, rear left, rear right."""
 PRESSURE = 2.3e5
 """Inflation pressure where a vehicle has none [Pa]."""
+OWN_FRICTION = START[FRICTION]
+"""Coefficient of friction of the virtual tire's own road: a vehicle's factor of 1."""
 _SHOWN = ("omega", "wheel_angle", "alpha_relaxed", "kappa_relaxed", "Fx_rig", "Fy_rig",
           "rolling_radius")  # fmt: skip
 _REALS = (*QUANTITIES, *(f"{q}_std" for q in QUANTITIES), "turn_rate", "contact_time")
@@ -62,6 +65,8 @@ class WheelStates:
     omega : array, [rad/s]
         Turn rate that a wheel speed sensor measures; only the estimators' watchdog reads it. NaN:
         there is none.
+    friction : array, [1]
+        Coefficient of friction under each wheel, 0.3 to 1.1.
     """
 
     load: FloatArray
@@ -71,12 +76,14 @@ class WheelStates:
     speed: FloatArray
     pressure: FloatArray = field(default_factory=lambda: np.full(len(WHEELS), PRESSURE))
     omega: FloatArray = field(default_factory=_nan)
+    friction: FloatArray = field(default_factory=lambda: np.full(len(WHEELS), OWN_FRICTION))
 
     def rows(self) -> FloatArray:
-        """Return the inputs of the virtual tires, shape (4, 6), in the order of `INPUTS`."""
+        """Return the inputs of the virtual tires, shape (4, 7): `INPUTS`, then the friction."""
         return np.stack(
-            (self.load, self.alpha, self.kappa, self.camber, self.speed, self.pressure), axis=1
-        )
+            (self.load, self.alpha, self.kappa, self.camber, self.speed, self.pressure,
+             self.friction), axis=1,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,8 +173,10 @@ class VirtualTire:
         self.slave.instantiate()
         self._wanted = (c_uint32 * len(wanted))(*wanted)
         self._values = (c_double * len(wanted))()
-        self._inputs = (c_uint32 * len(INPUTS))(*(self._at[name] for name in INPUTS))
-        self._given = (c_double * len(INPUTS))()
+        self.slippery = FRICTION in self._at
+        names = (*INPUTS, FRICTION) if self.slippery else INPUTS
+        self._inputs = (c_uint32 * len(names))(*(self._at[name] for name in names))
+        self._given = (c_double * len(names))()
 
     def close(self) -> None:
         """Free the instance and the files that were unpacked."""
@@ -175,7 +184,7 @@ class VirtualTire:
         rmtree(self._folder, ignore_errors=True)
 
     def start(self, state: FloatArray, parameters: dict[str, float]) -> None:
-        """Initialise with the first state, shape (6,), in the order of `INPUTS`."""
+        """Initialise with the first state, shape (7,), as `WheelStates.rows` has it."""
         slave = self.slave
         slave.reset()
         slave.setupExperiment(startTime=0.0)
@@ -187,8 +196,14 @@ class VirtualTire:
         slave.exitInitializationMode()
 
     def _put(self, state: FloatArray) -> None:
-        self._given[:] = state.tolist()
-        self.slave.fmi2SetReal(self.slave.component, self._inputs, len(INPUTS), self._given)
+        if not self.slippery and state[-1] != OWN_FRICTION:
+            raise ParameterError(
+                f"{self.slave.instanceName}: friction = {state[-1]:g}, but this virtual tire knows "
+                f"no other than its own; allowed is {OWN_FRICTION:g}; make it with "
+                "`tirelib fmu virtual --friction`"
+            )
+        self._given[:] = state[: len(self._given)].tolist()
+        self.slave.fmi2SetReal(self.slave.component, self._inputs, len(self._given), self._given)
 
     def step(self, time: float, step: float, state: FloatArray) -> tuple[FloatArray, list[float]]:
         """Step with a state and return the frame, shape (samples, g), and `_SHOWN`."""

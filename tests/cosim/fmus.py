@@ -6,8 +6,9 @@ from pathlib import Path
 from cosim.calibrate import CALIBRATION
 from cosim.vehicle14.build_fmu import build_vehicle
 
-from tests.fmu import live, virtual_host
+from tests.fmu import live
 from tirelib.fmu.build import build_fmu
+from tirelib.fmu.virtual.spec import build_virtual, friction_surface
 
 SAMPLES, STEP = 20, 2e-3
 
@@ -19,7 +20,8 @@ def vehicle() -> Path:
 
 @cache
 def virtual() -> Path:
-    return virtual_host.file(SAMPLES)
+    path = live.folder() / f"Slippery_{SAMPLES}.fmu"
+    return build_virtual(path, samples_per_step=SAMPLES, surface=friction_surface())
 
 
 @cache

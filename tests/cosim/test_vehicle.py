@@ -14,7 +14,7 @@ from vehiclemodels.vehicle_dynamics_mb import vehicle_dynamics_mb
 
 from tirelib.errors import ParameterError
 from tirelib.fmu.virtual.coordinates import INPUTS
-from tirelib.fmu.virtual.spec import default_surface
+from tirelib.fmu.virtual.spec import friction_surface
 from tirelib.fmu.virtual.surface import read_surface
 
 STEP = 2e-3
@@ -143,7 +143,7 @@ def test_brakes_hold_a_wheel_but_do_not_turn_it_back() -> None:
 
 
 def test_every_manoeuvre_stays_within_the_virtual_tire() -> None:
-    surface = read_surface(default_surface())
+    surface = read_surface(friction_surface())
     for manoeuvre in MANOEUVRES.values():
         if manoeuvre.name not in ("braking_in_a_turn", "kerb"):  # the hardest two for load
             continue

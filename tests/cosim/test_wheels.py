@@ -16,9 +16,9 @@ from cosim.recording import STEP, VEHICLE, Recording, build_fmus, follow, record
 from cosim.run import reached, series
 from cosim.score import LIMITS, in_range, score, turns_of
 from cosim.vehicle import Controls, G, Motion, Vehicle
-from cosim.wheels import NAMES, WHEELS, FourWheels, WheelStates
+from cosim.wheels import NAMES, OWN_FRICTION, WHEELS, FourWheels, WheelStates
 
-from tests.fmu import live
+from tests.fmu import live, virtual_host
 from tirelib.errors import ParameterError
 from tirelib.flags import TurnFlag
 from tirelib.report.cosim import write_cosim
@@ -174,6 +174,62 @@ def test_out_of_range_valid_drops_within_two_turns(fmus: tuple[Path, Path]) -> N
     two_turns = round(4.0 * np.pi / told["tire_omega"][before - 1, 0] / STEP)
     assert not told["valid"][before + two_turns :, :3].any()
     assert told["valid"][before:, 3].all()
+
+
+def test_every_wheel_has_the_friction_of_the_road_under_it(wheels: FourWheels) -> None:
+    """At a slip angle where the tire slides the lateral force is what the friction leaves."""
+    size, factor = len(WHEELS), np.array([0.5, 1.0, 0.4, 0.8])
+    state = WheelStates(
+        *(np.full(size, x) for x in (4000.0, 0.13, -0.01, 0.0, 20.0)),
+        friction=OWN_FRICTION * factor,
+    )  # fmt: skip
+    wheels.start(state)
+    told = wheels.step(0.0, STEP, state)
+    left_out = virtual_host.friction().about["left_out"]["friction 0.3 .. 0.5"]["Fy_N_rms"]
+    np.testing.assert_allclose(
+        -told.tire_fy, 0.97 * OWN_FRICTION * factor * 4000.0, rtol=0.05, atol=left_out
+    )
+
+
+def test_a_slippery_road_is_refused_by_a_virtual_tire_that_knows_one_friction(
+    fmus: tuple[Path, Path],
+) -> None:
+    state = WheelStates(*(np.full(len(WHEELS), x) for x in (4000.0, 0.0, 0.0, 0.0, 20.0)))
+    with FourWheels(virtual_host.file(10), fmus[1]) as wheels:
+        wheels.start(state)
+        wheels.step(0.0, STEP, state)
+        slippery = replace(state, friction=np.array([OWN_FRICTION, 0.5, 0.5, 0.5]))
+        with pytest.raises(ParameterError, match=r"tire_FR: friction = 0.5, .*allowed is 0.95"):
+            wheels.step(STEP, STEP, slippery)
+
+
+def test_the_vehicle_tells_the_friction_under_its_wheels() -> None:
+    factor = (0.5, 1.0, 0.4, 0.8)
+    told = Vehicle(VEHICLE, 20.0).step(STEP, Controls(friction=factor)).wheels
+    np.testing.assert_allclose(told.friction, OWN_FRICTION * np.array(factor))
+
+
+def test_on_a_slippery_road_the_interval_of_the_slip_angle_binds(braked: Recording) -> None:
+    one = score(braked)
+    assert one["least_friction"] == 1.0
+    assert reached([one], []) == []
+    part = one["all"]["interval"]["alpha"]
+    part["covered"], one["all"]["steady"]["alpha"] = 0.5, 1.0
+    assert reached([one], []) == ["brake: alpha 1 > 0.25"]
+    one["least_friction"] = 0.4
+    (missed,) = reached([one], [])
+    assert "the interval of alpha holds 50 % of the turns < 90 %" in missed
+    part["covered"] = 0.9
+    assert reached([one], []) == []
+
+
+def test_the_interval_holds_what_its_standard_deviation_allows(braked: Recording) -> None:
+    wide = {f"{name}_std": np.full_like(braked.told[name], np.inf) for name in LIMITS}
+    narrow = {name: 1e-9 * np.ones_like(values) for name, values in wide.items()}
+    for told, share in ((wide, 1.0), (narrow, 0.0)):
+        interval = score(replace(braked, told=braked.told | told))["all"]["interval"]
+        for name in LIMITS:
+            assert interval[name]["covered"] == share, name
 
 
 def test_the_page_names_what_is_not_reached(braked: Recording, tmp_path: Path) -> None:

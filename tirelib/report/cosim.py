@@ -113,6 +113,7 @@ def parts_of(document: Mapping[str, Any], series: Sequence[Series]) -> list[Part
         Part("Errors", "errors", _METHOD,
              tables=[_errors(document, "steady"), _errors(document, "transient")],
              plots=[_shares(document)]),
+        Part("Intervals", "intervals", tables=[_intervals(document)]),
         Part("Delay and validity", "delay", tables=[_delays(document), _held(document)]),
         Part("Out of range", "range", tables=[_range(document)]),
         *drives,
@@ -155,6 +156,31 @@ def _wheels(one: Mapping[str, Any]) -> Table:
     heads = [f"{name} [{unit}]" for name, (_, _, unit) in QUANTITIES.items()]
     return Table("Errors of each wheel (rms)", ["wheel", "part", "turns", *heads], rows, texts=2,
                  note=f"Peak of Fy: {number(one['peak_Fy_N'], 3)} N.", folded=True)  # fmt: skip
+
+
+def _intervals(document: Mapping[str, Any]) -> Table:
+    rows = []
+    for one in document["manoeuvres"]:
+        parts = [one["all"]["interval"][name] for name in QUANTITIES]
+        rows.append([
+            _words(one["name"]), number(one["least_friction"], 2),
+            *(number(100.0 * part["valid"], 3) for part in parts),
+            *(number(100.0 * part["covered"], 3) for part in parts),
+            *(number(part["worst"], 2) for part in parts),
+        ])  # fmt: skip
+    heads = (
+        *(f"{name}: valid [%]" for name in QUANTITIES),
+        *(f"{name}: covered [%]" for name in QUANTITIES),
+        *(f"{name}: largest [std]" for name in QUANTITIES),
+    )
+    return Table(
+        "What the 95 % intervals hold, all turns", ["manoeuvre", "friction", *heads], rows,
+        note="Friction: the least under any wheel, as a factor of the calibrated road's. Valid: "
+        "share of the turns. Covered: share of the valid turns whose truth lies within 1.96 "
+        "standard deviations; 95 is right. Largest: error over standard deviation. The calibration "
+        "is made on the numerical rig, so its intervals do not know the error of the surface that "
+        "stands for the rig here.",
+    )  # fmt: skip
 
 
 def _delays(document: Mapping[str, Any]) -> Table:

@@ -84,6 +84,8 @@ class Wheels:
         Travel speed of the contact points.
     radius : array, [m]
         R_e.
+    friction : array
+        Scale of the road's friction.
     """
 
     Fz: FloatArray
@@ -96,6 +98,7 @@ class Wheels:
     camber: FloatArray
     speed: FloatArray
     radius: FloatArray
+    friction: FloatArray
 
 
 @dataclass(frozen=True)
@@ -216,7 +219,7 @@ class Vehicle:
         ratio = np.where(slow, np.nan, roll / np.where(slow, 1.0, v_x))
         kappa = np.where(slow, np.nan, state[SPIN] * radius / np.where(slow, 1.0, travel) - 1.0)
         wheels = Wheels(load, Fx, Fy, Mz, np.arctan2(v_y, way), kappa, ratio, camber, travel,
-                        radius)  # fmt: skip
+                        radius, given.friction)  # fmt: skip
         flat = Fx * ahead + Fy * aside
         lever = Mz * up[:, None] - height * (above @ flat)
         return axle, wheels, (flat + load * up[:, None], lever), rates
