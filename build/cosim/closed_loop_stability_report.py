@@ -19,8 +19,8 @@ SHOWN = 12.0
 """Slip angle and side slip up to which the plot reaches [deg]; without control they leave it."""
 NOTE = (
     "A sine with dwell; the rear wheels on a more slippery road, vehicle and virtual tires alike; "
-    "the calibration is of a dry one. Largest of the runs. Refused: estimates that were not valid, the first turn "
-    "of each wheel among them; the last valid one was held."
+    "the calibration is of a dry one. Largest of the runs. Refused: estimates that were not valid, "
+    "the first turn of each wheel among them; the last valid one was held."
 )
 
 
