@@ -62,10 +62,13 @@ class TerminalSink:
             self._pull_or_plug()
         return not self._away and self._port.send(b"".join(frames))
 
+    def drain(self, patience: float) -> bool:
+        """Wait until the reader has taken all; False if it left before, or is too slow."""
+        return not self._away and self._port.drain(Deadline.after(patience))
+
     def end(self, patience: float) -> None:
-        """Let the reader take the rest and leave."""
+        """Let the reader leave."""
         if not self._away:
-            self._port.drain(Deadline.after(patience))
             self._port.wait_for_leave(Deadline.after(patience))
 
     def close(self) -> None:
@@ -125,6 +128,10 @@ class BusSink:
                 f"{self.path}: the bus went away ({error}); a steady connection is needed; check "
                 "cable and adapter"
             ) from None
+        return True
+
+    def drain(self, patience: float) -> bool:
+        """Say yes: a bus has taken what was sent."""
         return True
 
     def end(self, patience: float) -> None:

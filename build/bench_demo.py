@@ -17,13 +17,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bench_page import Look, Seen, address_of
-from demo import ROOT, Steps, judge, require_terminal, wait_for_port, write_device
+from demo import (
+    PATIENCE,
+    ROOT,
+    Steps,
+    end_when_played,
+    judge,
+    require_terminal,
+    wait_for_port,
+    write_device,
+)
 from rich.console import Console
 from rich.rule import Rule
 
 if TYPE_CHECKING:
-    import subprocess
-
     from bench.rig.plans import Plan
     from tirelib.report.live import LiveFiles
 
@@ -32,12 +39,6 @@ DAYS = {"calibrated": (11, 5.1), "played": (12, 15.1)}
 ESTIMATES = ("library", "fmu", "live", "replay")
 LOOKED = 0.5
 """Share of the runs after which the picture of the live page is taken."""
-
-
-SKIPPED = (
-    "This machine was too busy for the pace of the wheel, and the bench has left out whole turns, "
-    "as it says: live and library will differ by them. Play slower, with --pace 0.5."
-)
 
 
 def plan(name: str) -> "Plan":
@@ -128,7 +129,10 @@ def ready_fmu(steps: Steps, out: Path, samples: int = 16) -> tuple[Path, Path]:
 def play(
     steps: Steps, out: Path, day: Path, fmu: Path, look: Look, pace: float
 ) -> tuple["LiveFiles", Seen]:
-    """Play a day over the serial line to the bench while somebody looks at its page."""
+    """Play a day over the serial line to the bench while somebody looks at its page.
+
+    The day begins when the page is open, and the bench ends when it has read all of it.
+    """
     from tirelib.campaign import read_campaign
     from tirelib.report.live import LiveFiles
 
@@ -136,27 +140,24 @@ def play(
     files = LiveFiles(library, fmu_run, live, replay, out / "conditions.json", out / "device.toml")
     campaign = read_campaign(day)
     write_device(files.device, campaign.header.gage_lateral)
-    port_file, said, seen = out / "port", out / "run.log", Seen()
+    port_file, go, said, sent = out / "port", out / "go", out / "run.log", out / "emulate.log"
     with steps.beside(
         "Play the day as a wheel on a serial port, in the background",
         *("emulate", "--campaign", day, "--all", "--device", files.device),
         *("--port-file", port_file, "--conditions", files.conditions, "--speedup", f"{pace:g}"),
-        program="tirebench", log=out / "emulate.log",
+        *("--after", go, "--wait", f"{PATIENCE:.0f}"), program="tirebench", log=sent,
     ) as wheel:  # fmt: skip
-        port = wait_for_port(port_file, wheel, out / "emulate.log")
+        port = wait_for_port(port_file, wheel, sent)
         with steps.beside(
             "Read the port, step the FMU, record, show the live page",
             *("run", "--port", port, "--fmu", fmu, "--conditions", files.conditions),
             *("--device", files.device, "--record", out / "live.mcap", "--json", files.live),
-            *("--silence", "3"),
-            program="tirebench", log=said,
+            "--every-turn", program="tirebench", log=said,
         ) as run, steps.console.status("starting") as status:  # fmt: skip
             url = address_of(said, run)
-            seen = look(url, LOOKED * turns_of(day), status.update)
-            follow(run, said, status.update)
+            seen = look(url, LOOKED * turns_of(day), status.update, go.touch)
+            end_when_played(run, said, wheel, sent, status.update)
     steps.console.print(f"{seen.words}", highlight=False, markup=False, soft_wrap=True)
-    if "turns were skipped" in said.read_text(errors="replace"):
-        steps.console.print(SKIPPED, style="bold red", soft_wrap=True)
     return files, seen
 
 
@@ -167,14 +168,6 @@ def turns_of(day: Path) -> float:
     found = read_campaign(day)
     seconds = sum(run.strain.shape[1] / run.rate for run in map(found.load, found.plans))
     return 8.0 * seconds - 2.0 * len(found.plans)  # 65 km/h are 9 turns a second
-
-
-def follow(run: "subprocess.Popen[bytes]", log: Path, say: object) -> None:
-    """Show the newest turn of a run until it ends."""
-    while run.poll() is None:
-        lines = log.read_text(errors="replace").rstrip().splitlines()
-        say(lines[-1].strip() if lines else "")
-        time.sleep(0.2)
 
 
 def use(steps: Steps, out: Path, fmu: Path, files: "LiveFiles", model: Path | str) -> None:

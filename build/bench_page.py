@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     import subprocess
 
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-PATIENCE = 120.0
-"""For a page to appear, and for the wanted turns to come to it, [s]."""
+PATIENCE = 600.0
+"""For a page to appear, and for the next turn to come to it, [s]: only what hangs takes longer."""
 LAST_TURN = "Math.max(0, ...[...tirebench.wheels.values()].map(w => w.last ? w.last.turn : 0))"
 SIZE = {"width": 1600, "height": 1000}
 
@@ -39,7 +39,7 @@ def launched(playwright: Any) -> Any:
     """Start a headless browser of Playwright's: this machine's, else Playwright's own."""
     root = hasattr(os, "geteuid") and os.geteuid() == 0
     return playwright.chromium.launch(
-        executable_path=chromium(), args=["--no-sandbox"] if root else []
+        executable_path=chromium(), args=["--no-sandbox"] if root else [], timeout=1e3 * PATIENCE
     )
 
 
@@ -70,23 +70,33 @@ class Look:
         self._picture = picture
         self._browser = browser
 
-    def __call__(self, url: str, turns: float, say: Callable[[str], None]) -> Seen:
-        """Look; what hinders the browser is said and no reason to stop."""
+    def __call__(
+        self, url: str, turns: float, say: Callable[[str], None], begin: Callable[[], object]
+    ) -> Seen:
+        """Look; what hinders the browser is said and no reason to stop.
+
+        `begin` is called when the page is open, at the latest when it is known that none will be.
+        """
         why = "without a browser, as asked for"
         if self._browser:
             try:
-                return self._look(url, turns, say)
+                return self._look(url, turns, say, begin)
             except Exception as error:  # no Playwright, no Chromium, or one that does not start
                 why = f"without a browser ({type(error).__name__}: {str(error).splitlines()[0]})"
+        begin()
         return Seen("", f"{fetch(url)}; {why}")
 
-    def _look(self, url: str, turns: float, say: Callable[[str], None]) -> Seen:
+    def _look(
+        self, url: str, turns: float, say: Callable[[str], None], begin: Callable[[], object]
+    ) -> Seen:
         from playwright.sync_api import sync_playwright
 
         with sync_playwright() as playwright:
             browser = launched(playwright)
             page = browser.new_page(viewport=SIZE)
+            page.set_default_timeout(1e3 * PATIENCE)
             page.goto(url)
+            begin()
             last = wait_for_turns(page, turns, say)
             page.screenshot(path=str(self._picture))
             browser.close()
@@ -96,11 +106,13 @@ class Look:
 
 
 def wait_for_turns(page: Any, turns: float, say: Callable[[str], None]) -> float:
-    """Return the last turn on the page when there are so many, or when patience ends."""
+    """Return the last turn on the page when there are so many, or when no more come."""
     end, last = time.monotonic() + PATIENCE, 0.0
     while last < turns and time.monotonic() < end:
         page.wait_for_timeout(100)  # evaluates nothing in the page: its policy forbids that
-        last = float(page.evaluate(LAST_TURN))
+        before, last = last, float(page.evaluate(LAST_TURN))
+        if last > before:
+            end = time.monotonic() + PATIENCE
         say(f"live page: turn {last:.0f}")
     return last
 

@@ -29,6 +29,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from demo_live import (
     PATIENCE,
     RECORDING,
+    end_when_played,
     go_live,
     judge,
     require_terminal,
@@ -40,7 +41,8 @@ if TYPE_CHECKING:
     from bench.rig.plans import Plan
     from tirelib.report.live import LiveFiles
 
-__all__ = ["ROOT", "Steps", "judge", "require_terminal", "wait_for_port", "write_device"]
+__all__ = ["PATIENCE", "ROOT", "Steps", "end_when_played", "judge", "require_terminal",
+           "wait_for_port", "write_device"]  # fmt: skip
 
 ROOT = Path(__file__).resolve().parent.parent
 PROGRAMS = Path(sys.executable).parent

@@ -1,10 +1,16 @@
-"""The part of the demonstration that goes over a serial line: wheel, port, bench."""
+"""The part of the demonstration that goes over a serial line: wheel, port, bench.
+
+Nothing here depends on how fast the machine is: the wheel sends when the bench is ready, the bench
+skips no turn, and it ends when it has read all that the wheel sent.
+"""
 
 import os
+import re
+import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,8 +27,12 @@ if TYPE_CHECKING:
 LIVE_ANGLES = (-3.0, 4.0, 0.0, -5.0, 2.0, -4.0)
 """Slip angles [deg] of the runs that go over the line, the loads growing from one to the next."""
 RECORDING = "live.mcap"
-PATIENCE = 30.0
-"""How long a program in the background gets to begin or to end, [s]."""
+PATIENCE = 600.0
+"""How long a program in the background gets to begin or to end on a busy machine, [s]."""
+A_TURN = r"\n +\d+ +\d+ +[\d.]+ "
+"""A line that `tirebench run` prints of a turn: wheel, run, time."""
+PLAYED = "\nplayed: "
+"""What `tirebench emulate` says when its reader has taken all of it."""
 NO_TERMINAL = (
     "Error: make demo: this platform has no pseudo-terminal ({reason}); the part with the serial "
     "line needs one, as Linux and macOS have; run it there, or leave that part out with --no-live"
@@ -51,8 +61,9 @@ def go_live(steps: "Steps", out: Path, data: Path, fmu: Path, library: Path) -> 
     folder.mkdir(parents=True, exist_ok=True)
     files = LiveFiles(library, out / "fmu.json", folder / "live.json", folder / "replay.json",
                       folder / "conditions.json", folder / "device.toml")  # fmt: skip
-    port_file, record = folder / "port", folder / RECORDING
-    for old in (port_file, record, files.fmu, files.live, files.replay, files.conditions):
+    port_file, go, record = folder / "port", folder / "go", folder / RECORDING
+    said, sent = folder / "run.log", folder / "emulate.log"
+    for old in (port_file, go, record, files.fmu, files.live, files.replay, files.conditions):
         old.unlink(missing_ok=True)
     campaign = read_campaign(data)
     write_device(files.device, campaign.header.gage_lateral)
@@ -60,18 +71,52 @@ def go_live(steps: "Steps", out: Path, data: Path, fmu: Path, library: Path) -> 
     with steps.beside(
         "Play runs of it as a wheel on a serial port, in the background",
         *("emulate", "--campaign", data, *runs, "--device", files.device),
-        *("--port-file", port_file, "--conditions", files.conditions),
-        program="tirebench", log=folder / "emulate.log",
+        *("--port-file", port_file, "--conditions", files.conditions, "--after", go),
+        *("--wait", f"{PATIENCE:.0f}"), program="tirebench", log=sent,
     ) as wheel:  # fmt: skip
-        port = wait_for_port(port_file, wheel, folder / "emulate.log")
-        steps.run(
+        port = wait_for_port(port_file, wheel, sent)
+        with steps.beside(
             "Read the port, step the FMU, record",
             *("run", "--port", port, "--fmu", fmu, "--conditions", files.conditions),
             *("--device", files.device, "--record", record, "--json", files.live),
-            *("--silence", "1", "--no-page"),
-            program="tirebench",
-        )
+            *("--every-turn", "--no-page"), program="tirebench", log=said,
+        ) as run, steps.console.status("starting") as status:  # fmt: skip
+            go.touch()
+            end_when_played(run, said, wheel, sent, status.update)
     return files
+
+
+def end_when_played(
+    run: "subprocess.Popen[bytes]",
+    said: Path,
+    wheel: "subprocess.Popen[bytes]",
+    sent: Path,
+    show: Callable[[str], None],
+) -> None:
+    """Let a run go on until it has read all that the wheel sent, then end it as Ctrl-C does.
+
+    Parameters
+    ----------
+    run, wheel : Popen
+    said, sent : Path
+        Their logs.
+    show : callable
+        Gets the newest line of the run.
+    """
+    asked, before, end = False, "", time.monotonic() + PATIENCE
+    while run.poll() is None:
+        text = said.read_text(errors="replace")
+        newest = "".join(text.rstrip().splitlines()[-1:]).strip()
+        show(newest)
+        if newest != before:
+            before, end = newest, time.monotonic() + PATIENCE
+        over = wheel.poll() is not None or PLAYED in sent.read_text(errors="replace")
+        if over and not asked and re.search(A_TURN, text):
+            run.send_signal(signal.SIGINT)
+            asked = True
+        if time.monotonic() > end:
+            sys.exit(f"Error: tirebench run: nothing new for {PATIENCE:.0f} s; it said:\n{text}")
+        time.sleep(0.1)
 
 
 def write_device(file: Path, lateral: Sequence[float]) -> None:

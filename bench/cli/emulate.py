@@ -21,9 +21,13 @@ from bench.transmitter import FORMATS, transmitter
 from tirelib.campaign import read_campaign
 from tirelib.cli.common import FILE, write_json
 
+DRAIN = 600.0
+"""At the end, the reader gets this long to take what was sent, [s]."""
 LINGER = 10.0
-"""After the end, the reader gets this long to close the port, [s]."""
-
+"""After that, the reader gets this long to close the port, [s]."""
+PLAYED = "played: the reader has taken all of it"
+LOOK = 0.02
+"""Time between two looks for a file that is waited for, [s]."""
 AHEAD = 60.0
 """A first pass up to this is encoded before the port appears, [s of a wheel]."""
 
@@ -36,8 +40,9 @@ Examples:
   tirebench emulate --recording a.mcap --bus can:socketcan:vcan0
 
 \b
-It prints the port and waits until a reader opens it. Format serial is SERIAL v1 on a serial port;
-RAW16, RAW12 and RAW12C are CAN frames: on a bus with --bus, else as slcan on a serial port.
+It prints the port and waits until a reader opens it, and says `played` when the reader has taken
+all that was sent. Format serial is SERIAL v1 on a serial port; RAW16, RAW12 and RAW12C are CAN
+frames: on a bus with --bus, else as slcan on a serial port.
 A recording is played as it is, bad frames included.
 --fault NAME[=VALUE], several allowed: flips, cuts, inserts, lost, dup (rate per frame), nan (rate
 per sample), fades (per second), saturate, dead (number of a gage), hum (microstrain), drift (ppm),
@@ -79,6 +84,8 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
 @click.option("--seed", default=0, show_default=True, help="Of the faults.")
 @click.option("--wait", "patience", default=60.0, show_default=True, metavar="S",
               help="How long to wait for a reader.")  # fmt: skip
+@click.option("--after", metavar="F", type=FILE,
+              help="Send nothing before this file is there.")  # fmt: skip
 @click.option("--unplug", metavar="S", type=float,
               help="Pull the cable after this time.")  # fmt: skip
 @click.option("--replug", metavar="S", type=click.FloatRange(min=0.0),
@@ -106,6 +113,7 @@ def emulate(
     fault_texts: tuple[str, ...],
     seed: int,
     patience: float,
+    after: Path | None,
     unplug: float | None,
     replug: float | None,
     json_file: Path | None,
@@ -142,6 +150,8 @@ def emulate(
         try:
             with on_stop(_interrupt):
                 sink.wait_for_reader(Deadline.after(patience))
+                if after is not None:
+                    _wait_for(after)
                 start, turn = time.monotonic(), 0
                 while True:
                     shift = 0.0
@@ -156,6 +166,8 @@ def emulate(
                         break
                     if tape is None:
                         start += shift / speedup
+                if sink.drain(DRAIN):
+                    click.echo(PLAYED)
                 sink.end(LINGER)
         except (KeyboardInterrupt, UnpluggedError) as error:
             click.echo(str(error) or "stopped", err=True)
@@ -171,6 +183,12 @@ def emulate(
 
 def _interrupt() -> None:
     raise KeyboardInterrupt
+
+
+def _wait_for(file: Path) -> None:
+    """Wait until somebody makes a file, or stops the program."""
+    while not file.exists():
+        time.sleep(LOOK)
 
 
 def _campaign(

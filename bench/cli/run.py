@@ -105,6 +105,8 @@ class Given:
 @click.option("--silence", metavar="S", type=click.FloatRange(min=0.0),
               help="End when nothing came for so long.")  # fmt: skip
 @click.option("--turns", metavar="N", type=click.IntRange(min=1), help="End after so many turns.")
+@click.option("--every-turn", is_flag=True,
+              help="Skip none: the port waits.  [default: skip what is 3 s late]")  # fmt: skip
 @click.option("--realtime/--no-realtime", "asked", default=None,
               help="Go before all other programs.  [default: where this user may]")  # fmt: skip
 @bridge_options
@@ -135,6 +137,7 @@ def run(
     duration: float | None,
     silence: float | None,
     turns: int | None,
+    every_turn: bool,
     asked: bool | None,
     estimates_out: str | None,
     plotjuggler: str | None,
@@ -184,7 +187,8 @@ def run(
             header = RecordingHeader(settings, device_text, archive.sha256,
                                      known.protocol.as_header())  # fmt: skip
             recorded = record is not None or shown.anything
-            reader = ReaderPlan(plan, reconnect, known.protocol, known.devices, numbers, recorded)
+            reader = ReaderPlan(plan, reconnect, known.protocol, known.devices, numbers, recorded,
+                                every_turn)  # fmt: skip
             chain = stack.enter_context(LiveChain(
                 LivePlan(reader, file, known.conditions, header, record, shown.anything)
             ))  # fmt: skip

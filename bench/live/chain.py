@@ -25,15 +25,17 @@ from bench.page.board import SIZE
 from bench.recording import RecordingHeader, jump_event
 from bench.wheels import MOST, Wheels
 
-START = 60.0
-"""Processes that are not ready after so long do not start, [s]."""
+START = 300.0
+"""Processes that are not ready after so long do not start, even on a busy machine, [s]."""
 TRIES = 3
 """So often the FMU may crash when it is loaded."""
 LOOK = 0.05
 """Time between two looks after the processes and the line, [s]."""
-PATIENCE = 20.0
-"""At the end estimators get so long for what still waits, [s]."""
-LEAVE = 5.0
+PATIENCE = 60.0
+"""At the end estimators and recorder get so long for each step of what still waits, [s]."""
+LEAVE, AT_ONCE = 60.0, 5.0
+"""A process that was told to end and goes on for so long is ended, [s]: in good order; where
+nothing is left to be kept."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,7 +234,9 @@ class LiveChain:
         end = Deadline.after(PATIENCE)
         while len(self._done) < len(self._estimators) and not end.expired:
             woken(self._exchange.address.news, LOOK)
-            news.add(self._gather())
+            if came := self._gather():
+                end = Deadline.after(PATIENCE)
+                news.add(came)
             for slot in self._estimators.keys() - self._done:
                 self._estimators[slot].look()
         self.order("close", reason)
@@ -255,7 +259,8 @@ class LiveChain:
         def arguments(starts: int) -> tuple[Any, ...]:
             self._drain(slot, self._pending)
             plan = EstimatorPlan(file, self._plan.conditions, slot, self._plan.laps,
-                                 self._turns[slot], self._cursors[slot], starts > 1)  # fmt: skip
+                                 self._turns[slot], self._cursors[slot], starts > 1,
+                                 self._plan.reader.every_turn)  # fmt: skip
             return plan, self._exchange.address
 
         self._estimators[slot] = Kept(estimate, arguments)
@@ -349,5 +354,5 @@ class LiveChain:
         if not self._finished:
             self.order("close", "the run ended with an error")
         for kept in self._processes().values():
-            kept.wait(LEAVE)
+            kept.wait(AT_ONCE)
         self._exchange.close()

@@ -41,6 +41,8 @@ class EstimatorPlan:
         What is before this in the queue was done by an estimator that ended.
     again : bool
         Whether there was one.
+    every : bool
+        Estimate every turn, however late; else turns that are too late are skipped.
     """
 
     file: FmuFile
@@ -50,6 +52,7 @@ class EstimatorPlan:
     turns: int = 0
     cursor: int = 0
     again: bool = False
+    every: bool = False
 
 
 @dataclass(slots=True)
@@ -134,7 +137,7 @@ class _Estimator:
         if self._why:
             self._jump(Jump(block.wheel, place, place, self._why))
             self._why = ""
-        elif self._caught_up and age > BACKLOG and not self._exchange.is_set(FINISH):
+        elif self._too_late(age):
             block, content = self._newest(block, content)
         elif self._expected is not None and not content.reset and place != self._expected:
             self._left_out(block.wheel, self._expected, self._end_us, content)  # no room for them
@@ -144,11 +147,17 @@ class _Estimator:
         self._expected = Place(content.segment, content.start + len(content.strain))
         self._end_us = content.end_us
         try:
-            news = self._estimation.take(block, live=True)
+            news = self._estimation.take(block, live=not self._plan.every)
         except FmuError:  # ends this process; the next one goes on behind these samples
             self._jump(Jump(block.wheel, start, self._expected, RESTARTED, len(content.strain)))
             raise
         self._report(news)
+
+    def _too_late(self, age: float) -> bool:
+        """Tell whether samples that have waited so long [s] are to be left out."""
+        if self._plan.every or self._exchange.is_set(FINISH):
+            return False
+        return self._caught_up and age > BACKLOG
 
     def _newest(self, block: Block, content: Samples) -> tuple[Block, Samples]:
         """Leave out what is late, up to samples that are not or are the last ones."""

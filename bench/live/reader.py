@@ -11,13 +11,15 @@ from bench.errors import BenchError, UnpluggedError
 from bench.links import BACK, LOST, RESUMED, Link, Read
 from bench.links.opening import PortPlan
 from bench.links.reconnecting import ReconnectingLink
-from bench.live.exchange import STOP, Address, Exchange
+from bench.live.exchange import RAW, STOP, Address, Exchange
 from bench.live.kept import orphaned, settled
 from bench.protocols.plan import ProtocolPlan
 from bench.wheels import Wheels
 
 WAIT = 0.1
 """The longest wait for bytes before it is looked whether the run goes on, [s]."""
+FULL = 0.01
+"""Wait for those that are behind, [s]."""
 TRIES = 2
 RAW_LOST = "raw bytes lost: "
 """Begins the event of a recording that tells of bytes that the recorder had no room for."""
@@ -38,6 +40,8 @@ class ReaderPlan:
         See `bench.wheels.Wheels`.
     recorded : bool
         Whether there is a recorder.
+    every_turn : bool
+        Whether no turn is skipped: the port waits where estimators or recorder are behind.
     """
 
     port: PortPlan
@@ -46,6 +50,7 @@ class ReaderPlan:
     devices: Mapping[int | None, Device]
     wheels: tuple[int, ...] = ()
     recorded: bool = True
+    every_turn: bool = False
 
 
 @dataclass(slots=True)
@@ -140,6 +145,9 @@ class _Reader:
         """Go on until the end of the link or of the run."""
         state, exchange = self.state, self._exchange
         while not exchange.is_set(STOP) and not orphaned():
+            if self._plan.every_turn and self._behind():
+                time.sleep(FULL)
+                continue
             try:
                 read = link.receive(Deadline.after(WAIT))
             except UnpluggedError as error:
@@ -236,6 +244,12 @@ class _Reader:
             self._raw_lost += len(read.data)
             return False
         return True
+
+    def _behind(self) -> bool:
+        """Tell whether a queue is half full: what a read brings has room in the other half."""
+        exchange = self._exchange
+        waiting = max(queue.waiting for queue in exchange.samples)
+        return waiting > exchange.address.samples // 2 or exchange.raw.waiting > RAW // 2
 
     def _look(self, link: Link) -> None:
         """Count the overruns of the port since it was last asked, once a second."""

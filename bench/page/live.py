@@ -21,9 +21,10 @@ from bench.page.guard import bracketed
 from bench.session import Source
 
 LOOPBACK = "127.0.0.1"
-HANGS = 10.0
-"""A page without a sign of life for so long is ended and started again, [s]."""
-STARTS = 60.0
+HANGS = 60.0
+"""A page without a sign of life for so long is ended and started again, [s]: a page that has been
+given no time on a busy machine is silent too."""
+STARTS = 300.0
 """One that starts may be silent for so long more, [s]."""
 LOOK = 0.05
 """Time between two looks after the page's process, [s]."""

@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 
+from tests.bench.programs import PATIENCE
+
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 WITHOUT = "Playwright is not installed (`make` does it); only a real browser runs the page's script"
 WITHOUT_CHROMIUM = (
@@ -43,6 +45,8 @@ def chromium() -> Iterator[Any]:
     if path is None and not _done(sys.executable, "-m", "playwright", "install", "chromium"):
         pytest.skip(WITHOUT_CHROMIUM)
     with api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        browser = playwright.chromium.launch(
+            executable_path=path, args=["--no-sandbox"], timeout=1e3 * PATIENCE
+        )
         yield browser
         browser.close()

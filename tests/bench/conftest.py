@@ -1,8 +1,7 @@
 """Shared by the tests of the bench: a tiny campaign, toy FMUs, programs in their own process."""
 
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -11,6 +10,7 @@ from pythonfmu import FmuBuilder
 from bench.fmu_archive import read_fmu
 from bench.trust import remember
 from tests.bench.campaigns import write_tiny_campaign
+from tests.bench.programs import Program
 from tests.synthetic import cornering_runs, write
 from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration import Calibration
@@ -19,7 +19,7 @@ from tirelib.observations import observe
 
 TOY = Path(__file__).with_name("toy_slave.py")
 BUILD = Path(__file__).parents[2] / "build"
-Spawn = Callable[..., "subprocess.Popen[str]"]
+Spawn = Callable[..., Program]
 
 
 @pytest.fixture(scope="module")
@@ -68,22 +68,25 @@ def toy_fmus(tmp_path_factory: pytest.TempPathFactory, own_trust_list: None) -> 
 
 
 @pytest.fixture
-def spawn() -> Iterator[Spawn]:
+def spawn(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Spawn]:
     """Start ``tirebench`` in a process of its own; whatever is left is ended."""
-    started: list[subprocess.Popen[str]] = []
+    with spawning(tmp_path_factory) as start:
+        yield start
 
-    def start(*arguments: object) -> subprocess.Popen[str]:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "bench", *map(str, arguments)],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        started.append(process)
-        return process
 
-    yield start
-    for process in started:
-        if process.poll() is None:
-            process.kill()
-        process.communicate()
+@contextmanager
+def spawning(folders: pytest.TempPathFactory) -> Iterator[Spawn]:
+    """Give what starts programs, and end those that are left."""
+    started: list[Program] = []
+
+    def start(*arguments: object) -> Program:
+        started.append(Program(folders.mktemp("program"), *arguments))
+        return started[-1]
+
+    try:
+        yield start
+    finally:
+        for process in started:
+            if process.poll() is None:
+                process.kill()
+            process.wait()

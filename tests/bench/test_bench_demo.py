@@ -26,6 +26,7 @@ from bench.protocols.plan import ProtocolPlan
 from bench.rig.measure import Chain
 from bench.trust import remember
 from bench.wheels import Wheels
+from tests.bench.programs import PATIENCE, wait_until
 from tests.synthetic import cornering_runs, synthetic_run, write
 from tirelib.campaign import Run, check_campaign, read_campaign
 from tirelib.report.agreement import agreement, read_turns
@@ -76,21 +77,27 @@ def out(demo_module: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     side = synthetic_run(len(loads), load=4500.0, slip_angle=0.03, turns=5.2, seed=5)
     write(data / "played", map(as_the_rig_measures, [*straight, side]))
     out = tmp_path_factory.mktemp("demo")
-    demo_module.main(
-        [
-            "--data",
-            str(data),
-            "--out",
-            str(out),
-            "--model",
-            "table-6-1",
-            "--no-browser",
-            "--pace",
-            "0.25",
-        ],  # a busy machine would leave out turns
-        steps_here(demo_module),
-    )
+    words = ["--data", str(data), "--out", str(out), "--model", "table-6-1", "--pace", "8"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("bench_page.Look._look", late_and_long(out))
+        demo_module.main(words, steps_here(demo_module))
     return out
+
+
+def late_and_long(folder: Path) -> Any:
+    """Return somebody who opens the page late, and looks when the day is long over."""
+    import bench_page
+
+    def look(self: Any, url: str, turns: float, say: Any, begin: Any) -> Any:
+        sent = folder / "emulate.log"
+        bench_page.fetch(url)
+        assert "played" not in sent.read_text()
+        assert "frames in" not in sent.read_text()
+        begin()
+        wait_until(lambda: "played" in sent.read_text())
+        return bench_page.Seen("", bench_page.fetch(url))
+
+    return look
 
 
 def document(path: Path) -> Any:
@@ -130,7 +137,7 @@ def test_everything_that_was_promised_is_there_and_on_the_page(out: Path) -> Non
     page = (out / "index.html").read_text()
     assert "Library = FMU = bench" in page
     assert "NOT EQUAL" not in page
-    assert "live page fetched: 200" in page
+    assert "live page fetched: 200" in page  # by somebody who came late and stayed long
     for what in ("Replay the recording", "Export it as a campaign", "Where does the model fail?"):
         assert what in page
     for file in re.findall(r'href="(compared/[^"]+|figures/[^"]+)"', page):
@@ -246,7 +253,7 @@ def test_a_meter_counts_the_processes_of_a_run_and_those_that_ended(demo_module:
     run = subprocess.Popen([sys.executable, "-c", f"{parent}; input()", work],
                            stdin=subprocess.PIPE)  # fmt: skip
     meter = bench_processes.Meter(run.pid)
-    end = time.monotonic() + 30.0
+    end = time.monotonic() + PATIENCE
     most = 0
     while time.monotonic() < end and (most < 2 or len(bench_processes.children(run.pid)) > 1):
         meter.look()

@@ -14,8 +14,7 @@ from bench.errors import DeviceError
 from bench.live import kept as kept_module
 from bench.live.kept import CONTEXT, Kept
 from bench.live.priority import BELOW, PRIORITY, as_parent, below, realtime
-
-PATIENCE = 60.0
+from tests.bench.programs import PATIENCE
 
 
 def tell(news: Any, number: int) -> None:

@@ -2,8 +2,6 @@
 
 import json
 import signal
-import subprocess
-import time
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +14,7 @@ from bench.fmu_archive import read_fmu
 from bench.recording import Recording
 from bench.trust import remember
 from tests.bench.conftest import Spawn
+from tests.bench.programs import A_TURN, Line, port_of, wait_until
 from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import write_calibration
@@ -23,7 +22,6 @@ from tirelib.estimators.result import estimate_document
 from tirelib.fmu.build import build_fmu
 from tirelib.observations import observe
 
-PATIENCE = 30.0
 SECOND = 112_500
 """Bytes of a second of one wheel."""
 
@@ -39,20 +37,6 @@ def fmus(calibration: Calibration, tmp_path_factory: pytest.TempPathFactory) -> 
     for fmu in built.values():
         remember(read_fmu(fmu))
     return built
-
-
-def port_of(file: Path) -> str:
-    """Wait for the emulator's port."""
-    end = time.monotonic() + PATIENCE
-    while not file.exists() and time.monotonic() < end:
-        time.sleep(0.02)
-    return file.read_text().strip()
-
-
-def finish(process: "subprocess.Popen[str]") -> tuple[int, str, str]:
-    out, err = process.communicate(timeout=PATIENCE)
-    assert "Traceback" not in err
-    return process.returncode, out, err
 
 
 def result(path: Path) -> dict[str, Any]:
@@ -85,16 +69,13 @@ def compare(bench: dict[str, Any], library: dict[str, Any]) -> None:
 def test_library_live_and_replay_give_the_same_estimates(
     spawn: Spawn, campaign: Path, calibration: Calibration, fmus: dict[int, Path], tmp_path: Path
 ) -> None:
-    emulator = spawn("emulate", "--campaign", campaign, "--all", "--port-file", tmp_path / "port",
-                     "--conditions", tmp_path / "c.json", "--json", tmp_path / "e.json",
-                     "--speedup", 2)  # fmt: skip
-    port = port_of(tmp_path / "port")
-    live = spawn("run", "--port", port, "--fmu", fmus[16], "--conditions", tmp_path / "c.json",
-                 "--record", tmp_path / "a.mcap", "--json", tmp_path / "live.json",
-                 "--silence", 1.5, "--no-page")  # fmt: skip
-    code, out, _ = finish(live)
+    line = Line(spawn, tmp_path, "--campaign", campaign, "--all", "--speedup", 2,
+                "--conditions", tmp_path / "c.json", "--json", tmp_path / "e.json")  # fmt: skip
+    live = spawn("run", "--port", line.port, "--fmu", fmus[16], "--conditions",
+                 tmp_path / "c.json", "--record", tmp_path / "a.mcap", "--json",
+                 tmp_path / "live.json", "--every-turn", "--no-page")  # fmt: skip
+    code, out, _ = line.heard_by(live)
     assert code == 0
-    assert finish(emulator)[0] == 0
     observations = observe([read_campaign(campaign)])
     library = estimate_document(
         observations, calibration.estimate(observations.features), calibration
@@ -121,16 +102,13 @@ def test_library_live_and_replay_give_the_same_estimates(
 def test_every_fault_is_counted_and_none_passes_for_a_number(
     spawn: Spawn, campaign: Path, fmus: dict[int, Path], tmp_path: Path
 ) -> None:
-    emulator = spawn("emulate", "--campaign", campaign, "--run", 2, "--port-file",
-                     tmp_path / "port", "--json", tmp_path / "e.json", "--seed", 3,
-                     "--fault", "flips=0.03", "--fault", "lost=0.03", "--fault", "dup=0.05",
-                     "--fault", "saturate=5")  # fmt: skip
-    port = port_of(tmp_path / "port")
-    live = spawn("run", "--port", port, "--fmu", fmus[16], "--speed", 64.8, "--pressure", 2.3,
-                 "--camber", 0, "--record", tmp_path / "a.mcap", "--json", tmp_path / "live.json",
-                 "--silence", 1.5)  # fmt: skip
-    finish(live)
-    finish(emulator)
+    sender = Line(spawn, tmp_path, "--campaign", campaign, "--run", 2, "--json",
+                  tmp_path / "e.json", "--seed", 3, "--fault", "flips=0.03", "--fault",
+                  "lost=0.03", "--fault", "dup=0.05", "--fault", "saturate=5")  # fmt: skip
+    live = spawn("run", "--port", sender.port, "--fmu", fmus[16], "--speed", 64.8, "--pressure",
+                 2.3, "--camber", 0, "--record", tmp_path / "a.mcap", "--json",
+                 tmp_path / "live.json", "--every-turn")  # fmt: skip
+    sender.heard_by(live)
     sent, seen = result(tmp_path / "e.json"), result(tmp_path / "live.json")
     done, line = sent["faults"], seen["line"]
     assert line["duplicates"] == done["dup"] > 5
@@ -150,20 +128,22 @@ def test_every_fault_is_counted_and_none_passes_for_a_number(
 def test_an_unplugged_cable_is_told_and_the_recording_kept(
     spawn: Spawn, campaign: Path, toy_fmus: dict[int, Path], tmp_path: Path
 ) -> None:
-    emulator = spawn("emulate", "--campaign", campaign, "--all", "--port-file", tmp_path / "port",
-                     "--unplug", 1.2)  # fmt: skip
-    port = port_of(tmp_path / "port")
-    code, out, _ = finish(
-        spawn("run", "--port", port, "--fmu", toy_fmus[16], "--speed", 65, "--record",
-              tmp_path / "a.mcap", "--json", tmp_path / "live.json", "--reconnect", 0)
-    )  # fmt: skip
+    emulator = spawn("emulate", "--campaign", campaign, "--all", "--loop", "--port-file",
+                     tmp_path / "port")  # fmt: skip
+    port = port_of(tmp_path / "port", emulator)
+    live = spawn("run", "--port", port, "--fmu", toy_fmus[16], "--speed", 65, "--record",
+                 tmp_path / "a.mcap", "--json", tmp_path / "live.json", "--reconnect",
+                 0)  # fmt: skip
+    live.says(A_TURN)
+    emulator.terminate()  # it pulls the cable
+    code, out, _ = live.finish()
     assert code == 1
     assert f"unplugged: {port}: the port went away" in out
-    assert finish(emulator)[0] == 0
+    assert emulator.finish()[0] == 0
     data, complete = recorded(tmp_path / "a.mcap")
     assert complete
     line = result(tmp_path / "live.json")["line"]
-    assert len(data) == line["bytes"] > 50_000
+    assert len(data) == line["bytes"] > 1000
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
@@ -172,24 +152,22 @@ def test_a_stopped_or_killed_run_leaves_a_recording_that_replays(
 ) -> None:
     spawn("emulate", "--campaign", campaign, "--all", "--loop", "--port-file", tmp_path / "port")
     port = port_of(tmp_path / "port")
-    start = time.monotonic()
+    record = tmp_path / "a.mcap"
     live = spawn("run", "--port", port, "--fmu", toy_fmus[16], "--speed", 65, "--record",
-                 tmp_path / "a.mcap")  # fmt: skip
-    while time.monotonic() - start < PATIENCE:
-        if (tmp_path / "a.mcap").exists() and (tmp_path / "a.mcap").stat().st_size > SECOND:
-            break
-        time.sleep(0.02)
+                 record)  # fmt: skip
+    live.says(A_TURN)
+    wait_until(lambda: record.stat().st_size > SECOND)
     live.send_signal(number)
-    code, out, said = finish(live)  # its other processes too: they have its output open
-    data, complete = recorded(tmp_path / "a.mcap")
-    assert len(data) > 0.8 * SECOND
-    assert complete  # a recorder that is left alone comes to an end
+    code, out, _ = live.finish()
+    wait_until(lambda: recorded(record)[1])  # a recorder that is left alone comes to an end
+    assert len(recorded(record)[0]) > 0.8 * SECOND
     assert code == (-signal.SIGKILL if number == signal.SIGKILL else 0)
     assert ("ended: stopped" in out) == (number == signal.SIGINT)
-    assert ("leaked" in said) == (number == signal.SIGKILL)  # then, what was left is removed
-    code, out, _ = finish(
-        spawn("run", "--replay", tmp_path / "a.mcap", "--fmu", toy_fmus[16], "--no-page")
-    )
+    if number == signal.SIGKILL:  # then, what was left is removed
+        wait_until(lambda: "leaked" in live.err.read_text())
+    else:
+        assert "leaked" not in live.err.read_text()
+    code, out, _ = spawn("run", "--replay", record, "--fmu", toy_fmus[16], "--no-page").finish()
     assert code == 0
 
 
@@ -219,19 +197,19 @@ def test_bad_input_ends_with_code_2_and_a_message(
         assert isinstance(outcome.exception, BenchError | SystemExit), message
     record = tmp_path / "free.mcap"
     for _ in range(2):  # a run that did not begin leaves the name of its recording free
-        code, _, err = finish(spawn("run", "--port", "p", "--fmu", fmu, "--record", record))
+        code, _, err = spawn("run", "--port", "p", "--fmu", fmu, "--record", record).finish()
         assert code == 2
         assert err.startswith("Error: p: the port cannot be opened")
         assert not record.exists()
     record.touch()
-    code, _, err = finish(spawn("run", "--port", "p", "--fmu", fmu, "--record", record))
+    code, _, err = spawn("run", "--port", "p", "--fmu", fmu, "--record", record).finish()
     assert code == 2
     assert "a recording is never overwritten" in err
     assert record.exists()
 
 
 def test_ports_lists_what_there_is(spawn: Spawn, tmp_path: Path) -> None:
-    code, out, _ = finish(spawn("ports", "--json", tmp_path / "p.json"))
+    code, out, _ = spawn("ports", "--json", tmp_path / "p.json").finish()
     found = result(tmp_path / "p.json")["ports"]
     assert code == (0 if found else 1)
     assert all(port["device"] in out for port in found)

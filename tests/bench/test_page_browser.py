@@ -4,8 +4,6 @@ import json
 import os
 import re
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -23,9 +21,10 @@ from bench.page.live import LivePage, PageChoice
 from bench.page.quantities import UNITS
 from bench.recording import Recording
 from tests.bench.browser import chromium
-from tests.bench.conftest import Spawn
+from tests.bench.conftest import Spawn, spawning
 from tests.bench.in_process import FakeSource
-from tests.bench.test_live import PATIENCE, port_of, result
+from tests.bench.programs import PATIENCE, port_of, wait_until
+from tests.bench.test_live import result
 from tests.bench.test_page import turn as made_turn
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import write_calibration
@@ -66,35 +65,8 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture(scope="module")
 def spawn_all(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Spawn]:
-    """Start ``tirebench`` with its output in a file that nobody has to empty."""
-    started: list[subprocess.Popen[str]] = []
-    folder = tmp_path_factory.mktemp("output")
-
-    def start(*arguments: object) -> "subprocess.Popen[str]":
-        with (folder / f"{arguments[0]}.txt").open("w") as file:
-            process = subprocess.Popen(
-                [sys.executable, "-u", "-m", "bench", *map(str, arguments)],
-                stdout=file, stderr=subprocess.STDOUT, text=True,
-            )  # fmt: skip
-        process.output = folder / f"{arguments[0]}.txt"
-        started.append(process)
-        return process
-
-    yield start
-    for process in started:
-        if process.poll() is None:
-            process.kill()
-        process.wait()
-
-
-def address_of(run: Any) -> str:
-    """Wait until a run says where its page is."""
-    end = time.monotonic() + PATIENCE
-    while not (found := re.search(r"live page: (\S+)\n", run.output.read_text())):
-        assert time.monotonic() < end
-        assert run.poll() is None, run.output.read_text()
-        time.sleep(0.05)
-    return found[1]
+    with spawning(tmp_path_factory) as start:
+        yield start
 
 
 def opened(browser: Any, url: str, visit: Visit) -> Any:
@@ -121,10 +93,11 @@ def visit(
                           "--wheel", 5, "--port-file", folder / "port", "--fault", "lost=0.002",
                           "--speedup", 0.4,
                           "--conditions", folder / "c.json")  # fmt: skip
-    port = port_of(folder / "port")
+    port = port_of(folder / "port", emulator)
     run = spawn_all("run", "--port", port, "--fmu", fmu, "--trust", "--conditions",
-                     folder / "c.json", "--record", folder / "a.mcap")  # fmt: skip
-    url = address_of(run)
+                     folder / "c.json", "--record", folder / "a.mcap",
+                     "--every-turn")  # fmt: skip
+    url = run.says(r"live page: (\S+)\n")[1]
     seen.host = re.split("[/?]", url)[2]
     page = opened(browser, url, seen)
     other = opened(browser, url, seen)
@@ -147,10 +120,10 @@ def visit(
     page.context.close()
     other.context.close()
     run.send_signal(signal.SIGINT)
-    run.wait(PATIENCE)
+    run.finish()
     replay = spawn_all("replay", folder / "a.mcap", "--fmu", fmu,
                         "--json", folder / "r.json")  # fmt: skip
-    assert replay.wait(2.0 * PATIENCE) == 0
+    assert replay.finish()[0] == 0
     seen.replay = result(folder / "r.json")
     recording = Recording(folder / "a.mcap")
     seen.markers = re.findall(
@@ -175,10 +148,7 @@ def spawned_by(run: int) -> list[int]:
 
 def wait_for(page: Any, script: str) -> None:
     """Wait until a script gives true; Playwright's own way evaluates text, which is forbidden."""
-    end = time.monotonic() + PATIENCE
-    while page.evaluate(script) is not True:
-        assert time.monotonic() < end, script
-        page.wait_for_timeout(50)
+    wait_until(lambda: page.evaluate(script) is True, script)
 
 
 def press_keys(page: Any, seen: Visit) -> None:

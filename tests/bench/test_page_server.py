@@ -23,7 +23,7 @@ from bench.page.feed import About
 from bench.page.live import LivePage, PageChoice
 from bench.page.server import MOST_VIEWERS, STATIC
 from tests.bench.in_process import FakeSource
-from tests.bench.test_live import PATIENCE
+from tests.bench.programs import PATIENCE
 
 Answer = tuple[int, dict[str, str], bytes]
 
