@@ -12,6 +12,7 @@ from tirelib.contact.exact import load_exact
 from tirelib.contact.exact_slopes import NAMES, exact_slopes
 from tirelib.contact.tread import Tread
 from tirelib.errors import ConvergenceError, ParameterError
+from tirelib.parameters import read_tire
 from tirelib.ring.compliance import compliance
 from tirelib.ring.ring import Ring
 
@@ -283,3 +284,17 @@ def test_starts_and_directions_for_other_points_are_refused() -> None:
         load_exact(RING, TREAD, LOADS[:3], start=solved)
     with pytest.raises(ParameterError, match=r"shape \(1, 3, 7\)"):
         exact_slopes(solved, np.zeros((1, 3, 7)))
+
+
+def test_a_thin_belt_under_a_hard_tread_is_refused_for_the_short_contact() -> None:
+    """A bicycle's wheel at 30 N: its linear start settles, and the reason is the true one."""
+    base = read_tire("table-6-1").tire
+    bicycle = base.changed(
+        ring_radius=0.330, free_radius=0.3335, belt_width=0.026, tread_thickness=0.0035,
+        innerliner_offset=-0.001, bending_stiffness=0.0207, mass=0.25, pressure=5.664e5,
+        radial_stiffness=2.6e4, tangential_stiffness=4e4, tread_stiffness=2.79e9,
+    )  # fmt: skip
+    at = Ring.of(bicycle, bicycle.pressure), Tread.of(bicycle)
+    with pytest.raises(ParameterError, match=r"resolve 0\.015 rad.*a softer tread"):
+        load_exact(*at, 30.0)
+    assert load_exact(*at, 400.0).half_angle[0] > 0.015

@@ -15,8 +15,7 @@ from tirelib.errors import ConvergenceError, ParameterError
 from tirelib.parameters import Tire, TireFile, read_tire
 from tirelib.report.simulation import (
     CONTACTS,
-    LARGEST_TURN_RATE,
-    TURN_RATE_REASON,
+    LARGEST_BELT_SPEED,
     Simulation,
 )
 from tirelib.report.simulation import simulate as simulate_tire
@@ -128,13 +127,14 @@ def _si(values: Sequence[float], unit: str, dimension: str) -> FloatArray:
 
 def _turn_rate(speed: FloatArray, tire: Tire) -> FloatArray:
     """Return the turn rate of a belt of constant length in free rolling."""
-    good = (speed >= 0.0) & (speed <= LARGEST_TURN_RATE * tire.ring_radius)
+    good = (speed >= 0.0) & (speed <= LARGEST_BELT_SPEED)
     if not good.all():
-        most = from_si(LARGEST_TURN_RATE * tire.ring_radius, "km/h", "speed")
+        given, most = (
+            from_si(x, "km/h", "speed") for x in (float(speed[~good][0]), LARGEST_BELT_SPEED)
+        )
         raise ParameterError(
-            f"simulate: --speed {from_si(float(speed[~good][0]), 'km/h', 'speed'):g} km/h; the "
-            f"model holds from 0 to {most:.0f} km/h ({LARGEST_TURN_RATE:g} rad/s times ring "
-            f"radius); {TURN_RATE_REASON}; rolling is forward, entry first"
+            f"simulate: --speed {given:g} km/h; the model holds from 0 to {most:.0f} km/h, rolling "
+            "forward, entry first; no tire's belt runs faster; check value and unit"
         )
     rate: FloatArray = speed / tire.ring_radius
     return rate

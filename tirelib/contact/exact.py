@@ -34,6 +34,8 @@ from tirelib.ring.ring import Ring, columns
 
 SMALLEST_ANGLE = 0.015
 """Half contact angle below which nodes and modes do not resolve the contact, [rad]."""
+START_MODES = 4 * energy.N_MODES
+"""Harmonics of the linear start: fewer do not settle where a hard tread's contact is short."""
 INEXTENSIBLE = 1e8
 """EA that stands for an inextensible belt, [N]: it stretches by less than 1e-4."""
 LONGEST_STEP = 0.01
@@ -181,9 +183,9 @@ def load_exact(
 
 def _linear_start(ring: Ring, tread: Tread, loads: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return coefficients and deflections of the linear ring."""
-    still = compliance(replace(ring, damping=0.0), 0.0, energy.N_MODES)
+    still = compliance(replace(ring, damping=0.0), 0.0, START_MODES)
     linear = radial.load(still, tread, loads)
-    shape = linear.displacement
+    shape = linear.displacement[:, : energy.N_MODES + 1]
     x = np.concatenate([shape[..., 0].real, -shape[:, 1:, 1].imag], axis=1)
     return x, linear.deflection
 
@@ -203,8 +205,10 @@ def _check_half_angle(half: FloatArray, loads: FloatArray, ring: Ring, tread: Tr
         point = int(np.flatnonzero(small)[0])
         raise ParameterError(
             f"exact contact: point {point} at {loads[point]:.4g} N touches the road over a half "
-            f"angle of {half[point]:.2g} rad; from {SMALLEST_ANGLE} rad on {energy.N_MODES} modes "
-            "resolve it; take the linear contact for so small a load, or raise the load"
+            f"angle of {half[point]:.2g} rad; {energy.N_MODES} harmonics resolve "
+            f"{SMALLEST_ANGLE} rad and more; the load is too small for a tread of "
+            f"{np.broadcast_to(tread.normal_stiffness, half.shape)[point]:.3g} N/m^2: use the "
+            "linear contact, which agrees there, a larger load or a softer tread"
         )
     large = ~(half < energy.PATCH)
     if large.any():

@@ -214,7 +214,8 @@ def _undeformed(tread: Tread, d0: FloatArray) -> FloatArray:
     if (ratio > 0.5).any():
         raise ParameterError(
             f"contact: deflection {1e3 * d0[ratio > 0.5][0]:.1f} mm is more than half of the free "
-            "radius; give it in metres, at most some 15 % of the radius"
+            f"radius, {1e3 * (d0 / ratio)[ratio > 0.5][0]:.1f} mm; a tire bears some 15 % of its "
+            "radius; check the deflection and its unit"
         )
     half = np.arccos(1.0 - ratio)
     return np.stack([-half, half], axis=1)

@@ -306,8 +306,8 @@ def _solve(
         raise ConvergenceError(
             f"contact: {moving.size} of {d0.size} points, the first number {moving[0]} at "
             f"d0 = {1e3 * d0[moving[0]]:.2f} mm, still change by {worst:.2e} after "
-            f"{found.iterations} iterations; look at the last contact (attribute iterate), use a "
-            "smaller load or a stiffer belt",
+            f"{found.iterations} iterations; look at the last contact (attribute iterate); "
+            "another load, a stiffer belt, a softer tread or more harmonics may settle",
             contact,
             worst,
         )

@@ -37,11 +37,9 @@ CONTACTS = ("radial", "shear")
 N_SHEAR_NODES = 80
 N_ANGLES = 1441
 """A quarter of a degree."""
-LARGEST_TURN_RATE = 300.0
-"""Up to which the ring's steady rolling was checked, for every tire, [rad/s]."""
-TURN_RATE_REASON = (
-    "steady rolling was checked up to there for every tire alike; the tire itself may end earlier"
-)
+LARGEST_BELT_SPEED = 150.0
+"""Turn rate times ring radius up to which a tire is rolled, [m/s]: the fastest tires that race
+(540 km/h). The linear ring has no limit of its own, since its tension grows with the speed."""
 MICRO = 1e6
 
 
@@ -200,7 +198,7 @@ def simulate(
     own = tire.pressure if inflation is None else inflation
     target, p, omega = _points(pressed, own, turn_rate)
     _check_range("inflation pressure", p, FIELDS["pressure"].highest, "bar", "pressure")
-    check_turn_rate(omega)
+    check_turn_rate(tire, omega)
     n_modes, tread = modes(tire, p), Tread.of(tire)
     at = _ring_at(tire, p, omega, n_modes)
     if contact == "shear":
@@ -263,15 +261,18 @@ def _points(*given: Any) -> tuple[FloatArray, ...]:
     return tuple(np.broadcast_to(array, (count,)).copy() for array in arrays)
 
 
-def check_turn_rate(turn_rate: FloatArray) -> None:
-    """Refuse turn rates, [rad/s], that the model was not checked for.
+def check_turn_rate(tire: Tire, turn_rate: FloatArray) -> None:
+    """Refuse turn rates, [rad/s], with which no tire's belt runs.
 
     Raises
     ------
     ParameterError
     """
-    _check_range("turn rate", turn_rate, LARGEST_TURN_RATE, "rad/s", "angular_speed",
-                 TURN_RATE_REASON)  # fmt: skip
+    _check_range(
+        "turn rate", turn_rate, LARGEST_BELT_SPEED / tire.ring_radius, "rad/s", "angular_speed",
+        f"no tire's belt runs faster than {from_si(LARGEST_BELT_SPEED, 'km/h', 'speed'):.0f} km/h; "
+        "check value and unit",
+    )  # fmt: skip
 
 
 def _check_range(
