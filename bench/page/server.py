@@ -28,6 +28,7 @@ from bench.errors import DeviceError
 from bench.live.priority import below
 from bench.page.board import Board
 from bench.page.commands import parse_command
+from bench.page.connections import Connection as HttpConnection
 from bench.page.guard import LONGEST_BODY, Guard
 from bench.page.history import History, Viewer
 
@@ -195,7 +196,8 @@ def serve(plan: PagePlan, listener: socket.socket, pipe: Connection) -> None:
         os.set_blocking(pipe.fileno(), False)  # a run that does not ask may not stop the page
     app = Page(plan, board, pipe).app()
     config = uvicorn.Config(
-        app, log_config=None, access_log=False, server_header=False, ws="websockets-sansio",
+        app, log_config=None, access_log=False, server_header=False, http=HttpConnection,
+        ws="websockets-sansio",
         ws_max_size=256, ws_per_message_deflate=False, proxy_headers=False, lifespan="on",
         limit_concurrency=128, timeout_keep_alive=5,
     )  # fmt: skip

@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -19,11 +20,12 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from bench.estimation import News
+from bench.page.connections import MOST_IDLE, Connection, least_needed
 from bench.page.feed import About
 from bench.page.live import LivePage, PageChoice
 from bench.page.server import MOST_VIEWERS, STATIC
 from tests.bench.in_process import FakeSource
-from tests.bench.programs import PATIENCE
+from tests.bench.programs import PATIENCE, wait_until
 
 Answer = tuple[int, dict[str, str], bytes]
 
@@ -241,6 +243,52 @@ def test_a_viewer_that_talks_nonsense_is_served_on_and_one_too_many_is_sent_away
         assert b'"link": "port"' in first.recv(PATIENCE)
         with pytest.raises(InvalidStatus), served.stream(Cookie=served.cookie):
             pass
+
+
+def closed(one: socket.socket) -> bool:
+    """Tell whether the other end has closed a connection."""
+    try:
+        return not one.recv(1)
+    except (BlockingIOError, TimeoutError):
+        return False
+    except ConnectionError:
+        return True
+
+
+def test_connections_that_say_nothing_keep_nobody_from_the_page(served: Served) -> None:
+    """Some say nothing at all, some never end their request, some have been refused."""
+    begun = f"GET /page.js HTTP/1.1\r\nHost: {served.host}\r\n".encode()
+    said = [b"", begun, begun + b"\r\n"]
+    with ExitStack() as stack:
+        stream = stack.enter_context(served.stream(Cookie=served.cookie))
+        held = []
+        for number in range(150):
+            one = stack.enter_context(socket.create_connection(("127.0.0.1", served.port)))
+            one.sendall(said[number % 3])
+            held.append(one)
+        for path in STATIC:
+            assert served.ask(path, **served.good)[0] == 200, path
+        served.settle()
+        assert b'"link": "port"' in stream.recv(PATIENCE)
+        for one in held:
+            one.setblocking(False)
+        wait_until(lambda: sum(closed(one) for one in held[::3]) >= 50 - MOST_IDLE)
+
+
+@pytest.mark.parametrize("asked", [False, True])
+def test_a_connection_without_a_request_ends(asked: bool) -> None:
+    ended: list[str] = []
+    transport = SimpleNamespace(abort=lambda: ended.append("ended"))
+    one = SimpleNamespace(cycle=object() if asked else None, transport=transport)
+    one.connections = [one]
+    Connection._has_asked(one)
+    assert ended == ([] if asked else ["ended"])
+
+
+def test_of_idle_connections_the_oldest_of_who_has_most_gives_way() -> None:
+    idle = [SimpleNamespace(client=(peer, n), opened=age) for n, (peer, age) in enumerate(
+        [("10.0.0.1", 0.0), ("10.0.0.2", 3.0), ("10.0.0.2", 1.0), ("10.0.0.2", 2.0)])]  # fmt: skip
+    assert least_needed(idle) is idle[2]
 
 
 def test_a_page_that_is_killed_comes_back_at_the_same_address_and_is_counted(
