@@ -279,7 +279,7 @@ def _mark(entry: dict[str, Any]) -> RunMark:
         name: float(to_si(float(x), *TRUTH[name])) for name, x in entry.get("truth", {}).items()
     }
     plan = {
-        str(name): x if isinstance(x, str) else float(x)
+        str(name): str(x) if name == "kind" else float(x)
         for name, x in entry.get("plan_si", {}).items()
     }
     return RunMark(int(entry["run"]), int(entry["t_us"]), float(entry["start_s"]), truth, plan)

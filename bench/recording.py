@@ -27,7 +27,6 @@ from typing import Any, BinaryIO
 
 from mcap.exceptions import McapError
 from mcap.records import Channel, Message, Metadata
-from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 from bench.chain import Jump, Place
@@ -35,11 +34,12 @@ from bench.conditions import Conditions, conditions_document, parse_conditions
 from bench.errors import DeviceError, RecordingError
 from bench.links import BACK, LOST, RESUMED, Read
 from bench.protocols import SERIAL
+from bench.records import records
 
 FORMAT = "tirebench-recording/1"
 CONDITIONS, EVENTS = "/conditions", "/events"
-LARGEST_RECORD = 64 * 2**20
-"""A longer record is damage, not data, [bytes]."""
+LATEST = 2**63
+"""Times are below this, [ns]: 292 years."""
 
 
 class Recorder:
@@ -244,7 +244,7 @@ class Recording:
                 f"{path}: it cannot be read ({error.strerror}); a recording of `tirebench run "
                 "--record` is needed; check the path"
             ) from None
-        self._records = StreamReader(self._file, record_size_limit=LARGEST_RECORD).records
+        self._records = records(self._file)
         self._topics: dict[int, str] = {}
         try:
             self.header, self.conditions = self._open()
@@ -262,9 +262,10 @@ class Recording:
                 if header is None:
                     break
                 return header, self._conditions(record.data)
+        damage = f" ({self.damage})" if self.complete is False else ""
         raise RecordingError(
-            f"{self.path}: it has no header of a recording; a file of `tirebench run --record` is "
-            "needed; name one"
+            f"{self.path}: it has no header of a recording{damage}; a file of `tirebench run "
+            "--record` is needed; name one"
         )
 
     def raw(self) -> Iterator[tuple[int, bytes]]:
@@ -308,6 +309,8 @@ class Recording:
             for record in self._records:
                 if isinstance(record, Channel):
                     self._topics[record.id] = record.topic
+                elif isinstance(record, Message):
+                    _moment(record.publish_time)
                 yield record
             self.complete = True
         except (McapError, ValueError, EOFError, OSError, LookupError) as error:
@@ -325,12 +328,12 @@ class Recording:
             )
         try:
             return RecordingHeader(
-                settings=dict(json.loads(text["settings"])),
+                settings=_settings(_json(text["settings"])),
                 device=text["device"],
                 fmu=text["fmu_sha256"],
-                protocol=dict(json.loads(text.get("protocol", "{}"))),
-                wall_ns=int(text["wall_ns"]),
-                monotonic_ns=int(text["monotonic_ns"]),
+                protocol=dict(_json(text.get("protocol", "{}"))),
+                wall_ns=_moment(int(text["wall_ns"])),
+                monotonic_ns=_moment(int(text["monotonic_ns"])),
             )
         except (KeyError, TypeError, ValueError) as error:
             raise RecordingError(
@@ -340,7 +343,7 @@ class Recording:
 
     def _conditions(self, data: bytes) -> Conditions:
         try:
-            return parse_conditions(json.loads(data), f"{self.path}: {CONDITIONS}")
+            return parse_conditions(_json(data), f"{self.path}: {CONDITIONS}")
         except (ValueError, DeviceError) as error:
             raise RecordingError(
                 f"{self.path}: the conditions are damaged ({error}); JSON is needed; "
@@ -353,10 +356,41 @@ def raw_topic(encoding: str) -> str:
     return f"/{encoding.partition('-')[0]}"
 
 
+def _json(text: str | bytes) -> Any:
+    """Return what JSON says.
+
+    Raises
+    ------
+    ValueError
+        If it is none, or nested too deeply to be read.
+    """
+    try:
+        return json.loads(text)
+    except RecursionError:
+        raise ValueError("JSON is nested too deeply") from None
+
+
+def _moment(time_ns: int) -> int:
+    """Return a time [ns] that counters of 63 bits can hold; refuse another."""
+    if not 0 <= time_ns < LATEST:
+        raise ValueError(f"a time of {time_ns} ns; 0 .. 2^63 is allowed")
+    return time_ns
+
+
+def _settings(found: Any) -> dict[str, Any]:
+    """Return settings whose wheels, where they are named, are numbers of wheels."""
+    settings = dict(found)
+    wheels = settings.get("wheels") or []
+    sound = isinstance(wheels, list) and all(type(n) is int and 0 <= n <= 255 for n in wheels)
+    if not sound:
+        raise ValueError(f"wheels = {str(wheels)[:40]}; a list of 0 .. 255 is allowed")
+    return settings
+
+
 def _event(data: bytes) -> dict[str, Any]:
     """Return what an event says; empty if it is damaged."""
     try:
-        event = json.loads(data)
+        event = _json(data)
     except ValueError:
         return {}
     return event if isinstance(event, dict) else {}
@@ -370,7 +404,7 @@ def _jump(event: Mapping[str, Any]) -> Jump | None:
         start, end = (Place(*map(int, event[key])) for key in ("from", "to"))
         return Jump(int(event["wheel"]), start, end, str(event["why"]),
                     int(event["samples"]), int(event["turns"]))  # fmt: skip
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, OverflowError, TypeError, ValueError):
         return None
 
 

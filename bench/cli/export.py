@@ -106,8 +106,14 @@ def _header(recording: Recording, like: Path | None) -> CampaignHeader:
         header, problems = parse_header(like)
     else:
         with tempfile.TemporaryDirectory() as name:
-            text = tomli_w.dumps(campaign or {})
-            (Path(name) / "campaign.toml").write_text(text, encoding="utf-8")
+            try:
+                text = tomli_w.dumps(campaign or {})
+                (Path(name) / "campaign.toml").write_text(text, encoding="utf-8")
+            except (TypeError, ValueError, RecursionError) as error:
+                raise RecordingError(
+                    f"{recording.path}: what it says of tire and gages is damaged ({error}); name "
+                    "a campaign that has them with --like DIR"
+                ) from None
             header, problems = parse_header(Path(name))
     if header is None:
         raise RecordingError("\n".join(str(problem) for problem in problems))

@@ -95,13 +95,25 @@ def devices_of(texts: Sequence[str]) -> tuple[dict[int | None, Device], str]:
 
 
 def devices_of_text(text: str, where: str) -> dict[int | None, Device]:
-    """Return the devices of a recording's header; the inverse of `devices_of`."""
+    """Return the devices of a recording's header; the inverse of `devices_of`.
+
+    Raises
+    ------
+    DeviceError
+        With the faults of a file, or if a wheel has no number.
+    """
     from bench.device import parse_device
 
     devices: dict[int | None, Device] = {}
     for part in text.split("\0") if text else []:
         first, _, rest = part.partition("\n")
         own = first.startswith(WHEEL_MARK)
-        wheel = int(first.removeprefix(WHEEL_MARK)) if own else None
+        number = first.removeprefix(WHEEL_MARK)
+        if own and not (number.isdecimal() and len(number) <= 3 and int(number) <= 255):
+            raise DeviceError(
+                f"{where}: device file of wheel {number[:40]!r}; 0 .. 255 is allowed; the header "
+                "is damaged; take another recording, or name files with --device"
+            )
+        wheel = int(number) if own else None
         devices[wheel] = parse_device(rest if own else part, f"{where}: device file")
     return devices

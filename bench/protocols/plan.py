@@ -74,7 +74,7 @@ class ProtocolPlan:
         Raises
         ------
         RecordingError
-            If it names an encoding that is not known here.
+            If it names an encoding that is not known here, or a rate that is none.
         """
         encoding = header.get("encoding", SERIAL)
         if encoding not in ENCODINGS:
@@ -82,9 +82,15 @@ class ProtocolPlan:
                 f"{where}: its bytes are {encoding!r}; {', '.join(ENCODINGS)} are understood here; "
                 "take a newer program"
             )
+        rate = header.get("rate_hz", RATE)
+        if isinstance(rate, bool) or not isinstance(rate, int | float) or not 153 <= rate <= 2e5:
+            raise RecordingError(
+                f"{where}: rate_hz = {str(rate)[:40]}; 153 .. 200000 Hz is allowed; the header is "
+                "damaged; take another recording"
+            )
         text, _, dbc = str(header.get("map", "")).partition("\0")
         user = parse_map(text, dbc, where) if text else None
-        return cls(encoding, float(header.get("rate_hz", RATE)), user)
+        return cls(encoding, float(rate), user)
 
 
 def dbc_hash(user: str = "") -> str:

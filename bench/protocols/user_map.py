@@ -134,7 +134,12 @@ def read_map(path: Path) -> UserMap:
 
 def parse_map(text: str, dbc: str, where: str) -> UserMap:
     """Return what the texts of a map and its DBC say; errors as `read_map`."""
-    document = tomllib.loads(text)
+    try:
+        document = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise DeviceError(
+            f"{where}: the map is no TOML ({error}); a map is TOML; correct that line"
+        ) from None
     if document.get("format") != FORMAT:
         raise DeviceError(
             f"{where}: format = {document.get('format')!r}; {FORMAT!r} is understood here; "
