@@ -25,6 +25,8 @@ class News:
         See `bench.page.laps.Lap.pack`.
     messages : list of str
         What an estimator said.
+    alarms : list of str
+        What the user has to know at once: nothing can be recorded, or it can again.
     jumps : list of Jump
     left_out : int
         Laps that were left out because the estimator was late.
@@ -35,16 +37,18 @@ class News:
     turns: list[Turn] = field(default_factory=list)
     laps: list[bytes] = field(default_factory=list)
     messages: list[str] = field(default_factory=list)
+    alarms: list[str] = field(default_factory=list)
     jumps: list[Jump] = field(default_factory=list)
     left_out: int = 0
     latency: list[float] = field(default_factory=list)
 
     def __bool__(self) -> bool:
-        return bool(self.turns or self.laps or self.messages or self.jumps or self.left_out)
+        return bool(self.turns or self.laps or self.messages or self.alarms or self.jumps
+                    or self.left_out)  # fmt: skip
 
     def add(self, other: "News") -> None:
         """Add what came later."""
-        for name in ("turns", "laps", "messages", "jumps", "latency"):
+        for name in ("turns", "laps", "messages", "alarms", "jumps", "latency"):
             getattr(self, name).extend(getattr(other, name))
         self.left_out += other.left_out
 

@@ -72,6 +72,8 @@ class Screen:
         """Show what is new, also when nothing is; called again and again."""
         for said in news.messages:
             self._console.print(f"FMU: {said}", soft_wrap=True, markup=False)
+        for said in news.alarms:
+            self._console.print(f"ALARM: {said}", style="bold red", soft_wrap=True, markup=False)
         self._turns.extend(news.turns)
         if self._live is None:
             rows = [_plain_row(_cells(turn)) for turn in news.turns]

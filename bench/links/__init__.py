@@ -21,11 +21,14 @@ class Read(NamedTuple):
     event : str
         `LOST` or `BACK` when the port went away or came back, `RESUMED` when the process that
         reads it was started again; else empty.
+    source : int
+        Which of the run's sources it is of.
     """
 
     arrival: int
     data: bytes
     event: str = ""
+    source: int = 0
 
 
 LOST, BACK, RESUMED = "lost", "back", "resumed"

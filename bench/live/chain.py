@@ -1,11 +1,12 @@
 """The run's side of the live chain: starts the processes, keeps them going, gathers their news."""
 
 import gc
+import json
 import pickle
 import time
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from bench import errors
 from bench.chain import Jump
 from bench.conditions import Conditions
 from bench.deadline import Deadline
+from bench.document import turn_document
 from bench.errors import FmuError, LinkTimeoutError, RecordingError
 from bench.estimation import News, skipped
 from bench.fmu_model import FmuFile
@@ -20,9 +22,10 @@ from bench.live.estimator import EstimatorPlan, Report, estimate
 from bench.live.exchange import FINISH, STOP, Exchange, woken
 from bench.live.kept import CONTEXT, Kept
 from bench.live.reader import LineState, ReaderPlan, load, read_port
-from bench.live.recorder import Order, RecorderState, record
+from bench.live.recorder import Order, RecorderState, RecordingRule, record
 from bench.page.board import SIZE
-from bench.recording import RecordingHeader, jump_event
+from bench.recorder import jump_event
+from bench.recording_header import RecordingHeader, part_path
 from bench.wheels import MOST, Wheels
 
 START = 300.0
@@ -36,6 +39,7 @@ PATIENCE = 60.0
 LEAVE, AT_ONCE = 60.0, 5.0
 """A process that was told to end and goes on for so long is ended, [s]: in good order; where
 nothing is left to be kept."""
+RECORDED_AGAIN = "recording goes on"
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +58,7 @@ class LivePlan:
         File of the recording that begins with the run.
     laps : bool
         Whether anybody looks at laps.
+    rule : RecordingRule
     """
 
     reader: ReaderPlan
@@ -62,6 +67,7 @@ class LivePlan:
     header: RecordingHeader
     record: Path | None = None
     laps: bool = True
+    rule: RecordingRule = field(default_factory=RecordingRule)
 
 
 class LiveChain:
@@ -98,6 +104,7 @@ class LiveChain:
         self._recorder: Kept | None = None
         self._estimators: dict[int, Kept] = {}
         self._finished = False
+        self._alarm = ""  # what the recorder has said last
 
     def __enter__(self) -> "LiveChain":
         try:
@@ -105,7 +112,9 @@ class LiveChain:
                 self.order("start", str(self._plan.record))
             if self._plan.reader.recorded:
                 plan, address = self._plan, self._exchange.address
-                self._recorder = Kept(record, lambda _: (plan.header, plan.conditions, address))
+                self._recorder = Kept(
+                    record, lambda _: (plan.header, plan.conditions, plan.rule, address)
+                )
             if self._plan.file is not None:
                 known = range(max(1, len(self._plan.reader.wheels)))
                 for slot in known:  # those of wheels that are not named start when they are heard
@@ -174,6 +183,7 @@ class LiveChain:
             "restarts": {name: kept.starts - 1 for name, kept in self._processes().items()},
             "raw": {"lost_reads": refused, "lost_bytes": refused_bytes,
                     "most_waiting_bytes": exchange.raw.high},
+            "recording": self._recorded.as_document(refused_bytes),
             "wheels": {wheel: self.wheel_counts(wheel) for wheel in self.wheels.heard},
         }  # fmt: skip
 
@@ -303,9 +313,13 @@ class LiveChain:
             self._turns[slot] += len(report.news.turns)
             report.news.latency = [1e-9 * (now - turn.arrival) for turn in report.news.turns]
             news.add(report.news)
+            for turn in report.news.turns if self._recorder is not None else ():
+                document = json.dumps(turn_document(turn)).encode()
+                self._exchange.results.put(pickle.dumps((turn.wheel, turn.arrival, document), 5))
             for jump in report.news.jumps:
                 self.jumps.append(jump)
-                whole = self._recorded.path in (None, self._plan.record)
+                path = self._recorded.path
+                whole = path is None or part_path(path, 1) == self._plan.record
                 self.order("event", jump_event(jump, whole=whole))
             if report.ready:
                 self._ready.add(slot)
@@ -337,8 +351,9 @@ class LiveChain:
         if state.error:
             kind, text = state.error
             raise getattr(errors, kind)(text)
-        if self._recorded.error and not self._finished:
-            raise RecordingError(self._recorded.error)
+        if self._recorded.error != self._alarm:
+            self._alarm = self._recorded.error
+            self._pending.alarms.append(self._alarm or RECORDED_AGAIN)
         self.ended, self.message = state.ended, state.message
 
     def _remove_empty(self) -> None:

@@ -9,6 +9,9 @@ from bench.rings import ByteQueue, Cell, free, memory, too_little
 
 RAW = 8 * 2**20
 """Reads that wait for the recorder, [bytes]: a minute of one wheel, 9 s of four on CAN FD."""
+STRAIN, RESULTS = 4 * 2**20, 2**19
+"""Decoded samples and turns that wait for the recorder, [bytes]: 2 s of four wheels at 10 kHz. What
+does not fit is missing beside the raw bytes, which hold it."""
 SAMPLES, LEAST = 27 * 2**18, 2**21
 """Samples of a wheel that wait for its estimator, [bytes]: 13 s at 10 kHz; 4 s where memory is
 short, which is more than the age at which samples are left out."""
@@ -60,6 +63,8 @@ class Exchange:
     ----------
     raw : ByteQueue
         Reads, from the reader to the recorder.
+    strain, results : ByteQueue
+        Blocks from the reader and turns from the run, to the recorder.
     orders : ByteQueue
         From the run to the recorder.
     samples, news : tuple of ByteQueue
@@ -86,6 +91,7 @@ class Exchange:
 
         self._flags = part(_STOP).cast("Q")
         self.raw, self.orders = ByteQueue(part(RAW)), ByteQueue(part(ORDERS))
+        self.strain, self.results = ByteQueue(part(STRAIN)), ByteQueue(part(RESULTS))
         self.line, self.recorded = Cell(part(LINE)), Cell(part(STATE))
         slots = range(address.slots)
         self.samples = tuple(ByteQueue(part(address.samples)) for _ in slots)
@@ -107,7 +113,7 @@ class Exchange:
         LinkError
             If there is not enough for the shortest queues.
         """
-        fixed = _STOP + RAW + ORDERS + LINE + STATE + slots * NEWS
+        fixed = _STOP + RAW + ORDERS + STRAIN + RESULTS + LINE + STATE + slots * NEWS
         room = (free() - fixed - beside) / slots
         if room < LEAST:
             raise too_little(fixed + slots * LEAST + beside)
@@ -126,7 +132,7 @@ class Exchange:
 
     def close(self) -> None:
         """Let go of the memory; its maker removes it. Calling twice does no harm."""
-        for queue in (self.raw, self.orders, *self.samples, *self.news):
+        for queue in (self.raw, self.orders, self.strain, self.results, *self.samples, *self.news):
             queue.close()
         for cell in (self.line, self.recorded):
             cell.close()

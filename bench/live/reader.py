@@ -14,6 +14,7 @@ from bench.links.reconnecting import ReconnectingLink
 from bench.live.exchange import RAW, STOP, Address, Exchange
 from bench.live.kept import orphaned, settled
 from bench.protocols.plan import ProtocolPlan
+from bench.rings import ByteQueue
 from bench.wheels import Wheels
 
 WAIT = 0.1
@@ -42,6 +43,8 @@ class ReaderPlan:
         Whether there is a recorder.
     every_turn : bool
         Whether no turn is skipped: the port waits where estimators or recorder are behind.
+    strain : bool
+        Whether it records decoded samples too.
     """
 
     port: PortPlan
@@ -51,6 +54,7 @@ class ReaderPlan:
     wheels: tuple[int, ...] = ()
     recorded: bool = True
     every_turn: bool = False
+    strain: bool = True
 
 
 @dataclass(slots=True)
@@ -71,7 +75,8 @@ class LineState:
     raw : int
         Cursor of the queue of reads: those before it are done.
     samples : tuple of int
-        Cursors of the queues of samples: what is before them comes of those reads.
+        Cursors of the queues of samples, that of the recorder last: what is before them comes of
+        those reads.
     tries : int
         How often a reader began with what comes next of them and ended.
     cpu : float, [s]
@@ -130,6 +135,7 @@ class _Reader:
         self._plan = plan
         self._exchange = exchange
         self._fresh = exchange.address.fresh
+        self._queues = (*exchange.samples, exchange.strain)
         self._raw_lost = 0  # bytes since the recorder was told of it
         self._overruns: int | None = None
         self._next_look = 0.0
@@ -173,6 +179,8 @@ class _Reader:
             self.publish()  # before the samples: what is missing then shows as a hole, never twice
         for slot, message in messages:
             self._exchange.samples[slot].put(message)
+            if self._plan.strain:
+                self._exchange.strain.put(message)
         for slot in {slot for slot, _ in messages}:
             self._fresh[slot].release()
         self.publish()
@@ -183,7 +191,7 @@ class _Reader:
         """Let the run, and a reader after this one, see how the line is."""
         state, exchange = self.state, self._exchange
         state.raw = exchange.raw.written
-        state.samples = tuple(queue.written for queue in exchange.samples)
+        state.samples = tuple(queue.written for queue in self._queues)
         state.cpu, state.tries = time.process_time(), 0
         exchange.line.put(pickle.dumps(state, 5))
         if not self._plan.recorded:
@@ -198,19 +206,14 @@ class _Reader:
         state.tries += 1
         exchange.line.put(pickle.dumps(state, 5))
         exchange.raw.cursor = state.raw if state.tries <= TRIES else exchange.raw.written
-        for queue, cursor in zip(exchange.samples, state.samples, strict=True):
+        for queue, cursor in zip(self._queues, state.samples, strict=True):
             queue.cursor = cursor
         while (recorded := exchange.raw.read()) is not None:
             read: Read = pickle.loads(recorded)
             for slot, message in self._decoded(read):
-                queue = exchange.samples[slot]
-                before = queue.cursor
-                handed_over = queue.read()
-                if handed_over is None:
-                    queue.put(message)
-                    queue.cursor = queue.written
-                elif handed_over != message:  # there was no room for it, and it stays out
-                    queue.cursor = before
+                _hand_over(exchange.samples[slot], message)
+                if self._plan.strain:
+                    _hand_over(exchange.strain, message)
         for fresh in self._fresh:
             fresh.release()
         self.publish()
@@ -246,10 +249,17 @@ class _Reader:
         return True
 
     def _behind(self) -> bool:
-        """Tell whether a queue is half full: what a read brings has room in the other half."""
+        """Tell whether a queue is half full: what a read brings has room in the other half.
+
+        A recorder that cannot write is not waited for.
+        """
         exchange = self._exchange
-        waiting = max(queue.waiting for queue in exchange.samples)
-        return waiting > exchange.address.samples // 2 or exchange.raw.waiting > RAW // 2
+        if max(queue.waiting for queue in exchange.samples) > exchange.address.samples // 2:
+            return True
+        if exchange.raw.waiting <= RAW // 2:
+            return False
+        recorded = exchange.recorded.get()
+        return recorded is None or not pickle.loads(recorded).error
 
     def _look(self, link: Link) -> None:
         """Count the overruns of the port since it was last asked, once a second."""
@@ -259,3 +269,14 @@ class _Reader:
         self._next_look = now + 1.0
         seen, self._overruns = self._overruns, link.overruns()
         self.state.wheels.line.counts.overruns += 0 if seen is None else self._overruns - seen
+
+
+def _hand_over(queue: ByteQueue, message: bytes) -> None:
+    """Put a message into a queue unless a reader before this one did."""
+    before = queue.cursor
+    handed_over = queue.read()
+    if handed_over is None:
+        queue.put(message)
+        queue.cursor = queue.written
+    elif handed_over != message:  # there was no room for it, and it stays out
+        queue.cursor = before

@@ -1,23 +1,39 @@
 """The process that records: reads from the queue to the file, in files that the run names.
 
-What is on disk and what of the queue is on it are written down together, so that a recorder that is
-started again cuts off what its predecessor left half done and goes on with the read that follows.
+What is on disk and what of the queues is on it are written down together, so that a recorder that
+is started again cuts off what its predecessor left half done and goes on with what follows. Where
+nothing can be written, as on a full disk, the queues wait; a new part begins when there is room.
 """
 
 import pickle
 import time
+from collections import deque
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
+from uuid import uuid4
 
 from bench.conditions import Conditions
+from bench.document import line_document, wheel_document
 from bench.errors import RecordingError
 from bench.live.exchange import Address, Exchange
 from bench.live.kept import orphaned, settled
-from bench.recording import Recorder, RecordingHeader
+from bench.live.space import Space
+from bench.recorder import Recorder, finish
+from bench.recording_header import RecordingHeader, part_path
 
 LOOK = 0.05
 """Time between two looks into the queue, [s]; until then the bytes are safe in shared memory."""
+CHUNK, CHUNK_BYTES = 0.25, 2**20
+"""A chunk is closed after this time [s] or this length [bytes], whichever comes first."""
+RETRY = 1.0
+"""Where nothing can be written: time between two trials, [s]."""
+LINK_EVERY = 1.0
+"""Time between two messages of the counters, [s]."""
+NO_ROOM = "it could not be written any more"
+MOST_EVENTS = 1000
+"""Events that are kept where nothing can be written."""
 LEFT = 0.5
 """When the run is gone, how long the last bytes are waited for, [s]."""
 
@@ -40,6 +56,24 @@ class Order(NamedTuple):
     moment: int
 
 
+@dataclass(frozen=True, slots=True)
+class RecordingRule:
+    """How it is recorded.
+
+    Attributes
+    ----------
+    strain : bool
+        Whether decoded samples stand beside the raw bytes.
+    split_time : float, [s]
+    split_size : float, [bytes]
+        A new part begins when a file is so old or so long; infinite for never.
+    """
+
+    strain: bool = True
+    split_time: float = float("inf")
+    split_size: float = float("inf")
+
+
 @dataclass(slots=True)
 class RecorderState:
     """How far the recorder is.
@@ -47,14 +81,21 @@ class RecorderState:
     Attributes
     ----------
     path : Path or None
-        Of the recording that goes on.
+        Of the file that is written, or waits for room; None where nothing is recorded.
     length : int
         Bytes of that file that are whole.
     bytes : int
-        Raw bytes in it.
-    began : tuple of int, [ns]
-        The start of that file on the wall clock and on the monotonic one.
-    raw, orders : int
+        Raw bytes in the recording.
+    part : int
+        Of the recording that goes on, from 1.
+    written : int
+        Bytes of the recording's parts before it.
+    began : tuple of str, int and int
+        Name of the recording that goes on, and its start on the wall clock and on the monotonic
+        one, [ns]: the same in all its parts.
+    since : float, [s]
+        When the recording began, monotonic.
+    raw, strain, results, orders : int
         Cursors of the queues: what is before them was done.
     done : int
         Orders so far.
@@ -63,46 +104,94 @@ class RecorderState:
     answer : str
         Why the last recording could not be started; empty if it was.
     error : str
-        Why nothing more can be written; empty if it can.
+        Why nothing can be written at the moment; empty if it can.
+    failures : int
+        How often writing has failed.
+    free, rate : float, [bytes], [bytes/s]
+        Room on the disk; what the recording grows by.
     """
 
     path: Path | None = None
     length: int = 0
     bytes: int = 0
-    began: tuple[int, int] = (0, 0)
+    part: int = 1
+    written: int = 0
+    began: tuple[str, int, int] = ("", 0, 0)
+    since: float = 0.0
     raw: int = 0
+    strain: int = 0
+    results: int = 0
     orders: int = 0
     done: int = 0
     cpu: float = 0.0
     answer: str = ""
     error: str = ""
+    failures: int = 0
+    free: float = float("nan")
+    rate: float = float("nan")
+
+    def as_document(self, lost_bytes: int) -> dict[str, Any]:
+        """Return what the page shows of it; a number that is not known is null."""
+        going = self.path is not None
+        minutes = (time.monotonic() - self.since) / 60.0 if going else None
+        left = self.free / self.rate / 60.0 if self.rate > 0.0 else None
+        return {
+            "file": self.path.name if self.path else "",
+            "part": self.part,
+            "bytes": self.written + self.length,
+            "raw_bytes": self.bytes,
+            "minutes": minutes,
+            "free_bytes": self.free if self.free == self.free else None,
+            "bytes_per_s": self.rate if self.rate == self.rate else None,
+            "minutes_left": left,
+            "error": self.error,
+            "failures": self.failures,
+            "lost_bytes": lost_bytes,
+        }
 
 
-def record(header: RecordingHeader, conditions: Conditions, address: Address) -> None:
+@dataclass(slots=True)
+class _Unfinished:
+    """A file without its end, for want of room."""
+
+    path: Path
+    length: int
+    reason: str
+
+
+def record(
+    header: RecordingHeader, conditions: Conditions, rule: RecordingRule, address: Address
+) -> None:
     """Record until the run ends; the target of the process."""
     exchange = Exchange(address)
     saved = exchange.recorded.get()
     state = RecorderState() if saved is None else pickle.loads(saved)
-    _Recorder(header, conditions, exchange, state).run()
+    _Recorder(header, conditions, rule, exchange, state).run()
     exchange.close()
 
 
 class _Recorder:
     def __init__(
-        self, header: RecordingHeader, conditions: Conditions, exchange: Exchange,
-        state: RecorderState,
+        self, header: RecordingHeader, conditions: Conditions, rule: RecordingRule,
+        exchange: Exchange, state: RecorderState,
     ) -> None:  # fmt: skip
         self._header = header
         self._conditions = conditions
+        self._rule = rule
         self._exchange = exchange
         self._state = state
         self._recorder: Recorder | None = None
         self._before = state.bytes
+        self._space = Space()
+        self._unfinished: list[_Unfinished] = []
+        self._events: deque[tuple[dict[str, Any], int]] = deque(maxlen=MOST_EVENTS)
         self._last = ""  # why the run ends, once it does
-        exchange.raw.go_to(state.raw)
+        self._part_began = self._flushed = time.monotonic()
+        self._next_trial = self._next_link = 0.0
+        self._go_back()
         exchange.orders.go_to(state.orders)
         if state.path is not None:
-            state.error = self._open(state.path, state.length)
+            self._go_on(state.path)
         self._publish()
 
     def run(self) -> None:
@@ -110,86 +199,252 @@ class _Recorder:
         settled()
         gone: float | None = None
         while not self._last:
-            self._obey()
+            obeyed = self._obey()
             busy = self._write()
-            self._publish()
+            self._publish(obeyed=obeyed)
             if gone is None and orphaned():
                 gone = time.monotonic()
             if gone is not None and time.monotonic() - gone > LEFT:
                 self._last = "the run was killed"
             elif not busy and not self._last:
                 time.sleep(LOOK)
+        self._next_trial = 0.0  # once more, where it could not be written
         while self._write():
             self._publish()
+        self._link()
         self._end(self._last)
-        self._publish()
+        self._publish(obeyed=True)
 
-    def _obey(self) -> None:
-        queue = self._exchange.orders
+    def _obey(self) -> bool:
+        queue, before = self._exchange.orders, self._state.done
         while (message := queue.read()) is not None:
             order: Order = pickle.loads(message)
             if order.kind == "start":
-                self._before = self._state.bytes = 0
-                self._state.answer = self._open(Path(order.what), None)
+                self._start(Path(order.what))
             elif order.kind == "stop":
                 self._write()
                 self._end(order.what)
-            elif order.kind == "event" and self._recorder is not None:
-                self._recorder.event(order.what, order.moment)
+            elif order.kind == "event":
+                self._event(order)
             elif order.kind == "close":
                 self._last = order.what
             self._state.done += 1
+        return self._state.done > before
+
+    def _event(self, order: Order) -> None:
+        """Write an event; it is kept until it is on disk."""
+        if self._state.path is None:
+            return
+        self._events.append((order.what, order.moment))
+        if self._recorder is not None:
+            self._recorder.event(order.what, order.moment)
+
+    def _start(self, path: Path) -> None:
+        """Begin a recording."""
+        state = self._state
+        self._before = state.bytes = state.written = state.length = 0
+        state.part, state.error, state.since = 1, "", time.monotonic()
+        state.began = uuid4().hex, time.time_ns(), time.monotonic_ns()
+        self._events.clear()
+        self._drop()
+        second = part_path(path, 2)
+        if second.exists():
+            state.answer = f"{second}: it exists and is of another recording; name another file"
+        else:
+            state.answer = self._open(path, None)
+
+    def _go_on(self, path: Path) -> None:
+        """Go on in the file of a recorder that ended."""
+        state = self._state
+        error = state.error or self._open(path, state.length)
+        if error:
+            state.path, state.error = path, error
+            self._unfinished.append(_Unfinished(path, state.length, NO_ROOM))
 
     def _write(self) -> bool:
         """Write what has come; tell whether there was anything."""
-        queue, busy = self._exchange.raw, False
-        while (message := queue.read()) is not None:
+        if self._state.path is None:
+            self._drop()
+            return False
+        if self._recorder is None and not self._try_again():
+            return False
+        try:
+            return self._write_queues()
+        except RecordingError as error:
+            self._fail(error)
+            return False
+
+    def _write_queues(self) -> bool:
+        exchange, busy = self._exchange, False
+        recorder = self._recorder
+        while recorder is not None and (message := exchange.raw.read()) is not None:
             busy = True
-            if self._recorder is not None:
-                try:
-                    self._recorder.read(pickle.loads(message))
-                except RecordingError as error:
-                    self._fail(error)
+            recorder.read(pickle.loads(message))
+            if recorder.waiting > CHUNK_BYTES:
+                self._flush()
+        while recorder is not None and (message := exchange.strain.read()) is not None:
+            busy = True
+            recorder.block(pickle.loads(message))
+            if recorder.waiting > CHUNK_BYTES:
+                self._flush()
+        while recorder is not None and (message := exchange.results.read()) is not None:
+            busy = True
+            recorder.estimate(*pickle.loads(message))
+        if time.monotonic() >= self._next_link:
+            self._link()
         return busy
+
+    def _link(self) -> None:
+        """Write the counters of all wheels."""
+        self._next_link = time.monotonic() + LINK_EVERY
+        line = self._exchange.line.get()
+        if line is None or self._recorder is None:
+            return
+        wheels = pickle.loads(line).wheels
+        self._recorder.link(None, line_document(*wheels.counts))
+        for number in wheels.heard:
+            self._recorder.link(number, wheel_document(wheels, number))
+
+    def _drop(self) -> None:
+        """Nothing is recorded: what has come is done with."""
+        exchange = self._exchange
+        for queue in (exchange.raw, exchange.strain, exchange.results):
+            queue.go_to(queue.written)
 
     def _open(self, path: Path, length: int | None) -> str:
         """Begin a file, or go on in it; return why that is not possible, or nothing."""
-        if length is None:
-            self._state.began = time.time_ns(), time.monotonic_ns()
-        wall, monotonic = self._state.began
-        header = replace(self._header, wall_ns=wall, monotonic_ns=monotonic)
+        state = self._state
+        recording, wall, monotonic = state.began
+        header = replace(self._header, recording=recording, part=state.part, wall_ns=wall,
+                         monotonic_ns=monotonic)  # fmt: skip
+        self._part_began = time.monotonic()
         try:
             self._recorder = Recorder(path, header, self._conditions, length)
         except RecordingError as error:
-            self._recorder = self._state.path = None
+            self._recorder = state.path = None
             return str(error)
-        self._state.path = path
+        state.path = path
+        for event, moment in self._events:
+            self._recorder.event(event, moment)
         return ""
 
+    def _try_again(self) -> bool:
+        """Begin a new part if there is room for it by now."""
+        now, path = time.monotonic(), self._state.path
+        if path is None or now < self._next_trial:
+            return False
+        self._next_trial = now + RETRY
+        if not self._begin_part(path):
+            return False
+        try:
+            self._write_queues()
+            self._flush()
+        except RecordingError as error:
+            self._fail(error)
+            return False
+        self._finish_those_left()
+        self._state.error = ""
+        return True
+
+    def _finish_those_left(self) -> None:
+        for left in self._unfinished[:]:
+            with suppress(RecordingError):
+                finish(left.path, left.length, left.reason)
+                self._unfinished.remove(left)
+
+    def _begin_part(self, path: Path) -> bool:
+        """Begin the part that follows; the one before stays the current one where that fails."""
+        state = self._state
+        before = state.part, state.written
+        if state.length:
+            state.part, state.written = state.part + 1, state.written + state.length
+        error = self._open(part_path(path, state.part), None)
+        if error:
+            state.path, state.error, (state.part, state.written) = path, error, before
+            return False
+        state.length = 0
+        return True
+
+    def _split(self) -> None:
+        """Begin a new part where the rule wants one."""
+        rule, state, recorder = self._rule, self._state, self._recorder
+        age = time.monotonic() - self._part_began
+        if recorder is None or state.path is None or (
+            age < rule.split_time and recorder.length < rule.split_size
+        ):  # fmt: skip
+            return
+        path = state.path
+        recorder.close("the next part follows")
+        state.length = recorder.length
+        self._before, self._recorder = state.bytes, None
+        if not self._begin_part(path):
+            self._failed()
+
     def _end(self, reason: str) -> None:
-        recorder, self._recorder, self._state.path = self._recorder, None, None
-        if recorder is not None:
+        recorder, self._recorder = self._recorder, None
+        path, self._state.path = self._state.path, None
+        if recorder is not None and path is not None:
             try:
                 recorder.close(reason)
             except RecordingError as error:
-                self._fail(error)
+                self._state.error = str(error)
+                self._unfinished.append(_Unfinished(path, recorder.abandon(), reason))
+        self._finish_those_left()
 
     def _fail(self, error: RecordingError) -> None:
-        self._state.error = str(error)
-        self._recorder = self._state.path = None
+        """Note that nothing can be written, and go back to what is on disk."""
+        state, recorder = self._state, self._recorder
+        state.error = str(error)
+        if recorder is not None and state.path is not None:
+            state.length = recorder.abandon()
+            self._unfinished.append(_Unfinished(state.path, state.length, NO_ROOM))
+            self._before, self._recorder = state.bytes, None
+        self._failed()
 
-    def _publish(self) -> None:
-        """Note what is safe on disk, and give back its room."""
+    def _failed(self) -> None:
+        self._state.failures += 1
+        self._next_trial = time.monotonic() + RETRY
+        self._go_back()
+
+    def _go_back(self) -> None:
+        """Read again what is not on disk."""
         state, exchange = self._state, self._exchange
-        if self._recorder is not None:
+        for queue, cursor in ((exchange.raw, state.raw), (exchange.strain, state.strain),
+                              (exchange.results, state.results)):  # fmt: skip
+            queue.go_to(cursor)
+
+    def _flush(self) -> None:
+        """Close the chunk, and note what is safe on disk.
+
+        Raises
+        ------
+        RecordingError
+        """
+        state, exchange, recorder = self._state, self._exchange, self._recorder
+        self._flushed = time.monotonic()
+        if recorder is not None:
+            recorder.flush()
+            state.length = recorder.length
+            state.bytes = self._before + recorder.bytes
+            self._events.clear()
+        state.raw, state.strain = exchange.raw.cursor, exchange.strain.cursor
+        state.results = exchange.results.cursor
+
+    def _publish(self, *, obeyed: bool = False) -> None:
+        """Note what is safe on disk, and give back its room."""
+        state, exchange, recorder = self._state, self._exchange, self._recorder
+        due = recorder is None or time.monotonic() - self._flushed > CHUNK
+        if not (obeyed or due):
+            return
+        if recorder is not None or state.path is None:
             try:
-                self._recorder.flush()
-                state.length = self._recorder.length
-                state.bytes = self._before + self._recorder.bytes
+                self._flush()
+                self._split()
             except RecordingError as error:
                 self._fail(error)
-        state.raw, state.orders = exchange.raw.cursor, exchange.orders.cursor
-        state.cpu = time.process_time()
+        state.free, state.rate = self._space.look(state.path, state.written + state.length)
+        state.orders, state.cpu = exchange.orders.cursor, time.process_time()
         exchange.recorded.put(pickle.dumps(state, 5))
-        exchange.raw.take()
+        for queue in (exchange.raw, exchange.strain, exchange.results):
+            queue.take()
         exchange.orders.take()

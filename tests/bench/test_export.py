@@ -38,6 +38,7 @@ def write_recording(
     with Recorder(path, recording, tape.conditions) as recorder:
         for piece in Player(transmitter(kind), line, faults).pieces(tape):
             recorder.read(Read(round(1e9 * (1 + piece.due[-1])), b"".join(piece.frames)))
+            recorder.flush()
     return tape.conditions
 
 

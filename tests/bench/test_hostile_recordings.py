@@ -17,15 +17,17 @@ from mcap.writer import CompressionType, Writer
 
 from bench import records
 from bench.cli import program
-from bench.conditions import Conditions, RunMark, conditions_document
+from bench.conditions import Conditions, RunMark, condition, conditions_document
 from bench.errors import BenchError, RecordingError
 from bench.protocols import CAN, SERIAL
 from bench.protocols.plan import ProtocolPlan
-from bench.recording import CONDITIONS, EVENTS, FORMAT, Recording, raw_topic
+from bench.recording import Recording
+from bench.recording_header import FORMER as FORMAT
+from bench.recording_topics import CONDITIONS, EVENTS
 
 NESTED = "[" * 100_000
 MARK = RunMark(1, 0, 0.0, {}, {"kind": "free", "load": 3000.0})
-SOUND = conditions_document(Conditions((0,), ((18.0, 2.3e5, 0.0),), (MARK,)))
+SOUND = conditions_document(Conditions((0,), (condition(18.0, 2.3e5, 0.0),), (MARK,)))
 JUMP = {"event": "jump", "wheel": 0, "from": [0, 0], "to": [0, 9], "why": "x", "samples": 9,
         "turns": 0}  # fmt: skip
 
@@ -50,7 +52,7 @@ def made(
             data = content if isinstance(content, str) else json.dumps(content)
             for _ in range(times if topic == EVENTS else 1):
                 writer.add_message(channel, 1, data.encode(), 1)
-        raw = writer.register_channel(raw_topic(encoding), encoding, 0)
+        raw = writer.register_channel(f"/{encoding.partition('-')[0]}", encoding, 0)
         for arrival in arrivals:
             frame = bytes([16]) + (0x120).to_bytes(4, "little") + bytes([8, 0, 0, 0]) + bytes(8)
             writer.add_message(raw, arrival, frame, arrival)

@@ -156,7 +156,7 @@ def test_a_stopped_or_killed_run_leaves_a_recording_that_replays(
     live = spawn("run", "--port", port, "--fmu", toy_fmus[16], "--speed", 65, "--record",
                  record)  # fmt: skip
     live.says(A_TURN)
-    wait_until(lambda: record.stat().st_size > SECOND)
+    wait_until(lambda: record.stat().st_size > 2 * SECOND)
     live.send_signal(number)
     code, out, _ = live.finish()
     wait_until(lambda: recorded(record)[1])  # a recorder that is left alone comes to an end

@@ -32,7 +32,7 @@ from bench.live.estimator import EstimatorPlan, Report, _Estimator
 from bench.live.exchange import Address, Exchange
 from bench.live.kept import CONTEXT
 from bench.live.reader import ReaderPlan, load
-from bench.live.recorder import Order, RecorderState, _Recorder
+from bench.live.recorder import Order, RecorderState, RecordingRule, _Recorder
 from bench.protocols.plan import ProtocolPlan
 from bench.recording import Recorder, Recording, RecordingHeader, jump_event
 from bench.replay import ReplayChain
@@ -260,7 +260,7 @@ def test_a_recorder_that_starts_again_cuts_off_what_was_left_half_done(tmp_path:
         file.truncate(whole + 8000)  # killed in the middle
     with Recorder(path, header, STEADY, whole) as second:
         second.read(Read(4, b"y" * 100))
-    first._file.close()
+    first.abandon()
     recording = Recording(path)
     reads = [data for _, data in recording.raw()]
     recording.close()
@@ -268,9 +268,7 @@ def test_a_recorder_that_starts_again_cuts_off_what_was_left_half_done(tmp_path:
     assert recording.complete
     assert recording.header.settings == {"port": "p"}
     with path.open("rb") as file:  # and for other programs, which begin at the end
-        found = [
-            m.data[:1] for _, c, m in make_reader(file).iter_messages() if c.topic == "/serial"
-        ]
+        found = [m.data[:1] for _, c, m in make_reader(file).iter_messages() if c.topic == "/raw/0"]
     assert found == [data[:1] for data in reads]
 
 
@@ -288,10 +286,10 @@ def test_a_read_that_is_on_disk_is_not_written_again(
     state = RecorderState(tmp_path / "a.mcap", first.length, 9, raw=exchange.raw.cursor)
     exchange.orders.put(pickle.dumps(Order("close", "stopped", 0)))
     other = Exchange(exchange.address)
-    _Recorder(header, STEADY, other, state).run()
+    _Recorder(header, STEADY, RecordingRule(), other, state).run()
     other.close()
     exchange.close()
-    first._file.close()
+    first.abandon()
     recording = Recording(tmp_path / "a.mcap")
     assert [data for _, data in recording.raw()] == [b"\0" * 9, b"\1" * 9]
     recording.close()

@@ -138,5 +138,5 @@ def test_too_little_shared_memory_names_all_that_a_run_needs(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("bench.live.exchange.free", lambda: 40.0 * 2**20)
-    with pytest.raises(LinkError, match=r"; 50 MB are needed; .*--shm-size.*--wheel.*--no-page"):
+    with pytest.raises(LinkError, match=r"; 54 MB are needed; .*--shm-size.*--wheel.*--no-page"):
         Exchange.create(CONTEXT, 4, SIZE)

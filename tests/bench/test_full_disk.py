@@ -1,0 +1,165 @@
+"""A disk that is full ends nothing: the recorder says so, and goes on when there is room."""
+
+import errno
+import pickle
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bench.conditions import Conditions
+from bench.errors import RecordingError
+from bench.links import Read
+from bench.live.exchange import Exchange
+from bench.live.kept import CONTEXT
+from bench.live.recorder import Order, RecorderState, RecordingRule, _Recorder
+from bench.mcap_log import McapLog
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.recording_header import RecordingHeader
+
+STEADY = Conditions.constant(18.0)
+PIECES = [bytes([number]) * 5000 for number in range(9)]
+
+
+class Disk:
+    """Room for so many bytes of all files together."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.full = False
+        write = McapLog._write
+
+        def write_if_room(log: McapLog, data: bytes) -> None:
+            if self.full:
+                write(log, data[: len(data) // 2])  # a full disk takes a part
+                raise OSError(errno.ENOSPC, "No space left on device")
+            write(log, data)
+
+        monkeypatch.setattr(McapLog, "_write", write_if_room)
+
+
+@pytest.fixture
+def disk(monkeypatch: pytest.MonkeyPatch) -> Disk:
+    monkeypatch.setattr("bench.live.recorder.settled", lambda: None)
+    monkeypatch.setattr("bench.live.recorder.RETRY", 0.0)
+    monkeypatch.setattr("bench.live.recorder.CHUNK", -1.0)
+    return Disk(monkeypatch)
+
+
+class Bench:
+    """A recorder that does a step at a time, and the run's side of it."""
+
+    def __init__(self, file: Path, rule: RecordingRule | None = None) -> None:
+        self.exchange = Exchange.create(CONTEXT, 1)
+        state = RecorderState()
+        self.recorder = _Recorder(
+            RecordingHeader({}), STEADY, rule or RecordingRule(), self.exchange, state
+        )
+        self.order("start", str(file))
+        self.step()
+
+    def order(self, kind: str, what: Any) -> None:
+        self.exchange.orders.put(pickle.dumps(Order(kind, what, 5)))
+
+    def step(self, *pieces: bytes) -> RecorderState:
+        for piece in pieces:
+            self.exchange.raw.put(pickle.dumps(Read(7, piece)))
+        obeyed = self.recorder._obey()
+        self.recorder._write()
+        self.recorder._publish(obeyed=obeyed)
+        saved: RecorderState = pickle.loads(self.exchange.recorded.get() or b"")
+        return saved
+
+    def close(self) -> RecorderState:
+        self.order("close", "stopped")
+        self.recorder.run()
+        state = self.step()
+        self.exchange.close()
+        return state
+
+
+def recorded(path: Path) -> tuple[list[bytes], bool | None]:
+    recording = Recording(path)
+    data = [data for _, data in recording.raw()]
+    recording.close()
+    return data, recording.complete
+
+
+def test_what_a_full_disk_did_not_take_stands_in_the_next_part(disk: Disk, tmp_path: Path) -> None:
+    bench = Bench(tmp_path / "a.mcap")
+    assert bench.step(*PIECES[:3]).error == ""
+    disk.full = True
+    failed = bench.step(*PIECES[3:5])
+    assert "a.mcap: it cannot be written (No space left on device)" in failed.error
+    assert failed.as_document(0)["failures"] == 1
+    bench.order("event", {"event": "marker", "text": "while it was full"})
+    assert bench.step(PIECES[5]).error
+    assert not (tmp_path / "a.part2.mcap").exists()
+    assert recorded(tmp_path / "a.mcap") == (PIECES[:3], False)
+    disk.full = False
+    going = bench.step(PIECES[6])
+    assert (going.error, going.part, going.path) == ("", 2, tmp_path / "a.part2.mcap")
+    assert bench.step(*PIECES[7:]).bytes == 9 * 5000
+    assert bench.close().error == ""
+    assert recorded(tmp_path / "a.mcap") == (PIECES, True)
+    recording = Recording(tmp_path / "a.mcap")
+    events = [data for channel, _, data in recording.messages() if channel.topic == "/events"]
+    recording.close()
+    assert [b"while it was full" in event for event in events].count(True) == 1
+
+
+def test_a_disk_that_stays_full_ends_the_recording_and_nothing_else(
+    disk: Disk, tmp_path: Path
+) -> None:
+    bench = Bench(tmp_path / "a.mcap")
+    bench.step(*PIECES[:2])
+    disk.full = True
+    bench.step(PIECES[2])
+    assert "No space left" in bench.close().error
+    assert recorded(tmp_path / "a.mcap") == (PIECES[:2], False)
+    assert [file.name for file in tmp_path.iterdir()] == ["a.mcap"]
+
+
+def test_a_recording_that_cannot_be_begun_leaves_no_file(disk: Disk, tmp_path: Path) -> None:
+    disk.full = True
+    with pytest.raises(RecordingError, match="No space left"):
+        Recorder(tmp_path / "a.mcap", RecordingHeader({}), STEADY)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_recorder_that_starts_again_on_a_full_disk_goes_on_trying(
+    disk: Disk, tmp_path: Path
+) -> None:
+    bench = Bench(tmp_path / "a.mcap")
+    bench.step(*PIECES[:2])
+    disk.full = True
+    state = bench.step(*PIECES[2:4])
+    bench.recorder = _Recorder(RecordingHeader({}), STEADY, RecordingRule(), bench.exchange, state)
+    assert bench.step().error
+    disk.full = False
+    assert bench.step().error == ""
+    bench.close()
+    assert recorded(tmp_path / "a.mcap") == (PIECES[:4], True)
+
+
+@pytest.mark.parametrize("rule", [RecordingRule(split_size=1500), RecordingRule(split_time=-1.0)])
+def test_a_recording_in_parts_is_read_as_one(
+    disk: Disk, tmp_path: Path, rule: RecordingRule
+) -> None:
+    bench = Bench(tmp_path / "a.mcap", rule)
+    for piece in PIECES:
+        bench.step(piece)
+    state = bench.close()
+    assert state.part > 3
+    assert recorded(tmp_path / "a.mcap") == (PIECES, True)
+    later, complete = recorded(tmp_path / "a.part3.mcap")
+    assert complete
+    assert 0 < len(later) < len(PIECES)
+    assert later == PIECES[-len(later) :]
+
+
+def test_a_name_whose_second_part_is_there_is_refused(disk: Disk, tmp_path: Path) -> None:
+    (tmp_path / "a.part2.mcap").touch()
+    bench = Bench(tmp_path / "a.mcap")
+    assert "a.part2.mcap: it exists and is of another recording" in bench.recorder._state.answer
+    bench.close()
