@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from bench.can_batch import CanBatch
-from bench.conditions import UNKNOWN, Condition, Conditions, RunMark
+from bench.conditions import Condition, Conditions, RunMark
 from bench.device import Device
 from bench.errors import DeviceError
 from bench.faults import Faults
@@ -22,10 +22,9 @@ from bench.frames import GAGES, SAMPLES, TICK
 from bench.protocols import CAN, SERIAL, SLCAN
 from bench.protocols.slcan import encode as slcan_lines
 from bench.transmitter import ANNOUNCED, WHOLE, Record, Sent, SerialTransmitter, Transmitter
-from tirelib.arrays import FloatArray
 from tirelib.campaign import CampaignHeader, Run
+from tirelib.campaign.conditions import changes_of, conditions_of
 from tirelib.campaign.header import header_document
-from tirelib.held import HELD
 
 PAUSE = 0.1
 """Device time between two runs, [s]."""
@@ -282,18 +281,11 @@ def _samples(run: Run) -> int:
 
 
 def _conditions(run: Run) -> Iterator[tuple[float, Condition]]:
-    """Yield time [s, the run's clock] and conditions wherever the rig measured them."""
-    times: FloatArray = run.rig_time if run.rig_time is not None else np.array([run.start_time])
-    columns = [run.rig.get(name) for name in HELD]
-    first = int(np.searchsorted(times, run.start_time, side="right")) - 1
-    if first < 0:
-        yield run.start_time, UNKNOWN
-    for index in range(max(first, 0), len(times)):
-        values = (
-            float("nan") if column is None or not column.size else float(column[index])
-            for column in columns
-        )
-        yield max(float(times[index]), run.start_time), tuple(values)
+    """Yield time [s, the run's clock] and conditions wherever they may change."""
+    times = changes_of(run)
+    table = np.stack(list(conditions_of(run, times).values()))
+    for moment, values in zip(times.tolist(), table.T.tolist(), strict=True):
+        yield moment, tuple(values)
 
 
 def _plan(run: Run) -> dict[str, float | str]:

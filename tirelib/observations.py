@@ -7,19 +7,16 @@ from typing import Any
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
-from tirelib.campaign import Campaign, CampaignHeader, Run
+from tirelib.campaign import Campaign, CampaignHeader, Run, conditions_of
 from tirelib.errors import CalibrationError
 from tirelib.features.extract import Features, extract_features
 from tirelib.flags import INVALIDATING
-from tirelib.held import HELD
 from tirelib.signal import LowPass, cut_turns
 
 TRUTH = ("Fx", "Fy", "Fz", "Mz", "slip_angle", "slip_ratio")
 """Rig quantities that an estimate is held against."""
 SET_POINTS = ("load", "pressure", "speed", "slip_angle", "camber", "slip_ratio")
 """Nominal conditions of a run."""
-LATE = 3.0
-"""Rig samples after which the last one is no longer held."""
 BLOCK = 10
 """Turns of a sweep that are held out together in a cross-validation."""
 
@@ -80,8 +77,7 @@ def measure_run(
             f"{header.name}, run {run.plan.run}: the file holds no strain; "
             "strain_1 .. strain_N are needed"
         )
-    times = run.time()
-    held: Any = {name: _held(run, name, times) for name in HELD}
+    held: Any = conditions_of(run, run.time())
     turns = cut_turns(
         run.strain,
         run.rate,
@@ -96,18 +92,6 @@ def measure_run(
     )
     truth = {name: truth_of(run, name, features) for name in TRUTH}
     return features, truth
-
-
-def _held(run: Run, name: str, times: FloatArray) -> FloatArray | float:
-    """Return a condition at the gage samples: what the rig measured, else the set point.
-
-    A measurement that has ended says nothing of later samples.
-    """
-    values = run.hold(name, times)
-    if values is None or run.rig_time is None:
-        return float(getattr(run.plan, name, np.nan))
-    step = float(np.median(np.diff(run.rig_time))) if run.rig_time.size > 1 else np.inf
-    return np.where(times > run.rig_time[-1] + LATE * step, np.nan, values)
 
 
 def truth_of(run: Run, name: str, features: Features) -> FloatArray:

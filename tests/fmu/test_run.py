@@ -3,6 +3,7 @@
 import json
 import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from tests.fmu import live
-from tirelib.campaign import read_campaign, write_campaign
+from tirelib.campaign import Run, read_campaign, write_campaign
 from tirelib.cli.estimate import estimate
 from tirelib.cli.fmu import fmu
 from tirelib.errors import CalibrationError, FormatError
@@ -65,9 +66,32 @@ def test_the_document_is_that_of_estimate(tmp_path: Path, wanted: Any, samples: 
     assert "Fz" in output
 
 
-def test_another_tire_is_refused(tmp_path: Path) -> None:
-    from dataclasses import replace
+def lacking(run: Run, channel: str) -> Run:
+    """Return the run without a rig channel, or with one that ends halfway; Fz keeps its times."""
+    rig = {name: values for name, values in run.rig.items() if name != channel}
+    if channel == "end":
+        half = len(run.rig["Fz"]) // 2
+        return replace(run, rig={n: v[:half] for n, v in rig.items()}, rig_time=run.rig_time[:half])
+    return replace(run, rig=rig)
 
+
+@pytest.mark.parametrize("channel", ["speed", "pressure", "camber", "omega", "end"])
+def test_a_campaign_that_lacks_a_channel_gives_the_document_of_estimate(
+    channel: str, tmp_path: Path
+) -> None:
+    """Where the rig did not measure, the set point holds; after its end, nothing does."""
+    runs = [lacking(run, channel) for run in live.make_runs()[3:6]]
+    write_campaign(tmp_path / "c", live.HEADER, runs)
+    told(estimate, str(tmp_path / "c"), "--calibration", str(live.calibration_file()),
+         "--json", str(tmp_path / "e"))  # fmt: skip
+    told(fmu, "run", str(live.fmu_file(10)), str(tmp_path / "c"), "--json", str(tmp_path / "f"))
+    given, wanted = (json.loads((tmp_path / name).read_text()) for name in "fe")
+    assert_equal(given, wanted)
+    without_speed = {"no_speed" in turn["flags"] for turn in wanted["turns"][1:]}
+    assert without_speed == ({True, False} if channel == "end" else {False})
+
+
+def test_another_tire_is_refused(tmp_path: Path) -> None:
     header = replace(live.HEADER, tire=replace(live.HEADER.tire, name="another"))
     write_campaign(tmp_path / "c", header, live.make_runs()[:1])
     with (

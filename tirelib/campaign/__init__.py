@@ -1,6 +1,7 @@
 """Campaigns: folders of measurements in the format ``tirelib-campaign/1``."""
 
 from tirelib.campaign.check import check_campaign
+from tirelib.campaign.conditions import conditions_of
 from tirelib.campaign.model import (
     BoolArray,
     CampaignHeader,
@@ -25,6 +26,7 @@ __all__ = [
     "TireGeometry",
     "Tolerance",
     "check_campaign",
+    "conditions_of",
     "read_campaign",
     "write_campaign",
 ]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
-from tirelib.campaign import Campaign, Run
+from tirelib.campaign import Campaign, Run, conditions_of
 from tirelib.errors import CalibrationError, FormatError
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.chain import QUANTITIES
@@ -182,8 +182,7 @@ def play_run(fmu: LoadedFmu, run: Run) -> Iterator[dict[str, Any]]:
         raise CalibrationError(f"run {run.plan.run}: the file holds no strain; strain_1 .. "
                                "strain_N are needed")  # fmt: skip
     times = run.time()
-    held = [run.hold(name, times) for name in HELD]
-    table = np.stack([np.full(times.size, np.nan) if x is None else x for x in held])
+    table = np.stack(list(conditions_of(run, times).values()))
     fmu.start(run.rate)
     turns = 0
     turn = [fmu.references["turn"]]

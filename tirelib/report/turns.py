@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
-from tirelib.campaign import Campaign, RunPlan
+from tirelib.campaign import Campaign, RunPlan, conditions_of
 from tirelib.errors import CalibrationError
 from tirelib.features.extract import Features, extract_features
 from tirelib.observations import concatenate_features
@@ -64,14 +65,14 @@ def run_turns(campaign: Campaign, plan: RunPlan, low_pass: LowPass | None = None
             f"{campaign.header.name}, run {plan.run}: the file holds no strain; "
             "strain_1 .. strain_N are needed"
         )
-    speed = run.hold("speed", run.time())
+    held: Any = conditions_of(run, run.time())
     return cut_turns(
         run.strain,
         run.rate,
         campaign.header.gage_lateral,
-        speed=np.nan if speed is None else speed,
         trigger=run.trigger,
         low_pass=low_pass,
+        **held,
     )
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tests.fmu import live
 from tests.synthetic import LATERAL, frames
-from tirelib.campaign import read_campaign
+from tirelib.campaign import conditions_of, read_campaign
 from tirelib.errors import CalibrationError, ParameterError, ShapeError
 from tirelib.estimators.calibration import Estimates
 from tirelib.features import Features, extract_features
@@ -94,14 +94,13 @@ def test_a_campaign_streams_to_the_numbers_of_the_batch() -> None:
         )  # fmt: skip
         assert run.strain is not None
         assert run.trigger is not None
-        times = run.time()
-        held = {name: run.hold(name, times) for name in HELD}
+        held = conditions_of(run, run.time())
         found: list[TurnEstimate] = []
         for first in range(0, run.strain.shape[1], 10):
             part = slice(first, first + 10)
             found += estimator.push(
                 run.strain[:, part], trigger=run.trigger[part],
-                **{name: values[part] for name, values in held.items() if values is not None},
+                **{name: values[part] for name, values in held.items()},
             )  # fmt: skip
         assert len(found) == len(features)
         for row, turn in enumerate(found):
