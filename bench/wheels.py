@@ -57,11 +57,18 @@ class Wheel:
     timeline : Timeline
     clock : ClockFit
         The wheel's clock against the host's.
+    told : dict of float, SI
+        What a bus told last of the conditions, by name.
+    rssi, temperature : int or None, [dBm], [degC]
+        As the last frame says.
     """
 
     def __init__(self, device: Device, number: int) -> None:
         self.timeline = Timeline(device, number)
         self.clock = ClockFit()
+        self.told: dict[str, float] = {}
+        self.rssi: int | None = None
+        self.temperature: int | None = None
         self._number = number
         self._first_us: int | None = None
 
@@ -76,8 +83,10 @@ class Wheel:
         newest: int | None = None
         for item in items:
             if isinstance(item, Measured):
+                self.told[item.name] = item.value
                 blocks.append(self._block(Told(self.timeline.end_us, item), arrival))
                 continue
+            self._note(item)
             for samples in self.timeline.push(item):
                 if samples.reset:
                     self.clock.restart()
@@ -88,6 +97,11 @@ class Wheel:
         if newest is not None and arrival:
             self.clock.push(newest, arrival)
         return blocks
+
+    def _note(self, frames: Frames) -> None:
+        """Remember what the wheel says of itself."""
+        if len(frames) and frames.rssi[-1]:
+            self.rssi, self.temperature = int(frames.rssi[-1]), int(frames.temperature[-1])
 
     def _block(self, content: Samples | Told, arrival: int) -> Block:
         return Block(self._number, arrival, self._first_us or 0, content)

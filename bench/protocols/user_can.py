@@ -1,6 +1,8 @@
 """CAN frames of another make's transmitter to `Frames`, by its map."""
 
+from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -8,6 +10,7 @@ from bench.can_batch import CanBatch
 from bench.conditions import Measured
 from bench.frames import GAGES, CountArray, Frames
 from bench.line_counts import LineCounts
+from bench.protocols.layouts import Health
 from bench.protocols.signals import Signal, raw_values, real_values
 from bench.protocols.user_map import Message, UserMap, WheelMap
 from bench.protocols.wheel_can import period_of
@@ -22,6 +25,8 @@ class UserCan:
         self._map = replace(user_map, text="")  # of the file; this object is copied often
         self._counts = counts
         self._wheels = [_Wheel(wheel, user_map.rate) for wheel in user_map.wheels]
+
+    health: Mapping[int, Health] = MappingProxyType({})
 
     def push(self, batch: CanBatch, arrival: int) -> list[Frames | Measured]:
         """Return strain frames, and between them what the bus tells, before its own frame."""
