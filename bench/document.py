@@ -84,7 +84,7 @@ def wheel_document(wheels: Wheels, number: int) -> dict[str, Any]:
     wheel = wheels.heard[number]
     clock = wheel.clock
     return {
-        **line_document(wheels.line_counts(number), wheel.timeline.counts),
+        **line_document(wheels.line.counts, wheel.timeline.counts),
         "clock_drift_ppm": _number(clock.drift_ppm),
         "clock_residual_us": _number(1e6 * clock.residual),
     }
@@ -123,19 +123,23 @@ def flags(turn: Turn) -> list[str]:
     return [*names, *(note for note in said if note and note not in names)]
 
 
+def empty_summary(name: str) -> dict[str, Any]:
+    """Return the summary of a quantity that was not measured."""
+    return {"rmse": None, "unit": QUANTITIES[name][0], "r2": None, "n": 0,
+            "rmse_percent_of_range": None, "coverage_95": None, "bias": None}  # fmt: skip
+
+
 def _summary(
     name: str, turns: Sequence[Turn], truth: Mapping[int, Mapping[str, float]]
 ) -> dict[str, Any]:
     unit, factor = QUANTITIES[name]
-    empty = {"rmse": None, "unit": unit, "r2": None, "n": 0, "rmse_percent_of_range": None,
-             "coverage_95": None, "bias": None}  # fmt: skip
     rows: dict[int, list[tuple[float, float]]] = {}
     for turn in turns:
         if quantity_valid(turn, name) and name in truth.get(turn.run, {}):
             std = turn.outputs.get(f"{name}_std", math.nan)
             rows.setdefault(turn.run, []).append((turn.outputs[name], std))
     if not rows:
-        return empty
+        return empty_summary(name)
     measured = factor * np.array([truth[run][name] for run in rows])
     means = factor * np.array([np.mean(values, axis=0) for values in rows.values()])
     error = means[:, 0] - measured

@@ -14,6 +14,7 @@ from pathlib import Path, PureWindowsPath
 from tempfile import TemporaryDirectory
 
 from bench.errors import FmuError
+from bench.owned import prefix
 
 LARGEST_FILE = 256 * 2**20
 LARGEST_TOTAL = 512 * 2**20
@@ -49,7 +50,7 @@ class FmuArchive:
         FmuError
             If the folder's path would break the FMU, or the archive is damaged.
         """
-        folder = TemporaryDirectory(prefix="tirebench-")
+        folder = TemporaryDirectory(prefix=prefix())
         if (
             not all(c.isalnum() or c in "/\\:._- " for c in folder.name)
             or not folder.name.isascii()

@@ -175,3 +175,20 @@ def part_path(path: Path, part: int) -> Path:
     """
     stem = _PART.sub("", path.stem)
     return path.with_name(f"{stem}{f'.part{part}' if part > 1 else ''}{path.suffix}")
+
+
+def parts_of(path: Path) -> list[Path]:
+    """Return the files that a recording has, in order."""
+    found: list[Path] = []
+    while (file := part_path(path, len(found) + 1)).exists():
+        found.append(file)
+    return found
+
+
+def numbered(file: Path) -> Path:
+    """Return the file, or the first of ``name-2``, ``name-3`` ... that is not there yet."""
+    number, free = 1, file
+    while free.exists():
+        number += 1
+        free = file.with_name(f"{file.stem}-{number}{file.suffix}")
+    return free

@@ -39,11 +39,11 @@ class ReplayChain:
             self.ended = "end"
             return News()
         if read.event in (BACK, RESUMED):
-            self.wheels.interrupt(read.source)
+            self.wheels.interrupt()
         if not read.data:
             return News()
         self.heard, self.last_byte = time.time(), time.monotonic()
-        return self._estimation.take(self.wheels.push(read.data, read.arrival, read.source))
+        return self._estimation.take(self.wheels.push(read.data, read.arrival))
 
     def finish(self, reason: str) -> News:
         """Step what is left."""

@@ -9,9 +9,9 @@ import os
 import struct
 import zlib
 from multiprocessing.shared_memory import SharedMemory
-from pathlib import Path
 
 from bench.errors import LinkError
+from bench.owned import SHARED, shared_name
 
 _CONTROL = 64
 """Bytes before the messages: numbers of 8 bytes each."""
@@ -20,14 +20,13 @@ _RECORD = struct.Struct("<IIQ")
 """Before each message: length, CRC-32, number of the message's first byte."""
 _SKIP = 0xFFFFFFFF
 """A length that means: the rest of the memory is left out, go on at its start."""
-_PLACE = Path("/dev/shm")  # Linux; other systems have no such folder
 
 
 def free() -> float:
     """Return the shared memory that is free, [bytes]; infinite where the system does not tell."""
-    if not _PLACE.is_dir():
+    if not SHARED.is_dir():
         return math.inf
-    state = os.statvfs(_PLACE)
+    state = os.statvfs(SHARED)
     return float(state.f_bavail * state.f_frsize)
 
 
@@ -41,13 +40,13 @@ def memory(size: int) -> SharedMemory:
     """
     if free() < size:
         raise too_little(size)
-    return SharedMemory(create=True, size=size)
+    return SharedMemory(shared_name(), create=True, size=size)
 
 
 def too_little(size: float) -> LinkError:
     """Return the error that tells of missing shared memory."""
     return LinkError(
-        f"{_PLACE}: {free() / 2**20:.0f} MB of shared memory are free; {size / 2**20:.0f} MB "
+        f"{SHARED}: {free() / 2**20:.0f} MB of shared memory are free; {size / 2**20:.0f} MB "
         "are needed; give a container more (--shm-size), name fewer wheels with --wheel, or show "
         "nothing (--no-page)"
     )

@@ -16,6 +16,7 @@ from typing import Any
 
 from bench.errors import FmuError
 from bench.fmu_archive import FmuArchive, read_fmu
+from bench.owned import prefix
 from tirelib.errors import TirelibError
 
 FOLDER = "tirebench"
@@ -114,7 +115,7 @@ def _rebuilt(archive: FmuArchive) -> bytes | None:
         name: value for name, value in said.items()
         if name in known and isinstance(value, bool | int | float)
     }  # fmt: skip
-    with tempfile.TemporaryDirectory(prefix="tirebench-") as name:
+    with tempfile.TemporaryDirectory(prefix=prefix()) as name:
         folder = Path(name)
         (folder / "calibration.toml").write_bytes(calibration)
         try:

@@ -19,7 +19,7 @@ from bench.protocols import CAN, SERIAL, SLCAN
 from bench.sinks import BusSink, TerminalSink, open_bus
 from bench.transmitter import FORMATS, transmitter
 from tirelib.campaign import read_campaign
-from tirelib.cli.common import FILE, write_json
+from tirelib.cli.common import FILE, NEW_FILE, write_json
 
 DRAIN = 600.0
 """At the end, the reader gets this long to take what was sent, [s]."""
@@ -63,7 +63,7 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
 @click.option("--rate", default=10_000.0, show_default=True, metavar="HZ",
               type=click.FloatRange(153.0, 50_000.0),
               help="Of the gages in a manoeuvre.")  # fmt: skip
-@click.option("--truth", "truth_file", metavar="T.csv", type=FILE,
+@click.option("--truth", "truth_file", metavar="T.csv", type=NEW_FILE,
               help="Write the rig's forces along a manoeuvre.")  # fmt: skip
 @click.option("--format", "kind", default="serial", show_default=True,
               type=click.Choice(FORMATS), help="What the wheel sends.")  # fmt: skip
@@ -73,8 +73,10 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
 @click.option("--device", "device_file", metavar="D.toml", type=FILE, help="Scale and zero.")
 @click.option("--wheel", "wheels", multiple=True, default=(0,), show_default=True,
               type=click.IntRange(0, 255), help="Number of a wheel, up to four.")  # fmt: skip
-@click.option("--port-file", metavar="F", type=FILE, help="Write the port's path into this file.")
-@click.option("--conditions", "sidecar", metavar="F.json", type=FILE,
+@click.option(
+    "--port-file", metavar="F", type=NEW_FILE, help="Write the port's path into this file."
+)
+@click.option("--conditions", "sidecar", metavar="F.json", type=NEW_FILE,
               help="Write speed, pressure, camber and the rig's truth.")  # fmt: skip
 @click.option("--loop", is_flag=True, help="Begin again at the end, until Ctrl-C.")
 @click.option("--speedup", default=1.0, show_default=True, type=click.FloatRange(0.01, 1000.0),
@@ -90,7 +92,7 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
               help="Pull the cable after this time.")  # fmt: skip
 @click.option("--replug", metavar="S", type=click.FloatRange(min=0.0),
               help="Plug it in again after so long, and so on; with --link.")  # fmt: skip
-@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write what was sent.")
+@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write what was sent.")
 @click.pass_context
 def emulate(
     context: click.Context,

@@ -20,7 +20,7 @@ from bench.protocols.plan import ProtocolPlan
 from bench.recording import Recording
 from tirelib.campaign import CampaignHeader
 from tirelib.campaign.header import parse_header
-from tirelib.cli.common import FILE, write_json
+from tirelib.cli.common import FILE, NEW_FILE, NewPath, write_json
 
 TABLES = (".csv", ".parquet")
 
@@ -41,14 +41,14 @@ input.
 
 @click.command(epilog=_EXAMPLE)
 @click.argument("recording", metavar="RECORDING", type=FILE)
-@click.option("--out", metavar="DIR|FILE", required=True, type=click.Path(path_type=Path),
+@click.option("--out", metavar="DIR|FILE", required=True, type=NewPath(path_type=Path),
               help="A new folder for a campaign; a file by its ending.")  # fmt: skip
 @click.option("--like", metavar="DIR", type=click.Path(path_type=Path),
               help="Campaign whose tire and gages hold here.")  # fmt: skip
 @click.option("--wheel", type=click.IntRange(0, 255), help="[default: the first that was heard]")
 @click.option("--device", "device_texts", metavar="[WHEEL=]D.toml", multiple=True,
               help="Instead of the recording's device file.")  # fmt: skip
-@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write what was written.")
+@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write what was written.")
 @click.pass_context
 def export(
     context: click.Context,

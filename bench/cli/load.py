@@ -8,7 +8,7 @@ from bench.bus_load import HIGHEST_MEAN, LoadPlan, highest_rate, load_of, sugges
 from bench.errors import DeviceError
 from bench.protocols.layouts import RAW12, RAW12C, RAW16
 from bench.transmitter import SERIAL
-from tirelib.cli.common import FILE, write_json
+from tirelib.cli.common import NEW_FILE, write_json
 
 _EXAMPLE = f"""\b
 Examples:
@@ -34,7 +34,7 @@ Exit code: 0 it fits, 1 it does not (and what would is said), 2 bad input.
 @click.option("--wheels", default=1, show_default=True, type=click.IntRange(1, 8))
 @click.option("--rate", default=10_000.0, show_default=True, metavar="HZ",
               type=click.FloatRange(153.0, 200_000.0), help="Of the gages.")  # fmt: skip
-@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write the numbers.")
+@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers.")
 @click.pass_context
 def load(
     context: click.Context,

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import click
 
+from tirelib.cli.common import NEW_FILE, write_json
+
 _EXAMPLE = """\b
 Example:
   tirebench ports
@@ -15,13 +17,11 @@ Exit code: 0 at least one, 1 none.
 
 @click.command(epilog=_EXAMPLE)
 @click.option("--json", "json_file", metavar="FILE",
-              type=click.Path(path_type=Path, dir_okay=False), help="Write the list.")  # fmt: skip
+              type=NEW_FILE, help="Write the list.")  # fmt: skip
 @click.pass_context
 def ports(context: click.Context, json_file: Path | None) -> None:
     """List serial ports: device, description, identity."""
     from serial.tools import list_ports
-
-    from tirelib.cli.common import write_json
 
     found = sorted(list_ports.comports())
     for port in found:

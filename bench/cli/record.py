@@ -5,20 +5,20 @@ from typing import Any
 
 import click
 
-from bench.cli.given import given_live, live_sources
 from bench.cli.live import counters
-from bench.cli.options import PORTS, devices_of, port_options
+from bench.cli.options import PORTS, devices_of, port_options, protocol_of
+from bench.cli.recording import recording_options, room
 from bench.cli.stop import on_stop
-from bench.conditions import read_conditions
+from bench.conditions import Conditions, read_conditions
 from bench.document import line_document, wheel_document
+from bench.estimation import News
 from bench.links.opening import PortPlan
 from bench.live.chain import LiveChain, LivePlan
 from bench.live.reader import ReaderPlan
-from bench.protocols.plan import ProtocolPlan
-from bench.recording import RecordingHeader
+from bench.live.recording_state import RecordingRule
+from bench.recording_header import RecordingHeader
 from bench.session import Limits, Session
-from bench.source_plan import SourcePlan
-from tirelib.cli.common import FILE, write_json
+from tirelib.cli.common import FILE, NEW_FILE, write_json
 
 _EXAMPLE = f"""\b
 Examples:
@@ -33,11 +33,9 @@ Exit code: 0 done, 1 the port went away or not one good frame came, 2 bad input.
 
 
 @click.command(epilog=_EXAMPLE)
-@click.option("--port", "ports", metavar="[WHEEL=]PORT", multiple=True,
-              help="Port to read, several allowed; see below.")  # fmt: skip
-@click.option("--setup", metavar="S.toml", type=FILE,
-              help="Several sources, each with its protocol, wheel and device file.")  # fmt: skip
-@click.option("--out", metavar="FILE.mcap", type=FILE, required=True, help="A new file.")
+@click.option("--port", metavar="PORT", required=True, help="Port to read; see below.")
+@click.option("--out", metavar="FILE.mcap", type=NEW_FILE, required=True, help="A new file.")
+@recording_options
 @click.option("--conditions", "sidecar", metavar="F.json", type=FILE,
               help="Speed, pressure and camber over time.")  # fmt: skip
 @click.option("--device", "device_texts", metavar="[WHEEL=]D.toml", multiple=True,
@@ -46,13 +44,13 @@ Exit code: 0 done, 1 the port went away or not one good frame came, 2 bad input.
 @click.option("--duration", metavar="S", type=click.FloatRange(min=0.0), help="End after this.")
 @click.option("--silence", metavar="S", type=click.FloatRange(min=0.0),
               help="End when nothing came for so long.")  # fmt: skip
-@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write the counters.")
+@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the counters.")
 @click.pass_context
 def record(
     context: click.Context,
-    ports: tuple[str, ...],
-    setup: Path | None,
+    port: str,
     out: Path,
+    rule: RecordingRule,
     sidecar: Path | None,
     device_texts: tuple[str, ...],
     baud: int,
@@ -67,22 +65,19 @@ def record(
     json_file: Path | None,
 ) -> None:
     """Record the raw bytes of a port; Ctrl-C ends in good order."""
-    if bool(ports) == (setup is not None):
-        raise click.UsageError("just one of --port and --setup is needed")
+    plan = PortPlan(port, baud, bitrate, data_bitrate, bus_options)
+    protocol = protocol_of(plan, rate, map_file)
     devices, text = devices_of(device_texts)
-    plan = PortPlan("", baud, bitrate, data_bitrate, bus_options)
-    usual = SourcePlan(plan, ProtocolPlan(rate=rate), devices, None, text)
-    given = None if sidecar is None else read_conditions(sidecar)
-    known = given_live(live_sources(ports, setup, map_file, usual), given, ())
-    settings: dict[str, Any] = {"ports": [source.port.port for source in known.sources],
-                                "baud": baud, "bitrate": bitrate,
+    conditions = Conditions.constant() if sidecar is None else read_conditions(sidecar)
+    settings: dict[str, Any] = {"port": port, "baud": baud, "bitrate": bitrate,
                                 "data_bitrate": data_bitrate}  # fmt: skip
-    first, *more = (source.as_header() for source in known.sources)
-    header = RecordingHeader(settings, text, "", first, tuple(more))
-    reader = ReaderPlan(known.sources, reconnect)
-    with LiveChain(LivePlan(reader, None, known.conditions, header, out)) as chain:
-        session = Session(chain, limits=Limits(duration, silence))
+    header = RecordingHeader(settings, text, "", protocol.as_header())
+    reader = ReaderPlan(plan, reconnect, protocol, devices or {None: protocol.device},
+                        strain=rule.strain)  # fmt: skip
+    with LiveChain(LivePlan(reader, None, conditions, header, out, rule=rule)) as chain:
+        session = Session(chain, limits=Limits(duration, silence), watch=_alarm)
         click.echo(f"{chain.name} -> {out}")
+        click.echo(room(out, 1))
         with on_stop(session.stop):
             outcome = session.run()
         wheels, recorded, counts = chain.wheels, chain.recorded.bytes, chain.counts()
@@ -95,5 +90,13 @@ def record(
             "line": line_document(*wheels.counts), "chain": counts,
             "wheels": {n: wheel_document(wheels, n) for n in wheels.heard},
         })  # fmt: skip
-    good = wheels.counts[0].ok > 0 and outcome.reason != "unplugged"
+    failed = counts["recording"]["error"]
+    if failed:
+        click.secho(f"not everything is recorded: {failed}", fg="red")
+    good = wheels.counts[0].ok > 0 and outcome.reason != "unplugged" and not failed
     context.exit(0 if good else 1)
+
+
+def _alarm(news: News) -> None:
+    for said in news.alarms:
+        click.secho(f"ALARM: {said}", fg="red", bold=True)

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from bench.cli.run import run
-from tirelib.cli.common import FILE
+from tirelib.cli.common import FILE, NEW_FILE
 
 _EXAMPLE = """\b
 Examples:
@@ -28,7 +28,9 @@ Exit code: as of `tirebench run`.
               help="Times real time.  [default: as fast as possible]")  # fmt: skip
 @click.option("--wheel", "numbers", multiple=True, type=click.IntRange(0, 255),
               help="Wheels to look at.  [default: as in the run]")  # fmt: skip
-@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write every turn as JSON.")
+@click.option(
+    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write every turn as JSON."
+)
 @click.pass_context
 def replay(
     context: click.Context,

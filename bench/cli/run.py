@@ -1,7 +1,9 @@
 """``tirebench run``: a port or a recording through the FMU file, live."""
 
 import time
+from collections.abc import Mapping
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
@@ -10,36 +12,40 @@ from rich.console import Console
 
 from bench.chain import Estimator
 from bench.cli.bridges import Bridges, bridge_options
-from bench.cli.given import (
-    Given,
-    conditions_of,
-    given_live,
-    given_replayed,
-    live_sources,
-    port_of_file,
-    say_missing,
-)
 from bench.cli.live import Screen, counters
-from bench.cli.options import PORTS, devices_of, port_options
+from bench.cli.options import (
+    PORTS,
+    devices_of,
+    devices_of_text,
+    port_options,
+    protocol_of,
+)
 from bench.cli.page import Shown, page_choice, page_options
+from bench.cli.recording import recording_options, room
 from bench.cli.stop import on_stop
+from bench.conditions import Conditions, read_conditions
+from bench.device import Device
 from bench.document import document
+from bench.errors import DeviceError
 from bench.estimation import Estimation, News
-from bench.fmu_archive import read_fmu
+from bench.fmu_archive import FmuArchive, read_fmu
 from bench.fmu_model import FmuFile, FmuModel
+from bench.journal import Journal
 from bench.links.opening import PortPlan
 from bench.links.replay import ReplayLink
 from bench.live.chain import LiveChain, LivePlan
 from bench.live.priority import realtime
 from bench.live.reader import ReaderPlan
+from bench.live.recording_state import RecordingRule
 from bench.page.recording_switch import RecordingSwitch
 from bench.protocols.plan import ProtocolPlan
-from bench.recording import RecordingHeader
+from bench.recording_header import RecordingHeader, parts_of
 from bench.replay import ReplayChain
 from bench.session import Limits, Outcome, Session, Source
-from bench.source_plan import SourcePlan, wheels_of
 from bench.trust import check_trust
-from tirelib.cli.common import FILE, output, write_json
+from bench.wheels import Wheels
+from tirelib.cli.common import FILE, NEW_FILE, output
+from tirelib.units import to_si
 
 _EXAMPLE = f"""\b
 Examples:
@@ -57,16 +63,29 @@ Exit code: 0 done, 1 unplugged or not one valid turn, 2 bad input. Ctrl-C ends i
 """
 
 
+@dataclass(frozen=True, slots=True)
+class Given:
+    """What the bytes mean and what is known beside them.
+
+    Attributes
+    ----------
+    protocol : ProtocolPlan
+    devices : mapping of wheel to Device
+    device_text : str
+        Of the device files.
+    conditions : Conditions
+    wheels : tuple of int
+    """
+
+    protocol: ProtocolPlan
+    devices: Mapping[int | None, Device]
+    device_text: str
+    conditions: Conditions
+    wheels: tuple[int, ...]
+
+
 @click.command(epilog=_EXAMPLE)
-@click.option("--port", "ports", metavar="[WHEEL=]PORT", multiple=True,
-              help="Port to read, several allowed; see below and `tirebench ports`.")  # fmt: skip
-@click.option("--setup", metavar="S.toml", type=FILE,
-              help="Several sources, each with its protocol, wheel and device file.")  # fmt: skip
-@click.option("--port-file", metavar="FILE", type=FILE,
-              help="File that holds the port's name (`emulate --port-file`).")  # fmt: skip
-@click.option("--wait", metavar="[S]", type=click.FloatRange(min=0.0), default=0.0,
-              is_flag=False, flag_value=60.0,
-              help="Wait for ports that are not there yet, 60 s unless said.")  # fmt: skip
+@click.option("--port", metavar="PORT", help="Port to read; see below and `tirebench ports`.")
 @click.option("--replay", metavar="FILE", type=FILE, help="Recording to read instead.")
 @click.option("--pace", metavar="X", type=click.FloatRange(0.001, 1000.0),
               help="Replay at X times real time.  [default: as fast as possible]")  # fmt: skip
@@ -83,8 +102,11 @@ Exit code: 0 done, 1 unplugged or not one valid turn, 2 bad input. Ctrl-C ends i
 @click.option("--wheel", "numbers", multiple=True, type=click.IntRange(0, 255),
               help="Wheels to look at.  [default: the first four that are heard]")  # fmt: skip
 @port_options
-@click.option("--record", metavar="FILE.mcap", type=FILE, help="Record raw bytes.")
-@click.option("--json", "json_file", metavar="FILE", type=FILE, help="Write every turn as JSON.")
+@click.option("--record", metavar="FILE.mcap", type=NEW_FILE,
+              help="Record raw bytes, strain, estimates and counters.")  # fmt: skip
+@recording_options
+@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE,
+              help="Write every turn as JSON, as it comes.")  # fmt: skip
 @click.option("--duration", metavar="S", type=click.FloatRange(min=0.0), help="End after this.")
 @click.option("--silence", metavar="S", type=click.FloatRange(min=0.0),
               help="End when nothing came for so long.")  # fmt: skip
@@ -98,10 +120,7 @@ Exit code: 0 done, 1 unplugged or not one valid turn, 2 bad input. Ctrl-C ends i
 @click.pass_context
 def run(
     context: click.Context,
-    ports: tuple[str, ...],
-    setup: Path | None,
-    port_file: Path | None,
-    wait: float,
+    port: str | None,
     replay: Path | None,
     pace: float | None,
     fmu_file: Path,
@@ -120,6 +139,7 @@ def run(
     map_file: Path | None,
     reconnect: float,
     record: Path | None,
+    rule: RecordingRule,
     json_file: Path | None,
     duration: float | None,
     silence: float | None,
@@ -135,75 +155,75 @@ def run(
     tui: bool,
 ) -> None:
     """Estimate Fz, alpha, kappa and Fy of each turn, live from a port or from a recording."""
-    if [bool(ports), setup is not None, port_file is not None, replay is not None].count(True) != 1:
-        raise click.UsageError("just one of --port, --setup, --port-file and --replay is needed")
+    if (port is None) == (replay is None):
+        raise click.UsageError("just one of --port and --replay is needed")
     if replay is not None and record is not None:
         raise click.UsageError("--record goes with --port: a recording is there already")
     priority = realtime(asked) if replay is None else ""
     paced = replay is None or pace is not None
     choice = page_choice(page, host, network, page_port, tui, paced=paced)
     archive = read_fmu(fmu_file)
+    conditions = _conditions(speed, pressure, camber, sidecar)
     devices, device_text = devices_of(device_texts)
-    plan = PortPlan("", baud, bitrate, data_bitrate, bus_options)
+    plan = PortPlan(port or "", baud, bitrate, data_bitrate, bus_options)
     console = output()
-    if port_file is not None:
-        ports = (port_of_file(port_file, wait, console),)
-    conditions = conditions_of(speed, pressure, camber, sidecar)
     console.print(f"FMU {fmu_file}, sha256 {archive.sha256}", soft_wrap=True)
     console.print(f"FMU {check_trust(archive, trust=trust)}", soft_wrap=True)
     with ExitStack() as stack:
         file = stack.enter_context(FmuFile(archive))
         link = None if replay is None else stack.enter_context(ReplayLink(replay, pace))
         if link is None:
-            usual = SourcePlan(plan, ProtocolPlan(rate=rate), devices, None, device_text)
-            sources = live_sources(ports, setup, map_file, usual)
-            known = given_live(sources, conditions, numbers)
+            protocol = protocol_of(plan, rate, map_file)
+            known = Given(protocol, devices or {None: protocol.device}, device_text,
+                          conditions or Conditions.constant(), numbers)  # fmt: skip
         else:
-            known = given_replayed(link, conditions, devices, numbers, console)
-            recorded_with = link.recording.header.fmu
-            if recorded_with and recorded_with != archive.sha256:
-                console.print(f"note: recorded with another FMU ({recorded_with[:12]}...)")
+            known = _replayed(link, conditions, devices, numbers, archive, console)
         calibration = file.calibration
         if calibration is not None:
-            for device in known.devices:
+            for device in known.devices.values():
                 device.check_layout(calibration.lateral, str(fmu_file))
-            say_missing(known, calibration, console)
         bridges = stack.enter_context(Bridges(estimates_out, plotjuggler, plan))
         shown = Shown(choice, console)
         switch: RecordingSwitch | None = None
         source: Source
         if link is None:
-            settings = {"ports": [source.port.port for source in known.sources], "baud": baud,
-                        "bitrate": bitrate, "data_bitrate": data_bitrate, "wheels": list(numbers),
+            settings = {"port": port, "baud": baud, "bitrate": bitrate,
+                        "data_bitrate": data_bitrate, "wheels": list(numbers),
                         "fmu": str(fmu_file), "speed_kmh": speed, "pressure_bar": pressure,
                         "camber_deg": camber}  # fmt: skip
-            first, *more = (source.as_header() for source in known.sources)
-            header = RecordingHeader(settings, device_text, archive.sha256, first, tuple(more))
+            header = RecordingHeader(settings, device_text, archive.sha256,
+                                     known.protocol.as_header())  # fmt: skip
             recorded = record is not None or shown.anything
-            reader = ReaderPlan(known.sources, reconnect, numbers, recorded, every_turn, wait=wait)
+            reader = ReaderPlan(plan, reconnect, known.protocol, known.devices, numbers, recorded,
+                                every_turn, rule.strain)  # fmt: skip
             chain = stack.enter_context(LiveChain(
-                LivePlan(reader, file, known.conditions, header, record, shown.anything)
+                LivePlan(reader, file, known.conditions, header, record, shown.anything, rule)
             ))  # fmt: skip
-            file_name = record or Path(time.strftime("tirebench-%Y%m%d-%H%M%S.mcap"))
-            switch = RecordingSwitch(chain, file_name, started=record is not None)
+            first = record or Path(time.strftime("tirebench-%Y%m%d-%H%M%S.mcap"))
+            switch = RecordingSwitch(chain, first, started=record is not None)
             source = chain
         else:
             source = _in_process(link, file, known, stack, laps=shown.anything)
         console.print(f"{source.name} -> {file.name}, {file.samples} samples a step")
+        if record is not None:
+            console.print(room(record, len(numbers)), soft_wrap=True, markup=False)
         if priority:
             console.print(f"priority: {priority}", soft_wrap=True, markup=False)
         stack.enter_context(shown)
         shown.open(source, switch, fmu_file, calibration, known.devices)
+        journal = None if json_file is None else Journal(json_file)
+        if journal is not None:
+            stack.callback(journal.close)
         limits = Limits(duration, silence, turns)
         session = Session(source, limits=limits, keep=json_file is not None)
-        outcome, used = _session(session, source, console, bridges, shown)
+        outcome, used = _session(session, source, console, bridges, shown, journal)
         _summary(console, outcome, source, used, link, switch)
-        if json_file is not None:
+        if journal is not None:
             origin = {"link": source.name, "fmu_sha256": archive.sha256, "ended": outcome.reason,
                       "cpu_share": used if source.live else None,
                       "chain": source.counts()}  # fmt: skip
-            write_json(json_file, document(outcome.turns, known.conditions.runs, source.wheels,
-                                           origin, calibration))  # fmt: skip
+            journal.finish(document(outcome.turns, known.conditions.runs, source.wheels,
+                                    origin, calibration))  # fmt: skip
             console.print(f"written: {json_file}", soft_wrap=True)
     good = outcome.valid > 0 and outcome.reason != "unplugged"
     context.exit(0 if good else 1)
@@ -217,19 +237,32 @@ def _in_process(
     def estimator(_: int) -> Estimator:
         return stack.enter_context(FmuModel(file))
 
-    wheels = wheels_of(known.sources, known.wheels)
+    wheels = Wheels(known.protocol.decoder(), known.devices, known.wheels)
     jumps = link.recording.jumps()
     return ReplayChain(link, wheels, Estimation(estimator, known.conditions, jumps, laps=laps))
 
 
 def _session(
-    session: Session, source: Source, console: Console, bridges: Bridges, shown: Shown
+    session: Session,
+    source: Source,
+    console: Console,
+    bridges: Bridges,
+    shown: Shown,
+    journal: Journal | None,
 ) -> tuple[Outcome, float]:
     """Run until something ends it; return what came of it and the share of a core it took."""
     with ExitStack() as stack:
         screen = None if shown.quiet else stack.enter_context(Screen(console, source))
 
+        said = ""
+
         def watch(news: News) -> None:
+            nonlocal said
+            if journal is not None:
+                journal.add(news.turns)
+                if journal.error != said:
+                    said = journal.error
+                    news.alarms.append(said or "every turn is in the file again")
             if screen is not None:
                 screen.watch(news)
             bridges.send(news.turns)
@@ -248,6 +281,49 @@ def _session(
 def _cpu_time(source: Source, shown: Shown) -> float:
     """Return what all processes of the run have used, [s]."""
     return time.process_time() + source.cpu_time() + shown.cpu_time()
+
+
+def _conditions(
+    speed: float | None, pressure: float | None, camber: float | None, sidecar: Path | None
+) -> Conditions | None:
+    """Return conditions of the options; None when there are none."""
+    values = {"speed": (speed, "km/h", "speed"), "pressure": (pressure, "bar", "pressure"),
+              "camber": (camber, "deg", "angle")}  # fmt: skip
+    given = {
+        name: to_si(value, unit, dimension)
+        for name, (value, unit, dimension) in values.items()
+        if value is not None
+    }
+    if sidecar is None:
+        return Conditions.constant(**given) if given else None
+    if given:
+        raise DeviceError(
+            f"--{', --'.join(given)} and --conditions {sidecar} are given; one or the other says "
+            "what holds; leave one out"
+        )
+    return read_conditions(sidecar)
+
+
+def _replayed(
+    link: ReplayLink,
+    conditions: Conditions | None,
+    devices: Mapping[int | None, Device],
+    wheels: tuple[int, ...],
+    archive: FmuArchive,
+    console: Console,
+) -> Given:
+    """Return what a recording says; options that are given replace it, and that is said."""
+    header = link.recording.header
+    protocol = ProtocolPlan.of_header(header.protocol, link.name)
+    if header.fmu and header.fmu != archive.sha256:
+        console.print(f"note: recorded with another FMU ({header.fmu[:12]}...)")
+    if devices or conditions is not None:
+        console.print("note: device file or conditions of the recording are replaced by options")
+    own = devices_of_text(header.device, link.name) or {None: protocol.device}
+    if not wheels:
+        wheels = tuple(header.settings.get("wheels") or ())
+    return Given(protocol, devices or own, header.device,
+                 conditions or link.recording.conditions, wheels)  # fmt: skip
 
 
 def _summary(
@@ -281,5 +357,9 @@ def _summary(
         middle, high = np.percentile(np.array(outcome.latency) * 1e3, (50, 99))
         console.print(f"byte in to estimate out: median {middle:.1f} ms, 99 % {high:.1f} ms; "
                       f"{100 * used:.0f} % of a core")  # fmt: skip
+    triggered = counts.get("recording", {}).get("recordings", 0)
+    if triggered > 1:
+        console.print(f"{triggered} recordings, numbered from the first")
     for file in () if switch is None else switch.files:
-        console.print(f"recorded: {file}", soft_wrap=True)
+        for part in parts_of(file):
+            console.print(f"recorded: {part}", soft_wrap=True)

@@ -1,20 +1,46 @@
-"""Ctrl-C and SIGTERM as a request to end in good order, also for a program in the background."""
+"""Ctrl-C, SIGTERM and a terminal that closes (SIGHUP) as a request to end in good order.
 
+Also for a program in the background.
+"""
+
+import os
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+STOPS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+"""Windows has no SIGHUP."""
+
+
+def silence() -> None:
+    """Let output to a terminal that is gone go nowhere; files and pipes are kept."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            if not stream.isatty():
+                continue
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, stream.fileno())
+            os.close(nowhere)
+        except (OSError, ValueError):
+            continue
+
 
 @contextmanager
 def on_stop(action: Callable[[], None]) -> Iterator[None]:
-    """Call `action` at the first Ctrl-C or SIGTERM; a second Ctrl-C interrupts as usual."""
+    """Call `action` at the first Ctrl-C, SIGTERM or SIGHUP; a second Ctrl-C interrupts as usual.
+
+    After SIGHUP nobody reads what is said: it goes nowhere, instead of ending the program.
+    """
 
     def handle(number: int, frame: FrameType | None) -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+        if number == getattr(signal, "SIGHUP", None):
+            silence()
         action()
 
-    before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, handle) for number in STOPS}
     try:
         yield
     finally:

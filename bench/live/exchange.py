@@ -5,6 +5,7 @@ from multiprocessing.context import SpawnContext
 from multiprocessing.shared_memory import SharedMemory
 from typing import Any
 
+from bench.owned import name_semaphores, sweep
 from bench.rings import ByteQueue, Cell, free, memory, too_little
 
 RAW = 8 * 2**20
@@ -15,8 +16,6 @@ does not fit is missing beside the raw bytes, which hold it."""
 SAMPLES, LEAST = 27 * 2**18, 2**21
 """Samples of a wheel that wait for its estimator, [bytes]: 13 s at 10 kHz; 4 s where memory is
 short, which is more than the age at which samples are left out."""
-PORT, PORT_STATE = 2**21, 2**13
-"""Reads of one port of several that wait for the reader, [bytes], and how the port is."""
 NEWS = 2**20
 ORDERS = 2**18
 LINE = 2**20
@@ -42,10 +41,6 @@ class Address:
         Released when an estimator has news, or the line an event.
     samples : int
         Bytes of each queue of samples.
-    ports : int
-        Processes that read a port each, where there are several.
-    came : semaphore
-        Released when one of them has something.
     """
 
     name: str
@@ -53,8 +48,6 @@ class Address:
     fresh: tuple[Any, ...]
     news: Any
     samples: int
-    ports: int = 0
-    came: Any = None
 
 
 class Exchange:
@@ -79,10 +72,6 @@ class Exchange:
         Of each slot: blocks to the estimator, reports to the run.
     line, recorded : Cell
         State of the reader and of the recorder.
-    reads : tuple of ByteQueue
-        Of each port of several, to the reader.
-    ports : tuple of Cell
-        How each of them is.
     """
 
     def __init__(self, address: Address, shared: SharedMemory | None = None) -> None:
@@ -108,14 +97,9 @@ class Exchange:
         slots = range(address.slots)
         self.samples = tuple(ByteQueue(part(address.samples)) for _ in slots)
         self.news = tuple(ByteQueue(part(NEWS)) for _ in slots)
-        ports = range(address.ports)
-        self.reads = tuple(ByteQueue(part(PORT)) for _ in ports)
-        self.ports = tuple(Cell(part(PORT_STATE)) for _ in ports)
 
     @classmethod
-    def create(
-        cls, context: SpawnContext, slots: int, beside: int = 0, ports: int = 0
-    ) -> "Exchange":
+    def create(cls, context: SpawnContext, slots: int, beside: int = 0) -> "Exchange":
         """Make the memory; where it is short, the queues of samples are.
 
         Parameters
@@ -124,25 +108,22 @@ class Exchange:
         slots : int
         beside : int
             What others will need after this, [bytes].
-        ports : int
-            Of several, each read by a process of its own; 0 where there is one.
 
         Raises
         ------
         LinkError
             If there is not enough for the shortest queues.
         """
+        sweep()
+        name_semaphores()
         fixed = _STOP + RAW + ORDERS + STRAIN + RESULTS + LINE + STATE + slots * NEWS
-        fixed += ports * (PORT + PORT_STATE)
         room = (free() - fixed - beside) / slots
         if room < LEAST:
             raise too_little(fixed + slots * LEAST + beside)
         samples = int(min(SAMPLES, room)) // 64 * 64
         shared = memory(fixed + slots * samples)
         fresh = tuple(context.Semaphore(0) for _ in range(slots))
-        address = Address(shared.name, slots, fresh, context.Semaphore(0), samples, ports,
-                          context.Semaphore(0))  # fmt: skip
-        return cls(address, shared)
+        return cls(Address(shared.name, slots, fresh, context.Semaphore(0), samples), shared)
 
     def is_set(self, flag: int) -> bool:
         """Whether the run has set a flag."""
@@ -154,10 +135,9 @@ class Exchange:
 
     def close(self) -> None:
         """Let go of the memory; its maker removes it. Calling twice does no harm."""
-        for queue in (self.raw, self.orders, self.strain, self.results, *self.samples, *self.news,
-                      *self.reads):  # fmt: skip
+        for queue in (self.raw, self.orders, self.strain, self.results, *self.samples, *self.news):
             queue.close()
-        for cell in (self.line, self.recorded, *self.ports):
+        for cell in (self.line, self.recorded):
             cell.close()
         self._flags.release()
         for view in self._views:

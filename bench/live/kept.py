@@ -23,6 +23,8 @@ STAND_BY = 0.5
 """A process that took over and has lived so long gets one that stands by, [s]."""
 GLANCE = 0.5
 """Time between two looks of one that stands by whether the run goes on, [s]."""
+RUN_ONLY = [getattr(signal, name) for name in ("SIGINT", "SIGHUP") if hasattr(signal, name)]
+"""What a terminal sends to all of its processes, and only the run obeys."""
 CONTEXT: SpawnContext = get_context("spawn")
 
 
@@ -146,13 +148,14 @@ class Kept:
 
 
 def _begun(target: Callable[..., None], arguments: tuple[Any, ...]) -> Any:
-    """Return a new process that ignores Ctrl-C from its first moment."""
+    """Return a new process that ignores Ctrl-C and a closed terminal from its first moment."""
     process = CONTEXT.Process(target=target, args=arguments, daemon=True)
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # which the process inherits
+    before = {number: signal.signal(number, signal.SIG_IGN) for number in RUN_ONLY}
     try:
-        process.start()
+        process.start()  # which inherits what is ignored
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
     return process
 
 
@@ -172,7 +175,8 @@ def settled() -> None:
 
     Ctrl-C is the run's, what is there is no garbage, and from now on it goes first if the run does.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for number in RUN_ONLY:
+        signal.signal(number, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     gc.collect()
     gc.freeze()

@@ -11,17 +11,19 @@ from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 from uuid import uuid4
 
 from bench.conditions import Conditions
 from bench.document import line_document, wheel_document
 from bench.errors import RecordingError
+from bench.live.before import Before
 from bench.live.exchange import Address, Exchange
 from bench.live.kept import orphaned, settled
+from bench.live.recording_state import TRIGGERS, Order, RecorderState, RecordingRule
 from bench.live.space import Space
 from bench.recorder import Recorder, finish
-from bench.recording_header import RecordingHeader, part_path
+from bench.recording_header import RecordingHeader, numbered, part_path
 
 LOOK = 0.05
 """Time between two looks into the queue, [s]; until then the bytes are safe in shared memory."""
@@ -36,118 +38,6 @@ MOST_EVENTS = 1000
 """Events that are kept where nothing can be written."""
 LEFT = 0.5
 """When the run is gone, how long the last bytes are waited for, [s]."""
-
-
-class Order(NamedTuple):
-    """What the run wants.
-
-    Attributes
-    ----------
-    kind : str
-        ``start`` a recording, ``stop`` it, write an ``event``, or ``close`` after the last read.
-    what : str or dict
-        Name of the file; why it ends; the event.
-    moment : int, [ns]
-        Monotonic, of the event.
-    """
-
-    kind: str
-    what: Any
-    moment: int
-
-
-@dataclass(frozen=True, slots=True)
-class RecordingRule:
-    """How it is recorded.
-
-    Attributes
-    ----------
-    strain : bool
-        Whether decoded samples stand beside the raw bytes.
-    split_time : float, [s]
-    split_size : float, [bytes]
-        A new part begins when a file is so old or so long; infinite for never.
-    """
-
-    strain: bool = True
-    split_time: float = float("inf")
-    split_size: float = float("inf")
-
-
-@dataclass(slots=True)
-class RecorderState:
-    """How far the recorder is.
-
-    Attributes
-    ----------
-    path : Path or None
-        Of the file that is written, or waits for room; None where nothing is recorded.
-    length : int
-        Bytes of that file that are whole.
-    bytes : int
-        Raw bytes in the recording.
-    part : int
-        Of the recording that goes on, from 1.
-    written : int
-        Bytes of the recording's parts before it.
-    began : tuple of str, int and int
-        Name of the recording that goes on, and its start on the wall clock and on the monotonic
-        one, [ns]: the same in all its parts.
-    since : float, [s]
-        When the recording began, monotonic.
-    raw, strain, results, orders : int
-        Cursors of the queues: what is before them was done.
-    done : int
-        Orders so far.
-    cpu : float, [s]
-        Time that the recorder has used.
-    answer : str
-        Why the last recording could not be started; empty if it was.
-    error : str
-        Why nothing can be written at the moment; empty if it can.
-    failures : int
-        How often writing has failed.
-    free, rate : float, [bytes], [bytes/s]
-        Room on the disk; what the recording grows by.
-    """
-
-    path: Path | None = None
-    length: int = 0
-    bytes: int = 0
-    part: int = 1
-    written: int = 0
-    began: tuple[str, int, int] = ("", 0, 0)
-    since: float = 0.0
-    raw: int = 0
-    strain: int = 0
-    results: int = 0
-    orders: int = 0
-    done: int = 0
-    cpu: float = 0.0
-    answer: str = ""
-    error: str = ""
-    failures: int = 0
-    free: float = float("nan")
-    rate: float = float("nan")
-
-    def as_document(self, lost_bytes: int) -> dict[str, Any]:
-        """Return what the page shows of it; a number that is not known is null."""
-        going = self.path is not None
-        minutes = (time.monotonic() - self.since) / 60.0 if going else None
-        left = self.free / self.rate / 60.0 if self.rate > 0.0 else None
-        return {
-            "file": self.path.name if self.path else "",
-            "part": self.part,
-            "bytes": self.written + self.length,
-            "raw_bytes": self.bytes,
-            "minutes": minutes,
-            "free_bytes": self.free if self.free == self.free else None,
-            "bytes_per_s": self.rate if self.rate == self.rate else None,
-            "minutes_left": left,
-            "error": self.error,
-            "failures": self.failures,
-            "lost_bytes": lost_bytes,
-        }
 
 
 @dataclass(slots=True)
@@ -186,7 +76,8 @@ class _Recorder:
         self._unfinished: list[_Unfinished] = []
         self._events: deque[tuple[dict[str, Any], int]] = deque(maxlen=MOST_EVENTS)
         self._last = ""  # why the run ends, once it does
-        self._part_began = self._flushed = time.monotonic()
+        self._kept = None if rule.around is None else Before(rule.around[0])
+        self._part_began = self._published = time.monotonic()
         self._next_trial = self._next_link = 0.0
         self._go_back()
         exchange.orders.go_to(state.orders)
@@ -224,6 +115,7 @@ class _Recorder:
             elif order.kind == "stop":
                 self._write()
                 self._end(order.what)
+                self._state.waits = None
             elif order.kind == "event":
                 self._event(order)
             elif order.kind == "close":
@@ -233,6 +125,8 @@ class _Recorder:
 
     def _event(self, order: Order) -> None:
         """Write an event; it is kept until it is on disk."""
+        if order.what.get("event") in TRIGGERS:
+            self._trigger(order.moment)
         if self._state.path is None:
             return
         self._events.append((order.what, order.moment))
@@ -240,18 +134,41 @@ class _Recorder:
             self._recorder.event(order.what, order.moment)
 
     def _start(self, path: Path) -> None:
-        """Begin a recording."""
+        """Begin a recording, or wait for what triggers one."""
+        if self._kept is None:
+            self._state.answer = self._begin(path)
+        elif path.exists():
+            self._state.answer = f"{path}: it exists; a recording is never overwritten"
+        else:
+            self._state.answer, self._state.waits = "", path
+
+    def _trigger(self, moment: int) -> None:
+        """Begin the recording around a moment [ns, monotonic], or go on with one for longer."""
+        state, around = self._state, self._rule.around
+        if state.waits is None or around is None:
+            return
+        state.until = moment + round(1e9 * around[1])
+        if state.path is None:
+            path = numbered(state.waits)
+            error = self._begin(path)
+            if error:
+                state.path, state.error = path, error
+
+    def _begin(self, path: Path) -> str:
+        """Begin a recording; return why that is not possible, or nothing."""
         state = self._state
         self._before = state.bytes = state.written = state.length = 0
         state.part, state.error, state.since = 1, "", time.monotonic()
         state.began = uuid4().hex, time.time_ns(), time.monotonic_ns()
         self._events.clear()
-        self._drop()
+        if self._kept is None:
+            self._drop()
         second = part_path(path, 2)
         if second.exists():
-            state.answer = f"{second}: it exists and is of another recording; name another file"
-        else:
-            state.answer = self._open(path, None)
+            return f"{second}: it exists and is of another recording; name another file"
+        error = self._open(path, None)
+        state.recordings += not error
+        return error
 
     def _go_on(self, path: Path) -> None:
         """Go on in the file of a recorder that ended."""
@@ -263,6 +180,11 @@ class _Recorder:
 
     def _write(self) -> bool:
         """Write what has come; tell whether there was anything."""
+        if self._state.path is None and self._state.waits is not None and self._kept is not None:
+            busy, lost = self._kept.take(self._exchange)
+            if lost:
+                self._trigger(lost)
+            return busy
         if self._state.path is None:
             self._drop()
             return False
@@ -324,6 +246,8 @@ class _Recorder:
             self._recorder = state.path = None
             return str(error)
         state.path = path
+        if self._kept is not None:
+            self._kept.write(self._recorder)
         for event, moment in self._events:
             self._recorder.event(event, moment)
         return ""
@@ -360,7 +284,8 @@ class _Recorder:
             state.part, state.written = state.part + 1, state.written + state.length
         error = self._open(part_path(path, state.part), None)
         if error:
-            state.path, state.error, (state.part, state.written) = path, error, before
+            state.path, (state.part, state.written) = path, before
+            state.error = state.error or error
             return False
         state.length = 0
         return True
@@ -421,25 +346,30 @@ class _Recorder:
         RecordingError
         """
         state, exchange, recorder = self._state, self._exchange, self._recorder
-        self._flushed = time.monotonic()
         if recorder is not None:
             recorder.flush()
             state.length = recorder.length
             state.bytes = self._before + recorder.bytes
             self._events.clear()
+            if self._kept is not None:
+                self._kept.clear()
         state.raw, state.strain = exchange.raw.cursor, exchange.strain.cursor
         state.results = exchange.results.cursor
 
     def _publish(self, *, obeyed: bool = False) -> None:
         """Note what is safe on disk, and give back its room."""
         state, exchange, recorder = self._state, self._exchange, self._recorder
-        due = recorder is None or time.monotonic() - self._flushed > CHUNK
+        due = recorder is None or time.monotonic() - self._published > CHUNK
         if not (obeyed or due):
             return
-        if recorder is not None or state.path is None:
+        self._published = time.monotonic()
+        going = recorder is not None or (state.path is None and state.waits is None)
+        if going:
             try:
                 self._flush()
                 self._split()
+                if self._kept is not None and state.path and time.monotonic_ns() > state.until:
+                    self._end("the time after the trigger is over")
             except RecordingError as error:
                 self._fail(error)
         state.free, state.rate = self._space.look(state.path, state.written + state.length)

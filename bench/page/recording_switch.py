@@ -5,6 +5,7 @@ from pathlib import Path
 from bench.deadline import Deadline
 from bench.errors import RecordingError
 from bench.live.chain import LiveChain
+from bench.recording_header import numbered
 
 PATIENCE = 5.0
 """How long the recorder may take to answer, [s]."""
@@ -48,6 +49,10 @@ class RecordingSwitch:
         """Write a marker of the user at this moment."""
         self._chain.order("event", {"event": "marker", "text": text})
 
+    def alarm(self, text: str) -> None:
+        """Write an alarm of this moment; a recording that waits for a trigger begins."""
+        self._chain.order("event", {"event": "alarm", "text": text})
+
     def start(self) -> str:
         """Begin a recording, unless one is going on; return the name of its file.
 
@@ -73,12 +78,3 @@ class RecordingSwitch:
             self._on = False
             self._chain.order("stop", "stopped by a viewer")
             self._chain.obeyed(Deadline.after(PATIENCE))
-
-
-def numbered(file: Path) -> Path:
-    """Return the file, or the first of ``name-2``, ``name-3`` ... that is not there yet."""
-    number, free = 1, file
-    while free.exists():
-        number += 1
-        free = file.with_name(f"{file.stem}-{number}{file.suffix}")
-    return free

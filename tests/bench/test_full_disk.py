@@ -9,10 +9,11 @@ import pytest
 
 from bench.conditions import Conditions
 from bench.errors import RecordingError
-from bench.links import Read
+from bench.links import LOST, Read
 from bench.live.exchange import Exchange
 from bench.live.kept import CONTEXT
-from bench.live.recorder import Order, RecorderState, RecordingRule, _Recorder
+from bench.live.recorder import _Recorder
+from bench.live.recording_state import Order, RecorderState, RecordingRule
 from bench.mcap_log import McapLog
 from bench.recorder import Recorder
 from bench.recording import Recording
@@ -61,9 +62,9 @@ class Bench:
     def order(self, kind: str, what: Any) -> None:
         self.exchange.orders.put(pickle.dumps(Order(kind, what, 5)))
 
-    def step(self, *pieces: bytes) -> RecorderState:
+    def step(self, *pieces: bytes, arrival: int = 7) -> RecorderState:
         for piece in pieces:
-            self.exchange.raw.put(pickle.dumps(Read(7, piece)))
+            self.exchange.raw.put(pickle.dumps(Read(arrival, piece)))
         obeyed = self.recorder._obey()
         self.recorder._write()
         self.recorder._publish(obeyed=obeyed)
@@ -163,3 +164,45 @@ def test_a_name_whose_second_part_is_there_is_refused(disk: Disk, tmp_path: Path
     bench = Bench(tmp_path / "a.mcap")
     assert "a.part2.mcap: it exists and is of another recording" in bench.recorder._state.answer
     bench.close()
+
+
+SECOND = 1_000_000_000
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Give what the recorder takes for this moment, [ns]."""
+    now = [0]
+    monkeypatch.setattr("bench.live.recorder.time.monotonic_ns", lambda: now[0])
+    return now
+
+
+def test_a_trigger_records_what_was_before_and_after_it(
+    disk: Disk, tmp_path: Path, clock: list[int]
+) -> None:
+    bench = Bench(tmp_path / "a.mcap", RecordingRule(around=(2.0, 1.0)))
+    for second, piece in enumerate(PIECES):
+        clock[0] = second * SECOND
+        if second == 4:
+            bench.exchange.orders.put(
+                pickle.dumps(Order("event", {"event": "marker", "text": "kerb"}, clock[0]))
+            )
+        state = bench.step(piece, arrival=clock[0])
+        assert (state.path is not None) == (second in (4, 5))
+        assert state.as_document(0)["waits_for_trigger"] == (second not in (4, 5))
+    bench.exchange.raw.put(pickle.dumps(Read(8 * SECOND, b"", LOST)))
+    assert bench.close().recordings == 2
+    assert recorded(tmp_path / "a.mcap") == (PIECES[1:7], True)
+    assert recorded(tmp_path / "a-2.mcap") == (PIECES[7:], True)
+
+
+def test_what_was_before_a_trigger_waits_for_room(disk: Disk, tmp_path: Path) -> None:
+    bench = Bench(tmp_path / "a.mcap", RecordingRule(around=(9.0, 1e9)))
+    bench.step(*PIECES[:4])
+    disk.full = True
+    bench.order("event", {"event": "alarm", "text": "Fz"})
+    assert "No space left" in bench.step(PIECES[4]).error
+    disk.full = False
+    assert bench.step(PIECES[5]).error == ""
+    bench.close()
+    assert recorded(tmp_path / "a.mcap") == (PIECES[:6], True)

@@ -2,6 +2,7 @@
 
 import os
 import pickle
+import resource
 import signal
 import time
 from collections.abc import Callable, Iterator
@@ -27,15 +28,17 @@ from bench.fmu_model import FmuFile, FmuModel
 from bench.links import BACK, LOST, RESUMED, Read
 from bench.links.opening import PortPlan
 from bench.links.replay import ReplayLink
-from bench.live.chain import LiveChain, LivePlan
+from bench.live.chain import RECORDED_AGAIN, LiveChain, LivePlan
 from bench.live.estimator import EstimatorPlan, Report, _Estimator
 from bench.live.exchange import Address, Exchange
 from bench.live.kept import CONTEXT
 from bench.live.reader import ReaderPlan, load
-from bench.live.recorder import Order, RecorderState, RecordingRule, _Recorder
+from bench.live.recorder import _Recorder
+from bench.live.recording_state import Order, RecorderState, RecordingRule
+from bench.protocols.plan import ProtocolPlan
 from bench.recording import Recorder, Recording, RecordingHeader, jump_event
+from bench.recording_header import parts_of
 from bench.replay import ReplayChain
-from bench.source_plan import SourcePlan
 from bench.wheels import Block, Wheels
 from tests.bench.campaigns import tiny_runs
 from tests.bench.conftest import Spawn
@@ -51,7 +54,7 @@ def documents(turns: list[Turn]) -> list[dict[str, Any]]:
 
 def replayed(path: Path, file: FmuFile) -> tuple[list[Turn], Wheels]:
     with ReplayLink(path) as link, FmuModel(file) as model:
-        wheels = Wheels.of_one(SerialDecoder(), {None: Device()})
+        wheels = Wheels(SerialDecoder(), {None: Device()})
         estimation = Estimation(lambda _: model, STEADY, link.recording.jumps())
         chain, news = ReplayChain(link, wheels, estimation), News()
         while not chain.ended:
@@ -74,7 +77,7 @@ def file(toy_fmus: dict[int, Path]) -> Iterator[FmuFile]:
 
 
 def plan_of(port: str, file: FmuFile | None, record: Path) -> LivePlan:
-    reader = ReaderPlan((SourcePlan(PortPlan(port)),), 60.0)
+    reader = ReaderPlan(PortPlan(port), 60.0, ProtocolPlan(), {None: Device()})
     return LivePlan(reader, file, STEADY, RecordingHeader({}), record)
 
 
@@ -89,9 +92,9 @@ def test_who_stands_by_has_its_port_loaded_and_its_garbage_collected(
     done: list[object] = []
     monkeypatch.setattr(PortPlan, "load", lambda port: done.append(port))
     monkeypatch.setattr("bench.live.reader.settled", lambda: done.append("settled"))
-    plan = ReaderPlan((SourcePlan(PortPlan("p")),), 60.0)
+    plan = ReaderPlan(PortPlan("p"), 60.0, ProtocolPlan(), {None: Device()})
     load(plan, Address("", 0, (), None, 0))
-    assert done == [plan.sources[0].port, "settled"]
+    assert done == [plan.port, "settled"]
 
 
 def test_each_process_may_be_killed_and_a_replay_gives_what_the_run_gave(
@@ -132,6 +135,41 @@ def test_each_process_may_be_killed_and_a_replay_gives_what_the_run_gave(
     with pytest.raises(FileNotFoundError):
         SharedMemory(name)
     assert not [pid for pid in processes if pid and Path(f"/proc/{pid}").exists()]
+
+
+@pytest.mark.skipif(not hasattr(resource, "prlimit"), reason="no limits of other processes here")
+def test_a_file_that_may_not_grow_ends_nothing_and_nothing_is_lost(
+    spawn: Spawn, campaign: Path, file: FmuFile, tmp_path: Path
+) -> None:
+    spawn("emulate", "--campaign", campaign, "--all", "--loop", "--port-file", tmp_path / "port")
+    news, path = News(), tmp_path / "a.mcap"
+    with LiveChain(plan_of(port_of(tmp_path / "port"), file, path)) as chain:
+
+        def failures() -> int:
+            return int(chain.counts()["recording"]["failures"])
+
+        gathered(chain, news, lambda: len(news.turns) > 3)
+        recorder = chain.process_ids["recorder"] or 0
+        before = resource.prlimit(recorder, resource.RLIMIT_FSIZE)
+        resource.prlimit(recorder, resource.RLIMIT_FSIZE, (path.stat().st_size + 9000, before[1]))
+        gathered(chain, news, lambda: failures() > 0)
+        turns = len(news.turns)
+        gathered(chain, news, lambda: len(news.turns) > turns + 3)  # the run goes on
+        resource.prlimit(recorder, resource.RLIMIT_FSIZE, before)
+        gathered(chain, news, lambda: not chain.recorded.error)
+        news.add(chain.finish("stopped"))
+        counts = chain.counts()
+    assert "a.mcap: it cannot be written (File too large)" in news.alarms[0]
+    assert news.alarms[-1] == RECORDED_AGAIN
+    assert counts["restarts"] == {"reader": 0, "recorder": 0, "estimator 0": 0}
+    assert counts["raw"]["lost_bytes"] == 0
+    assert counts["recording"]["part"] >= 2
+    turns_again, again = replayed(path, file)
+    assert documents(turns_again) == documents(news.turns)
+    assert again.counts == chain.wheels.counts
+    for part in parts_of(path):  # each has its end and its index
+        with part.open("rb") as opened:
+            assert make_reader(opened, validate_crcs=True).get_summary() is not None
 
 
 def test_a_run_that_is_killed_while_the_wheel_sends_leaves_no_process_behind(
@@ -218,7 +256,7 @@ def stepped(
 @pytest.fixture(scope="module")
 def blocks() -> list[Block]:
     wire = write_script(tiny_runs()[:2], Device(), Faults({})).frames
-    wheels = Wheels.of_one(SerialDecoder(), {None: Device()})
+    wheels = Wheels(SerialDecoder(), {None: Device()})
     return [b for i in range(0, len(wire), 3) for b in wheels.push(b"".join(wire[i : i + 3]))]
 
 

@@ -12,13 +12,8 @@ _SUFFIXES = frozenset({".mf4", ".mdf", ".dat"})
 
 
 def extra_files(folder: Path) -> list[Problem]:
-    """Return a warning for each recording in the folder that ``runs.csv`` does not list.
-
-    None where ``runs.csv`` names no files at all: that is the fault to mend first.
-    """
+    """Return a warning for each recording in the folder that ``runs.csv`` does not list."""
     listed = _listed(folder)
-    if listed is None:
-        return []
     return [
         Problem(
             file,
@@ -36,16 +31,13 @@ def extra_files(folder: Path) -> list[Problem]:
     ]
 
 
-def _listed(folder: Path) -> set[str] | None:
-    """Return the files that the rows name, those of faulty rows included; None without a column."""
+def _listed(folder: Path) -> set[str]:
+    """Return the files that the rows name, those of faulty rows included."""
     try:
         with (folder / plan_file.FILE).open(encoding="utf-8-sig", newline="") as stream:
-            table = csv.DictReader(stream)
-            rows = [{k.strip(): v for k, v in row.items() if k} for row in table]
+            rows = [{k.strip(): v for k, v in row.items() if k} for row in csv.DictReader(stream)]
     except (OSError, UnicodeDecodeError, csv.Error):
-        return None
-    if "file" not in {name.strip() for name in table.fieldnames or ()}:
-        return None
+        return set()
     return {(row.get("file") or "").strip().removeprefix("./") for row in rows}
 
 
