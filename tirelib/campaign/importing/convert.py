@@ -13,6 +13,7 @@ import numpy.typing as npt
 from tirelib.axes import sign
 from tirelib.campaign.finding import Finding
 from tirelib.campaign.importing.columns import Column, Table, did_you_mean, row_list
+from tirelib.campaign.importing.defects import Clock
 from tirelib.campaign.importing.mapfile import ChannelRule, ImportMap
 from tirelib.campaign.importing.mapheader import GAGE_TIME, is_gage, strain_number
 from tirelib.campaign.importing.signs import sign_findings
@@ -55,6 +56,20 @@ class Piece:
     gage_time: FloatArray | None = None
     trigger: BoolArray | None = None
     points: dict[str, float] = field(default_factory=dict)
+
+
+def clocks_of(rules: ImportMap, table: Table) -> list[Clock]:
+    """Return the mapped time columns, each with the mapped columns that it times."""
+    channels = rules.channels
+    time = channels["time"].column if "time" in channels else ""
+    fast = channels[GAGE_TIME].column if GAGE_TIME in channels else time
+    timed: dict[str, list[str]] = {}
+    for quantity, rule in channels.items():
+        if quantity in ("time", GAGE_TIME) or rule.column not in table.columns:
+            continue
+        clock = (fast if is_gage(quantity) else time) or table.columns[rule.column].clock
+        timed.setdefault(clock, []).append(rule.column)
+    return [Clock(name, tuple(columns)) for name, columns in timed.items() if name]
 
 
 def convert(table: Table, rules: ImportMap, number: int) -> tuple[list[Piece], list[Finding]]:
@@ -260,7 +275,8 @@ class _Conversion:
                 self.fault("finite", f"column {columns[quantity].name!r} ({quantity})",
                            f"{rows.size} value(s) are NaN or infinite, in {row_list(rows)}",
                            "finite numbers are needed",
-                           "drop these rows, or map another column")  # fmt: skip
+                           'drop these rows or fill them with missing = "drop" or '
+                           '"interpolate" in the map, or map another column')  # fmt: skip
 
     def look(self, columns: dict[str, Column], clocks: Sequence[FloatArray]) -> None:
         """Note what else is wrong in a file that cannot be imported as it stands."""
@@ -327,11 +343,13 @@ class _Conversion:
         rows = np.arange(times.size, dtype=np.intp)[span]
         inside = times[span]
         steps = np.diff(inside)
-        for wrong, given in (
-            (~np.isfinite(inside), "no finite time"),
-            (np.append(False, steps == 0.0), "the time of the row before stands again"),
-            (np.append(False, steps < 0.0), "the time falls"),
-        ):
+        for wrong, given, choice in (
+            (~np.isfinite(inside), "no finite time", 'missing = "drop"'),
+            (np.append(False, steps == 0.0), "the time of the row before stands again",
+             'repeated_time = "drop"'),
+            (np.append(False, steps < 0.0), "the time falls",
+             'backward_time = "drop" or, for segments on end, "join"'),
+        ):  # fmt: skip
             if wrong.any():
                 count = int(np.count_nonzero(wrong))
                 first = int(np.flatnonzero(wrong)[0])
@@ -340,7 +358,7 @@ class _Conversion:
                     f"{given} in {row_list(rows[wrong])} (t = {inside[first]:.6g} s"
                     + (f", {count} in all)" if count > 1 else ")"),
                     "time must grow from row to row",
-                    "sort out the clock at its source, or drop these rows",
+                    f"sort out the clock at its source, or say {choice} in the map",
                 )
                 self.found.append(Finding(given, source, "time", problem))
 

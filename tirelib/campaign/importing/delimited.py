@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tirelib.campaign.importing.columns import Column, Table, refusal
+from tirelib.campaign.importing.columns import Column, FloatArray, Table, refusal
 from tirelib.units import dimensions_of_unit
 
 SEPARATORS = {";": "';'", "\t": "tab", ",": "','", "|": "'|'", " ": "blanks"}
@@ -39,12 +39,15 @@ class CsvOptions:
         Point or comma.
     names_line, units_line : int or None
         Lines, counted from 1, with the names and the units of the columns.
+    text_is_missing : bool
+        Text in a column that holds numbers too is a missing number.
     """
 
     separator: str | None = None
     decimal: str | None = None
     names_line: int | None = None
     units_line: int | None = None
+    text_is_missing: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,12 +84,14 @@ def read_delimited(path: Path, options: CsvOptions) -> Table:
     units = _split(lines[units_at], layout.separator) if units_at is not None else []
     body = [(number, line) for number, line in enumerate(lines[first:], first + 1) if line.strip()]
     _check_counts(str(path), body, layout)
-    columns, left_out = _columns(names, units, [line for _, line in body], layout)
+    columns, left_out, found = _columns(
+        names, units, [line for _, line in body], layout, options.text_is_missing
+    )
     told = f"read as text table: {layout}, names in line {names_at + 1}"
     told += f", units in line {units_at + 1}" if units_at is not None else ""
     told += f", {len(body)} rows from line {first + 1}"
     told += f", encoding {encoding}" if encoding != "utf-8" else ""
-    return Table(str(path), "text table", columns, left_out, (told,))
+    return Table(str(path), "text table", columns, left_out, (told, *found))
 
 
 def _decoded(path: Path) -> tuple[str, str]:
@@ -269,8 +274,13 @@ def _check_counts(file: str, body: Sequence[tuple[int, str]], layout: _Layout) -
 
 
 def _columns(
-    names: Sequence[str], units: Sequence[str], body: Sequence[str], layout: _Layout
-) -> tuple[dict[str, Column], dict[str, str]]:
+    names: Sequence[str],
+    units: Sequence[str],
+    body: Sequence[str],
+    layout: _Layout,
+    text_is_missing: bool,
+) -> tuple[dict[str, Column], dict[str, str], list[str]]:
+    """Return the columns of numbers, why others are none, and what was made of text."""
     import pandas as pd
 
     frame = pd.read_csv(
@@ -286,6 +296,7 @@ def _columns(
     )
     columns: dict[str, Column] = {}
     left_out: dict[str, str] = {}
+    notes: list[str] = []
     for place, name in enumerate(names):
         series = frame[place]
         if not name and series.isna().all():  # every line ends in a separator
@@ -297,8 +308,27 @@ def _columns(
             stated = _bare(units[place]) if units else _unit_in(name)
             columns[name] = Column(name, series.to_numpy(np.float64), stated)
         else:
-            left_out[name] = _first_text([str(cell) for cell in series], layout.decimal)
-    return columns, left_out
+            cells = [str(cell).strip() for cell in series]
+            values = _numbers(cells, layout.decimal)
+            said = _first_text(cells, layout.decimal)
+            if text_is_missing and np.isfinite(values).any():
+                stated = _bare(units[place]) if units else _unit_in(name)
+                columns[name] = Column(name, values, stated)
+                notes.append(f'text = "missing": column {name!r}: {said}')
+            else:
+                left_out[name] = said + (
+                    '; text = "missing" in the map makes it a missing number'
+                    if np.isfinite(values).any()
+                    else ""
+                )
+    return columns, left_out, notes
+
+
+def _numbers(cells: Sequence[str], decimal: str) -> FloatArray:
+    """Return the numbers of a column's cells, NaN for missing ones and for text."""
+    return np.array(
+        [float(c.replace(decimal, ".")) if _is_number(c, decimal) else np.nan for c in cells]
+    )
 
 
 def _unit_in(name: str) -> str:

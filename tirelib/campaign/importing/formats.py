@@ -72,8 +72,12 @@ def read_table(path: Path, options: CsvOptions | None = None) -> Table:
         path, options or CsvOptions()
     )  # fmt: skip
     if not any(column.values.size for column in table.columns.values()):
+        why = "; ".join(f"{name}: {reason}" for name, reason in list(table.left_out.items())[:1])
         raise refusal(
-            file, "it holds no column of numbers", "measured columns are needed", "export it again"
+            file,
+            "it holds no column of numbers" + f" ({why})" * bool(why),
+            "measured columns are needed",
+            "export it again",
         )
     return table
 

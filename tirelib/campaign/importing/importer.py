@@ -17,7 +17,8 @@ from tirelib.campaign import header as header_file
 from tirelib.campaign import plan as plan_file
 from tirelib.campaign.check import check_campaign
 from tirelib.campaign.finding import Finding, gathered
-from tirelib.campaign.importing.convert import Piece, convert
+from tirelib.campaign.importing.convert import Piece, clocks_of, convert
+from tirelib.campaign.importing.defects import mended
 from tirelib.campaign.importing.formats import read_table
 from tirelib.campaign.importing.mapfile import ImportMap, parse_map
 from tirelib.campaign.importing.plans import (
@@ -123,6 +124,7 @@ class _Import:
         self.files = files
         self.progress = progress
         self.notes: list[str] = []
+        self.changes: list[str] = []  # of the data, by choice of the map
         self.rules, self.problems = parse_map(map_file, files[0].stem)
         self._last: tuple[int, list[Piece]] | None = None
 
@@ -168,14 +170,20 @@ class _Import:
             return self._last[1], []
         self._last = None  # one file in memory at a time
         table = read_table(self.files[place], self.rules.csv)
+        changes = [note for note in table.notes if note.startswith("text = ")]
         self.notes += [f"{table.file}: {note}" for note in table.notes]
+        table, done = mended(table, self.rules.defects, clocks_of(self.rules, table),
+                             self.rules.run_column)  # fmt: skip
+        self.notes += [f"{table.file}: {note}" for note in done]
+        self.changes += [f"{Path(table.file).name}: {note}" for note in (*changes, *done)]
         pieces, findings = convert(table, self.rules, place)
         self._last = (place, pieces)
         return pieces, findings
 
     def header(self, clocks: Sequence[tuple[str, int, float]]) -> CampaignHeader:
         """Return the header; its rate is that of all time columns together, if not declared."""
-        header = self.rules.header
+        made = dict.fromkeys(note for note in (self.rules.header.rig_note, *self.changes) if note)
+        header = replace(self.rules.header, rig_note="; ".join(made))
         if not header.gage_lateral or math.isfinite(header.rate) or not clocks:
             return header
         rate = sum(steps for _, steps, _ in clocks) / sum(duration for _, _, duration in clocks)

@@ -3,11 +3,12 @@
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from tirelib.campaign.importing.columns import did_you_mean
+from tirelib.campaign.importing.defects import CHOICES, Defects
 from tirelib.campaign.importing.delimited import CsvOptions
 from tirelib.campaign.importing.mapheader import GAGE_TIME, header_of, strain_number
 from tirelib.campaign.importing.mapreader import (
@@ -26,7 +27,7 @@ POINTS = tuple(column.name for column in SET_POINTS)
 """Names of the set points, as in ``runs.csv``."""
 
 _TOP = ("format", "axes", "name", "kind", "run_column", "tire", "gages", "tolerance", "rig",
-        "channels", "set_points", "runs", "csv")  # fmt: skip
+        "channels", "set_points", "runs", "csv", *CHOICES)  # fmt: skip
 _CHANNEL = ("column", "unit", "factor", "sign", "offset", "override_unit")
 _NAMES = (*(name for name in QUANTITIES if name != "load"), GAGE_TIME, "temperature")
 
@@ -121,6 +122,8 @@ class ImportMap:
     set_points : mapping of column of ``runs.csv`` to SetPointRule
     runs : mapping of run number to RunEntry
     csv : CsvOptions
+    defects : Defects
+        What is done with defects of the recordings.
     warnings : tuple of Problem
     sound : bool
         False when the map has a fault; then axes and set points mean nothing.
@@ -134,6 +137,7 @@ class ImportMap:
     set_points: Mapping[str, SetPointRule]
     runs: Mapping[int, RunEntry]
     csv: CsvOptions
+    defects: Defects
     warnings: tuple[Problem, ...] = ()
     sound: bool = True
 
@@ -184,7 +188,8 @@ def parse_map(path: str | Path, name: str) -> tuple[ImportMap, list[Problem]]:
     run_column = reader.text("", reader.document, "run_column")
     set_points = _set_points(reader, channels)
     runs = _runs(reader)
-    options = read_csv_options(reader)
+    defects = _defects(reader)
+    options = replace(read_csv_options(reader), text_is_missing=defects.text == "missing")
     header, faults = header_of(file, reader.document, channels, name)
     problems = [*reader.problems, *faults]
     errors = errors_of(problems)
@@ -192,8 +197,8 @@ def parse_map(path: str | Path, name: str) -> tuple[ImportMap, list[Problem]]:
     sound = header is not None and not errors
     header = header or CampaignHeader("", "iso", TireGeometry("", math.nan))
     right = {quantity: rule for quantity, rule in channels.items() if quantity not in wrong}
-    rules = ImportMap(file, header, kind, run_column, right, set_points, runs, options, warnings,
-                      sound)  # fmt: skip
+    rules = ImportMap(file, header, kind, run_column, right, set_points, runs, options, defects,
+                      warnings, sound)  # fmt: skip
     return rules, problems
 
 
@@ -202,6 +207,16 @@ def _kind(reader: MapReader, where: str, kind: str) -> str:
         reader.fault(where, f"{kind!r} is given", f"{', '.join(KINDS)} are allowed",
                      did_you_mean(kind, KINDS))  # fmt: skip
     return kind
+
+
+def _defects(reader: MapReader) -> Defects:
+    chosen = {key: reader.text("", reader.document, key) for key in CHOICES}
+    for key, choice in chosen.items():
+        if choice and choice not in CHOICES[key]:
+            reader.fault(key, f"{choice!r} is given",
+                         f"{', '.join(map(repr, CHOICES[key]))} is allowed",
+                         did_you_mean(choice, CHOICES[key]))  # fmt: skip
+    return Defects(**chosen)
 
 
 def _channels(reader: MapReader) -> tuple[dict[str, ChannelRule], set[str]]:
