@@ -35,7 +35,10 @@ class Verbs(click.Group):
         """Import and return one verb."""
         if cmd_name not in VERBS:
             return None
-        command = getattr(import_module(f"bench.cli.{cmd_name}"), cmd_name)
+        try:
+            command = getattr(import_module(f"bench.cli.{cmd_name}"), cmd_name)
+        except ModuleNotFoundError as error:
+            return _lacking(cmd_name, error)
         return command if isinstance(command, click.Command) else None
 
     def resolve_command(
@@ -47,6 +50,24 @@ class Verbs(click.Group):
             meant = f"; did you mean '{near[0]}'?" if near else ""
             ctx.fail(f"no such command '{args[0]}'; there are {', '.join(VERBS)}{meant}")
         return super().resolve_command(ctx, args)
+
+
+def _lacking(verb: str, error: ModuleNotFoundError) -> click.Command:
+    """Return a verb that says which package it lacks; a plain install holds the library only."""
+    package = (error.name or "").partition(".")[0]
+    if package in ("bench", "tirelib"):
+        raise error
+    needs = f"needs the package {package!r}, which is not installed: pip install 'tirelib[bench]'"
+
+    def refuse() -> None:
+        raise BenchError(f"tirebench {verb}: it {needs}")
+
+    return click.Command(
+        verb,
+        callback=refuse,
+        help=f"It {needs}.",
+        context_settings={"ignore_unknown_options": True, "allow_extra_args": True},
+    )
 
 
 @click.group(cls=Verbs, epilog=_EXAMPLE)

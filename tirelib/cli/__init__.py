@@ -29,6 +29,9 @@ VERBS = (
 """Verbs; each is the command of that name in the module of that name (`import_` for import, `_` in
 place of `-`)."""
 
+OPTIONAL = {"pythonfmu": "fmu", "fmpy": "fmu"}
+"""Packages that a plain install lacks, and the extra that brings each."""
+
 _EXAMPLE = """\b
 Examples:
   tirelib rig --plan set1 --out build/out/set1
@@ -71,6 +74,16 @@ def main() -> None:
         program(prog_name="tirelib")
     except TirelibError as error:
         click.echo(f"Error: {error}", err=True)
+        sys.exit(2)
+    except ModuleNotFoundError as error:
+        package = (error.name or "").partition(".")[0]
+        if package not in OPTIONAL:
+            raise
+        click.echo(
+            f"Error: the package {package!r} is not installed, which this verb needs; install it "
+            f"with pip install 'tirelib[{OPTIONAL[package]}]'",
+            err=True,
+        )
         sys.exit(2)
     except OSError as error:
         click.echo(f"Error: {error.filename}: {error.strerror}; choose another place", err=True)
