@@ -5,6 +5,7 @@ to `MOST_TIMES` what they take in the file. The records of a chunk are yielded o
 """
 
 import io
+import zlib
 from collections.abc import Iterator
 from typing import BinaryIO
 
@@ -69,6 +70,8 @@ def _unpacked(chunk: Chunk) -> bytes:
         raise RecordingError(
             f"a chunk unpacks to {len(content)} bytes or more; it says {chunk.uncompressed_size}"
         )
+    if chunk.uncompressed_crc and zlib.crc32(content) != chunk.uncompressed_crc:
+        raise RecordingError("a chunk is damaged: what it holds is not what its checksum says")
     return content
 
 

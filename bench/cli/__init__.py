@@ -10,7 +10,7 @@ from bench.errors import BenchError
 from tirelib import __version__
 from tirelib.errors import TirelibError
 
-VERBS = ("ports", "load", "emulate", "run", "record", "replay", "export")
+VERBS = ("ports", "load", "emulate", "run", "record", "replay", "export", "repair")
 """Verbs; each is the command of that name in the module of that name."""
 
 _EXAMPLE = """\b
