@@ -26,6 +26,10 @@ UNITS = {"speed": ("km/h", "speed"), "pressure": ("bar", "pressure"), "camber": 
          "omega": ("rad/s", "angular_speed")}  # fmt: skip
 QUANTITIES = {name: UNITS[name] for name in HELD}
 """Unit in files and dimension of each condition, in the order of `tirelib.held.HELD`."""
+TELLABLE = {**{name: (name, dimension) for name, (_, dimension) in QUANTITIES.items()},
+            "temperature": ("tread_temperature", "temperature")}  # fmt: skip
+"""What a bus may tell, by its name in a map: the condition, and its dimension. What is no condition
+of the estimator is left alone."""
 TRUTH = {"Fz": ("N", "force"), "alpha": ("deg", "angle"), "kappa": ("1", "ratio"),
          "Fy": ("N", "force")}  # fmt: skip
 ROUNDING = 0.6
@@ -98,6 +102,15 @@ class Conditions:
         """Return conditions that do not change, SI, by order or name."""
         return cls((0,), (condition(*values, **known),))
 
+    @property
+    def known(self) -> tuple[str, ...]:
+        """Names of what is known at any time."""
+        return tuple(
+            name
+            for index, name in enumerate(QUANTITIES)
+            if any(not math.isnan(value[index]) for value in self.values)
+        )
+
     def at(self, t_us: float) -> Condition:
         """Return what holds at a device time."""
         if len(self.t_us) == 1 and self.t_us[0] == 0:
@@ -136,10 +149,13 @@ class Measured:
     name : str
         One of `tirelib.held.HELD`.
     value : float, SI
+    wheel : int or None
+        For which it holds; None: for all.
     """
 
     name: str
     value: float
+    wheel: int | None = None
 
 
 class Held:
@@ -155,6 +171,8 @@ class Held:
 
     def tell(self, t_us: int, measured: Measured) -> None:
         """Note what holds from a device time on."""
+        if measured.name not in QUANTITIES:
+            return
         index = list(QUANTITIES).index(measured.name)
         last = next((value for _, i, value in reversed(self._told) if i == index), None)
         if last != measured.value:

@@ -10,7 +10,7 @@ length, never changed.
 
 import resource
 from collections import Counter
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -21,7 +21,7 @@ from bench.decoder import SerialDecoder
 from bench.frames import Frames, encode
 from bench.line_counts import LineCounts
 from bench.protocols.frame_decoder import PackedDecoder
-from bench.protocols.layouts import LAYOUTS, RAW12C, RAW16, Raw, encode_raw12c, encode_raw16
+from bench.protocols.layouts import LAYOUTS, RAW12C, RAW16, Health, Raw, encode_raw12c, encode_raw16
 from bench.protocols.slcan import SlcanDecoder
 from bench.protocols.slcan import encode as slcan_lines
 from bench.protocols.wheel_can import WheelCan
@@ -217,6 +217,10 @@ class _Tap:
         ours &= (batch.identifier >= layout.base) & (batch.identifier < layout.base + 8)
         self._keys += _bus_keys(batch.take(ours), self._kind)
         return self._frames.push(batch, arrival)
+
+    @property
+    def health(self) -> Mapping[int, Health]:
+        return self._frames.health
 
     def interrupt(self) -> None:
         """Forget what waits."""

@@ -6,7 +6,9 @@ are cut into reads: a replay decodes to the same frames and the same counts.
 """
 
 import zlib
+from collections.abc import Mapping
 from itertools import groupby
+from types import MappingProxyType
 
 import numpy as np
 from cobs import cobs
@@ -21,6 +23,7 @@ from bench.frames import (
     layout,
 )
 from bench.line_counts import LineCounts
+from bench.protocols.layouts import Health
 
 _COUNT_AT = 10  # offset of `n` in the header
 _PERIOD_AT = 8  # offset of `period` in the header
@@ -34,6 +37,8 @@ class SerialDecoder:
     The line may be joined in the middle of a frame: a first piece that is no frame is not counted
     as damage.
     """
+
+    health: Mapping[int, Health] = MappingProxyType({})
 
     def __init__(self) -> None:
         self.counts = LineCounts()

@@ -84,7 +84,7 @@ def wheel_document(wheels: Wheels, number: int) -> dict[str, Any]:
     wheel = wheels.heard[number]
     clock = wheel.clock
     return {
-        **line_document(wheels.line.counts, wheel.timeline.counts),
+        **line_document(wheels.line_counts(number), wheel.timeline.counts),
         "clock_drift_ppm": _number(clock.drift_ppm),
         "clock_residual_us": _number(1e6 * clock.residual),
     }

@@ -67,7 +67,8 @@ class Frames:
     Attributes
     ----------
     wheel, seq, t_us, period, flags, rssi, temperature : int arrays
-        As the header has them, `period` in ticks of 0.1 us.
+        As the header has them, `period` in ticks of 0.1 us; an `rssi` of 0 is not known, nor is
+        the temperature then.
     counts : int16 or int32 array, shape (m, n, 5)
     """
 

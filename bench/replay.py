@@ -39,11 +39,11 @@ class ReplayChain:
             self.ended = "end"
             return News()
         if read.event in (BACK, RESUMED):
-            self.wheels.interrupt()
+            self.wheels.interrupt(read.source)
         if not read.data:
             return News()
         self.heard, self.last_byte = time.time(), time.monotonic()
-        return self._estimation.take(self.wheels.push(read.data, read.arrival))
+        return self._estimation.take(self.wheels.push(read.data, read.arrival, read.source))
 
     def finish(self, reason: str) -> News:
         """Step what is left."""

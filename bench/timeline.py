@@ -118,6 +118,7 @@ class Timeline:
 
     def __init__(self, device: Device, wheel: int | None = None) -> None:
         self.counts = TimelineCounts()
+        self.received = 0  # samples so far
         self.wheel = wheel
         self._device = device
         self._segment = -1
@@ -220,6 +221,11 @@ class Timeline:
         return self._time + self._frame_time
 
     @property
+    def rate(self) -> float:
+        """Sample rate of the gages, as the wheel says it, [Hz]; 0 before the first frame."""
+        return 1.0 / (self._period * TICK) if self._period else 0.0
+
+    @property
     def _frame_time(self) -> int:
         """Microseconds from the first sample of the last frame to the end of that frame."""
         return round(self._samples * self._period / 10)
@@ -245,6 +251,7 @@ class Timeline:
         self._period = int(frames.period[0])
         self._rate.push(int(frames.wheel[0]), frames)
         strain, saturated = self._device.strain(frames.counts, frames.flags)
+        self.received += len(strain)
         if saturated.any():
             seen = saturated.sum(axis=0).tolist()
             self.counts.saturated = [

@@ -1,14 +1,17 @@
-"""One line, several wheels: bytes to the samples of each wheel, in line, with its clock.
+"""Several lines, several wheels: bytes to the samples of each wheel, in line, with its clock.
 
 All of it can be pickled, so that a reader that is started again goes on where the last one was.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
 
 from bench.clock import ClockFit
 from bench.conditions import Measured
 from bench.device import Device
+from bench.errors import DeviceError
 from bench.frames import Frames, select
 from bench.line_counts import LineCounts
 from bench.protocols import Decoder
@@ -54,11 +57,18 @@ class Wheel:
     timeline : Timeline
     clock : ClockFit
         The wheel's clock against the host's.
+    told : dict of float, SI
+        What a bus told last of the conditions, by name.
+    rssi, temperature : int or None, [dBm], [degC]
+        As the last frame says.
     """
 
     def __init__(self, device: Device, number: int) -> None:
         self.timeline = Timeline(device, number)
         self.clock = ClockFit()
+        self.told: dict[str, float] = {}
+        self.rssi: int | None = None
+        self.temperature: int | None = None
         self._number = number
         self._first_us: int | None = None
 
@@ -73,8 +83,10 @@ class Wheel:
         newest: int | None = None
         for item in items:
             if isinstance(item, Measured):
+                self.told[item.name] = item.value
                 blocks.append(self._block(Told(self.timeline.end_us, item), arrival))
                 continue
+            self._note(item)
             for samples in self.timeline.push(item):
                 if samples.reset:
                     self.clock.restart()
@@ -86,18 +98,71 @@ class Wheel:
             self.clock.push(newest, arrival)
         return blocks
 
+    def _note(self, frames: Frames) -> None:
+        """Remember what the wheel says of itself."""
+        if len(frames) and frames.rssi[-1]:
+            self.rssi, self.temperature = int(frames.rssi[-1]), int(frames.temperature[-1])
+
     def _block(self, content: Samples | Told, arrival: int) -> Block:
         return Block(self._number, arrival, self._first_us or 0, content)
 
 
+@dataclass(frozen=True, slots=True)
+class Line:
+    """What one source of bytes means.
+
+    Attributes
+    ----------
+    decoder : Decoder
+        Fresh.
+    devices : mapping of wheel to Device
+        ``None`` is the key of the device for all others.
+    wheel : int or None
+        Number that the only wheel of this line gets; None: numbers are as sent.
+    name : str
+        For messages.
+    """
+
+    decoder: Decoder
+    devices: Mapping[int | None, Device]
+    wheel: int | None = None
+    name: str = "the line"
+
+    def push(self, data: bytes, arrival: int) -> list[Frames | Measured]:
+        """Return what bytes bring, with the wheels' numbers of the run.
+
+        Raises
+        ------
+        DeviceError
+            If a second wheel is heard where one was said.
+        """
+        items = list(self.decoder.push(data, arrival))
+        return items if self.wheel is None else [self._numbered(item) for item in items]
+
+    def _numbered(self, item: Frames | Measured) -> Frames | Measured:
+        if isinstance(item, Measured):
+            return item
+        sent = sorted(set(item.wheel.tolist()))
+        if len(sent) > 1:
+            raise DeviceError(
+                f"{self.name}: wheels {', '.join(map(str, sent))} are heard; one is allowed where "
+                f"the source says wheel = {self.wheel}; leave that out, and give each transmitter "
+                "a number of its own"
+            )
+        return replace(item, wheel=np.full(len(item), self.wheel))
+
+    def device(self, wheel: int) -> Device:
+        """Return what the counts of a wheel mean."""
+        return self.devices.get(wheel, self.devices.get(None, Device()))
+
+
 class Wheels:
-    """Bytes of one line to the samples of all its wheels; the same bytes give the same samples.
+    """Bytes of all lines to the samples of all wheels; the same bytes give the same samples.
 
     Parameters
     ----------
-    decoder : Decoder
-    devices : mapping of wheel to Device
-        ``None`` is the key of the device for all others.
+    lines : sequence of Line
+        By the number of the source.
     chosen : sequence of int, optional
         Wheels to look at; by default the first `MOST` that are heard.
 
@@ -109,36 +174,60 @@ class Wheels:
         Frames of other wheels.
     """
 
-    def __init__(
-        self,
+    def __init__(self, lines: Sequence[Line], chosen: Sequence[int] = ()) -> None:
+        self.lines = tuple(lines)
+        self.heard: dict[int, Wheel] = {}
+        self.ignored = 0
+        self._chosen = tuple(chosen)
+        self._sources: dict[int, int] = {}  # of each wheel that was heard
+        self._told: dict[tuple[str, int | None], Measured] = {}  # what a bus told last
+
+    @classmethod
+    def of_one(
+        cls,
         decoder: Decoder,
         devices: Mapping[int | None, Device],
         chosen: Sequence[int] = (),
-    ) -> None:
-        self.line = decoder
-        self.heard: dict[int, Wheel] = {}
-        self.ignored = 0
-        self._devices = dict(devices)
-        self._chosen = tuple(chosen)
-        self._told: dict[str, Measured] = {}  # what the bus told last
+    ) -> "Wheels":
+        """Return the wheels of a single line."""
+        return cls([Line(decoder, devices)], chosen)
 
-    def push(self, data: bytes, arrival: int = 0) -> list[Block]:
-        """Take bytes that came at a moment [ns, monotonic] and return what they bring."""
+    @property
+    def line(self) -> Decoder:
+        """The decoder of the first line."""
+        return self.lines[0].decoder
+
+    def push(self, data: bytes, arrival: int = 0, source: int = 0) -> list[Block]:
+        """Take bytes of a source that came at a moment [ns, monotonic]; return what they bring.
+
+        What a bus tells holds for the wheels of all lines, from the sample that comes next.
+
+        Raises
+        ------
+        DeviceError
+            If a wheel comes from two sources.
+        """
         sorted_items: dict[int, list[Frames | Measured]] = {wheel: [] for wheel in self.heard}
-        for item in self.line.push(data, arrival):
+        told: dict[tuple[str, int | None], Measured] = {}  # since the last frame of strain
+        for item in self.lines[source].push(data, arrival):
             if isinstance(item, Measured):
-                self._told[item.name] = item
-                for items in sorted_items.values():
-                    items.append(item)
+                told[item.name, item.wheel] = item
                 continue
+            self._tell(told, sorted_items)
             numbers = sorted(set(item.wheel.tolist()))
             for wheel in numbers:
                 rows = item.wheel == wheel
-                if self._wanted(wheel, len(sorted_items)):
-                    items = sorted_items.setdefault(wheel, list(self._told.values()))
-                    items.append(item if len(numbers) == 1 else select(item, rows))
-                else:
+                if not self._wanted(wheel, len(sorted_items)):
                     self.ignored += int(rows.sum())
+                    continue
+                if self._sources.setdefault(wheel, source) != source:
+                    raise self._twice(wheel, source)
+                known: list[Frames | Measured] = [
+                    one for one in self._told.values() if one.wheel in (None, wheel)
+                ]
+                items = sorted_items.setdefault(wheel, known)
+                items.append(item if len(numbers) == 1 else select(item, rows))
+        self._tell(told, sorted_items)
         return [
             block
             for wheel, items in sorted_items.items()
@@ -146,17 +235,38 @@ class Wheels:
             for block in self._wheel(wheel).take(items, arrival)
         ]
 
+    def _tell(
+        self,
+        told: dict[tuple[str, int | None], Measured],
+        sorted_items: dict[int, list[Frames | Measured]],
+    ) -> None:
+        """Hand what a bus told to the wheels for which it holds, and forget it."""
+        for item in told.values():
+            for wheel, items in sorted_items.items():
+                if item.wheel in (None, wheel):
+                    items.append(item)
+        self._told |= told
+        told.clear()
+
+    def line_counts(self, wheel: int) -> LineCounts:
+        """Return what the line of a wheel has seen and lost."""
+        return self.lines[self._sources.get(wheel, 0)].decoder.counts
+
     @property
     def counts(self) -> tuple[LineCounts, TimelineCounts]:
-        """What was seen and lost so far, all wheels together."""
+        """What was seen and lost so far, all lines and all wheels together."""
         total = sum((wheel.timeline.counts for wheel in self.heard.values()), TimelineCounts())
         total.other_wheel += self.ignored
-        return self.line.counts, total
+        lines = [line.decoder.counts for line in self.lines]
+        names = [field.name for field in fields(LineCounts)]
+        seen = LineCounts(*(sum(getattr(line, name) for line in lines) for name in names))
+        return seen, total
 
-    def interrupt(self) -> None:
-        """Note that the line was broken here: a half frame is forgotten."""
-        self.line.interrupt()
-        self.line.counts.reconnects += 1
+    def interrupt(self, source: int = 0) -> None:
+        """Note that a line was broken here: a half frame is forgotten."""
+        decoder = self.lines[source].decoder
+        decoder.interrupt()
+        decoder.counts.reconnects += 1
 
     def _wanted(self, wheel: int, heard: int) -> bool:
         if self._chosen:
@@ -165,6 +275,13 @@ class Wheels:
 
     def _wheel(self, number: int) -> Wheel:
         if number not in self.heard:
-            device = self._devices.get(number, self._devices.get(None, Device()))
-            self.heard[number] = Wheel(device, number)
+            line = self.lines[self._sources.get(number, 0)]
+            self.heard[number] = Wheel(line.device(number), number)
         return self.heard[number]
+
+    def _twice(self, wheel: int, source: int) -> DeviceError:
+        names = self.lines[self._sources[wheel]].name, self.lines[source].name
+        return DeviceError(
+            f"wheel {wheel} comes from {names[0]} and from {names[1]}; each wheel may come from "
+            "one source; say `wheel = N` of a source in the setup, or --port N=PORT"
+        )

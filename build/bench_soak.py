@@ -296,7 +296,7 @@ def run(
         recorder = Hourly(out, conditions)
         stack.callback(recorder.close)
         wire = Wire(counts, faults, hours, recorder)
-        wheels = Wheels(ProtocolPlan().decoder(), {None: Device()})
+        wheels = Wheels.of_one(ProtocolPlan().decoder(), {None: Device()})
         file = stack.enter_context(FmuFile(read_fmu(fmu)))
         model = stack.enter_context(FmuModel(file))
         estimation = Estimation(lambda _: model, conditions, laps=False)

@@ -170,7 +170,13 @@ def _measure(run: Run, header: CampaignHeader, low_pass: LowPass) -> _Row | str:
     )
     waves, steps = _whole_turns(run, turns, low_pass)
     if len(waves) < 1:
-        return f"holds no whole turn between contacts ({len(turns)} contacts)"
+        finder = int(np.argmin(np.abs(header.gage_lateral)))
+        lost = np.mean(~np.isfinite(run.strain[finder]))
+        because = (
+            f", and {lost:.0%} of the samples of gage {finder + 1}, which finds the contacts, are "
+            "no numbers (NaN)"
+        )
+        return f"holds no whole turn between contacts ({len(turns)} contacts{because * bool(lost)})"
     stack = np.stack(waves)
     stack = stack - stack.mean(axis=2, keepdims=True)
     mean = stack.mean(axis=0)

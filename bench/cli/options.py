@@ -8,8 +8,8 @@ import click
 
 from bench.device import Device, read_device
 from bench.errors import DeviceError
-from bench.links.opening import BITRATE, PortPlan
-from bench.protocols.plan import RATE, ProtocolPlan
+from bench.links.opening import BITRATE
+from bench.protocols.plan import RATE
 from tirelib.cli.common import FILE
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -45,26 +45,6 @@ def port_options(command: Command) -> Command:
     for option in reversed(_PORT_OPTIONS):
         command = option(command)
     return command
-
-
-def protocol_of(port: PortPlan, rate: float, map_file: Path | None) -> ProtocolPlan:
-    """Return what is on a port.
-
-    Raises
-    ------
-    DeviceError
-        If a map is given for a line that has none.
-    """
-    from bench.protocols import SERIAL
-    from bench.protocols.user_map import read_map
-
-    if map_file is not None and port.encoding == SERIAL:
-        raise DeviceError(
-            f"--map {map_file} with --port {port.port}: a map is for CAN frames; "
-            "slcan:... or can:... is needed; leave it out, or name such a port"
-        )
-    user = None if map_file is None else read_map(map_file)
-    return ProtocolPlan(port.encoding, rate if user is None else user.rate, user)
 
 
 def devices_of(texts: Sequence[str]) -> tuple[dict[int | None, Device], str]:

@@ -1,6 +1,6 @@
 """Options of the live page, and what is said of it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from importlib.util import find_spec
 from pathlib import Path
@@ -79,7 +79,7 @@ class Shown:
         switch: Switch | None,
         fmu: Path,
         calibration: Calibration | None,
-        devices: Mapping[int | None, Device],
+        devices: Sequence[Device],
     ) -> None:
         """Start what is to be shown and say where it is."""
         choice, console = self._choice, self._console
@@ -89,7 +89,7 @@ class Shown:
             choice = PageChoice(False, choice.terminal)
         if not (choice.page or choice.terminal):
             return
-        lateral = next((d.lateral for d in devices.values() if d.lateral), None)
+        lateral = next((d.lateral for d in devices if d.lateral), None)
         about = About(source.name, fmu.name)
         if calibration is not None:
             about = About(source.name, fmu.name, calibration.tire, calibration.lateral)

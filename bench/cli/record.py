@@ -5,19 +5,22 @@ from typing import Any
 
 import click
 
+from bench.cli.given import given_live, live_sources
 from bench.cli.live import counters
-from bench.cli.options import PORTS, devices_of, port_options, protocol_of
+from bench.cli.options import PORTS, devices_of, port_options
 from bench.cli.recording import recording_options, room
 from bench.cli.stop import on_stop
-from bench.conditions import Conditions, read_conditions
+from bench.conditions import read_conditions
 from bench.document import line_document, wheel_document
 from bench.estimation import News
 from bench.links.opening import PortPlan
 from bench.live.chain import LiveChain, LivePlan
 from bench.live.reader import ReaderPlan
 from bench.live.recording_state import RecordingRule
+from bench.protocols.plan import ProtocolPlan
 from bench.recording_header import RecordingHeader
 from bench.session import Limits, Session
+from bench.source_plan import SourcePlan
 from tirelib.cli.common import FILE, NEW_FILE, write_json
 
 _EXAMPLE = f"""\b
@@ -33,7 +36,10 @@ Exit code: 0 done, 1 the port went away or not one good frame came, 2 bad input.
 
 
 @click.command(epilog=_EXAMPLE)
-@click.option("--port", metavar="PORT", required=True, help="Port to read; see below.")
+@click.option("--port", "ports", metavar="[WHEEL=]PORT", multiple=True,
+              help="Port to read, several allowed; see below.")  # fmt: skip
+@click.option("--setup", metavar="S.toml", type=FILE,
+              help="Several sources, each with its protocol, wheel and device file.")  # fmt: skip
 @click.option("--out", metavar="FILE.mcap", type=NEW_FILE, required=True, help="A new file.")
 @recording_options
 @click.option("--conditions", "sidecar", metavar="F.json", type=FILE,
@@ -48,7 +54,8 @@ Exit code: 0 done, 1 the port went away or not one good frame came, 2 bad input.
 @click.pass_context
 def record(
     context: click.Context,
-    port: str,
+    ports: tuple[str, ...],
+    setup: Path | None,
     out: Path,
     rule: RecordingRule,
     sidecar: Path | None,
@@ -65,16 +72,20 @@ def record(
     json_file: Path | None,
 ) -> None:
     """Record the raw bytes of a port; Ctrl-C ends in good order."""
-    plan = PortPlan(port, baud, bitrate, data_bitrate, bus_options)
-    protocol = protocol_of(plan, rate, map_file)
+    if bool(ports) == (setup is not None):
+        raise click.UsageError("just one of --port and --setup is needed")
     devices, text = devices_of(device_texts)
-    conditions = Conditions.constant() if sidecar is None else read_conditions(sidecar)
-    settings: dict[str, Any] = {"port": port, "baud": baud, "bitrate": bitrate,
+    plan = PortPlan("", baud, bitrate, data_bitrate, bus_options)
+    usual = SourcePlan(plan, ProtocolPlan(rate=rate), devices, None, text)
+    given = None if sidecar is None else read_conditions(sidecar)
+    known = given_live(live_sources(ports, setup, map_file, usual), given, ())
+    settings: dict[str, Any] = {"ports": [source.port.port for source in known.sources],
+                                "baud": baud, "bitrate": bitrate,
                                 "data_bitrate": data_bitrate}  # fmt: skip
-    header = RecordingHeader(settings, text, "", protocol.as_header())
-    reader = ReaderPlan(plan, reconnect, protocol, devices or {None: protocol.device},
-                        strain=rule.strain)  # fmt: skip
-    with LiveChain(LivePlan(reader, None, conditions, header, out, rule=rule)) as chain:
+    first, *more = (source.as_header() for source in known.sources)
+    header = RecordingHeader(settings, text, "", first, tuple(more))
+    reader = ReaderPlan(known.sources, reconnect, strain=rule.strain)
+    with LiveChain(LivePlan(reader, None, known.conditions, header, out, rule=rule)) as chain:
         session = Session(chain, limits=Limits(duration, silence), watch=_alarm)
         click.echo(f"{chain.name} -> {out}")
         click.echo(room(out, 1))

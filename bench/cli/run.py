@@ -1,9 +1,7 @@
 """``tirebench run``: a port or a recording through the FMU file, live."""
 
 import time
-from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 
 import click
@@ -12,23 +10,23 @@ from rich.console import Console
 
 from bench.chain import Estimator
 from bench.cli.bridges import Bridges, bridge_options
-from bench.cli.live import Screen, counters
-from bench.cli.options import (
-    PORTS,
-    devices_of,
-    devices_of_text,
-    port_options,
-    protocol_of,
+from bench.cli.given import (
+    Given,
+    conditions_of,
+    given_live,
+    given_replayed,
+    live_sources,
+    port_of_file,
+    say_missing,
 )
+from bench.cli.live import Screen, counters
+from bench.cli.options import PORTS, devices_of, port_options
 from bench.cli.page import Shown, page_choice, page_options
 from bench.cli.recording import recording_options, room
 from bench.cli.stop import on_stop
-from bench.conditions import Conditions, read_conditions
-from bench.device import Device
 from bench.document import document
-from bench.errors import DeviceError
 from bench.estimation import Estimation, News
-from bench.fmu_archive import FmuArchive, read_fmu
+from bench.fmu_archive import read_fmu
 from bench.fmu_model import FmuFile, FmuModel
 from bench.journal import Journal
 from bench.links.opening import PortPlan
@@ -42,10 +40,9 @@ from bench.protocols.plan import ProtocolPlan
 from bench.recording_header import RecordingHeader, parts_of
 from bench.replay import ReplayChain
 from bench.session import Limits, Outcome, Session, Source
+from bench.source_plan import SourcePlan, wheels_of
 from bench.trust import check_trust
-from bench.wheels import Wheels
 from tirelib.cli.common import FILE, NEW_FILE, output
-from tirelib.units import to_si
 
 _EXAMPLE = f"""\b
 Examples:
@@ -63,29 +60,16 @@ Exit code: 0 done, 1 unplugged or not one valid turn, 2 bad input. Ctrl-C ends i
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Given:
-    """What the bytes mean and what is known beside them.
-
-    Attributes
-    ----------
-    protocol : ProtocolPlan
-    devices : mapping of wheel to Device
-    device_text : str
-        Of the device files.
-    conditions : Conditions
-    wheels : tuple of int
-    """
-
-    protocol: ProtocolPlan
-    devices: Mapping[int | None, Device]
-    device_text: str
-    conditions: Conditions
-    wheels: tuple[int, ...]
-
-
 @click.command(epilog=_EXAMPLE)
-@click.option("--port", metavar="PORT", help="Port to read; see below and `tirebench ports`.")
+@click.option("--port", "ports", metavar="[WHEEL=]PORT", multiple=True,
+              help="Port to read, several allowed; see below and `tirebench ports`.")  # fmt: skip
+@click.option("--setup", metavar="S.toml", type=FILE,
+              help="Several sources, each with its protocol, wheel and device file.")  # fmt: skip
+@click.option("--port-file", metavar="FILE", type=FILE,
+              help="File that holds the port's name (`emulate --port-file`).")  # fmt: skip
+@click.option("--wait", metavar="[S]", type=click.FloatRange(min=0.0), default=0.0,
+              is_flag=False, flag_value=60.0,
+              help="Wait for ports that are not there yet, 60 s unless said.")  # fmt: skip
 @click.option("--replay", metavar="FILE", type=FILE, help="Recording to read instead.")
 @click.option("--pace", metavar="X", type=click.FloatRange(0.001, 1000.0),
               help="Replay at X times real time.  [default: as fast as possible]")  # fmt: skip
@@ -120,7 +104,10 @@ class Given:
 @click.pass_context
 def run(
     context: click.Context,
-    port: str | None,
+    ports: tuple[str, ...],
+    setup: Path | None,
+    port_file: Path | None,
+    wait: float,
     replay: Path | None,
     pace: float | None,
     fmu_file: Path,
@@ -155,52 +142,58 @@ def run(
     tui: bool,
 ) -> None:
     """Estimate Fz, alpha, kappa and Fy of each turn, live from a port or from a recording."""
-    if (port is None) == (replay is None):
-        raise click.UsageError("just one of --port and --replay is needed")
+    if [bool(ports), setup is not None, port_file is not None, replay is not None].count(True) != 1:
+        raise click.UsageError("just one of --port, --setup, --port-file and --replay is needed")
     if replay is not None and record is not None:
         raise click.UsageError("--record goes with --port: a recording is there already")
     priority = realtime(asked) if replay is None else ""
     paced = replay is None or pace is not None
     choice = page_choice(page, host, network, page_port, tui, paced=paced)
     archive = read_fmu(fmu_file)
-    conditions = _conditions(speed, pressure, camber, sidecar)
     devices, device_text = devices_of(device_texts)
-    plan = PortPlan(port or "", baud, bitrate, data_bitrate, bus_options)
+    plan = PortPlan("", baud, bitrate, data_bitrate, bus_options)
     console = output()
+    if port_file is not None:
+        ports = (port_of_file(port_file, wait, console),)
+    conditions = conditions_of(speed, pressure, camber, sidecar)
     console.print(f"FMU {fmu_file}, sha256 {archive.sha256}", soft_wrap=True)
     console.print(f"FMU {check_trust(archive, trust=trust)}", soft_wrap=True)
     with ExitStack() as stack:
         file = stack.enter_context(FmuFile(archive))
         link = None if replay is None else stack.enter_context(ReplayLink(replay, pace))
         if link is None:
-            protocol = protocol_of(plan, rate, map_file)
-            known = Given(protocol, devices or {None: protocol.device}, device_text,
-                          conditions or Conditions.constant(), numbers)  # fmt: skip
+            usual = SourcePlan(plan, ProtocolPlan(rate=rate), devices, None, device_text)
+            sources = live_sources(ports, setup, map_file, usual)
+            known = given_live(sources, conditions, numbers)
         else:
-            known = _replayed(link, conditions, devices, numbers, archive, console)
+            known = given_replayed(link, conditions, devices, numbers, console)
+            recorded_with = link.recording.header.fmu
+            if recorded_with and recorded_with != archive.sha256:
+                console.print(f"note: recorded with another FMU ({recorded_with[:12]}...)")
         calibration = file.calibration
         if calibration is not None:
-            for device in known.devices.values():
+            for device in known.devices:
                 device.check_layout(calibration.lateral, str(fmu_file))
+            say_missing(known, calibration, console)
         bridges = stack.enter_context(Bridges(estimates_out, plotjuggler, plan))
         shown = Shown(choice, console)
         switch: RecordingSwitch | None = None
         source: Source
         if link is None:
-            settings = {"port": port, "baud": baud, "bitrate": bitrate,
-                        "data_bitrate": data_bitrate, "wheels": list(numbers),
+            settings = {"ports": [source.port.port for source in known.sources], "baud": baud,
+                        "bitrate": bitrate, "data_bitrate": data_bitrate, "wheels": list(numbers),
                         "fmu": str(fmu_file), "speed_kmh": speed, "pressure_bar": pressure,
                         "camber_deg": camber}  # fmt: skip
-            header = RecordingHeader(settings, device_text, archive.sha256,
-                                     known.protocol.as_header())  # fmt: skip
+            first, *more = (source.as_header() for source in known.sources)
+            header = RecordingHeader(settings, device_text, archive.sha256, first, tuple(more))
             recorded = record is not None or shown.anything
-            reader = ReaderPlan(plan, reconnect, known.protocol, known.devices, numbers, recorded,
-                                every_turn, rule.strain)  # fmt: skip
+            reader = ReaderPlan(known.sources, reconnect, numbers, recorded, every_turn,
+                                rule.strain, wait)  # fmt: skip
             chain = stack.enter_context(LiveChain(
                 LivePlan(reader, file, known.conditions, header, record, shown.anything, rule)
             ))  # fmt: skip
-            first = record or Path(time.strftime("tirebench-%Y%m%d-%H%M%S.mcap"))
-            switch = RecordingSwitch(chain, first, started=record is not None)
+            file_name = record or Path(time.strftime("tirebench-%Y%m%d-%H%M%S.mcap"))
+            switch = RecordingSwitch(chain, file_name, started=record is not None)
             source = chain
         else:
             source = _in_process(link, file, known, stack, laps=shown.anything)
@@ -237,7 +230,7 @@ def _in_process(
     def estimator(_: int) -> Estimator:
         return stack.enter_context(FmuModel(file))
 
-    wheels = Wheels(known.protocol.decoder(), known.devices, known.wheels)
+    wheels = wheels_of(known.sources, known.wheels)
     jumps = link.recording.jumps()
     return ReplayChain(link, wheels, Estimation(estimator, known.conditions, jumps, laps=laps))
 
@@ -281,49 +274,6 @@ def _session(
 def _cpu_time(source: Source, shown: Shown) -> float:
     """Return what all processes of the run have used, [s]."""
     return time.process_time() + source.cpu_time() + shown.cpu_time()
-
-
-def _conditions(
-    speed: float | None, pressure: float | None, camber: float | None, sidecar: Path | None
-) -> Conditions | None:
-    """Return conditions of the options; None when there are none."""
-    values = {"speed": (speed, "km/h", "speed"), "pressure": (pressure, "bar", "pressure"),
-              "camber": (camber, "deg", "angle")}  # fmt: skip
-    given = {
-        name: to_si(value, unit, dimension)
-        for name, (value, unit, dimension) in values.items()
-        if value is not None
-    }
-    if sidecar is None:
-        return Conditions.constant(**given) if given else None
-    if given:
-        raise DeviceError(
-            f"--{', --'.join(given)} and --conditions {sidecar} are given; one or the other says "
-            "what holds; leave one out"
-        )
-    return read_conditions(sidecar)
-
-
-def _replayed(
-    link: ReplayLink,
-    conditions: Conditions | None,
-    devices: Mapping[int | None, Device],
-    wheels: tuple[int, ...],
-    archive: FmuArchive,
-    console: Console,
-) -> Given:
-    """Return what a recording says; options that are given replace it, and that is said."""
-    header = link.recording.header
-    protocol = ProtocolPlan.of_header(header.protocol, link.name)
-    if header.fmu and header.fmu != archive.sha256:
-        console.print(f"note: recorded with another FMU ({header.fmu[:12]}...)")
-    if devices or conditions is not None:
-        console.print("note: device file or conditions of the recording are replaced by options")
-    own = devices_of_text(header.device, link.name) or {None: protocol.device}
-    if not wheels:
-        wheels = tuple(header.settings.get("wheels") or ())
-    return Given(protocol, devices or own, header.device,
-                 conditions or link.recording.conditions, wheels)  # fmt: skip
 
 
 def _summary(

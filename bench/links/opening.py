@@ -4,6 +4,9 @@
 typed                        link
 ===========================  ==========================================================
 ``/dev/ttyUSB0``, ``COM3``   SERIAL v1 on a serial port
+``tcp://HOST:PORT``          the same from a server in the network (``socket://`` too)
+``udp://[HOST]:PORT``        the same in datagrams that are sent to this machine
+``rfc2217://HOST:PORT``      the same from a serial port in the network
 ``slcan:/dev/ttyACM0``       CAN adapter with slcan, our own bulk reader
 ``can:INTERFACE:CHANNEL``    python-can: ``can:socketcan:can0``, ``can:virtual:test``, ...
 ===========================  ==========================================================
@@ -20,6 +23,8 @@ from bench.protocols import CAN, SERIAL, SLCAN
 
 BITRATE = 500_000
 KINDS = ("slcan", "can")
+SOCKETS = ("tcp://", "socket://", "udp://")
+URLS = (*SOCKETS, "rfc2217://")
 _MODULES = {SERIAL: "serial_port", SLCAN: "slcan_port", CAN: "can_bus"}
 
 
@@ -54,7 +59,8 @@ class PortPlan:
 
     def load(self) -> None:
         """Import what `open` needs: python-can takes over half a second of CPU."""
-        import_module(f"bench.links.{_MODULES[self.encoding]}")
+        module = "socket_port" if self.port.startswith(SOCKETS) else _MODULES[self.encoding]
+        import_module(f"bench.links.{module}")
 
     def check(self) -> None:
         """Look at what was typed; nothing is opened.
@@ -65,11 +71,18 @@ class PortPlan:
             If it names no port.
         """
         kind, colon, rest = self.port.partition(":")
-        if self.port in KINDS or (colon and kind not in KINDS and "/" not in kind):
+        if self.port.startswith(SOCKETS):
+            from bench.links.socket_port import address
+
+            address(self.port)
+        elif self.port.startswith(URLS):
+            return
+        elif self.port in KINDS or (colon and kind not in KINDS and "/" not in kind):
             raise DeviceError(
                 f"--port {self.port}: {kind!r} is no {'name' if kind in KINDS else 'kind'} of a "
-                "port; a serial port such as /dev/ttyUSB0 or COM3, slcan:/dev/ttyACM0 or "
-                "can:INTERFACE:CHANNEL is needed; see `tirebench ports`"
+                "port; a serial port such as /dev/ttyUSB0 or COM3, tcp://HOST:PORT, "
+                "udp://[HOST]:PORT, slcan:/dev/ttyACM0 or can:INTERFACE:CHANNEL is needed; see "
+                "`tirebench ports`"
             )
         if self.encoding == SLCAN and not rest:
             raise DeviceError(
@@ -107,6 +120,10 @@ class PortPlan:
                 interface, channel, self.bitrate, self.data_bitrate, bus_options(self.options),
                 transmit=transmit,
             )  # fmt: skip
+        if self.port.startswith(SOCKETS):
+            from bench.links.socket_port import SocketLink
+
+            return SocketLink(self.port)
         from bench.links.serial_port import SerialLink
 
         return SerialLink(self.port, self.baud)

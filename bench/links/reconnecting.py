@@ -24,7 +24,9 @@ class ReconnectingLink:
     patience : float, [s]
         When the port stays away for longer, the loss is raised.
     away : str, optional
-        Name of a port that was open before and may be away now: it is waited for.
+        Name of a port that may be away now: it is waited for.
+    wait : float, [s]
+        How long, where it was never open before; 0: it was, and `patience` holds.
 
     Raises
     ------
@@ -34,7 +36,9 @@ class ReconnectingLink:
 
     live = True
 
-    def __init__(self, open_link: Callable[[], Link], patience: float, away: str = "") -> None:
+    def __init__(
+        self, open_link: Callable[[], Link], patience: float, away: str = "", *, wait: float = 0.0
+    ) -> None:
         self._open = open_link
         self._patience = patience
         self._link: Link | None = None
@@ -42,15 +46,20 @@ class ReconnectingLink:
         self._overruns = 0
         self._wait = FIRST_WAIT
         self._next = self._given_up = 0.0
-        self._loss = UnpluggedError(f"{away}: the port went away; check cable and receiver")
+        self._loss: LinkError = UnpluggedError(
+            f"{away}: the port went away; check cable and receiver"
+        )
         self._seen = True
+        self._found = BACK  # what it means when the port is there
         try:
             self._link = open_link()
             self.name, self.encoding = self._link.name, self._link.encoding
-        except LinkError:
+        except LinkError as error:
             if not away:
                 raise
-            self._lose(self._loss)
+            self._lose(error if wait else self._loss)
+            if wait:
+                self._given_up, self._found = time.monotonic() + wait, ""
 
     def receive(self, deadline: Deadline) -> Read | None:
         """Return what has come by the deadline; see `bench.links.Link.receive`."""
@@ -73,7 +82,7 @@ class ReconnectingLink:
         """Return the overruns so far, those before a loss included."""
         return self._overruns + (0 if self._link is None else self._link.overruns())
 
-    def _lose(self, error: UnpluggedError) -> None:
+    def _lose(self, error: LinkError) -> None:
         if self._link is not None:
             self._overruns += self._link.overruns()
             try:
@@ -93,7 +102,8 @@ class ReconnectingLink:
             if now >= self._next or (there and not self._seen):
                 self._seen = there
                 if self._try():
-                    return Read(time.monotonic_ns(), b"", BACK)
+                    found, self._found = self._found, BACK
+                    return Read(time.monotonic_ns(), b"", found)
                 self._wait = min(2.0 * self._wait, LONGEST_WAIT)
                 self._next = time.monotonic() + self._wait
             self._seen = there

@@ -44,7 +44,7 @@ class SerialLink:
     Parameters
     ----------
     port : str
-        ``/dev/ttyUSB0``, ``COM3``, or a link in ``/dev/serial/by-id``.
+        ``/dev/ttyUSB0``, ``COM3``, a link in ``/dev/serial/by-id``, or ``rfc2217://HOST:PORT``.
     baud : int
         Ignored by native USB and pseudo-terminals.
     gather : float, [s]
@@ -63,7 +63,12 @@ class SerialLink:
         self._gather = gather
         self._last = 0.0
         try:
-            self._port = serial.Serial(port, baud, timeout=0.0, exclusive=True, write_timeout=1.0)
+            if "://" in port:
+                self._port = serial.serial_for_url(port, baud, timeout=0.0, write_timeout=1.0)
+            else:
+                self._port = serial.Serial(
+                    port, baud, timeout=0.0, exclusive=True, write_timeout=1.0
+                )
         except (serial.SerialException, OSError, ValueError) as error:
             known = ", ".join(entry.split()[0] for entry in ports()) or "none"
             raise LinkError(

@@ -6,7 +6,9 @@ python-can reads slcan byte by byte, which does not hold the rate of one wheel o
 from bench.deadline import Deadline
 from bench.errors import DeviceError
 from bench.links import Read
+from bench.links.opening import SOCKETS
 from bench.links.serial_port import SerialLink
+from bench.links.socket_port import SocketLink
 from bench.protocols import SLCAN
 
 BITRATES = {10_000: "S0", 20_000: "S1", 50_000: "S2", 100_000: "S3", 125_000: "S4",
@@ -55,7 +57,8 @@ class SlcanLink:
         self, port: str, bitrate: int, data_bitrate: int | None = None, *, transmit: bool = False
     ) -> None:
         opening = commands(bitrate, data_bitrate, transmit=transmit)
-        self._port = SerialLink(port)
+        sockets = port.startswith(SOCKETS)
+        self._port = SocketLink(port) if sockets else SerialLink(port)
         self.name = f"slcan:{port}"
         self.encoding = SLCAN
         try:

@@ -21,6 +21,7 @@ from bench.fmu_model import FmuFile
 from bench.live.estimator import EstimatorPlan, Report, estimate
 from bench.live.exchange import FINISH, STOP, Exchange, woken
 from bench.live.kept import CONTEXT, Kept
+from bench.live.ports import read_source
 from bench.live.reader import LineState, ReaderPlan, load, read_port
 from bench.live.recorder import record
 from bench.live.recording_state import Order, RecorderState, RecordingRule
@@ -83,15 +84,15 @@ class LiveChain:
     live = True
 
     def __init__(self, plan: LivePlan) -> None:
-        plan.reader.port.check()  # before all that takes time
+        for source in plan.reader.sources:
+            source.port.check()  # before all that takes time
         self.ended = self.message = ""
         self.jumps: list[Jump] = []
         self._plan = plan
         self._slots = len(plan.reader.wheels) or MOST
-        self._exchange = Exchange.create(CONTEXT, self._slots, SIZE if plan.laps else 0)
-        self._state = LineState(
-            Wheels(plan.reader.protocol.decoder(), plan.reader.devices, plan.reader.wheels)
-        )
+        beside = SIZE if plan.laps else 0
+        self._exchange = Exchange.create(CONTEXT, self._slots, beside, plan.reader.ports)
+        self._state = LineState(plan.reader.fresh())
         self._recorded = RecorderState()
         self._orders = 0
         self._pending = News()
@@ -101,6 +102,7 @@ class LiveChain:
         self._ready: set[int] = set()
         self._done: set[int] = set()
         self._next_look = 0.0
+        self._ports: list[Kept] = []
         self._reader: Kept | None = None
         self._recorder: Kept | None = None
         self._estimators: dict[int, Kept] = {}
@@ -122,7 +124,9 @@ class LiveChain:
                     self._start_estimator(slot)
                 self._wait(lambda: self._ready.issuperset(known))
             self._wait(lambda: self.obeyed(Deadline.after(0.0)))
-            # a port is opened last: from then on bytes come
+            # ports are opened last: from then on bytes come
+            for number in range(self._plan.reader.ports):
+                self._start_port(number)
             self._reader = Kept(
                 read_port, lambda _: (self._plan.reader, self._exchange.address), stand_by=load
             )
@@ -179,7 +183,7 @@ class LiveChain:
         refused, refused_bytes = exchange.raw.refused
         return {
             "processes": self.process_ids,
-            "cpu_s": {"reader": self._state.cpu, "recorder": self._recorded.cpu,
+            "cpu_s": {"reader": self._state.cpu, "recorder": self._recorded.cpu, **self._port_cpu(),
                       **{f"estimator {slot}": cpu for slot, cpu in self._cpu.items()}},
             "restarts": {name: kept.starts - 1 for name, kept in self._processes().items()},
             "raw": {"lost_reads": refused, "lost_bytes": refused_bytes,
@@ -187,6 +191,11 @@ class LiveChain:
             "recording": self._recorded.as_document(refused_bytes),
             "wheels": {wheel: self.wheel_counts(wheel) for wheel in self.wheels.heard},
         }  # fmt: skip
+
+    def _port_cpu(self) -> dict[str, float]:
+        states = [cell.get() for cell in self._exchange.ports]
+        known = [(number, state) for number, state in enumerate(states) if state]
+        return {f"port {number}": pickle.loads(state).cpu for number, state in known}
 
     def cpu_time(self) -> float:
         """Return what reader, recorder and estimators have used so far, [s]."""
@@ -238,8 +247,9 @@ class LiveChain:
         self._finished = True
         news = News()
         self._exchange.set(STOP)
-        if self._reader is not None:
-            self._reader.wait(LEAVE)
+        for kept in (*self._ports, self._reader):
+            if kept is not None:
+                kept.wait(LEAVE)
         self._see()
         self._exchange.set(FINISH)
         end = Deadline.after(PATIENCE)
@@ -259,8 +269,15 @@ class LiveChain:
 
     def _processes(self) -> dict[str, Kept]:
         named = {"reader": self._reader, "recorder": self._recorder}
+        named |= {f"port {number}": kept for number, kept in enumerate(self._ports)}
         named |= {f"estimator {slot}": kept for slot, kept in self._estimators.items()}
         return {name: kept for name, kept in named.items() if kept is not None}
+
+    def _start_port(self, number: int) -> None:
+        reader = self._plan.reader
+        plan = (number, reader.sources[number].port, reader.patience, reader.wait,
+                self._exchange.address)  # fmt: skip
+        self._ports.append(Kept(read_source, lambda _: plan))
 
     def _start_estimator(self, slot: int) -> None:
         file = self._plan.file
@@ -293,8 +310,8 @@ class LiveChain:
                 raise RecordingError(self._recorded.answer)
             if end.expired:
                 raise LinkTimeoutError(
-                    f"{self._plan.reader.port.port}: the processes of the run are not ready after "
-                    f"{START:.0f} s; a machine with time for them is needed; try again"
+                    f"{self._plan.reader.sources[0].port.port}: the processes of the run are not "
+                    f"ready after {START:.0f} s; a machine with time for them is needed; try again"
                 )
 
     def _gather(self) -> News:
@@ -336,7 +353,7 @@ class LiveChain:
         self._next_look = time.monotonic() + LOOK
         self._see()
         for kept in self._processes().values():
-            if kept is self._reader and self._state.ended:
+            if self._state.ended and (kept is self._reader or kept in self._ports):
                 continue
             kept.look()
         for slot in range(len(self._estimators), min(len(self.wheels.heard), self._slots)):

@@ -16,6 +16,8 @@ does not fit is missing beside the raw bytes, which hold it."""
 SAMPLES, LEAST = 27 * 2**18, 2**21
 """Samples of a wheel that wait for its estimator, [bytes]: 13 s at 10 kHz; 4 s where memory is
 short, which is more than the age at which samples are left out."""
+PORT, PORT_STATE = 2**21, 2**13
+"""Reads of one port of several that wait for the reader, [bytes], and how the port is."""
 NEWS = 2**20
 ORDERS = 2**18
 LINE = 2**20
@@ -41,6 +43,10 @@ class Address:
         Released when an estimator has news, or the line an event.
     samples : int
         Bytes of each queue of samples.
+    ports : int
+        Processes that read a port each, where there are several.
+    came : semaphore
+        Released when one of them has something.
     """
 
     name: str
@@ -48,6 +54,8 @@ class Address:
     fresh: tuple[Any, ...]
     news: Any
     samples: int
+    ports: int = 0
+    came: Any = None
 
 
 class Exchange:
@@ -72,6 +80,10 @@ class Exchange:
         Of each slot: blocks to the estimator, reports to the run.
     line, recorded : Cell
         State of the reader and of the recorder.
+    reads : tuple of ByteQueue
+        Of each port of several, to the reader.
+    ports : tuple of Cell
+        How each of them is.
     """
 
     def __init__(self, address: Address, shared: SharedMemory | None = None) -> None:
@@ -97,9 +109,14 @@ class Exchange:
         slots = range(address.slots)
         self.samples = tuple(ByteQueue(part(address.samples)) for _ in slots)
         self.news = tuple(ByteQueue(part(NEWS)) for _ in slots)
+        ports = range(address.ports)
+        self.reads = tuple(ByteQueue(part(PORT)) for _ in ports)
+        self.ports = tuple(Cell(part(PORT_STATE)) for _ in ports)
 
     @classmethod
-    def create(cls, context: SpawnContext, slots: int, beside: int = 0) -> "Exchange":
+    def create(
+        cls, context: SpawnContext, slots: int, beside: int = 0, ports: int = 0
+    ) -> "Exchange":
         """Make the memory; where it is short, the queues of samples are.
 
         Parameters
@@ -108,6 +125,8 @@ class Exchange:
         slots : int
         beside : int
             What others will need after this, [bytes].
+        ports : int
+            Of several, each read by a process of its own; 0 where there is one.
 
         Raises
         ------
@@ -117,13 +136,16 @@ class Exchange:
         sweep()
         name_semaphores()
         fixed = _STOP + RAW + ORDERS + STRAIN + RESULTS + LINE + STATE + slots * NEWS
+        fixed += ports * (PORT + PORT_STATE)
         room = (free() - fixed - beside) / slots
         if room < LEAST:
             raise too_little(fixed + slots * LEAST + beside)
         samples = int(min(SAMPLES, room)) // 64 * 64
         shared = memory(fixed + slots * samples)
         fresh = tuple(context.Semaphore(0) for _ in range(slots))
-        return cls(Address(shared.name, slots, fresh, context.Semaphore(0), samples), shared)
+        address = Address(shared.name, slots, fresh, context.Semaphore(0), samples, ports,
+                          context.Semaphore(0))  # fmt: skip
+        return cls(address, shared)
 
     def is_set(self, flag: int) -> bool:
         """Whether the run has set a flag."""
@@ -135,9 +157,10 @@ class Exchange:
 
     def close(self) -> None:
         """Let go of the memory; its maker removes it. Calling twice does no harm."""
-        for queue in (self.raw, self.orders, self.strain, self.results, *self.samples, *self.news):
+        for queue in (self.raw, self.orders, self.strain, self.results, *self.samples, *self.news,
+                      *self.reads):  # fmt: skip
             queue.close()
-        for cell in (self.line, self.recorded):
+        for cell in (self.line, self.recorded, *self.ports):
             cell.close()
         self._flags.release()
         for view in self._views:

@@ -1,20 +1,21 @@
-"""The process that reads a port: bytes to the recorder first, then samples to the estimators."""
+"""The process that reads: bytes to the recorder first, then samples to the estimators.
+
+It reads a port itself; of several ports it gathers what their processes bring (`bench.live.ports`).
+"""
 
 import pickle
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from bench.deadline import Deadline
-from bench.device import Device
 from bench.errors import BenchError, UnpluggedError
 from bench.links import BACK, LOST, RESUMED, Link, Read
-from bench.links.opening import PortPlan
 from bench.links.reconnecting import ReconnectingLink
 from bench.live.exchange import RAW, STOP, Address, Exchange
 from bench.live.kept import orphaned, settled
-from bench.protocols.plan import ProtocolPlan
+from bench.live.ports import GatheredLink
 from bench.rings import ByteQueue
+from bench.source_plan import SourcePlan, wheels_of
 from bench.wheels import Wheels
 
 WAIT = 0.1
@@ -32,11 +33,10 @@ class ReaderPlan:
 
     Attributes
     ----------
-    port : PortPlan
+    sources : tuple of SourcePlan
+        A port each.
     patience : float, [s]
-        How long the port may be away.
-    protocol : ProtocolPlan
-    devices : mapping of wheel to Device
+        How long a port may be away.
     wheels : tuple of int
         See `bench.wheels.Wheels`.
     recorded : bool
@@ -45,16 +45,26 @@ class ReaderPlan:
         Whether no turn is skipped: the port waits where estimators or recorder are behind.
     strain : bool
         Whether it records decoded samples too.
+    wait : float, [s]
+        How long a port that is not there is waited for at the start.
     """
 
-    port: PortPlan
+    sources: tuple[SourcePlan, ...]
     patience: float
-    protocol: ProtocolPlan
-    devices: Mapping[int | None, Device]
     wheels: tuple[int, ...] = ()
     recorded: bool = True
     every_turn: bool = False
     strain: bool = True
+    wait: float = 0.0
+
+    @property
+    def ports(self) -> int:
+        """Processes that read a port each; 0 where the reader reads the only one."""
+        return len(self.sources) if len(self.sources) > 1 else 0
+
+    def fresh(self) -> Wheels:
+        """Return the wheels before anything was heard."""
+        return wheels_of(self.sources, self.wheels)
 
 
 @dataclass(slots=True)
@@ -67,7 +77,7 @@ class LineState:
     name : str
         Of the port, once it is open.
     heard, lost : float or None, [s]
-        When bytes came last and when the port went away, on `time.time`; None if not.
+        When bytes came last and when a port went away, on `time.time`; None if not.
     last_byte : float or None, [s]
         When bytes came last, monotonic.
     ended, message : str
@@ -81,6 +91,10 @@ class LineState:
         How often a reader began with what comes next of them and ended.
     cpu : float, [s]
         Time that the reader has used.
+    away : dict of source to float, [s]
+        Ports that went away, and when, on `time.time`.
+    newest : dict of source to int, [ns]
+        Arrival of the newest read that was taken.
     error : tuple of str
         Name of the class and text of an error that ends the run; empty without one.
     """
@@ -88,7 +102,6 @@ class LineState:
     wheels: Wheels
     name: str = ""
     heard: float | None = None
-    lost: float | None = None
     last_byte: float | None = None
     ended: str = ""
     message: str = ""
@@ -96,12 +109,20 @@ class LineState:
     samples: tuple[int, ...] = ()
     tries: int = 0
     cpu: float = 0.0
+    away: dict[int, float] = field(default_factory=dict)
+    newest: dict[int, int] = field(default_factory=dict)
     error: tuple[str, str] | tuple[()] = ()
+
+    @property
+    def lost(self) -> float | None:
+        """When the first of the ports that are away went, on `time.time`; None if none is."""
+        return min(self.away.values(), default=None)
 
 
 def load(plan: ReaderPlan, _: Address) -> None:
     """Import beforehand what `read_port` needs; whoever takes over has no time for it."""
-    plan.port.load()
+    if not plan.ports:
+        plan.sources[0].port.load()
     settled()
 
 
@@ -113,9 +134,16 @@ def read_port(plan: ReaderPlan, address: Address) -> None:
     try:
         if reader.again:
             reader.catch_up()
-        link = ReconnectingLink(plan.port.open, plan.patience, state.name)
-        if reader.again:
-            reader.take(Read(time.monotonic_ns(), b"", RESUMED))
+        link: Link
+        if plan.ports:
+            link = GatheredLink(exchange, state.newest)
+        else:
+            port = plan.sources[0].port
+            wait = 0.0 if reader.again else plan.wait
+            away = state.name or (port.port if wait else "")
+            link = ReconnectingLink(port.open, plan.patience, away, wait=wait)
+            if reader.again:
+                reader.take(Read(time.monotonic_ns(), b"", RESUMED))
         state.name = link.name
         reader.publish()
         settled()
@@ -137,15 +165,11 @@ class _Reader:
         self._fresh = exchange.address.fresh
         self._queues = (*exchange.samples, exchange.strain)
         self._raw_lost = 0  # bytes since the recorder was told of it
-        self._overruns: int | None = None
+        self._overruns: list[int] = []
         self._next_look = 0.0
         saved = exchange.line.get()
         self.again = saved is not None
-        self.state: LineState = (
-            LineState(Wheels(plan.protocol.decoder(), plan.devices, plan.wheels))
-            if saved is None
-            else pickle.loads(saved)
-        )
+        self.state: LineState = LineState(plan.fresh()) if saved is None else pickle.loads(saved)
 
     def run(self, link: Link) -> None:
         """Go on until the end of the link or of the run."""
@@ -158,7 +182,7 @@ class _Reader:
                 read = link.receive(Deadline.after(WAIT))
             except UnpluggedError as error:
                 state.ended, state.message = "unplugged", str(error)
-                state.lost = state.lost or time.time()
+                state.away.setdefault(0, time.time())
                 return
             if read is None:
                 state.ended = "end"
@@ -221,16 +245,17 @@ class _Reader:
     def _decoded(self, read: Read) -> list[tuple[int, bytes]]:
         """Return what a read brings, for the slot of each wheel."""
         state = self.state
+        state.newest[read.source] = read.arrival
         if read.event in (BACK, RESUMED):
-            state.wheels.interrupt()
+            state.wheels.interrupt(read.source)
         if read.event == LOST:
-            state.lost = time.time()
+            state.away[read.source] = time.time()
         elif read.event == BACK or read.data:
-            state.lost = None
+            state.away.pop(read.source, None)
         if not read.data:
             return []
         state.heard, state.last_byte = time.time(), time.monotonic()
-        blocks = state.wheels.push(read.data, read.arrival)
+        blocks = state.wheels.push(read.data, read.arrival, read.source)
         slots = {wheel: slot for slot, wheel in enumerate(state.wheels.heard)}
         return [(slots[block.wheel], pickle.dumps(block, 5)) for block in blocks]
 
@@ -238,7 +263,7 @@ class _Reader:
         """Put a read into the queue of the recorder; False if there is no room for it."""
         raw = self._exchange.raw
         if self._raw_lost:
-            told = Read(read.arrival, b"", f"{RAW_LOST}{self._raw_lost}")
+            told = Read(read.arrival, b"", f"{RAW_LOST}{self._raw_lost}", read.source)
             if not raw.put(pickle.dumps(told, 5)):
                 self._raw_lost += len(read.data)
                 return False
@@ -262,13 +287,15 @@ class _Reader:
         return recorded is None or not pickle.loads(recorded).error
 
     def _look(self, link: Link) -> None:
-        """Count the overruns of the port since it was last asked, once a second."""
+        """Count the overruns of the ports since they were last asked, once a second."""
         now = time.monotonic()
         if now < self._next_look:
             return
         self._next_look = now + 1.0
-        seen, self._overruns = self._overruns, link.overruns()
-        self.state.wheels.line.counts.overruns += 0 if seen is None else self._overruns - seen
+        now_seen = link.port_overruns() if isinstance(link, GatheredLink) else [link.overruns()]
+        seen, self._overruns = self._overruns or now_seen, now_seen
+        for line, before, after in zip(self.state.wheels.lines, seen, now_seen, strict=True):
+            line.decoder.counts.overruns += after - before
 
 
 def _hand_over(queue: ByteQueue, message: bytes) -> None:

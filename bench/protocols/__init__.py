@@ -11,12 +11,15 @@ encoding                bytes of a read
 What comes out depends on the bytes and their arrival alone, never on how they are cut into reads.
 """
 
-from collections.abc import Sequence
-from typing import Protocol
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Protocol
 
 from bench.conditions import Measured
 from bench.frames import Frames
 from bench.line_counts import LineCounts
+
+if TYPE_CHECKING:
+    from bench.protocols.layouts import Health
 
 SERIAL, SLCAN, CAN = "serial-v1", "slcan", "can"
 ENCODINGS = (SERIAL, SLCAN, CAN)
@@ -32,6 +35,10 @@ class Decoder(Protocol):
     """
 
     counts: LineCounts
+
+    @property
+    def health(self) -> "Mapping[int, Health]":
+        """What each wheel said last of itself in frames of their own."""
 
     def push(self, data: bytes, arrival: int = 0) -> "Sequence[Frames | Measured]":
         """Return the frames that `data` completes, in order, and conditions told between them.

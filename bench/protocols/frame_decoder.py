@@ -1,16 +1,22 @@
 """What the frames of a CAN bus mean: one protocol, a child for each kind of transmitter."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from bench.can_batch import CanBatch, unpack
 from bench.conditions import Measured
 from bench.frames import Frames
 from bench.line_counts import LineCounts
+from bench.protocols.layouts import Health
 
 
 class FrameDecoder(Protocol):
     """CAN frames to strain frames: `bench.protocols.wheel_can`, or a user's own transmitter."""
+
+    @property
+    def health(self) -> Mapping[int, Health]:
+        """What each wheel said last of itself; nothing where there are no such frames."""
+        return {}
 
     def push(self, batch: CanBatch, arrival: int) -> Sequence[Frames | Measured]:
         """Return the strain frames of a batch, those of each wheel in order."""
@@ -25,6 +31,11 @@ class PackedDecoder:
     def __init__(self, frames: FrameDecoder, counts: LineCounts) -> None:
         self.counts = counts
         self._frames = frames
+
+    @property
+    def health(self) -> Mapping[int, Health]:
+        """What each wheel said last of itself."""
+        return self._frames.health
 
     def push(self, data: bytes, arrival: int = 0) -> Sequence[Frames | Measured]:
         """Return the frames of one packed batch; what is no batch is counted."""

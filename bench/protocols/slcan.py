@@ -8,7 +8,7 @@ Every line is checked on its own: a bad letter, length, digit, or byte costs tha
 The format has no checksum, so that a digit that became another digit cannot be seen.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,7 @@ from bench.conditions import Measured
 from bench.frames import Frames
 from bench.line_counts import LineCounts
 from bench.protocols.frame_decoder import FrameDecoder
+from bench.protocols.layouts import Health
 
 LONGEST = 1 + 8 + 1 + 128 + 4
 """Characters of the longest line."""
@@ -41,6 +42,11 @@ class SlcanDecoder:
         self._tail = b""
         self._too_long = False
         self._joined = False
+
+    @property
+    def health(self) -> Mapping[int, Health]:
+        """What each wheel said last of itself."""
+        return self._frames.health
 
     def push(self, data: bytes, arrival: int = 0) -> Sequence[Frames | Measured]:
         """Return the frames that `data` completes."""

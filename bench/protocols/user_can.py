@@ -1,6 +1,8 @@
 """CAN frames of another make's transmitter to `Frames`, by its map."""
 
+from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -8,12 +10,12 @@ from bench.can_batch import CanBatch
 from bench.conditions import Measured
 from bench.frames import GAGES, CountArray, Frames
 from bench.line_counts import LineCounts
+from bench.protocols.layouts import Health
 from bench.protocols.signals import Signal, raw_values, real_values
 from bench.protocols.user_map import Message, UserMap, WheelMap
 from bench.protocols.wheel_can import period_of
 from bench.protocols.widening import Widener
 from tirelib.arrays import BoolArray
-from tirelib.units import to_si
 
 
 class UserCan:
@@ -24,39 +26,52 @@ class UserCan:
         self._counts = counts
         self._wheels = [_Wheel(wheel, user_map.rate) for wheel in user_map.wheels]
 
+    health: Mapping[int, Health] = MappingProxyType({})
+
     def push(self, batch: CanBatch, arrival: int) -> list[Frames | Measured]:
-        """Return strain frames, and the speed where it changes between them."""
-        if self._map.speed is None:
-            return self._strain(batch, arrival)
-        message, signal, unit = self._map.speed
-        rows = np.flatnonzero(_rows(batch, message, signal))
-        self._counts.ok += len(rows)
+        """Return strain frames, and between them what the bus tells, before its own frame."""
+        told = self._told(batch)
+        wheels = [(wheel, _rows(batch, wheel.map.message, wheel.map.strain[0]))
+                  for wheel in self._wheels]  # fmt: skip
+        known = np.zeros(len(batch), np.bool_)
+        known[[row for row, _ in told]] = True
+        for _, rows in wheels:
+            known |= rows
+        self._counts.ok += int(known.sum())
+        self._counts.unknown += int((~known).sum())
         items: list[Frames | Measured] = []
-        numbers = np.arange(len(batch))
         first = 0
-        read = real_values if signal.real else raw_values
-        raw = read(batch.data[rows], [signal])[:, 0]
-        for row, value in zip(rows.tolist(), raw.tolist(), strict=True):
-            items += self._strain(batch.take(numbers[first:row]), arrival)
-            shown = signal.offset + signal.factor * value
-            items.append(Measured("speed", float(to_si(shown, unit, "speed"))))
-            first = row + 1
-        return items + self._strain(batch.take(numbers[first:]), arrival)
+        for row, measured in told:
+            items += self._strain(batch, wheels, first, row, arrival)
+            items.append(measured)
+            first = row
+        return items + self._strain(batch, wheels, first, len(batch), arrival)
+
+    def _told(self, batch: CanBatch) -> list[tuple[int, Measured]]:
+        """Return what the bus tells in which row, in order."""
+        told: list[tuple[int, Measured]] = []
+        for quantity in self._map.quantities:
+            signal = quantity.signal
+            rows = np.flatnonzero(_rows(batch, quantity.message, signal))
+            read = real_values if signal.real else raw_values
+            raw = read(batch.data[rows], [signal])[:, 0]
+            told += zip(rows.tolist(), map(quantity.measured, raw.tolist()), strict=True)
+        return sorted(told, key=lambda one: one[0])
 
     def interrupt(self) -> None:
         """Nothing waits here."""
 
-    def _strain(self, batch: CanBatch, arrival: int) -> list[Frames | Measured]:
-        items: list[Frames | Measured] = []
-        known = 0
-        for wheel in self._wheels:
-            rows = _rows(batch, wheel.map.message, wheel.map.strain[0])
-            if rows.any():
-                known += int(rows.sum())
-                items.append(wheel.frames(batch.take(rows), arrival))
-        self._counts.ok += known
-        self._counts.unknown += len(batch) - known
-        return items
+    @staticmethod
+    def _strain(
+        batch: CanBatch, wheels: "list[tuple[_Wheel, BoolArray]]", first: int, end: int,
+        arrival: int,
+    ) -> list[Frames | Measured]:  # fmt: skip
+        """Return the strain of some rows."""
+        return [
+            wheel.frames(batch.take(np.flatnonzero(rows[first:end]) + first), arrival)
+            for wheel, rows in wheels
+            if rows[first:end].any()
+        ]
 
 
 class _Wheel:

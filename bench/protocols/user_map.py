@@ -15,10 +15,16 @@
     time      = "stamp"           # device time of the first sample
     time_unit = "us"              # of the signal's value
 
-    [speed]                       # optional: travel speed from the bus
+    [speed]                       # optional: what the bus tells beside the strain
     message = "ABS"
     signal  = "v_ref"
     unit    = "km/h"
+
+    [[pressure]]                  # of one wheel; also camber, omega, temperature
+    wheel   = 0
+    message = "TPMS"
+    signal  = "p_fl"
+    unit    = "bar"
 
     [[message]]                   # without a DBC
     name = "WHEEL_FL"
@@ -30,11 +36,12 @@
 
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from bench.conditions import TELLABLE, Measured
 from bench.device import Device
 from bench.errors import DeviceError, cause
 from bench.frames import GAGES
@@ -46,7 +53,7 @@ FORMAT = "tirebench-map/1"
 LONGEST_SIGNAL = 32
 SHORTEST_WRAP = 0.1
 """A counter that wraps sooner needs a time beside it, or a gap could not be seen, [s]."""
-_KEYS = {"format", "dbc", "rate_hz", "strain_unit", "wheel", "speed", "message", "name"}
+_KEYS = {"format", "dbc", "rate_hz", "strain_unit", "wheel", "message", "name", *TELLABLE}
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +96,35 @@ class WheelMap:
 
 
 @dataclass(frozen=True, slots=True)
+class Quantity:
+    """Where a condition is.
+
+    Attributes
+    ----------
+    name : str
+        One of `bench.conditions.TELLABLE`.
+    message : Message
+    signal : Signal
+    unit : str
+        Of the signal's value.
+    wheel : int or None
+        For which it holds; None: for all.
+    """
+
+    name: str
+    message: Message
+    signal: Signal
+    unit: str
+    wheel: int | None = None
+
+    def measured(self, raw: float) -> Measured:
+        """Return what a raw value means."""
+        shown = self.signal.offset + self.signal.factor * raw
+        name, dimension = TELLABLE[self.name]
+        return Measured(name, float(to_si(shown, self.unit, dimension)), self.wheel)
+
+
+@dataclass(frozen=True, slots=True)
 class UserMap:
     """What a map says.
 
@@ -96,9 +132,10 @@ class UserMap:
     ----------
     rate : float, [Hz]
     wheels : tuple of WheelMap
+        None of a bus that only tells conditions.
     device : Device
         Scale and zero, where the map says a unit of strain; else those of counts.
-    speed : (Message, Signal, unit) or None
+    quantities : tuple of Quantity
     text : str
         Of the file, DBC included, for the header of a recording.
     """
@@ -106,7 +143,7 @@ class UserMap:
     rate: float
     wheels: tuple[WheelMap, ...]
     device: Device
-    speed: tuple[Message, Signal, str] | None
+    quantities: tuple[Quantity, ...]
     text: str
 
 
@@ -164,21 +201,27 @@ class _Reader:
 
     def read(self, text: str, dbc: str) -> UserMap:
         messages = self._of_dbc(dbc) if dbc else self._of_tables()
-        rate = self.document.get("rate_hz")
+        tables = self._tables("wheel")
+        rate = self.document.get("rate_hz", None if tables else 1e3)
         if not isinstance(rate, int | float) or isinstance(rate, bool) or not 153 <= rate <= 2e5:
             self.fault("rate_hz", rate, "153 .. 200000 Hz is needed")
             rate = 1e3
-        tables = self._tables("wheel")
         wheels = [w for table in tables if (w := self._wheel(table, messages, float(rate)))]
-        if not tables:
-            self.fault("wheel", tables, "at least one table [[wheel]] is needed", "write it")
+        told = [name for name in TELLABLE if name in self.document]
+        if not tables and not told:
+            self.fault("wheel", tables, "a table [[wheel]], or one of a condition such as [speed], "
+                       "is needed", "write it")  # fmt: skip
         if len({w.wheel for w in wheels}) < len(wheels):
             self.fault("wheel", [w.wheel for w in wheels], "each number may come once")
         device = self._device(wheels)
-        speed = self._speed(messages)
+        quantities = [q for name in told for q in self._quantities(name, messages)]
+        places = [(TELLABLE[q.name][0], q.wheel) for q in quantities]
+        if twice := {place for place in places if clashes(place, places)}:
+            self.fault("conditions", sorted(twice, key=str), "each may come once for a wheel, or "
+                       "once for all")  # fmt: skip
         if self.faults:
             raise DeviceError(self.faults)
-        return UserMap(float(rate), tuple(wheels), device, speed, text)
+        return UserMap(float(rate), tuple(wheels), device, tuple(quantities), text)
 
     def _tables(self, key: str) -> list[dict[str, Any]]:
         """Return the tables of that name; whatever else has it is a fault."""
@@ -274,7 +317,7 @@ class _Reader:
                        "counter and time included, must stand in the same frames: one "
                        "multiplexer, one value")  # fmt: skip
         number = table.get("wheel")
-        if not isinstance(number, int) or not 0 <= number <= 255:
+        if not _is_wheel(number):
             self.fault("wheel", number, "0 .. 255 is needed")
         if len(self.faults) > before:
             return None
@@ -347,23 +390,42 @@ class _Reader:
         zero = tuple(-s.offset / s.factor for s in strain[:GAGES])
         return Device("map", step, zero, lowest=low, highest=high)
 
-    def _speed(self, messages: Mapping[str, Message]) -> tuple[Message, Signal, str] | None:
-        table = self.document.get("speed")
-        if table is None:
-            return None
-        if not isinstance(table, dict):
-            self.fault("speed", table, "a table [speed] is needed")
-            return None
-        message = self._message("speed: message", table.get("message"), messages)
+    def _quantities(self, name: str, messages: Mapping[str, Message]) -> list[Quantity]:
+        given = self.document[name]
+        tables = given if isinstance(given, list) else [given]
+        if not all(isinstance(table, dict) for table in tables):
+            self.fault(name, given, f"a table [{name}], or tables [[{name}]] of wheels, are needed")
+            return []
+        found = [self._quantity(name, table, messages) for table in tables]
+        return [quantity for quantity in found if quantity is not None]
+
+    def _quantity(
+        self, name: str, table: dict[str, Any], messages: Mapping[str, Message]
+    ) -> Quantity | None:
+        message = self._message(f"{name}: message", table.get("message"), messages)
         if message is None:
             return None
-        signal = self._signal("speed", table.get("signal"), message)
-        unit = str(table.get("unit"))
+        signal = self._signal(name, table.get("signal"), message)
+        unit, wheel = str(table.get("unit")), table.get("wheel")
+        dimension = TELLABLE[name][1]
         try:
-            to_si(1.0, unit, "speed")
+            to_si(1.0, unit, dimension)
         except TirelibError as error:
-            self.fault("speed: unit", unit, f"a unit of speed is needed ({error})")
-        return None if signal is None else (message, signal, unit)
+            self.fault(f"{name}: unit", unit, f"a unit of {dimension} is needed ({error})")
+        if wheel is not None and not _is_wheel(wheel):
+            self.fault(f"{name}: wheel", wheel, "0 .. 255 is needed, or nothing for all wheels")
+        return None if signal is None else Quantity(name, message, signal, unit, wheel)
+
+
+def clashes(place: tuple[str, int | None], places: Sequence[tuple[str, int | None]]) -> bool:
+    """Tell whether a condition of a wheel (None: of all) is told by more than one of the places."""
+    name, wheel = place
+    same = [w for n, w in places if n == name and (w is None or wheel is None or w == wheel)]
+    return len(same) > 1
+
+
+def _is_wheel(number: object) -> bool:
+    return isinstance(number, int) and not isinstance(number, bool) and 0 <= number <= 255
 
 
 def _fits(signal: Signal, message: Message) -> bool:

@@ -28,6 +28,8 @@ def _table() -> npt.NDArray[np.int8]:
 _KINDS = _table()
 PASSED = int(FrameFlag.LOW_BATTERY | FrameFlag.TIME_RESET | FrameFlag.RADIO_LOSS)
 """Flags of HEALTH that hold for the strain frames after it; saturation is marked in band."""
+UNHEARD = Health(rssi=0, temperature=0)
+"""Stands for a wheel that has said nothing of itself yet."""
 SLOWEST, FASTEST = 153.0, 200_000.0
 """Sample rates that a period in ticks can say, [Hz]."""
 
@@ -111,7 +113,7 @@ class WheelCan:
 
     def _state(self, wheel: int, batch: CanBatch, rows: BoolArray) -> IntArray:
         """Return flags, rssi and temperature that hold at each frame, shape (m, 3)."""
-        said = [self.health.get(wheel) or Health()]
+        said = [self.health.get(wheel) or UNHEARD]
         if not rows.any():
             h = said[0]
             return np.array([[h.flags & PASSED, h.rssi, h.temperature]]).repeat(len(rows), axis=0)

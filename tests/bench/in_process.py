@@ -26,7 +26,7 @@ class InProcess:
         chosen: Sequence[int] = (),
     ) -> None:
         known = {None: Device()} if devices is None else devices
-        self.wheels = Wheels(decoder or SerialDecoder(), known, chosen)
+        self.wheels = Wheels.of_one(decoder or SerialDecoder(), known, chosen)
         self.estimation = Estimation(estimator, conditions)
 
     @property
@@ -50,7 +50,7 @@ class FakeSource:
     def __init__(self, *numbers: int) -> None:
         self.heard: float | None = None
         self.lost: float | None = None
-        self.wheels = Wheels(SerialDecoder(), {None: Device()})
+        self.wheels = Wheels.of_one(SerialDecoder(), {None: Device()})
         self.skipped = 0
         for number in numbers:
             self.hear(number)

@@ -191,7 +191,7 @@ def test_what_a_soak_has_struck_is_never_ahead_of_what_it_has_sent(demo_module: 
     faults = Faults(dict.fromkeys(bench_soak.RATES, 0.02), seed=1)
     counts = np.zeros((16 * bench_soak.TURN_FRAMES, 5), np.int16)
     wire = bench_soak.Wire(counts, faults, 0.002, Nowhere())
-    wheels = Wheels(ProtocolPlan().decoder(), {None: Device()})
+    wheels = Wheels.of_one(ProtocolPlan().decoder(), {None: Device()})
     struck = []
     while (read := wire.receive(Deadline.never())) is not None:
         wheels.push(read.data, read.arrival)

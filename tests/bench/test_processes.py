@@ -35,10 +35,10 @@ from bench.live.kept import CONTEXT
 from bench.live.reader import ReaderPlan, load
 from bench.live.recorder import _Recorder
 from bench.live.recording_state import Order, RecorderState, RecordingRule
-from bench.protocols.plan import ProtocolPlan
 from bench.recording import Recorder, Recording, RecordingHeader, jump_event
 from bench.recording_header import parts_of
 from bench.replay import ReplayChain
+from bench.source_plan import SourcePlan
 from bench.wheels import Block, Wheels
 from tests.bench.campaigns import tiny_runs
 from tests.bench.conftest import Spawn
@@ -54,7 +54,7 @@ def documents(turns: list[Turn]) -> list[dict[str, Any]]:
 
 def replayed(path: Path, file: FmuFile) -> tuple[list[Turn], Wheels]:
     with ReplayLink(path) as link, FmuModel(file) as model:
-        wheels = Wheels(SerialDecoder(), {None: Device()})
+        wheels = Wheels.of_one(SerialDecoder(), {None: Device()})
         estimation = Estimation(lambda _: model, STEADY, link.recording.jumps())
         chain, news = ReplayChain(link, wheels, estimation), News()
         while not chain.ended:
@@ -77,7 +77,7 @@ def file(toy_fmus: dict[int, Path]) -> Iterator[FmuFile]:
 
 
 def plan_of(port: str, file: FmuFile | None, record: Path) -> LivePlan:
-    reader = ReaderPlan(PortPlan(port), 60.0, ProtocolPlan(), {None: Device()})
+    reader = ReaderPlan((SourcePlan(PortPlan(port)),), 60.0)
     return LivePlan(reader, file, STEADY, RecordingHeader({}), record)
 
 
@@ -92,9 +92,9 @@ def test_who_stands_by_has_its_port_loaded_and_its_garbage_collected(
     done: list[object] = []
     monkeypatch.setattr(PortPlan, "load", lambda port: done.append(port))
     monkeypatch.setattr("bench.live.reader.settled", lambda: done.append("settled"))
-    plan = ReaderPlan(PortPlan("p"), 60.0, ProtocolPlan(), {None: Device()})
+    plan = ReaderPlan((SourcePlan(PortPlan("p")),), 60.0)
     load(plan, Address("", 0, (), None, 0))
-    assert done == [plan.port, "settled"]
+    assert done == [plan.sources[0].port, "settled"]
 
 
 def test_each_process_may_be_killed_and_a_replay_gives_what_the_run_gave(
@@ -256,7 +256,7 @@ def stepped(
 @pytest.fixture(scope="module")
 def blocks() -> list[Block]:
     wire = write_script(tiny_runs()[:2], Device(), Faults({})).frames
-    wheels = Wheels(SerialDecoder(), {None: Device()})
+    wheels = Wheels.of_one(SerialDecoder(), {None: Device()})
     return [b for i in range(0, len(wire), 3) for b in wheels.push(b"".join(wire[i : i + 3]))]
 
 

@@ -15,7 +15,7 @@ from bench.links.opening import PortPlan
 from bench.live.exchange import Exchange
 from bench.live.kept import CONTEXT
 from bench.live.reader import ReaderPlan, _Reader
-from bench.protocols.plan import ProtocolPlan
+from bench.source_plan import SourcePlan
 from bench.wheels import Wheels
 from tests.bench.campaigns import tiny_runs
 
@@ -35,7 +35,7 @@ def read_until(killed_before: int, *, room: bool = True) -> tuple[list[list[byte
     Returns what the estimators and the recorder were given.
     """
     exchange = Exchange.create(CONTEXT, 2)
-    plan = ReaderPlan(PortPlan("p"), 60.0, ProtocolPlan(), {None: Device()})
+    plan = ReaderPlan((SourcePlan(PortPlan("p")),), 60.0)
     lines = [WIRE, write_script(tiny_runs()[:1], Device(), Faults({}), wheel=1).frames]
     reads = [Read(i + 1, b"".join(part for line in lines for part in line[3 * i : 3 * i + 3]))
              for i in range(4)]  # fmt: skip
@@ -95,7 +95,7 @@ def test_wherever_a_reader_is_killed_samples_come_once_and_a_replay_gives_the_sa
     killed_before: int,
 ) -> None:
     given, recorded = read_until(killed_before)
-    wheels = Wheels(SerialDecoder(), {None: Device()})
+    wheels = Wheels.of_one(SerialDecoder(), {None: Device()})
     blocks: list[list[bytes]] = [[], []]
     for read in recorded:
         if read.event == RESUMED:
@@ -108,7 +108,7 @@ def test_wherever_a_reader_is_killed_samples_come_once_and_a_replay_gives_the_sa
 
 def test_a_read_that_ends_every_reader_is_left_alone() -> None:
     exchange = Exchange.create(CONTEXT, 1)
-    plan = ReaderPlan(PortPlan("p"), 60.0, ProtocolPlan(), {None: Device()})
+    plan = ReaderPlan((SourcePlan(PortPlan("p")),), 60.0)
 
     def deadly(_: Read) -> list[tuple[int, bytes]]:
         raise KilledError

@@ -166,7 +166,7 @@ def test_multiplexed_and_real_signals_are_read_as_cantools_wrote_them() -> None:
     batch = same_kind(530, np.frombuffer(b"".join(rows), np.uint8).reshape(-1, 32), fd=True)
     plan = ProtocolPlan(CAN, 1e3, user)
     speeds = Speeds()
-    wheels = Wheels(plan.decoder(), {None: plan.device})
+    wheels = Wheels.of_one(plan.decoder(), {None: plan.device})
     estimation = Estimation(lambda _: speeds, Conditions.constant(5.0))
     blocks = wheels.push(pack(batch), 10**6)
     estimation.take(blocks)
@@ -217,7 +217,7 @@ def test_a_speed_on_the_bus_holds_from_the_sample_after_it(reads: int) -> None:
     batch = joined([strain.take(rows[:10]), told.take(rows[:1]), strain.take(rows[10:61]),
                     told.take(rows[1:2]), strain.take(rows[61:])])  # fmt: skip
     plan, speeds = ProtocolPlan(CAN, 1e3, user), Speeds()
-    wheels = Wheels(plan.decoder(), {None: plan.device})
+    wheels = Wheels.of_one(plan.decoder(), {None: plan.device})
     estimation = Estimation(lambda _: speeds, Conditions.constant(5.0))
     for part in np.array_split(np.arange(102), reads):
         estimation.take(wheels.push(pack(batch.take(part)), 10**6 * int(part[-1])))
@@ -244,7 +244,8 @@ def test_what_is_held_is_bounded_and_the_newest_counts() -> None:
     (('strain_unit = "ustrain"', 'strain_unit = "N"'), "a unit of strain is needed"),
     (('unit = "km/h"', 'unit = "N"'), "a unit of speed is needed"),
     (("[speed]", "[sped]"), "sped is not known"),
-    (("[speed]", "[[speed]]"), r"speed = .*; a table \[speed\] is needed"),
+    (("[speed]", "[[speed]]\nwheel = 300"), r"speed: wheel = 300; 0 \.\. 255 is needed"),
+    (("rate_hz = 1000", "rate_hz = 1000\ncamber = 5"), r"camber = 5; a table \[camber\]"),
     (("[[wheel]]", "wheel = [1, 2]\n[other]"), r"wheel = \[1, 2\]; tables \[\[wheel\]\]"),
     (('[["g1", "g2", "g3", "g4", "g5"]]', "1.5"), r"samples = 1.5; lists of 5 signals"),
 ])  # fmt: skip

@@ -58,7 +58,7 @@ def played(
 
 
 def test_a_line_without_a_frame_says_what_to_look_at() -> None:
-    wheels = Wheels(ProtocolPlan().decoder(), {None: Device()})
+    wheels = Wheels.of_one(ProtocolPlan().decoder(), {None: Device()})
     assert counters(wheels).endswith("0 frames; no byte came: is the transmitter on, and is this "
                                      "its port?")  # fmt: skip
     wheels.push(b"temperature 23.1\r\n" * 9)  # text: not even a bad frame

@@ -14,7 +14,9 @@ from bench.rig.plans import Plan
 from bench.rig.tire import TIRES, Condition
 from tests.chain.test_command_line import run
 from tests.synthetic import synthetic_run, write
+from tirelib.arrays import FloatArray
 from tirelib.campaign import read_campaign
+from tirelib.campaign.write import write_campaign
 from tirelib.cli import main, program
 from tirelib.parameters import read_tire
 
@@ -38,7 +40,29 @@ def files(campaign: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str,
         program, ["identify", str(campaign), "--out", str(out["model"]), "--json", str(out["json"])]
     )
     assert found.exit_code == 0, found.output
-    assert "4 straight runs, 5 gages averaged" in found.output
+    assert "4 straight runs, 5 of 5 gages averaged" in found.output
+    return out
+
+
+def test_a_gage_without_numbers_is_warned_of_before_the_results(
+    campaign: Path, tmp_path: Path
+) -> None:
+    given = read_campaign(campaign)
+    runs = [replace(run, strain=without(run.strain, 1)) for run in given.runs()]
+    write_campaign(tmp_path / "broken", given.header, runs)
+    found = CliRunner().invoke(
+        program, ["identify", str(tmp_path / "broken"), "--out", str(tmp_path / "M.toml")]
+    )
+    assert found.exit_code == 0, found.output
+    assert "Warning: gage 2 at" in found.stderr
+    assert "no numbers (NaN) in 4 runs" in found.stderr
+    assert "4 straight runs, 3 of 5 gages averaged" in found.output
+
+
+def without(strain: FloatArray | None, gage: int) -> FloatArray:
+    assert strain is not None
+    out = strain.copy()
+    out[gage] = np.nan
     return out
 
 

@@ -15,7 +15,6 @@ import pytest
 
 from bench.conditions import Conditions
 from bench.deadline import Deadline
-from bench.device import Device
 from bench.estimation import News
 from bench.fmu_archive import read_fmu
 from bench.fmu_model import FmuFile
@@ -26,6 +25,7 @@ from bench.live.reader import ReaderPlan
 from bench.protocols import SERIAL, SLCAN
 from bench.protocols.plan import ProtocolPlan
 from bench.recording import Recording, RecordingHeader
+from bench.source_plan import SourcePlan
 from tests.bench.campaigns import quantised
 from tests.synthetic import cornering_runs, synthetic_run, write
 from tirelib.campaign import read_campaign
@@ -80,7 +80,7 @@ def emulate(folder: Path, tmp_path: Path) -> Iterator[Callable[..., str]]:
 
 def plan_of(port: PortPlan, file: FmuFile, record: Path) -> LivePlan:
     protocol = ProtocolPlan(port.encoding)
-    reader = ReaderPlan(port, 60.0, protocol, {None: Device()})
+    reader = ReaderPlan((SourcePlan(port, protocol),), 60.0)
     conditions = Conditions.constant(18.0, 2.3e5, 0.0)
     header = RecordingHeader({}, protocol=protocol.as_header())
     return LivePlan(reader, file, conditions, header, record)

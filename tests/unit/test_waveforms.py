@@ -67,6 +67,20 @@ def test_a_turn_rate_that_no_rig_tells_is_that_of_the_contacts(tmp_path: Path) -
     assert found.conditions["omega"] == pytest.approx([told], rel=1e-3)
 
 
+def test_a_run_whose_contacts_cannot_be_found_is_left_out_with_the_gage_at_fault(
+    tmp_path: Path,
+) -> None:
+    sound, broken = synthetic_run(0, load=4000.0), synthetic_run(1, load=5000.0)
+    assert broken.strain is not None
+    strain = broken.strain.copy()
+    strain[2] = np.nan
+    found = measure_waveforms(
+        read_campaign(write(tmp_path / "w", [sound, replace(broken, strain=strain)]))
+    )
+    assert found.run.tolist() == [0]
+    assert "100% of the samples of gage 3, which finds the contacts" in found.left_out[1]
+
+
 def test_equal_set_points_are_a_group(waves: Waveforms) -> None:
     assert waves.group.tolist() == [0, 1, 2, 1, 3]
 

@@ -12,8 +12,13 @@ _SUFFIXES = frozenset({".mf4", ".mdf", ".dat"})
 
 
 def extra_files(folder: Path) -> list[Problem]:
-    """Return a warning for each recording in the folder that ``runs.csv`` does not list."""
+    """Return a warning for each recording in the folder that ``runs.csv`` does not list.
+
+    None where ``runs.csv`` names no files at all: that is the fault to mend first.
+    """
     listed = _listed(folder)
+    if listed is None:
+        return []
     return [
         Problem(
             file,
@@ -31,13 +36,16 @@ def extra_files(folder: Path) -> list[Problem]:
     ]
 
 
-def _listed(folder: Path) -> set[str]:
-    """Return the files that the rows name, those of faulty rows included."""
+def _listed(folder: Path) -> set[str] | None:
+    """Return the files that the rows name, those of faulty rows included; None without a column."""
     try:
         with (folder / plan_file.FILE).open(encoding="utf-8-sig", newline="") as stream:
-            rows = [{k.strip(): v for k, v in row.items() if k} for row in csv.DictReader(stream)]
+            table = csv.DictReader(stream)
+            rows = [{k.strip(): v for k, v in row.items() if k} for row in table]
     except (OSError, UnicodeDecodeError, csv.Error):
-        return set()
+        return None
+    if "file" not in {name.strip() for name in table.fieldnames or ()}:
+        return None
     return {(row.get("file") or "").strip().removeprefix("./") for row in rows}
 
 

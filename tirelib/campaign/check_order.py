@@ -86,8 +86,11 @@ def order_findings(
 ) -> tuple[list[Finding], list[Problem]]:
     """Return runs with swapped gages, and a lateral order that the whole campaign contradicts."""
     usable = [s for s in summaries if s.features is not None and np.isfinite(s.conditions).all()]
-    if len(usable) < 4 or len(header.gage_lateral) < 2:
+    if not usable or len(header.gage_lateral) < 2:
         return [], []
+    if len(usable) < 4:  # where faults of the runs are the reason, those come first
+        few = [_unchecked(f"{len(usable)} run(s) with strain")]
+        return [], few if len(usable) == len(summaries) else []
     features = np.stack([s.features for s in usable if s.features is not None])
     deviation = features - features.mean(axis=2, keepdims=True)
     regressors = _regressors(np.stack([s.conditions for s in usable]))
@@ -232,7 +235,7 @@ def _lateral_order(
     """Find gages whose slope over the lateral force is out of the order of their positions."""
     force = regressors[:, 1] if regressors.shape[1] > 1 else np.zeros(len(regressors))
     if np.ptp(force) < 0.2 or force.min() > -0.05 or force.max() < 0.05:
-        return []  # lateral force in one direction, or none: nothing to tell the sides by
+        return [_unchecked("no runs with lateral force to both sides")]
     error = np.sqrt(np.linalg.pinv(regressors.T @ regressors)[1, 1])
     lateral = np.array(header.gage_lateral)
     order = np.argsort(lateral)
@@ -258,6 +261,17 @@ def _lateral_order(
             "it may be the other ones",
         )
     ]
+
+
+def _unchecked(held: str) -> Problem:
+    """Return the warning that swapped gages would not have been noticed."""
+    return Problem(
+        "campaign.toml, [gages] lateral_m",
+        f"the order of the gages was not checked: the campaign holds {held}",
+        "lateral force tells the sides apart, by its sign in four runs or more",
+        "add runs with slip angles to both sides, or make sure of the wiring",
+        "warning",
+    )
 
 
 def _out_of_order(slopes: FloatArray, error: float) -> list[int]:

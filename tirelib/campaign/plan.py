@@ -77,7 +77,7 @@ def parse_plans(folder: Path, axes: str) -> tuple[tuple[RunPlan, ...], list[Prob
             )
         ]
     columns = [name.strip() for name in table[0]] if table else []
-    problems = _column_problems(columns)
+    problems = _separator_problems(columns) or _column_problems(columns)
     if problems:
         return (), problems
     plans: list[RunPlan] = []
@@ -92,6 +92,21 @@ def parse_plans(folder: Path, axes: str) -> tuple[tuple[RunPlan, ...], list[Prob
             Problem(FILE, "no run is listed", "one row a run is needed", "add the runs")
         )
     return tuple(plans), problems
+
+
+def _separator_problems(columns: list[str]) -> list[Problem]:
+    """Return a fault where the columns stand apart by another sign than a comma."""
+    for mark, words in ((";", "semicolons"), ("\t", "tabs"), ("|", "bars")):
+        if len(columns) == 1 and {"run", "file"} <= {c.strip() for c in columns[0].split(mark)}:
+            return [
+                Problem(
+                    f"{FILE}, line 1",
+                    f"the columns are separated by {words} ({mark!r})",
+                    "commas are needed, and a point in decimal numbers",
+                    "export it again as comma-separated text",
+                )
+            ]
+    return []
 
 
 def _column_problems(columns: list[str]) -> list[Problem]:

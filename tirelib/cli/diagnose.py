@@ -9,7 +9,7 @@ import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from tirelib.campaign import Campaign, CampaignHeader, read_campaign
+from tirelib.campaign import Campaign, read_campaign
 from tirelib.cli.common import (
     CAMPAIGN,
     FILE,
@@ -85,7 +85,7 @@ def diagnose(
     catalogue = registered_effects(effect_files)
     file = read_tire(model_name)
     campaign = read_campaign(folder)
-    forces = explains_forces(quantity, campaign.header, file)
+    forces = explains_forces(quantity, campaign, file)
     explain = of_forces if forces else _of_strain
     with progress_bar("diagnosing") as progress:
         told, document = explain(campaign, file, catalogue, quantity, members, seed, progress)
@@ -100,7 +100,7 @@ def diagnose(
         console.print(f"written: {path}")
 
 
-def explains_forces(quantity: str | None, header: CampaignHeader, file: "TireFile") -> bool:
+def explains_forces(quantity: str | None, campaign: Campaign, file: "TireFile") -> bool:
     """Return whether a force is to be explained, and not strain.
 
     Strain comes first, where there is strain and the model has a ring.
@@ -110,8 +110,13 @@ def explains_forces(quantity: str | None, header: CampaignHeader, file: "TireFil
     ParameterError
         If there is no such quantity.
     CalibrationError
-        If strain is asked for and not measured.
+        If strain is asked for and not measured, or is all that the campaign tells and the model has
+        no ring.
     """
+    from tirelib.compare.compare import needs_ring
+    from tirelib.identify.strain_notes import is_straight
+
+    header = campaign.header
     if quantity is not None and quantity not in QUANTITIES:
         raise ParameterError(
             f"--quantity {quantity}: allowed are {', '.join(QUANTITIES)}; correct the name"
@@ -121,6 +126,9 @@ def explains_forces(quantity: str | None, header: CampaignHeader, file: "TireFil
             f"{header.name}: it has no strain gages; look at its forces: --quantity "
             f"{', '.join(QUANTITIES[1:])}"
         )
+    only_strain = bool(header.gage_lateral) and all(map(is_straight, campaign.plans))
+    if quantity == "strain" or (quantity is None and only_strain):
+        needs_ring(campaign, file)
     if quantity is None:
         return not header.gage_lateral or bool(file.missing)
     return quantity != "strain"

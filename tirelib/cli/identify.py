@@ -60,14 +60,18 @@ def identify(
     console = output()
     if whole.ring_failed:
         click.echo(f"Warning: the straight runs gave {whole.ring_failed}", err=True)
+    warned = whole.ring.notes if whole.ring is not None else ()
+    for note in warned:
+        click.echo(f"Warning: {note}", err=True)
     if whole.ring is not None:
-        _say_ring(console, document)
+        _say_ring(console, document, len(campaign.header.gage_lateral))
     if document["brush"] is not None:
         _say_brush(console, document)
     if document["ring_pressure"] is not None:
         _say_pressure(console, document["ring_pressure"])
     for reason in document["reasons"]:
-        console.print(f"  {reason}")
+        if reason not in warned:
+            console.print(f"  {reason}")
     console.print(f"written: {out}")
     if json_file is not None:
         write_json(json_file, document)
@@ -78,10 +82,11 @@ def identify(
     context.exit(0 if told and not whole.ring_failed else 1)
 
 
-def _say_ring(console: Console, document: dict[str, Any]) -> None:
+def _say_ring(console: Console, document: dict[str, Any], gages: int) -> None:
     console.print(
         f"{document['campaign']}: {len(document['runs'])} straight runs, "
-        f"{len(document['gages'])} gages averaged; strain rms left {document['rms_ustrain']:.0f} "
+        f"{len(document['gages'])} of {gages} gages averaged; strain rms left "
+        f"{document['rms_ustrain']:.0f} "
         f"of {document['strain_rms_ustrain']:.0f} microstrain"
     )
     _say_parameters(console, document["parameters"])

@@ -131,7 +131,7 @@ def next_test(
     file = read_tire(model_name)
     campaign = read_campaign(folder)
     declared: dict[str, Any] = {name: _si(name, ranges[f"{name}_range"]) for name in RANGES}
-    if explains_forces(quantity, campaign.header, file):
+    if explains_forces(quantity, campaign, file):
         answer, force_plan = _for_force(
             campaign, file, catalogue, quantity, diagnosis_file, names, declared, members, seed,
             wanted, sweep,

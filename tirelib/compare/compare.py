@@ -59,13 +59,13 @@ def compare(
             f"{', '.join(FORCES)}"
         )
     if quantity == "strain" or (quantity is None and has_strain):
-        _needs_ring(campaign, file)
+        needs_ring(campaign, file)
         waves = waves or measure_waveforms(campaign, progress=progress)
         return compare_strain(waves, model_of(file, effects), campaign.content_hash())
     return compare_forces(campaign, file, quantity, effects)
 
 
-def _needs_ring(campaign: Campaign, file: TireFile) -> None:
+def needs_ring(campaign: Campaign, file: TireFile) -> None:
     """Refuse to predict strain from a file that states no ring."""
     if not file.missing:
         return
@@ -74,7 +74,7 @@ def _needs_ring(campaign: Campaign, file: TireFile) -> None:
     if brush:
         raise CalibrationError(
             f"{file.name}: it is a model of the brush only ({', '.join(brush)}) and says nothing "
-            f"of the strain of {name}: {lacks}; compare its forces with --quantity "
+            f"of the strain of {name}: {lacks}; look at its forces in runs with slip, --quantity "
             f"{', '.join(FORCES)}, or identify the ring from straight runs with `tirelib identify`"
         )
     raise CalibrationError(

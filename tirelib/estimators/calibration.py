@@ -154,14 +154,16 @@ class Calibration:
             flags[rows] |= np.where(self._unknown_condition(chain, part), _NO_CONDITION, 0)
         return self._finish(features, value, std, valid, flags, radius, traction, extrapolated)
 
+    @property
+    def needed(self) -> tuple[str, ...]:
+        """Conditions without which no turn is valid."""
+        return _needed(self.chains[-1])
+
     def _unknown_condition(self, chain: Chain, regressors: Mapping[str, FloatArray]) -> BoolArray:
         """Tell where a condition that a model needs is not known."""
-        models = [chain.load, chain.force, chain.angle.polynomial if chain.angle else None]
-        used = {v.name for model in models if model is not None for v in model.variables}
         unknown = np.zeros(regressors["omega"].shape, dtype=np.bool_)
-        for name, source in (("pressure",) * 2, ("camber",) * 2, ("speed_squared", "speed")):
-            if name in used:
-                unknown |= np.isnan(regressors[source]) & np.isfinite(regressors["omega"])
+        for name in _needed(chain):
+            unknown |= np.isnan(regressors[name]) & np.isfinite(regressors["omega"])
         return unknown
 
     def _finish(
@@ -211,6 +213,14 @@ class Calibration:
             radius=radius,
             contact_length=features.contact_angle * radius[:, None],
         )
+
+
+def _needed(chain: Chain) -> tuple[str, ...]:
+    """Return the conditions that the models of a chain use."""
+    models = [chain.load, chain.force, chain.angle.polynomial if chain.angle else None]
+    used = {v.name for model in models if model is not None for v in model.variables}
+    sources = {"pressure": "pressure", "camber": "camber", "speed_squared": "speed"}
+    return tuple(source for name, source in sources.items() if name in used)
 
 
 _NO_CONDITION = int(TurnFlag.NO_CONDITION)

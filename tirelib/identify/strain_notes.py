@@ -51,10 +51,13 @@ def gage_notes(waves: Waveforms, used: tuple[int, ...]) -> tuple[str, ...]:
             )
             continue
         run = bad[0]
-        out.append(
-            f"{at}: {1e6 * size[run, gage]:.0f} microstrain rms in {named(waves.run[bad])}, where "
-            f"the others show {1e6 * typical[run, 0]:.0f}; left out of the ring in all runs"
+        shown = (
+            f"{1e6 * size[run, gage]:.0f} microstrain rms in {named(waves.run[bad])}, where the "
+            f"others show {1e6 * typical[run, 0]:.0f}"
+            if np.isfinite(size[run, gage])
+            else f"samples that are no numbers (NaN) in {named(waves.run[bad])}"
         )
+        out.append(f"{at}: {shown}; left out of the ring in all runs")
     return tuple(out)
 
 

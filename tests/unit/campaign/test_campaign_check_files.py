@@ -112,6 +112,33 @@ def test_each_fault_of_the_plan_has_its_message(write: Write, fault: str) -> Non
         read_campaign(folder)
 
 
+@pytest.mark.parametrize("mark", [";", "\t"])
+def test_a_plan_with_another_separator_is_one_fault(write: Write, mark: str) -> None:
+    folder = write()
+    plan = folder / "runs.csv"
+    plan.write_text(plan.read_text().replace(",", mark))
+    problem = the_one(check_campaign(folder))
+    says(problem, "runs.csv, line 1: the columns are separated by")
+    says(problem, "export it again as comma-separated text")
+
+
+def test_straight_runs_alone_do_not_tell_that_the_gages_are_in_order(
+    write: Write, sound_runs: Runs
+) -> None:
+    straight = [
+        replace(
+            run,
+            plan=replace(run.plan, slip_angle=0.0, camber=0.0),
+            rig={
+                name: value for name, value in run.rig.items() if name not in ("Fy", "slip_angle")
+            },
+        )
+        for run in sound_runs
+    ]
+    texts = [str(problem) for problem in check_campaign(write(runs=straight))]
+    assert any("the order of the gages was not checked" in text for text in texts)
+
+
 def test_a_run_number_given_twice_is_a_duplicate_run(write: Write) -> None:
     folder = write()
     text = (folder / "runs.csv").read_text().replace("\n3,runs", "\n2,runs")

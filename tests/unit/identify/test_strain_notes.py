@@ -46,6 +46,15 @@ def test_a_gage_that_fell_off_is_named_with_its_runs_and_so_is_its_twin(waves: W
     assert gage_notes(waves, straight_runs(waves).gages) == ()
 
 
+def test_a_gage_without_numbers_is_named_as_such(waves: Waveforms) -> None:
+    strain = waves.strain.copy()
+    strain[3, 1] = np.nan
+    runs = straight_runs(replace(waves, strain=strain))
+    assert gage_notes(runs.waves, runs.gages)[0].startswith(
+        "gage 2 at +30 mm: samples that are no numbers (NaN) in run 3"
+    )
+
+
 def test_a_straight_run_without_waveform_is_named_with_its_reason(waves: Waveforms) -> None:
     lost = replace(waves, left_out={20: "holds no whole turn", 21: "holds no whole turn"})
     plans = [plan(20), plan(21, slip_angle=0.05)]

@@ -1,0 +1,197 @@
+"""What a run is told: its sources, and what is known beside the strain."""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from rich.console import Console
+
+from bench.cli.options import devices_of_text
+from bench.conditions import Conditions, read_conditions
+from bench.deadline import Deadline
+from bench.device import Device
+from bench.errors import DeviceError, RecordingError
+from bench.links.opening import PortPlan
+from bench.links.replay import ReplayLink
+from bench.protocols.plan import ProtocolPlan
+from bench.setup_file import check_sources, read_setup, told_by
+from bench.source_plan import SourcePlan, protocol_of
+from tirelib.estimators.calibration import Calibration
+from tirelib.units import to_si
+
+LOOK = 0.05
+"""Time between two looks for a file that is waited for, [s]."""
+_OPTIONS = {"speed": "--speed KMH", "pressure": "--pressure BAR", "camber": "--camber DEG"}
+_WITHOUT = {"speed": "there will be no slip ratio",
+            "pressure": "standard deviations are wider by what pressure does",
+            "camber": "the standard deviation of Fy is wider by what camber does"}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """What is read, and what is known beside it.
+
+    Attributes
+    ----------
+    sources : tuple of SourcePlan
+    conditions : Conditions
+    wheels : tuple of int
+        That are looked at; empty: the first that are heard.
+    """
+
+    sources: tuple[SourcePlan, ...]
+    conditions: Conditions
+    wheels: tuple[int, ...]
+
+    @property
+    def devices(self) -> list[Device]:
+        """What a count means, of all wheels."""
+        return [
+            device
+            for source in self.sources
+            for device in (source.devices or {None: source.protocol.device}).values()
+        ]
+
+
+def live_sources(
+    ports: Sequence[str], setup: Path | None, map_file: Path | None, usual: SourcePlan
+) -> tuple[SourcePlan, ...]:
+    """Return what is read live: ``[WHEEL=]PORT`` each, or the sources of a setup.
+
+    Raises
+    ------
+    DeviceError
+        With the faults of a file.
+    """
+    if setup is not None:
+        return read_setup(setup, usual)
+    sources = []
+    for text in ports:
+        number, _, rest = text.partition("=")
+        wheel = int(number) if rest and number.isdecimal() and int(number) <= 255 else None
+        port = replace(usual.port, port=text if wheel is None else rest)
+        protocol = protocol_of(port, usual.protocol.rate, map_file)
+        sources.append(replace(usual, port=port, protocol=protocol, wheel=wheel))
+    return tuple(sources)
+
+
+def port_of_file(file: Path, wait: float, console: Console) -> str:
+    """Return the port whose name stands in a file, once the file and the port are there.
+
+    Raises
+    ------
+    DeviceError
+        If they do not come in time.
+    """
+    deadline, told = Deadline.after(wait), False
+    while True:
+        try:
+            port = file.read_text(encoding="utf-8").strip()
+        except (OSError, UnicodeDecodeError):
+            port = ""
+        if port and (not port.startswith("/") or Path(port).exists()):
+            return port
+        if deadline.expired:
+            raise DeviceError(
+                f"--port-file {file}: {f'its port {port} is not there' if port else 'no port'}; "
+                "the file that `tirebench emulate --port-file` writes is needed; start that, or "
+                "wait for it with --wait"
+            )
+        if not told:
+            console.print(f"waiting for {file}", soft_wrap=True, markup=False)
+            told = True
+        time.sleep(LOOK)
+
+
+def conditions_of(
+    speed: float | None, pressure: float | None, camber: float | None, sidecar: Path | None
+) -> Conditions | None:
+    """Return conditions of the options; None when there are none.
+
+    Raises
+    ------
+    DeviceError
+        If a file is given beside values, or has faults.
+    """
+    values = {"speed": (speed, "km/h", "speed"), "pressure": (pressure, "bar", "pressure"),
+              "camber": (camber, "deg", "angle")}  # fmt: skip
+    given = {
+        name: to_si(value, unit, dimension)
+        for name, (value, unit, dimension) in values.items()
+        if value is not None
+    }
+    if sidecar is None:
+        return Conditions.constant(**given) if given else None
+    if given:
+        raise DeviceError(
+            f"--{', --'.join(given)} and --conditions {sidecar} are given; one or the other says "
+            "what holds; leave one out"
+        )
+    return read_conditions(sidecar)
+
+
+def given_live(
+    sources: tuple[SourcePlan, ...], conditions: Conditions | None, wheels: tuple[int, ...]
+) -> Given:
+    """Return what a live run is told.
+
+    Raises
+    ------
+    DeviceError
+        If sources contradict each other or the conditions.
+    """
+    check_sources(sources, conditions)
+    return Given(sources, conditions or Conditions.constant(), wheels)
+
+
+def given_replayed(
+    link: ReplayLink,
+    conditions: Conditions | None,
+    devices: Mapping[int | None, Device],
+    wheels: tuple[int, ...],
+    console: Console,
+) -> Given:
+    """Return what a recording says; options that are given replace it, and that is said."""
+    header = link.recording.header
+    if devices or conditions is not None:
+        console.print("note: device file or conditions of the recording are replaced by options")
+    sources = []
+    for number, source in enumerate(header.sources):
+        protocol = ProtocolPlan.of_header(source, link.name)
+        text = str(source.get("device", header.device))
+        own = devices_of_text(text, link.name)
+        port = PortPlan(str(source.get("name", f"source {number}")))
+        wheel = source.get("wheel")
+        if wheel is not None and wheel not in range(256):
+            raise RecordingError(
+                f"{link.name}: wheel = {str(wheel)[:40]} of source {number}; 0 .. 255 is allowed; "
+                "the header is damaged; take another recording"
+            )
+        sources.append(SourcePlan(port, protocol, devices or own, wheel, text))
+    if not wheels:
+        wheels = tuple(header.settings.get("wheels") or ())
+    return Given(tuple(sources), conditions or link.recording.conditions, wheels)
+
+
+def missing(given: Given, calibration: Calibration) -> tuple[list[str], list[str]]:
+    """Return what is not known: without which no turn is valid, and without which it is worse."""
+    told = [place for source in given.sources for place in told_by(source)]
+    known = {*given.conditions.known, *(name for name, _ in told)}
+    needed = [name for name in calibration.needed if name not in known]
+    useful = [name for name in _WITHOUT if name not in known and name not in needed]
+    return needed, useful
+
+
+def say_missing(given: Given, calibration: Calibration, console: Console) -> None:
+    """Say what is not known before the first turn shows it."""
+    needed, useful = missing(given, calibration)
+    for name in needed:
+        console.print(
+            f"WARNING: no {name}: this calibration needs it, and NO TURN WILL BE VALID; give "
+            f"{_OPTIONS[name]}, --conditions FILE, or a map with [{name}]", style="bold red",
+            soft_wrap=True, markup=False,
+        )  # fmt: skip
+    for name in useful:
+        console.print(f"note: no {name}: {_WITHOUT[name]}; give {_OPTIONS[name]}, --conditions "
+                      f"FILE, or a map with [{name}]", soft_wrap=True, markup=False)  # fmt: skip

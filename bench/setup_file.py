@@ -1,0 +1,172 @@
+"""Several sources in one run, from a file (``tirebench-setup/1``).
+
+::
+
+    format = "tirebench-setup/1"
+
+    [[source]]
+    port   = "/dev/ttyUSB0"       # as --port takes it
+    baud   = 2000000
+    wheel  = 0                    # number that its only wheel gets; left out: as sent
+    device = "front_left.toml"    # beside this file
+
+    [[source]]
+    port    = "can:socketcan:can0"
+    bitrate = 500000
+    map     = "vehicle.toml"      # [speed], [pressure], ..., [[wheel]]; beside this file
+
+What a table leaves out is as the options of the command say.
+"""
+
+import tomllib
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from bench.conditions import TELLABLE, Conditions
+from bench.device import read_device
+from bench.errors import DeviceError, cause
+from bench.links.opening import PortPlan
+from bench.protocols.user_map import clashes
+from bench.source_plan import SourcePlan, protocol_of
+
+FORMAT = "tirebench-setup/1"
+_KEYS: dict[str, type | tuple[type, ...]] = {
+         "port": str, "baud": int, "bitrate": int, "data_bitrate": int, "bus_options": list,
+         "rate_hz": (int, float), "map": str, "device": str, "wheel": int,
+}  # fmt: skip
+
+
+def read_setup(path: Path, usual: SourcePlan) -> tuple[SourcePlan, ...]:
+    """Read a setup.
+
+    Parameters
+    ----------
+    path : Path
+    usual : SourcePlan
+        What holds where a table says nothing.
+
+    Raises
+    ------
+    DeviceError
+        With every fault of the file.
+    """
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        raise DeviceError(
+            f"{path}: it cannot be read ({cause(error)}); a setup is TOML in UTF-8; check path and "
+            "line"
+        ) from None
+    if document.get("format") != FORMAT:
+        raise DeviceError(
+            f"{path}: format = {document.get('format')!r}; {FORMAT!r} is understood here; correct "
+            "it, or take a program of that version"
+        )
+    tables = document.get("source")
+    faults = [
+        f"{path}: {key} is not known; allowed are format and [[source]]; correct it"
+        for key in sorted(set(document) - {"format", "source"})
+    ]
+    if not isinstance(tables, list) or not tables or not all(isinstance(t, dict) for t in tables):
+        faults.append(f"{path}: source = {tables!r}; tables [[source]] are needed; write them")
+        raise DeviceError(faults)
+    for number, table in enumerate(tables, start=1):
+        faults += _faults(table, f"{path}: source {number}")
+    if faults:
+        raise DeviceError(faults)
+    return tuple(_source(table, path.parent, usual) for table in tables)
+
+
+def _faults(table: dict[str, Any], where: str) -> list[str]:
+    """Return what is wrong with the keys of a table."""
+    faults = [
+        f"{where}: {key} is not known; allowed are {', '.join(_KEYS)}; correct it"
+        for key in sorted(set(table) - set(_KEYS))
+    ]
+    if "port" not in table:
+        faults.append(f"{where}: port is missing; a port as --port takes it is needed; write it")
+    for key, kind in _KEYS.items():
+        value = table.get(key)
+        if value is not None and (not isinstance(value, kind) or isinstance(value, bool)):
+            wanted = kind.__name__ if isinstance(kind, type) else "number"
+            faults.append(f"{where}: {key} = {value!r}; a TOML value of type {wanted} is needed; "
+                          "correct it")  # fmt: skip
+    wheel = table.get("wheel", 0)
+    if isinstance(wheel, int) and not 0 <= wheel <= 255:
+        faults.append(f"{where}: wheel = {wheel}; 0 .. 255 is allowed; correct it")
+    return faults
+
+
+def _source(table: dict[str, Any], folder: Path, usual: SourcePlan) -> SourcePlan:
+    port = PortPlan(
+        table["port"],
+        table.get("baud", usual.port.baud),
+        table.get("bitrate", usual.port.bitrate),
+        table.get("data_bitrate", usual.port.data_bitrate),
+        tuple(map(str, table.get("bus_options", usual.port.options))),
+    )
+    map_file = folder / table["map"] if "map" in table else None
+    protocol = protocol_of(port, float(table.get("rate_hz", usual.protocol.rate)), map_file)
+    source = replace(usual, port=port, protocol=protocol, wheel=table.get("wheel"))
+    if "device" not in table:
+        return source
+    file = folder / table["device"]
+    device = read_device(file)
+    return replace(source, devices={None: device}, device_text=file.read_text(encoding="utf-8"))
+
+
+def check_sources(sources: Sequence[SourcePlan], conditions: Conditions | None) -> None:
+    """Refuse sources that contradict each other, or the options.
+
+    Raises
+    ------
+    DeviceError
+        If two have one port, one wheel, or tell the same condition; if an option does.
+    """
+    faults = []
+    ports = [source.port.port for source in sources]
+    for port in sorted({port for port in ports if ports.count(port) > 1}):
+        faults.append(f"--port {port}: it comes twice; each source needs a port of its own; leave "
+                      "one out")  # fmt: skip
+    wheels = [(wheel, source.port.port) for source in sources for wheel in known_wheels(source)]
+    for wheel in sorted({w for w, _ in wheels}):
+        named = [port for w, port in wheels if w == wheel]
+        if len(named) > 1:
+            faults.append(f"wheel {wheel} comes from {' and '.join(named)}; each wheel may come "
+                          "from one source; number them: `wheel = N` or --port N=PORT")  # fmt: skip
+    told = [(place, source.port.port) for source in sources for place in told_by(source)]
+    places = [place for place, _ in told]
+    if clash := [(place, port) for place, port in told if clashes(place, places)]:
+        names = ", ".join(f"{_words(place)} from {port}" for place, port in clash)
+        faults.append(f"a condition is told twice: {names}; each may come from one source, for a "
+                      "wheel or for all; leave one out of its map")  # fmt: skip
+    known = () if conditions is None else conditions.known
+    for place, port in told:
+        if (name := place[0]) in known:
+            faults.append(f"{_words(place)} comes from {port}, and from --{name} or "
+                          "--conditions; one of them may say it; leave one out")  # fmt: skip
+    if faults:
+        raise DeviceError(faults)
+
+
+def known_wheels(source: SourcePlan) -> list[int]:
+    """Return the wheels of a source that are known before anything is heard."""
+    if source.wheel is not None:
+        return [source.wheel]
+    user = source.protocol.user_map
+    return [] if user is None else [wheel.wheel for wheel in user.wheels]
+
+
+def told_by(source: SourcePlan) -> list[tuple[str, int | None]]:
+    """Return the conditions that a source tells, each with the wheel for which it holds."""
+    user = source.protocol.user_map
+    if user is None:
+        return []
+    return [(TELLABLE[q.name][0], q.wheel) for q in user.quantities]
+
+
+def _words(place: tuple[str, int | None]) -> str:
+    name, wheel = place
+    return name if wheel is None else f"{name} of wheel {wheel}"

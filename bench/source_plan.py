@@ -1,0 +1,73 @@
+"""One source of a run: a port, what its bytes mean, and what its wheels are called."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from bench.device import Device
+from bench.errors import DeviceError
+from bench.links.opening import PortPlan
+from bench.protocols import SERIAL
+from bench.protocols.plan import ProtocolPlan
+from bench.protocols.user_map import read_map
+from bench.wheels import Line, Wheels
+
+
+@dataclass(frozen=True, slots=True)
+class SourcePlan:
+    """What is read from one port.
+
+    Attributes
+    ----------
+    port : PortPlan
+    protocol : ProtocolPlan
+    devices : mapping of wheel to Device
+        ``None`` is the key of the device for all others; empty: what the protocol says.
+    wheel : int or None
+        Number that its only wheel gets; None: numbers are as sent.
+    device_text : str
+        Of the device files.
+    """
+
+    port: PortPlan
+    protocol: ProtocolPlan = field(default_factory=ProtocolPlan)
+    devices: Mapping[int | None, Device] = field(default_factory=dict)
+    wheel: int | None = None
+    device_text: str = ""
+
+    def line(self) -> Line:
+        """Return what decodes it, fresh."""
+        devices = self.devices or {None: self.protocol.device}
+        return Line(self.protocol.decoder(), devices, self.wheel, self.port.port)
+
+    def as_header(self) -> dict[str, Any]:
+        """Return the plan as the header of a recording holds it."""
+        return {
+            **self.protocol.as_header(),
+            "name": self.port.port,
+            "wheel": self.wheel,
+            "device": self.device_text,
+        }
+
+
+def wheels_of(sources: Sequence[SourcePlan], chosen: Sequence[int] = ()) -> Wheels:
+    """Return all wheels of a run, fresh."""
+    return Wheels([source.line() for source in sources], chosen)
+
+
+def protocol_of(port: PortPlan, rate: float, map_file: Path | None) -> ProtocolPlan:
+    """Return what is on a port.
+
+    Raises
+    ------
+    DeviceError
+        If a map is given for a line that has none, or has faults.
+    """
+    if map_file is not None and port.encoding == SERIAL:
+        raise DeviceError(
+            f"--map {map_file} with --port {port.port}: a map is for CAN frames; "
+            "slcan:... or can:... is needed; leave it out, or name such a port"
+        )
+    user = None if map_file is None else read_map(map_file)
+    return ProtocolPlan(port.encoding, rate if user is None else user.rate, user)

@@ -1,0 +1,297 @@
+"""Several sources in one run: told apart, contradictions refused, replayed to the bit."""
+
+import os
+import signal
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from rich.console import Console
+
+from bench.can_batch import same_kind
+from bench.cli import program
+from bench.cli.given import given_replayed
+from bench.conditions import Conditions
+from bench.deadline import Deadline
+from bench.decoder import SerialDecoder
+from bench.device import Device
+from bench.document import turn_document
+from bench.emulator import write_script
+from bench.errors import BenchError, DeviceError
+from bench.estimation import Estimation, News
+from bench.faults import Faults
+from bench.fmu_archive import read_fmu
+from bench.fmu_model import FmuFile, FmuModel
+from bench.frames import encode, strain_frames
+from bench.links.opening import PortPlan
+from bench.links.replay import ReplayLink
+from bench.live.chain import LiveChain, LivePlan
+from bench.live.reader import ReaderPlan
+from bench.protocols import SLCAN, slcan
+from bench.protocols.plan import ProtocolPlan
+from bench.protocols.user_map import parse_map
+from bench.recording import Recording, RecordingHeader
+from bench.replay import ReplayChain
+from bench.setup_file import check_sources, read_setup
+from bench.source_plan import SourcePlan, wheels_of
+from bench.wheels import Line, Wheels
+from tests.bench.campaigns import tiny_runs
+from tests.bench.programs import PATIENCE
+from tests.bench.servers import Server
+
+VEHICLE = """
+format = "tirebench-map/1"
+[speed]
+message = "ABS"
+signal = "v"
+unit = "km/h"
+[[pressure]]
+wheel = 3
+message = "ABS"
+signal = "p3"
+unit = "bar"
+[[message]]
+name = "ABS"
+id = 0x100
+length = 4
+signals = [{ name = "v", start = 0, length = 16, factor = 0.01 },
+           { name = "p3", start = 16, length = 8, factor = 0.1 }]
+"""
+
+
+def told(speed: float, pressure: float = 2.5) -> bytes:
+    """One message of the vehicle on a line of slcan."""
+    values = round(100 * speed).to_bytes(2, "little") + bytes([round(10 * pressure), 0])
+    data = np.frombuffer(values, np.uint8)[None, :]
+    return b"".join(slcan.encode(same_kind(0x100, data, fd=False)))
+
+
+def wire() -> list[bytes]:
+    """Three runs of a wheel that calls itself 0."""
+    return list(write_script(tiny_runs(), Device(), Faults({})).frames)
+
+
+def vehicle(url: str = "p") -> SourcePlan:
+    return SourcePlan(
+        PortPlan(f"slcan:{url}"), ProtocolPlan(SLCAN, 1e3, parse_map(VEHICLE, "", "v.toml"))
+    )
+
+
+@pytest.fixture
+def file(toy_fmus: dict[int, Path]) -> Iterator[FmuFile]:
+    with FmuFile(read_fmu(toy_fmus[16])) as opened:
+        yield opened
+
+
+def gathered(chain: LiveChain, news: News, enough: Callable[[], bool]) -> None:
+    end = Deadline.after(PATIENCE)
+    while not enough():
+        news.add(chain.poll(Deadline.after(0.05)))
+        assert not end.expired, chain.counts()
+
+
+def by_wheel(news: News) -> dict[int, list[dict[str, Any]]]:
+    turns: dict[int, list[dict[str, Any]]] = {}
+    for turn in news.turns:
+        turns.setdefault(turn.wheel, []).append(turn_document(turn))
+    return turns
+
+
+def replayed(path: Path, file: FmuFile) -> tuple[News, Wheels]:
+    models: list[FmuModel] = []
+
+    def model(_: int) -> FmuModel:
+        models.append(FmuModel(file))
+        return models[-1]
+
+    with ReplayLink(path) as link:
+        given = given_replayed(link, None, {}, (), Console(quiet=True))
+        wheels = wheels_of(given.sources, given.wheels)
+        estimation = Estimation(model, given.conditions, link.recording.jumps())
+        chain, news = ReplayChain(link, wheels, estimation), News()
+        while not chain.ended:
+            news.add(chain.poll(Deadline.never()))
+        news.add(chain.finish("end"))
+    for one in models:
+        one.close()
+    return news, wheels
+
+
+def speed_of(chain: LiveChain) -> float:
+    known = chain.wheels._told.get(("speed", None))
+    return 0.0 if known is None else 3.6 * known.value
+
+
+def test_two_wheels_and_the_vehicle_on_one_clock_are_replayed_to_the_bit(
+    file: FmuFile, tmp_path: Path
+) -> None:
+    frames = wire()
+    half = len(frames) // 2
+    first, second, faster = Event(), Event(), Event()
+
+    def wheel_may(number: int) -> None:
+        (first if number < half else second).wait()
+
+    left, right = (Server(frames, wheel_may) for _ in range(2))
+    bus = Server([told(65.0), told(72.0)], lambda number: faster.wait() if number else None)
+    sources = (
+        SourcePlan(PortPlan(left.url)),
+        SourcePlan(PortPlan(right.url), wheel=3),
+        vehicle(bus.url),
+    )
+    head, *more = (source.as_header() for source in sources)
+    header = RecordingHeader({}, protocol=head, more=tuple(more))
+    plan = LivePlan(ReaderPlan(sources, 60.0, every_turn=True), file, Conditions.constant(), header,
+                    tmp_path / "a.mcap")  # fmt: skip
+    news = News()
+    with LiveChain(plan) as chain:
+        gathered(chain, news, lambda: speed_of(chain) == pytest.approx(65.0))
+        first.set()
+        gathered(chain, news, lambda: all(len(by_wheel(news).get(w, ())) > 1 for w in (0, 3)))
+        os.kill(chain.process_ids["reader"] or 0, signal.SIGKILL)  # what the ports bring waits
+        gathered(chain, news, lambda: chain.counts()["restarts"]["reader"] == 1)
+        faster.set()
+        gathered(chain, news, lambda: speed_of(chain) == pytest.approx(72.0))
+        second.set()
+        size = sum(map(len, frames))
+        gathered(
+            chain, news, lambda: all(chain.wheels.line_counts(w).bytes == size for w in (0, 3))
+        )
+        news.add(chain.finish("stopped"))
+        assert {f"port {n}" for n in range(3)} <= chain.process_ids.keys()
+        counts = chain.wheels.counts
+    for server in (left, right, bus):
+        server.close()
+    live = by_wheel(news)
+    assert set(live) == {0, 3}
+    for turns in live.values():
+        assert len(turns) >= 15
+        speeds = [round(3.6 * turn["kappa"], 6) for turn in turns]  # the toy gives its speed back
+        assert set(speeds) == {65.0, 72.0}
+        assert speeds == sorted(speeds)
+    assert (counts[1].lost_samples, counts[0].bad) == (0, 0)
+    again, wheels = replayed(tmp_path / "a.mcap", file)
+    assert by_wheel(again) == live
+    assert wheels.counts == counts
+
+
+def test_a_port_of_several_that_is_killed_is_read_again(tmp_path: Path) -> None:
+    frames = wire()
+    more = Event()
+    held = Server(frames, lambda number: more.wait() if number > 9 else None)
+    other = Server([told(50.0)])
+    sources = (SourcePlan(PortPlan(held.url)), vehicle(other.url))
+    plan = LivePlan(ReaderPlan(sources, 60.0), None, Conditions.constant(),
+                    RecordingHeader({}, more=({},)), tmp_path / "a.mcap", laps=False)  # fmt: skip
+    news = News()
+    with LiveChain(plan) as chain:
+        gathered(chain, news, lambda: chain.wheels.line_counts(0).ok >= 9)
+        gathered(chain, news, lambda: speed_of(chain) > 0.0)
+        os.kill(chain.process_ids["port 1"] or 0, signal.SIGKILL)
+        gathered(chain, news, lambda: chain.counts()["restarts"]["port 1"] >= 1)
+        before = chain.wheels.line_counts(0).ok
+        more.set()
+        gathered(chain, news, lambda: chain.wheels.line_counts(0).ok > before)
+        chain.finish("stopped")
+    held.close()
+    other.close()
+    recording = Recording(tmp_path / "a.mcap")
+    reads = list(recording.reads())
+    recording.close()
+    assert {read.source for read in reads if read.data} == {0, 1}
+
+
+def test_a_wheel_that_comes_from_two_sources_is_refused() -> None:
+    wheels = Wheels([Line(SerialDecoder(), {}, name=name) for name in ("left", "right")])
+    data = b"".join(encode(strain_frames(np.zeros((32, 5), np.int16), period=1000, wheel=2)))
+    wheels.push(data, 1, 0)
+    with pytest.raises(DeviceError, match="wheel 2 comes from left and from right; each wheel may"):
+        wheels.push(data, 2, 1)
+
+
+def test_a_source_of_one_wheel_refuses_a_second() -> None:
+    wheels = Wheels([Line(SerialDecoder(), {}, 5, "left")])
+    frames = [encode(strain_frames(np.zeros((16, 5), np.int16), period=1000, wheel=w))[0]
+              for w in (1, 2)]  # fmt: skip
+    wheels.push(frames[0], 1)
+    assert list(wheels.heard) == [5]
+    with pytest.raises(DeviceError, match="left: wheels 1, 2 are heard; one is allowed"):
+        wheels.push(frames[0] + frames[1], 2)
+
+
+def serial(port: str, wheel: int | None = None) -> SourcePlan:
+    return SourcePlan(PortPlan(port), wheel=wheel)
+
+
+@pytest.mark.parametrize(("sources", "conditions", "message"), [
+    ((serial("a"), serial("a")), None, "--port a: it comes twice"),
+    ((serial("a", 1), serial("b", 1)), None, "wheel 1 comes from a and b"),
+    ((vehicle("a"), vehicle("b")), None, "told twice: speed from slcan:a, pressure of wheel 3 fr"),
+    ((serial("a"), vehicle("b")), Conditions.constant(18.0), "speed comes from slcan:b, and from"),
+])  # fmt: skip
+def test_sources_that_contradict_each_other_are_refused(
+    sources: tuple[SourcePlan, ...], conditions: Conditions | None, message: str
+) -> None:
+    with pytest.raises(DeviceError, match=message):
+        check_sources(sources, conditions)
+    check_sources((serial("a", 1), serial("b", 2), vehicle("c")), Conditions.constant(camber=0.1))
+
+
+SETUP = """
+format = "tirebench-setup/1"
+[[source]]
+port = "/dev/ttyUSB0"
+wheel = 0
+device = "left.toml"
+[[source]]
+port = "slcan:/dev/ttyACM0"
+bitrate = 1000000
+map = "vehicle.toml"
+"""
+DEVICE = 'format = "tirebench-device/1"\nname = "left"\n[scale]\nstrain_per_count = 1e-6\n'
+
+
+def test_a_setup_lists_sources_and_the_options_fill_in(tmp_path: Path) -> None:
+    (tmp_path / "left.toml").write_text(DEVICE)
+    (tmp_path / "vehicle.toml").write_text(VEHICLE)
+    (tmp_path / "s.toml").write_text(SETUP)
+    usual = SourcePlan(PortPlan("", baud=1_000_000), ProtocolPlan(rate=5e3))
+    left, bus = read_setup(tmp_path / "s.toml", usual)
+    assert (left.port.port, left.port.baud, left.wheel) == ("/dev/ttyUSB0", 1_000_000, 0)
+    assert left.devices[None].scale == 1e-6
+    assert (bus.port.encoding, bus.port.bitrate, bus.wheel) == (SLCAN, 1_000_000, None)
+    assert bus.protocol.user_map is not None
+
+
+@pytest.mark.parametrize(("change", "message"), [
+    (("tirebench-setup/1", "x/1"), "'x/1'; 'tirebench-setup/1' is understood"),
+    (("wheel = 0", "wheel = 300"), "source 1: wheel = 300; 0 .. 255"),
+    (("bitrate = 1000000", 'bitrate = "fast"'), "source 2: bitrate = 'fast'; .* type int"),
+    (("wheel = 0", "weel = 0"), "source 1: weel is not known; allowed are port"),
+    (('port = "/dev/ttyUSB0"', ""), "source 1: port is missing"),
+    (("[[source]]", "[[sources]]"), "sources is not known"),
+    (('map = "vehicle.toml"', 'map = "none.toml"'), "none.toml: it cannot be read"),
+    (("[[source]]", "[source]"), "cannot be read|tables"),
+])  # fmt: skip
+def test_a_wrong_setup_says_what_is_wrong(
+    change: tuple[str, str], message: str, tmp_path: Path
+) -> None:
+    (tmp_path / "left.toml").write_text(DEVICE)
+    (tmp_path / "vehicle.toml").write_text(VEHICLE)
+    (tmp_path / "s.toml").write_text(SETUP.replace(*change))
+    with pytest.raises(DeviceError, match=message):
+        read_setup(tmp_path / "s.toml", serial(""))
+
+
+def test_ports_that_contradict_each_other_end_the_command(
+    toy_fmus: dict[int, Path], tmp_path: Path
+) -> None:
+    arguments = ["run", "--port", "1=/dev/a", "--port", "1=/dev/b", "--fmu", str(toy_fmus[16])]
+    outcome = CliRunner().invoke(program, [*arguments, "--no-page"])
+    assert isinstance(outcome.exception, BenchError | SystemExit)
+    said = str(outcome.exception) + outcome.output
+    assert "wheel 1 comes from /dev/a and /dev/b" in said
