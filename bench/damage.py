@@ -2,13 +2,14 @@
 
 One damage strikes every `SPACING` frames or so. What comes out must be among what went in.
 
-SERIAL v1 has a checksum, so that nothing damaged may pass. The text of slcan has none: a digit that
-became another digit passes, whoever reads it, while a line that lost or gained characters does not.
-On a bus the adapter checks each frame: there frames are lost, doubled, foreign or of another
-length, never changed.
+SERIAL v1 has a checksum, and so has a line of another make whose map names CRC-32, so that nothing
+damaged may pass. The text of slcan has none: a digit that became another digit passes, whoever
+reads it, while a line that lost or gained characters does not. On a bus the adapter checks each
+frame: there frames are lost, doubled, foreign or of another length, never changed.
 """
 
 import resource
+import zlib
 from collections import Counter
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -22,8 +23,10 @@ from bench.frames import Frames, encode
 from bench.line_counts import LineCounts
 from bench.protocols.frame_decoder import PackedDecoder
 from bench.protocols.layouts import LAYOUTS, RAW12C, RAW16, Health, Raw, encode_raw12c, encode_raw16
+from bench.protocols.map_messages import BinaryCut, Message
 from bench.protocols.slcan import SlcanDecoder
 from bench.protocols.slcan import encode as slcan_lines
+from bench.protocols.user_line import Binary
 from bench.protocols.wheel_can import WheelCan
 
 KINDS = ("flip", "cut", "insertion", "splice", "random bytes")
@@ -38,6 +41,8 @@ BLOCK = 2048
 """Frames that go over the line at once."""
 RATE = 10_000.0
 """Samples a second on a bus."""
+_MAPPED = BinaryCut(b"\xaa\x55", 46, "crc32", covers_sync=True, big=False)
+"""Number, time and four samples of five gages."""
 
 
 @dataclass(slots=True)
@@ -122,6 +127,11 @@ def strike_serial(damages: int, seed: int = 0) -> Outcome:
     return strike(SerialLine(seed), damages)
 
 
+def strike_map(damages: int, seed: int = 0) -> Outcome:
+    """Strike a serial line that a map describes."""
+    return strike(MapLine(seed), damages)
+
+
 def strike_slcan(
     damages: int, seed: int = 0, kind: str = RAW16, allowed: Sequence[str] = KINDS
 ) -> Outcome:
@@ -153,6 +163,29 @@ class SerialLine:
         return [
             _key(batch, row) for batch in self._decoder.push(broken) for row in range(len(batch))
         ]
+
+
+class MapLine:
+    """A serial line of another make with a sync word and CRC-32, as a map says; see `Line`."""
+
+    def __init__(self, seed: int) -> None:
+        self._rng = np.random.default_rng(seed)
+        pool = self._rng.integers(0, 256, (POOL, _MAPPED.size)).astype(np.uint8)
+        bodies = [row.tobytes() for row in pool]
+        self.keys: list[Hashable] = list(bodies)
+        self._wire = [
+            _MAPPED.sync + body + zlib.crc32(_MAPPED.sync + body).to_bytes(4, "little")
+            for body in bodies
+        ]
+        self.counts = LineCounts()
+        self._cutter = Binary([Message("wheel", 0, False, _MAPPED.size, {}, _MAPPED)], self.counts)
+
+    def struck(self, rows: list[int], count: int, kinds: "Counter[str]") -> list[Hashable]:
+        """Send frames with so many damages."""
+        stream = b"".join(self._wire[row] for row in rows)
+        found = self._cutter.push(damaged(stream, count, self._rng, kinds))
+        self.counts.ok += len(found)
+        return [body for _, body in found]
 
 
 class SlcanLine:

@@ -28,7 +28,7 @@ from bench.conditions import TELLABLE, Conditions
 from bench.device import read_device
 from bench.errors import DeviceError, cause
 from bench.links.opening import PortPlan
-from bench.protocols.user_map import clashes
+from bench.protocols.map_parts import clashes
 from bench.source_plan import SourcePlan, protocol_of
 
 FORMAT = "tirebench-setup/1"

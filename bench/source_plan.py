@@ -8,7 +8,7 @@ from typing import Any
 from bench.device import Device
 from bench.errors import DeviceError
 from bench.links.opening import PortPlan
-from bench.protocols import SERIAL
+from bench.protocols import LINE_MAP, SERIAL
 from bench.protocols.plan import ProtocolPlan
 from bench.protocols.user_map import read_map
 from bench.wheels import Line, Wheels
@@ -64,10 +64,14 @@ def protocol_of(port: PortPlan, rate: float, map_file: Path | None) -> ProtocolP
     DeviceError
         If a map is given for a line that has none, or has faults.
     """
-    if map_file is not None and port.encoding == SERIAL:
-        raise DeviceError(
-            f"--map {map_file} with --port {port.port}: a map is for CAN frames; "
-            "slcan:... or can:... is needed; leave it out, or name such a port"
-        )
     user = None if map_file is None else read_map(map_file)
-    return ProtocolPlan(port.encoding, rate if user is None else user.rate, user)
+    if user is None:
+        return ProtocolPlan(port.encoding, rate)
+    if user.of_line != (port.encoding == SERIAL):
+        mine, other = ("a serial line", "PORT, tcp:// or udp://") if user.of_line else (
+            "CAN frames", "slcan:... or can:...")  # fmt: skip
+        raise DeviceError(
+            f"--map {map_file} with --port {port.port}: this map is for {mine}; {other} is needed; "
+            "name such a port, or another map"
+        )
+    return ProtocolPlan(LINE_MAP if user.of_line else port.encoding, user.rate, user)

@@ -1,8 +1,9 @@
 """A million damaged frames on each kind of line: ``make faults``.
 
-Flips, cuts, insertions, splices and random bytes strike SERIAL v1 and slcan; on a bus, whose frames
-an adapter checks, frames are lost, doubled, foreign or of another length. Nothing may be accepted
-that was not sent, 1.1 good frames may be lost for each damage, and memory must stay flat.
+Flips, cuts, insertions, splices and random bytes strike SERIAL v1, a line with sync and CRC-32 as a
+map describes it, and slcan; on a bus, whose frames an adapter checks, frames are lost, doubled,
+foreign or of another length. Nothing may be accepted that was not sent, 1.1 good frames may be lost
+for each damage, and memory must stay flat.
 The text of slcan has no checksum: what flips, splices and random bytes change into other digits
 passes, which is shown and not judged; of cuts and insertions one in 5,000 may pass. The figures
 land in ``build/out/bench_faults.json``.
@@ -19,7 +20,15 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from bench.damage import CHANGED, KINDS, Outcome, strike_bus, strike_serial, strike_slcan
+from bench.damage import (
+    CHANGED,
+    KINDS,
+    Outcome,
+    strike_bus,
+    strike_map,
+    strike_serial,
+    strike_slcan,
+)
 from bench.protocols.layouts import RAW12C, RAW16
 
 OUT = Path(__file__).resolve().parent / "out" / "bench_faults.json"
@@ -38,6 +47,7 @@ def jobs(damages: int, seed: int) -> dict[str, Callable[[], Outcome]]:
     each = max(1, damages // 4)
     found: dict[str, Callable[[], Outcome]] = {
         "SERIAL v1": lambda: strike_serial(damages, seed),
+        "map, sync and CRC-32": lambda: strike_map(damages, seed),
         "bus": lambda: strike_bus(damages, seed),
     }
     for kind in (RAW16, RAW12C):

@@ -16,8 +16,9 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 WHEEL_MARK = "# wheel "
 PORTS = """\b
-Ports: /dev/ttyUSB0 or COM3 (SERIAL v1), slcan:/dev/ttyACM0 (CAN adapter with slcan, read in bulk),
-can:INTERFACE:CHANNEL (python-can: can:socketcan:can0, can:virtual:test, can:pcan:PCAN_USBBUS1).
+Ports: /dev/ttyUSB0 or COM3, tcp://HOST:PORT, udp://[HOST]:PORT, rfc2217://HOST:PORT (SERIAL v1, or
+as a map says), slcan:/dev/ttyACM0 (CAN adapter with slcan, read in bulk), can:INTERFACE:CHANNEL
+(python-can: can:socketcan:can0, can:virtual:test, can:pcan:PCAN_USBBUS1).
 """
 
 _PORT_OPTIONS = (
@@ -33,7 +34,7 @@ _PORT_OPTIONS = (
                  type=click.FloatRange(153.0, 200_000.0),
                  help="Sample rate of the gages on CAN; SERIAL v1 says its own."),
     click.option("--map", "map_file", metavar="M.toml", type=FILE,
-                 help="Signals of another make's transmitter, from its DBC or listed."),
+                 help="Another make's transmitter, on CAN or a serial line."),
     click.option("--reconnect", default=60.0, show_default=True, metavar="S",
                  type=click.FloatRange(min=0.0),
                  help="How long a port may be away before the run ends."),

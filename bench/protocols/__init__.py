@@ -6,6 +6,7 @@ encoding                bytes of a read
 ``serial-v1``           a serial line with SERIAL v1 frames
 ``slcan``               text lines of a CAN adapter on a serial line
 ``can``                 packed CAN frames, see `bench.can_batch`
+``line-map``            a serial line of another make, as a map says
 ======================  =====================================================================
 
 What comes out depends on the bytes and their arrival alone, never on how they are cut into reads.
@@ -21,8 +22,8 @@ from bench.line_counts import LineCounts
 if TYPE_CHECKING:
     from bench.protocols.layouts import Health
 
-SERIAL, SLCAN, CAN = "serial-v1", "slcan", "can"
-ENCODINGS = (SERIAL, SLCAN, CAN)
+SERIAL, SLCAN, CAN, LINE_MAP = "serial-v1", "slcan", "can", "line-map"
+ENCODINGS = (SERIAL, SLCAN, CAN, LINE_MAP)
 
 
 class Decoder(Protocol):
@@ -53,4 +54,4 @@ class Decoder(Protocol):
         """Forget a half frame: the line was broken here."""
 
 
-__all__ = ["CAN", "ENCODINGS", "SERIAL", "SLCAN", "Decoder"]
+__all__ = ["CAN", "ENCODINGS", "LINE_MAP", "SERIAL", "SLCAN", "Decoder"]

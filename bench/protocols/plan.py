@@ -8,12 +8,14 @@ from bench.decoder import SerialDecoder
 from bench.device import Device
 from bench.errors import RecordingError
 from bench.line_counts import LineCounts
-from bench.protocols import ENCODINGS, SERIAL, SLCAN, Decoder
+from bench.protocols import ENCODINGS, LINE_MAP, SERIAL, SLCAN, Decoder
 from bench.protocols.dbc import FILES, database
 from bench.protocols.frame_decoder import FrameDecoder, PackedDecoder
+from bench.protocols.map_parts import UserMap
 from bench.protocols.slcan import SlcanDecoder
 from bench.protocols.user_can import UserCan
-from bench.protocols.user_map import UserMap, parse_map
+from bench.protocols.user_line import UserLine
+from bench.protocols.user_map import parse_map
 from bench.protocols.wheel_can import WheelCan
 
 RATE = 10_000.0
@@ -43,6 +45,8 @@ class ProtocolPlan:
         if self.encoding == SERIAL:
             return SerialDecoder()
         counts = LineCounts()
+        if self.encoding == LINE_MAP and self.user_map is not None:
+            return UserLine(self.user_map, counts)
         frames: FrameDecoder
         if self.user_map is None:
             frames = WheelCan(self.rate, counts)
@@ -90,6 +94,11 @@ class ProtocolPlan:
             )
         text, _, dbc = str(header.get("map", "")).partition("\0")
         user = parse_map(text, dbc, where) if text else None
+        if (encoding == LINE_MAP) != (user is not None and user.of_line):
+            raise RecordingError(
+                f"{where}: its bytes are {encoding!r}, and its map is of another kind of line; the "
+                "header is damaged; take another recording"
+            )
         return cls(encoding, float(rate), user)
 
 

@@ -11,8 +11,9 @@ from bench.conditions import Measured
 from bench.frames import GAGES, CountArray, Frames
 from bench.line_counts import LineCounts
 from bench.protocols.layouts import Health
+from bench.protocols.map_messages import Message
+from bench.protocols.map_parts import UserMap, WheelMap
 from bench.protocols.signals import Signal, raw_values, real_values
-from bench.protocols.user_map import Message, UserMap, WheelMap
 from bench.protocols.wheel_can import period_of
 from bench.protocols.widening import Widener
 from tirelib.arrays import BoolArray
@@ -103,6 +104,10 @@ class _Wheel:
             counts = real_values(batch.data, wheel.strain)
         else:
             counts = raw_values(batch.data, wheel.strain).astype(np.int32)
+        counts = counts.reshape(m, wheel.samples, -1)
+        if any(wheel.absent):
+            counts, there = np.full((m, wheel.samples, GAGES), np.nan), counts
+            counts[:, :, ~np.array(wheel.absent)] = there
         return Frames(
             wheel=np.full(m, wheel.wheel),
             seq=seq,
@@ -111,7 +116,7 @@ class _Wheel:
             flags=np.zeros(m, np.int64),
             rssi=np.zeros(m, np.int64),
             temperature=np.zeros(m, np.int64),
-            counts=counts.reshape(m, wheel.samples, GAGES),
+            counts=counts,
         )
 
 

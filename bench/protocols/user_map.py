@@ -32,19 +32,32 @@
     length = 8
     signals = [{ name = "g1", start = 4, length = 12, signed = true, order = "little" }, ...]
     # a real number: float = true; multiplexed: multiplexer = "page", page = 1
+
+    [[message]]                   # on a serial line: a sync word, a struct, a checksum
+    name     = "WHEEL"
+    sync     = "AA55"
+    struct   = "<HI5h"            # of Python's struct
+    fields   = ["count", "stamp", "g1", "g2", "g3", "g4", "g5"]
+    checksum = "CRC-16/MODBUS"
+
+    [[message]]                   # on a serial line: columns of text
+    name    = "WHEEL"
+    columns = [{ name = "count", bits = 16 }, "g1", "g2", "g3", "g4", "g5"]
 """
 
 import math
+import struct
 import tomllib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from bench.conditions import TELLABLE, Measured
+from bench.conditions import TELLABLE
 from bench.device import Device
 from bench.errors import DeviceError, cause
 from bench.frames import GAGES
+from bench.protocols.map_messages import Message, kind_of, listed, of_dbc
+from bench.protocols.map_parts import Quantity, UserMap, WheelMap, clashes
 from bench.protocols.signals import Signal
 from tirelib.errors import TirelibError
 from tirelib.units import to_si
@@ -53,98 +66,9 @@ FORMAT = "tirebench-map/1"
 LONGEST_SIGNAL = 32
 SHORTEST_WRAP = 0.1
 """A counter that wraps sooner needs a time beside it, or a gap could not be seen, [s]."""
+_WANTED = ("name, id, length and signals of CAN; name, sync, struct and fields; or name and "
+           "columns")  # fmt: skip
 _KEYS = {"format", "dbc", "rate_hz", "strain_unit", "wheel", "message", "name", *TELLABLE}
-
-
-@dataclass(frozen=True, slots=True)
-class Message:
-    """A frame and its signals by name."""
-
-    name: str
-    identifier: int
-    extended: bool
-    length: int
-    signals: Mapping[str, Signal]
-
-
-@dataclass(frozen=True, slots=True)
-class WheelMap:
-    """Where a wheel's strain is.
-
-    Attributes
-    ----------
-    wheel : int
-    message : Message
-    strain : tuple of Signal
-        Samples x 5, oldest sample first.
-    counter, time : Signal or None
-    tick : float, [s]
-        Step of `time`.
-    """
-
-    wheel: int
-    message: Message
-    strain: tuple[Signal, ...]
-    counter: Signal | None
-    time: Signal | None
-    tick: float
-
-    @property
-    def samples(self) -> int:
-        """Samples in a frame."""
-        return len(self.strain) // GAGES
-
-
-@dataclass(frozen=True, slots=True)
-class Quantity:
-    """Where a condition is.
-
-    Attributes
-    ----------
-    name : str
-        One of `bench.conditions.TELLABLE`.
-    message : Message
-    signal : Signal
-    unit : str
-        Of the signal's value.
-    wheel : int or None
-        For which it holds; None: for all.
-    """
-
-    name: str
-    message: Message
-    signal: Signal
-    unit: str
-    wheel: int | None = None
-
-    def measured(self, raw: float) -> Measured:
-        """Return what a raw value means."""
-        shown = self.signal.offset + self.signal.factor * raw
-        name, dimension = TELLABLE[self.name]
-        return Measured(name, float(to_si(shown, self.unit, dimension)), self.wheel)
-
-
-@dataclass(frozen=True, slots=True)
-class UserMap:
-    """What a map says.
-
-    Attributes
-    ----------
-    rate : float, [Hz]
-    wheels : tuple of WheelMap
-        None of a bus that only tells conditions.
-    device : Device
-        Scale and zero, where the map says a unit of strain; else those of counts.
-    quantities : tuple of Quantity
-    text : str
-        Of the file, DBC included, for the header of a recording.
-    """
-
-    rate: float
-    wheels: tuple[WheelMap, ...]
-    device: Device
-    quantities: tuple[Quantity, ...]
-    text: str
 
 
 def read_map(path: Path) -> UserMap:
@@ -221,7 +145,8 @@ class _Reader:
                        "once for all")  # fmt: skip
         if self.faults:
             raise DeviceError(self.faults)
-        return UserMap(float(rate), tuple(wheels), device, tuple(quantities), text)
+        return UserMap(float(rate), tuple(wheels), device, tuple(quantities), text,
+                       tuple(messages.values()))  # fmt: skip
 
     def _tables(self, key: str) -> list[dict[str, Any]]:
         """Return the tables of that name; whatever else has it is a fault."""
@@ -239,43 +164,23 @@ class _Reader:
         except Exception as error:  # cantools raises its own, textparser's and bare ones
             self.fault("dbc", str(error)[:200], "a sound DBC is needed")
             return {}
-        messages = {}
-        for m in database.messages:
-            signals = {
-                s.name: Signal(
-                    s.name, s.start, s.length, s.is_signed, float(s.scale), s.unit or "",
-                    s.byte_order == "big_endian", float(s.offset), real=s.is_float,
-                )
-                for s in m.signals
-            }  # fmt: skip
-            ways = {
-                s.name: (s.multiplexer_signal, tuple(s.multiplexer_ids))
-                for s in m.signals
-                if s.multiplexer_ids and s.multiplexer_signal
-            }
-            messages[m.name] = Message(m.name, m.frame_id, m.is_extended_frame, m.length,
-                                       _multiplexed(signals, ways))  # fmt: skip
-        return messages
+        return of_dbc(database)
 
     def _of_tables(self) -> dict[str, Message]:
-        messages = {}
-        for table in self._tables("message"):
+        messages: dict[str, Message] = {}
+        tables = self._tables("message")
+        for number, table in enumerate(tables):
             try:
-                signals = {s["name"]: _signal(s) for s in table["signals"]}
-                ways = {
-                    s["name"]: (s["multiplexer"], (int(s["page"]),))
-                    for s in table["signals"]
-                    if "multiplexer" in s
-                }
-                signals = _multiplexed(signals, ways)
-                message = Message(
-                    str(table["name"]), int(table["id"]), bool(table.get("extended", False)),
-                    int(table["length"]), signals,
-                )  # fmt: skip
-            except (KeyError, TypeError, ValueError, AttributeError) as error:
-                self.fault("message", table, f"name, id, length and signals are needed ({error!r})")
+                message = listed(table, number)
+            except (KeyError, TypeError, ValueError, AttributeError, IndexError, struct.error) as e:
+                self.fault("message", table, f"{_WANTED} are needed ({_why(e)})")
                 continue
+            if message.name in messages:
+                self.fault("message", message.name, "each name may come once")
             messages[message.name] = message
+        if len({kind_of(table) for table in tables}) > 1:
+            self.fault("message", [t.get("name") for t in tables], "all are frames of CAN, or all "
+                       "have a sync, or all are columns: a line has one kind")  # fmt: skip
         return messages
 
     def _wheel(
@@ -295,7 +200,12 @@ class _Reader:
             return None
         if message is None:
             return None
-        strain = [self._signal(what, name, message) for row in rows for name in row]
+        names = [name for row in rows for name in row if name != ""]
+        strain = [self._signal(what, name, message) for name in names]
+        absent = tuple(name == "" for name in rows[0])
+        if any(tuple(name == "" for name in row) != absent for row in rows) or all(absent):
+            self.fault(f"{what}: samples", rows, "each sample needs the same gages, one at least; "
+                       'a gage that is not there is ""')  # fmt: skip
         counter = self._optional(what, table, "counter", message)
         time = self._optional(what, table, "time", message)
         tick = 1.0
@@ -322,7 +232,7 @@ class _Reader:
         if len(self.faults) > before:
             return None
         known = tuple(signal for signal in strain if signal is not None)
-        return WheelMap(int(number or 0), message, known, counter, time, tick)
+        return WheelMap(int(number or 0), message, known, counter, time, tick, absent)
 
     def _message(self, what: str, name: Any, messages: Mapping[str, Message]) -> Message | None:
         message = messages.get(str(name))
@@ -351,7 +261,8 @@ class _Reader:
     def _integer(self, what: str, signal: Signal) -> None:
         if signal.real:
             self.fault(f"{what}: signal", signal.name, "counter and time must be integers: a real "
-                       "number does not say where it wraps", "name another")  # fmt: skip
+                       "number does not say where it wraps", "name another, or say the bits of "
+                       "the column")  # fmt: skip
 
     def _optional(
         self, what: str, table: dict[str, Any], key: str, message: Message
@@ -387,7 +298,9 @@ class _Reader:
         except TirelibError as error:
             self.fault("strain_unit", unit, f"a unit of strain is needed ({error})")
             return Device()
-        zero = tuple(-s.offset / s.factor for s in strain[:GAGES])
+        offsets = iter(wheels[0].strain)
+        there = (None if absent else next(offsets) for absent in wheels[0].absent)
+        zero = tuple(0.0 if s is None else -s.offset / s.factor for s in there)
         return Device("map", step, zero, lowest=low, highest=high)
 
     def _quantities(self, name: str, messages: Mapping[str, Message]) -> list[Quantity]:
@@ -417,13 +330,6 @@ class _Reader:
         return None if signal is None else Quantity(name, message, signal, unit, wheel)
 
 
-def clashes(place: tuple[str, int | None], places: Sequence[tuple[str, int | None]]) -> bool:
-    """Tell whether a condition of a wheel (None: of all) is told by more than one of the places."""
-    name, wheel = place
-    same = [w for n, w in places if n == name and (w is None or wheel is None or w == wheel)]
-    return len(same) > 1
-
-
 def _is_wheel(number: object) -> bool:
     return isinstance(number, int) and not isinstance(number, bool) and 0 <= number <= 255
 
@@ -435,30 +341,6 @@ def _fits(signal: Signal, message: Message) -> bool:
     return good and int(places.min()) >= 0 and int(places.max()) < 8 * message.length
 
 
-def _multiplexed(
-    signals: Mapping[str, Signal], ways: Mapping[str, tuple[str | None, tuple[int, ...]]]
-) -> dict[str, Signal]:
-    """Return the signals with their multiplexers: its name and its values."""
-    plain = {
-        name: replace(signal, selector=signals[str(ways[name][0])], selected=ways[name][1])
-        if name in ways
-        else signal
-        for name, signal in signals.items()
-    }
-    return {
-        name: replace(signal, selector=plain[signal.selector.name])
-        if signal.selector is not None
-        else signal
-        for name, signal in plain.items()
-    }
-
-
-def _signal(table: dict[str, Any]) -> Signal:
-    order = table.get("order", "little")
-    if order not in ("little", "big"):
-        raise ValueError(f"order = {order!r}; little or big")
-    return Signal(
-        str(table["name"]), int(table["start"]), int(table["length"]),
-        bool(table.get("signed", False)), float(table.get("factor", 1.0)), "", order == "big",
-        float(table.get("offset", 0.0)), real=bool(table.get("float", False)),
-    )  # fmt: skip
+def _why(error: Exception) -> str:
+    """Return what an error says, and a missing key as one."""
+    return f"{error.args[0]} is missing" if isinstance(error, KeyError) else str(error)

@@ -14,6 +14,7 @@ from bench.damage import (
     KINDS,
     damaged,
     strike_bus,
+    strike_map,
     strike_serial,
     strike_slcan,
 )
@@ -32,6 +33,13 @@ def test_twenty_thousand_frames_damaged_none_accepted_wrong() -> None:
     assert outcome.wrong == 0
     assert outcome.lost_per_damage <= 1.1
     assert outcome.counts.bad >= 0.8 * outcome.good_lost
+
+
+def test_a_line_that_a_map_describes_takes_nothing_wrong() -> None:
+    outcome = strike_map(800, seed=7)
+    assert set(outcome.kinds) == set(KINDS)
+    assert outcome.wrong == 0
+    assert 0.8 <= outcome.lost_per_damage <= 1.1
 
 
 def test_damage_does_damage() -> None:
