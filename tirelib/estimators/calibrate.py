@@ -16,6 +16,7 @@ from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.errors import CalibrationError
 from tirelib.estimators import basis
 from tirelib.estimators.chain import AngleModel, Chain
+from tirelib.estimators.ends import End, growth, outermost
 from tirelib.estimators.fit import Fit, fit_best, levels_of
 from tirelib.estimators.floor import with_floor
 from tirelib.estimators.grow import grow
@@ -32,6 +33,8 @@ VARIES = {
     "traction": 0.08,
     "camber": 0.02,
     "slip_ratio": 0.02,
+    "slip_angle": np.deg2rad(1.0),
+    "side": 300.0,
     "load": 300.0,
     "pressure": 1e4,
     "speed_squared": 60.0,
@@ -88,6 +91,23 @@ class Links:
     def load_level(self) -> IntArray | None:
         """Return the levels at which the load was held; None if it was not held at some."""
         return levels_of(self.truth["Fz"])
+
+    def angle_step(self) -> IntArray | None:
+        """Return the levels at which the size of the slip angle was held; None if at no few."""
+        return levels_of(np.abs(self.truth["slip_angle"]))
+
+    def outermost(self) -> list[BoolArray]:
+        """Return the rows at either end of every condition that was varied."""
+        varied = {
+            "load": self.truth["Fz"],
+            "side": np.abs(self.truth["Fy"]),
+            "slip_angle": np.abs(self.truth["slip_angle"]),
+            "slip_ratio": self.truth["slip_ratio"],
+            "camber": np.abs(self.values["camber"]),
+            "pressure": self.values["pressure"],
+            "speed_squared": self.values["speed_squared"],
+        }
+        return list(outermost({name: x for name, x in varied.items() if np.ptp(x) > VARIES[name]}))
 
 
 def calibrate_chain(
@@ -234,7 +254,8 @@ def _fit_load(
     candidates += [grown] if grown and grown not in candidates else []
     try:
         fit = fit_best(
-            values, truth - correction, links.groups, candidates, odd=ODD, level=level, what="Fz",
+            values, truth - correction, links.groups, candidates, odd=ODD, level=level,
+            step=links.angle_step(), outermost=links.outermost(), what="Fz",
         )  # fmt: skip
     except CalibrationError as error:
         links.refused["Fz"] = str(error)
@@ -264,7 +285,10 @@ def _fit_radius(links: Links, say: Callable[[str], None]) -> Polynomial | None:
     if np.unique(groups).size < 2:
         groups, part = np.arange(2), {name: np.repeat(x, 2) for name, x in part.items()}
         radius = np.repeat(radius, 2)
-    fit = fit_best(part, radius, groups, basis.radius_candidates(varying), what="R_eff")
+    ends = outermost({name: part[name] for name in sorted(varying)})
+    fit = fit_best(
+        part, radius, groups, basis.radius_candidates(varying), outermost=list(ends), what="R_eff",
+    )  # fmt: skip
     held_radius = fit.model.predict(values)[0]
     held_radius[np.flatnonzero(free)[: fit.held_out.size]] = fit.held_out[: int(free.sum())]
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -293,8 +317,8 @@ def _fit_force(links: Links, say: Callable[[str], None]) -> Polynomial | None:
     )  # fmt: skip
     candidates += [grown] if grown and grown not in candidates else []
     fit = fit_best(
-        values, truth, links.groups, candidates, odd=odd, level=links.load_level(), centre=False,
-        what="Fy",
+        values, truth, links.groups, candidates, odd=odd, level=links.load_level(),
+        step=links.angle_step(), outermost=links.outermost(), centre=False, what="Fy",
     )  # fmt: skip
     _keep(links, "Fy", fit, fit.held_out)
     return fit.model
@@ -336,16 +360,19 @@ def _fit_angle(links: Links, has_force: bool, say: Callable[[str], None]) -> Ang
     for _ in range(2):
         fit = fit_best(
             values, truth, links.groups, candidates, odd=odd, level=links.load_level(),
-            weights=weights, centre=False, what="alpha",
+            step=links.angle_step(), outermost=links.outermost(), weights=weights, centre=False,
+            what="alpha",
         )  # fmt: skip
         steep = np.maximum(steep, np.abs(fit.model.slope(values, "utilisation")))
         weights = 1.0 / (1.0 + (sharpness * steep) ** 2)
     _keep(links, "alpha", fit, fit.held_out)
-    return _weighed(fit.model, values, truth - fit.held_out)
+    return _weighed(fit.model, values, truth - fit.held_out, fit.ends)
 
 
-def _weighed(model: Polynomial, values: dict[str, FloatArray], error: FloatArray) -> AngleModel:
-    """Find how the held-out error grows where the cornering curve is flat.
+def _weighed(
+    model: Polynomial, values: dict[str, FloatArray], error: FloatArray, ends: tuple[End, ...]
+) -> AngleModel:
+    """Find how the held-out error grows where the cornering curve is flat, and beyond the data.
 
     Maximum likelihood of ``variance = leverage + a + b s^2 + c s^4``, s the slope d alpha / d u.
     """
@@ -365,8 +392,17 @@ def _weighed(model: Polynomial, values: dict[str, FloatArray], error: FloatArray
         options={"maxiter": 2000},
     )  # fmt: skip
     constant, square, fourth = np.exp(best.x) * unit
+    known = unit * (np.exp(best.x) @ shape)
+    if model.border is None:
+        raise ValueError("a fitted model knows its border")
+    lost = growth(
+        [end.error for end in ends],
+        [known[end.rows] + end.uncertain for end in ends],
+        [end.beyond for end in ends],
+    )
+    border = replace(model.border, growth=lost)
     return AngleModel(
-        replace(model, residual=float(np.sqrt(constant))),
+        replace(model, residual=float(np.sqrt(constant)), border=border),
         blur=float(np.sqrt(square / typical)),
         bend=float(np.sqrt(fourth) / typical),
     )

@@ -18,6 +18,8 @@ REGRESSORS = frozenset(
 )  # fmt: skip
 """Names that a polynomial or a range may use."""
 QUANTITIES = frozenset(("Fz", "alpha", "kappa", "Fy"))
+BORDER = ("near", "growth", "far")
+"""What a model's border says, each from 0."""
 HIGHEST_POWER = 12
 FEWEST_POINTS = 64
 """Of a reference turn."""
@@ -162,6 +164,11 @@ def _model(table: Any, where: str, unit: str) -> Iterator[str]:
     for name in ("residual", "floor"):
         if not _finite(table.get(name)) or table[name] < 0.0:
             yield f"{where}.{name} = {table.get(name)!r}; a number from 0 is needed"
+    border: Any = table.get("border", dict.fromkeys(BORDER, 0.0))
+    for name in BORDER:
+        value: Any = border.get(name) if isinstance(border, dict) else border
+        if not _finite(value) or value < 0.0:
+            yield f"{where}.border.{name} = {value!r}; a number from 0 is needed"
     variables, terms = table.get("variable"), table.get("term")
     if not isinstance(variables, list) or not isinstance(terms, list) or not terms:
         yield f"{where}: variable and term are needed"

@@ -6,6 +6,7 @@ Numbers keep all their digits, so an estimate from a file equals the one from me
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,9 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.errors import FormatError
+from tirelib.estimators.border import Border
 from tirelib.estimators.calibration import Calibration, Rolling
-from tirelib.estimators.calibration_check import faults
+from tirelib.estimators.calibration_check import BORDER, faults
 from tirelib.estimators.chain import AngleModel, Chain
 from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.polynomial import Cloud, Polynomial, Range, Variable
@@ -200,10 +202,12 @@ def _chain(table: Mapping[str, Any]) -> Chain:
 
 def _polynomial_table(model: Polynomial, unit: str) -> dict[str, Any]:
     std = np.sqrt(np.diag(model.covariance))
+    border = model.border
     return {
         "unit": unit,
         "residual": model.residual,
         "floor": model.floor,
+        **({} if border is None else {"border": asdict(border)}),
         "variable": [
             {"name": v.name, "centre": v.centre, "scale": v.scale} for v in model.variables
         ],
@@ -239,6 +243,9 @@ def _polynomial(table: Mapping[str, Any]) -> Polynomial:
         covariance=covariance,
         residual=float(table["residual"]),
         floor=float(table["floor"]),
+        border=Border(**{name: float(table["border"][name]) for name in BORDER})
+        if "border" in table  # files of before say nothing of it
+        else None,
     )
 
 

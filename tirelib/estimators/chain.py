@@ -43,7 +43,8 @@ class AngleModel:
     """Slip angle from utilisation; less certain where the cornering curve is flat.
 
     With s the slope d alpha / d utilisation, the variance of a turn is the polynomial's plus
-    ``(blur s)^2 + (bend s^2)^2``; blur is the uncertainty of the utilisation.
+    ``(blur s)^2 + (bend s^2)^2``; blur is the uncertainty of the utilisation over the calibration,
+    for which that of the turn itself stands where it is larger.
     """
 
     polynomial: Polynomial
@@ -51,13 +52,13 @@ class AngleModel:
     bend: float
 
     def predict(
-        self, values: Mapping[str, FloatArray]
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return slip angle and standard deviation, [rad], and the slope over utilisation."""
+        self, values: Mapping[str, FloatArray], spread: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return slip angle and standard deviation, [rad]; `spread` is the utilisation's own."""
         value, std = self.polynomial.predict(values)
         slope = self.polynomial.slope(values, "utilisation")
-        std = np.sqrt(std**2 + (self.blur * slope) ** 2 + (self.bend * slope**2) ** 2)
-        return value, std, slope
+        blur = np.maximum(self.blur, spread)
+        return value, np.sqrt(std**2 + (blur * slope) ** 2 + (self.bend * slope**2) ** 2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,11 +156,12 @@ class Chain:
         law = np.hypot(doubt * np.abs(force) + laws.spread(values, factor * force), tilted)
         force, std = factor * force, np.hypot(factor * std, law)
         result["Fy"] = Estimate(force, std, self._valid("Fy", values, force, std) & calibrated)
+        load_std = result["Fz"].std if "Fz" in result else np.zeros_like(load)
         with np.errstate(invalid="ignore", divide="ignore"):
             values["utilisation"] = force / load
+            spread = np.hypot(std, values["utilisation"] * load_std) / np.abs(load)
         if self.angle is not None:
-            angle, std, slope = self.angle.predict(values)
-            std = np.hypot(std, np.abs(slope / load) * law)
+            angle, std = self.angle.predict(values, spread)
             valid = self._valid("alpha", values, angle, std) & calibrated
             result["alpha"] = Estimate(angle, std, valid)
 
@@ -169,7 +171,8 @@ class Chain:
         """Return R_eff and its standard deviation, [m].
 
         It changes little with load; where the load is not known to be right, the mean load of the
-        calibration stands for it, and what a departure of half that load would change is doubt.
+        calibration stands for it, and what a departure of half that load would change is doubt, or
+        what the load that was estimated would, where that is more.
         """
         model = self.radius
         if model is None:
@@ -184,9 +187,27 @@ class Chain:
         std = np.hypot(std, RADIUS_SHARE * np.abs(radius - at_reference))
         std = np.hypot(std, RADIUS_DOUBT * radius * self.laws.speed_departure(values))
         if any(variable.name == "load" for variable in model.variables):
-            doubt = 0.5 * self.mean_load * np.abs(model.slope(at, "load"))
-            std = np.hypot(std, np.where(known, 0.0, doubt))
+            slope = np.abs(model.slope(at, "load"))
+            doubt = 0.5 * self.mean_load * slope
+            if load is not None:
+                told = model.predict({**at, "load": self.laws.equivalent_load(load.value, values)})
+                doubt = np.where(known, slope * load.std, np.fmax(doubt, np.abs(told[0] - radius)))
+            std = np.hypot(std, doubt)
         return radius, std
+
+    def _carried(self, quantity: str) -> tuple[Polynomial, ...]:
+        """Return the models on whose calibrated data a quantity stands.
+
+        The slip ratio has none: where the load is not known, its own doubt of the radius holds. The
+        slip angle's own polynomial is judged by its standard deviation.
+        """
+        models = {
+            "Fz": (self.load,),
+            "Fy": (self.force,),
+            "alpha": (self.load, self.force),
+            "kappa": (),
+        }[quantity]
+        return tuple(model for model in models if model is not None)
 
     def _valid(
         self,
@@ -196,6 +217,8 @@ class Chain:
         std: FloatArray,
     ) -> BoolArray:
         known = np.isfinite(value) & np.isfinite(std)
+        for model in self._carried(quantity):
+            known &= model.within(values)
         guards = self.guards[quantity]
         if not guards:
             return known

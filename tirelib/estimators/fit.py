@@ -7,7 +7,7 @@ measured.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from sklearn.model_selection import GroupKFold, LeaveOneGroupOut
@@ -15,6 +15,8 @@ from sklearn.model_selection import GroupKFold, LeaveOneGroupOut
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.errors import CalibrationError
 from tirelib.estimators.basis import Powers
+from tirelib.estimators.border import Border
+from tirelib.estimators.ends import FAR, End, growth, left_out, near
 from tirelib.estimators.polynomial import Polynomial, Variable, design, leverage
 from tirelib.estimators.ridge import ridge_fit, ridge_fits
 
@@ -36,12 +38,14 @@ MOST_FOLDS = 80
 class Fit:
     """A fitted polynomial and what cross-validation says of it.
 
-    `held_out` holds, for each row, the prediction by a fit that did not see its condition.
+    `held_out` holds, for each row, the prediction by a fit that did not see its condition; `ends`
+    what fits without them say of the outermost data, and of loads between others.
     """
 
     model: Polynomial
     held_out: FloatArray
     candidates: tuple[tuple[int, float], ...]
+    ends: tuple[End, ...] = ()
 
 
 def variables_for(
@@ -75,6 +79,8 @@ def fit_best(
     *,
     odd: Sequence[str] = (),
     level: IntArray | None = None,
+    step: IntArray | None = None,
+    outermost: Sequence[BoolArray] = (),
     weights: FloatArray | None = None,
     centre: bool = True,
     what: str = "quantity",
@@ -92,6 +98,10 @@ def fit_best(
     odd : names of regressors that are standardised about zero
     level : int array, shape (n,), optional
         Load level, growing from 0; inner ones are held out whole.
+    step : int array, shape (n,), optional
+        Level of another condition; inner ones are held out to learn the border, not to choose.
+    outermost : sequence of bool arrays, shape (n,)
+        Rows at the ends of what was varied: held out, they say how errors grow beyond the data.
     weights : array, shape (n,), optional
         Relative precision of the rows.
     centre : bool
@@ -110,7 +120,7 @@ def fit_best(
         if len(terms) > max(LARGEST_SHARE * conditions, 1.0 if len(terms) == 1 else 0.0):
             continue
         variables, exponents, x = design_for(values, terms, odd)
-        held_out, held_std = _cross_validate(x, y, groups, weights, centre)
+        held_out, held_variance, held_leverage = _cross_validate(x, y, groups, weights, centre)
         error = y - held_out
         squares = [float(np.average(error**2, weights=weights))]
         if level is not None:
@@ -121,16 +131,28 @@ def fit_best(
             continue
         found = ridge_fit(x, y, weights, centre)
         # held-out errors, not the fit's own residuals, say how large an error to expect
-        inflation = max(1.0, float(np.sqrt(np.average((error / held_std) ** 2, weights=weights))))
+        inflation = max(1.0, float(np.average(error**2 / held_variance, weights=weights)))
+        ends, reach = _ends(x, y, (level, step), outermost, weights, centre)
+        reach = found.noise**2 * max(reach, float(np.quantile(held_leverage, FAR)))
+        root = np.sqrt(weights)
         model = Polynomial(
             variables=variables,
             terms=exponents,
             coefficients=found.coefficients,
-            covariance=found.covariance * inflation**2,
-            residual=found.noise * inflation,
+            covariance=found.covariance * inflation,
+            residual=found.noise * float(np.sqrt(inflation)),
             floor=0.0,
+            border=Border(
+                near=inflation * near(found, x),
+                growth=growth(
+                    [root[end.rows] * end.error for end in ends],
+                    [inflation * (end.noise**2 + end.uncertain) for end in ends],
+                    [inflation * end.beyond for end in ends],
+                ),
+                far=inflation * reach,
+            ),
         )
-        best = (score, Fit(model, held_out, ()))
+        best = (score, Fit(model, held_out, (), ends))
     if best is None:
         raise CalibrationError(
             f"{what}: {conditions} distinct conditions are too few for "
@@ -138,22 +160,43 @@ def fit_best(
             f"{int(np.ceil(min(len(t) for t in candidates) / LARGEST_SHARE))} are needed; "
             "measure more loads or slip angles, or calibrate several campaigns together"
         )
-    return Fit(best[1].model, best[1].held_out, tuple(tried))
+    return replace(best[1], candidates=tuple(tried))
 
 
 def _cross_validate(
     x: FloatArray, y: FloatArray, groups: IntArray, weights: FloatArray, centre: bool
-) -> tuple[FloatArray, FloatArray]:
-    """Return held-out predictions and their standard deviations, each of shape (n,)."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return held-out predictions, their variance and leverage (share of the squared noise)."""
     count = np.unique(groups).size
     splitter = LeaveOneGroupOut() if count <= MOST_FOLDS else GroupKFold(MOST_FOLDS)
-    predicted, std = np.empty_like(y), np.empty_like(y)
+    predicted, variance, far = np.empty_like(y), np.empty_like(y), np.empty_like(y)
     left_out = [np.isin(np.arange(y.size), test) for _, test in splitter.split(x, y, groups)]
     fits = ridge_fits(x, y, weights, centre, (~test for test in left_out))
     for test, fit in zip(left_out, fits, strict=True):
         predicted[test] = x[test] @ fit.coefficients
-        std[test] = np.sqrt(fit.noise**2 + leverage(x[test], fit.covariance))
-    return predicted, std
+        uncertain = leverage(x[test], fit.covariance)
+        variance[test] = fit.noise**2 + uncertain
+        far[test] = uncertain / fit.noise**2
+    return predicted, variance, far
+
+
+def _ends(
+    x: FloatArray,
+    y: FloatArray,
+    levels: Sequence[IntArray | None],
+    outermost: Sequence[BoolArray],
+    weights: FloatArray,
+    centre: bool,
+) -> tuple[tuple[End, ...], float]:
+    """Return what was left out, and the leverage (share of squared noise) of levels between."""
+    between = [one for level in levels if level is not None for one in inner_levels(x, level)]
+    sets = [*(rows for rows, _ in between), *outermost]
+    ends = left_out(x, y, weights, centre, sets)
+    reach = [
+        float(np.quantile(end.uncertain[inside], FAR)) / end.noise**2
+        for end, (_, inside) in zip(ends, between, strict=False)
+    ]
+    return ends, max(reach, default=0.0)
 
 
 def levels_of(x: FloatArray, share: float = 0.05) -> IntArray | None:

@@ -24,7 +24,8 @@ A pressure or a camber that is not known at all widens the standard deviation: 1
 2 deg of camber.
 
 **Speed.** Features are taken over wheel angle, so speed enters only through inertia and damping; no
-correction, but the standard deviation grows with the square of the speed's departure.
+correction, but the standard deviation grows with the squared speed's departure from the calibrated
+ones, below the lowest as above the highest.
 
 Outside a declared envelope no estimate is valid.
 """
@@ -50,6 +51,8 @@ UNKNOWN_CAMBER = 0.04
 """Standard deviation of Fy / Fz where the camber is unknown (2 deg of it)."""
 FASTEST = 60.0
 """Highest speed for which a calibration at another speed is taken to hold, [m/s]."""
+SLOWEST = 2.5
+"""Lowest speed for which a calibration at higher speeds is taken to hold, [m/s]."""
 SPEED_DOUBT = 0.02
 """Relative standard deviation of any estimate per (40 m/s)^2 of speed squared."""
 SPEED_UNIT = 1600.0
@@ -132,18 +135,21 @@ class ConditionLaws:
             slack = CALIBRATED_SLACK * (high - low)
             low, high = low - slack, high + slack
         good = ~(pressure < low) & ~(pressure > high)
-        fastest = self.speed[1] * 1.05 if self.speed_fitted else FASTEST
-        return np.asarray(good & ~(np.abs(speed) > fastest), dtype=np.bool_)
+        slowest, fastest = np.fmin(SLOWEST, 0.95 * self.speed[0]), FASTEST
+        if self.speed_fitted:
+            fastest = 1.05 * self.speed[1]
+        good &= ~(np.abs(speed) < slowest) & ~(np.abs(speed) > fastest)
+        return np.asarray(good, dtype=np.bool_)
 
     def spread(self, values: Mapping[str, FloatArray], value: FloatArray) -> FloatArray:
-        """Return the standard deviation due to a speed that was not varied, shape (n,)."""
+        """Return the standard deviation due to a speed outside the calibrated ones, shape (n,)."""
         doubt = SPEED_DOUBT * self.speed_departure(values)
         return np.asarray(doubt * np.abs(value), dtype=np.float64)
 
     def speed_departure(self, values: Mapping[str, FloatArray]) -> FloatArray:
         """Return how far the squared speed lies outside its calibrated range, [(40 m/s)^2]."""
         squared = values["speed"] ** 2
-        if self.speed_fitted or not np.isfinite(self.speed[1]):
+        if not np.isfinite(self.speed[1]):
             return np.zeros_like(squared)
         apart = np.maximum(squared - self.speed[1] ** 2, self.speed[0] ** 2 - squared)
         return np.asarray(np.fmax(apart, 0.0) / SPEED_UNIT, dtype=np.float64)
@@ -154,7 +160,6 @@ class ConditionLaws:
         if not self.pressure_fitted:
             ratio = values["pressure"] / self.reference_pressure
             apart |= (np.abs(ratio - 1.0) > CALIBRATED_SLACK) | np.isnan(ratio)
-        if not self.speed_fitted:
-            speed = values["speed"]
-            apart |= (speed > 1.1 * self.speed[1]) | (speed < 0.9 * self.speed[0])
+        speed, slack = np.abs(values["speed"]), 0.05 if self.speed_fitted else 0.1
+        apart |= (speed > (1.0 + slack) * self.speed[1]) | (speed < (1.0 - slack) * self.speed[0])
         return apart

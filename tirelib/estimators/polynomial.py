@@ -10,6 +10,7 @@ from functools import lru_cache
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.estimators.border import Border
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +138,8 @@ class Polynomial:
         Standard deviation of what the polynomial leaves, unit of y, cross-validated.
     floor : float
         Standard deviation of one turn about the mean of its run, unit of y.
+    border : Border or None
+        Where the data end; None: not known.
     """
 
     variables: tuple[Variable, ...]
@@ -145,6 +148,7 @@ class Polynomial:
     covariance: FloatArray
     residual: float
     floor: float
+    border: Border | None = None
 
     def design(self, values: Mapping[str, FloatArray]) -> FloatArray:
         """Return the terms' values, shape (n, k)."""
@@ -153,8 +157,18 @@ class Polynomial:
     def predict(self, values: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
         """Return value and standard deviation (one turn), each of shape (n,)."""
         x = self.design(values)
-        std = np.sqrt(self.residual**2 + self.floor**2 + leverage(x, self.covariance))
+        uncertain = leverage(x, self.covariance)
+        if self.border is not None:
+            uncertain = self.border.grown(uncertain)
+        std = np.sqrt(self.residual**2 + self.floor**2 + uncertain)
         return x @ self.coefficients, std
+
+    def within(self, values: Mapping[str, FloatArray]) -> BoolArray:
+        """Tell which rows lie no further from the data than held-out ones did, shape (n,)."""
+        if self.border is None:
+            return np.ones(next(iter(values.values())).shape, dtype=np.bool_)
+        uncertain = leverage(self.design(values), self.covariance)
+        return np.asarray(uncertain <= self.border.far, dtype=np.bool_)
 
     def slope(self, values: Mapping[str, FloatArray], name: str) -> FloatArray:
         """Return the derivative of y by the regressor `name`, shape (n,), unit of y per SI."""

@@ -20,7 +20,7 @@ SLACK = {
     "angle_slope": 0.004,
     "utilisation": 0.02,
     "camber": np.deg2rad(0.5),
-    "kappa": 0.01,
+    "kappa": 0.003,
     "angle_bow": 0.004,
     "tp_bow": 0.02,
     "cp1_bow": 0.01,
@@ -42,7 +42,9 @@ REACH = (0.1, 0.2)
 AROUND = 0.4
 """Distance within which calibrated combinations count that lie all round, in half ranges."""
 MARGIN = 0.05
-"""The same, as a share of the range."""
+"""The same for a regressor, as a share of the range: beyond, the leverage widens the deviation."""
+OWN_MARGIN = 0.01
+"""The same for the quantity itself and the utilisation: twice a set point's scatter of 0.5 %."""
 MIRRORED = (*ODD, "camber")
 """What turns its sign in the mirror image: calibrated on one side, it is on the other as well."""
 GAIN_SLACK = 0.3
@@ -60,7 +62,8 @@ def with_ranges(
         if name in MIRRORED:
             low, high = min(low, -high), max(high, -low)
         slack = GAIN_SLACK * high if name == "tension" else SLACK[name]
-        return Range(name, low, high, max(slack, MARGIN * (high - low)), needed)
+        margin = OWN_MARGIN if name == "utilisation" else MARGIN
+        return Range(name, low, high, max(slack, margin * (high - low)), needed)
 
     names = ("contact_angle", "compression", "traction", "tension", *ODD)
     shape = tuple(limits(name) for name in names)
@@ -77,16 +80,20 @@ def with_ranges(
             return ()
         x = truth[measured]
         low, high = float(np.nanmin(x)), float(np.nanmax(x))
-        slack = max(SLACK.get(quantity, 0.0), MARGIN * (high - low))
+        slack = max(SLACK.get(quantity, 0.0), OWN_MARGIN * (high - low))
         return (Range(quantity, low, high, slack),)
 
     driven = bool(np.ptp(values["traction"]) >= LEAST_TRACTION)
+    rolling = own("kappa", "slip_ratio") if driven else ()
+    # a radius that does not know the load holds for the contact at which it was read
+    if chain.radius is not None and "load" not in (v.name for v in chain.radius.variables):
+        rolling = (*rolling, limits("contact_angle"))
 
     guards = {
         "Fz": (*shape, *carried(chain.load), *own("Fz", "Fz")),
         "Fy": (*shape, *carried(chain.force), *own("Fy", "Fy")),
         "alpha": (*shape, *carried(chain.load, chain.force), *angle, *own("alpha", "slip_angle")),
-        "kappa": own("kappa", "slip_ratio") if driven else (),
+        "kappa": rolling,
     }
     return replace(chain, guards=guards, cloud=_cloud(values))
 
