@@ -21,7 +21,6 @@ from fmpy.fmi2 import (
     fmi2Fatal,
     fmi2ValueReference,
 )
-from fmpy.logging import addLoggerProxy
 
 from bench.chain import Outputs
 from bench.conditions import Condition
@@ -215,7 +214,6 @@ class FmuModel:
         )
         self._callbacks = fmi2CallbackFunctions()
         self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
-        addLoggerProxy(ctypes.byref(self._callbacks))
         slave.instantiate(callbacks=self._callbacks, loggingOn=True)
         self._slave = slave
         self._ready = False
@@ -328,8 +326,12 @@ class FmuModel:
     def _log(
         self, _component: int, _instance: bytes, _status: int, _category: bytes, message: bytes
     ) -> None:
-        """Keep the last messages of the FMU: they name the cause of an error."""
-        self._messages.append(message.decode("utf-8", "replace").strip())
+        """Keep the last messages of the FMU: they name the cause of an error.
+
+        A message is a printf format. FMPy's proxy would fill in its arguments, but knows one logger
+        in a process, that of the last wheel, and calls it when that wheel is gone.
+        """
+        self._messages.append(message.decode("utf-8", "replace").replace("%%", "%").strip())
         del self._messages[:-5]
 
     def _error(self, what: str, error: Exception) -> FmuError:

@@ -154,7 +154,7 @@ def test_bad_inputs_refuse_the_step_and_heal(host: Host, bad: dict[str, float], 
     host.play(2)
     good = {name: INPUT.get(name, 1.0 if name[:8] == "friction" else 0.0) for name in bad}
     host.put(**bad)
-    with pytest.raises(Exception, match="discard"):
+    with pytest.raises(Exception, match="status 3"):
         host.play(1)
     assert told in host.status()
     host.put(**good)

@@ -142,7 +142,7 @@ def test_a_fmu_loaded_in_this_process_does_not_disturb_its_own_rebuild(tmp_path:
         twin = build_fmu(live.calibration_file(), tmp_path / "twin.fmu", samples_per_step=10,
                          sample_rate=live.RATE)  # fmt: skip
         assert twin.read_bytes() == live.fmu_file(10).read_bytes()
-        fmu.step(np.zeros((5, 10)), np.array([18.0, 2.3e5, 0.0]))
+        fmu.step(np.zeros((5, 10)), np.array([18.0, 2.3e5, 0.0, np.nan]))
 
 
 def test_a_place_that_cannot_be_written_is_told_before_the_work(tmp_path: Path) -> None:

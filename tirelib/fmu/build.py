@@ -104,6 +104,7 @@ def export(spec: SlaveSpec, out: str | Path, progress: Callable[[str], None] | N
     _check_writable(target)
     slave = source_file(spec.script)
     sources = {**collect(slave), slave.name: slave.read_text(encoding="utf-8")}
+    gate = source_file("gate/linux64.so").read_bytes()
     settings = {**spec.settings, "description": spec.description, "step_size": spec.step_size}
     digest = content_hash(
         {
@@ -114,6 +115,7 @@ def export(spec: SlaveSpec, out: str | Path, progress: Callable[[str], None] | N
             **{f"resources/{k}": v.hex() for k, v in spec.resources.items()},
             **{f"documentation/{k}": v.hex() for k, v in spec.documentation.items()},
             "icon": spec.icon.hex(),
+            "gate": gate.hex(),
         }
     )
     settings["guid"] = f"{{{uuid5(_NAMESPACE, digest)}}}"
@@ -128,7 +130,9 @@ def export(spec: SlaveSpec, out: str | Path, progress: Callable[[str], None] | N
         script.write_text(launcher, encoding="utf-8")
         content = [write_package(folder, sources, package)]
         for path, data in {
-            **spec.resources, "settings.json": json.dumps(settings, indent=1).encode()
+            **spec.resources,
+            "settings.json": json.dumps(settings, indent=1).encode(),
+            "guid.txt": str(settings["guid"]).encode(),
         }.items():  # fmt: skip
             place = folder / path
             place.parent.mkdir(parents=True, exist_ok=True)
@@ -138,6 +142,7 @@ def export(spec: SlaveSpec, out: str | Path, progress: Callable[[str], None] | N
         raw = _export(script, folder / "raw" / f"{spec.model}.fmu", content, suffix)
         tell("exported by pythonfmu")
         files = _own_pythonfmu(_unzipped(raw), slave.name, package)
+    files |= _gated(files, f"binaries/linux64/{spec.model}.so", gate)
     files |= {
         "modelDescription.xml": described(
             files["modelDescription.xml"], spec.table, spec.start_depends_on
@@ -255,6 +260,11 @@ def _own_pythonfmu(files: Mapping[str, bytes], slave: str, package: str) -> dict
             place = name.replace("resources/pythonfmu/", f"resources/{package}/pythonfmu/", 1)
             moved[place] = data
     return moved
+
+
+def _gated(files: Mapping[str, bytes], library: str, gate: bytes) -> dict[str, bytes]:
+    """Return the gate in the place of pythonfmu's library, and that among the resources."""
+    return {"resources/binaries/linux64/pythonfmu.so": files[library], library: gate}
 
 
 def _licenses() -> dict[str, bytes]:

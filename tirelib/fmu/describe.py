@@ -72,6 +72,8 @@ def described(
         raise ValueError("pythonfmu wrote no CoSimulation, ModelVariables or ModelStructure")
     place = list(root).index(simulation) + 1
     root[place:place] = [_unit_definitions(), _type_definitions()]
+    for output in structure.iter("Unknown"):
+        output.set("dependencies", "")  # a step takes the inputs; between steps outputs stand still
     unknown = Xml.SubElement(structure, "InitialUnknowns")
     numbers = {variable.name: str(number) for number, variable in enumerate(table, start=1)}
     given = {} if known is None else {"dependencies": " ".join(numbers[name] for name in known)}

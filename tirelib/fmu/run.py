@@ -24,7 +24,11 @@ from tirelib.observations import SET_POINTS, TRUTH, Observations, truth_of
 
 
 def keeping(messages: list[str]) -> Any:
-    """Return callbacks for ``FMU2Slave.instantiate`` that keep what the FMU logs."""
+    """Return callbacks for ``FMU2Slave.instantiate`` that keep what the FMU logs.
+
+    A message is a printf format without arguments here, so that two percent signs mean one. FMPy's
+    ``addLoggerProxy`` would print it, but knows one logger in a process: that of the last instance.
+    """
     from fmpy import calloc, free
     from fmpy.fmi2 import (
         fmi2CallbackAllocateMemoryTYPE,
@@ -34,7 +38,7 @@ def keeping(messages: list[str]) -> Any:
     )
 
     def keep(_: Any, __: Any, ___: Any, ____: Any, message: bytes) -> None:
-        messages.append(message.decode("utf-8", "replace"))
+        messages.append(message.decode("utf-8", "replace").replace("%%", "%"))
 
     found = fmi2CallbackFunctions()
     found.logger = fmi2CallbackLoggerTYPE(keep)
@@ -129,11 +133,11 @@ class LoadedFmu:
         self.count = 0
 
     def step(self, frame: FloatArray, conditions: FloatArray) -> None:
-        """Set a frame, shape (n_gages, n), n up to `samples`, with its conditions, and step."""
+        """Set a frame, shape (n_gages, n), n up to `samples`, with what `HELD` names, and step."""
         references, size, values = self._frame
         view = np.ctypeslib.as_array(values)
         view[: frame.size] = frame.T.ravel()
-        view[-conditions.size :] = conditions
+        view[-len(HELD) :] = conditions
         self.slave.fmi2SetReal(self.slave.component, references, size, values)
         n = frame.shape[1]
         if self.buffered:

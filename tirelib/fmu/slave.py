@@ -16,7 +16,7 @@ import json
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, NoReturn, Protocol
 
 from tirelib.errors import FormatError, ParameterError
 from tirelib.fmu.journal import Journal
@@ -53,7 +53,7 @@ def guarded(method: Callable[..., Any]) -> Callable[..., Any]:
         try:
             return method(self, *args)
         except Exception as error:
-            self.complain(_cause(error))
+            self.complain(str(error) if isinstance(error, StepError) else _cause(error))
             for kept in (type(self), self, self.log_queue):
                 ctypes.pythonapi.Py_IncRef(ctypes.py_object(kept))
             raise
@@ -273,14 +273,19 @@ class GuardedSlave:
         """Take no further steps; the outputs stay."""
         self._phase = "terminated"
 
+    @guarded
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """Do a step. A refused one is discarded; an error holds the last values as invalid."""
+        """Do a step. A refused one is an FMI error; any other holds the last values as invalid.
+
+        A discarded step would be quieter: pythonfmu 0.7.0 says with it that the slave wants the
+        simulation to end, and importers end it without a word.
+        """
         if self._phase != "stepping":
-            return self._refuse(_PHASES[self._phase])
+            self._refuse(_PHASES[self._phase])
         try:
             changed = self.advance(step_size)
         except StepError as error:
-            return self._refuse(str(error))
+            self._refuse(str(error))
         except Exception as error:  # nothing may reach the importer
             cause = _cause(error)
             self.complain(cause)
@@ -297,14 +302,19 @@ class GuardedSlave:
         self.other.update(zip(self._names, others, strict=True))
         self._refused = False
 
-    def _refuse(self, cause: str) -> bool:
-        """Log why, and let nothing be valid until a step is done: time stands still."""
-        self.complain(cause)
+    def _refuse(self, cause: str) -> NoReturn:
+        """Let nothing be valid until a step is done: time stands still.
+
+        Raises
+        ------
+        StepError
+            Always, with the cause.
+        """
         self._refused = True
         self.other.update(dict.fromkeys(self._truths, False))
         if "status" in self.other:
             self.other["status"] = told(STEP_REFUSED, cause)
-        return False
+        raise StepError(cause)
 
     def complain(self, cause: str) -> None:
         """Log an error, unless its like was logged."""

@@ -173,7 +173,7 @@ With <code>axes</code> = sae the signs of Fz, alpha and Fy turn, with adapted_sa
 both, y points to the right, so <code>strain_1</code> is the gage on the other side.</p>"""
 _FRAMES = """<p>A communication step brings a frame of samples, oldest first. A shorter step takes
 the first samples of the frame, in a longer one the samples after it are missing. A step that is no
-whole number of samples is discarded. Estimates are the same for every frame length.</p>"""
+whole number of samples is refused. Estimates are the same for every frame length.</p>"""
 _BUFFERED = """<p>The input <code>samples</code> says how many samples of the frame are new, oldest
 first; the step may have any length, time is counted in samples. A step with none lets the estimate
 age, and after two turns' time nothing is valid. Estimates are the same however samples are
