@@ -26,6 +26,7 @@ from tirelib.estimators.chain import QUANTITIES
 from tirelib.fmu.run import LoadedFmu
 from tirelib.fmu.virtual.coordinates import FRICTION, INPUTS
 from tirelib.fmu.virtual.table import START
+from tirelib.held import HELD
 
 WHEELS = ("FL", "FR", "RL", "RR")
 """Order of the wheels in every array: front left, front right, rear left, rear right."""
@@ -67,6 +68,8 @@ class WheelStates:
         there is none.
     friction : array, [1]
         Coefficient of friction under each wheel, 0.3 to 1.1.
+    told_speed : array, [m/s]
+        Speed that the strain tires are told; NaN: the true one.
     """
 
     load: FloatArray
@@ -77,6 +80,7 @@ class WheelStates:
     pressure: FloatArray = field(default_factory=lambda: np.full(len(WHEELS), PRESSURE))
     omega: FloatArray = field(default_factory=_nan)
     friction: FloatArray = field(default_factory=lambda: np.full(len(WHEELS), OWN_FRICTION))
+    told_speed: FloatArray = field(default_factory=_nan)
 
     def rows(self) -> FloatArray:
         """Return the inputs of the virtual tires, shape (4, 7): `INPUTS`, then the friction."""
@@ -303,23 +307,20 @@ class FourWheels:
             for name, value in zip(_TIRE, shown, strict=True):
                 parts[name][wheel] = value
             parts["tire_valid"][wheel] = good
-            self._estimate(wheel, frame[:new], good, state, truth.omega[wheel], parts)
+            self._estimate(wheel, frame[:new], good, told_conditions(truth, wheel), parts)
         self.told = Estimates(**parts)
         return self.told
 
     def _estimate(
-        self, wheel: int, frame: FloatArray, good: bool, state: FloatArray, omega: float,
-        parts: dict[str, Any],
-    ) -> None:  # fmt: skip
-        """Give a frame to the strain tire of a wheel, and note what it says."""
+        self, wheel: int, frame: FloatArray, good: bool, known: FloatArray, parts: dict[str, Any]
+    ) -> None:
+        """Give a frame and the conditions of `HELD` to a strain tire, and note what it says."""
         fmu = self.estimators[wheel]
         at, slave = fmu.references, fmu.slave
         if good != self._fresh[wheel]:
             slave.setBoolean([at["frame_valid"]], [good])
             self._fresh[wheel] = good
-        if np.isfinite(omega):
-            slave.setReal([at["omega"]], [omega])
-        fmu.step(frame.T, np.array([state[4], state[5], state[3]]))
+        fmu.step(frame.T, known)
         turn, flags = slave.getInteger([at["turn"], at["flags"]])
         valid = slave.getBoolean([at[name] for name in _VALID])
         for name, value in zip(_VALID, valid, strict=True):
@@ -329,6 +330,18 @@ class FourWheels:
                 parts[name][wheel] = value
             parts["contact_time"][wheel] += 1.0 / fmu.rate  # its first sample is not at zero
         parts["turn"][wheel], parts["flags"][wheel] = turn, flags
+
+
+def told_conditions(truth: WheelStates, wheel: int) -> FloatArray:
+    """Return what a strain tire is told beside the strain, in the order of `HELD`; NaN: nothing."""
+    speed = truth.told_speed[wheel]
+    known = {
+        "speed": speed if np.isfinite(speed) else truth.speed[wheel],
+        "pressure": truth.pressure[wheel],
+        "camber": truth.camber[wheel],
+        "omega": truth.omega[wheel],
+    }
+    return np.array([known.get(name, np.nan) for name in HELD])
 
 
 _TIRE = ("tire_omega", "tire_angle", "tire_alpha", "tire_kappa", "tire_fx", "tire_fy",
