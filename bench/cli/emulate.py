@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import closing
+from contextlib import ExitStack, closing, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -143,12 +143,13 @@ def emulate(
     tally, player = Tally(), Player(transmitter(kind), line, faults)
     short = tape is not None and tape.duration * len(wheels) <= AHEAD
     ready = list(player.pieces(tape)) if tape is not None and short else []
-    with closing(sink):
+    with closing(sink), ExitStack() as stack:
         if sidecar is not None and tape is not None:
             write_json(sidecar, _sidecar(tape, loop))
         click.echo(sink.path)
         if port_file is not None:
             _announce(port_file, sink.path)
+            stack.callback(_withdraw, port_file, sink.path)
         try:
             with on_stop(_interrupt):
                 sink.wait_for_reader(Deadline.after(patience))
@@ -262,3 +263,10 @@ def _announce(port_file: Path, path: str) -> None:
     part = port_file.with_name(port_file.name + ".part")
     part.write_text(path + "\n", encoding="utf-8")
     part.replace(port_file)
+
+
+def _withdraw(port_file: Path, path: str) -> None:
+    """Remove the file that names a port which is gone, unless it names another one by now."""
+    with suppress(OSError):
+        if port_file.read_text(encoding="utf-8").strip() == path:
+            port_file.unlink()

@@ -15,7 +15,7 @@ from bench.errors import DeviceError, RecordingError
 from bench.links.opening import PortPlan
 from bench.links.replay import ReplayLink
 from bench.protocols.plan import ProtocolPlan
-from bench.setup_file import check_sources, read_setup, told_by
+from bench.setup_file import check_sources, known_wheels, read_setup, told_by
 from bench.source_plan import SourcePlan, protocol_of
 from tirelib.estimators.calibration import Calibration
 from tirelib.units import to_si
@@ -174,24 +174,31 @@ def given_replayed(
     return Given(tuple(sources), conditions or link.recording.conditions, wheels)
 
 
-def missing(given: Given, calibration: Calibration) -> tuple[list[str], list[str]]:
-    """Return what is not known: without which no turn is valid, and without which it is worse."""
+def missing(given: Given, calibration: Calibration) -> tuple[dict[str, str], dict[str, str]]:
+    """Return what is not known, by name and in words: needed by the calibration, and useful."""
     told = [place for source in given.sources for place in told_by(source)]
-    known = {*given.conditions.known, *(name for name, _ in told)}
-    needed = [name for name in calibration.needed if name not in known]
-    useful = [name for name in _WITHOUT if name not in known and name not in needed]
-    return needed, useful
+    wheels = {*given.wheels, *(w for source in given.sources for w in known_wheels(source))}
+    words: dict[str, str] = {}
+    for name in {*calibration.needed, *_WITHOUT} - set(given.conditions.known):
+        places = [wheel for other, wheel in told if other == name]
+        without = sorted(wheels - set(places))
+        if not places:
+            words[name] = name
+        elif None not in places and without:
+            words[name] = f"{name} of wheel {', '.join(map(str, without))}"
+    needed = {name: words[name] for name in calibration.needed if name in words}
+    return needed, {name: words[name] for name in _WITHOUT if name in words.keys() - needed}
 
 
 def say_missing(given: Given, calibration: Calibration, console: Console) -> None:
     """Say what is not known before the first turn shows it."""
     needed, useful = missing(given, calibration)
-    for name in needed:
+    for name, words in needed.items():
         console.print(
-            f"WARNING: no {name}: this calibration needs it, and NO TURN WILL BE VALID; give "
+            f"WARNING: no {words}: this calibration needs it, and NO TURN WILL BE VALID; give "
             f"{_OPTIONS[name]}, --conditions FILE, or a map with [{name}]", style="bold red",
             soft_wrap=True, markup=False,
         )  # fmt: skip
-    for name in useful:
-        console.print(f"note: no {name}: {_WITHOUT[name]}; give {_OPTIONS[name]}, --conditions "
+    for name, words in useful.items():
+        console.print(f"note: no {words}: {_WITHOUT[name]}; give {_OPTIONS[name]}, --conditions "
                       f"FILE, or a map with [{name}]", soft_wrap=True, markup=False)  # fmt: skip

@@ -48,6 +48,8 @@ _EXAMPLE = f"""\b
 Examples:
   tirebench run --port /dev/ttyUSB0 --fmu StrainTire.fmu --speed 65 --pressure 2.3 --record a.mcap
   tirebench run --port slcan:/dev/ttyACM0 --bitrate 1000000 --data-bitrate 5000000 --fmu X.fmu
+  tirebench run --port 0=/dev/ttyUSB0 --port 1=/dev/ttyUSB1 --wait --fmu StrainTire.fmu
+  tirebench run --setup rig.toml --fmu StrainTire.fmu --record a.mcap
   tirebench run --replay a.mcap --fmu StrainTire.fmu --json a.json --no-page
 
 {PORTS}
@@ -155,6 +157,8 @@ def run(
     console = output()
     if port_file is not None:
         ports = (port_of_file(port_file, wait, console),)
+    elif wait and replay is None:
+        console.print(f"ports that are not there yet are waited for, {wait:g} s")
     conditions = conditions_of(speed, pressure, camber, sidecar)
     console.print(f"FMU {fmu_file}, sha256 {archive.sha256}", soft_wrap=True)
     console.print(f"FMU {check_trust(archive, trust=trust)}", soft_wrap=True)

@@ -153,6 +153,10 @@ def test_pressure_becomes_an_input_when_it_was_varied(
     refused = both.calibration.estimate(unknown)
     assert not refused.turn_valid.any()
     assert (refused.flags[1:] & TurnFlag.NO_CONDITION > 0).all()
+    assert both.calibration.needed == ("pressure",)
+    alone = train(observe([cornering])).calibration
+    assert alone.needed == ()
+    assert alone.estimate(unknown).turn_valid[1:].all()
 
 
 def test_slip_ratio_and_rolling_condition(cornering: Campaign, braking: Campaign) -> None:

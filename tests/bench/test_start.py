@@ -1,0 +1,163 @@
+"""What a run says and waits for before its first frame."""
+
+import signal
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+from rich.console import Console
+
+from bench.cli import program
+from bench.cli.given import Given, port_of_file, say_missing
+from bench.conditions import Conditions
+from bench.deadline import Deadline
+from bench.errors import DeviceError, LinkError, UnpluggedError
+from bench.links import BACK, Link, Read
+from bench.links.reconnecting import ReconnectingLink
+from bench.source_plan import SourcePlan
+from tests.bench.clocks import Clock
+from tests.bench.conftest import Spawn
+from tests.bench.programs import A_TURN, PATIENCE
+from tests.bench.test_sources import serial, vehicle
+
+
+def said(given: Given, *needed: str) -> str:
+    calibration: Any = SimpleNamespace(needed=needed)
+    console = Console(record=True, width=400, quiet=False, file=None)
+    with console.capture() as captured:
+        say_missing(given, calibration, console)
+    return captured.get()
+
+
+def test_a_condition_that_the_calibration_needs_is_missed_before_the_first_turn() -> None:
+    sources: tuple[SourcePlan, ...] = (serial("a", 0),)
+    text = said(Given(sources, Conditions.constant(18.0), ()), "pressure", "camber")
+    assert "WARNING: no camber: this calibration needs it, and NO TURN WILL BE VALID" in text
+    assert "give --camber DEG, --conditions FILE, or a map with [camber]" in text
+    assert "WARNING: no pressure" in text
+    assert "speed" not in text
+
+
+def test_what_only_makes_it_worse_is_a_note() -> None:
+    text = said(Given((serial("a", 0),), Conditions.constant(pressure=2e5, camber=0.0), ()))
+    assert text.startswith("note: no speed: there will be no slip ratio; give --speed KMH")
+    assert text.count("\n") == 1
+
+
+def test_what_a_bus_tells_is_not_missed_but_for_the_wheels_it_leaves_out() -> None:
+    sources = (serial("a", 0), serial("b", 3), vehicle("c"))  # pressure of wheel 3, speed of all
+    text = said(Given(sources, Conditions.constant(camber=0.0), ()), "pressure")
+    assert "WARNING: no pressure of wheel 0: this calibration" in text
+    assert "speed" not in text
+    assert said(Given(sources[1:], Conditions.constant(camber=0.0), ()), "pressure") == ""
+
+
+def test_a_port_file_is_waited_for_and_so_is_its_port(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock, file, port = Clock(), tmp_path / "port", tmp_path / "pts"
+    steps = iter([lambda: None, lambda: file.write_text(str(port)), lambda: port.write_text("")])
+
+    def sleep(seconds: float) -> None:
+        clock.now += seconds
+        next(steps, lambda: None)()
+
+    with monkeypatch.context() as patch:
+        for module in ("bench.cli.given", "bench.deadline"):
+            patch.setattr(f"{module}.time", clock)
+        patch.setattr(clock, "sleep", sleep)
+        quiet = Console(quiet=True)
+        assert port_of_file(file, 60.0, quiet) == str(port)
+        port.unlink()  # one that is left of another day
+        with pytest.raises(DeviceError, match=r"its port .*pts is not there; .* --wait"):
+            port_of_file(file, 60.0, quiet)
+        assert clock.now > 60.0
+
+
+class Absent:
+    """A port that opens at the fourth attempt."""
+
+    name, encoding, live = "port", "serial-v1", True
+
+    def __init__(self) -> None:
+        self.tries = 0
+
+    def open(self) -> Link:
+        self.tries += 1
+        if self.tries < 4:
+            raise LinkError("port: it cannot be opened; plug it in")
+        return self
+
+    def receive(self, deadline: Deadline) -> Read:
+        raise UnpluggedError("port: it went away")
+
+    def close(self) -> None:
+        self.tries = 0
+
+    def overruns(self) -> int:
+        return 0
+
+
+def test_a_port_that_is_not_there_yet_is_waited_for_and_its_coming_is_no_return(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    clock = Clock()
+    for module in ("bench.links.reconnecting", "bench.deadline"):
+        monkeypatch.setattr(f"{module}.time", clock)
+    port = Absent()
+    link = ReconnectingLink(port.open, 5.0, "port", wait=60.0)
+    assert link.name == "port"
+    first = link.receive(Deadline.after(30.0))
+    assert (first and first.event, port.tries) == ("", 4)
+    assert (lost := link.receive(Deadline.after(1.0)))
+    assert lost.event == "lost"
+    again = link.receive(Deadline.after(4.0))
+    assert again
+    assert again.event == BACK
+
+
+def test_a_port_that_does_not_come_is_told_with_what_was_wrong(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    clock = Clock()
+    for module in ("bench.links.reconnecting", "bench.deadline"):
+        monkeypatch.setattr(f"{module}.time", clock)
+
+    def nothing() -> Link:
+        raise LinkError("port: it cannot be opened; plug it in")
+
+    link = ReconnectingLink(nothing, 5.0, "port", wait=60.0)
+    with pytest.raises(LinkError, match="it cannot be opened; plug it in") as raised:
+        link.receive(Deadline.after(100.0))
+    assert not isinstance(raised.value, UnpluggedError)
+    assert clock.now == pytest.approx(60.0, abs=3.0)
+
+
+def test_a_run_may_begin_before_its_port_is_there(
+    spawn: Spawn, campaign: Path, toy_fmus: dict[int, Path], tmp_path: Path
+) -> None:
+    run = spawn("run", "--port", tmp_path / "wheel", "--wait", PATIENCE, "--fmu", toy_fmus[16],
+                "--record", tmp_path / "a.mcap", "--no-page")  # fmt: skip
+    run.says("samples a step")  # all is loaded, and nothing to read
+    wheel = spawn("emulate", "--campaign", campaign, "--all", "--loop", "--link",
+                  tmp_path / "wheel", "--port-file", tmp_path / "port")  # fmt: skip
+    run.says(A_TURN)
+    run.send_signal(signal.SIGINT)
+    code, text, _ = run.finish()
+    assert (code, "reconnects" in text) == (0, False)
+    assert (tmp_path / "port").exists()
+    wheel.send_signal(signal.SIGINT)
+    wheel.finish()
+    assert not (tmp_path / "port").exists()  # it names no port that is gone
+
+
+def test_without_a_wait_a_port_that_is_not_there_is_refused(
+    toy_fmus: dict[int, Path], tmp_path: Path
+) -> None:
+    arguments = ("run", "--port-file", tmp_path / "port", "--fmu", toy_fmus[16], "--no-page")
+    outcome = CliRunner().invoke(program, [str(argument) for argument in arguments])
+    assert "no port; the file that `tirebench emulate --port-file` writes" in (
+        str(outcome.exception) + outcome.output
+    )
