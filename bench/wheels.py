@@ -15,6 +15,7 @@ from bench.errors import DeviceError
 from bench.frames import Frames, select
 from bench.line_counts import LineCounts
 from bench.protocols import Decoder
+from bench.protocols.layouts import Health
 from bench.timeline import Samples, Timeline, TimelineCounts
 
 MOST = 4
@@ -251,6 +252,14 @@ class Wheels:
     def line_counts(self, wheel: int) -> LineCounts:
         """Return what the line of a wheel has seen and lost."""
         return self.lines[self._sources.get(wheel, 0)].decoder.counts
+
+    def health(self, wheel: int) -> Health | None:
+        """Return what a wheel said last of itself in frames of their own, if it did."""
+        line = self.lines[self._sources.get(wheel, 0)]
+        said = line.decoder.health
+        if line.wheel is not None:  # whatever number it says, it is the only one
+            return next(iter(said.values()), None)
+        return said.get(wheel)
 
     @property
     def counts(self) -> tuple[LineCounts, TimelineCounts]:

@@ -1,7 +1,8 @@
 """Options of the live page, and what is said of it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar
@@ -9,12 +10,15 @@ from typing import Any, TypeVar
 import click
 from rich.console import Console
 
+from bench.conditions import Conditions
 from bench.device import Device
 from bench.estimation import News
+from bench.page.alarms import RULES, Rule
 from bench.page.commands import Switch
 from bench.page.feed import About
 from bench.page.live import LOOPBACK, LivePage, PageChoice
 from bench.session import Source
+from tirelib.cli.common import FILE
 from tirelib.estimators.calibration import Calibration
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -31,6 +35,8 @@ _OPTIONS = (
     click.option("--page-port", default=0, type=click.IntRange(0, 65535), metavar="N",
                  help="Port of the page.  [default: a free one]"),
     click.option("--tui", is_flag=True, help="The same in this terminal."),
+    click.option("--alarms", "alarms", metavar="A.toml", type=FILE,
+                 help="Limits of the page's alarms."),
 )  # fmt: skip
 
 
@@ -63,10 +69,15 @@ class Shown:
     choice : PageChoice
     console : Console
         Gets the address, and a warning when others can reach it.
+    rules : mapping of name to Rule
+        Limits of the alarms.
     """
 
-    def __init__(self, choice: PageChoice, console: Console) -> None:
+    def __init__(
+        self, choice: PageChoice, console: Console, rules: Mapping[str, Rule] = RULES
+    ) -> None:
         self._choice = choice
+        self._rules = rules
         self._console = console
         self._stack = ExitStack()
         self._page: LivePage | None = None
@@ -80,8 +91,13 @@ class Shown:
         fmu: Path,
         calibration: Calibration | None,
         devices: Sequence[Device],
+        conditions: Conditions,
+        origin: str,
     ) -> None:
-        """Start what is to be shown and say where it is."""
+        """Start what is to be shown and say where it is.
+
+        `conditions` are what is known beside a bus, `origin` says where they come from.
+        """
         choice, console = self._choice, self._console
         missing = [name for name in NEEDED if find_spec(name) is None]
         if choice.page and missing:
@@ -90,12 +106,12 @@ class Shown:
         if not (choice.page or choice.terminal):
             return
         lateral = next((d.lateral for d in devices if d.lateral), None)
-        about = About(source.name, fmu.name)
+        about = About(source.name, fmu.name, conditions=conditions, origin=origin)
         if calibration is not None:
-            about = About(source.name, fmu.name, calibration.tire, calibration.lateral)
+            about = replace(about, tire=calibration.tire, lateral=calibration.lateral)
         elif lateral is not None:
-            about = About(source.name, fmu.name, "", lateral)
-        page = LivePage(choice, source, about, switch)
+            about = replace(about, lateral=lateral)
+        page = LivePage(choice, source, about, switch, self._rules)
         self._page = self._stack.enter_context(page)
         if choice.open_to_others:
             console.print(

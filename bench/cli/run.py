@@ -35,6 +35,7 @@ from bench.live.chain import LiveChain, LivePlan
 from bench.live.priority import realtime
 from bench.live.reader import ReaderPlan
 from bench.live.recording_state import RecordingRule
+from bench.page.alarms import RULES, read_alarms
 from bench.page.recording_switch import RecordingSwitch
 from bench.protocols.plan import ProtocolPlan
 from bench.recording_header import RecordingHeader, parts_of
@@ -142,6 +143,7 @@ def run(
     network: bool,
     page_port: int,
     tui: bool,
+    alarms: Path | None,
 ) -> None:
     """Estimate Fz, alpha, kappa and Fy of each turn, live from a port or from a recording."""
     if [bool(ports), setup is not None, port_file is not None, replay is not None].count(True) != 1:
@@ -150,6 +152,7 @@ def run(
         raise click.UsageError("--record goes with --port: a recording is there already")
     priority = realtime(asked) if replay is None else ""
     paced = replay is None or pace is not None
+    rules = RULES if alarms is None else read_alarms(alarms)
     choice = page_choice(page, host, network, page_port, tui, paced=paced)
     archive = read_fmu(fmu_file)
     devices, device_text = devices_of(device_texts)
@@ -180,7 +183,7 @@ def run(
                 device.check_layout(calibration.lateral, str(fmu_file))
             say_missing(known, calibration, console)
         bridges = stack.enter_context(Bridges(estimates_out, plotjuggler, plan))
-        shown = Shown(choice, console)
+        shown = Shown(choice, console, rules)
         switch: RecordingSwitch | None = None
         source: Source
         if link is None:
@@ -207,7 +210,9 @@ def run(
         if priority:
             console.print(f"priority: {priority}", soft_wrap=True, markup=False)
         stack.enter_context(shown)
-        shown.open(source, switch, fmu_file, calibration, known.devices)
+        of_recording = link is not None and conditions is None
+        said_by = "recording" if of_recording else sidecar.name if sidecar else "option"
+        shown.open(source, switch, fmu_file, calibration, known.devices, known.conditions, said_by)
         journal = None if json_file is None else Journal(json_file)
         if journal is not None:
             stack.callback(journal.close)

@@ -6,6 +6,8 @@ between two reads and never waits. Nothing that a viewer sends names a file.
 
 import json
 import time
+from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any, Protocol
@@ -15,6 +17,8 @@ from bench.errors import BenchError, DeviceError
 LONGEST_MARKER = 200
 """Characters of a marker."""
 KINDS = ("marker", "record")
+NOTES = 20
+"""Markers that the page lists."""
 ASK_EVERY = 0.05
 """Time between two looks into the pipe, [s]."""
 
@@ -78,8 +82,8 @@ class Target(Protocol):
     def bytes(self) -> int:
         """Raw bytes so far."""
 
-    def marker(self, text: str) -> None:
-        """Write a marker."""
+    def event(self, event: Mapping[str, Any]) -> None:
+        """Write an event of this moment."""
 
 
 class Switch(Protocol):
@@ -88,6 +92,10 @@ class Switch(Protocol):
     @property
     def recorder(self) -> Target | None:
         """What records now; None if nothing does."""
+
+    @property
+    def name(self) -> str:
+        """Of the recording that goes on, or went on last; empty before the first."""
 
     def start(self) -> str:
         """Begin a recording and return its name; the name of one that is going on."""
@@ -111,7 +119,7 @@ class CommandDesk:
         self._next = 0.0
         self._markers = 0
         self._done: list[dict[str, Any]] = []
-        self._name = ""
+        self._notes: deque[dict[str, Any]] = deque(maxlen=NOTES)
 
     def listen(self, pipe: Connection) -> None:
         """Take commands from this pipe from now on, instead of the one before."""
@@ -148,14 +156,19 @@ class CommandDesk:
                 return
             self._markers += 1
             text = command.text or f"marker {self._markers}"
-            switch.recorder.marker(text)
+            switch.recorder.event({"event": "marker", "text": text})
+            self._notes.append({"time": time.time(), "text": text})
             self._say(True, f"marker set: {text}")
         elif command.on:
-            self._name = switch.start()
-            self._say(True, f"recording {self._name}")
+            self._say(True, f"recording {switch.start()}")
         else:
             switch.stop()
             self._say(True, "recording stopped")
+
+    def note(self, event: Mapping[str, Any]) -> None:
+        """Write an event into the recording, where one goes on."""
+        if self._switch is not None and self._switch.recorder is not None:
+            self._switch.recorder.event(event)
 
     def _say(self, good: bool, text: str) -> None:
         number = self._done[-1]["number"] + 1 if self._done else 1
@@ -170,6 +183,8 @@ class CommandDesk:
                 "on": recorder is not None,
                 "bytes": 0 if recorder is None else recorder.bytes,
                 "markers": self._markers,
+                "name": "" if self._switch is None else self._switch.name,
             },
+            "notes": list(self._notes),
             "answers": self._done,
         }

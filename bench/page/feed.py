@@ -14,10 +14,16 @@ from typing import Any
 import numpy as np
 
 from bench.chain import Turn
+from bench.conditions import UNKNOWN, Conditions
 from bench.document import turn_document, wheel_document
 from bench.estimation import News
+from bench.page.alarms import RULES, Alarms, Rule, event_of
 from bench.page.board import Board
+from bench.page.condition_lines import in_use
+from bench.page.quantities import UNITS
+from bench.page.recent import Recent
 from bench.session import Source
+from bench.wheels import Wheels
 
 STATE_EVERY = 0.25
 """Time between two states, [s]."""
@@ -27,6 +33,7 @@ MESSAGES = 5
 FLAGS = 8
 FLAG_LENGTH = 160
 """Flags and notes of a turn that the page gets: so many, so long; the document has all."""
+NOTHING_KNOWN = Conditions((0,), (UNKNOWN,))
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,12 +45,18 @@ class About:
     link, fmu, tire : str
     lateral : tuple of float, [m]
         ISO 8855, left positive, as the gages are numbered.
+    conditions : Conditions
+        Known beside what a bus tells.
+    origin : str
+        Where they come from, in words.
     """
 
     link: str
     fmu: str = ""
     tire: str = ""
     lateral: tuple[float, ...] = (0.06, 0.03, 0.0, -0.03, -0.06)
+    conditions: Conditions = NOTHING_KNOWN
+    origin: str = "option"
 
 
 class Feed:
@@ -56,6 +69,10 @@ class Feed:
     about : About
     extra : callable, optional
         More for the state: recording, processes that were started again.
+    rules : mapping of name to Rule
+        Limits of the alarms.
+    note : callable, optional
+        Takes the event of each alarm that begins or ends.
     """
 
     def __init__(
@@ -64,11 +81,17 @@ class Feed:
         source: Source,
         about: About,
         extra: Callable[[], Mapping[str, Any]] = dict,
+        rules: Mapping[str, Rule] = RULES,
+        note: Callable[[dict[str, Any]], None] | None = None,
     ) -> None:
         self._board = board
         self._source = source
         self._about = about
         self._extra = extra
+        self._alarms = Alarms(rules)
+        self._note = note
+        self._recent: dict[int, Recent] = {}
+        self._last: dict[int, dict[str, Any]] = {}
         self._left_out = 0
         self._count: Counter[int] = Counter()
         self._invalid: Counter[int] = Counter()
@@ -106,11 +129,15 @@ class Feed:
         now = time.time()
         waited = 1e-9 * (time.monotonic_ns() - turn.arrival) if self._source.live else 0.0
         entry["came"], entry["told"] = now - waited, now
+        self._last[turn.wheel] = entry
         self._board.turns.put(json.dumps(entry).encode())
 
     def state(self) -> dict[str, Any]:
         """Return the state of the run as the page shows it."""
         about, latency = self._about, np.array(self._latency or (math.nan,))
+        extra = dict(self._extra())
+        wheels = {wheel: self._wheel(wheel) for wheel in sorted(self._source.wheels.heard)}
+        self._watch_limits(wheels, extra)
         return {
             "link": about.link,
             "live": self._source.live,
@@ -126,22 +153,75 @@ class Feed:
             "latency_p99_ms": _finite(1e3 * float(np.percentile(latency, 99.0))),
             "left_out": self._left_out + self._board.turns.refused + self._board.laps.refused,
             "messages": [message[:FLAG_LENGTH] for message in self._said],
-            "wheels": {
-                str(wheel): self._wheel(wheel) for wheel in sorted(self._source.wheels.heard)
-            },
-            **self._extra(),
+            "wheels": {str(wheel): entry for wheel, entry in wheels.items()},
+            "alarms": self._alarms.document(),
+            **extra,
         }
 
     def _wheel(self, number: int) -> dict[str, Any]:
         wheel = self._source.wheels.heard[number]
         age = time.monotonic() - wheel.clock.host_time(wheel.newest_us)
+        recent = self._recent.setdefault(number, Recent())
+        turns, invalid = self._count[number], self._invalid[number]
         return {
             **wheel_document(self._source.wheels, number),
             **self._source.wheel_counts(number),
-            "turns": self._count[number],
-            "invalid_turns": self._invalid[number],
+            "turns": turns,
+            "invalid_turns": invalid,
             "newest_sample_age_ms": _finite(1e3 * age),
+            **(recent.look(wheel, turns, invalid) if self._source.live else {}),
+            **vitals(self._source.wheels, number),
+            "in_use": in_use(wheel, self._about.conditions, self._about.origin),
         }
+
+    def _watch_limits(self, wheels: dict[int, dict[str, Any]], extra: dict[str, Any]) -> None:
+        """Let alarms begin and end with what is known now; a replay has none."""
+        if not self._source.live or self._ended:
+            return
+        now = time.time()
+        changed = []
+        for number, entry in wheels.items():
+            changed += self._alarms.look(self._watched(number, entry, now), number, now)
+        recorded = extra.get("chain", {}).get("recording", {})
+        free = recorded.get("free_bytes")
+        room = {"minutes_left": recorded.get("minutes_left"),
+                "disk": None if free is None else 1e-9 * free}  # fmt: skip
+        changed += self._alarms.look(room, None, now)
+        if self._note is not None:
+            for alarm in changed:
+                self._note(event_of(alarm))
+
+    def _watched(self, number: int, entry: dict[str, Any], now: float) -> dict[str, float | None]:
+        """Return the values of a wheel that have limits."""
+        age, heard = entry["newest_sample_age_ms"], self._source.heard
+        last = self._last.get(number, {})
+        silence = None if age is None and heard is None else max(
+            0.0 if age is None else 1e-3 * age, 0.0 if heard is None else now - heard
+        )  # fmt: skip
+        return {
+            "silence": silence,
+            "rate": entry.get("rate_percent"),
+            "loss": entry.get("loss_percent"),
+            "saturated": entry.get("saturated_percent"),
+            "invalid": entry.get("invalid_percent"),
+            "delay": age,
+            "signal": entry["rssi_dbm"],
+            "temperature": entry["temperature_c"],
+            "battery": entry["battery_v"],
+            "tire_pressure": entry["tire_pressure_bar"],
+            **{name: last[name] for name in UNITS if last.get(f"{name}_valid")},
+        }
+
+
+def vitals(wheels: Wheels, number: int) -> dict[str, float | None]:
+    """Return what a wheel says of itself; null where it does not."""
+    wheel, health = wheels.heard[number], wheels.health(number)
+    return {
+        "rssi_dbm": wheel.rssi,
+        "temperature_c": wheel.temperature,
+        "battery_v": None if health is None else health.battery or None,  # 0: not measured
+        "tire_pressure_bar": None if health is None else 1e-5 * health.pressure or None,
+    }
 
 
 def _finite(value: float) -> float | None:

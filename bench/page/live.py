@@ -3,7 +3,7 @@
 import ipaddress
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -14,6 +14,7 @@ from bench.errors import DeviceError
 from bench.estimation import News
 from bench.live.kept import CONTEXT, Kept
 from bench.page.address import listener, new_token
+from bench.page.alarms import RULES, Rule
 from bench.page.board import Board
 from bench.page.commands import CommandDesk, Switch
 from bench.page.feed import About, Feed
@@ -92,6 +93,8 @@ class LivePage:
     about : About
     switch : Switch or None
         What a record button turns on and off; None if there is nothing to record.
+    rules : mapping of name to Rule
+        Limits of the alarms.
 
     Attributes
     ----------
@@ -105,6 +108,7 @@ class LivePage:
         source: Source,
         about: About,
         switch: Switch | None,
+        rules: Mapping[str, Rule] = RULES,
     ) -> None:
         self.url = ""
         self.desk = CommandDesk(switch)
@@ -115,7 +119,7 @@ class LivePage:
         self._writing: Connection | None = None
         self._source = source
         self._board = self._stack.enter_context(Board())
-        self.feed = Feed(self._board, source, about, self._state)
+        self.feed = Feed(self._board, source, about, self._state, rules, self.desk.note)
 
     def __enter__(self) -> "LivePage":
         try:

@@ -1,6 +1,8 @@
 """Recordings that are turned on and off while the run goes on."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from bench.deadline import Deadline
 from bench.errors import RecordingError
@@ -45,9 +47,14 @@ class RecordingSwitch:
         """Raw bytes of the recording that goes on."""
         return self._chain.recorded.bytes
 
-    def marker(self, text: str) -> None:
-        """Write a marker of the user at this moment."""
-        self._chain.order("event", {"event": "marker", "text": text})
+    @property
+    def name(self) -> str:
+        """Of the recording that goes on, or went on last; empty before the first."""
+        return self.files[-1].name if self.files else ""
+
+    def event(self, event: Mapping[str, Any]) -> None:
+        """Write an event of this moment."""
+        self._chain.order("event", dict(event))
 
     def alarm(self, text: str) -> None:
         """Write an alarm of this moment; a recording that waits for a trigger begins."""

@@ -24,6 +24,15 @@ from bench.page.quantities import DIGITS, NORMAL_95, UNITS
 REFRESH = 0.2
 """Time between two drawings, [s]."""
 BLOCKS = " ▁▂▃▄▅▆▇█"
+NOW = (
+    ("rate_hz", "samples/s", 0),
+    ("loss_percent", "lost %", 2),
+    ("rssi_dbm", "dBm", 0),
+    ("temperature_c", "degC", 0),
+    ("battery_v", "V", 2),
+    ("tire_pressure_bar", "bar", 2),
+)
+"""Of the last seconds and what the wheel says of itself: key, heading, digits."""
 LOSSES = ("crc_bad", "framing_bad", "lost_frames", "lost_samples", "duplicates", "out_of_order",
           "resets", "overruns", "reconnects", "queue_overruns", "skipped_turns",
           "estimator_restarts", "radio_loss", "low_battery")  # fmt: skip
@@ -54,11 +63,20 @@ def picture(history: History, starts: int = 1) -> RenderableType:
     """Return what is shown: state, numbers, strain, losses."""
     state = history.state
     parts: list[RenderableType] = [_heading(state)]
+    parts += [Text(f" ALARM {text} ", "bold white on red") for text in alarms(state)]
     for number, wheel in sorted(history.wheels.items()):
         if wheel.last:
             parts.append(_wheel(number, wheel, state))
     parts.append(_health(state, history, starts))
+    parts.append(Text(_room(state)))
     return Group(*parts)
+
+
+def alarms(state: dict[str, Any]) -> list[str]:
+    """Return the alarms that go on, in words."""
+    error = state.get("chain", {}).get("recording", {}).get("error")
+    found = [alarm["text"] for alarm in state.get("alarms", {}).get("active", [])]
+    return [f"recording: {error}", *found] if error else found
 
 
 def status(state: dict[str, Any]) -> str:
@@ -110,7 +128,8 @@ def _heading(state: dict[str, Any]) -> RenderableType:
     said = status(state)
     style = "bold white on red" if said.split()[0].isupper() else "bold"
     recording = state.get("recording", {})
-    rec = f"  REC {recording['bytes'] / 1e6:.1f} MB" if recording.get("on") else ""
+    rec = f"  REC {recording.get('name', '')} {recording.get('bytes', 0) / 1e6:.1f} MB"
+    rec = rec if recording.get("on") else ""
     return Text.assemble((f" {said} ", style), f"  {state.get('link', '')}  ISO 8855",
                          (rec, "bold red"))  # fmt: skip
 
@@ -122,6 +141,8 @@ def _wheel(number: int, wheel: WheelHistory, state: dict[str, Any]) -> Renderabl
         table.add_row(Text(name), Text(text, "red" if text.endswith("INVALID") else "bold green"))
     lengths = [entry[f"contact_length_{gage}_mm"] for gage in range(1, 6)]
     table.add_row(Text("contact [mm]"), " ".join("-" if x is None else f"{x:.0f}" for x in lengths))
+    counts = state.get("wheels", {}).get(str(number), {})
+    table.add_row("in use", in_use_line(counts.get("in_use", {})))
     if entry["flags"]:
         table.add_row("flags", " ".join(entry["flags"]))
     traces = Table(box=None, show_header=False, padding=(0, 1))
@@ -133,7 +154,8 @@ def _wheel(number: int, wheel: WheelHistory, state: dict[str, Any]) -> Renderabl
 
 def _health(state: dict[str, Any], history: History, starts: int) -> RenderableType:
     table = Table(box=SIMPLE_HEAD)
-    for name in ("wheel", "frames", "turns", "invalid", "lost", "saturated", "ppm", "age [ms]"):
+    for name in ("wheel", "frames", "turns", "invalid", "lost", "saturated", "ppm", "age [ms]",
+                 *(heading for _, heading, _ in NOW)):  # fmt: skip
         table.add_column(Text(name), justify="right")
     for number, counts in state.get("wheels", {}).items():
         lost = " ".join(f"{name} {counts[name]}" for name in LOSSES if counts[name]) or "nothing"
@@ -141,7 +163,8 @@ def _health(state: dict[str, Any], history: History, starts: int) -> RenderableT
                       str(counts["invalid_turns"]), lost,
                       " ".join(map(str, counts["saturated_samples"])),
                       _or_dash(counts["clock_drift_ppm"]),
-                      _or_dash(counts["newest_sample_age_ms"]))  # fmt: skip
+                      _or_dash(counts["newest_sample_age_ms"]),
+                      *(_or_dash(counts.get(key), digits) for key, _, digits in NOW))  # fmt: skip
     starts += sum(state.get("chain", {}).get("restarts", {}).values())
     dropped = history.missed + state.get("left_out", 0)
     said = "".join(f"\nFMU: {message}" for message in state.get("messages", []))
@@ -152,5 +175,23 @@ def _clock(moment: float) -> str:
     return time.strftime("%H:%M:%S", time.localtime(moment))
 
 
-def _or_dash(value: float | None) -> str:
-    return "-" if value is None else f"{value:.1f}"
+def in_use_line(conditions: dict[str, dict[str, Any]]) -> str:
+    """Return which conditions are in use and where each comes from, in one line."""
+    return ", ".join(
+        f"{name} not known" if one["value"] is None
+        else f"{name} {one['value']:.2f} {one['unit']} ({one['source']})"
+        for name, one in conditions.items()
+    )  # fmt: skip
+
+
+def _room(state: dict[str, Any]) -> str:
+    """Return what room the recording has, in words."""
+    recorded = state.get("chain", {}).get("recording", {})
+    free, left = recorded.get("free_bytes"), recorded.get("minutes_left")
+    if free is None or not state.get("recording", {}).get("on"):
+        return ""
+    return f"{1e-9 * free:.1f} GB free" + ("" if left is None else f", for {left:.0f} min")
+
+
+def _or_dash(value: float | None, digits: int = 1) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"

@@ -20,6 +20,7 @@ from bench.page.laps import GRID
 from bench.page.live import LivePage, PageChoice
 from bench.page.quantities import UNITS
 from bench.recording import Recording
+from bench.recording_topics import EVENTS
 from tests.bench.browser import chromium
 from tests.bench.conftest import Spawn, spawning
 from tests.bench.in_process import FakeSource
@@ -102,6 +103,8 @@ def visit(
     page = opened(browser, url, seen)
     other = opened(browser, url, seen)
     wait_for(page, "tirebench.wheels.get(5)?.last?.turn > 12 && tirebench.lap?.laps > 3")
+    wait_for(page, "document.querySelectorAll('#all .card .value').length === 8")
+    wait_for(page, "[...document.querySelectorAll('#all .value')].every(v => v.textContent > '!')")
     press_keys(page, seen)
     look(page, seen)
     for wheel in (0, 5):
@@ -126,9 +129,9 @@ def visit(
     assert replay.finish()[0] == 0
     seen.replay = result(folder / "r.json")
     recording = Recording(folder / "a.mcap")
-    seen.markers = re.findall(
-        r'"marker", "text": "(.*?)"', (folder / "a.mcap").read_text("latin-1")
-    )
+    events = [json.loads(data) for channel, _, data in recording.messages()
+              if channel.topic == EVENTS]  # fmt: skip
+    seen.markers = [event["text"] for event in events if event["event"] == "marker"]
     recording.close()
     return seen
 
@@ -167,8 +170,12 @@ def press_keys(page: Any, seen: Visit) -> None:
     note("+", "tirebench.seconds")
     note("?", "document.getElementById('help-box').open")
     note("Escape", "document.getElementById('help-box').open")
-    note("2", "tirebench.wheel")
-    note("1", "tirebench.wheel")
+    note("2", "tirebench.all ? 'all' : tirebench.wheel")
+    note("1", "tirebench.all ? 'all' : tirebench.wheel")
+    note("0", "tirebench.all ? 'all' : tirebench.wheel")
+    keyboard.press("1")
+    note("a", "document.getElementById('alarm-box').open")
+    note("Escape", "document.getElementById('alarm-box').open")
     note("n", "document.getElementById('toast').textContent")
     note("m", "document.getElementById('marker-box').open")
     keyboard.type("kerb, right")
@@ -193,9 +200,9 @@ def look(page: Any, seen: Visit) -> None:
     seen.trace = page.evaluate(
         "[...document.querySelectorAll('.trace .chart')].map(c => c.plot.data.map(d => [...d]))"
     )
-    cells = page.locator("#health tbody tr").first.locator("td[data-counter]")
+    cells = page.locator("#health tbody tr").first.locator("[data-counter]")
     for cell in cells.all():
-        seen.counters[cell.get_attribute("data-counter")] = cell.inner_text()
+        seen.counters[cell.get_attribute("data-counter")] = cell.get_attribute("data-count")
 
 
 def recorded(seen: Visit, wheel: int) -> list[dict[str, Any]]:
@@ -260,8 +267,10 @@ def test_every_key_does_what_the_help_says(visit: Visit) -> None:
     assert got["+"] == (60, 30)
     assert got["?"] == (False, True)
     assert got["Escape"] == (True, False)
-    assert got["2"] == (0, 5)
+    assert got["2"] == ("all", 5)
     assert got["1"] == (5, 0)
+    assert got["0"] == (0, "all")
+    assert got["a"] == (False, True)
     assert got[" "] == (False, True)
     assert got["n"][1] == "marker set: marker 1"
     assert got["Enter"][1] == "marker set: kerb, right"
@@ -350,6 +359,7 @@ def test_what_may_not_be_used_is_struck_out_and_says_why(browser: Any) -> None:
         )
         assert [value is None for value in drawn[3]] == [False, True, True, False]
         assert [value is None for value in drawn[4]] == [True, False, False, True]
+        assert {value for value in drawn[4] if value is not None} == {0.03}  # at the bottom
         page.context.close()
 
 

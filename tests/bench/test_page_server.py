@@ -9,7 +9,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import SimpleNamespace
@@ -42,8 +42,11 @@ class Markers:
     def recorder(self) -> "Markers":
         return self
 
-    def marker(self, text: str) -> None:
-        self.texts.append(text)
+    name = "a.mcap"
+
+    def event(self, event: Mapping[str, Any]) -> None:
+        if event["event"] == "marker":
+            self.texts.append(event["text"])
 
     def start(self) -> str:
         return "a.mcap"

@@ -1,43 +1,18 @@
 // The page of `tirebench run`: takes messages from the stream, draws at most once a frame.
+import { buildAll, drawAll } from "./all.js";
 import { drawn, readColors, timeChart, traceChart } from "./charts.js";
+import {
+  clock, limits, newest, node, QUANTITIES, reasons, scaled, series, shown, WIDTH,
+} from "./format.js";
+import { buildHealth, drawAlarms, drawHealth, drawLimits, drawUse } from "./panels.js";
 import { drawShape } from "./shape.js";
 
 const $ = (id) => document.getElementById(id);
-const QUANTITIES = [
-  { key: "Fz", sign: "Fz", name: "vertical load", unit: "N", digits: 0, least: 200 },
-  { key: "alpha", sign: "α", name: "slip angle", unit: "deg", digits: 2, least: 0.5 },
-  { key: "kappa", sign: "κ", name: "slip ratio", unit: "%", digits: 2, factor: 100, least: 1 },
-  { key: "Fy", sign: "Fy", name: "lateral force", unit: "N", digits: 0, least: 200 },
-];
-const REASONS = {
-  first_turn: "first turn: its period is unknown", gap: "samples are missing",
-  bridged: "one or two samples were bridged", spike: "a spike was seen",
-  saturated: "a gage is saturated", dead_gage: "a gage is dead",
-  period_jump: "the turn rate jumped", trigger_mismatch: "trigger does not fit",
-  drift: "a gage drifts", no_speed: "travel speed unknown", reversed: "rolls backward",
-  out_of_range: "outside the calibrated range", cut_off: "filter does not suit the turn rate",
-  reduced_gages: "one gage is out", too_few_gages: "too few gages",
-  no_condition: "pressure or camber unknown", weak_edge: "contact edge not distinct",
-  no_contact: "no contact: standstill or dead gages", fault: "the estimator met an error",
-  restarted: "the FMU was started again", skipped: "turns were skipped: overload",
-};
-const COUNTERS = [
-  ["frames", "frames good"], ["crc_bad", "CRC bad", 1], ["framing_bad", "framing bad", 1],
-  ["lost_frames", "frames lost", 1], ["lost_samples", "samples lost", 1],
-  ["duplicates", "doubled", 1], ["out_of_order", "late", 1], ["resets", "resets", 1],
-  ["overruns", "overruns", 1], ["reconnects", "replugs", 1],
-  ["skipped_turns", "turns skipped", 1],
-  ["saturated_samples", "saturated gage 1..5", 1], ["radio_loss", "radio loss", 1],
-  ["low_battery", "low battery", 1], ["clock_drift_ppm", "clock, ppm"],
-  ["newest_sample_age_ms", "sample age, ms"], ["turns", "turns"],
-  ["invalid_turns", "turns invalid"],
-];
 const WINDOWS = [5, 10, 20, 30, 60, 120, 300];
 const KEPT = 6000;
-const WIDTH = 2 + 2 * QUANTITIES.length; // columns of a row: time, value and band each, valid
 
 const app = {
-  wheels: new Map(), wheel: null, state: null, page: null, lap: null, band: null,
+  wheels: new Map(), wheel: null, all: false, chosen: false, cards: "", state: null, page: null, lap: null, band: null,
   seconds: 30, hold: false, zoomed: false, socket: null, away: null, answered: null,
   dirty: new Set(["all"]), latency: [], delay: [], messages: 0, bytes: 0, lastTimes: 0, toast: 0,
 };
@@ -95,7 +70,8 @@ function wheelOf(number) {
   if (!app.wheels.has(number)) {
     app.wheels.set(number, { rows: [], last: null, fresh: false });
     app.wheels = new Map([...app.wheels].sort(([a], [b]) => a - b));
-    if (app.wheel === null) choose(number);
+    if (app.wheel === null) choose(number, false);
+    if (app.wheels.size > 1 && !app.chosen) view(true);
     drawWheels();
   }
   return app.wheels.get(number);
@@ -162,22 +138,15 @@ function draw() {
     const now = performance.now();
     if (all || now - app.lastTimes > 90) {
       app.lastTimes = now;
-      drawTimes();
+      if (app.all) drawAll($("all"), app.wheels, app.state, notLive, app.seconds);
+      else drawTimes();
     } else { app.dirty.add("turns"); setTimeout(wake, 60); }
   }
-  if (all || dirty.has("lap")) drawLap();
+  if (!app.all && (all || dirty.has("lap"))) drawLap();
   if (all || dirty.has("state")) drawState();
 }
 
 function current() { return app.wheels.get(app.wheel) || { rows: [], last: null }; }
-
-function shown(value, digits) {
-  if (value === null || !Number.isFinite(value)) return "–";
-  const text = value.toFixed(digits);
-  return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "\u2212");
-}
-
-function scaled(value, factor) { return value === null ? null : factor * value; }
 
 function drawNumbers() {
   const wheel = current();
@@ -186,9 +155,8 @@ function drawNumbers() {
     const box = $(`q-${key}`);
     const [value, band, why] = ["value", "pm", "why"].map((name) => box.querySelector(`.${name}`));
     value.textContent = last ? shown(scaled(last[key], factor), digits) : "–";
-    const std = last ? last[`${key}_std`] : null;
     value.classList.toggle("none", value.textContent === "–");
-    band.textContent = std === null ? "± –" : `± ${shown(1.959964 * factor * std, digits)}`;
+    band.textContent = limits(last, key, digits, factor);
     const valid = last ? last[`${key}_valid`] : true;
     const old = notLive();
     box.classList.toggle("invalid", !valid);
@@ -212,42 +180,23 @@ function drawNumbers() {
   drawShape($("shape"), lateral, lengths.map((x) => (x === null ? NaN : x)), !last || last.valid);
 }
 
-function reasons(last) {
-  const said = last.flags.map((flag) => REASONS[flag] || flag.replaceAll("_", " "));
-  return said.join("; ") || "the estimator says so";
-}
-
 // Why the numbers on the page are not of this moment; empty if they are.
-function notLive() {
+function notLive(wheel = current()) {
   const state = app.state;
   if (app.away) return `held: no connection since ${clock(app.away)}`;
-  if (!state || !current().last) return "";
+  if (!state || !wheel.last) return "";
   if (state.lost) return `held: unplugged since ${clock(1000 * state.lost)}`;
   if (state.ended) return "held: the run has ended";
-  const age = state.time - current().last.came;
+  const age = state.time - wheel.last.came;
   return state.live && age > 2 ? `held: last turn ${age.toFixed(0)} s ago` : "";
 }
 
 function drawTimes() {
-  const { rows } = current();
-  const end = rows.length ? rows[rows.length - 1][0] : 0;
-  let first = rows.length;
-  while (first > 0 && rows[first - 1][0] >= end - app.seconds) first -= 1;
-  const part = rows.slice(first);
-  const times = part.map((row) => row[0]);
+  const [part, window_] = newest(current().rows, app.seconds);
   QUANTITIES.forEach(({ key, factor = 1 }, index) => {
-    const [low, high, value, bad] = [[], [], [], []];
-    for (const row of part) {
-      const [x, half] = [factor * row[1 + 2 * index], factor * row[2 + 2 * index]];
-      const good = (row[WIDTH - 1] >> index) & 1 && Number.isFinite(x);
-      value.push(good ? x : null);
-      low.push(good && half >= 0 ? x - half : null);
-      high.push(good && half >= 0 ? x + half : null);
-      bad.push(!good && Number.isFinite(x) ? x : null);
-    }
     const { plot } = $(`q-${key}`).querySelector(".chart");
-    plot.window = [Math.max(0, end - app.seconds), Math.max(end, app.seconds)];
-    plot.setData([times, high, low, value, bad]);
+    plot.window = window_;
+    plot.setData(series(part, index, factor));
   });
 }
 
@@ -275,8 +224,6 @@ function drawLap() {
     plot.setData([ANGLES, high, low, mine ? column(lap.data, 720 * gage) : none]);
   });
 }
-
-function clock(milliseconds) { return new Date(milliseconds).toLocaleTimeString("en-GB"); }
 
 function status() {
   const { state } = app;
@@ -307,7 +254,8 @@ function drawState() {
   record.disabled = !recording.possible || Boolean(state.ended) || Boolean(app.away);
   record.setAttribute("aria-pressed", String(recording.on));
   record.querySelector("span").textContent = recording.on
-    ? `Recording ${(recording.bytes / 1e6).toFixed(1)} MB` : "Record";
+    ? `Recording ${(((state.chain || {}).recording || recording).bytes / 1e6).toFixed(1)} MB` : "Record";
+  record.title = recording.name || "";
   $("marker").disabled = record.disabled || !recording.on;
   state.lateral_mm.forEach((y, i) => {
     const label = document.querySelectorAll(".trace b small")[i];
@@ -315,11 +263,16 @@ function drawState() {
   });
   const parts = [`byte to estimate p99 ${shown(state.latency_p99_ms, 1)} ms`,
     `page: ${page.missed + page.skipped_all + state.left_out} frames dropped`,
-    `${restarts(state, page)} restarts`, `${page.viewers} viewer${page.viewers === 1 ? "" : "s"}`];
+    "rates: last 5 s", `${restarts(state, page)} restarts`, `${page.viewers} viewer${page.viewers === 1 ? "" : "s"}`];
   if (state.messages.length) parts.push(`FMU: ${state.messages.at(-1)}`);
   $("system").textContent = parts.join(" · ");
   $("system").title = $("system").textContent;
-  drawHealth(state.wheels);
+  drawHealth($("health"), state.wheels, state.alarms);
+  drawUse($("use-list"), state, app.wheel);
+  const alarms = drawAlarms($("alarms"), state);
+  $("alarms-count").textContent = alarms || "";
+  $("alarm-list").dataset.count = alarms;
+  if ($("alarm-box").open && state.alarms) drawLimits($("limits"), $("past"), state.alarms);
   drawNumbers();
 }
 
@@ -329,38 +282,26 @@ function restarts(state, page) {
   return others.reduce((a, b) => a + b, page.starts - 1);
 }
 
-function drawHealth(wheels) {
-  const rows = Object.entries(wheels).map(([number, counts]) => {
-    const row = document.createElement("tr");
-    row.append(cell("td", `wheel ${number}`));
-    for (const [key, , loss] of COUNTERS) {
-      const given = counts[key];
-      const total = Array.isArray(given) ? given.reduce((a, b) => a + b, 0) : given;
-      const text = Array.isArray(given) ? (total ? given.join(" ") : "0")
-        : key.endsWith("ppm") || key.endsWith("ms") ? shown(given, 1) : String(given);
-      const entry = cell("td", text);
-      entry.dataset.counter = key;
-      entry.classList.toggle("lost", Boolean(loss) && total > 0);
-      row.append(entry);
-    }
-    return row;
-  });
-  document.querySelector("#health tbody").replaceChildren(...rows);
-}
-
-function cell(kind, text) {
-  const node = document.createElement(kind);
-  node.textContent = text;
-  return node;
-}
-
 function drawWheels() {
-  $("wheels").replaceChildren(...[...app.wheels.keys()].map((number, place) => {
-    const button = cell("button", `Wheel ${number} `);
+  const numbers = [...app.wheels.keys()];
+  if (app.cards !== numbers.join()) {
+    app.cards = numbers.join();
+    buildAll($("all"), numbers, choose);
+    document.querySelectorAll("#all .chart").forEach(({ plot }) => plot.redraw(false));
+  }
+  const every = node("button", "All ");
+  every.type = "button";
+  every.dataset.wheel = "all";
+  every.setAttribute("aria-pressed", String(app.all));
+  every.append(node("kbd", "0"));
+  every.onclick = showAll;
+  const several = numbers.length > 1 ? [every] : [];
+  $("wheels").replaceChildren(...several, ...numbers.map((number, place) => {
+    const button = node("button", `Wheel ${number} `);
     button.type = "button";
     button.dataset.wheel = number;
-    button.setAttribute("aria-pressed", String(number === app.wheel));
-    if (place < 9) button.append(cell("kbd", String(place + 1)));
+    button.setAttribute("aria-pressed", String(!app.all && number === app.wheel));
+    if (place < 9) button.append(node("kbd", String(place + 1)));
     button.onclick = () => choose(number);
     return button;
   }));
@@ -368,10 +309,23 @@ function drawWheels() {
 
 // ---- what the user does
 
-function choose(number) {
+function view(all) {
+  app.all = all;
+  document.body.classList.toggle("every", all);
+  drawWheels();
+  app.dirty.add("all");
+  wake();
+}
+
+function showAll() {
+  app.chosen = true;
+  view(true);
+}
+
+function choose(number, byUser = true) {
+  if (byUser) { app.chosen = true; app.all = false; document.body.classList.remove("every"); }
+  if (app.wheel !== number) { app.band = null; app.lap = null; }
   app.wheel = number;
-  app.band = null;
-  app.lap = null;
   tell();
   drawWheels();
   app.dirty.add("all");
@@ -434,10 +388,16 @@ function window_(step) {
   drawTimes();
 }
 
+function alarmList() {
+  if (app.state && app.state.alarms) drawLimits($("limits"), $("past"), app.state.alarms);
+  $("alarm-box").showModal();
+}
+
 const KEYS = {
   r: record, m: marker, d: otherTheme, z: zoom, " ": hold,
   n: () => ($("marker").disabled ? marker() : setMarker("")),
   "+": () => window_(-1), "=": () => window_(-1), "-": () => window_(1),
+  0: () => { if (app.wheels.size > 1) showAll(); }, a: alarmList,
   "?": () => $("help-box").showModal(), h: () => $("help-box").showModal(),
 };
 
@@ -445,7 +405,7 @@ function build() {
   for (let gage = 1; gage <= 5; gage += 1) {
     const row = document.createElement("div");
     row.className = gage === 5 ? "trace last" : "trace";
-    const label = cell("b", `gage ${gage} `);
+    const label = node("b", `gage ${gage} `);
     label.append(document.createElement("small"));
     const chart = document.createElement("div");
     chart.className = "chart full";
@@ -459,14 +419,14 @@ function build() {
     box.id = `q-${key}`;
     const top = document.createElement("div");
     top.className = "top";
-    const left = cell("div", sign);
+    const left = node("div", sign);
     left.className = "name";
-    left.append(cell("small", name), cell("small", "ISO 8855"));
-    const value = cell("div", "–");
+    left.append(node("small", name), node("small", "ISO 8855"));
+    const value = node("div", "–");
     value.className = "value";
     const right = document.createElement("div");
     right.className = "unit";
-    const limits = cell("small", "± –");
+    const limits = node("small", "± –");
     limits.className = "pm";
     right.append(limits, unit);
     top.append(left, value, right);
@@ -479,9 +439,7 @@ function build() {
     $("numbers").append(box);
     timeChart(chart, least);
   }
-  const head = document.createElement("tr");
-  head.append(cell("th", ""), ...COUNTERS.map(([, name]) => cell("th", name)));
-  document.querySelector("#health thead").append(head);
+  buildHealth($("health"));
 }
 
 function listen() {
@@ -489,6 +447,8 @@ function listen() {
   $("marker").onclick = marker;
   $("theme").onclick = otherTheme;
   $("help").onclick = KEYS["?"];
+  $("alarm-list").onclick = alarmList;
+  $("alarm-close").onclick = () => $("alarm-box").close();
   $("help-close").onclick = () => $("help-box").close();
   $("marker-set").onclick = () => setMarker($("marker-text").value);
   $("marker-cancel").onclick = () => $("marker-box").close();
