@@ -6,25 +6,23 @@ in an exported campaign what the FMU was given.
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from bench.can_batch import CanBatch, unpack
-from bench.conditions import QUANTITIES, UNKNOWN, Condition, Conditions, Measured, RunMark
-from bench.device import Device
+from bench.conditions import QUANTITIES, ROUNDING, Condition, Conditions, RunMark
 from bench.errors import RecordingError
 from bench.frames import GAGES
 from bench.line_counts import LineCounts
 from bench.protocols import CAN, SLCAN
 from bench.protocols.frame_decoder import FrameDecoder
-from bench.protocols.plan import ProtocolPlan
 from bench.protocols.slcan import SlcanDecoder
 from bench.recording import Recording
-from bench.timeline import Samples, Timeline
-from tirelib.arrays import BoolArray, FloatArray
+from bench.segments import Segment
+from tirelib.arrays import FloatArray
 from tirelib.campaign import CampaignHeader, Run, RunPlan, write_campaign
 from tirelib.held import HELD
 from tirelib.units import from_si
@@ -35,81 +33,47 @@ RIG_TRUTH = {"Fz": "Fz", "alpha": "slip_angle", "kappa": "slip_ratio", "Fy": "Fy
 CAN_LOGS = (".blf", ".asc", ".log")
 
 
-@dataclass(slots=True)
-class Segment:
-    """Samples of one wheel without a break in time."""
-
-    wheel: int
-    number: int
-    t_us: int
-    period: float
-    blocks: list[Samples] = field(default_factory=list)
-
-    @property
-    def strain(self) -> FloatArray:
-        """All samples, shape (n, 5), NaN where lost or saturated."""
-        return np.concatenate([block.strain for block in self.blocks])
-
-    @property
-    def lost(self) -> BoolArray:
-        """Where no frame brought the sample, shape (n,)."""
-        return np.concatenate([block.lost for block in self.blocks])
-
-
-def segments(
-    recording: Recording, plan: ProtocolPlan, devices: dict[int | None, Device],
-    wheel: int | None = None,
-) -> Iterator[Segment]:  # fmt: skip
-    """Yield the segments of all wheels, or of one, each when it is complete."""
-    decoder = plan.decoder()
-    lines: dict[int, Timeline] = {}
-    current: dict[int, Segment] = {}
-    for read in recording.reads():
-        if not read.data:
-            decoder.interrupt()
-            continue
-        for item in decoder.push(read.data, read.arrival):
-            if isinstance(item, Measured):
-                continue
-            for number in np.unique(item.wheel).tolist():
-                if wheel is not None and number != wheel:
-                    continue
-                if number not in lines:
-                    device = devices.get(number, devices.get(None, plan.device))
-                    lines[number] = Timeline(device, number)
-                for block in lines[number].push(item):
-                    if block.reset:
-                        if number in current:
-                            yield current[number]
-                        current[number] = Segment(number, block.segment, block.t_us, block.period)
-                    current[number].blocks.append(block)
-    yield from current.values()
-
-
 def campaign_runs(found: Sequence[Segment], conditions: Conditions) -> Iterator[Run]:
-    """Yield each segment as a run with the conditions that were told."""
+    """Yield each segment as a run with the conditions that were told, see `left_out`."""
     taken: set[int] = set()
     for segment in found:
-        strain = segment.strain
+        left = left_out(segment, conditions)
+        strain = segment.strain[left:]
         if len(strain) * segment.period < SHORTEST:
             continue
+        first_us = segment.t_us + round(1e6 * segment.period * left)
         known = conditions.run_at(segment.t_us)
         mark, begin = known if known is not None else (RunMark(0, segment.t_us, 0.0), segment.t_us)
         number = mark.run
         while number in taken or (number < 1 and known is None):
             number = max(taken, default=0) + 1
         taken.add(number)
-        start = mark.start_time + 1e-6 * (segment.t_us - begin)
-        span = segment.t_us, segment.t_us + round(1e6 * segment.period * len(strain))
-        times, rig = _rig(conditions, span, start, mark)
+        start = mark.start_time + 1e-6 * (first_us - begin)
+        span = first_us, first_us + round(1e6 * segment.period * len(strain))
+        times, rig = _rig(segment.known(conditions), span, start, mark)
         yield Run(
-            plan=_plan(mark, number, 1e-6 * segment.t_us),
+            plan=_plan(mark, number, 1e-6 * first_us),
             strain=np.ascontiguousarray(strain.T),
             rate=round(1.0 / segment.period, 6),
             start_time=start,
             rig=rig,
             rig_time=times,
         )
+
+
+def left_out(segment: Segment, conditions: Conditions) -> int:
+    """Return how many samples of a segment came before a bus told what it tells.
+
+    A channel of a campaign holds numbers from its first sample on, so that a run begins there; none
+    are left out where too few would remain.
+    """
+    known = segment.known(conditions)
+    values = np.array(known.values)
+    told = np.isfinite(values).any(axis=0)
+    row = int(np.argmax(np.isfinite(values[:, told]).all(axis=1)))
+    left = round(1e-6 * (known.t_us[row] - segment.t_us) / segment.period)
+    enough = (len(segment.strain) - left) * segment.period >= SHORTEST
+    return left if enough else 0
 
 
 def write_campaign_of(
@@ -142,8 +106,8 @@ def sample_table(segment: Segment, conditions: Conditions) -> dict[str, Any]:
     strain = segment.strain
     n = len(strain)
     t_us = segment.t_us + 1e6 * segment.period * np.arange(n)
-    index = np.searchsorted(np.asarray(conditions.t_us), t_us + 0.6, side="right") - 1
-    held = np.array([*conditions.values, UNKNOWN])[index]  # -1: nothing is known yet
+    told = segment.known(conditions)
+    held = np.array(told.values)[np.searchsorted(told.t_us, t_us + ROUNDING, side="right") - 1]
     known = conditions.run_at(segment.t_us)
     return {
         "wheel": np.full(n, segment.wheel, np.int16),

@@ -103,7 +103,8 @@ def strain_messages(samples: Samples) -> list[tuple[int, bytes]]:
 
 
 def told_message(measured: Measured) -> bytes:
-    """Return a condition that a bus told."""
-    unit, dimension = CONDITION_UNITS[measured.name]
-    value = from_si(measured.value, unit, dimension)
-    return json.dumps({field_of(measured.name): value if math.isfinite(value) else None}).encode()
+    """Return what a bus told; what is no condition of the estimator as it is, SI."""
+    value, name = measured.value, measured.name
+    if name in CONDITION_UNITS:
+        value, name = from_si(value, *CONDITION_UNITS[name]), field_of(name)
+    return json.dumps({name: value if math.isfinite(value) else None}).encode()

@@ -7,31 +7,36 @@ from pathlib import Path
 import click
 import tomli_w
 
-from bench.cli.options import devices_of, devices_of_text
+from bench.cli.given import recorded_sources
+from bench.cli.options import devices_of
 from bench.errors import RecordingError
 from bench.export import (
     CAN_LOGS,
-    segments,
+    left_out,
     write_campaign_of,
     write_can_log,
     write_table,
 )
-from bench.protocols.plan import ProtocolPlan
+from bench.export_results import write_mdf, write_results
 from bench.recording import Recording
+from bench.segments import segments
 from tirelib.campaign import CampaignHeader
 from tirelib.campaign.header import parse_header
 from tirelib.cli.common import FILE, NEW_FILE, NewPath, write_json
 
-TABLES = (".csv", ".parquet")
+TABLES, MDF = (".csv", ".parquet"), ".mf4"
 
 _EXAMPLE = """\b
 Examples:
   tirebench export live.mcap --out build/out/live             # campaign folder with MDF4
   tirebench export live.mcap --out build/out/live --like build/out/set1
   tirebench export live.mcap --out live.parquet
+  tirebench export live.mcap --out live.mf4                   # all of it in one MDF4 file
   tirebench export bus.mcap --out bus.blf                     # or .asc, .log
 
 \b
+What a bus told of speed, pressure and camber is in all of them. Estimates of the run, events and
+markers are in .mf4, else in tables beside it (live.estimates.csv, live.events.csv).
 A campaign holds one wheel. Tire and gages come from the recording where a campaign was played, else
 from the campaign that --like names. Without told set points its runs are sweeps.
 Exit code: 0 done, 1 the recording breaks off (what is there is written) or has nothing of it, 2 bad
@@ -59,33 +64,43 @@ def export(
     device_texts: tuple[str, ...],
     json_file: Path | None,
 ) -> None:
-    """Write a recording as a campaign (MDF4), CSV, Parquet, or a CAN log (BLF, ASC, log)."""
+    """Write a recording as a campaign, MDF4, CSV, Parquet, or a CAN log (BLF, ASC, log)."""
     suffix = out.suffix.lower()
-    if suffix and suffix not in (*TABLES, *CAN_LOGS):
+    if suffix and suffix not in (*TABLES, MDF, *CAN_LOGS):
         raise click.UsageError(
-            f"--out {out}: {', '.join((*TABLES, *CAN_LOGS))} are known, and a folder without "
+            f"--out {out}: {', '.join((*TABLES, MDF, *CAN_LOGS))} are known, and a folder without "
             "ending for a campaign"
         )
     if out.exists():
         raise RecordingError(f"{out}: it exists; nothing is overwritten; name another place")
     out.parent.mkdir(parents=True, exist_ok=True)
+    beside: list[Path] = []
     with closing(Recording(recording)) as opened:
         header = opened.header
-        plan = ProtocolPlan.of_header(header.protocol, str(recording))
-        devices = devices_of(device_texts)[0] or devices_of_text(header.device, str(recording))
+        sources = recorded_sources(header, str(recording), devices_of(device_texts)[0])
         if suffix in CAN_LOGS:
             count, what = write_can_log(opened, out), "frames"
         elif suffix in TABLES:
-            found = segments(opened, plan, devices, wheel)
+            found = segments(opened, sources, wheel)
             count, what = write_table(found, opened.conditions, out), "samples"
+            beside = write_results(recording, out, suffix, wheel)
+        elif suffix == MDF:
+            every = list(segments(opened, sources, wheel))
+            count, what = write_mdf(recording, every, opened.conditions, out), "samples"
         else:
             campaign = _header(opened, like)
-            every = list(segments(opened, plan, devices, wheel))
+            every = list(segments(opened, sources, wheel))
             chosen = every[0].wheel if every and wheel is None else wheel
             mine = [segment for segment in every if segment.wheel == chosen]
             count, what = write_campaign_of(opened, mine, out, campaign), "runs"
+            beside = write_results(recording, out, ".csv", chosen)
+            left = sum(left_out(segment, opened.conditions) for segment in mine)
+            if left:
+                click.echo(f"note: {left} samples before the bus told what it tells are left out")
         damage = getattr(opened, "damage", "") if opened.complete is False else ""
     click.echo(f"{count} {what} in {out}")
+    for file in beside:
+        click.echo(f"beside it: {file}")
     if damage:
         click.echo(f"note: the recording breaks off ({damage})")
     if json_file is not None:

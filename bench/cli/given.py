@@ -15,6 +15,7 @@ from bench.errors import DeviceError, RecordingError
 from bench.links.opening import PortPlan
 from bench.links.replay import ReplayLink
 from bench.protocols.plan import ProtocolPlan
+from bench.recording_header import RecordingHeader
 from bench.setup_file import check_sources, known_wheels, read_setup, told_by
 from bench.source_plan import SourcePlan, protocol_of
 from tirelib.estimators.calibration import Calibration
@@ -145,6 +146,32 @@ def given_live(
     return Given(sources, conditions or Conditions.constant(), wheels)
 
 
+def recorded_sources(
+    header: RecordingHeader, where: str, devices: Mapping[int | None, Device]
+) -> tuple[SourcePlan, ...]:
+    """Return the sources that a recording has; devices that are given replace its own.
+
+    Raises
+    ------
+    RecordingError
+        If the header is damaged.
+    """
+    sources = []
+    for number, source in enumerate(header.sources):
+        protocol = ProtocolPlan.of_header(source, where)
+        text = str(source.get("device", header.device))
+        own = devices_of_text(text, where)
+        port = PortPlan(str(source.get("name", f"source {number}")))
+        wheel = source.get("wheel")
+        if wheel is not None and wheel not in range(256):
+            raise RecordingError(
+                f"{where}: wheel = {str(wheel)[:40]} of source {number}; 0 .. 255 is allowed; "
+                "the header is damaged; take another recording"
+            )
+        sources.append(SourcePlan(port, protocol, devices or own, wheel, text))
+    return tuple(sources)
+
+
 def given_replayed(
     link: ReplayLink,
     conditions: Conditions | None,
@@ -156,22 +183,10 @@ def given_replayed(
     header = link.recording.header
     if devices or conditions is not None:
         console.print("note: device file or conditions of the recording are replaced by options")
-    sources = []
-    for number, source in enumerate(header.sources):
-        protocol = ProtocolPlan.of_header(source, link.name)
-        text = str(source.get("device", header.device))
-        own = devices_of_text(text, link.name)
-        port = PortPlan(str(source.get("name", f"source {number}")))
-        wheel = source.get("wheel")
-        if wheel is not None and wheel not in range(256):
-            raise RecordingError(
-                f"{link.name}: wheel = {str(wheel)[:40]} of source {number}; 0 .. 255 is allowed; "
-                "the header is damaged; take another recording"
-            )
-        sources.append(SourcePlan(port, protocol, devices or own, wheel, text))
+    sources = recorded_sources(header, link.name, devices)
     if not wheels:
         wheels = tuple(header.settings.get("wheels") or ())
-    return Given(tuple(sources), conditions or link.recording.conditions, wheels)
+    return Given(sources, conditions or link.recording.conditions, wheels)
 
 
 def missing(given: Given, calibration: Calibration) -> tuple[dict[str, str], dict[str, str]]:

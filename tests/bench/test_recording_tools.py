@@ -42,7 +42,7 @@ READER = Path(__file__).parents[2] / "build" / "mcap_index.cjs"
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Record a second of a wheel with two sources, and all that a run makes of it."""
     path = tmp_path_factory.mktemp("tools") / "a.mcap"
-    wheels = Wheels(SerialDecoder(), {None: Device()})
+    wheels = Wheels.of_one(SerialDecoder(), {None: Device()})
     header = RecordingHeader({}, protocol={"encoding": "serial-v1", "name": "/dev/ttyUSB0"},
                              more=({"encoding": "can", "name": "can0"},))  # fmt: skip
     frames = list(write_script(tiny_runs()[:1], Device(), Faults({})).frames[:200])
@@ -100,7 +100,7 @@ def test_an_indexed_reader_lists_all_topics_and_every_message_follows_its_schema
 
 def test_strain_stands_in_the_recording_as_it_was_decoded(recording: Path) -> None:
     reader = Recording(recording)
-    wheels = Wheels(SerialDecoder(), {None: Device()})
+    wheels = Wheels.of_one(SerialDecoder(), {None: Device()})
     decoded = [block.content for read in reader.reads() if read.source == 0
                for block in wheels.push(read.data, read.arrival)]  # fmt: skip
     reader.close()
