@@ -24,7 +24,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from bench.conditions import TELLABLE, Conditions
+from bench.conditions import Conditions
 from bench.device import read_device
 from bench.errors import DeviceError, cause
 from bench.links.opening import PortPlan
@@ -130,13 +130,13 @@ def check_sources(sources: Sequence[SourcePlan], conditions: Conditions | None) 
     for port in sorted({port for port in ports if ports.count(port) > 1}):
         faults.append(f"--port {port}: it comes twice; each source needs a port of its own; leave "
                       "one out")  # fmt: skip
-    wheels = [(wheel, source.port.port) for source in sources for wheel in known_wheels(source)]
+    wheels = [(wheel, source.port.port) for source in sources for wheel in source.known_wheels]
     for wheel in sorted({w for w, _ in wheels}):
         named = [port for w, port in wheels if w == wheel]
         if len(named) > 1:
             faults.append(f"wheel {wheel} comes from {' and '.join(named)}; each wheel may come "
                           "from one source; number them: `wheel = N` or --port N=PORT")  # fmt: skip
-    told = [(place, source.port.port) for source in sources for place in told_by(source)]
+    told = [(place, source.port.port) for source in sources for place in source.told]
     places = [place for place, _ in told]
     if clash := [(place, port) for place, port in told if clashes(place, places)]:
         names = ", ".join(f"{_words(place)} from {port}" for place, port in clash)
@@ -149,22 +149,6 @@ def check_sources(sources: Sequence[SourcePlan], conditions: Conditions | None) 
                           "--conditions; one of them may say it; leave one out")  # fmt: skip
     if faults:
         raise DeviceError(faults)
-
-
-def known_wheels(source: SourcePlan) -> list[int]:
-    """Return the wheels of a source that are known before anything is heard."""
-    if source.wheel is not None:
-        return [source.wheel]
-    user = source.protocol.user_map
-    return [] if user is None else [wheel.wheel for wheel in user.wheels]
-
-
-def told_by(source: SourcePlan) -> list[tuple[str, int | None]]:
-    """Return the conditions that a source tells, each with the wheel for which it holds."""
-    user = source.protocol.user_map
-    if user is None:
-        return []
-    return [(TELLABLE[q.name][0], q.wheel) for q in user.quantities]
 
 
 def _words(place: tuple[str, int | None]) -> str:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from bench.conditions import TELLABLE
 from bench.device import Device
 from bench.errors import DeviceError
 from bench.links.opening import PortPlan
@@ -35,6 +36,20 @@ class SourcePlan:
     devices: Mapping[int | None, Device] = field(default_factory=dict)
     wheel: int | None = None
     device_text: str = ""
+
+    @property
+    def known_wheels(self) -> list[int]:
+        """Its wheels, as far as they are known before anything is heard."""
+        if self.wheel is not None:
+            return [self.wheel]
+        user = self.protocol.user_map
+        return [] if user is None else [wheel.wheel for wheel in user.wheels]
+
+    @property
+    def told(self) -> list[tuple[str, int | None]]:
+        """The conditions that it tells, each with the wheel for which it holds; None: for all."""
+        user = self.protocol.user_map
+        return [] if user is None else [(TELLABLE[q.name][0], q.wheel) for q in user.quantities]
 
     def line(self) -> Line:
         """Return what decodes it, fresh."""

@@ -16,6 +16,7 @@ from bench.frames import GAGES, TICK
 from bench.manoeuvre import Manoeuvre, Motion, Rig, nodes, waveform
 from bench.protocols import CAN
 from bench.recording import Recording
+from bench.recording_header import encoding_of
 from bench.transmitter import Record
 from tirelib.campaign import Campaign, Run
 
@@ -107,13 +108,29 @@ def truth_rows(motions: Mapping[int, Motion]) -> Iterator[dict[str, float]]:
             }  # fmt: skip
 
 
-def recording_pieces(recording: Recording) -> Iterator[Script]:
-    """Yield the reads of a recording in pieces at their recorded times, bad frames included."""
+def recording_pieces(recording: Recording, source: int | None = None) -> Iterator[Script]:
+    """Yield the reads of a source in pieces at their recorded times, bad frames included.
+
+    Raises
+    ------
+    DeviceError
+        If the recording has no such source, or several and none was chosen.
+    """
+    sources = recording.header.sources
+    if source not in range(len(sources)) and (source is not None or len(sources) > 1):
+        names = (f"{n} {one.get('name', '')}" for n, one in enumerate(sources))
+        raise DeviceError(
+            f"{recording.path}: source {'none' if source is None else source}; its sources are "
+            f"{', '.join(names)}; one line carries one of them; choose with --source"
+        )
+    chosen = source or 0
     start: int | None = None
     due: list[float] = []
     frames: list[Any] = []
-    packed = recording.header.encoding == CAN
-    for arrival, data in recording.raw():
+    packed = encoding_of(sources[chosen]) == CAN
+    for arrival, data, _, number in recording.reads():
+        if number != chosen or not data:
+            continue
         start = arrival if start is None else start
         due.append(1e-9 * (arrival - start))
         frames.append(_messages(data) if packed else data)

@@ -60,6 +60,8 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
 @click.option("--manoeuvre", "manoeuvre_file", metavar="M", type=FILE,
               help="Play a manoeuvre on the numerical rig (TOML or CSV).")  # fmt: skip
 @click.option("--recording", metavar="R.mcap", type=FILE, help="Play a recording.")
+@click.option("--source", "number", metavar="N", type=click.IntRange(min=0),
+              help="Which source of a recording that has several.")  # fmt: skip
 @click.option("--rate", default=10_000.0, show_default=True, metavar="HZ",
               type=click.FloatRange(153.0, 50_000.0),
               help="Of the gages in a manoeuvre.")  # fmt: skip
@@ -101,6 +103,7 @@ def emulate(
     everything: bool,
     manoeuvre_file: Path | None,
     recording: Path | None,
+    number: int | None,
     rate: float,
     truth_file: Path | None,
     kind: str,
@@ -160,7 +163,7 @@ def emulate(
                     shift = 0.0
                     pieces: Iterable[Script] = ready if not turn else ()
                     if not pieces:
-                        pieces = player.pieces(tape, turn) if tape else _recorded(recording)
+                        pieces = player.pieces(tape, turn) if tape else _recorded(recording, number)
                     for piece in pieces:
                         play(piece, sink, tally, start=start, speedup=speedup)
                         shift = piece.due[-1] if piece.due else shift
@@ -232,14 +235,14 @@ def _manoeuvre(
     return tape
 
 
-def _recorded(recording: Path | None) -> Iterator[Script]:
+def _recorded(recording: Path | None, source: int | None) -> Iterator[Script]:
     from bench.recording import Recording
     from bench.sources import recording_pieces
 
     if recording is None:
         return
     with closing(Recording(recording)) as opened:
-        yield from recording_pieces(opened)
+        yield from recording_pieces(opened, source)
 
 
 def _summary(tally: Tally, runs: int, faults: Faults, sink: TerminalSink | BusSink) -> None:

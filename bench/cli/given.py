@@ -16,14 +16,14 @@ from bench.links.opening import PortPlan
 from bench.links.replay import ReplayLink
 from bench.protocols.plan import ProtocolPlan
 from bench.recording_header import RecordingHeader
-from bench.setup_file import check_sources, known_wheels, read_setup, told_by
+from bench.setup_file import check_sources, read_setup
 from bench.source_plan import SourcePlan, protocol_of
 from tirelib.estimators.calibration import Calibration
 from tirelib.units import to_si
 
 LOOK = 0.05
 """Time between two looks for a file that is waited for, [s]."""
-_OPTIONS = {"speed": "--speed KMH", "pressure": "--pressure BAR", "camber": "--camber DEG"}
+_OPTIONS = {"speed": "--speed KMH, ", "pressure": "--pressure BAR, ", "camber": "--camber DEG, "}
 _WITHOUT = {"speed": "there will be no slip ratio",
             "pressure": "standard deviations are wider by what pressure does",
             "camber": "the standard deviation of Fy is wider by what camber does"}  # fmt: skip
@@ -191,8 +191,8 @@ def given_replayed(
 
 def missing(given: Given, calibration: Calibration) -> tuple[dict[str, str], dict[str, str]]:
     """Return what is not known, by name and in words: needed by the calibration, and useful."""
-    told = [place for source in given.sources for place in told_by(source)]
-    wheels = {*given.wheels, *(w for source in given.sources for w in known_wheels(source))}
+    told = [place for source in given.sources for place in source.told]
+    wheels = {*given.wheels, *(w for source in given.sources for w in source.known_wheels)}
     words: dict[str, str] = {}
     for name in {*calibration.needed, *_WITHOUT} - set(given.conditions.known):
         places = [wheel for other, wheel in told if other == name]
@@ -211,9 +211,11 @@ def say_missing(given: Given, calibration: Calibration, console: Console) -> Non
     for name, words in needed.items():
         console.print(
             f"WARNING: no {words}: this calibration needs it, and NO TURN WILL BE VALID; give "
-            f"{_OPTIONS[name]}, --conditions FILE, or a map with [{name}]", style="bold red",
+            f"{_OPTIONS.get(name, '')}--conditions FILE, or a map with [{name}]", style="bold red",
             soft_wrap=True, markup=False,
         )  # fmt: skip
     for name, words in useful.items():
-        console.print(f"note: no {words}: {_WITHOUT[name]}; give {_OPTIONS[name]}, --conditions "
-                      f"FILE, or a map with [{name}]", soft_wrap=True, markup=False)  # fmt: skip
+        console.print(
+            f"note: no {words}: {_WITHOUT[name]}; give {_OPTIONS.get(name, '')}"
+            f"--conditions FILE, or a map with [{name}]", soft_wrap=True, markup=False,
+        )  # fmt: skip

@@ -48,11 +48,7 @@ class SocketLink:
             if self._stream:
                 self._socket = socket.create_connection((host, number), CONNECT)
             else:
-                family = socket.AF_INET6 if ":" in host else socket.AF_INET
-                self._socket = socket.socket(family, socket.SOCK_DGRAM)
-                with suppress(OSError):  # as much as the system allows
-                    self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
-                self._socket.bind((host, number))
+                self._socket = _bound(host, number)
         except OSError as error:
             what = "a server that listens there" if self._stream else "a free address of this host"
             raise LinkError(
@@ -117,6 +113,20 @@ class SocketLink:
             f"{self.name}: the connection went away ({error}); a steady connection is needed; "
             "check cable and receiver, then start again"
         )
+
+
+def _bound(host: str, number: int) -> socket.socket:
+    """Return a socket that takes datagrams."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    made = socket.socket(family, socket.SOCK_DGRAM)
+    try:
+        with suppress(OSError):  # as much as the system allows
+            made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
+        made.bind((host, number))
+    except OSError:
+        made.close()
+        raise
+    return made
 
 
 def address(url: str) -> tuple[str, str, int]:

@@ -119,8 +119,8 @@ class LiveChain:
                     record, lambda _: (plan.header, plan.conditions, plan.rule, address)
                 )
             if self._plan.file is not None:
-                known = range(max(1, len(self._plan.reader.wheels)))
-                for slot in known:  # those of wheels that are not named start when they are heard
+                known = range(self._plan.reader.expected)
+                for slot in known:  # those of other wheels start when they are heard
                     self._start_estimator(slot)
                 self._wait(lambda: self._ready.issuperset(known))
             self._wait(lambda: self.obeyed(Deadline.after(0.0)))

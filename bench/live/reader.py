@@ -16,7 +16,7 @@ from bench.live.kept import orphaned, settled
 from bench.live.ports import GatheredLink
 from bench.rings import ByteQueue
 from bench.source_plan import SourcePlan, wheels_of
-from bench.wheels import Wheels
+from bench.wheels import MOST, Wheels
 
 WAIT = 0.1
 """The longest wait for bytes before it is looked whether the run goes on, [s]."""
@@ -61,6 +61,12 @@ class ReaderPlan:
     def ports(self) -> int:
         """Processes that read a port each; 0 where the reader reads the only one."""
         return len(self.sources) if len(self.sources) > 1 else 0
+
+    @property
+    def expected(self) -> int:
+        """Wheels that are known before anything is heard, one at least; as many as are read."""
+        known = sum(len(source.known_wheels) for source in self.sources)
+        return max(1, len(self.wheels) or min(known, MOST))
 
     def fresh(self) -> Wheels:
         """Return the wheels before anything was heard."""

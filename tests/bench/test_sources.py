@@ -3,6 +3,7 @@
 import os
 import signal
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -27,6 +28,7 @@ from bench.faults import Faults
 from bench.fmu_archive import read_fmu
 from bench.fmu_model import FmuFile, FmuModel
 from bench.frames import encode, strain_frames
+from bench.links import Read
 from bench.links.opening import PortPlan
 from bench.links.replay import ReplayLink
 from bench.live.chain import LiveChain, LivePlan
@@ -34,10 +36,11 @@ from bench.live.reader import ReaderPlan
 from bench.protocols import SLCAN, slcan
 from bench.protocols.plan import ProtocolPlan
 from bench.protocols.user_map import parse_map
-from bench.recording import Recording, RecordingHeader
+from bench.recording import Recorder, Recording, RecordingHeader
 from bench.replay import ReplayChain
 from bench.setup_file import check_sources, read_setup
 from bench.source_plan import SourcePlan, wheels_of
+from bench.sources import recording_pieces
 from bench.wheels import Line, Wheels
 from tests.bench.campaigns import tiny_runs
 from tests.bench.programs import PATIENCE
@@ -203,6 +206,22 @@ def test_a_port_of_several_that_is_killed_is_read_again(tmp_path: Path) -> None:
     reads = list(recording.reads())
     recording.close()
     assert {read.source for read in reads if read.data} == {0, 1}
+
+
+def test_an_emulator_plays_one_source_of_several(tmp_path: Path) -> None:
+    head, other = (source.as_header() for source in (serial("left"), serial("right", 3)))
+    header = RecordingHeader({}, protocol=head, more=(other,))
+    with Recorder(tmp_path / "a.mcap", header, Conditions.constant()) as recorder:
+        for number, data in enumerate((b"one", b"two", b"three")):
+            recorder.read(Read(10**6 * number, data, "", number % 2))
+    with closing(Recording(tmp_path / "a.mcap")) as recording:
+        (piece,) = recording_pieces(recording, 0)
+    assert piece.frames == (b"one", b"three")
+    for wrong in (None, 2):
+        with closing(Recording(tmp_path / "a.mcap")) as recording:
+            pieces = recording_pieces(recording, wrong)
+            with pytest.raises(DeviceError, match=r"its sources are 0 left, 1 right; .* --source"):
+                next(pieces)
 
 
 def test_a_wheel_that_comes_from_two_sources_is_refused() -> None:
