@@ -30,6 +30,8 @@ from demo import (
 from rich.console import Console
 from rich.rule import Rule
 
+from tirelib.threads import one_thread
+
 if TYPE_CHECKING:
     from bench.rig.plans import Plan
     from tirelib.report.live import LiveFiles
@@ -264,4 +266,5 @@ def main(arguments: Sequence[str] | None = None, steps: Steps | None = None) -> 
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

@@ -28,6 +28,7 @@ from demo import PROGRAMS, ROOT, Steps
 from rich.console import Console
 
 from bench.recording import Recording
+from tirelib.threads import one_thread
 
 OUT = ROOT / "build/out/bench-endurance"
 LINES = {"serial, 1 wheel": ("serial", 1), "slcan FD, 4 wheels": ("RAW16", 4)}
@@ -368,4 +369,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

@@ -30,6 +30,7 @@ from bench.damage import (
     strike_slcan,
 )
 from bench.protocols.layouts import RAW12C, RAW16
+from tirelib.threads import one_thread
 
 OUT = Path(__file__).resolve().parent / "out" / "bench_faults.json"
 MOST_LOST, MOST_LOST_SHORT = 1.1, 1.5
@@ -107,4 +108,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

@@ -41,6 +41,7 @@ from bench.recording import Recorder, Recording, RecordingHeader
 from bench.replay import ReplayChain
 from bench.wheels import Wheels
 from tirelib.campaign import Run, read_campaign
+from tirelib.threads import one_thread
 
 OUT = ROOT / "build/out/bench-soak"
 RATES = {"flips": 2e-4, "lost": 2e-4, "dup": 2e-4}
@@ -354,4 +355,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

@@ -37,6 +37,8 @@ from demo_live import (
     write_device,
 )
 
+from tirelib.threads import one_thread
+
 if TYPE_CHECKING:
     from bench.rig.plans import Plan
     from tirelib.report.live import LiveFiles
@@ -356,4 +358,5 @@ def draw(
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

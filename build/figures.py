@@ -22,6 +22,7 @@ from tirelib.report.figures import (
 )
 from tirelib.report.page import Drawing, Section, draw_all, write_page
 from tirelib.report.simulation import Simulation
+from tirelib.threads import one_thread
 
 ROOT = Path(__file__).resolve().parent.parent
 ROLLING, TEST, LITERATURE_A, LITERATURE_B = "table-6-1", "table-6-2-195-65r15", "gong", "jenkins"
@@ -172,4 +173,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

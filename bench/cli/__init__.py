@@ -9,6 +9,7 @@ import click
 from bench.errors import BenchError
 from tirelib import __version__
 from tirelib.errors import TirelibError
+from tirelib.threads import bound_process
 
 VERBS = ("ports", "load", "emulate", "run", "record", "replay", "export", "repair")
 """Verbs; each is the command of that name in the module of that name."""
@@ -78,6 +79,7 @@ def program() -> None:
 
 def main() -> None:
     """Run the command line; an error that is raised on purpose ends with exit code 2."""
+    bound_process()
     try:
         program(prog_name="tirebench")
     except (BenchError, TirelibError) as error:

@@ -10,6 +10,7 @@ from bench.rig.mesh import Mesh, mesh
 from bench.rig.system import Balance, balance
 from bench.rig.tire import NEW_DEPTH, Array, Condition, RigTire
 from tirelib.errors import ParameterError, TirelibError
+from tirelib.threads import one_thread
 
 TOLERANCE = 1e-9
 """Largest Newton step of a solved state: metres and radians."""
@@ -96,6 +97,7 @@ def inflated(tire: RigTire, pressure: float, omega: float) -> float:
     )
 
 
+@one_thread()
 def solve(
     tire: RigTire,
     cond: Condition,

@@ -23,6 +23,7 @@ from bench.rig.plans import Plan
 from bench.rig.tire import Condition, tire
 from tirelib.arrays import FloatArray
 from tirelib.cli.common import progress_bar
+from tirelib.threads import one_thread
 
 CALIBRATION = Path(__file__).with_name("calibration.toml")
 """The calibration of the co-simulations."""
@@ -116,4 +117,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

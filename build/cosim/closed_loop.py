@@ -28,6 +28,7 @@ from cosim.vehicle14.run import Drive
 from cosim.wheels import FourWheels
 from tirelib.arrays import FloatArray
 from tirelib.errors import ConvergenceError, ParameterError
+from tirelib.threads import one_thread
 
 YAW, YAW_RATE = 5, 15
 """Places in the vehicle's state."""
@@ -370,4 +371,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    with one_thread():
+        sys.exit(main())

@@ -28,6 +28,7 @@ from cosim.vehicle14.model import SPIN, Controls
 from cosim.vehicle14.run import Drive
 from cosim.wheels import FourWheels
 from tirelib.arrays import FloatArray
+from tirelib.threads import one_thread
 
 FORWARD, SIDE = 10, 11
 """Places in the vehicle's state: velocities in its axes."""
@@ -273,4 +274,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    with one_thread():
+        sys.exit(main())

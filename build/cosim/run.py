@@ -35,6 +35,7 @@ from cosim.wheels import WHEELS, FourWheels
 from tirelib import __version__
 from tirelib.cli.common import progress_bar
 from tirelib.report.cosim import Series, write_cosim
+from tirelib.threads import one_thread
 
 ROOT = Path(__file__).parents[2]
 DRILL, STABILITY = "range", "stability"
@@ -211,4 +212,5 @@ def _plain(value: Any) -> Any:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

@@ -21,6 +21,7 @@ from cosim.vehicle14.parameters import WHEELS
 from tirelib.errors import ParameterError
 from tirelib.fmu.describe import UNITS, repack
 from tirelib.fmu.virtual.coordinates import INPUTS
+from tirelib.threads import one_thread
 
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
@@ -238,4 +239,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    with one_thread():
+        sys.exit(main())

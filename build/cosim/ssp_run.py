@@ -26,6 +26,7 @@ from cosim.ssp import SET, SSD
 from cosim.vehicle14.parameters import WHEELS
 from tirelib.arrays import FloatArray
 from tirelib.errors import FormatError, ParameterError
+from tirelib.threads import one_thread
 
 WATCHED = (
     *(f"vehicle.{q}_{w}" for q in ("Fz", "alpha", "kappa", "Fx", "Fy") for w in WHEELS),
@@ -234,4 +235,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    with one_thread():
+        sys.exit(main())

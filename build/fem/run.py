@@ -18,6 +18,8 @@ from cases import CHECKS, STORED, Case
 from fields import states
 from rich.console import Console
 
+from tirelib.threads import one_thread
+
 ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "build" / "out" / "fem"
 GOLDEN = ROOT / "tests" / "golden"
@@ -76,4 +78,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

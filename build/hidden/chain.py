@@ -22,6 +22,7 @@ from hidden.judge import fingerprint, outcome
 from hidden.measured import CACHE, keep
 from hidden.plan import HELD_OUT, REPEATS, day
 from tirelib.cli import program
+from tirelib.threads import one_thread
 
 
 def by_files(case: Case) -> dict[str, Any]:
@@ -78,4 +79,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

@@ -15,6 +15,7 @@ from bench.rig.hidden import HIDDEN
 from hidden.cases import NONE, case_file, make_case
 from hidden.measured import CACHE
 from tirelib.errors import TirelibError
+from tirelib.threads import one_thread
 
 
 def seeds(text: str) -> list[int]:
@@ -71,4 +72,5 @@ def _one(seed: int, kind: str, ratio: float) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

@@ -31,6 +31,7 @@ from hidden.table import figures, markdown
 from tirelib import __version__
 from tirelib.diagnose.ensemble import MEMBERS
 from tirelib.errors import TirelibError
+from tirelib.threads import one_thread
 
 ROOT = Path(__file__).parents[2]
 GOLDEN = ROOT / "tests" / "golden" / "hidden_effects.json"
@@ -147,4 +148,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

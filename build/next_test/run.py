@@ -30,6 +30,7 @@ from next_test.pair import cases_of, open_still
 from next_test.rig import CACHE
 from tirelib.errors import TirelibError
 from tirelib.planning.document import PROMISING
+from tirelib.threads import one_thread
 
 VISIBLE = {"strain": 15.0, "Fy": 17.0}
 """Chi-square by which the campaign alone shows the effect, against none, in the metric of
@@ -137,4 +138,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

@@ -21,6 +21,7 @@ from tirelib.brush.mf import magic_forces
 from tirelib.identify.brush_estimates import estimates_of, slip_stiffness
 from tirelib.identify.brush_fit import fit_brush
 from tirelib.identify.brush_study import study_of
+from tirelib.threads import one_thread
 
 FEW = (2000.0, 4000.0, 6000.0)
 FAR = np.radians([-12, -9, -6, -4, -2, -1, 0, 1, 2, 4, 6, 9, 12])
@@ -79,10 +80,11 @@ def line(plan: str, found: Sequence[Row]) -> str:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description="Coverage of the brush's intervals.")
-    parser.add_argument("--seeds", default="200-239", metavar="FIRST-LAST")
-    first, last = map(int, parser.parse_args().seeds.split("-"))
-    for plan in PLANS:
-        sys.stdout.write(
-            line(plan, [r for seed in range(first, last + 1) for r in rows(plan, seed)]) + "\n"
-        )
+    with one_thread():
+        parser = argparse.ArgumentParser(description="Coverage of the brush's intervals.")
+        parser.add_argument("--seeds", default="200-239", metavar="FIRST-LAST")
+        first, last = map(int, parser.parse_args().seeds.split("-"))
+        for plan in PLANS:
+            sys.stdout.write(
+                line(plan, [r for seed in range(first, last + 1) for r in rows(plan, seed)]) + "\n"
+            )

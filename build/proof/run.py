@@ -24,6 +24,7 @@ from proof.case import case
 from proof.tires import CACHE
 from tirelib import __version__
 from tirelib.identify.structure import STRUCTURE_STD
+from tirelib.threads import one_thread
 
 TYPICAL = {"radial_pressure_slope": 1.0, "tangential_pressure_slope": 0.35}
 """Size [m] to which errors of slopes are related, as in `tirelib.identify`."""
@@ -132,4 +133,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

@@ -21,6 +21,7 @@ from bench.rig.measure import slip_ratio
 from bench.rig.observe import edges, forces, trace
 from bench.rig.solve import SolverError, State, solve
 from bench.rig.tire import Condition, tire
+from tirelib.threads import one_thread
 
 OUT = Path(__file__).parents[1] / "out" / "virtual_tire"
 OUT_FRICTION = OUT.parent / "virtual_tire_friction"
@@ -125,11 +126,12 @@ def main(points: int, seconds: float, folder: Path, friction: bool) -> None:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--points", type=int, default=200)
-    parser.add_argument("--seconds", type=float, default=600.0, help="most CPU time to spend")
-    parser.add_argument("--friction", action="store_true", help="vary the friction as well")
-    parser.add_argument("--folder", type=Path)
-    given = parser.parse_args()
-    place = given.folder or (OUT_FRICTION if given.friction else OUT)
-    main(given.points, given.seconds, place, given.friction)
+    with one_thread():
+        parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+        parser.add_argument("--points", type=int, default=200)
+        parser.add_argument("--seconds", type=float, default=600.0, help="most CPU time to spend")
+        parser.add_argument("--friction", action="store_true", help="vary the friction as well")
+        parser.add_argument("--folder", type=Path)
+        given = parser.parse_args()
+        place = given.folder or (OUT_FRICTION if given.friction else OUT)
+        main(given.points, given.seconds, place, given.friction)

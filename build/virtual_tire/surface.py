@@ -32,6 +32,7 @@ from tirelib.fmu.virtual.surface import (
     radius_terms,
     write_surface,
 )  # fmt: skip
+from tirelib.threads import one_thread
 
 GRID = 720
 """Angles of a component."""
@@ -312,10 +313,11 @@ def main(folder: Path, out: Path, most: int | None, more: Path | None) -> None:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--folder", type=Path, default=OUT)
-    parser.add_argument("--out", type=Path, default=OUT.parent / "virtual_tire.npz")
-    parser.add_argument("--points", type=int, help="take only the first ones")
-    parser.add_argument("--friction", action="store_true", help="with friction as an input")
-    given = parser.parse_args()
-    main(given.folder, given.out, given.points, OUT_FRICTION if given.friction else None)
+    with one_thread():
+        parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+        parser.add_argument("--folder", type=Path, default=OUT)
+        parser.add_argument("--out", type=Path, default=OUT.parent / "virtual_tire.npz")
+        parser.add_argument("--points", type=int, help="take only the first ones")
+        parser.add_argument("--friction", action="store_true", help="with friction as an input")
+        given = parser.parse_args()
+        main(given.folder, given.out, given.points, OUT_FRICTION if given.friction else None)

@@ -8,6 +8,7 @@ import click
 
 from tirelib import __version__
 from tirelib.errors import TirelibError
+from tirelib.threads import bound_process
 
 VERBS = (
     "campaign",
@@ -70,6 +71,7 @@ def program() -> None:
 
 def main() -> None:
     """Run the command line; an error that the library raises on purpose ends with exit code 2."""
+    bound_process()
     try:
         program(prog_name="tirelib")
     except TirelibError as error:

@@ -10,6 +10,7 @@ from tirelib.effects import CATALOGUE, Effect
 from tirelib.errors import CalibrationError, ParameterError
 from tirelib.identify.force_data import FORCES
 from tirelib.parameters import TireFile
+from tirelib.threads import one_thread
 from tirelib.waveforms import Waveforms, measure_waveforms
 
 QUANTITIES = ("strain", *FORCES)
@@ -17,6 +18,7 @@ BRUSH = ("bristle_lateral", "bristle_longitudinal", "friction")
 """Numbers that a model of the brush states."""
 
 
+@one_thread()
 def compare(
     campaign: Campaign,
     file: TireFile,

@@ -18,6 +18,7 @@ from tirelib.diagnose.unlisted import UNLISTED
 from tirelib.effects import Effect
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.waveform_fit import Data
+from tirelib.threads import one_thread
 
 OUTSIDE = 3.0
 """Ratio of an effect outside its range from which something unknown is there."""
@@ -120,6 +121,7 @@ class Diagnosis:
     refitted: Refits
 
 
+@one_thread()
 def diagnose(
     runs: StraightRuns,
     values: Mapping[str, float | FloatArray],

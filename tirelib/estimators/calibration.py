@@ -13,6 +13,7 @@ from tirelib.estimators.regressors import compute_regressors
 from tirelib.features.extract import Features
 from tirelib.flags import INVALIDATING, TurnFlag
 from tirelib.signal.quality import UNUSABLE
+from tirelib.threads import one_thread
 
 UNITS = {"Fz": "N", "alpha": "rad", "kappa": "1", "Fy": "N"}
 """Unit of each estimated quantity inside the library."""
@@ -121,6 +122,7 @@ class Calibration:
                 f"them at {_millimetres(self.lateral)} mm; calibrate with this layout"
             )
 
+    @one_thread()
     def estimate(self, features: Features) -> Estimates:
         """Estimate every turn; a turn with one gage out uses the chain without it."""
         n = len(features)

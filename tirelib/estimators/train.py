@@ -14,6 +14,7 @@ from tirelib.estimators.dissertation import Means, Regression, fit_all, means_fo
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.observations import Observations, mean_by
 from tirelib.signal import LowPass
+from tirelib.threads import one_thread
 
 ROLLING_SIGMAS = 4.0
 """Scatter of free-rolling turns, in standard deviations, that is not called traction."""
@@ -39,6 +40,7 @@ class Trained:
     cornering: CorneringTrend | None
 
 
+@one_thread()
 def train(
     observations: Observations,
     *,

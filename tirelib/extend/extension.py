@@ -16,6 +16,7 @@ from tirelib.effects import Effect
 from tirelib.errors import ParameterError
 from tirelib.extend.step import Step, added, removed
 from tirelib.identify.campaign_data import StraightRuns
+from tirelib.threads import one_thread
 
 START_INSIDE = 0.9
 """Share of the range within which a refit starts."""
@@ -36,6 +37,7 @@ class Extension(Step[Refit]):
     runs: StraightRuns
 
 
+@one_thread()
 def add_effect(
     runs: StraightRuns,
     model: Model,

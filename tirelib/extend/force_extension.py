@@ -14,6 +14,7 @@ from tirelib.diagnose.forces.ranking import ForceRanking
 from tirelib.effects import Effect
 from tirelib.errors import ParameterError, TirelibError
 from tirelib.extend.step import Step, added, removed
+from tirelib.threads import one_thread
 
 FLOOR_MEMBERS = 20
 
@@ -30,6 +31,7 @@ class ForceExtension(Step[ForceFit]):
     case: ForceCase
 
 
+@one_thread()
 def add_brush_effect(
     case: ForceCase,
     effect: Effect,

@@ -18,7 +18,7 @@ from tirelib import __version__
 from tirelib.errors import FormatError
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration
-from tirelib.fmu.bundle import collect, content_hash, write_package
+from tirelib.fmu.bundle import BROUGHT, collect, content_hash, write_package
 from tirelib.fmu.describe import described, repack
 from tirelib.fmu.spec import SlaveSpec
 
@@ -271,7 +271,7 @@ def _licenses() -> dict[str, bytes]:
     """Return the licences of all that is inside."""
     own = Path(__file__).parents[2] / "LICENSE"
     texts = {"license.txt": own.read_bytes() if own.is_file() else _installed_license("tirelib")}
-    texts["pythonfmu.txt"] = _installed_license("pythonfmu")
+    texts |= {f"{name}.txt": _installed_license(name) for name in ("pythonfmu", BROUGHT)}
     return {f"documentation/licenses/{name}": text for name, text in texts.items() if text}
 
 

@@ -6,6 +6,8 @@ whichever version came first. The copy is therefore called ``tirelib_<hash>``, b
 
 import ast
 import hashlib
+import importlib
+import inspect
 import re
 import sys
 from collections.abc import Mapping
@@ -16,7 +18,10 @@ from tirelib.errors import FormatError
 PACKAGE = "tirelib"
 ALLOWED = frozenset({"numpy", "scipy", "pythonfmu", "tomli_w"})
 """What a bundled module may import beside the standard library; `tomli_w` writes files only."""
+BROUGHT = "threadpoolctl"
+"""A module that comes along, because it is one file."""
 _IMPORT = re.compile(rf"^(\s*(?:from|import)\s+){PACKAGE}(?=[.\s])", re.MULTILINE)
+_BROUGHT = re.compile(rf"^(\s*from\s+)({BROUGHT}\s+import)", re.MULTILINE)
 
 
 def collect(slave: Path) -> dict[str, str]:
@@ -40,6 +45,9 @@ def collect(slave: Path) -> dict[str, str]:
         if key not in sources:
             sources[key] = path.read_text(encoding="utf-8")
             waiting |= _imports(sources[key], key)
+    if any(_BROUGHT.search(source) for source in sources.values()):
+        module = importlib.import_module(BROUGHT)
+        sources[f"{BROUGHT}.py"] = inspect.getsource(module)
     for key in list(sources):
         for folder in Path(key).parents:
             sources.setdefault((folder / "__init__.py").as_posix(), '"""Part of an FMU."""\n')
@@ -62,7 +70,7 @@ def renamed(source: str, package: str) -> str:
     >>> renamed("from tirelib.errors import TirelibError", "tirelib_0")
     'from tirelib_0.errors import TirelibError'
     """
-    return _IMPORT.sub(rf"\g<1>{package}", source)
+    return _BROUGHT.sub(rf"\g<1>{package}.\g<2>", _IMPORT.sub(rf"\g<1>{package}", source))
 
 
 def write_package(folder: Path, sources: Mapping[str, str], package: str) -> Path:
@@ -85,7 +93,8 @@ def _imports(source: str, where: str) -> set[str]:
             if node.module.split(".")[0] == PACKAGE:
                 names |= {f"{node.module}.{alias.name}" for alias in node.names}
     own = {name for name in names if name.split(".")[0] == PACKAGE}
-    strange = {name.split(".")[0] for name in names - own} - ALLOWED - sys.stdlib_module_names
+    other = {name.split(".")[0] for name in names - own}
+    strange = other - ALLOWED - {BROUGHT} - sys.stdlib_module_names
     if strange:
         raise FormatError(
             f"{where}: imports {', '.join(sorted(strange))}; an FMU has numpy and scipy only; "

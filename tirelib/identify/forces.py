@@ -30,6 +30,7 @@ from tirelib.identify.lateral_force import (
     compare_pressures,
 )
 from tirelib.parameters import Number, Tire
+from tirelib.threads import one_thread
 
 MOST_SAMPLES = 50000
 """A longer sweep is thinned evenly: its samples are closer than its errors are independent."""
@@ -67,6 +68,7 @@ class ForceIdentification:
     numbers: Mapping[str, Number]
 
 
+@one_thread()
 def identify_forces(
     campaign: Campaign,
     ring: Tire | None = None,

@@ -18,6 +18,7 @@ from tirelib.identify.structure import STRUCTURE_STD
 from tirelib.identify.waveform_fit import Prior, WaveformFit, fit_waveforms
 from tirelib.model.base import FREE, Coordinate, values_of
 from tirelib.parameters import FIELDS, Number, Tire, TireFile
+from tirelib.threads import one_thread
 from tirelib.units import from_si
 from tirelib.waveforms import Waveforms, measure_waveforms
 
@@ -95,6 +96,7 @@ class Identification:
     notes: tuple[str, ...] = ()
 
 
+@one_thread()
 def identify(
     campaign: Campaign,
     tire: TireFile | None = None,

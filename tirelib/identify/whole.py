@@ -14,6 +14,7 @@ from tirelib.identify.identify import Identification, identify, start_file
 from tirelib.identify.routes import Routes, follow_routes
 from tirelib.identify.strain_notes import broken_gages, ring_expected
 from tirelib.parameters import Number, Tire, TireFile
+from tirelib.threads import one_thread
 
 ALIKE = 0.01
 """Relative difference up to which two free radii may be one tire's."""
@@ -45,6 +46,7 @@ class Whole:
     file: TireFile
 
 
+@one_thread()
 def identify_whole(
     campaign: Campaign,
     start: TireFile | None = None,

@@ -25,8 +25,10 @@ from tirelib.planning.force_rivals import (
 )
 from tirelib.planning.rivals import try_suspects
 from tirelib.planning.structure import Shapes, structure_shapes
+from tirelib.threads import one_thread
 
 
+@one_thread()
 def next_test(
     data: Data,
     base: Refit,

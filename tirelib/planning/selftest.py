@@ -25,6 +25,7 @@ from tirelib.model.base import move, predict
 from tirelib.planning.first_round import FirstRound
 from tirelib.planning.rivals import try_suspects
 from tirelib.planning.variants import Track, draw_variants
+from tirelib.threads import one_thread
 
 RATIOS = (1.05, 1.2, 1.5)
 """Error with the planted effect, over the error without."""
@@ -113,6 +114,7 @@ class SelfTest:
     campaign: str
 
 
+@one_thread()
 def selftest(
     runs: StraightRuns,
     values: Mapping[str, float | FloatArray],

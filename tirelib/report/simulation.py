@@ -31,6 +31,7 @@ from tirelib.report.simulation_series import (
 from tirelib.ring.compliance import Compliance, compliance
 from tirelib.ring.ring import ComplexArray, Ring
 from tirelib.strain.innerliner import strain_harmonics
+from tirelib.threads import one_thread
 from tirelib.units import from_si
 
 CONTACTS = ("radial", "shear")
@@ -155,6 +156,7 @@ class Simulation:
         return x, z
 
 
+@one_thread()
 def simulate(
     tire: Tire,
     *,

@@ -19,6 +19,7 @@ from tirelib.fmu.handbook import page
 from tirelib.fmu.reference import FOLDER, Reference
 from tirelib.fmu.spec import SlaveSpec
 from tirelib.fmu.variables import Variable
+from tirelib.threads import one_thread
 
 MODEL = "VehicleModel"
 PARTS = ("__init__.py", "model.py", "parameters.py", "port.py", "run.py", "tire.py")
@@ -125,4 +126,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    with one_thread():
+        sys.exit(main())

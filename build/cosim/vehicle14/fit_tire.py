@@ -20,6 +20,7 @@ from tirelib.arrays import FloatArray
 from tirelib.brush import predict
 from tirelib.fmu.virtual.spec import default_surface
 from tirelib.fmu.virtual.surface import read_surface
+from tirelib.threads import one_thread
 
 TARGET = Path(__file__).parents[3] / "models" / "vehicle14" / "tire.toml"
 START = {"mu": 0.95, "mu_load": -0.02, "C_y": 4.2e4, "C_y_top": 2.0, "C_x": 7.5e4,
@@ -86,4 +87,5 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    with one_thread():
+        sys.exit(main())

@@ -14,6 +14,7 @@ from tirelib.diagnose.forces.ranking import ForceRanking, ForceScores
 from tirelib.diagnose.forces.search import ALARM, ROUNDS, Search, alarms, ratio_of
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
+from tirelib.threads import one_thread
 
 FORM = 1.6
 """Rms left after the joint fit, over the ensemble's largest, from which a law's form is doubted."""
@@ -96,6 +97,7 @@ class ForceDiagnosis:
     doubts: Mapping[str, tuple[str, ...]]
 
 
+@one_thread()
 def diagnose_force(
     problem: Problem,
     values: Mapping[str, float],

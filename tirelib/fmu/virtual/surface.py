@@ -29,6 +29,7 @@ from tirelib.fmu.virtual.coordinates import (
     coordinates,
 )  # fmt: skip
 from tirelib.fmu.virtual.waveform import Waveforms
+from tirelib.threads import one_thread
 
 FORMAT = "tirelib-virtual-tire/2"
 FORCES = ("Fx", "Fy", "Mz", "loaded_radius")
@@ -116,6 +117,7 @@ class Surface:
     def _limits(self) -> list[tuple[str, float, float]]:
         return list(zip(self.inputs, self.low.tolist(), self.high.tolist(), strict=True))
 
+    @one_thread()
     def warm(self) -> "Surface":
         """Do now what would be done at the first use."""
         _ = self._interpolator, self._waveforms
@@ -133,11 +135,14 @@ class Surface:
 
         Nothing is checked: ask `outside` first.
         """
-        if len(inputs) == 1:
-            places = np.array([coordinates(inputs[0].tolist(), *self._shape, math)])
-        else:
-            places = self._places(inputs)
-        found: FloatArray = self._interpolator(places)
+        found: FloatArray
+        if len(inputs) == 1:  # one row is too little for two threads
+            found = self._interpolator(
+                np.array([coordinates(inputs[0].tolist(), *self._shape, math)])
+            )
+            return found
+        with one_thread():
+            found = self._interpolator(self._places(inputs))
         return found
 
     def forces_of(self, answers: FloatArray) -> FloatArray:
