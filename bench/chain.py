@@ -13,7 +13,6 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from bench.conditions import ROUNDING, UNKNOWN, Condition, Conditions, Held
-from bench.frames import GAGES
 from bench.timeline import Samples
 from bench.wheels import Block
 from tirelib.arrays import BoolArray, FloatArray, IntArray
@@ -139,13 +138,14 @@ class _Segment:
     run: int
     origin: float  # what to add to the estimator's time for `t`
     device_origin: float
-    waiting: FloatArray = field(default_factory=lambda: np.empty((0, GAGES)))
+    gages: int
+    waiting: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     stepped: int = 0  # samples so far
     until: float = -1.0  # the sample at which the condition changes
     condition: Condition = UNKNOWN
-    marks: BoolArray = field(default_factory=lambda: np.empty((0, GAGES + 1), np.bool_))
+    marks: BoolArray = field(default_factory=lambda: np.empty((0, 0), np.bool_))
     """Of those that wait: saturated in each gage, lost."""
-    marked: IntArray = field(default_factory=lambda: np.empty((0, GAGES + 2), np.int64))
+    marked: IntArray = field(default_factory=lambda: np.empty((0, 0), np.int64))
     """Of those since the turn before that have a mark: number, saturated in each gage, lost."""
 
     def mark(self, marks: BoolArray) -> None:
@@ -153,12 +153,12 @@ class _Segment:
         rows = np.flatnonzero(marks.any(axis=1))
         if len(rows):
             new = np.column_stack((self.stepped + rows, marks[rows]))
-            self.marked = np.concatenate((self.marked, new))
+            self.marked = np.concatenate((*([self.marked] if len(self.marked) else []), new))
 
     def seen(self, ready: float) -> list[int]:
         """Return and forget the marks up to the end of a turn [s], which a step may go beyond."""
         if not len(self.marked):
-            return [0] * (GAGES + 1)
+            return [0] * (self.gages + 1)
         mine = self.marked[:, 0] < round(ready / self.period)
         counts = self.marked[mine, 1:].sum(axis=0)
         self.marked = self.marked[~mine]
@@ -230,8 +230,9 @@ class Chain:
             mark, start = known
             run, origin = mark.run, mark.start_time + 1e-6 * (block.t_us - start)
         self._segment = _Segment(
-            block.segment, block.t_us, block.period, run, origin, device_origin
-        )
+            block.segment, block.t_us, block.period, run, origin, device_origin,
+            block.strain.shape[1],
+        )  # fmt: skip
 
     def _take(self, block: Samples) -> list[Turn]:
         """Store samples and take as many steps as they fill."""

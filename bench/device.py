@@ -28,7 +28,16 @@ from typing import Any
 import numpy as np
 
 from bench.errors import DeviceError, cause
-from bench.frames import GAGES, HIGHEST, LOWEST, CountArray, FrameFlag, Int16Array, IntArray
+from bench.frames import (
+    GAGES,
+    HIGHEST,
+    LOWEST,
+    MOST_GAGES,
+    CountArray,
+    FrameFlag,
+    Int16Array,
+    IntArray,
+)
 from tirelib.arrays import BoolArray, FloatArray
 
 FORMAT = "tirebench-device/1"
@@ -51,7 +60,7 @@ class Device:
     name : str
     scale : float
         Strain per count. The default is +-2 % over the range of int16.
-    zero : tuple of 5 float
+    zero : tuple of float, one a gage
         Counts at strain zero.
     lateral : tuple of 5 float, or None, [m]
         Gage positions, ISO; None where the file does not say.
@@ -67,48 +76,58 @@ class Device:
     highest: float = HIGHEST
 
     def strain(self, counts: CountArray, flags: IntArray) -> tuple[FloatArray, BoolArray]:
-        """Return the strain of frames, shape (m * n, 5), and where a gage was saturated.
+        """Return the strain of frames, shape (m * n, n_gages), and where a gage was saturated.
 
         A saturated sample is NaN. Saturation is marked in band by the ends of the range. If a
         frame's flag names a gage and none of its samples is marked, all of them are taken as
         saturated.
         """
-        m, n = counts.shape[:2]
+        m, n, gages = counts.shape
         saturated = (counts == self.highest) | (counts == self.lowest)
         if (flags & _SATURATED).any():
             named = (flags[:, None] & _GAGE_BITS) != 0
             saturated |= (named & ~saturated.any(axis=1))[:, None, :]
-        strain = (counts - np.asarray(self.zero)) * self.scale
+        strain = (counts - self._zero(gages)) * self.scale
         if saturated.any():
             strain = np.where(saturated, np.nan, strain)
-        return strain.reshape(m * n, GAGES), saturated.reshape(m * n, GAGES)
+        return strain.reshape(m * n, gages), saturated.reshape(m * n, gages)
+
+    def _zero(self, gages: int) -> FloatArray:
+        """Return the counts at strain zero of so many gages."""
+        if len(self.zero) != gages and any(self.zero):
+            raise DeviceError(
+                f"the device {self.name!r} has zeros of {len(self.zero)} gages, its wheel sends "
+                f"{gages}; both must agree; take the device file of this wheel"
+            )
+        return np.asarray(self.zero) if any(self.zero) else np.zeros(gages)
 
     def counts(self, strain: FloatArray) -> tuple[Int16Array, BoolArray]:
         """Return counts of shape (n, 5) and where they are saturated; the inverse of `strain`.
 
         What is out of range or not finite gets the mark of saturation.
         """
-        exact = np.rint(strain / self.scale + np.asarray(self.zero))
+        exact = np.rint(strain / self.scale + self._zero(strain.shape[-1]))
         high, low = exact >= HIGHEST, ~(exact > LOWEST)  # NaN counts as low
         inside = np.where(high | low, 0.0, exact).astype(np.int16)
         marked = np.where(high, HIGHEST, np.where(low, LOWEST, inside)).astype(np.int16)
         return marked, high | low
 
-    def check_layout(self, lateral: Sequence[float], where: str) -> None:
-        """Refuse data of another gage layout.
+    def check_layout(self, lateral: Sequence[float], where: str, gages: int = GAGES) -> None:
+        """Refuse data of another gage layout, or of another number of gages.
 
         Raises
         ------
         DeviceError
             Naming both.
         """
-        if len(lateral) == GAGES and (
-            self.lateral is None or np.allclose(lateral, self.lateral, atol=1e-4)
-        ):
+        same = self.lateral is None or (
+            len(self.lateral) == len(lateral) and np.allclose(lateral, self.lateral, atol=1e-4)
+        )
+        if same and len(lateral) == gages:
             return
         raise DeviceError(
             f"{where}: gages lie at {_millimetres(lateral)} mm (ISO), the device "
-            f"{self.name!r} has {_millimetres(self.lateral) if self.lateral else GAGES} of them; "
+            f"{self.name!r} has {_millimetres(self.lateral) if self.lateral else gages} of them; "
             "both must agree; take the device file of this wheel"
         )
 
@@ -150,6 +169,9 @@ def parse_device(text: str, where: str) -> Device:
     gages = gages if isinstance(gages, dict) else {}
     zero = _numbers(gages, "zero_counts", where, faults, LOWEST, HIGHEST)
     lateral = _numbers(gages, "lateral_m", where, faults, -0.5, 0.5)
+    if zero and lateral and len(zero) != len(lateral):
+        faults.append(f"{where}: gages.zero_counts has {len(zero)} numbers, lateral_m "
+                      f"{len(lateral)}; one a gage is needed; correct them")  # fmt: skip
     if faults:
         raise DeviceError(faults)
     name = str(document.get("name", Path(where).stem))
@@ -215,11 +237,11 @@ def _numbers(
     value = table.get(key)
     if value is None:
         return None
-    good = isinstance(value, list) and len(value) == GAGES
+    good = isinstance(value, list) and 1 <= len(value) <= MOST_GAGES
     good = good and all(isinstance(x, int | float) and not isinstance(x, bool) for x in value)
     if not good:
-        faults.append(f"{where}: gages.{key} = {value!r}; {GAGES} numbers are needed, one a gage; "
-                      "correct the list")  # fmt: skip
+        faults.append(f"{where}: gages.{key} = {value!r}; 1 to {MOST_GAGES} numbers are needed, "
+                      "one a gage; correct the list")  # fmt: skip
         return None
     for number, x in enumerate(value, start=1):
         if not low <= x <= high:

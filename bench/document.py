@@ -12,7 +12,6 @@ import numpy as np
 
 from bench.chain import Turn, quantity_valid
 from bench.conditions import RunMark
-from bench.frames import GAGES
 from bench.line_counts import LineCounts
 from bench.timeline import TimelineCounts
 from bench.wheels import Wheels
@@ -103,7 +102,7 @@ def turn_document(turn: Turn) -> dict[str, Any]:
         entry[name] = _number(outputs[name] * factor)
         entry[f"{name}_std"] = _number(outputs.get(f"{name}_std", math.nan) * factor)
         entry[f"{name}_valid"] = quantity_valid(turn, name)
-    for gage in range(1, GAGES + 1):
+    for gage in range(1, len(turn.saturated) + 1):
         length = outputs.get(f"contact_length_{gage}", math.nan)
         entry[f"contact_length_{gage}_mm"] = _number(1e3 * length)
     entry["omega_rad_s"] = _number(outputs.get("turn_rate", math.nan))

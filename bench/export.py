@@ -15,7 +15,6 @@ import numpy as np
 from bench.can_batch import CanBatch, unpack
 from bench.conditions import QUANTITIES, ROUNDING, Condition, Conditions, RunMark
 from bench.errors import RecordingError
-from bench.frames import GAGES
 from bench.line_counts import LineCounts
 from bench.protocols import CAN, SLCAN
 from bench.protocols.frame_decoder import FrameDecoder
@@ -114,7 +113,7 @@ def sample_table(segment: Segment, conditions: Conditions) -> dict[str, Any]:
         "segment": np.full(n, segment.number, np.int32),
         "run": np.full(n, known[0].run if known else 0, np.int32),
         "t_s": 1e-6 * t_us,
-        **{f"strain_{g + 1}_ustrain": 1e6 * strain[:, g] for g in range(GAGES)},
+        **{f"strain_{g + 1}_ustrain": 1e6 * strain[:, g] for g in range(strain.shape[1])},
         "lost": segment.lost,
         **{
             f"{name}_{_SPELLED[unit]}": from_si(held[:, column], unit, dimension)

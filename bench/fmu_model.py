@@ -26,7 +26,7 @@ from bench.chain import Outputs
 from bench.conditions import Condition
 from bench.errors import FmuError
 from bench.fmu_archive import FmuArchive
-from bench.frames import GAGES
+from bench.frames import GAGES, MOST_GAGES
 from tirelib.arrays import FloatArray
 from tirelib.errors import FormatError
 from tirelib.held import HELD
@@ -45,7 +45,7 @@ _CTYPES: dict[str, Any] = {
     "Boolean": ctypes.c_int,
     "Enumeration": ctypes.c_int,
 }
-_STRAIN = re.compile(r"strain_(?:(\d+)_)?([1-5])")
+_STRAIN = re.compile(r"strain_(?:(\d+)_)?(\d+)")
 
 
 class _Ports:
@@ -86,8 +86,8 @@ class FmuFile:
     ----------
     path : Path
     folder : str
-    samples : int
-        k, samples a step.
+    samples, gages : int
+        Samples a step (k), and gages of each.
     name : str
 
     Raises
@@ -102,7 +102,7 @@ class FmuFile:
         self.folder = self._unpacked.name
         try:
             description = self.description()
-            self.samples = _samples_a_step(self.path, description)
+            self.samples, self.gages = _frame(self.path, description)
             self.name = str(description.modelName)
         except FmuError:
             self.close()
@@ -147,17 +147,23 @@ class FmuFile:
         self.close()
 
 
-def _samples_a_step(path: Path, description: Any) -> int:
-    """Return k; refuse an FMU that is no strain estimator."""
+def strain_names(samples: int, gages: int) -> list[str]:
+    """Return the names of the strain inputs in their order, oldest sample first."""
+    if samples == 1:
+        return [f"strain_{g}" for g in range(1, gages + 1)]
+    return [f"strain_{i}_{g}" for i in range(1, samples + 1) for g in range(1, gages + 1)]
+
+
+def _frame(path: Path, description: Any) -> tuple[int, int]:
+    """Return samples a step and gages; refuse an FMU that is no strain estimator."""
     if description.coSimulation is None:
         raise FmuError(f"{path}: it is no FMU for co-simulation; FMI 2.0 co-simulation "
                        "is needed; build it with `tirelib fmu build`")  # fmt: skip
     names = {variable.name for variable in description.modelVariables}
     found = [m for name in names if (m := _STRAIN.fullmatch(name))]
-    samples = len(found) // GAGES
-    wanted = {f"strain_{g}" for g in range(1, GAGES + 1)}
-    if any(m[1] for m in found):
-        wanted = {f"strain_{i}_{g}" for i in range(1, samples + 1) for g in range(1, GAGES + 1)}
+    gages = max((int(m[2]) for m in found), default=GAGES)
+    samples = max(1, len(found) // gages) if 1 <= gages <= MOST_GAGES else 1
+    wanted = set(strain_names(samples, min(gages, MOST_GAGES)))
     missing = sorted(wanted - names)
     missing += [name for name in REQUIRED if name not in names]
     if not description.coSimulation.canHandleVariableCommunicationStepSize:
@@ -167,7 +173,7 @@ def _samples_a_step(path: Path, description: Any) -> int:
             f"{path}: {', '.join(missing[:8]) or 'some strain inputs'} are missing; the "
             "variables of a StrainTire.fmu are needed; build it with `tirelib fmu build`"
         )
-    return samples
+    return samples, gages
 
 
 class FmuModel:
@@ -217,11 +223,7 @@ class FmuModel:
         slave.instantiate(callbacks=self._callbacks, loggingOn=True)
         self._slave = slave
         self._ready = False
-        strain = [f"strain_{g}" for g in range(1, GAGES + 1)]
-        if strain[0] not in self._variables:
-            strain = [
-                f"strain_{i}_{g}" for i in range(1, self.samples + 1) for g in range(1, GAGES + 1)
-            ]
+        strain = strain_names(self.samples, self._file.gages)
         present = [name for name in HELD if name in self._variables]
         self._held = [HELD.index(name) for name in present]
         self._inputs = self._ports([*strain, *present])
@@ -275,7 +277,7 @@ class FmuModel:
 
         Parameters
         ----------
-        strain : array, shape (n, 5), n up to k
+        strain : array, shape (n, n_gages), n up to k
             Oldest first, NaN where unknown.
         conditions : Condition
         valid : bool
@@ -288,7 +290,7 @@ class FmuModel:
         """
         try:
             n = len(strain)
-            self._strain[: n * GAGES] = strain.reshape(-1)
+            self._strain[: strain.size] = strain.reshape(-1)
             for place, index in enumerate(self._held):
                 self._conditions[place] = conditions[index]
             self._inputs.set()

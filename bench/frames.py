@@ -28,7 +28,8 @@ import numpy as np
 import numpy.typing as npt
 from cobs import cobs
 
-GAGES = 5
+GAGES, MOST_GAGES = 5, 16
+"""Of our transmitter; of another make's, at most."""
 SAMPLES = 16
 """Samples in a full frame."""
 STRAIN = 1

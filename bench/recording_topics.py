@@ -96,7 +96,7 @@ def strain_messages(samples: Samples) -> list[tuple[int, bytes]]:
             "segment": samples.segment,
             "t_us": samples.t_us + round(1e6 * offset),
             "period_us": round(1e6 * period, 4),
-            **dict(zip(_GAGES, piece, strict=True)),
+            **{f"gage_{number}": row for number, row in enumerate(piece, start=1)},
         }
         messages.append((round(1e9 * offset), json.dumps(document).encode()))
     return messages

@@ -8,6 +8,7 @@ from typing import Any
 from bench.conditions import TELLABLE
 from bench.device import Device
 from bench.errors import DeviceError
+from bench.frames import GAGES
 from bench.links.opening import PortPlan
 from bench.protocols import LINE_MAP, SERIAL
 from bench.protocols.plan import ProtocolPlan
@@ -44,6 +45,12 @@ class SourcePlan:
             return [self.wheel]
         user = self.protocol.user_map
         return [] if user is None else [wheel.wheel for wheel in user.wheels]
+
+    @property
+    def gages(self) -> set[int]:
+        """Numbers of gages that its wheels have."""
+        user = self.protocol.user_map
+        return {GAGES} if user is None else {len(wheel.absent) for wheel in user.wheels}
 
     @property
     def told(self) -> list[tuple[str, int | None]]:

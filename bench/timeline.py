@@ -5,7 +5,9 @@ is too long to fill, a time reset, or a change of the sample period a new **segm
 whatever follows must forget what came before. What comes again or late is dropped and counted.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import zip_longest
 
 import numpy as np
 import numpy.typing as npt
@@ -61,11 +63,13 @@ class TimelineCounts:
         total = TimelineCounts()
         for name in TimelineCounts.__slots__:
             one, two = getattr(self, name), getattr(other, name)
-            both = (
-                [a + b for a, b in zip(one, two, strict=True)] if name == "saturated" else one + two
-            )
-            setattr(total, name, both)
+            setattr(total, name, added(one, two) if name == "saturated" else one + two)
         return total
+
+
+def added(one: Sequence[int], two: Sequence[int]) -> list[int]:
+    """Return counts of gages, gage by gage; a wheel may have more of them than another."""
+    return [a + b for a, b in zip_longest(one, two, fillvalue=0)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,11 +87,11 @@ class Samples:
         Device time of the first sample, unwrapped; it never goes back, not even when a device
         clock that restarts does.
     period : float, [s]
-    strain : array, shape (n, 5)
+    strain : array, shape (n, n_gages)
         NaN where lost or saturated.
     lost : bool array, shape (n,)
         True where no frame brought the sample.
-    saturated : bool array, shape (n, 5)
+    saturated : bool array, shape (n, n_gages)
     """
 
     segment: int
@@ -128,6 +132,7 @@ class Timeline:
         self._time = 0  # the same, unwrapped
         self._samples = 0  # in the last frame
         self._period = 0  # ticks
+        self._gages = GAGES
         self._flagged = False  # last frame had the time-reset flag
         self._rate = RateCheck()
 
@@ -233,9 +238,9 @@ class Timeline:
     def _fill(self, missing: int) -> Samples:
         time = self._time + self._frame_time
         return self._samples_of(
-            np.full((missing, GAGES), np.nan),
+            np.full((missing, self._gages), np.nan),
             np.ones(missing, np.bool_),
-            np.zeros((missing, GAGES), np.bool_),
+            np.zeros((missing, self._gages), np.bool_),
             time,
             "",
         )
@@ -248,15 +253,13 @@ class Timeline:
                 self._rate.restart()
         else:
             time = self._time + _signed_one(int(frames.t_us[0]) - self._wire_time, TIME_RANGE)
-        self._period = int(frames.period[0])
+        self._period, self._gages = int(frames.period[0]), frames.counts.shape[2]
         self._rate.push(int(frames.wheel[0]), frames)
         strain, saturated = self._device.strain(frames.counts, frames.flags)
         self.received += len(strain)
         if saturated.any():
             seen = saturated.sum(axis=0).tolist()
-            self.counts.saturated = [
-                a + b for a, b in zip(self.counts.saturated, seen, strict=True)
-            ]
+            self.counts.saturated = added(self.counts.saturated, seen)
         if frames.flags.any():
             for name, bit in _COUNTED:
                 seen = int(np.count_nonzero(frames.flags & bit))

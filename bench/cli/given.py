@@ -45,6 +45,19 @@ class Given:
     conditions: Conditions
     wheels: tuple[int, ...]
 
+    def check_layout(self, lateral: Sequence[float], where: str) -> None:
+        """Refuse wheels with other gages than the calibration.
+
+        Raises
+        ------
+        DeviceError
+            Naming both.
+        """
+        for source in self.sources:
+            for device in (source.devices or {None: source.protocol.device}).values():
+                for gages in source.gages:
+                    device.check_layout(lateral, where, gages)
+
     @property
     def devices(self) -> list[Device]:
         """What a count means, of all wheels."""

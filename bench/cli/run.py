@@ -179,8 +179,7 @@ def run(
                 console.print(f"note: recorded with another FMU ({recorded_with[:12]}...)")
         calibration = file.calibration
         if calibration is not None:
-            for device in known.devices:
-                device.check_layout(calibration.lateral, str(fmu_file))
+            known.check_layout(calibration.lateral, str(fmu_file))
             say_missing(known, calibration, console)
         bridges = stack.enter_context(Bridges(estimates_out, plotjuggler, plan))
         shown = Shown(choice, console, rules)

@@ -119,7 +119,9 @@ class Laps:
             kept = min(self._used, ROOM // 2)
             self._rows[:kept] = self._rows[self._used - kept : self._used]
             self._used = kept
-        self._rows[self._used : self._used + len(strain)] = strain
+        shown = min(strain.shape[1], GAGES)  # the chart has room for five
+        self._rows[self._used : self._used + len(strain), :shown] = strain[:, :shown]
+        self._rows[self._used : self._used + len(strain), shown:] = np.nan
         self._used += len(strain)
         self._start = block.start + len(block.strain) - self._used
 

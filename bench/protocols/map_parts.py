@@ -24,7 +24,7 @@ class WheelMap:
     counter, time : Signal or None
     tick : float, [s]
         Step of `time`.
-    absent : tuple of 5 bool
+    absent : tuple of bool, one a gage of the calibration
         Gages that are not there.
     """
 

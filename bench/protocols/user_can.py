@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.can_batch import CanBatch
 from bench.conditions import Measured
-from bench.frames import GAGES, CountArray, Frames
+from bench.frames import CountArray, Frames
 from bench.line_counts import LineCounts
 from bench.protocols.layouts import Health
 from bench.protocols.map_messages import Message
@@ -106,7 +106,7 @@ class _Wheel:
             counts = raw_values(batch.data, wheel.strain).astype(np.int32)
         counts = counts.reshape(m, wheel.samples, -1)
         if any(wheel.absent):
-            counts, there = np.full((m, wheel.samples, GAGES), np.nan), counts
+            counts, there = np.full((m, wheel.samples, len(wheel.absent)), np.nan), counts
             counts[:, :, ~np.array(wheel.absent)] = there
         return Frames(
             wheel=np.full(m, wheel.wheel),

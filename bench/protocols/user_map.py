@@ -55,7 +55,7 @@ from typing import Any
 from bench.conditions import TELLABLE
 from bench.device import Device
 from bench.errors import DeviceError, cause
-from bench.frames import GAGES
+from bench.frames import MOST_GAGES
 from bench.protocols.map_messages import Message, kind_of, listed, of_dbc
 from bench.protocols.map_parts import Quantity, UserMap, WheelMap, clashes
 from bench.protocols.signals import Signal
@@ -193,10 +193,11 @@ class _Reader:
         if (
             not isinstance(rows, list)
             or not rows
-            or not all(isinstance(r, list) and len(r) == GAGES for r in rows)
+            or not all(isinstance(r, list) and len(r) == len(rows[0]) for r in rows)
+            or not 1 <= len(rows[0]) <= MOST_GAGES
         ):
-            self.fault(f"{what}: samples", rows, f"lists of {GAGES} signals are needed, a list a "
-                       "sample")  # fmt: skip
+            self.fault(f"{what}: samples", rows, f"lists of 1 to {MOST_GAGES} signals are needed, "
+                       "a list a sample")  # fmt: skip
             return None
         if message is None:
             return None

@@ -8,9 +8,16 @@ import pytest
 from crccheck.crc import Crc16Modbus
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pythonfmu import FmuBuilder
 
-from bench.conditions import Measured
+from bench.cli.given import Given
+from bench.conditions import Conditions, Measured
+from bench.device import Device
+from bench.document import turn_document
 from bench.errors import DeviceError
+from bench.estimation import Estimation
+from bench.fmu_archive import read_fmu
+from bench.fmu_model import FmuFile, FmuModel
 from bench.frames import Frames
 from bench.links.opening import PortPlan
 from bench.protocols import LINE_MAP
@@ -18,6 +25,8 @@ from bench.protocols.plan import ProtocolPlan
 from bench.protocols.user_map import parse_map
 from bench.source_plan import SourcePlan, protocol_of, wheels_of
 from bench.timeline import Samples
+from tests.bench.campaigns import tiny_runs
+from tests.bench.conftest import TOY
 
 BINARY = """
 format = "tirebench-map/1"
@@ -242,3 +251,59 @@ def test_a_map_fits_its_kind_of_port_and_comes_back_from_a_header(tmp_path: Path
     assert plan.encoding == LINE_MAP
     again = ProtocolPlan.of_header(plan.as_header(), "a.mcap")
     assert again.user_map == plan.user_map
+
+
+THREE = """
+format = "tirebench-map/1"
+rate_hz = 10000
+strain_unit = "ustrain"
+[[wheel]]
+wheel = 1
+message = "W"
+samples = [["left", "centre", "right"]]
+counter = "count"
+[[message]]
+name = "W"
+columns = [{ name = "count", bits = 16 }, "left", "centre", "right"]
+"""
+
+
+@pytest.fixture(scope="module")
+def toy_of_three(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build the toy for three gages."""
+    folder = tmp_path_factory.mktemp("three")
+    text = (
+        TOY.read_text().replace("range(1, 6)", "range(1, 4)").replace("n[-1]) == 3", "n[-1]) == 2")
+    )
+    script = folder / "toy_slave_three.py"
+    script.write_text(text.replace("ToyTire", "ToyThree"))
+    FmuBuilder.build_FMU(script, dest=folder)
+    return folder / "ToyThree.fmu"
+
+
+def test_three_gages_where_the_estimator_has_three(toy_of_three: Path) -> None:
+    strain = 1e6 * np.asarray(tiny_runs()[0].strain)[1:4].T
+    lines = [f"{number},{row[0]:.3f},{row[1]:.3f},{row[2]:.3f}\n".encode()
+             for number, row in enumerate(strain) if number not in range(3000, 3010)]  # fmt: skip
+    source = SourcePlan(PortPlan("p"), plan_of(THREE))
+    with FmuFile(read_fmu(toy_of_three)) as file, FmuModel(file) as model:
+        assert (file.samples, file.gages) == (16, 3)
+        wheels = wheels_of([source])
+        estimation = Estimation(lambda _: model, Conditions.constant(18.0))
+        reads = [b"".join(lines[i] for i in part) for part in np.array_split(range(len(lines)), 9)]
+        turns = [turn for read in reads for turn in estimation.take(wheels.push(read)).turns]
+    assert len(turns) >= 4
+    assert all(turn.saturated == (0, 0, 0) for turn in turns)
+    assert [turn.outputs["Fy"] for turn in turns].count(10.0) == 1  # the toy counts what is lost
+    assert {"contact_length_3_mm"} < turn_document(turns[0]).keys()
+    assert "contact_length_4_mm" not in turn_document(turns[0])
+
+
+def test_wheels_with_other_gages_than_the_calibration_are_refused() -> None:
+    given = Given((SourcePlan(PortPlan("p"), plan_of(THREE)),), Conditions.constant(), ())
+    given.check_layout((0.03, 0.0, -0.03), "X.fmu")
+    with pytest.raises(DeviceError, match=r"X.fmu: gages lie at .*, the device 'map' has 3 of"):
+        given.check_layout((0.06, 0.03, 0.0, -0.03, -0.06), "X.fmu")
+    device = Device("wheel 1", zero=(1.0, 2.0, 3.0))
+    with pytest.raises(DeviceError, match="'wheel 1' has zeros of 3 gages, its wheel sends 5"):
+        device.strain(np.zeros((1, 2, 5), np.int16), np.zeros(1, np.int64))
