@@ -19,11 +19,12 @@ from bench.errors import DeviceError, cause
 from tirelib.held import HELD
 from tirelib.units import from_si, to_si
 
-FORMAT = "tirebench-conditions/2"
-FIRST_FORMAT = "tirebench-conditions/1"
-"""Which knew speed, pressure and camber."""
+FORMAT = "tirebench-conditions/3"
+EARLIER_FORMATS = ("tirebench-conditions/1", "tirebench-conditions/2")
+"""Which knew fewer conditions: speed, pressure and camber, later the turn rate."""
 UNITS = {"speed": ("km/h", "speed"), "pressure": ("bar", "pressure"), "camber": ("deg", "angle"),
-         "omega": ("rad/s", "angular_speed")}  # fmt: skip
+         "omega": ("rad/s", "angular_speed"), "friction": ("1", "ratio"),
+         "tread_depth": ("mm", "length"), "tread_temperature": ("degC", "temperature")}  # fmt: skip
 QUANTITIES = {name: UNITS[name] for name in HELD}
 """Unit in files and dimension of each condition, in the order of `tirelib.held.HELD`."""
 TELLABLE = {**{name: (name, dimension) for name, (_, dimension) in QUANTITIES.items()},
@@ -240,17 +241,17 @@ def parse_conditions(document: Any, where: str) -> Conditions:
         If it is not what this program writes.
     """
     given = document.get("format") if isinstance(document, dict) else type(document).__name__
-    if given not in (FIRST_FORMAT, FORMAT):
+    if given not in (*EARLIER_FORMATS, FORMAT):
+        known = ", ".join((*EARLIER_FORMATS, FORMAT))
         raise DeviceError(
-            f"{where}: format = {given!r}; {FIRST_FORMAT!r} and {FORMAT!r} are understood "
-            "here; "
+            f"{where}: format = {given!r}; {known} are understood here; "
             "take the file that `tirebench emulate --conditions` wrote"
         )
     try:
         times = tuple(int(t) for t in document["t_us"])
         columns = [
             [math.nan] * len(times)
-            if given == FIRST_FORMAT and name not in document
+            if given != FORMAT and name not in document
             else _column(document[name], *row)
             for name, row in QUANTITIES.items()
         ]

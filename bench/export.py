@@ -96,8 +96,8 @@ def write_campaign_of(
     return len(runs)
 
 
-_SPELLED = {"km/h": "kmh", "bar": "bar", "deg": "deg", "rad/s": "rad_s"}
-"""Units as a column's name spells them."""
+_SPELLED = {"km/h": "_kmh", "rad/s": "_rad_s", "1": ""}
+"""Ends of columns' names for units that are not spelled as they are."""
 
 
 def sample_table(segment: Segment, conditions: Conditions) -> dict[str, Any]:
@@ -116,7 +116,7 @@ def sample_table(segment: Segment, conditions: Conditions) -> dict[str, Any]:
         **{f"strain_{g + 1}_ustrain": 1e6 * strain[:, g] for g in range(strain.shape[1])},
         "lost": segment.lost,
         **{
-            f"{name}_{_SPELLED[unit]}": from_si(held[:, column], unit, dimension)
+            f"{name}{_SPELLED.get(unit, f'_{unit}')}": from_si(held[:, column], unit, dimension)
             for column, (name, (unit, dimension)) in enumerate(QUANTITIES.items())
         },
     }

@@ -130,7 +130,8 @@ def synthetic_run(
 
     return Run(
         plan=RunPlan(run, f"runs/{run:03d}.mf4", kind, load, pressure, speed, slip_angle, camber,
-                     slip_ratio, start=12.0 * run),
+                     slip_ratio, start=12.0 * run, friction=0.9, tread_depth=0.008,
+                     tread_temperature=313.15),
         strain=strain,
         rate=RATE,
         trigger=trigger,

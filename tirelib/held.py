@@ -24,6 +24,12 @@ class Held(TypedDict, total=False):
     """Inclination of the wheel plane, [rad]."""
     omega: FloatArray | float
     """Measured turn rate of the wheel, [rad/s]."""
+    friction: FloatArray | float
+    """Coefficient of friction between tread and road, [1]."""
+    tread_depth: FloatArray | float
+    """Depth of the tread's grooves that is left, [m]."""
+    tread_temperature: FloatArray | float
+    """Temperature of the tread's rubber, [K]."""
 
 
 HELD = tuple(Held.__annotations__)

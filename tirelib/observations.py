@@ -15,6 +15,8 @@ from tirelib.signal import LowPass, cut_turns
 
 TRUTH = ("Fx", "Fy", "Fz", "Mz", "slip_angle", "slip_ratio")
 """Rig quantities that an estimate is held against."""
+ROAD = ("friction", "tread_depth", "tread_temperature")
+"""What a plan may say of road and tread."""
 SET_POINTS = ("load", "pressure", "speed", "slip_angle", "camber", "slip_ratio")
 """Nominal conditions of a run."""
 BLOCK = 10
@@ -40,7 +42,7 @@ class Observations:
     truth : dict of arrays, shape (n,), SI, ISO
         What the rig measured: mean of the run, or of the turn in a sweep. NaN where absent.
     nominal : dict of arrays, shape (n,), SI, ISO
-        Set points; NaN in a sweep.
+        Set points, NaN in a sweep; friction, tread depth and tread temperature where given.
     headers : tuple of CampaignHeader
     """
 
@@ -137,7 +139,8 @@ def observe(
     same_tire([campaign.header for campaign in campaigns])
     parts: list[Features] = []
     columns: dict[str, list[FloatArray]] = {name: [] for name in TRUTH}
-    plans: dict[str, list[FloatArray]] = {name: [] for name in SET_POINTS}
+    points = (*SET_POINTS, *ROAD)
+    plans: dict[str, list[FloatArray]] = {name: [] for name in points}
     numbers: list[FloatArray] = []
     for index, campaign in enumerate(campaigns):
         for run in campaign.runs():
@@ -146,7 +149,7 @@ def observe(
             parts.append(features)
             for name in TRUTH:
                 columns[name].append(truth[name])
-            for name in SET_POINTS:
+            for name in points:
                 plans[name].append(np.full(n, getattr(run.plan, name)))
             sweep = run.plan.kind == "sweep"
             block = np.arange(n) // BLOCK if sweep else np.zeros(n)
@@ -163,7 +166,7 @@ def observe(
     number = np.concatenate(numbers, axis=1)
     nominal = {name: np.concatenate(values) for name, values in plans.items()}
     sweep_mask = number[2] > 0
-    key = np.stack([np.nan_to_num(nominal[name], nan=-9e9) for name in SET_POINTS])
+    key = np.stack([np.nan_to_num(nominal[name], nan=-9e9) for name in points])
     own = np.where(sweep_mask, 1 + number[0] * 1e6 + number[1] * 1e4 + number[3], 0.0)
     group = np.unique(np.vstack((key, own)), axis=1, return_inverse=True)[1].ravel()
     return Observations(

@@ -29,6 +29,8 @@ from tirelib.campaign import (
 from tirelib.errors import ParameterError
 
 TRUTH_FILE = "truth.csv"
+TREAD_TEMPERATURE = 313.15
+"""The rig's rubber knows one temperature, [K]."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """Environment of a process that shares the processors with others like it: one thread each."""
 
@@ -242,6 +244,7 @@ def _run(job: Job, recording: Recording) -> Run:
         start=job.run * job.chain.run_spacing,
         friction=job.friction if c.friction is None else c.friction,
         tread_depth=NEW_DEPTH if c.tread_depth is None else c.tread_depth,
+        tread_temperature=TREAD_TEMPERATURE,
     )
     return Run(
         plan=plan,

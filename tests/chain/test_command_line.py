@@ -46,7 +46,7 @@ def test_calibrate_prints_and_stores_statistics(place: Path) -> None:
     assert ("load", "4500 N") in held
     assert document["data"][0]["sha256"] == read_campaign(place / "set1").content_hash()
     text = (place / "cal.toml").read_text()
-    assert 'format = "tirelib-calibration/1"' in text
+    assert 'format = "tirelib-calibration/2"' in text
     assert "sha256" in text
 
 

@@ -7,8 +7,16 @@ import numpy as np
 
 from tests.fmu import live
 from tirelib.fmu.run import LoadedFmu
+from tirelib.held import HELD
 
-CONDITIONS = np.array([live.SPEED, live.PRESSURE, 0.0, np.nan])
+
+def held(**known: float) -> np.ndarray:
+    """Conditions in the order of `HELD`; usual speed, pressure and camber unless told."""
+    usual = {"speed": live.SPEED, "pressure": live.PRESSURE, "camber": 0.0}
+    return np.array([{**usual, **known}.get(name, np.nan) for name in HELD])
+
+
+CONDITIONS = held()
 
 
 def strain(load: float = 4e3, tilt: float = 0.05, turns: float = 3.4) -> np.ndarray:

@@ -14,6 +14,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 
 from tests.fmu import live
+from tests.fmu.player import held
 from tests.synthetic import LATERAL
 from tirelib.errors import FormatError
 from tirelib.estimators.calibration_file import write_calibration
@@ -21,13 +22,7 @@ from tirelib.flags import TurnFlag
 from tirelib.fmu import build
 from tirelib.fmu.run import LoadedFmu
 
-
-def told(speed: float = live.SPEED, pressure: float = live.PRESSURE) -> np.ndarray:
-    """Return conditions in the order of `HELD`: the turn rate is not known."""
-    return np.array([speed, pressure, 0.0, np.nan])
-
-
-GOOD = told()
+GOOD = held()
 TURN = int(2.0 * math.pi * live.RADIUS / live.SPEED * live.RATE)
 ONSET = int(3.1 * TURN) // 10 * 10
 """Sample at which a fault begins; the last good contact has just been read (3 of them)."""
@@ -93,15 +88,15 @@ FAULTS = {
     "a gage frozen": (freeze(3), GOOD, "reduced_gages"),
     "a gage NaN": (set_all(np.nan, (1,)), GOOD, "reduced_gages"),
     "a gage infinite": (set_all(-np.inf, (4,)), GOOD, "reduced_gages"),
-    "speed zero while the wheel turns": (nothing, told(0.0), "no_speed"),
-    "speed lost": (nothing, told(np.nan), "no_speed"),
-    "speed infinite": (nothing, told(np.inf), "no_speed"),
+    "speed zero while the wheel turns": (nothing, held(speed=0.0), "no_speed"),
+    "speed lost": (nothing, held(speed=np.nan), "no_speed"),
+    "speed infinite": (nothing, held(speed=np.inf), "no_speed"),
     "two gages NaN": (set_all(np.nan, (0, 3)), GOOD, "too_few_gages"),
-    "reverse": (nothing, told(-live.SPEED), "reversed"),
+    "reverse": (nothing, held(speed=-live.SPEED), "reversed"),
     "load above the calibrated": (load(9e3), GOOD, "out_of_range"),
     "load below the calibrated": (load(1e2), GOOD, "out_of_range"),
     "slip angle beyond the calibrated": (tilt, GOOD, "out_of_range"),
-    "pressure beyond the calibrated": (nothing, told(pressure=9e5), "out_of_range"),
+    "pressure beyond the calibrated": (nothing, held(pressure=9e5), "out_of_range"),
 }
 
 
@@ -144,7 +139,7 @@ def test_without_a_usable_speed_the_slip_ratio_alone_is_invalid(
     fmu: LoadedFmu, strain: np.ndarray, speed: float
 ) -> None:
     fmu.start(live.RATE)
-    last = play(fmu, strain[:, :ONSET], told(speed))[-1]
+    last = play(fmu, strain[:, :ONSET], held(speed=speed))[-1]
     assert np.isnan(last["kappa"])
     assert not last["kappa_valid"]
     assert last["Fz_valid"]

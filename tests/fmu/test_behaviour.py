@@ -9,7 +9,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 
 from tests.fmu import live
-from tests.fmu.player import CONDITIONS, play, play_from_start, same, strain
+from tests.fmu.player import CONDITIONS, held, play, play_from_start, same, strain
 from tirelib.errors import FormatError
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.flags import TurnFlag, flag_names
@@ -179,7 +179,7 @@ def test_when_contacts_stay_away_validity_drops_and_values_are_held(ten: LoadedF
 )
 def test_a_speed_that_says_nothing_is_flagged(ten: LoadedFmu, speed: float, flag: str) -> None:
     ten.start(live.RATE)
-    last = play(ten, strain(), np.array([speed, live.PRESSURE, 0.0, np.nan]))[-1]
+    last = play(ten, strain(), held(speed=speed))[-1]
     assert flag in last["status"]
     assert np.isnan(last["kappa"])
 
@@ -188,7 +188,7 @@ def test_a_measured_standstill_drops_validity(ten: LoadedFmu) -> None:
     samples = strain(turns=3.0)
     ten.start(live.RATE)
     assert play(ten, samples)[-1]["valid"]
-    ten.step(samples[:, -10:], np.array([live.SPEED, live.PRESSURE, 0.0, 0.0]))
+    ten.step(samples[:, -10:], held(omega=0.0))
     assert not ten.read()["valid"]
 
 

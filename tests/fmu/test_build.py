@@ -41,7 +41,8 @@ def test_inputs_and_outputs_are_those_of_the_contract(samples: int) -> None:
         if samples == 1
         else [f"strain_{s}_{g}" for s in range(1, samples + 1) for g in range(1, 6)]
     )
-    inputs = [*strains, "speed", "pressure", "camber", "omega", "frame_valid"]
+    road = ("friction", "tread_depth", "tread_temperature")
+    inputs = [*strains, "speed", "pressure", "camber", "omega", *road, "frame_valid"]
     assert [name for name, causality in names.items() if causality == "input"] == inputs
     for name in ("Fz", "alpha", "kappa", "Fy"):
         assert names[name] == names[f"{name}_std"] == "output"
@@ -142,7 +143,7 @@ def test_a_fmu_loaded_in_this_process_does_not_disturb_its_own_rebuild(tmp_path:
         twin = build_fmu(live.calibration_file(), tmp_path / "twin.fmu", samples_per_step=10,
                          sample_rate=live.RATE)  # fmt: skip
         assert twin.read_bytes() == live.fmu_file(10).read_bytes()
-        fmu.step(np.zeros((5, 10)), np.array([18.0, 2.3e5, 0.0, np.nan]))
+        fmu.step(np.zeros((5, 10)), CONDITIONS)
 
 
 def test_a_place_that_cannot_be_written_is_told_before_the_work(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from tests.fmu import live
+from tests.fmu import live, player
 from tests.synthetic import frames as cut
 from tests.synthetic import record
 from tirelib.flags import TurnFlag
@@ -17,7 +17,7 @@ from tirelib.fmu.run import LoadedFmu
 from tirelib.held import HELD
 
 RATE = 1e4
-CONDITIONS = np.array([live.SPEED, live.PRESSURE, 0.0, np.nan])
+CONDITIONS = player.CONDITIONS
 ESTIMATES = ("Fz", "alpha", "kappa", "Fy", "Fz_std", "alpha_std", "kappa_std", "Fy_std",
              *(f"contact_length_{g}" for g in range(1, 6)), "rolling_radius", "turn_rate",
              "contact_time")  # fmt: skip

@@ -9,6 +9,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 
 from tests.fmu import live
+from tests.fmu.player import held
 from tests.fmu.virtual_host import QUIET, TYPICAL, Host, file
 from tirelib.fmu.run import LoadedFmu
 from tirelib.fmu.variables import outputs
@@ -87,7 +88,7 @@ def course(fmu: LoadedFmu, missing: float, strain: np.ndarray) -> list[dict[str,
     fmu.slave.exitInitializationMode()
     found.append(fmu.read())
     for first in range(0, strain.shape[1] - 9, 10):
-        fmu.step(strain[:, first : first + 10], np.array([np.nan, live.PRESSURE, 0.0, np.nan]))
+        fmu.step(strain[:, first : first + 10], held(speed=math.nan))
         found.append(fmu.read())
     return found
 

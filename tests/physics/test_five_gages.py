@@ -63,7 +63,20 @@ def read(trace: StrainTrace) -> Features:
     zero, none = np.zeros(n), np.zeros((n, gages))
     flat = np.zeros((n, gages), dtype=np.int64)
     return extract_features(
-        Turns(trace, zero, zero, zero + 0.1, none, none, flat, np.zeros(n, dtype=np.int64), 1e4)
+        Turns(
+            trace,
+            zero,
+            zero,
+            zero + 0.1,
+            none,
+            none,
+            zero,
+            zero,
+            zero,
+            flat,
+            np.zeros(n, dtype=np.int64),
+            1e4,
+        )
     )
 
 

@@ -18,12 +18,15 @@ from tirelib.estimators import basis
 from tirelib.estimators.chain import AngleModel, Chain
 from tirelib.estimators.ends import End, growth, outermost
 from tirelib.estimators.fit import Fit, fit_best, levels_of
+from tirelib.estimators.fit_sliding import fit_sliding
 from tirelib.estimators.floor import with_floor
 from tirelib.estimators.grow import grow
 from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.polynomial import Polynomial, leverage
 from tirelib.estimators.ranges import with_ranges
 from tirelib.estimators.regressors import EVEN, ODD, compute_regressors
+from tirelib.estimators.sliding import SlidingCurve
+from tirelib.estimators.unknowns import Road
 from tirelib.observations import TRUTH, Observations, mean_by
 
 FEWEST_CONDITIONS = 5
@@ -145,7 +148,8 @@ def calibrate_chain(
     load, mean_load = _fit_load(links, laws, say)
     radius = _or_refused(links, "kappa", lambda: _fit_radius(links, say))
     force = _or_refused(links, "Fy", lambda: _fit_force(links, say))
-    angle = _or_refused(links, "alpha", lambda: _fit_angle(links, force is not None, say))
+    moment, sliding = _fit_moment(links, force is not None, say), fit_sliding_of(links)
+    angle = _or_refused(links, "alpha", lambda: _fit_angle(links, force is not None, sliding, say))
     chain = Chain(
         gages=tuple(gages),
         guards=dict.fromkeys(("Fz", "alpha", "kappa", "Fy"), ()),
@@ -156,6 +160,9 @@ def calibrate_chain(
         radius=radius,
         force=force,
         angle=angle,
+        moment=moment,
+        sliding=sliding,
+        road=_road(links),
     )
     return with_ranges(with_floor(chain, regressors, unit, rows), values, truth), links
 
@@ -308,6 +315,14 @@ def _fit_force(links: Links, say: Callable[[str], None]) -> Polynomial | None:
         links.refused["Fy"] = f"Fy varies by {np.ptp(truth):.0f} N only; measure slip angles"
         return None
     say("Fy")
+    fit = _fit_odd(links, truth, "Fy")
+    _keep(links, "Fy", fit, fit.held_out)
+    return fit.model
+
+
+def _fit_odd(links: Links, truth: FloatArray, what: str) -> Fit:
+    """Fit what changes its sign when left and right change places."""
+    values = links.values
     varying = _varying(values, list(VARIES))
     varying -= _frozen_with_slip(links, varying)
     candidates, odd = basis.force_candidates(varying), (*ODD, "camber")
@@ -316,12 +331,43 @@ def _fit_force(links: Links, say: Callable[[str], None]) -> Polynomial | None:
         level=links.load_level(), centre=False,
     )  # fmt: skip
     candidates += [grown] if grown and grown not in candidates else []
-    fit = fit_best(
+    return fit_best(
         values, truth, links.groups, candidates, odd=odd, level=links.load_level(),
-        step=links.angle_step(), outermost=links.outermost(), centre=False, what="Fy",
+        step=links.angle_step(), outermost=links.outermost(), centre=False, what=what,
     )  # fmt: skip
-    _keep(links, "Fy", fit, fit.held_out)
-    return fit.model
+
+
+def _fit_moment(links: Links, has_force: bool, say: Callable[[str], None]) -> Polynomial | None:
+    """Aligning moment, from the regressors of the lateral force; None where it was not measured."""
+    truth = links.truth["Mz"]
+    if not has_force or not np.isfinite(truth).all() or np.ptp(truth) == 0.0:
+        return None
+    say("Mz")
+    try:
+        return _fit_odd(links, truth, "Mz").model
+    except CalibrationError:
+        return None
+
+
+def fit_sliding_of(links: Links) -> SlidingCurve | None:
+    """Fit the cornering curve on roads of other friction; None where slip was not varied."""
+    truth = links.truth
+    needed = (truth["slip_angle"], truth["Fz"], truth["Fy"])
+    if not all(np.isfinite(x).all() for x in needed) or np.ptp(needed[0]) < LEAST_ANGLE:
+        return None
+    return fit_sliding(
+        *needed, truth["Mz"], links.values["camber"], truth["slip_ratio"], links.values["friction"]
+    )
+
+
+def _road(links: Links) -> Road:
+    """Return what the data say of friction and tread; NaN where a run does not."""
+    ranges = []
+    for name in ("friction", "tread_depth", "tread_temperature"):
+        x = links.values[name]
+        known = bool(np.isfinite(x).all())
+        ranges.append((float(x.min()), float(x.max())) if known else (np.nan, np.nan))
+    return Road(*ranges)
 
 
 def _frozen_with_slip(links: Links, varying: set[str]) -> set[str]:
@@ -331,7 +377,9 @@ def _frozen_with_slip(links: Links, varying: set[str]) -> set[str]:
     return varying - _varying(part, sorted(varying))
 
 
-def _fit_angle(links: Links, has_force: bool, say: Callable[[str], None]) -> AngleModel | None:
+def _fit_angle(
+    links: Links, has_force: bool, sliding: SlidingCurve | None, say: Callable[[str], None]
+) -> AngleModel | None:
     truth, values = links.truth["slip_angle"], links.values
     if not has_force:
         links.refused["alpha"] = "it follows from Fy, which is not calibrated"
@@ -356,7 +404,10 @@ def _fit_angle(links: Links, has_force: bool, say: Callable[[str], None]) -> Ang
     # where the cornering curve is flat, the same error of Fy means more slip angle: weigh it less
     steep = _flatness(truth, values["utilisation"])
     odd = ("utilisation", "camber")
-    weights = 1.0 / (1.0 + (sharpness * steep) ** 2)
+    moved, doubt = _by_friction(links, sliding)
+    truth = truth - moved  # what it would be on the road that the curve stands for
+    steady = 1.0 / (1.0 + (doubt / LEAST_ANGLE_ERROR) ** 2)
+    weights = steady / (1.0 + (sharpness * steep) ** 2)
     for _ in range(2):
         fit = fit_best(
             values, truth, links.groups, candidates, odd=odd, level=links.load_level(),
@@ -364,9 +415,23 @@ def _fit_angle(links: Links, has_force: bool, say: Callable[[str], None]) -> Ang
             what="alpha",
         )  # fmt: skip
         steep = np.maximum(steep, np.abs(fit.model.slope(values, "utilisation")))
-        weights = 1.0 / (1.0 + (sharpness * steep) ** 2)
-    _keep(links, "alpha", fit, fit.held_out)
+        weights = steady / (1.0 + (sharpness * steep) ** 2)
+    _keep(links, "alpha", fit, fit.held_out + moved)
     return _weighed(fit.model, values, truth - fit.held_out, fit.ends)
+
+
+def _by_friction(links: Links, sliding: SlidingCurve | None) -> tuple[FloatArray, FloatArray]:
+    """Return what the friction of each run changes in its slip angle, and its doubt, [rad]."""
+    friction = links.values["friction"]
+    none = np.zeros_like(friction)
+    if sliding is None or np.isnan(friction).all():
+        return none, none
+    used = np.abs(links.truth["Fy"] / links.truth["Fz"])
+    told = sliding.at(
+        used, links.truth["Fz"], np.where(np.isnan(friction), sliding.friction, friction)
+    )
+    side = np.where(links.truth["slip_angle"] < 0.0, -1.0, 1.0)
+    return side * told.change, np.fmin(told.std, 1.0)
 
 
 def _weighed(

@@ -10,7 +10,7 @@ from tirelib.estimators.reference_turn import CONDITIONS
 from tirelib.estimators.regressors import EVEN, ODD, SHAPE
 
 AXES = "iso"
-UNITS = {"Fz": "N", "R_eff": "m", "Fy": "N", "alpha": "rad"}
+UNITS = {"Fz": "N", "R_eff": "m", "Fy": "N", "Mz": "N m", "alpha": "rad"}
 """Models of a chain with the unit of their coefficients."""
 REGRESSORS = frozenset(
     (*EVEN, *ODD, *SHAPE, "pressure", "speed_squared", "camber", "load", "utilisation",
@@ -77,6 +77,35 @@ def _chain(chain: Any, where: str, gages: int) -> Iterator[str]:
         yield from _numbers(chain, "alpha", ("blur", "bend"), where)
     if "cloud" in chain:
         yield from _cloud(chain["cloud"], f"{where}.cloud")
+    if "road" in chain:
+        yield from _road(chain["road"], f"{where}.road")
+    if "sliding" in chain:
+        yield from _sliding(chain["sliding"], f"{where}.sliding")
+
+
+def _road(table: Any, where: str) -> Iterator[str]:
+    for name in ("friction", "tread_depth", "tread_temperature"):
+        pair: Any = table.get(name) if isinstance(table, dict) else None
+        good = isinstance(pair, list) and len(pair) == 2 and all(map(_number, pair))
+        if not good or pair[0] > pair[1] or min(pair) < 0.0:
+            yield f"{where}.{name} = {pair!r}; two numbers from 0, the lower first, are needed"
+
+
+def _sliding(table: Any, where: str) -> Iterator[str]:
+    if not isinstance(table, dict):
+        yield f"{where}: is no table"
+        return
+    for name in ("friction", "sharpness", "fading"):
+        if not _finite(table.get(name)) or table[name] <= 0.0:
+            yield f"{where}.{name} = {table.get(name)!r}; a number above 0 is needed"
+    for name in ("misfit", "largest"):
+        if not _number(table.get(name)) or not table[name] >= 0.0:
+            yield f"{where}.{name} = {table.get(name)!r}; a number from 0 is needed"
+    for name, most in (("stiffness", 3), ("trail", 3), ("camber", 2)):
+        row: Any = table.get(name)
+        good = isinstance(row, list) and 0 < len(row) <= most and all(map(_finite, row))
+        if not good or (name == "camber" and len(row) != most):
+            yield f"{where}.{name} = {row!r}; up to {most} finite numbers are needed"
 
 
 def _reference_turn(table: Any, gages: int) -> Iterator[str]:

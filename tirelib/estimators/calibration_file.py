@@ -1,4 +1,7 @@
-"""Calibrations as TOML files (``tirelib-calibration/1``): written once, read everywhere.
+"""Calibrations as TOML files (``tirelib-calibration/2``): written once, read everywhere.
+
+Version 1 knew nothing of friction and tread: a brush through its slip angle stands for the
+cornering curve, and its tread counts as new.
 
 Numbers keep all their digits, so an estimate from a file equals the one from memory.
 """
@@ -6,7 +9,7 @@ Numbers keep all their digits, so an estimate from a file equals the one from me
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +24,14 @@ from tirelib.estimators.chain import AngleModel, Chain
 from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.polynomial import Cloud, Polynomial, Range, Variable
 from tirelib.estimators.reference_turn import ReferenceTurn
+from tirelib.estimators.sliding import SlidingCurve, brush_through
+from tirelib.estimators.unknowns import Road
 
-FORMAT = "tirelib-calibration/1"
+FORMAT = "tirelib-calibration/2"
+FIRST_FORMAT = "tirelib-calibration/1"
+_ROAD = tuple(field.name for field in fields(Road))
 _NUMBERS = re.compile(r"\[\n((?:\s+[-+.\w]+,\n)+)\s*\]")
-_MODEL_UNITS = {"Fz": "N", "R_eff": "m", "Fy": "N", "alpha": "rad"}
+_MODEL_UNITS = {"Fz": "N", "R_eff": "m", "Fy": "N", "Mz": "N m", "alpha": "rad"}
 
 
 def write_calibration(
@@ -93,9 +100,10 @@ def read_calibration(path: str | Path) -> Calibration:
         raise FormatError(f"{where}: is not TOML ({error}); give a file made by "
                           "`tirelib calibrate`") from None  # fmt: skip
     given = document.get("format")
-    if given != FORMAT:
+    if given not in (FORMAT, FIRST_FORMAT):
         raise FormatError(
-            f"{where}: format = {given!r}; this version reads {FORMAT!r}; calibrate anew"
+            f"{where}: format = {given!r}; this version reads {FORMAT!r} and {FIRST_FORMAT!r}; "
+            "calibrate anew"
         )
     found = [f"{where}: {fault}; calibrate anew" for fault in faults(document)]
     if found:
@@ -132,6 +140,7 @@ def _chain_table(chain: Chain) -> dict[str, Any]:
         "mean_load": chain.mean_load,
         "laws": _laws_table(chain.laws),
         "force_laws": _laws_table(chain.force_laws),
+        "road": {name: list(getattr(chain.road, name)) for name in _ROAD},
         "range": {
             quantity: [
                 {"name": r.name, "low": r.low, "high": r.high, "slack": r.slack, "needed": r.needed}
@@ -149,7 +158,13 @@ def _chain_table(chain: Chain) -> dict[str, Any]:
             "around": chain.cloud.around,
             "mirrored": chain.cloud.mirrored,
         }
-    models = {"Fz": chain.load, "R_eff": chain.radius, "Fy": chain.force}
+    if chain.sliding is not None:
+        curve = chain.sliding
+        table["sliding"] = {
+            field.name: list(x) if isinstance(x := getattr(curve, field.name), tuple) else x
+            for field in fields(curve)
+        }
+    models = {"Fz": chain.load, "R_eff": chain.radius, "Fy": chain.force, "Mz": chain.moment}
     for name, model in models.items():
         if model is not None:
             table[name] = _polynomial_table(model, _MODEL_UNITS[name])
@@ -160,6 +175,23 @@ def _chain_table(chain: Chain) -> dict[str, Any]:
             "bend": chain.angle.bend,
         }
     return table
+
+
+def _sliding(table: Mapping[str, Any], angle: AngleModel | None) -> SlidingCurve | None:
+    """Return the cornering curve; for a version that held none, a brush through the slip angle."""
+    if "sliding" in table:
+        part = table["sliding"]
+        values: dict[str, Any] = {field.name: part[field.name] for field in fields(SlidingCurve)}
+        values |= {name: tuple(map(float, x)) for name, x in values.items() if isinstance(x, list)}
+        return SlidingCurve(**values)
+    ends = {r["name"]: r for r in table["range"]["alpha"]}
+    if angle is None or "road" in table or not {"utilisation", "alpha"} <= set(ends):
+        return None
+    load = {r["name"]: r for r in table["range"]["Fz"]}.get("Fz")
+    mean = float(table["mean_load"])
+    low, high = (mean, 1.01 * mean) if load is None else (load["low"], load["high"])
+    used = max(abs(ends["utilisation"]["low"]), abs(ends["utilisation"]["high"]))
+    return brush_through(angle.polynomial, float(used), (float(low), float(high)))
 
 
 def _chain(table: Mapping[str, Any]) -> Chain:
@@ -197,6 +229,9 @@ def _chain(table: Mapping[str, Any]) -> Chain:
         force=_polynomial(table["Fy"]) if "Fy" in table else None,
         angle=angle,
         cloud=cloud,
+        moment=_polynomial(table["Mz"]) if "Mz" in table else None,
+        sliding=_sliding(table, angle),
+        road=Road(**{name: _pair(pair) for name, pair in table.get("road", {}).items()}),
     )  # fmt: skip
 
 

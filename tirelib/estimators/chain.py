@@ -7,13 +7,15 @@ Each link may use what the links before it say:
 - ``R_eff`` from load and pressure in free rolling; ``kappa = Omega R_eff / v - 1`` (Eq. 21, 22),
 - ``Fy`` from the slopes of CP1, CP2, contact angle and tension over the lateral position,
 - ``alpha`` from the lateral utilisation Fy/Fz and the load: the inverse of a tire's cornering
-  curve.
+  curve; where the friction is not known, the aligning moment tells how much of the tread slides.
+
+What friction, tread and its temperature may do to each is in `tirelib.estimators.unknowns`.
 
 Prediction needs numpy only.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -25,7 +27,13 @@ from tirelib.estimators.laws import (
     ConditionLaws,
 )
 from tirelib.estimators.polynomial import Cloud, Polynomial, Range, all_inside
+from tirelib.estimators.sliding import FORCE_DOUBT, LOAD_DOUBT, MOMENT_DOUBT, SlidingCurve, Told
+from tirelib.estimators.unknowns import BENT, CORNERING, EDGE, FORCE, LAW_DOUBT, Road
 
+LEAST_REACH = 0.01
+"""Floor of the range of contact angles by which the load's slope is taken, [rad]."""
+WIDEST = 0.5
+"""Largest slip angle and largest standard deviation of one, [rad]."""
 QUANTITIES = ("Fz", "alpha", "kappa", "Fy")
 
 
@@ -36,6 +44,10 @@ class Estimate:
     value: FloatArray
     std: FloatArray
     valid: BoolArray
+
+    def widened(self, more: FloatArray) -> "Estimate":
+        """Return it with a further standard deviation; valid only where that is a number."""
+        return Estimate(self.value, np.hypot(self.std, more), self.valid & np.isfinite(more))
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +91,12 @@ class Chain:
         Combinations of traction and lateral distortion that were calibrated.
     mean_load : float, [N]
         Stands for the load where no load model could be calibrated.
+    moment : Polynomial or None
+        Aligning moment, [N m].
+    sliding : SlidingCurve or None
+        The cornering curve on roads of other friction.
+    road : Road
+        Friction and tread of the calibration.
     """
 
     gages: tuple[int, ...]
@@ -91,6 +109,9 @@ class Chain:
     force: Polynomial | None = None
     angle: AngleModel | None = None
     cloud: Cloud | None = None
+    moment: Polynomial | None = None
+    sliding: SlidingCurve | None = None
+    road: Road = field(default_factory=Road)
 
     def has(self, quantity: str) -> bool:
         """Tell whether a quantity is calibrated."""
@@ -118,7 +139,7 @@ class Chain:
         if self.load is not None:
             load, std = self.load.predict(values)
             correction, extra = self.laws.load_correction(values)
-            load = load + correction
+            load = load + correction + self._load_per_hardening() * self.road.hardened(values)[0]
             std = np.hypot(std, extra + self.laws.spread(values, load))
             result["Fz"] = Estimate(load, std, self._valid("Fz", values, load, std) & calibrated)
         values["load"] = load
@@ -137,6 +158,10 @@ class Chain:
         values["slip_size"] = np.abs(values["slip_ratio"])
         if self.force is not None:
             self._lateral(self.force, values, load, calibrated, result)
+        if "Fz" in result:
+            harder, unknown = self.road.hardened(values)
+            doubt = self._load_per_hardening() * np.hypot(unknown, LAW_DOUBT * harder)
+            result["Fz"] = result["Fz"].widened(doubt)
         return result, radius
 
     def _lateral(
@@ -160,10 +185,79 @@ class Chain:
         with np.errstate(invalid="ignore", divide="ignore"):
             values["utilisation"] = force / load
             spread = np.hypot(std, values["utilisation"] * load_std) / np.abs(load)
+        slid = self._slid(values, force, load)
         if self.angle is not None:
-            angle, std = self.angle.predict(values, spread)
-            valid = self._valid("alpha", values, angle, std) & calibrated
-            result["alpha"] = Estimate(angle, std, valid)
+            angle = self._slip_angle(self.angle, values, load, spread, slid)
+            valid = self._valid("alpha", values, angle.value, angle.std) & angle.valid
+            result["alpha"] = replace(angle, valid=valid & calibrated)
+        harder, unknown = self.road.hardened(values)
+        result["Fy"] = result["Fy"].widened(FORCE * np.hypot(harder, unknown) * np.abs(force))
+        if slid is not None:
+            result["Fy"] = result["Fy"].widened(FORCE_DOUBT * slid.sliding * np.abs(force))
+            if "Fz" in result:
+                result["Fz"] = result["Fz"].widened(LOAD_DOUBT * slid.sliding * np.abs(load))
+
+    def _slip_angle(
+        self,
+        model: AngleModel,
+        values: Mapping[str, FloatArray],
+        load: FloatArray,
+        spread: FloatArray,
+        slid: Told | None,
+    ) -> Estimate:
+        """Return the slip angle; valid where road and tread leave it known."""
+        angle, std = model.predict(values, spread)
+        slope = np.abs(model.polynomial.slope(values, "utilisation"))
+        told = np.isfinite(angle)
+        if slid is not None:
+            flatter = np.sqrt(
+                np.fmax(slid.slope**2 - slope**2, 0.0)
+            )  # than where it was calibrated
+            angle, told = angle + slid.change, np.isfinite(slid.std)
+            std = np.sqrt(std**2 + slid.std**2 + (np.fmax(model.blur, spread) * flatter) ** 2)
+            slope = slid.slope
+        harder, unknown = self.road.hardened(values)
+        # a stiffer tread hides load, so the utilisation seems larger, and turns it into more force
+        hidden = self._load_per_hardening() / np.abs(load)
+        both = slope * np.abs(values["utilisation"]) * hidden + CORNERING * np.abs(angle)
+        doubt = both * np.hypot(unknown, LAW_DOUBT * harder)
+        std = np.fmin(np.hypot(std, doubt), WIDEST)
+        return Estimate(angle * (1.0 - CORNERING * harder), std, told)
+
+    def _load_per_hardening(self) -> float:
+        """Return the load that a tread of e times the stiffness hides, [N]."""
+        ends = {known.name: known for known in self.guards["Fz"]}
+        if not {"Fz", "contact_angle"} <= set(ends) or not self.laws.radius > 0.0:
+            return 0.0
+        load, angle = ends["Fz"], ends["contact_angle"]
+        per_angle = (load.high - load.low) / max(angle.high - angle.low, LEAST_REACH)
+        return per_angle * EDGE / self.laws.radius
+
+    def _slid(
+        self, values: Mapping[str, FloatArray], force: FloatArray, load: FloatArray
+    ) -> Told | None:
+        """Return what is known of a tread that slides more than it was calibrated."""
+        curve = self.sliding
+        if curve is None:
+            return None
+        camber, friction = np.nan_to_num(values["camber"]), values["friction"]
+        load = np.maximum(load, 1.0)
+        used = -force / load - curve.camber[0] * camber
+        side = np.where(used < 0.0, -1.0, 1.0)
+        unseen = self.road.unseen_friction(curve.friction)
+        known = np.isfinite(friction)
+        told = curve.at(np.abs(used), load, np.where(known, friction, curve.friction))
+        if not known.all():
+            moment, std = np.zeros_like(used), np.full_like(used, np.inf)
+            if self.moment is not None:
+                moment, std = self.moment.predict(values)
+                moment = (moment / load - curve.camber[1] * camber) * side
+                doubt = np.hypot(curve.misfit, MOMENT_DOUBT * unseen * curve.largest)
+                std = np.hypot(std / load, doubt)
+            widest = max([known.high for known in self.guards["alpha"] if known.name == "alpha"]
+                         or [WIDEST])  # fmt: skip
+            told = told.where(known, curve.told(np.abs(used), moment, std, load, widest))
+        return replace(told, change=side * told.change, sliding=unseen * told.sliding)
 
     def _rolling_radius(
         self, values: Mapping[str, FloatArray], load: Estimate | None
@@ -186,14 +280,22 @@ class Chain:
         at_reference, _ = model.predict({**at, "load": load_here})
         std = np.hypot(std, RADIUS_SHARE * np.abs(radius - at_reference))
         std = np.hypot(std, RADIUS_DOUBT * radius * self.laws.speed_departure(values))
+        worn, unknown = self.road.worn(values)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            share = np.fmin(BENT / values["contact_angle"], 1.0)
+        doubt = share * np.hypot(unknown, LAW_DOUBT * worn)
         if any(variable.name == "load" for variable in model.variables):
-            slope = np.abs(model.slope(at, "load"))
-            doubt = 0.5 * self.mean_load * slope
+            per_load = np.abs(model.slope(at, "load"))
+            away = 0.5 * self.mean_load * per_load
             if load is not None:
                 told = model.predict({**at, "load": self.laws.equivalent_load(load.value, values)})
-                doubt = np.where(known, slope * load.std, np.fmax(doubt, np.abs(told[0] - radius)))
-            std = np.hypot(std, doubt)
-        return radius, std
+                away = np.fmax(away, np.abs(told[0] - radius))
+                away = np.where(known, per_load * load.std, away)
+            std = np.hypot(std, away)
+            harder, unknown = self.road.hardened(values)
+            hidden = self._load_per_hardening() * np.hypot(unknown, LAW_DOUBT * harder)
+            doubt = doubt + per_load * hidden  # one tread is behind both
+        return radius - share * worn, np.hypot(std, doubt)
 
     def _carried(self, quantity: str) -> tuple[Polynomial, ...]:
         """Return the models on whose calibrated data a quantity stands.

@@ -90,6 +90,9 @@ def compute_regressors(features: Features, gages: Sequence[int]) -> dict[str, Fl
         "pressure": features.pressure,
         "speed": features.speed,
         "camber": features.camber,
+        "friction": features.friction,
+        "tread_depth": features.tread_depth,
+        "tread_temperature": features.tread_temperature,
     }
 
 

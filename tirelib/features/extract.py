@@ -62,6 +62,8 @@ class Features:
         Strain opposite the contact.
     time, ready, period, omega, speed, pressure, camber, axis_shift
         Of the turn, SI.
+    friction, tread_depth, tread_temperature
+        What was said of road and tread, SI.
     flags, gage_flags
         `TurnFlag` bits.
     lateral : shape (n_gages,), [m]
@@ -90,6 +92,9 @@ class Features:
     speed: FloatArray
     pressure: FloatArray
     camber: FloatArray
+    friction: FloatArray
+    tread_depth: FloatArray
+    tread_temperature: FloatArray
     axis_shift: FloatArray
     flags: IntArray
     gage_flags: IntArray
@@ -159,6 +164,9 @@ def extract_features(turns: Turns) -> Features:
         speed=trace.conditions.speed,
         pressure=trace.conditions.pressure,
         camber=trace.conditions.camber,
+        friction=turns.friction,
+        tread_depth=turns.tread_depth,
+        tread_temperature=turns.tread_temperature,
         axis_shift=trace.axis_shift,
         flags=turns.flags | weak.max(axis=1, initial=0),
         gage_flags=turns.gage_flags | weak,

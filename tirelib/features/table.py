@@ -35,6 +35,9 @@ PER_TURN = {
     "speed": "m/s",
     "pressure": "Pa",
     "camber": "rad",
+    "friction": "1",
+    "tread_depth": "m",
+    "tread_temperature": "K",
     "axis_shift": "rad",
 }
 """Columns of one turn with their units."""

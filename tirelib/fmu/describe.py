@@ -24,6 +24,7 @@ UNITS: Mapping[str, tuple[dict[str, str], dict[str, float]]] = {
     "Hz": ({"s": "-1"}, {"kHz": 1e-3}),
     "1/s": ({"s": "-1"}, {"ustrain/s": 1e6}),
     "kg": ({"kg": "1"}, {}),
+    "K": ({"K": "1"}, {}),
     "m/s2": ({"m": "1", "s": "-2"}, {}),
 }
 """Exponents of the base units, and factors of the display units, of every unit in use."""
@@ -40,6 +41,7 @@ TYPES: Mapping[str, tuple[str, str | None, str]] = {
     "TurnRate": ("rad/s", "rpm", "turn rate"),
     "Time": ("s", "ms", "time"),
     "Frequency": ("Hz", "kHz", "frequency"),
+    "Temperature": ("K", None, "temperature"),
     "Mass": ("kg", None, "mass"),
     "Acceleration": ("m/s2", None, "acceleration"),
 }

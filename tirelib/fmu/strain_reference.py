@@ -20,6 +20,7 @@ from tirelib.estimators.reference_turn import ReferenceTurn
 from tirelib.fmu.reference import Reference, contact_strain
 from tirelib.fmu.variables import inputs, outputs
 from tirelib.fmu.wheel import Wheel
+from tirelib.held import HELD
 from tirelib.stream.estimator import StreamEstimator
 
 TURNS, STILL = 6.4, 2.3
@@ -73,10 +74,11 @@ def strain_reference(
     rows = [_row(wheel)]
     strains = [v.name for v in inputs(calibration.lateral, samples) if v.name[:7] == "strain_"]
     frames = np.stack([given[name] for name in strains], axis=1)
+    conditions = [getattr(scene, name, math.nan) for name in HELD]
     for at in range(counts.size - 1):
         wheel.step(
-            frames[at].tolist(), step, not lost[at], scene.speed, scene.pressure, scene.camber,
-            scene.omega, count=int(counts[at]) if buffered else None,
+            frames[at].tolist(), step, not lost[at], *conditions,
+            count=int(counts[at]) if buffered else None,
         )  # fmt: skip
         rows.append(_row(wheel))
     table = np.array(rows)
@@ -107,8 +109,7 @@ def _inputs(
         frames[at, :count] = strain[:, first : first + count].T
         first += int(count)
     flat = frames.reshape(n, -1)
-    names = ("speed", "pressure", "camber", "omega")
-    held = {name: getattr(scene, name) for name in names}
+    held = {name: getattr(scene, name, math.nan) for name in HELD}
     given: dict[str, FloatArray] = {}
     for column, variable in enumerate(inputs(calibration.lateral, samples, buffered=buffered)):
         if variable.name in held:

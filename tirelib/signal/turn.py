@@ -28,6 +28,9 @@ class Turn:
     speed: float
     pressure: float
     camber: float
+    friction: float
+    tread_depth: float
+    tread_temperature: float
     offset: FloatArray
     mean: FloatArray
     strain: FloatArray
@@ -48,6 +51,8 @@ class Turns:
         Strain opposite the contact: hoop strain of inflation and speed, and the gage's zero.
     mean : shape (n, n_gages), [-]
         Mean strain of the preceding turn, less the offset.
+    friction, tread_depth, tread_temperature : shape (n,), [1], [m], [K]
+        What was said of road and tread; NaN where unknown.
     gage_flags : shape (n, n_gages); flags : shape (n,)
         `TurnFlag` bits.
     rate_hz : float, [Hz]
@@ -59,6 +64,9 @@ class Turns:
     period: FloatArray
     offset: FloatArray
     mean: FloatArray
+    friction: FloatArray
+    tread_depth: FloatArray
+    tread_temperature: FloatArray
     gage_flags: IntArray
     flags: IntArray
     rate_hz: float
@@ -98,6 +106,9 @@ def stack_turns(turns: Sequence[Turn], lateral: FloatArray, rate: float) -> Turn
         period=column("period"),
         offset=rows("offset", gages),
         mean=rows("mean", gages),
+        friction=column("friction"),
+        tread_depth=column("tread_depth"),
+        tread_temperature=column("tread_temperature"),
         gage_flags=rows("gage_flags", gages).astype(np.int64),
         flags=column("flags").astype(np.int64),
         rate_hz=rate,

@@ -211,6 +211,9 @@ class TurnCutter:
             speed=np.nan,
             pressure=np.nan,
             camber=np.nan,
+            friction=np.nan,
+            tread_depth=np.nan,
+            tread_temperature=np.nan,
             offset=unknown,
             mean=unknown,
             strain=empty,
@@ -251,8 +254,12 @@ class TurnCutter:
         conditions, _ = self._mean(
             slice(self._gages, self._gages + len(HELD)), before.middle, contact.middle
         )
-        speed, pressure = (float(conditions[HELD.index(name)]) for name in ("speed", "pressure"))
-        camber = self._in_contact(self._gages + HELD.index("camber"), contact)
+        known = dict(zip(HELD, conditions.tolist(), strict=True))
+        speed = known["speed"]
+        camber, friction = (
+            self._in_contact(self._gages + HELD.index(name), contact)
+            for name in ("camber", "friction")
+        )
         if not np.isfinite(speed) or speed == 0.0:
             flags |= TurnFlag.NO_SPEED
             speed = np.nan  # a wheel that turns does not stand
@@ -273,8 +280,11 @@ class TurnCutter:
             pulse=pulse,
             axis_shift=axis_shift,
             speed=speed,
-            pressure=pressure,
+            pressure=known["pressure"],
             camber=camber,
+            friction=friction,
+            tread_depth=known["tread_depth"],
+            tread_temperature=known["tread_temperature"],
             offset=offset,
             mean=mean,
             strain=strain,

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from tests.fmu import live
 from tests.synthetic import frames as cut
 from tirelib.flags import TurnFlag
+from tirelib.held import HELD
 from tirelib.signal.turns import TurnCutter
 from tirelib.stream import StreamEstimator
 from tirelib.stream.backlog import MOST, quiet_range
@@ -40,8 +41,9 @@ def spoilt(kind: str) -> np.ndarray:
 
 def held(at: int) -> dict[str, Any]:
     """Conditions that change now and then."""
-    return {"speed": live.SPEED + 0.01 * (at // 300), "pressure": live.PRESSURE,
-            "camber": 0.0 if at % 700 else 0.01, "omega": math.nan}  # fmt: skip
+    known = {"speed": live.SPEED + 0.01 * (at // 300), "pressure": live.PRESSURE,
+             "camber": 0.0 if at % 700 else 0.01, "friction": 0.5 + 0.1 * (at // 500)}  # fmt: skip
+    return {name: known.get(name, math.nan) for name in HELD}
 
 
 def told(estimator: StreamEstimator) -> Any:

@@ -1,0 +1,115 @@
+r"""What nobody measures on the road: friction, tread depth and tread temperature.
+
+Each is *known* (a channel, a column, an input), or it is *unknown* and counts as spread evenly over
+the range declared here. What a calibration has varied it knows: only what lies beyond its own range
+is a departure. A calibration that says nothing was made with a new tread.
+
+**Tread.** A bristle's stiffness is a modulus over its height, so a worn or a cold tread is stiffer:
+with :math:`h` the rubber between belt and road and :math:`T` its temperature,
+
+.. math:: L = \ln\frac{k}{k_0} = \ln\frac{h_0}{h} - \beta (T - T_0)
+
+The belt bends onto the road over a length that the tread's compression d allows,
+:math:`e = \sqrt{2 \rho d}` at each end. It shrinks as :math:`e \propto k^{-1/2}`, so the contact
+angle read from the strain loses :math:`e L / R` at the same load: a constant load, because the load
+grows evenly with the contact angle. The tread that wears carries the wheel where the belt is still
+bent, so it takes part in the rolling radius by the share :math:`b / \varphi` of the contact angle.
+The lateral stiffness of the tread is one of the springs behind the cornering stiffness, which
+grows as :math:`C \propto k^{0.3}`.
+
+**Friction** acts through sliding: `tirelib.estimators.sliding`.
+
+Constants were measured on the numerical rig and are held against other tires by
+``python build/road/coverage.py``; `docs/estimators.md` shows half and double of each.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+
+Pair = tuple[float, float]
+
+FRICTION: Pair = (0.3, 1.1)
+"""An unknown friction: from packed snow to a dry, rough road."""
+DEPTH: Pair = (0.004, 0.008)
+"""An unknown tread depth, [m]; the upper end is a new tread."""
+TEMPERATURE = 15.0
+"""An unknown tread temperature is that of the calibration within so much, [K]."""
+UNDER_GROOVES = 0.0035
+"""Rubber between the grooves' bottom and the belt, [m]."""
+SOFTENING = 0.006
+"""Relative loss of the tread's modulus per kelvin, [1/K]."""
+EDGE = 0.012
+"""Contact length that a tread of e times the stiffness loses, both ends together, [m]."""
+BENT = 0.145
+"""Contact angle over which the belt is still bent, [rad]."""
+CORNERING = 0.3
+"""Power of the tread's stiffness with which the cornering stiffness grows."""
+FORCE = 0.08
+"""Relative standard deviation of Fy per unit of L."""
+LAW_DOUBT = 0.3
+"""Relative standard deviation of a correction for a known tread."""
+TWO_SIGMA = 1.96
+
+
+@dataclass(frozen=True, slots=True)
+class Road:
+    """Friction [1], tread depth [m] and tread temperature [K] of a calibration.
+
+    Each is the range that its data cover; NaN where nobody wrote it down.
+    """
+
+    friction: Pair = (np.nan, np.nan)
+    tread_depth: Pair = (np.nan, np.nan)
+    tread_temperature: Pair = (np.nan, np.nan)
+
+    @property
+    def depth(self) -> Pair:
+        """Calibrated tread depth, [m]; that of a new tread where it is not known."""
+        return (DEPTH[1], DEPTH[1]) if np.isnan(self.tread_depth[0]) else self.tread_depth
+
+    def unseen_friction(self, reference: float) -> float:
+        """Return which share of the way down to the lowest friction no data cover, 0 to 1."""
+        lowest = reference if np.isnan(self.friction[0]) else self.friction[0]
+        share = np.log(lowest / FRICTION[0]) / np.log(
+            max(reference, 2.0 * FRICTION[0]) / FRICTION[0]
+        )
+        return float(np.clip(share, 0.0, 1.0))
+
+    def worn(self, values: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+        """Return the tread lost beyond what was calibrated and its standard deviation, [m]."""
+        depth = values["tread_depth"]
+        lost = -beyond(depth, self.depth)
+        known = np.isfinite(lost)
+        unknown = spread(beyond(np.linspace(*DEPTH, 81), self.depth))
+        return np.where(known, lost, 0.0), np.where(known, 0.0, unknown)
+
+    def hardened(self, values: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+        """Return L, how much stiffer the tread is than calibrated, and its standard deviation."""
+        depth, low_high = values["tread_depth"], self.depth
+        wear = -_log_height(depth, low_high)
+        known = np.isfinite(wear)
+        std = np.where(known, 0.0, spread(_log_height(np.linspace(*DEPTH, 81), low_high)))
+        warmer = beyond(values["tread_temperature"], self.tread_temperature)
+        told = np.isfinite(warmer)
+        unknown = SOFTENING * spread(np.linspace(-TEMPERATURE, TEMPERATURE, 81))
+        value = np.where(known, wear, 0.0) - np.where(told, SOFTENING * warmer, 0.0)
+        return value, np.hypot(std, np.where(told, 0.0, unknown))
+
+
+def beyond(x: FloatArray, low_high: Pair) -> FloatArray:
+    """Return how far values lie below (negative) or above a range; NaN where unknown."""
+    return np.asarray(x - np.clip(x, *low_high), dtype=np.float64)
+
+
+def spread(departure: FloatArray) -> float:
+    """Return the standard deviation whose 95 % interval holds 95 % of the departures."""
+    return float(np.quantile(np.abs(departure), 0.95)) / TWO_SIGMA
+
+
+def _log_height(depth: FloatArray, low_high: Pair) -> FloatArray:
+    inside = np.clip(depth, *low_high)
+    return np.asarray(np.log((depth + UNDER_GROOVES) / (inside + UNDER_GROOVES)))
