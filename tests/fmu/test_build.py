@@ -14,6 +14,7 @@ from fmpy import extract, read_model_description
 from fmpy.validation import validate_fmu
 
 from tests.fmu import live, virtual_host
+from tests.fmu.player import CONDITIONS
 from tirelib.errors import FormatError, ParameterError
 from tirelib.flags import TurnFlag
 from tirelib.fmu.build import build_fmu, embedded_calibration, source_file
