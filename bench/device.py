@@ -7,7 +7,8 @@
 
     [gages]
     lateral_m   = [0.06, 0.03, 0.0, -0.03, -0.06]   # ISO 8855, left positive, as strain_1 .. _5
-    zero_counts = [0, 0, 0, 0, 0]
+    zero_counts = [0, 0, 0, 0, 0]                   # `tirebench zero` finds them
+    gain        = [1, 1, 1, 1, 1]                   # of a shunt calibration, `tirebench shunt`
 
     [scale]                    # either: strain per count ...
     strain_per_count = 6.103515625e-7
@@ -43,17 +44,19 @@ from tirelib.arrays import BoolArray, FloatArray
 FORMAT = "tirebench-device/1"
 _KNOWN = {
     "": {"format", "name", "gages", "scale", "bridge"},
-    "gages": {"lateral_m", "zero_counts"},
+    "gages": {"lateral_m", "zero_counts", "gain"},
     "scale": {"strain_per_count"},
     "bridge": {"gage_factor", "excitation_V", "volt_per_count"},
 }
+GAIN_RANGE = 0.2, 5.0
+"""A gage beyond these gains is not the one that the file speaks of."""
 _SATURATED = int(FrameFlag.SATURATED)
 _GAGE_BITS = 1 << np.arange(GAGES)
 
 
 @dataclass(frozen=True, slots=True)
 class Device:
-    """How counts become strain: ``strain = scale * (counts - zero)``.
+    """How counts become strain: ``strain = scale * gain * (counts - zero)``.
 
     Attributes
     ----------
@@ -66,6 +69,8 @@ class Device:
         Gage positions, ISO; None where the file does not say.
     lowest, highest : float
         Counts at the ends of the range, which mean saturation.
+    gain : tuple of 5 float
+        Of each gage, from a shunt calibration.
     """
 
     name: str = "default"
@@ -74,6 +79,7 @@ class Device:
     lateral: tuple[float, ...] | None = None
     lowest: float = LOWEST
     highest: float = HIGHEST
+    gain: tuple[float, ...] = (1.0,) * GAGES
 
     def strain(self, counts: CountArray, flags: IntArray) -> tuple[FloatArray, BoolArray]:
         """Return the strain of frames, shape (m * n, n_gages), and where a gage was saturated.
@@ -87,30 +93,46 @@ class Device:
         if (flags & _SATURATED).any():
             named = (flags[:, None] & _GAGE_BITS) != 0
             saturated |= (named & ~saturated.any(axis=1))[:, None, :]
-        strain = (counts - self._zero(gages)) * self.scale
+        strain = (counts - self.zero_of(gages)) * self._scales(gages)
         if saturated.any():
             strain = np.where(saturated, np.nan, strain)
         return strain.reshape(m * n, gages), saturated.reshape(m * n, gages)
 
-    def _zero(self, gages: int) -> FloatArray:
+    def zero_of(self, gages: int) -> FloatArray:
         """Return the counts at strain zero of so many gages."""
-        if len(self.zero) != gages and any(self.zero):
+        return self._of_each(self.zero, gages, 0.0)
+
+    def gain_of(self, gages: int) -> FloatArray:
+        """Return the gains of so many gages."""
+        return self._of_each(self.gain, gages, 1.0)
+
+    def _of_each(self, known: tuple[float, ...], gages: int, usual: float) -> FloatArray:
+        """Return zeros or gains of so many gages."""
+        if all(one == usual for one in known):
+            return np.full(gages, usual)
+        if len(known) != gages:
             raise DeviceError(
-                f"the device {self.name!r} has zeros of {len(self.zero)} gages, its wheel sends "
-                f"{gages}; both must agree; take the device file of this wheel"
+                f"the device {self.name!r} has zeros or gains of {len(known)} gages, its wheel "
+                f"sends {gages}; both must agree; take the device file of this wheel"
             )
-        return np.asarray(self.zero) if any(self.zero) else np.zeros(gages)
+        return np.asarray(known)
 
     def counts(self, strain: FloatArray) -> tuple[Int16Array, BoolArray]:
         """Return counts of shape (n, 5) and where they are saturated; the inverse of `strain`.
 
         What is out of range or not finite gets the mark of saturation.
         """
-        exact = np.rint(strain / self.scale + self._zero(strain.shape[-1]))
+        gages = strain.shape[-1]
+        exact = np.rint(strain / self._scales(gages) + self.zero_of(gages))
         high, low = exact >= HIGHEST, ~(exact > LOWEST)  # NaN counts as low
         inside = np.where(high | low, 0.0, exact).astype(np.int16)
         marked = np.where(high, HIGHEST, np.where(low, LOWEST, inside)).astype(np.int16)
         return marked, high | low
+
+    def _scales(self, gages: int) -> FloatArray | float:
+        """Strain per count, of each gage where they differ: one number keeps a count exact."""
+        equal = all(one == 1.0 for one in self.gain)
+        return self.scale if equal else self.scale * self.gain_of(gages)
 
     def check_layout(self, lateral: Sequence[float], where: str, gages: int = GAGES) -> None:
         """Refuse data of another gage layout, or of another number of gages.
@@ -169,13 +191,16 @@ def parse_device(text: str, where: str) -> Device:
     gages = gages if isinstance(gages, dict) else {}
     zero = _numbers(gages, "zero_counts", where, faults, LOWEST, HIGHEST)
     lateral = _numbers(gages, "lateral_m", where, faults, -0.5, 0.5)
-    if zero and lateral and len(zero) != len(lateral):
-        faults.append(f"{where}: gages.zero_counts has {len(zero)} numbers, lateral_m "
-                      f"{len(lateral)}; one a gage is needed; correct them")  # fmt: skip
+    gain = _numbers(gages, "gain", where, faults, *GAIN_RANGE)
+    for key, given in (("zero_counts", zero), ("gain", gain)):
+        if given and lateral and len(given) != len(lateral):
+            faults.append(f"{where}: gages.{key} has {len(given)} numbers, lateral_m "
+                          f"{len(lateral)}; one a gage is needed; correct them")  # fmt: skip
     if faults:
         raise DeviceError(faults)
     name = str(document.get("name", Path(where).stem))
-    return Device(name, scale, zero or (0.0,) * GAGES, lateral)
+    gain = gain or (1.0,) * GAGES
+    return Device(name, scale, zero or (0.0,) * GAGES, lateral, gain=gain)
 
 
 def _unknown_keys(document: dict[str, Any], where: str) -> list[str]:

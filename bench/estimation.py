@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from bench.chain import RESTARTED, Chain, Estimator, Jump, Place, Turn
 from bench.conditions import Conditions
 from bench.page.laps import Laps
+from bench.standing import Level, Levels
 from bench.timeline import Samples
 from bench.wheels import Block
 
@@ -28,6 +29,8 @@ class News:
     alarms : list of str
         What the user has to know at once: nothing can be recorded, or it can again.
     jumps : list of Jump
+    levels : list of Level
+        Strain of the last moments, for whoever looks.
     left_out : int
         Laps that were left out because the estimator was late.
     latency : list of float, [s]
@@ -39,6 +42,7 @@ class News:
     messages: list[str] = field(default_factory=list)
     alarms: list[str] = field(default_factory=list)
     jumps: list[Jump] = field(default_factory=list)
+    levels: list[Level] = field(default_factory=list)
     left_out: int = 0
     latency: list[float] = field(default_factory=list)
 
@@ -48,7 +52,7 @@ class News:
 
     def add(self, other: "News") -> None:
         """Add what came later."""
-        for name in ("turns", "laps", "messages", "alarms", "jumps", "latency"):
+        for name in ("turns", "laps", "messages", "alarms", "jumps", "levels", "latency"):
             getattr(self, name).extend(getattr(other, name))
         self.left_out += other.left_out
 
@@ -92,6 +96,7 @@ class WheelEstimation:
         self._turns = turns
         self._looked_at = laps
         self._laps: Laps | None = None
+        self._levels: Levels | None = None
 
     def take(self, block: Block, *, live: bool = False) -> News:
         """Take what comes next and return what came of it."""
@@ -103,6 +108,9 @@ class WheelEstimation:
                 self._laps = self._laps or Laps(block.wheel)
                 self._laps.samples(content)
         news = self._news(self._chain.take(block))
+        if self._looked_at and isinstance(content, Samples):
+            self._levels = self._levels or Levels(block.wheel)
+            news.levels = self._levels.take(content)
         if live and news.laps and time.monotonic_ns() - block.arrival > 1e9 * LATE:
             news.left_out, news.laps = len(news.laps), []
         return news

@@ -226,6 +226,11 @@ class Timeline:
         return self._time + self._frame_time
 
     @property
+    def device(self) -> Device:
+        """What the counts of the wheel mean."""
+        return self._device
+
+    @property
     def rate(self) -> float:
         """Sample rate of the gages, as the wheel says it, [Hz]; 0 before the first frame."""
         return 1.0 / (self._period * TICK) if self._period else 0.0

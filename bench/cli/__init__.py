@@ -11,7 +11,8 @@ from tirelib import __version__
 from tirelib.errors import TirelibError
 from tirelib.threads import bound_process
 
-VERBS = ("ports", "load", "emulate", "run", "record", "replay", "export", "repair")
+VERBS = ("ports", "load", "emulate", "run", "record", "zero", "shunt", "replay", "export",
+         "repair")  # fmt: skip
 """Verbs; each is the command of that name in the module of that name."""
 
 _EXAMPLE = """\b

@@ -93,10 +93,12 @@ class Shown:
         devices: Sequence[Device],
         conditions: Conditions,
         origin: str,
+        folder: Path,
     ) -> None:
         """Start what is to be shown and say where it is.
 
-        `conditions` are what is known beside a bus, `origin` says where they come from.
+        `conditions` are what is known beside a bus, `origin` says where they come from; device
+        files that the page asks for are written into `folder`.
         """
         choice, console = self._choice, self._console
         missing = [name for name in NEEDED if find_spec(name) is None]
@@ -106,7 +108,7 @@ class Shown:
         if not (choice.page or choice.terminal):
             return
         lateral = next((d.lateral for d in devices if d.lateral), None)
-        about = About(source.name, fmu.name, conditions=conditions, origin=origin)
+        about = About(source.name, fmu.name, conditions=conditions, origin=origin, folder=folder)
         if calibration is not None:
             about = replace(about, tire=calibration.tire, lateral=calibration.lateral)
         elif lateral is not None:

@@ -211,7 +211,8 @@ def run(
         stack.enter_context(shown)
         of_recording = link is not None and conditions is None
         said_by = "recording" if of_recording else sidecar.name if sidecar else "option"
-        shown.open(source, switch, fmu_file, calibration, known.devices, known.conditions, said_by)
+        shown.open(source, switch, fmu_file, calibration, known.devices, known.conditions, said_by,
+                   Path() if record is None else record.parent)  # fmt: skip
         journal = None if json_file is None else Journal(json_file)
         if journal is not None:
             stack.callback(journal.close)

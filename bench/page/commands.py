@@ -1,4 +1,4 @@
-"""What the viewers ask the run to do: set a marker, start or stop recording.
+"""What the viewers ask the run to do: set a marker, record, take the zero or a shunt of the gages.
 
 A command crosses from the page's process as JSON in one write of a pipe; the run asks for it
 between two reads and never waits. Nothing that a viewer sends names a file.
@@ -16,7 +16,7 @@ from bench.errors import BenchError, DeviceError
 
 LONGEST_MARKER = 200
 """Characters of a marker."""
-KINDS = ("marker", "record")
+KINDS = ("marker", "record", "zero", "shunt")
 NOTES = 20
 """Markers that the page lists."""
 ASK_EVERY = 0.05
@@ -30,26 +30,29 @@ class Command:
     Attributes
     ----------
     kind : str
-        ``marker`` or ``record``.
+        One of `KINDS`.
     text : str
-        Of a marker.
+        Of a marker; resistance of the gage and of the shunt, and gage factor, of a shunt.
     on : bool
-        Whether to record.
+        Whether to record; whether the shunt is on.
+    wheel : int
+        Of a zero or a shunt.
     """
 
     kind: str
     text: str = ""
     on: bool = False
+    wheel: int = 0
 
     def pack(self) -> bytes:
         """Return the command as bytes, short enough for one write of a pipe."""
-        return json.dumps([self.kind, self.text, self.on]).encode()
+        return json.dumps([self.kind, self.text, self.on, self.wheel]).encode()
 
     @classmethod
     def unpack(cls, data: bytes) -> "Command":
         """Return the command of `pack`, checked again."""
-        kind, text, on = json.loads(data)
-        return parse_command({"command": kind, "text": text, "on": on})
+        kind, text, on, wheel = json.loads(data)
+        return parse_command({"command": kind, "text": text, "on": on, "wheel": wheel})
 
 
 def parse_command(document: Any) -> Command:
@@ -65,14 +68,16 @@ def parse_command(document: Any) -> Command:
         raise DeviceError(
             f"command = {str(given)[:40]!r}; {' and '.join(KINDS)} are known; send one of them"
         )
-    text, on = document.get("text", ""), document.get("on", False)
+    text, on, wheel = (document.get(*one) for one in (("text", ""), ("on", False), ("wheel", 0)))
     printable = isinstance(text, str) and all(c.isprintable() for c in text)
-    if not printable or len(text) > LONGEST_MARKER or not isinstance(on, bool):
+    known = isinstance(wheel, int) and not isinstance(wheel, bool) and 0 <= wheel <= 255
+    if not printable or len(text) > LONGEST_MARKER or not isinstance(on, bool) or not known:
         raise DeviceError(
-            f"command = {given!r} with text of {len(str(text))} characters, on = {on!r}; a line of "
-            f"up to {LONGEST_MARKER} characters and true or false are needed; shorten it"
+            f"command = {given!r} with text of {len(str(text))} characters, on = {on!r}, wheel = "
+            f"{str(wheel)[:9]}; a line of up to {LONGEST_MARKER} characters, true or false, and "
+            "0 .. 255 are needed; correct it"
         )
-    return Command(str(given), text, on)
+    return Command(str(given), text, on, wheel)
 
 
 class Target(Protocol):
@@ -104,6 +109,16 @@ class Switch(Protocol):
         """End the recording that is going on, if there is one."""
 
 
+class Gages(Protocol):
+    """What takes the zero of gages, and their gain; each returns what it did, in words."""
+
+    def zero(self, wheel: int) -> str:
+        """Write a device file with the zero of a standing wheel."""
+
+    def shunt(self, wheel: int, on: bool, text: str) -> str:
+        """Remember the strain without the shunt; with it, write a device file with the gains."""
+
+
 class CommandDesk:
     """Take commands from the page and carry them out between two reads.
 
@@ -111,10 +126,13 @@ class CommandDesk:
     ----------
     switch : Switch or None
         None when there is nothing to record, as in a replay.
+    gages : Gages or None
+        None where they may not be set up, as in a replay.
     """
 
-    def __init__(self, switch: Switch | None) -> None:
+    def __init__(self, switch: Switch | None, gages: Gages | None = None) -> None:
         self._switch = switch
+        self._gages = gages
         self._pipes: list[Connection] = []
         self._next = 0.0
         self._markers = 0
@@ -148,7 +166,9 @@ class CommandDesk:
 
     def _carry_out(self, command: Command) -> None:
         switch = self._switch
-        if switch is None:
+        if command.kind in ("zero", "shunt"):
+            self._set_up(command)
+        elif switch is None:
             self._say(False, "this run cannot record: a recording is being replayed")
         elif command.kind == "marker":
             if switch.recorder is None:
@@ -164,6 +184,17 @@ class CommandDesk:
         else:
             switch.stop()
             self._say(True, "recording stopped")
+
+    def _set_up(self, command: Command) -> None:
+        if self._gages is None:
+            self._say(False, "gages are set up while a wheel sends: this is a replay")
+            return
+        if command.kind == "zero":
+            said = self._gages.zero(command.wheel)
+        else:
+            said = self._gages.shunt(command.wheel, command.on, command.text)
+        self.note({"event": command.kind, "wheel": command.wheel, "text": said})
+        self._say(True, said)
 
     def note(self, event: Mapping[str, Any]) -> None:
         """Write an event into the recording, where one goes on."""

@@ -9,6 +9,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -49,6 +50,8 @@ class About:
         Known beside what a bus tells.
     origin : str
         Where they come from, in words.
+    folder : Path
+        Where device files are written that the page asks for.
     """
 
     link: str
@@ -57,6 +60,7 @@ class About:
     lateral: tuple[float, ...] = (0.06, 0.03, 0.0, -0.03, -0.06)
     conditions: Conditions = NOTHING_KNOWN
     origin: str = "option"
+    folder: Path = Path()
 
 
 class Feed:

@@ -18,6 +18,7 @@ from bench.page.alarms import RULES, Rule
 from bench.page.board import Board
 from bench.page.commands import CommandDesk, Switch
 from bench.page.feed import About, Feed
+from bench.page.gages import GageSetup
 from bench.page.guard import bracketed
 from bench.session import Source
 
@@ -111,7 +112,8 @@ class LivePage:
         rules: Mapping[str, Rule] = RULES,
     ) -> None:
         self.url = ""
-        self.desk = CommandDesk(switch)
+        self._gages = GageSetup(source, about.folder)
+        self.desk = CommandDesk(switch, self._gages if source.live else None)
         self._choice = choice
         self._stack = ExitStack()
         self._kept: list[Kept] = []
@@ -142,6 +144,7 @@ class LivePage:
 
     def watch(self, news: News) -> None:
         """Show what is new, take commands and look after the page; called again and again."""
+        self._gages.watch(news.levels)
         self.feed.watch(news)
         self.desk.poll()
         now = time.monotonic()
@@ -171,7 +174,7 @@ class LivePage:
         return self._kept[0].process_id if self._kept else None
 
     def _state(self) -> dict[str, Any]:
-        return {**self.desk.state(), "chain": self._source.counts()}
+        return {**self.desk.state(), "gages": self._gages.state(), "chain": self._source.counts()}
 
     def _open_page(self) -> None:
         from bench.page.server import PagePlan, serve

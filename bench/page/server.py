@@ -41,6 +41,7 @@ STATIC = {
     "/page.js": ("page.js", "text/javascript; charset=utf-8"),
     "/all.js": ("all.js", "text/javascript; charset=utf-8"),
     "/format.js": ("format.js", "text/javascript; charset=utf-8"),
+    "/gages.js": ("gages.js", "text/javascript; charset=utf-8"),
     "/panels.js": ("panels.js", "text/javascript; charset=utf-8"),
     "/charts.js": ("charts.js", "text/javascript; charset=utf-8"),
     "/shape.js": ("shape.js", "text/javascript; charset=utf-8"),

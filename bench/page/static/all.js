@@ -69,6 +69,7 @@ export function drawAll(place, wheels, state, old, seconds) {
     for (const { key, digits, factor = 1 } of QUANTITIES) {
       const line = box.querySelector(`[data-key="${key}"]`);
       line.querySelector(".value").textContent = last ? shown(scaled(last[key], factor), digits) : "–";
+      line.querySelector(".value").classList.toggle("none", !last || last[key] === null);
       line.querySelector(".pm").textContent = limits(last, key, digits, factor);
       line.classList.toggle("invalid", Boolean(last) && !last[`${key}_valid`]);
     }

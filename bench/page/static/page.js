@@ -4,6 +4,7 @@ import { drawn, readColors, timeChart, traceChart } from "./charts.js";
 import {
   clock, limits, newest, node, QUANTITIES, reasons, scaled, series, shown, WIDTH,
 } from "./format.js";
+import { drawGages, listenGages, openGages } from "./gages.js";
 import { buildHealth, drawAlarms, drawHealth, drawLimits, drawUse } from "./panels.js";
 import { drawShape } from "./shape.js";
 
@@ -269,6 +270,8 @@ function drawState() {
   $("system").title = $("system").textContent;
   drawHealth($("health"), state.wheels, state.alarms);
   drawUse($("use-list"), state, app.wheel);
+  drawGages(state);
+  $("gages").disabled = !state.live || Boolean(state.ended) || app.wheel === null;
   const alarms = drawAlarms($("alarms"), state);
   $("alarms-count").textContent = alarms || "";
   $("alarm-list").dataset.count = alarms;
@@ -394,6 +397,7 @@ function alarmList() {
 }
 
 const KEYS = {
+  g: () => { if (!$("gages").disabled) { openGages(app.wheel); drawGages(app.state); } },
   r: record, m: marker, d: otherTheme, z: zoom, " ": hold,
   n: () => ($("marker").disabled ? marker() : setMarker("")),
   "+": () => window_(-1), "=": () => window_(-1), "-": () => window_(1),
@@ -447,6 +451,8 @@ function listen() {
   $("marker").onclick = marker;
   $("theme").onclick = otherTheme;
   $("help").onclick = KEYS["?"];
+  listenGages(send);
+  $("gages").onclick = () => KEYS.g();
   $("alarm-list").onclick = alarmList;
   $("alarm-close").onclick = () => $("alarm-box").close();
   $("help-close").onclick = () => $("help-box").close();
