@@ -72,7 +72,7 @@ class Levels:
 
 
 def standing_mean(levels: Sequence[Level], still: float = STILL) -> FloatArray:
-    """Return the mean strain of each gage, shape (n_gages,); NaN where a gage showed nothing at all.
+    """Return the mean strain of each gage, shape (n_gages,); NaN where it showed nothing.
 
     Raises
     ------
