@@ -48,6 +48,8 @@ class TurnFlag(IntFlag):
     """No contact for two turns (standstill, gages frozen or dead). Live only: a batch has turns."""
     FAULT = 262144
     """The estimator met an error that it did not expect; the log names it. Live only."""
+    OTHER_TIRE = 1048576
+    """The strain is not what the calibrated tire shows: another tire, or another state of it."""
 
 
 INVALIDATING = (
@@ -61,6 +63,7 @@ INVALIDATING = (
     | TurnFlag.NO_CONDITION
     | TurnFlag.NO_CONTACT
     | TurnFlag.FAULT
+    | TurnFlag.OTHER_TIRE
 )
 """Flags with which no estimate of the turn is valid."""
 

@@ -12,6 +12,7 @@ from tirelib.errors import CalibrationError
 from tirelib.features.extract import Features, extract_features
 from tirelib.flags import INVALIDATING
 from tirelib.signal import LowPass, cut_turns
+from tirelib.sizes import differing
 
 TRUTH = ("Fx", "Fy", "Fz", "Mz", "slip_angle", "slip_ratio")
 """Rig quantities that an estimate is held against."""
@@ -204,11 +205,23 @@ def same_tire(headers: Sequence[CampaignHeader]) -> None:
                 f"{other.name}: tire {other.tire.name!r} is not {first.tire.name!r} of "
                 f"{first.name}; a calibration holds for one tire; calibrate them apart"
             )
+        for name, given, known in differing(geometry_of(other), geometry_of(first)):
+            raise CalibrationError(
+                f"{other.name}: {name} of the tire is {1e3 * given:g} mm, of that of {first.name} "
+                f"{1e3 * known:g} mm; a calibration holds for one tire; calibrate them apart, or "
+                "mend campaign.toml"
+            )
         if not same_layout(other.gage_lateral, first.gage_lateral):
             raise CalibrationError(
                 f"{other.name}: gages at {other.gage_lateral} m, {first.name} has them at "
                 f"{first.gage_lateral} m; one calibration needs one layout"
             )
+
+
+def geometry_of(header: CampaignHeader) -> dict[str, float]:
+    """Return the dimensions of the tire that a header gives, [m]."""
+    size = {f.name: getattr(header.tire, f.name) for f in fields(header.tire) if f.name != "name"}
+    return {name: float(x) for name, x in size.items() if x is not None}
 
 
 def same_layout(a: Sequence[float], b: Sequence[float]) -> bool:

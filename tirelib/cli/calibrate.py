@@ -1,6 +1,6 @@
 """``tirelib calibrate``: fit the regressions on campaigns of one tire."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,7 @@ from tirelib.estimators.crossval import (
     leave_levels_out,
 )
 from tirelib.estimators.dissertation import SMALL_ANGLE, Regression
+from tirelib.estimators.mixed import strangers
 from tirelib.estimators.result import VARIED
 from tirelib.estimators.train import Trained, train
 from tirelib.estimators.typical import typical_turn
@@ -92,6 +93,12 @@ def calibrate(
     write_calibration(replace(trained.calibration, reference=turn), target, _provenance(document))
     console = output()
     _print(console, trained, document)
+    for odd in document["other_tire"]:
+        console.print(
+            f"another tire? {odd['turns']} of {odd['judged']} turns of {odd['name']} show strain "
+            f"that the tire of {odd['of']} does not (one in a thousand would by chance); look "
+            "whether both are of one tire in one state, else calibrate them apart"
+        )
     console.print(f"written: {target}")
     if json_file is not None:
         write_json(json_file, document)
@@ -160,6 +167,7 @@ def statistics(
             {"name": c.header.name, "runs": len(c.plans), "sha256": c.content_hash()}
             for c in campaigns
         ],
+        "other_tire": [asdict(odd) for odd in strangers(observations)],
         "turns": len(observations),
         "usable_turns": int(observations.usable.sum()),
         "in_use": in_use,

@@ -20,7 +20,7 @@ from tirelib.cli.common import (
 from tirelib.errors import CalibrationError
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.estimators.result import estimate_document
-from tirelib.observations import observe
+from tirelib.observations import geometry_of, observe
 from tirelib.signal import LowPass
 
 _EXAMPLE = """\b
@@ -29,7 +29,7 @@ Example:
 
 \b
 JSON: N, deg, kappa without unit, ISO 8855 axes; null where a quantity has no calibration or
-cannot be told. Exit code 1: not one turn is valid.
+cannot be told. Exit code 1: not one turn is valid, or the tire is probably another one.
 """
 
 
@@ -53,7 +53,10 @@ def estimate(
     """Estimate every turn of DIR, and compare with the rig where it measured."""
     calibration = read_calibration(calibration_file)
     campaign = read_campaign(folder)
-    calibration.check_layout(campaign.header.tire.name, campaign.header.gage_lateral, str(folder))
+    header = campaign.header
+    calibration.check_layout(
+        header.tire.name, header.gage_lateral, str(folder), geometry_of(header)
+    )
     if not campaign.header.gage_lateral:
         raise CalibrationError(f"{folder}: the campaign holds no strain; there is nothing to "
                                "estimate from")  # fmt: skip
@@ -72,7 +75,7 @@ def estimate(
 
         page = write_estimate_report(observations, estimates, calibration, report)
         console.print(f"written: {page}")
-    context.exit(0 if valid else 1)
+    context.exit(0 if valid and not document["other_tire"]["suspected"] else 1)
 
 
 def print_document(name: str, document: dict[str, Any]) -> int:
@@ -88,6 +91,13 @@ def print_document(name: str, document: dict[str, Any]) -> int:
             counts[flag] = counts.get(flag, 0) + 1
     for flag, count in sorted(counts.items(), key=lambda item: -item[1]):
         console.print(f"  {count:5d} turns flagged {flag}")
+    other = document["other_tire"]
+    if other["suspected"]:
+        console.print(
+            f"another tire? {other['turns']} of {other['judged']} turns in range show strain that "
+            f"the calibrated {document['tire']!r} does not (one in a thousand would by chance); "
+            "look whether this tire is on the wheel, worn or soft; else calibrate anew"
+        )
     return valid
 
 

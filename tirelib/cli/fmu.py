@@ -120,7 +120,7 @@ def run(context: click.Context, file: Path, folder: Path, json_file: Path | None
     if json_file is not None:
         write_json(json_file, document)
         output().print(f"written: {json_file}")
-    context.exit(0 if valid else 1)
+    context.exit(0 if valid and not document["other_tire"]["suspected"] else 1)
 
 
 @fmu.command(epilog=_CHECK)

@@ -22,6 +22,7 @@ from tirelib.estimators.fit_sliding import fit_sliding
 from tirelib.estimators.floor import with_floor
 from tirelib.estimators.grow import grow
 from tirelib.estimators.laws import ConditionLaws
+from tirelib.estimators.likeness_fit import fit_likeness
 from tirelib.estimators.polynomial import Polynomial, leverage
 from tirelib.estimators.ranges import with_ranges
 from tirelib.estimators.regressors import EVEN, ODD, compute_regressors
@@ -144,7 +145,7 @@ def calibrate_chain(
     groups = mean_by(unit, observations.group.astype(np.float64), rows).astype(np.int64)
     links = Links(np.unique(unit[rows]), groups, values, truth, nominal, {}, {}, {})
     say = progress or (lambda _: None)
-    laws = _laws(observations, values)
+    laws = laws_of(observations, values)
     load, mean_load = _fit_load(links, laws, say)
     radius = _or_refused(links, "kappa", lambda: _fit_radius(links, say))
     force = _or_refused(links, "Fy", lambda: _fit_force(links, say))
@@ -164,6 +165,13 @@ def calibrate_chain(
         sliding=sliding,
         road=_road(links),
     )
+    turns = {**regressors, "speed_squared": regressors["speed"] ** 2}
+    chain = replace(
+        chain,
+        likeness=fit_likeness(
+            values, groups, varying_of(values, list(VARIES)), turns, unit, rows
+        ),
+    )  # fmt: skip
     return with_ranges(with_floor(chain, regressors, unit, rows), values, truth), links
 
 
@@ -185,7 +193,7 @@ def _or_refused(links: Links, quantity: str, fit: Callable[[], Model | None]) ->
         return None
 
 
-def _varying(values: dict[str, FloatArray], names: Sequence[str]) -> set[str]:
+def varying_of(values: dict[str, FloatArray], names: Sequence[str]) -> set[str]:
     """Return the regressors that cover a range worth fitting."""
     return {
         name
@@ -196,9 +204,10 @@ def _varying(values: dict[str, FloatArray], names: Sequence[str]) -> set[str]:
     }
 
 
-def _laws(observations: Observations, values: dict[str, FloatArray]) -> ConditionLaws:
+def laws_of(observations: Observations, values: dict[str, FloatArray]) -> ConditionLaws:
+    """Return the laws of the conditions under which run means `values` were measured."""
     tire = observations.headers[0].tire
-    varying = _varying(values, ("pressure", "speed_squared"))
+    varying = varying_of(values, ("pressure", "speed_squared"))
 
     def limits(x: FloatArray) -> tuple[float, float]:
         return (float(x.min()), float(x.max())) if np.isfinite(x).all() else (np.nan, np.nan)
@@ -220,7 +229,7 @@ def _force_laws(links: Links, laws: ConditionLaws) -> ConditionLaws:
     if not cornering.any():
         return laws
     part = {name: x[cornering] for name, x in links.values.items()}
-    varying = _varying(part, ("pressure", "speed_squared"))
+    varying = varying_of(part, ("pressure", "speed_squared"))
 
     def limits(x: FloatArray) -> tuple[float, float]:
         return (float(x.min()), float(x.max())) if np.isfinite(x).all() else (np.nan, np.nan)
@@ -242,7 +251,7 @@ def _fit_load(
     reason = ""
     if not np.isfinite(mean):
         reason = "the rig measured no Fz in some run"
-    elif np.ptp(truth) < LEAST_LOAD * mean or "contact_angle" not in _varying(
+    elif np.ptp(truth) < LEAST_LOAD * mean or "contact_angle" not in varying_of(
         values, ["contact_angle"]
     ):
         reason = f"the load varies by {np.ptp(truth):.0f} N only; measure several loads"
@@ -252,7 +261,7 @@ def _fit_load(
         return None, mean
     say("Fz")
     correction, _ = laws.load_correction(values)
-    varying, level = _varying(values, list(VARIES)), links.load_level()
+    varying, level = varying_of(values, list(VARIES)), links.load_level()
     candidates = basis.load_candidates(varying)
     grown = grow(
         values, truth - correction, links.groups, candidates, basis.load_families(varying),
@@ -283,7 +292,7 @@ def _fit_radius(links: Links, say: Callable[[str], None]) -> Polynomial | None:
     say("kappa")
     part = {name: x[free] for name, x in values.items()}
     radius = part["speed"] * (1.0 + kappa[free]) / part["omega"]
-    varying = _varying(part, ["load", "pressure", "speed_squared"])
+    varying = varying_of(part, ["load", "pressure", "speed_squared"])
     if "Fz" in links.refused:
         varying.discard("load")
     groups = links.groups[free]
@@ -323,7 +332,7 @@ def _fit_force(links: Links, say: Callable[[str], None]) -> Polynomial | None:
 def _fit_odd(links: Links, truth: FloatArray, what: str) -> Fit:
     """Fit what changes its sign when left and right change places."""
     values = links.values
-    varying = _varying(values, list(VARIES))
+    varying = varying_of(values, list(VARIES))
     varying -= _frozen_with_slip(links, varying)
     candidates, odd = basis.force_candidates(varying), (*ODD, "camber")
     grown = grow(
@@ -374,7 +383,7 @@ def _frozen_with_slip(links: Links, varying: set[str]) -> set[str]:
     """Return the conditions that stand still wherever there is lateral force."""
     cornering = np.abs(links.truth["Fy"]) > 0.2 * np.abs(links.truth["Fy"]).max()
     part = {name: x[cornering] for name, x in links.values.items()}
-    return varying - _varying(part, sorted(varying))
+    return varying - varying_of(part, sorted(varying))
 
 
 def _fit_angle(
@@ -392,7 +401,7 @@ def _fit_angle(
         return None
     say("alpha")
     values["utilisation"] = links.held_out["Fy"] / values["load"]
-    varying = _varying(values, list(VARIES))
+    varying = varying_of(values, list(VARIES))
     varying -= _frozen_with_slip(links, varying)
     if "Fz" in links.refused:
         varying.discard("load")

@@ -1,7 +1,7 @@
 """A calibration: the chains of estimators of one tire and gage layout, with their statistics."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from tirelib.estimators.regressors import compute_regressors
 from tirelib.features.extract import Features
 from tirelib.flags import INVALIDATING, TurnFlag
 from tirelib.signal.quality import UNUSABLE
+from tirelib.sizes import differing
 from tirelib.threads import one_thread
 
 UNITS = {"Fz": "N", "alpha": "rad", "kappa": "1", "Fy": "N"}
@@ -92,6 +93,8 @@ class Calibration:
         Fixed cut-off, where one was chosen.
     reference : ReferenceTurn or None
         A measured turn that the calibration takes for valid.
+    geometry : mapping of str to float, [m]
+        Of the tire, as far as its campaigns gave it.
     """
 
     tire: str
@@ -101,8 +104,15 @@ class Calibration:
     order: float
     cut_off: float | None = None
     reference: ReferenceTurn | None = None
+    geometry: Mapping[str, float] = field(default_factory=dict)
 
-    def check_layout(self, tire: str, lateral: tuple[float, ...], where: str) -> None:
+    def check_layout(
+        self,
+        tire: str,
+        lateral: tuple[float, ...],
+        where: str,
+        geometry: Mapping[str, float] | None = None,
+    ) -> None:
         """Refuse data of another tire or gage layout.
 
         Raises
@@ -114,6 +124,11 @@ class Calibration:
             raise CalibrationError(
                 f"{where}: the tire is {tire!r}, the calibration is of {self.tire!r}; "
                 "calibrate on a campaign of this tire"
+            )
+        for name, given, known in differing(geometry or {}, self.geometry):
+            raise CalibrationError(
+                f"{where}: {name} of the tire is {1e3 * given:g} mm, of the calibrated one "
+                f"{1e3 * known:g} mm; calibrate on a campaign of this tire, or mend campaign.toml"
             )
         same = len(lateral) == len(self.lateral) and np.allclose(lateral, self.lateral, atol=1e-4)
         if not same:
@@ -133,7 +148,7 @@ class Calibration:
         radius = np.full(n, np.nan)
         traction = np.full(n, np.nan)
         out = (features.gage_flags & int(UNUSABLE)) != 0
-        extrapolated = np.zeros(n, dtype=np.bool_)
+        extrapolated, unlike = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
         missing = np.where(out.any(axis=1), out.argmax(axis=1), -1)
         missing[out.sum(axis=1) > 1] = -2
         for index in np.unique(missing):
@@ -146,6 +161,7 @@ class Calibration:
             part = {name: x[rows] for name, x in part.items()}
             estimates, radius[rows] = chain.predict(part)
             traction[rows] = part["traction"]
+            unlike[rows] = chain.unlike(part)
             extrapolated[rows] = chain.laws.extrapolated(part) | (
                 chain.force_laws.extrapolated(part) if chain.has("Fy") else False
             )
@@ -154,7 +170,9 @@ class Calibration:
                 std[quantity][rows] = estimate.std
                 valid[quantity][rows] = estimate.valid
             flags[rows] |= np.where(self._unknown_condition(chain, part), _NO_CONDITION, 0)
-        return self._finish(features, value, std, valid, flags, radius, traction, extrapolated)
+        return self._finish(
+            features, value, std, valid, flags, radius, traction, extrapolated, unlike
+        )
 
     @property
     def needed(self) -> tuple[str, ...]:
@@ -178,6 +196,7 @@ class Calibration:
         radius: FloatArray,
         traction: FloatArray,
         extrapolated: BoolArray,
+        unlike: BoolArray,
     ) -> Estimates:
         measured = (flags & int(INVALIDATING)) == 0
         full = self.chains[-1]
@@ -193,6 +212,9 @@ class Calibration:
             for row in np.flatnonzero(unfit):
                 notes[row].append(f"{quantity}_out_of_range")
             valid[quantity] &= measured
+        other = measured & in_range & unlike  # beyond the data nobody knows what it looks like
+        for quantity in QUANTITIES:
+            valid[quantity] &= ~other
         saturated = valid["alpha"] & (std["alpha"] > LARGEST_ANGLE_STD)
         valid["alpha"] &= ~saturated
         for row in np.flatnonzero(saturated):
@@ -200,6 +222,7 @@ class Calibration:
         for row in np.flatnonzero(extrapolated & measured):
             notes[row].append("condition_extrapolated")
         flags = flags | np.where(measured & ~in_range, int(TurnFlag.OUT_OF_RANGE), 0)
+        flags = flags | np.where(other, int(TurnFlag.OTHER_TIRE), 0)
         bad = ~measured
         for quantity in QUANTITIES:
             value[quantity] = np.where(bad, np.nan, value[quantity])
@@ -208,7 +231,7 @@ class Calibration:
             value=value,
             std=std,
             valid=valid,
-            turn_valid=measured & in_range,
+            turn_valid=measured & in_range & ~other,
             flags=flags,
             notes=tuple(tuple(row) for row in notes),
             rolling=self.rolling.classify(traction),

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from tirelib.estimators.likeness import DRIFT
 from tirelib.estimators.reference_turn import CONDITIONS
 from tirelib.estimators.regressors import EVEN, ODD, SHAPE
 
@@ -44,6 +45,9 @@ def faults(document: Mapping[str, Any]) -> Iterator[str]:
         yield f"chain: missing_gage = {seen}; each once, and 0 (none missing) among them"
     for index, chain in enumerate(chains):
         yield from _chain(chain, f"chain[{index}]", len(lateral))
+    geometry = document.get("geometry_m", {})
+    if not isinstance(geometry, dict) or not all(map(_finite, geometry.values())):
+        yield f"geometry_m = {geometry!r}; a table of finite numbers is needed"
     if "reference_turn" in document:
         yield from _reference_turn(document["reference_turn"], len(lateral))
 
@@ -75,6 +79,8 @@ def _chain(chain: Any, where: str, gages: int) -> Iterator[str]:
             yield from _model(chain[name], f"{where}.{name}", unit)
     if "alpha" in chain:
         yield from _numbers(chain, "alpha", ("blur", "bend"), where)
+    if "likeness" in chain:
+        yield from _likeness(chain["likeness"], f"{where}.likeness")
     if "cloud" in chain:
         yield from _cloud(chain["cloud"], f"{where}.cloud")
     if "road" in chain:
@@ -180,6 +186,47 @@ def _cloud(table: Any, where: str) -> Iterator[str]:
         yield f"{where}.mirrored = {table['mirrored']!r}; true or false is needed"
 
 
+def _likeness(table: Any, where: str) -> Iterator[str]:
+    if not isinstance(table, dict):
+        yield f"{where}: is no table"
+        return
+    if not _finite(table.get("limit")) or table["limit"] <= 0.0:
+        yield f"{where}.limit = {table.get('limit')!r}; a finite number above 0 is needed"
+    names, terms, variables = (table.get(k) for k in ("names", "exponents", "variable"))
+    if not isinstance(names, list) or not names or not set(names) <= set(DRIFT):
+        yield f"{where}.names = {names!r}; names of regressors are needed"
+        return
+    if not isinstance(variables, list) or not isinstance(terms, list) or not terms:
+        yield f"{where}: variable and exponents are needed"
+        return
+    yield from _variables(variables, where)
+    for position, powers in enumerate(terms):
+        good = isinstance(powers, list) and len(powers) == len(variables)
+        if not good or not all(_whole(p, 0, HIGHEST_POWER) for p in powers):
+            yield f"{where}.exponents[{position}] = {powers!r}; {len(variables)} whole numbers"
+    rows = table.get("coefficients")
+    if (
+        not isinstance(rows, list)
+        or len(rows) != len(terms)
+        or not all(
+            isinstance(row, list) and len(row) == len(names) and all(map(_finite, row))
+            for row in rows
+        )
+    ):
+        yield f"{where}.coefficients: {len(terms)} rows of {len(names)} finite numbers are needed"
+    yield from _covariance(table.get("covariance"), f"{where}.covariance", len(names))
+
+
+def _variables(variables: list[Any], where: str) -> Iterator[str]:
+    for position, variable in enumerate(variables):
+        if variable.get("name") not in REGRESSORS:
+            yield f"{where}.variable[{position}]: name = {variable.get('name')!r} is unknown"
+        if not _finite(variable.get("centre")) or not _finite(variable.get("scale")):
+            yield f"{where}.variable[{position}]: centre and scale must be finite numbers"
+        elif variable["scale"] == 0.0:
+            yield f"{where}.variable[{position}].scale = 0; another number is needed"
+
+
 def _pair(value: Any) -> bool:
     return isinstance(value, list) and len(value) == 2 and all(map(_finite, value))
 
@@ -202,13 +249,7 @@ def _model(table: Any, where: str, unit: str) -> Iterator[str]:
     if not isinstance(variables, list) or not isinstance(terms, list) or not terms:
         yield f"{where}: variable and term are needed"
         return
-    for position, variable in enumerate(variables):
-        if variable.get("name") not in REGRESSORS:
-            yield f"{where}.variable[{position}]: name = {variable.get('name')!r} is unknown"
-        if not _finite(variable.get("centre")) or not _finite(variable.get("scale")):
-            yield f"{where}.variable[{position}]: centre and scale must be finite numbers"
-        elif variable["scale"] == 0.0:
-            yield f"{where}.variable[{position}].scale = 0; another number is needed"
+    yield from _variables(variables, where)
     for position, term in enumerate(terms):
         powers = term.get("exponents")
         good = isinstance(powers, list) and len(powers) == len(variables)

@@ -22,6 +22,7 @@ from tirelib.estimators.calibration import Calibration, Rolling
 from tirelib.estimators.calibration_check import BORDER, faults
 from tirelib.estimators.chain import AngleModel, Chain
 from tirelib.estimators.laws import ConditionLaws
+from tirelib.estimators.likeness import Likeness
 from tirelib.estimators.polynomial import Cloud, Polynomial, Range, Variable
 from tirelib.estimators.reference_turn import ReferenceTurn
 from tirelib.estimators.sliding import SlidingCurve, brush_through
@@ -45,6 +46,7 @@ def write_calibration(
         "axes": "iso",
         "tire": calibration.tire,
         "lateral_m": list(calibration.lateral),
+        "geometry_m": dict(calibration.geometry),
         "filter": {"order": calibration.order},
         "rolling": {
             "centre": calibration.rolling.centre,
@@ -124,6 +126,7 @@ def _calibration(document: Mapping[str, Any]) -> Calibration:
     return Calibration(
         tire=str(document["tire"]),
         lateral=tuple(float(y) for y in document["lateral_m"]),
+        geometry={name: float(x) for name, x in document.get("geometry_m", {}).items()},
         chains={int(table["missing_gage"]) - 1: _chain(table) for table in document["chain"]},
         rolling=Rolling(
             float(document["rolling"]["centre"]), float(document["rolling"]["threshold"])
@@ -165,6 +168,8 @@ def _chain_table(chain: Chain) -> dict[str, Any]:
             for field in fields(curve)
         }
     models = {"Fz": chain.load, "R_eff": chain.radius, "Fy": chain.force, "Mz": chain.moment}
+    if chain.likeness is not None:
+        table["likeness"] = _likeness_table(chain.likeness)
     for name, model in models.items():
         if model is not None:
             table[name] = _polynomial_table(model, _MODEL_UNITS[name])
@@ -232,7 +237,38 @@ def _chain(table: Mapping[str, Any]) -> Chain:
         moment=_polynomial(table["Mz"]) if "Mz" in table else None,
         sliding=_sliding(table, angle),
         road=Road(**{name: _pair(pair) for name, pair in table.get("road", {}).items()}),
+        likeness=_likeness(table["likeness"]) if "likeness" in table else None,
     )  # fmt: skip
+
+
+def _likeness_table(known: Likeness) -> dict[str, Any]:
+    return {
+        "limit": known.limit,
+        "names": list(known.names),
+        "variable": _variables_table(known.variables),
+        "exponents": [list(term) for term in known.terms],
+        "coefficients": known.coefficients.tolist(),
+        "covariance": known.covariance.tolist(),
+    }
+
+
+def _likeness(table: Mapping[str, Any]) -> Likeness:
+    return Likeness(
+        variables=_variables(table["variable"]),
+        terms=tuple(tuple(int(e) for e in term) for term in table["exponents"]),
+        names=tuple(str(name) for name in table["names"]),
+        coefficients=np.asarray(table["coefficients"], dtype=np.float64),
+        covariance=np.asarray(table["covariance"], dtype=np.float64),
+        limit=float(table["limit"]),
+    )
+
+
+def _variables_table(variables: Sequence[Variable]) -> list[dict[str, Any]]:
+    return [{"name": v.name, "centre": v.centre, "scale": v.scale} for v in variables]
+
+
+def _variables(rows: Sequence[Mapping[str, Any]]) -> tuple[Variable, ...]:
+    return tuple(Variable(str(v["name"]), float(v["centre"]), float(v["scale"])) for v in rows)
 
 
 def _polynomial_table(model: Polynomial, unit: str) -> dict[str, Any]:
@@ -243,9 +279,7 @@ def _polynomial_table(model: Polynomial, unit: str) -> dict[str, Any]:
         "residual": model.residual,
         "floor": model.floor,
         **({} if border is None else {"border": asdict(border)}),
-        "variable": [
-            {"name": v.name, "centre": v.centre, "scale": v.scale} for v in model.variables
-        ],
+        "variable": _variables_table(model.variables),
         "term": [
             {
                 "name": name,
@@ -269,10 +303,7 @@ def _polynomial(table: Mapping[str, Any]) -> Polynomial:
     if covariance.shape != (len(terms), len(terms)):
         raise ValueError(f"covariance has shape {covariance.shape} for {len(terms)} terms")
     return Polynomial(
-        variables=tuple(
-            Variable(str(v["name"]), float(v["centre"]), float(v["scale"]))
-            for v in table["variable"]
-        ),
+        variables=_variables(table["variable"]),
         terms=tuple(tuple(int(e) for e in term["exponents"]) for term in terms),
         coefficients=np.array([float(term["value"]) for term in terms]),
         covariance=covariance,

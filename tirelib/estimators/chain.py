@@ -26,6 +26,7 @@ from tirelib.estimators.laws import (
     UNKNOWN_CAMBER,
     ConditionLaws,
 )
+from tirelib.estimators.likeness import Likeness
 from tirelib.estimators.polynomial import Cloud, Polynomial, Range, all_inside
 from tirelib.estimators.sliding import FORCE_DOUBT, LOAD_DOUBT, MOMENT_DOUBT, SlidingCurve, Told
 from tirelib.estimators.unknowns import BENT, CORNERING, EDGE, FORCE, LAW_DOUBT, Road
@@ -97,6 +98,8 @@ class Chain:
         The cornering curve on roads of other friction.
     road : Road
         Friction and tread of the calibration.
+    likeness : Likeness or None
+        What turns of the calibrated tire look like; None where too few conditions were measured.
     """
 
     gages: tuple[int, ...]
@@ -112,11 +115,20 @@ class Chain:
     moment: Polynomial | None = None
     sliding: SlidingCurve | None = None
     road: Road = field(default_factory=Road)
+    likeness: Likeness | None = None
 
     def has(self, quantity: str) -> bool:
         """Tell whether a quantity is calibrated."""
         model = {"Fz": self.load, "kappa": self.radius, "Fy": self.force, "alpha": self.angle}
         return model[quantity] is not None
+
+    def unlike(self, regressors: Mapping[str, FloatArray]) -> BoolArray:
+        """Tell which turns show strain that the calibrated tire does not, shape (n,)."""
+        if self.likeness is None:
+            return np.zeros(regressors["omega"].shape, dtype=np.bool_)
+        values = {**regressors, "speed_squared": regressors["speed"] ** 2}
+        apart = self.likeness.apart(values, self.laws)
+        return np.asarray(apart > self.likeness.limit, dtype=np.bool_)
 
     def predict(
         self, regressors: Mapping[str, FloatArray]

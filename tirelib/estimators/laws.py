@@ -154,6 +154,15 @@ class ConditionLaws:
         apart = np.maximum(squared - self.speed[1] ** 2, self.speed[0] ** 2 - squared)
         return np.asarray(np.fmax(apart, 0.0) / SPEED_UNIT, dtype=np.float64)
 
+    def pressure_departure(self, values: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+        """Return the relative change from the one calibrated pressure, and its own deviation."""
+        pressure = values["pressure"]
+        if self.pressure_fitted or not np.isfinite(self.reference_pressure):
+            return np.zeros_like(pressure), np.zeros_like(pressure)
+        apart = pressure / self.reference_pressure - 1.0
+        known = np.isfinite(apart)
+        return np.where(known, apart, 0.0), np.where(known, 0.0, UNKNOWN_PRESSURE)
+
     def extrapolated(self, values: Mapping[str, FloatArray]) -> BoolArray:
         """Tell which turns need a law instead of a calibration, shape (n,)."""
         apart = np.zeros(values["pressure"].shape, dtype=np.bool_)

@@ -10,7 +10,8 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.chain import QUANTITIES, Chain
-from tirelib.flags import flag_names
+from tirelib.estimators.likeness import suspected
+from tirelib.flags import TurnFlag, flag_names
 from tirelib.observations import Observations, mean_by
 
 FORMAT = "tirelib-estimate/1"
@@ -31,6 +32,7 @@ def estimate_document(
         "format": FORMAT,
         "axes": "iso",
         "tire": calibration.tire,
+        "other_tire": _other_tire(estimates),
         "summary": {
             quantity: _summary(quantity, observations, estimates, _floor(chain, quantity))
             if chain.has(quantity)
@@ -41,6 +43,14 @@ def estimate_document(
             _turn(row, observations, estimates, calibration) for row in range(len(observations))
         ],
     }
+
+
+def _other_tire(estimates: Estimates) -> dict[str, Any]:
+    """Return how many turns in range show another tire's strain, and whether that is no chance."""
+    unlike = (estimates.flags & int(TurnFlag.OTHER_TIRE)) != 0
+    judged = int((estimates.turn_valid | unlike).sum())
+    turns = int(unlike.sum())
+    return {"turns": turns, "judged": judged, "suspected": suspected(turns, judged)}
 
 
 def run_means(

@@ -12,7 +12,7 @@ from tirelib.estimators.calibration import Calibration, Rolling
 from tirelib.estimators.cornering import CorneringTrend, cornering_trend
 from tirelib.estimators.dissertation import Means, Regression, fit_all, means_for_tables
 from tirelib.estimators.regressors import compute_regressors
-from tirelib.observations import Observations, mean_by
+from tirelib.observations import Observations, geometry_of, mean_by
 from tirelib.signal import LowPass
 from tirelib.threads import one_thread
 
@@ -94,6 +94,7 @@ def train(
         rolling=_rolling(observations),
         order=filtered.order,
         cut_off=filtered.cut_off,
+        geometry=geometry_of(header),
     )
     regressors = compute_regressors(features, range(count))
     average = averaging(observations)

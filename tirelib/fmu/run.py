@@ -20,7 +20,7 @@ from tirelib.features.extract import Features
 from tirelib.flags import INVALIDATING, flag_names
 from tirelib.fmu.build import embedded_calibration
 from tirelib.held import HELD
-from tirelib.observations import SET_POINTS, TRUTH, Observations, truth_of
+from tirelib.observations import SET_POINTS, TRUTH, Observations, geometry_of, truth_of
 
 
 def keeping(messages: list[str]) -> Any:
@@ -228,7 +228,9 @@ def play_campaign(
         If tire or gage layout are not those of the FMU, or no contact is found.
     """
     header = campaign.header
-    fmu.calibration.check_layout(header.tire.name, header.gage_lateral, str(fmu.path))
+    fmu.calibration.check_layout(
+        header.tire.name, header.gage_lateral, str(fmu.path), geometry_of(header)
+    )
     rows: list[dict[str, Any]] = []
     truth: dict[str, list[FloatArray]] = {name: [] for name in TRUTH}
     for run in campaign.runs():

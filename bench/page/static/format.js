@@ -17,6 +17,7 @@ const REASONS = {
   reduced_gages: "one gage is out", too_few_gages: "too few gages",
   no_condition: "pressure or camber unknown", weak_edge: "contact edge not distinct",
   no_contact: "no contact: standstill or dead gages", fault: "the estimator met an error",
+  other_tire: "not the strain of the calibrated tire",
   accelerating: "the wheel changes its speed too fast",
   restarted: "the FMU was started again", skipped: "turns were skipped: overload",
 };

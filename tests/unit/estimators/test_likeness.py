@@ -1,0 +1,109 @@
+"""Another tire is told by its name, by its dimensions and by its strain; this one is not."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.synthetic import LATERAL, header, synthetic_run
+from tirelib.campaign import Campaign
+from tirelib.errors import CalibrationError
+from tirelib.estimators.calibration import Estimates
+from tirelib.estimators.calibration_file import read_calibration, write_calibration
+from tirelib.estimators.mixed import strangers
+from tirelib.estimators.result import estimate_document
+from tirelib.estimators.train import Trained
+from tirelib.features import Features
+from tirelib.flags import TurnFlag
+from tirelib.observations import Observations, measure_run, observe, same_tire
+
+
+def other(features: Features) -> Features:
+    """Return what a tire with longer edges of the contact would show: each edge is less steep."""
+    return replace(features, rate_lead=0.8 * features.rate_lead,
+                   rate_trail=0.8 * features.rate_trail)  # fmt: skip
+
+
+def flagged(found: Estimates) -> np.ndarray:
+    return (found.flags & int(TurnFlag.OTHER_TIRE)) != 0
+
+
+def test_another_day_of_the_same_tire_is_not_taken_for_another_tire(
+    trained: Trained, another_day: Campaign
+) -> None:
+    day = observe([another_day])
+    found = trained.calibration.estimate(day.features)
+    assert flagged(found).sum() <= 1
+    assert not estimate_document(day, found, trained.calibration)["other_tire"]["suspected"]
+
+
+def test_another_shape_of_the_contact_is_another_tire(
+    trained: Trained, another_day: Campaign
+) -> None:
+    day = observe([another_day])
+    strange = other(day.features)
+    found = trained.calibration.estimate(strange)
+    told = flagged(found)
+    assert told.sum() > 0.5 * len(day)
+    assert not found.turn_valid[told].any()
+    assert not any(found.valid[quantity][told].any() for quantity in found.valid)
+    assert np.isfinite(found.value["Fz"][told]).all()
+    document = estimate_document(
+        replace(day, features=strange), found, trained.calibration
+    )["other_tire"]  # fmt: skip
+    assert document["suspected"]
+    assert document["turns"] == told.sum()
+
+
+@pytest.mark.parametrize("outside", [{"load": 9500.0}, {"slip_ratio": -0.3}, {"pressure": 3.2e5}])
+def test_out_of_range_is_not_called_another_tire(
+    trained: Trained, outside: dict[str, float]
+) -> None:
+    features = measure_run(synthetic_run(0, **outside), header())[0]
+    assert not flagged(trained.calibration.estimate(features)).any()
+
+
+def test_a_file_keeps_what_the_tire_looks_like(trained: Trained, tmp_path: Path) -> None:
+    write_calibration(trained.calibration, tmp_path / "cal.toml")
+    again = read_calibration(tmp_path / "cal.toml")
+    strange = other(measure_run(synthetic_run(0), header())[0])
+    assert flagged(again.estimate(strange)).tolist() == flagged(
+        trained.calibration.estimate(strange)
+    ).tolist()  # fmt: skip
+    assert again.geometry == trained.calibration.geometry
+    assert again.geometry["free_radius"] == header().tire.free_radius
+
+
+def test_a_tire_of_other_dimensions_is_refused(trained: Trained) -> None:
+    calibration = trained.calibration
+    radius = calibration.geometry["free_radius"]
+    calibration.check_layout("made-up tire", LATERAL, "here", {"free_radius": 1.005 * radius})
+    with pytest.raises(CalibrationError, match="here: free_radius of the tire is"):
+        calibration.check_layout("made-up tire", LATERAL, "here", {"free_radius": 1.05 * radius})
+    first = header()
+    wider = replace(first, tire=replace(first.tire, free_radius=1.05 * first.tire.free_radius))
+    with pytest.raises(CalibrationError, match="calibrate them apart, or mend"):
+        same_tire([first, wider])
+
+
+def test_too_few_conditions_say_nothing_of_the_tire(observed: Observations) -> None:
+    from tirelib.estimators.calibrate import calibrate_chain
+    from tirelib.estimators.train import take
+
+    few = take(observed, observed.group < 10)
+    assert calibrate_chain(few, range(5))[0].likeness is None
+
+
+def test_a_calibration_of_two_tires_says_so(cornering: Campaign, another_day: Campaign) -> None:
+    both = observe([cornering, another_day])
+    assert strangers(both) == ()
+    second = both.campaign == 1
+    strange = other(both.features)
+    features = replace(
+        both.features,
+        rate_lead=np.where(second[:, None], strange.rate_lead, both.features.rate_lead),
+        rate_trail=np.where(second[:, None], strange.rate_trail, both.features.rate_trail),
+    )
+    (found,) = strangers(replace(both, features=features))
+    assert found.turns > 0.5 * found.judged

@@ -1,0 +1,109 @@
+r"""Whether the strain is that of the calibrated tire: how far a turn lies from what it can show.
+
+Contact angle, lateral distortion (CP1 slope), traction and the known conditions say what a turn of
+the calibrated tire looks like in everything else: compression, the other slopes, the shape of the
+contact. With r what the other regressors differ from that, and S the covariance of r over
+conditions that were held out and over single turns,
+
+.. math:: D^2 = r^T (S + K)^{-1} r / m
+
+is near 1 for the calibrated tire, m the number of regressors. Another tire, whose contact is
+otherwise shaped at the same contact angle, has more. `limit` is the value that a turn of the
+calibrated tire exceeds with the probability `FALSE_ALARM` (Hotelling; Johnson and Wichern, *Applied
+Multivariate Statistical Analysis*, section 5.4).
+
+Pressures and speeds that were not calibrated shift the regressors by `DRIFT`, as the rig's tires
+show it. The shift with pressure is taken off, and half of it is doubt; of that with speed tires
+agree less: twice its size is doubt. K holds both. Where a regressor that says where a turn lies is
+beyond its calibrated range, nobody knows what the tire looks like. Predicting needs numpy only.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.estimators.laws import ConditionLaws
+from tirelib.estimators.polynomial import Term, Variable, design
+
+DRIFT = {
+    "compression": (0.0168, 0.0018),
+    "cp2_slope": (0.0, 0.0006),
+    "angle_slope": (0.0, 0.0002),
+    "tp_slope": (0.0, 0.0011),
+    "angle_bow": (0.0100, 0.0005),
+    "tp_bow": (0.0311, 0.0119),
+    "cp1_bow": (0.0037, 0.0200),
+    "cp2_bow": (0.0094, 0.0019),
+    "fullness": (-0.0112, 0.0016),
+    "skew": (-0.0004, 0.0009),
+    "steepness": (0.1210, 0.41),
+    "steepness_change": (0.3046, 0.61),
+    "lead_bend": (-0.0293, 0.0200),
+    "trail_bend": (-0.0533, 0.0338),
+}
+"""Shift (SI) at the same contact angle, for a pressure that is doubled and for a squared speed that
+grows by (40 m/s)^2: of the rig's tires `reference`, `soft` and `stiff` over the plan `set3`, mean
+with the pressure and rms with the speed. Odd regressors have none in the mean."""
+PRESSURE_DOUBT, SPEED_DOUBT = 0.5, 2.0
+"""Tires differ: standard deviation of another tire's shift, as a share of `DRIFT`."""
+FEWEST_UNLIKE, SHARE_UNLIKE = 5, 0.05
+"""Turns, and share of them, that must look like another tire's: fifty times chance."""
+EDGE = 1.0 + 1e-6
+"""End of a standardised regressor's calibrated range."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Likeness:
+    """What a turn of the calibrated tire looks like.
+
+    Attributes
+    ----------
+    variables, terms
+        Of the polynomials, as in `tirelib.estimators.polynomial.Polynomial`.
+    names : tuple of m str
+        Regressors that are foretold.
+    coefficients : array, shape (k, m)
+    covariance : array, shape (m, m)
+        Of one turn about what is foretold.
+    limit : float
+        Value of D^2 above which a turn is not of this tire.
+    """
+
+    variables: tuple[Variable, ...]
+    terms: tuple[Term, ...]
+    names: tuple[str, ...]
+    coefficients: FloatArray
+    covariance: FloatArray
+    limit: float
+
+    def rest(self, values: Mapping[str, FloatArray]) -> FloatArray:
+        """Return what the regressors differ from what is foretold, shape (n, m)."""
+        seen = np.stack([values[name] for name in self.names], axis=1)
+        return seen - design(self.variables, self.terms, values) @ self.coefficients
+
+    def apart(self, values: Mapping[str, FloatArray], laws: ConditionLaws) -> FloatArray:
+        """Return D^2 of each turn, shape (n,); NaN where it cannot be told."""
+        pressure, unknown = laws.pressure_departure(values)
+        speed = laws.speed_departure(values)
+        with_pressure, with_speed = np.array([DRIFT[name] for name in self.names]).T
+        rest = self.rest(values) - pressure[:, None] * with_pressure
+        doubt = np.hypot(PRESSURE_DOUBT * pressure, unknown)[:, None] * with_pressure
+        doubt = np.hypot(doubt, SPEED_DOUBT * np.nan_to_num(speed)[:, None] * with_speed)
+        spread = self.covariance + doubt[:, :, None] ** 2 * np.eye(len(self.names))
+        found = np.linalg.solve(spread, rest[:, :, None])[..., 0]
+        within = [np.abs(v.standardise(values[v.name])) <= EDGE for v in self.variables]
+        square = np.sum(rest * found, axis=1) / len(self.names)
+        return np.where(np.all(within, axis=0), square, np.nan)
+
+
+def suspected(unlike: int, judged: int) -> bool:
+    """Tell whether so many turns of those judged are no chance.
+
+    Examples
+    --------
+    >>> suspected(4, 4), suspected(5, 90), suspected(5, 110)
+    (False, True, False)
+    """
+    return unlike >= FEWEST_UNLIKE and unlike > SHARE_UNLIKE * judged

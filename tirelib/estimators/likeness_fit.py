@@ -1,0 +1,109 @@
+"""Learn what turns of a tire look like, from conditions that were held out."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.estimators.basis import G1, G2, L1, L2, ONE, P1, T1, T2, Powers, V, times
+from tirelib.estimators.fit import design_for
+from tirelib.estimators.likeness import DRIFT, Likeness
+from tirelib.estimators.regressors import ODD
+
+FALSE_ALARM = 0.001
+"""Probability with which a turn of the calibrated tire is taken for another's; at least the largest
+D^2 of a held-out condition is allowed, though."""
+SPARE = 3
+"""Conditions more than regressors without which their covariance says too little."""
+SMALL = 1e-6
+"""Penalty of the least squares, relative: terms that the data cannot tell apart stay small."""
+
+
+def fit_likeness(
+    values: Mapping[str, FloatArray],
+    groups: IntArray,
+    varying: set[str],
+    turns: Mapping[str, FloatArray],
+    unit: IntArray,
+    rows: BoolArray,
+) -> Likeness | None:
+    """Return what the calibrated tire can show; None if there are too few conditions.
+
+    Parameters
+    ----------
+    values : mapping of arrays, shape (n,)
+        Regressors of each independent measurement.
+    groups : shape (n,)
+        Its condition.
+    varying : set of str
+        Conditions and regressors that were varied.
+    turns : mapping of arrays, shape (n_turns,)
+        Regressors of single turns.
+    unit, rows : shape (n_turns,)
+        Measurement of each turn, and whether it counts.
+    """
+    from scipy.stats import f
+    from sklearn.covariance import LedoitWolf
+
+    names = tuple(name for name in DRIFT if np.isfinite(values[name]).all())
+    conditions = np.unique(groups).size
+    freedom = conditions - len(names)
+    if freedom < SPARE:
+        return None
+    even, odd = _terms(varying)
+    variables, terms, x = design_for(values, [*even, *odd], (*ODD, "camber", "traction"))
+    share = np.zeros((len(terms), len(names)))
+    held_out = np.empty((x.shape[0], len(names)))
+    evens = np.arange(len(terms)) < len(even)
+    for column, name in enumerate(names):
+        use = ~evens if name in ODD else evens
+        share[use, column], held_out[:, column] = _left_out(x[:, use], values[name], groups)
+    size = held_out.std(axis=0) + np.finfo(np.float64).tiny
+    between = LedoitWolf(assume_centered=True).fit(held_out / size).covariance_
+    known = Likeness(variables, terms, names, share, between * np.outer(size, size), 0.0)
+    single = known.rest(turns)[rows]
+    single -= _mean_of(single, unit[rows])
+    covariance = known.covariance + np.cov(single.T)
+    seen = np.einsum("ij,ij->i", held_out, np.linalg.solve(covariance, held_out.T).T) / len(names)
+    limit = f.isf(FALSE_ALARM, len(names), freedom) * (conditions - 1) / freedom
+    limit = max(float(limit), float(seen.max()))
+    return Likeness(variables, terms, names, share, covariance, limit)
+
+
+def _terms(varying: set[str]) -> tuple[list[Powers], list[Powers]]:
+    """Return even and odd terms in what says where a turn lies."""
+    s: Powers = {"cp1_slope": 1}  # stands for the lateral distortion
+    even = [ONE, L1, L2, T1, times(s, s), times(s, s, L1)]
+    odd = [s, times(s, L1), times(s, L2), times(s, s, s)]
+    if "traction" in varying:
+        even += [T2, times(T1, L1), times(T2, L1), times(T1, T2)]
+        odd += [times(s, T1), times(s, T2)]
+    if "camber" in varying:
+        even += [G2, times(G1, s)]
+        odd += [G1, times(G1, L1)]
+    for name, term in (("pressure", P1), ("speed_squared", V)):
+        if name in varying:
+            even += [term, times(term, L1)]
+            odd += [times(term, s)]
+    return even, odd
+
+
+def _left_out(x: FloatArray, y: FloatArray, groups: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Return least-squares coefficients, and the errors of each condition by a fit without it."""
+    inverse = np.linalg.inv(x.T @ x + SMALL * len(y) * np.eye(x.shape[1]))
+    found = inverse @ x.T @ y
+    hat, rest = x @ inverse @ x.T, y - x @ found
+    error = np.empty_like(rest)
+    for group in np.unique(groups):
+        rows = groups == group
+        own = np.eye(int(rows.sum())) - hat[np.ix_(rows, rows)]
+        error[rows] = np.linalg.solve(own, rest[rows])
+    return found, error
+
+
+def _mean_of(values: FloatArray, unit: IntArray) -> FloatArray:
+    """Return for each row the mean of the rows of its unit."""
+    _, index, count = np.unique(unit, return_inverse=True, return_counts=True)
+    total = np.zeros((count.size, values.shape[1]))
+    np.add.at(total, index, values)
+    return np.asarray((total / count[:, None])[index], dtype=np.float64)
