@@ -8,11 +8,12 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 
+from bench.conditions import Conditions
 from bench.estimation import News
 from bench.page.feed import About
 from bench.page.history import COLUMNS
@@ -21,6 +22,7 @@ from bench.page.live import LivePage, PageChoice
 from bench.page.quantities import UNITS
 from bench.recording import Recording
 from bench.recording_topics import EVENTS
+from bench.standing import Level
 from tests.bench.browser import chromium
 from tests.bench.conftest import Spawn, spawning
 from tests.bench.in_process import FakeSource
@@ -325,6 +327,72 @@ def test_without_data_the_page_says_what_it_waits_for(browser: Any) -> None:
         run.end("stopped")
         page.locator("#status").filter(has_text="run ended: stopped").wait_for()
         page.context.close()
+    assert seen.complaints == []
+
+
+class FourWheels(FakeSource):
+    """Four wheels, a weak signal, a full disk; and a recording that goes on."""
+
+    recorded: ClassVar = {"file": "a.mcap", "bytes": 2.5e6, "minutes": 3.0, "free_bytes": 4e8,
+                          "minutes_left": 5.0, "error": "no space is left"}  # fmt: skip
+    bytes, name = 1, "a.mcap"
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(0, 1, 2, 3)
+        self.heard = time.time() + 3600.0
+        self.wheels.heard[2].rssi = -93
+        self.wheels.heard[2].told["speed"] = 18.0
+        self.events: list[Any] = []
+        self.about = About("port", conditions=Conditions.constant(pressure=2.3e5), folder=folder)
+
+    @property
+    def recorder(self) -> "FourWheels":
+        return self
+
+    def event(self, event: Any) -> None:
+        self.events.append(event)
+
+    def counts(self) -> dict[str, Any]:
+        return {"recording": self.recorded}
+
+
+def test_all_wheels_alarms_what_is_in_use_and_the_zero_of_the_gages(
+    browser: Any, tmp_path: Path
+) -> None:
+    source, seen = FourWheels(tmp_path), Visit()
+    level = Level(2, 1.5, *(1e-6 * np.arange(5.0),) * 3, np.zeros(5))
+    with LivePage(PageChoice(), source, source.about, source) as run:
+        page = opened(browser, run.url, seen)
+        run.watch(News([made_turn(1, wheel=n, Fz=1000.0 * (n + 1)) for n in range(4)]))
+        wait_for(page, "document.querySelectorAll('#all .card').length === 4")
+        shown = page.locator("#all [data-key=Fz] .value")
+        wait_until(lambda: shown.all_text_contents() == ["1000", "2000", "3000", "4000"])
+        alarms = page.locator("#alarms .alarm")
+        wait_until(lambda: alarms.count() == 4)
+        said = " ".join(alarms.all_text_contents())
+        for part in ("recording: no space is left", "wheel 2: signal -93 dBm", "5 min", "0.4 GB"):
+            assert part in said
+        page.keyboard.press("3")
+        wait_for(page, "tirebench.wheel === 2 && !tirebench.all")
+        use = {cell.get_attribute("data-use"): cell.inner_text()
+               for cell in page.locator("#use-list dd[data-use]").all()}  # fmt: skip
+        assert use == {"speed": "64.8 km/h bus", "pressure": "2.30 bar option",
+                       "camber": "not known", "recording": "a.mcap 2.5 MB, 3.0 min",
+                       "room": "400.0 MB free for 5.0 min"}  # fmt: skip
+        page.keyboard.press("g")
+        page.locator("#zero-set").click()
+        assert list(tmp_path.iterdir()) == []  # asked once more before anything is written
+        page.locator("#zero-set").filter(has_text="Write the zero of wheel 2?").wait_for()
+        run.watch(News(levels=[level]))
+        page.locator("#zero-set").click()
+
+        def written() -> bool:
+            run.watch(News(levels=[level]))
+            return len(list(tmp_path.glob("wheel-2-zero-*.toml"))) == 1
+
+        wait_until(written)
+        page.context.close()
+    assert {event["event"] for event in source.events} == {"alarm", "zero"}
     assert seen.complaints == []
 
 

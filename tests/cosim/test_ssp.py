@@ -101,7 +101,7 @@ def test_another_engine_gives_the_same(engine: str) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "cosim.ssp_run", str(archive()), "--engine", engine, "--step",
          str(fmus.STEP), "--stop", str(fmus.STEP * STEPS), "--out", str(out)],
-        capture_output=True, text=True, cwd=BUILD, timeout=300,
+        capture_output=True, text=True, cwd=BUILD, timeout=1200,
         env={**os.environ, "PYTHONPATH": str(BUILD)}, check=False,
     )  # fmt: skip
     assert out.is_file(), done.stderr[-2000:]

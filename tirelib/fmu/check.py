@@ -30,7 +30,7 @@ FORMAT = "tirelib-fmu-check/1"
 LARGEST = 2_000_000_000
 """Bytes that an FMU may unpack to."""
 MOST_FILES = 20_000
-TIME_LIMIT = 180.0
+TIME_LIMIT = 600.0
 """Seconds for one FMU."""
 _PARTS = ("archive", "validation", "run", "reference")
 

@@ -86,7 +86,7 @@ def _run(record: Record, description: Any, unpacked: Path, fmu: Path, folder: Pa
 
     common: dict[str, Any] = {
         "filename": str(unpacked), "model_description": description, "validate": False,
-        "logger": keep, "debug_logging": True, "timeout": 60.0,
+        "logger": keep, "debug_logging": True, "timeout": 300.0,
     }  # fmt: skip
     model = description.modelName
     signals = unpacked / "resources" / "reference"
