@@ -64,9 +64,17 @@ def picture(history: History, starts: int = 1) -> RenderableType:
     state = history.state
     parts: list[RenderableType] = [_heading(state)]
     parts += [Text(f" ALARM {text} ", "bold white on red") for text in alarms(state)]
-    for number, wheel in sorted(history.wheels.items()):
-        if wheel.last:
-            parts.append(_wheel(number, wheel, state))
+    wheels = [(number, wheel) for number, wheel in sorted(history.wheels.items()) if wheel.last]
+    if len(wheels) == 1:
+        parts.append(_wheel(*wheels[0], state))
+    else:  # two beside each other, so that four are seen at once
+        grid = Table.grid(expand=True)
+        for _ in range(2):
+            grid.add_column(ratio=1)
+        panels = [_wheel(number, wheel, state, traces=False) for number, wheel in wheels]
+        for row in range(0, len(panels), 2):
+            grid.add_row(*panels[row : row + 2])
+        parts.append(grid)
     parts.append(_health(state, history, starts))
     parts.append(Text(_room(state)))
     return Group(*parts)
@@ -134,7 +142,9 @@ def _heading(state: dict[str, Any]) -> RenderableType:
                          (rec, "bold red"))  # fmt: skip
 
 
-def _wheel(number: int, wheel: WheelHistory, state: dict[str, Any]) -> RenderableType:
+def _wheel(
+    number: int, wheel: WheelHistory, state: dict[str, Any], *, traces: bool = True
+) -> RenderableType:
     entry = wheel.last
     table = Table(box=None, show_header=False, padding=(0, 2))
     for name, text in numbers(entry):
@@ -145,11 +155,11 @@ def _wheel(number: int, wheel: WheelHistory, state: dict[str, Any]) -> Renderabl
     table.add_row("in use", in_use_line(counts.get("in_use", {})))
     if entry["flags"]:
         table.add_row("flags", " ".join(entry["flags"]))
-    traces = Table(box=None, show_header=False, padding=(0, 1))
-    for gage, trace in enumerate(wheel.laps[-1] if wheel.laps else (), 1):
-        traces.add_row(f"gage {gage}", sparkline(trace))
+    lines = Table(box=None, show_header=False, padding=(0, 1))
+    for gage, trace in enumerate(wheel.laps[-1] if wheel.laps and traces else (), 1):
+        lines.add_row(f"gage {gage}", sparkline(trace))
     title = f"wheel {number}, turn {entry['turn']}, t = {entry['device_time']:.2f} s"
-    return Panel(Columns([table, traces]), title=title, title_align="left")
+    return Panel(Columns([table, lines]), title=title, title_align="left")
 
 
 def _health(state: dict[str, Any], history: History, starts: int) -> RenderableType:
