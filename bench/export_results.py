@@ -21,6 +21,9 @@ Rows = dict[str, list[Any]]
 _ESTIMATED = ("run", "segment", "t", "ready", "device_time",
               *(f"{name}{end}" for name in QUANTITIES for end in ("", "_std", "_valid")),
               "omega_rad_s", "valid")  # fmt: skip
+_TEXTS = ("event", "text")
+_LARGEST = 2.0**63
+"""Numbers are below this, so that tables can hold them; NaN and infinity are written as null."""
 _UNITS = {"N": "_N", "deg": "_deg", "rad/s": "_rad_s"}
 
 
@@ -41,6 +44,11 @@ def results(path: Path, wheel: int | None = None) -> tuple[Rows, Rows]:
             if not is_event and (number is None or wheel not in (None, number)):
                 continue
             content = _content(data)
+            if wrong := _wrong(content, is_event):
+                raise RecordingError(
+                    f"{recording.path}: {channel.topic} at {moment} ns: {wrong}; the samples are "
+                    "exported, estimates and events are not; take another recording"
+                )
             row = {**content, "utc_s": 1e-9 * (moment + header.clock),
                    "t_s": 1e-9 * (moment - header.monotonic_ns)}  # fmt: skip
             if not is_event:
@@ -160,6 +168,24 @@ def _content(data: bytes) -> Mapping[str, Any]:
     except (ValueError, RecursionError):
         return {}
     return content if isinstance(content, dict) else {}
+
+
+def _wrong(content: Mapping[str, Any], is_event: bool) -> str:
+    """Return the first field that is not what the schemas say, and what it must be, or nothing."""
+    for name in _TEXTS if is_event else ():
+        if not _is_text(content.get(name, "")):
+            return f"{name} = {str(content[name])[:40]!r}; a text is needed"
+    for name in ("wheel",) if is_event else _ESTIMATED:
+        value = content.get(name)
+        if value is not None and not (isinstance(value, int | float) and abs(value) < _LARGEST):
+            return f"{name} = {str(value)[:40]!r}; a number or null is needed"
+    flags = () if is_event else content.get("flags", ())
+    sound = isinstance(flags, list | tuple) and all(map(_is_text, flags))
+    return "" if sound else f"flags = {str(flags)[:40]!r}; a list of texts is needed"
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str) and not any("\ud800" <= sign <= "\udfff" for sign in value)
 
 
 def _named(estimates: Rows) -> Rows:

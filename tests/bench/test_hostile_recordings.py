@@ -23,7 +23,7 @@ from bench.protocols import CAN, SERIAL
 from bench.protocols.plan import ProtocolPlan
 from bench.recording import Recording
 from bench.recording_header import FORMER as FORMAT
-from bench.recording_topics import CONDITIONS, EVENTS
+from bench.recording_topics import CONDITIONS, ESTIMATE, EVENTS
 
 NESTED = "[" * 100_000
 MARK = RunMark(1, 0, 0.0, {}, {"kind": "free", "load": 3000.0})
@@ -35,7 +35,7 @@ JUMP = {"event": "jump", "wheel": 0, "from": [0, 0], "to": [0, 9], "why": "x", "
 def made(
     path: Path, conditions: Any = SOUND, event: Any = JUMP, encoding: str = SERIAL,
     packed: CompressionType | None = None, times: int = 1, arrivals: tuple[int, ...] = (),
-    **header: Any,
+    estimate: Any = None, **header: Any,
 ) -> Path:  # fmt: skip
     """Write a recording as this program would not."""
     with path.open("wb") as file:
@@ -47,7 +47,10 @@ def made(
                 "monotonic_ns": "1"}  # fmt: skip
         texts = {k: v if isinstance(v, str) else json.dumps(v) for k, v in header.items()}
         writer.add_metadata("tirebench", {"format": FORMAT, **text, **texts})
-        for topic, content in ((CONDITIONS, conditions), (EVENTS, event)):
+        parts = {CONDITIONS: conditions, EVENTS: event, ESTIMATE.format(0): estimate}
+        for topic, content in parts.items():
+            if content is None:
+                continue
             channel = writer.register_channel(topic, "json", 0)
             data = content if isinstance(content, str) else json.dumps(content)
             for _ in range(times if topic == EVENTS else 1):
@@ -104,6 +107,24 @@ def test_an_event_that_says_nothing_is_passed_over(event: Any, tmp_path: Path) -
     assert list(recording.reads()) == []
     assert recording.complete
     recording.close()
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet", "mf4"])
+@pytest.mark.parametrize(("parts", "said"), [
+    ({"event": {"event": [1]}}, "event = '[1]'; a text is needed"),
+    ({"event": {"event": "marker", "text": "\ud800"}}, "a text is needed"),
+    ({"event": {"event": "marker", "wheel": {}}}, "wheel = '{}'; a number or null is needed"),
+    ({"estimate": {"Fz": "much"}}, "Fz = 'much'; a number or null is needed"),
+    ({"estimate": {"turn": 1, "segment": 2**70}}, "a number or null is needed"),
+    ({"estimate": {"flags": 5}}, "flags = '5'; a list of texts is needed"),
+])  # fmt: skip
+def test_an_estimate_or_event_that_no_table_can_hold_is_named(
+    parts: dict[str, Any], said: str, ending: str, tmp_path: Path
+) -> None:
+    path = made(tmp_path / "a.mcap", **parts)
+    code, text = invoke("export", path, "--out", tmp_path / f"a.{ending}")
+    assert code == 2
+    assert said in text
 
 
 @pytest.mark.parametrize("campaign", [{"name": None}, {"name": "\ud800"}])
