@@ -51,10 +51,14 @@ class TurnFlag(IntFlag):
     OTHER_TIRE = 1048576
     """The strain is not what the calibrated tire shows: another tire, or another state of it."""
 
+    ACCELERATING = 524288
+    """The wheel's rate changes within the turn more than is known of it: angles are uncertain."""
+
 
 INVALIDATING = (
     TurnFlag.FIRST_TURN
     | TurnFlag.PERIOD_JUMP
+    | TurnFlag.ACCELERATING
     | TurnFlag.TRIGGER_MISMATCH
     | TurnFlag.REVERSED
     | TurnFlag.OUT_OF_RANGE

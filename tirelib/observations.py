@@ -41,7 +41,8 @@ class Observations:
     sweep : array of bool, shape (n,)
         True where the conditions change within the run.
     truth : dict of arrays, shape (n,), SI, ISO
-        What the rig measured: mean of the run, or of the turn in a sweep. NaN where absent.
+        What the rig measured: mean of the run, in a sweep of a turn about the contact; NaN where
+        absent.
     nominal : dict of arrays, shape (n,), SI, ISO
         Set points, NaN in a sweep; friction, tread depth and tread temperature where given.
     headers : tuple of CampaignHeader
@@ -98,7 +99,7 @@ def measure_run(
 
 
 def truth_of(run: Run, name: str, features: Features) -> FloatArray:
-    """Rig quantity for each turn: mean over the run, or over the turn in a sweep."""
+    """Rig quantity for each turn: mean over the run; in a sweep, over a turn about the contact."""
     n = len(features)
     samples, clock = run.rig.get(name), run.rig_time
     if samples is None or clock is None or samples.size == 0:
@@ -110,8 +111,9 @@ def truth_of(run: Run, name: str, features: Features) -> FloatArray:
         return np.full(n, float(samples[known].mean()))
     total = np.concatenate(([0.0], np.cumsum(np.where(known, samples, 0.0))))
     count = np.concatenate(([0], np.cumsum(known)))
-    start = np.searchsorted(clock, features.time - np.nan_to_num(features.period))
-    stop = np.searchsorted(clock, features.time)
+    half = np.pi / np.where(features.omega > 0.0, features.omega, np.inf)
+    start = np.searchsorted(clock, features.time - half)
+    stop = np.searchsorted(clock, features.time + half)
     held = count[stop] - count[start]
     mean = (total[stop] - total[start]) / np.maximum(held, 1)
     return np.asarray(np.where(held > 0, mean, np.nan), dtype=np.float64)

@@ -209,7 +209,8 @@ def _whole_turns(run: Run, turns: Turns, low_pass: LowPass) -> tuple[list[FloatA
         first, last = (middles[k] + (GRID[[0, -1]] - zero) / step).tolist()
         if first - reach < 0 or last + reach >= run.strain.shape[1]:
             continue
-        waves.append(smooth_to_angle(run.strain, middles[k], step, GRID - zero, sigma)[0])
+        angle = (np.arange(run.strain.shape[1]) - middles[k]) * step
+        waves.append(smooth_to_angle(run.strain, angle, GRID - zero, sigma)[0])
         steps.append(step)
     return waves, steps
 

@@ -190,7 +190,8 @@ def test_the_filter_is_that_of_the_measured_chain() -> None:
     wanted = gage_trace(c, TIRE.innerliner_offset, low_pass=LowPass())
     sigma = LowPass().sigma(10.0)
     for i in range(2):
-        strain, rate = smooth_to_angle(raw.strain[i], n / 2.0, 2.0 * np.pi / n, wanted.phi, sigma)
+        angle = 2.0 * np.pi * (np.arange(raw.strain.shape[-1]) / n - 0.5)
+        strain, rate = smooth_to_angle(raw.strain[i], angle, wanted.phi, sigma)
         zero = (wanted.strain[i] - strain).mean(axis=1, keepdims=True)  # zeros differ by filtering
         scale, steep = np.abs(strain).max(), np.abs(rate).max()
         # the chain's Gaussian ends at 4 sigma

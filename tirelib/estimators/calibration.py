@@ -8,6 +8,7 @@ import numpy as np
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.errors import CalibrationError
 from tirelib.estimators.chain import QUANTITIES, Chain
+from tirelib.estimators.doubt import doubt, with_moved
 from tirelib.estimators.reference_turn import ReferenceTurn
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.features.extract import Features
@@ -149,6 +150,7 @@ class Calibration:
         traction = np.full(n, np.nan)
         out = (features.gage_flags & int(UNUSABLE)) != 0
         extrapolated, unlike = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
+        moved = with_moved(features)
         missing = np.where(out.any(axis=1), out.argmax(axis=1), -1)
         missing[out.sum(axis=1) > 1] = -2
         for index in np.unique(missing):
@@ -157,19 +159,23 @@ class Calibration:
             if chain is None:
                 flags[rows] |= int(TurnFlag.TOO_FEW_GAGES)
                 continue
-            part = compute_regressors(features, chain.gages)
-            part = {name: x[rows] for name, x in part.items()}
-            estimates, radius[rows] = chain.predict(part)
+            part = compute_regressors(moved, chain.gages)
+            part = {name: x[np.tile(rows, 3)] for name, x in part.items()}
+            estimates, radii = chain.predict(part)
+            many = int(rows.sum())
+            part, radius[rows] = {name: x[:many] for name, x in part.items()}, radii[:many]
             traction[rows] = part["traction"]
             unlike[rows] = chain.unlike(part)
             extrapolated[rows] = chain.laws.extrapolated(part) | (
                 chain.force_laws.extrapolated(part) if chain.has("Fy") else False
             )
             for quantity, estimate in estimates.items():
-                value[quantity][rows] = estimate.value
-                std[quantity][rows] = estimate.std
-                valid[quantity][rows] = estimate.valid
+                value[quantity][rows] = estimate.value[:many]
+                more = doubt(estimate.value, features.angle_std[rows])
+                std[quantity][rows] = np.hypot(estimate.std[:many], more)
+                valid[quantity][rows] = estimate.valid[:many]
             flags[rows] |= np.where(self._unknown_condition(chain, part), _NO_CONDITION, 0)
+        std["kappa"] = np.hypot(std["kappa"], (1.0 + value["kappa"]) * features.slip_std)
         return self._finish(
             features, value, std, valid, flags, radius, traction, extrapolated, unlike
         )

@@ -61,7 +61,11 @@ class Features:
     offset
         Strain opposite the contact.
     time, ready, period, omega, speed, pressure, camber, axis_shift
-        Of the turn, SI.
+        Of the turn, SI; `omega`, `speed` and `camber` at its contact.
+    angle_std, slip_std
+        Relative standard deviation of angles about the contact, and of ``omega / speed``.
+    offset_std : shape (n, n_gages)
+        Standard deviation of the offset.
     friction, tread_depth, tread_temperature
         What was said of road and tread, SI.
     flags, gage_flags
@@ -96,6 +100,9 @@ class Features:
     tread_depth: FloatArray
     tread_temperature: FloatArray
     axis_shift: FloatArray
+    offset_std: FloatArray
+    angle_std: FloatArray
+    slip_std: FloatArray
     flags: IntArray
     gage_flags: IntArray
     lateral: FloatArray
@@ -168,6 +175,9 @@ def extract_features(turns: Turns) -> Features:
         tread_depth=turns.tread_depth,
         tread_temperature=turns.tread_temperature,
         axis_shift=trace.axis_shift,
+        offset_std=turns.offset_std,
+        angle_std=turns.angle_std,
+        slip_std=turns.slip_std,
         flags=turns.flags | weak.max(axis=1, initial=0),
         gage_flags=turns.gage_flags | weak,
         lateral=trace.lateral,

@@ -26,6 +26,7 @@ PER_GAGE = {
     "skew": "rad",
     "mean": "1",
     "offset": "1",
+    "offset_std": "1",
 }
 """Columns of one turn and gage with their units."""
 PER_TURN = {
@@ -39,6 +40,8 @@ PER_TURN = {
     "tread_depth": "m",
     "tread_temperature": "K",
     "axis_shift": "rad",
+    "angle_std": "1",
+    "slip_std": "1",
 }
 """Columns of one turn with their units."""
 

@@ -273,10 +273,9 @@ def _features(rows: list[dict[str, Any]], calibration: Calibration) -> Features:
     per_gage = np.full((len(rows), len(calibration.lateral)), np.nan)
     values: dict[str, Any] = {field.name: per_gage for field in fields(Features)}
     per_turn = np.full(len(rows), np.nan)
-    values |= dict.fromkeys(
-        ("speed", "pressure", "camber", "axis_shift", "friction", "tread_depth",
-         "tread_temperature"), per_turn,
-    )  # fmt: skip
+    unknown = ("speed", "pressure", "camber", "axis_shift", "friction", "tread_depth",
+               "tread_temperature", "angle_std", "slip_std")  # fmt: skip
+    values |= dict.fromkeys(unknown, per_turn)
     omega = _column(rows, "turn_rate")
     values |= {
         "time": _column(rows, "contact_time"),

@@ -24,6 +24,9 @@ It must lie above the strain away from the contact, so the dips may be 1.6 times
 pulse is high: beyond what a tire shows, even at half its pressure and 1.5 times its load."""
 JUMP = 2.5
 """A swing this many times the one that set the levels shows that they were set by no contact."""
+GAP_REACH = 0.1
+"""Turns before a pulse and after the one before within which a gap may hide an extreme: the dips
+lie within 0.6 rad of the pulse. The levels then stay as they were."""
 PATIENCE = 2.5
 """Turns to wait for a contact before starting afresh."""
 
@@ -77,6 +80,7 @@ class ContactFinder:
         self._count = 0  # samples taken, after the median
         self._tail: FloatArray = np.empty(0)  # last two raw samples, for the median of three
         self._held = np.nan  # last finite sample
+        self._missing = np.empty(0, dtype=np.int64)  # numbers of samples missing since the pulse
         self._restart()
 
     def _restart(self) -> None:
@@ -139,6 +143,8 @@ class ContactFinder:
     def _without_gaps(self, x: FloatArray) -> FloatArray:
         finite = np.isfinite(x)
         if not finite.all():
+            missing = np.flatnonzero(~finite) + self._count + self._tail.size
+            self._missing = np.concatenate((self._missing, missing))[-self._longest_turn :]
             last = np.maximum.accumulate(np.where(finite, np.arange(x.size), -1))
             x = np.where(last >= 0, x[last], self._held)
         if x.size:
@@ -223,6 +229,15 @@ class ContactFinder:
             patience = min(patience, int(PATIENCE * self._last_period))
         return max(1, self._since + patience - self._count)
 
+    def _extreme_hidden(self) -> bool:
+        """Tell whether samples are missing where the turn's extremes may have been."""
+        missing = self._missing[self._missing < self._count]
+        if self._last_period is None or missing.size == 0:
+            return missing.size > 0
+        reach = GAP_REACH * self._last_period
+        near = (missing < self._since + reach) | (missing > self._pulse_start - reach)
+        return bool(near.any())
+
     def _finish(self, found: list[Contact]) -> None:
         """Close the pulse, and set the levels of the next one."""
         pulse = np.concatenate(self._pulse or [])
@@ -239,9 +254,11 @@ class ContactFinder:
             if not start_up:
                 self._restart()
             return  # too little has been seen of what lies before it
-        self._level = own_level
-        self._low_level = self._lowest + FALL * swing
-        self._swing = swing
+        if start_up or not self._extreme_hidden():
+            self._level = own_level
+            self._low_level = self._lowest + FALL * swing
+            self._swing = swing
+        self._missing = self._missing[self._missing >= self._count]
         self._armed = False  # the new levels may lie below the strain just reached
         self._lowest = self._highest = self._before
         rise = i - 1 + (level - pulse[i - 1]) / (pulse[i] - pulse[i - 1])

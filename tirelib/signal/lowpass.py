@@ -85,18 +85,16 @@ def half_width(sigma: float) -> float:
 
 
 def smooth_to_angle(
-    samples: FloatArray, zero: float, step: float, phi: FloatArray, sigma: float
+    samples: FloatArray, angle: FloatArray, phi: FloatArray, sigma: float
 ) -> tuple[FloatArray, FloatArray]:
     """Filter samples in time and evaluate strain and rate at given wheel angles.
 
     Parameters
     ----------
     samples : array, shape (n_gages, n), [-]
-        Strain at a uniform rate.
-    zero : float, [samples]
-        Position of wheel angle zero in `samples`, not necessarily whole.
-    step : float, [rad]
-        Wheel angle per sample.
+        Strain.
+    angle : array, shape (n,), [rad]
+        Wheel angle of each sample, growing.
     phi : array, shape (n_phi,), [rad]
         Wanted wheel angles; the filter must not reach beyond `samples`.
     sigma : float, [rad]
@@ -116,19 +114,20 @@ def smooth_to_angle(
     --------
     A straight line passes unchanged, and its rate is its slope per radian.
 
-    >>> strain, rate = smooth_to_angle(np.arange(100.0)[None], 50.0, 0.01, np.array([0.0]), 0.05)
+    >>> angle = 0.01 * np.arange(-50, 50)
+    >>> strain, rate = smooth_to_angle(50.0 + 100.0 * angle[None], angle, np.zeros(1), 0.05)
     >>> float(strain[0, 0]), float(rate[0, 0])
     (50.0, 100.0)
     """
-    position = zero + phi / step
-    nearest = np.rint(position).astype(np.int64)
-    reach = max(1, int(SUPPORT * sigma / step))
+    place = np.clip(np.searchsorted(angle, phi), 1, angle.size - 1)
+    nearest = place - (phi - angle[place - 1] <= angle[place] - phi)
+    reach = max(1, int(SUPPORT * sigma / np.median(np.diff(angle))))
     if nearest[0] - reach < 0 or nearest[-1] + reach >= samples.shape[1]:
         raise ParameterError(
             f"filter needs samples {nearest[0] - reach} .. {nearest[-1] + reach}; "
             f"given are 0 .. {samples.shape[1] - 1}"
         )
-    distance = np.arange(-reach, reach + 1) * step - ((position - nearest) * step)[:, None]
+    distance = sliding_window_view(angle, 2 * reach + 1)[nearest - reach] - phi[:, None]
     weight = distance * distance
     weight *= -0.5 / sigma**2
     np.exp(weight, out=weight)

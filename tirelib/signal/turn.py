@@ -17,12 +17,16 @@ class Turn:
     """One turn; arrays over gages and wheel angle. NaN where the flags say why.
 
     `time` is the middle of the contact pulse, [s since the start]; `ready` is when the last sample
-    that the turn needs was taken, [s].
+    that the turn needs was taken, [s]. `omega` and `speed` are those at the middle of the contact,
+    `period` is that of the turn before it.
     """
 
     time: float
     ready: float
     period: float
+    omega: float
+    angle_std: float
+    slip_std: float
     pulse: float
     axis_shift: float
     speed: float
@@ -32,6 +36,7 @@ class Turn:
     tread_depth: float
     tread_temperature: float
     offset: FloatArray
+    offset_std: FloatArray
     mean: FloatArray
     strain: FloatArray
     rate: FloatArray
@@ -47,8 +52,13 @@ class Turns:
     ----------
     trace : StrainTrace
     time, ready, period : shape (n,), [s]
+    angle_std, slip_std : shape (n,), [1]
+        Relative standard deviation of wheel angles about the contact, and of the ratio of turn rate
+        to speed there.
     offset : shape (n, n_gages), [-]
         Strain opposite the contact: hoop strain of inflation and speed, and the gage's zero.
+    offset_std : shape (n, n_gages), [-]
+        Standard deviation of the offset.
     mean : shape (n, n_gages), [-]
         Mean strain of the preceding turn, less the offset.
     friction, tread_depth, tread_temperature : shape (n,), [1], [m], [K]
@@ -62,7 +72,10 @@ class Turns:
     time: FloatArray
     ready: FloatArray
     period: FloatArray
+    angle_std: FloatArray
+    slip_std: FloatArray
     offset: FloatArray
+    offset_std: FloatArray
     mean: FloatArray
     friction: FloatArray
     tread_depth: FloatArray
@@ -93,7 +106,7 @@ def stack_turns(turns: Sequence[Turn], lateral: FloatArray, rate: float) -> Turn
         lateral=lateral,
         axis_shift=column("axis_shift"),
         conditions=Conditions(
-            omega=2.0 * np.pi / column("period"),
+            omega=column("omega"),
             speed=column("speed"),
             pressure=column("pressure"),
             camber=column("camber"),
@@ -104,7 +117,10 @@ def stack_turns(turns: Sequence[Turn], lateral: FloatArray, rate: float) -> Turn
         time=column("time"),
         ready=column("ready"),
         period=column("period"),
+        angle_std=column("angle_std"),
+        slip_std=column("slip_std"),
         offset=rows("offset", gages),
+        offset_std=rows("offset_std", gages),
         mean=rows("mean", gages),
         friction=column("friction"),
         tread_depth=column("tread_depth"),

@@ -2,9 +2,11 @@
 
 For the contact k, with the middles of the centre gage's pulses m at k-1 and k:
 
-- period and wheel angle per sample from the preceding turn: ``step = 2 pi / (m_k - m_(k-1))``,
-- offset of each gage: median over +-0.5 rad round the point half-way between the two contacts,
-- conditions: mean over the preceding turn of what was held,
+- wheel angle over time from the preceding turn, ``2 pi`` from m at k-1 to m at k, and from how the
+  wheel's rate changes within it: `tirelib.signal.angle`,
+- offset of each gage: median over +-0.5 rad round the point half-way round from the contact,
+- conditions: mean over the preceding turn of what was held; the camber, the turn rate and the speed
+  are those of the contact,
 - strain and rate over wheel angle: `tirelib.signal.lowpass`, up to 20 degrees after the pulse.
 
 `TurnCutter` takes samples in frames of any length; `cut_turns` gives it a whole record. Both run
@@ -14,6 +16,7 @@ the same code, so they agree.
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Unpack
 
 import numpy as np
@@ -22,7 +25,9 @@ from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.errors import ParameterError, ShapeError
 from tirelib.flags import TurnFlag
 from tirelib.held import HELD, Held
+from tirelib.signal.angle import SOURCES, AngleLaw, Past, angle_law, minmod
 from tirelib.signal.contacts import Contact, ContactFinder
+from tirelib.signal.course import course
 from tirelib.signal.lowpass import LowPass, half_width, smooth_to_angle
 from tirelib.signal.quality import UNUSABLE, inspect
 from tirelib.signal.turn import PHI, Turn, Turns, stack_turns
@@ -39,6 +44,10 @@ LARGEST_PERIOD_RATIO = 2.0
 NEAR_EDGE = 3
 """Samples before a pulse's edge that must be there, as those beside it, for the edge to count."""
 DRIFT_SHARE = 0.05
+MISSED_RATIO = 1.5
+"""A turn with a gap that lasts this many times the one before has hidden a contact in it."""
+LARGEST_ANGLE_STD = 0.02
+"""Relative uncertainty of the wheel angle's scale beyond which a turn is `accelerating`."""
 LONGEST_TURN = 3.0
 """A turn that lasts longer is standstill, [s]."""
 
@@ -76,7 +85,8 @@ class TurnCutter:
         self._waiting: deque[Contact] = deque()
         self._previous: Contact | None = None
         self._previous_period = np.nan
-        self._previous_offset: FloatArray | None = None
+        self._offsets: tuple[tuple[float, FloatArray], ...] = ()  # of two turns, with their times
+        self._past: Past = ()
 
     def push(
         self,
@@ -150,18 +160,18 @@ class TurnCutter:
         if contact.fresh or before is None:
             self._waiting.popleft()
             self._previous = replace(contact, damaged=self._damaged(contact))
-            self._previous_period, self._previous_offset = np.nan, None
+            self._previous_period, self._offsets, self._past = np.nan, (), ()
             return self._first_turn(contact)
-        period = contact.middle - before.middle
-        step, sigma, stop = self._needs(contact, before)
-        if stop > self._base + self._filled:
+        law, stop = self._needs(contact, before)
+        if law is None or stop > self._base + self._filled:
             return None
         self._waiting.popleft()
         contact = replace(contact, damaged=self._damaged(contact))
         self._previous = contact
-        turn = self._full_turn(contact, before, step, sigma, stop)
-        self._previous_period = period
-        self._previous_offset = turn.offset
+        turn = self._full_turn(contact, before, law, stop)
+        self._previous_period = contact.middle - before.middle
+        if not turn.flags & TurnFlag.FIRST_TURN:
+            self._past = law.past
         return turn
 
     @property
@@ -169,25 +179,42 @@ class TurnCutter:
         """How many samples the contact that waits for those after it lacks; None: none waits."""
         if not self._waiting or self._previous is None:
             return None
-        stop = self._needs(self._waiting[0], self._previous)[2]
+        stop = self._needs(self._waiting[0], self._previous)[1]
         return stop - self._base - self._filled
 
-    def _needs(self, contact: Contact, before: Contact) -> tuple[float, float | None, int]:
-        """Return the angle of a sample, the filter's width [rad], and `_stop`, of a turn.
+    def _needs(self, contact: Contact, before: Contact) -> tuple[AngleLaw | None, int]:
+        """Return the law of a turn's wheel angle, and the sample after the last one that it needs.
 
-        The width is None where the filter does not suit the turn.
+        The law waits for the samples that a wheel of steady rate would need; what it then says may
+        need more of them.
         """
-        period = contact.middle - before.middle
-        step = 2.0 * np.pi / period
-        suits = self.low_pass.suits(self.rate / period, self.rate)
-        sigma = (self.low_pass if suits else LowPass()).sigma(self.rate / period)
-        return step, sigma if suits else None, self._stop(contact, step, sigma)
+        turn = contact.middle - before.middle
+        steady = angle_law(contact.middle, turn, 0.0, {}, ())
+        stop = self._stop(contact, steady)
+        if stop > self._base + self._filled:
+            return None, stop
+        first = int(np.ceil(before.middle))
+        seen = slice(max(first - self._base, 0), stop - self._base)
+        told = {
+            name: course(
+                self._buffer[self._gages + HELD.index(name), seen], first - contact.middle, turn
+            )
+            for name in SOURCES
+        }
+        law = angle_law(contact.middle, turn, stop - contact.middle, told, self._past)
+        return law, max(stop, self._stop(contact, law))
 
-    def _stop(self, contact: Contact, step: float, sigma: float) -> int:
+    def _sigma(self, law: AngleLaw) -> float | None:
+        """Return the filter's width, [rad]; None where it does not suit the turn."""
+        turn_rate = law.step * self.rate / (2.0 * np.pi)
+        suits = self.low_pass.suits(turn_rate, self.rate)
+        return self.low_pass.sigma(turn_rate) if suits else None
+
+    def _stop(self, contact: Contact, law: AngleLaw) -> int:
         """Return the number of the sample after the last one that a turn needs."""
-        pulse = 0.5 * (contact.fall - contact.rise) * step
-        end = float(PHI[pulse + AFTER >= PHI][-1])
-        return int(contact.middle + (end + half_width(sigma)) / step + 2.0) + 1
+        sigma = self._sigma(law) or LowPass().sigma(1.0)
+        end = float(PHI[_pulse(contact, law) + AFTER >= PHI][-1])
+        return int(law.sample(end + half_width(sigma)) + 2.0) + 1
 
     def _damaged(self, contact: Contact) -> bool:
         """Tell whether samples of the centre gage are missing where the contact begins or ends."""
@@ -198,6 +225,11 @@ class TurnCutter:
                 return True
         return False
 
+    def _gap_between(self, before: Contact, contact: Contact) -> bool:
+        """Tell whether samples of the centre gage are missing between two contacts."""
+        a, b = int(before.fall) - self._base, int(contact.rise) - self._base
+        return not np.isfinite(self._buffer[self._centre, max(a, 0) : b]).all()
+
     def _first_turn(self, contact: Contact) -> Turn:
         """Return the turn of a contact that no turn precedes: nothing is known of it."""
         unknown = np.full(self._gages, np.nan)
@@ -206,6 +238,9 @@ class TurnCutter:
             time=contact.middle / self.rate,
             ready=contact.fall / self.rate,
             period=np.nan,
+            omega=np.nan,
+            angle_std=np.nan,
+            slip_std=np.nan,
             pulse=np.nan,
             axis_shift=np.nan,
             speed=np.nan,
@@ -215,6 +250,7 @@ class TurnCutter:
             tread_depth=np.nan,
             tread_temperature=np.nan,
             offset=unknown,
+            offset_std=unknown,
             mean=unknown,
             strain=empty,
             rate=empty,
@@ -222,35 +258,34 @@ class TurnCutter:
             flags=int(TurnFlag.FIRST_TURN),
         )
 
-    def _full_turn(
-        self, contact: Contact, before: Contact, step: float, sigma: float | None, stop: int
-    ) -> Turn:
+    def _full_turn(self, contact: Contact, before: Contact, law: AngleLaw, stop: int) -> Turn:
         period = contact.middle - before.middle
+        sigma = self._sigma(law)
         flags = TurnFlag(0)
         ratio = period / self._previous_period
         if not np.isnan(ratio) and not 1 / LARGEST_PERIOD_RATIO <= ratio <= LARGEST_PERIOD_RATIO:
             flags |= TurnFlag.PERIOD_JUMP
+        if law.std > LARGEST_ANGLE_STD:
+            flags |= TurnFlag.ACCELERATING
         if sigma is None:
             flags |= TurnFlag.CUT_OFF
-        if contact.damaged or before.damaged:
+        missed = ratio > MISSED_RATIO and self._gap_between(before, contact)
+        if contact.damaged or before.damaged or missed:
             flags |= TurnFlag.FIRST_TURN | TurnFlag.GAP  # its period is unknown
-        pulse = 0.5 * (contact.fall - contact.rise) * step
-        strain, rate, gage_flags = self._window(contact.middle, step, sigma, pulse, stop)
-        opposite = 0.5 * (contact.middle + before.middle)
-        half = OFFSET_HALF_WIDTH / step
-        sector = (slice(0, self._gages), opposite - half, opposite + half)
-        offset, gap = self._mean(*sector, robust=True)
+        pulse = _pulse(contact, law)
+        strain, rate, gage_flags = self._window(law, sigma, pulse, stop)
+        sector = (law.sample(-np.pi + side * OFFSET_HALF_WIDTH) for side in (-1.0, 1.0))
+        opposite, gap = self._mean(slice(0, self._gages), *sector, robust=True)
+        offset, offset_std, moved = self._offset(opposite, law)
         mean, gap_in_turn = self._mean(slice(0, self._gages), before.middle, contact.middle)
         gage_flags[gap | gap_in_turn] |= int(TurnFlag.GAP)
         unusable = (gage_flags & int(UNUSABLE)) != 0
         strain -= offset[:, None]
         mean = np.where(unusable, np.nan, mean - offset)
         strain[unusable], rate[unusable] = np.nan, np.nan
-        if self._previous_offset is not None:
-            moved = np.abs(offset - self._previous_offset)
-            swing = np.fmax.reduce(strain, axis=1, initial=0.0)
-            swing -= np.fmin.reduce(strain, axis=1, initial=0.0)
-            gage_flags[moved > DRIFT_SHARE * swing] |= int(TurnFlag.DRIFT)
+        swing = np.fmax.reduce(strain, axis=1, initial=0.0)
+        swing -= np.fmin.reduce(strain, axis=1, initial=0.0)
+        gage_flags[np.abs(moved) > DRIFT_SHARE * swing] |= int(TurnFlag.DRIFT)
         conditions, _ = self._mean(
             slice(self._gages, self._gages + len(HELD)), before.middle, contact.middle
         )
@@ -263,9 +298,10 @@ class TurnCutter:
         if not np.isfinite(speed) or speed == 0.0:
             flags |= TurnFlag.NO_SPEED
             speed = np.nan  # a wheel that turns does not stand
-        elif speed < 0.0:
-            flags |= TurnFlag.REVERSED
-        axis_shift, once = self._trigger(before.middle, contact.middle, step)
+        else:
+            flags |= TurnFlag.REVERSED if speed < 0.0 else 0
+            speed = law.speed if np.isfinite(law.speed) else speed
+        axis_shift, once = self._trigger(before.middle, contact.middle, law)
         if not once:
             flags |= TurnFlag.TRIGGER_MISMATCH
         flags |= TurnFlag(int(np.bitwise_or.reduce(gage_flags)))
@@ -277,6 +313,9 @@ class TurnCutter:
             time=contact.middle / self.rate,
             ready=(stop - 1) / self.rate,
             period=period / self.rate,
+            omega=law.step * self.rate,
+            angle_std=law.std,
+            slip_std=law.slip_std,
             pulse=pulse,
             axis_shift=axis_shift,
             speed=speed,
@@ -286,6 +325,7 @@ class TurnCutter:
             tread_depth=known["tread_depth"],
             tread_temperature=known["tread_temperature"],
             offset=offset,
+            offset_std=offset_std,
             mean=mean,
             strain=strain,
             rate=rate,
@@ -293,8 +333,28 @@ class TurnCutter:
             flags=int(flags),
         )
 
+    def _offset(
+        self, opposite: FloatArray, law: AngleLaw
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the offset at the contact, its std, and how it moved since the turn before.
+
+        What is read half a turn before the contact moves on until there: the hoop strain with the
+        square of the turn rate, the gage's zero with its temperature. It is followed as the turn
+        rate is, see `tirelib.signal.angle`.
+        """
+        time = law.sample(-np.pi)
+        earlier, self._offsets = self._offsets, (*self._offsets[-1:], (time, opposite))
+        moved: FloatArray = np.zeros(self._gages)
+        followed = left = moved
+        for (start, first), (stop, second) in pairwise((*earlier, (time, opposite))):
+            before, moved = moved, second - first
+            share = (law.middle - time) / (stop - start)
+            followed = minmod(moved, before)
+            followed, left = share * followed, share * np.abs(moved - followed)
+        return opposite + followed, left, moved
+
     def _window(
-        self, middle: float, step: float, sigma: float | None, pulse: float, stop: int
+        self, law: AngleLaw, sigma: float | None, pulse: float, stop: int
     ) -> tuple[FloatArray, FloatArray, IntArray]:
         """Strain and rate over `PHI`, NaN beyond the end of the window, and the gages' flags."""
         strain = np.full((self._gages, PHI.size), np.nan)
@@ -302,12 +362,11 @@ class TurnCutter:
         if sigma is None:
             return strain, rate, np.zeros(self._gages, dtype=np.int64)
         seen = pulse + AFTER >= PHI
-        reach = half_width(sigma) / step + 2.0
-        first = int(middle + PHI[0] / step - reach) - self._base
-        raw = self._buffer[: self._gages, max(first, 0) : stop - self._base]
-        mended, gage_flags = inspect(raw, step)
-        zero = middle - self._base - max(first, 0)
-        strain[:, seen], rate[:, seen] = smooth_to_angle(mended, zero, step, PHI[seen], sigma)
+        first = max(int(law.sample(PHI[0] - half_width(sigma)) - 2.0), self._base)
+        raw = self._buffer[: self._gages, first - self._base : stop - self._base]
+        mended, gage_flags = inspect(raw, law.step)
+        angle = law.at(np.arange(first, stop))
+        strain[:, seen], rate[:, seen] = smooth_to_angle(mended, angle, PHI[seen], sigma)
         return strain, rate, gage_flags
 
     def _mean(
@@ -334,7 +393,7 @@ class TurnCutter:
         mean, _ = self._mean(slice(row, row + 1), contact.rise, contact.fall + 1.0)
         return float(mean[0])
 
-    def _trigger(self, start: float, stop: float, step: float) -> tuple[float, bool]:
+    def _trigger(self, start: float, stop: float, law: AngleLaw) -> tuple[float, bool]:
         """Wheel angle of the contact's middle from the trigger, and whether it came just once."""
         a, b = round(start) - self._base, round(stop) - self._base
         seen = self._buffer[-1, max(a, 0) : b]
@@ -343,8 +402,14 @@ class TurnCutter:
         on = np.flatnonzero((seen[1:] > 0.5) & (seen[:-1] <= 0.5)) + 1
         if on.size != 1:
             return np.nan, False
-        top = float(on[0]) - 0.5 + max(a, 0) + self._base  # passed between two samples
-        return -np.pi + (stop - top) * step, True
+        top = (on + max(a, 0) + self._base) - 0.5  # passed between two samples
+        return -np.pi - float(law.at(top)[0]), True
+
+
+def _pulse(contact: Contact, law: AngleLaw) -> float:
+    """Return half the wheel angle from where the centre gage's pulse rises to where it falls."""
+    rise, fall = law.at(np.array([contact.rise, contact.fall]))
+    return 0.5 * float(fall - rise)
 
 
 def cut_turns(

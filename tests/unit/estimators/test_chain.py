@@ -244,8 +244,7 @@ def test_sweeps_count_turn_by_turn(tmp_path: Path) -> None:
     assert np.unique(swept.unit).size == len(swept)
     steady, rising = (swept.usable & (swept.run == run) for run in (2, 3))
     np.testing.assert_allclose(swept.truth["Fz"][steady], 1500.0, atol=60.0)
-    turn = swept.features.time[rising] - 0.5 * swept.features.period[rising]
-    expected = 1000.0 + 2000.0 * turn / (ramp.size / 100.0)
+    expected = 1000.0 + 2000.0 * swept.features.time[rising] / (ramp.size / 100.0)
     np.testing.assert_allclose(swept.truth["Fz"][rising], expected, atol=60.0)
 
 

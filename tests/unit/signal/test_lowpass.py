@@ -12,7 +12,7 @@ STEP = 2 * np.pi / 1000
 
 
 def evaluate(samples: np.ndarray, phi: np.ndarray, sigma: float, zero: float = 1000.0):
-    return smooth_to_angle(samples[None], zero, STEP, phi, sigma)
+    return smooth_to_angle(samples[None], (np.arange(samples.size) - zero) * STEP, phi, sigma)
 
 
 @given(a=st.floats(-1, 1), b=st.floats(-1, 1), zero=st.floats(990, 1010), s=st.floats(0.02, 0.1))
@@ -67,7 +67,8 @@ def test_noise_falls_with_the_width_of_the_filter() -> None:
     rng = np.random.default_rng(0)
     noise = rng.standard_normal((400, 2000))
     phi = np.array([0.0])
-    spread = [smooth_to_angle(noise, 1000.0, STEP, phi, sigma)[0].std() for sigma in (0.02, 0.08)]
+    angle = (np.arange(2000) - 1000) * STEP
+    spread = [smooth_to_angle(noise, angle, phi, sigma)[0].std() for sigma in (0.02, 0.08)]
     assert spread[0] / spread[1] == pytest.approx(2.0, rel=0.2)  # root of the width's ratio
 
 

@@ -289,7 +289,7 @@ def test_a_turn_does_not_depend_on_what_lies_far_before_it(start: float) -> None
     assert strain.shape[1] > 65_000  # the buffer of 12 s has been compacted
     for turn in found[108:118]:
         stop = int(turn.ready * live.RATE) + 2
-        fresh = played(strain[:, stop - 4 * TURN : stop])[-1]
+        fresh = played(strain[:, stop - 7 * TURN : stop])[-1]
         for quantity in QUANTITIES:
             # positions are counted from another start: the last digits of 68000 samples
             np.testing.assert_allclose(

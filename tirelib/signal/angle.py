@@ -1,0 +1,172 @@
+r"""Wheel angle over time within a turn: the wheel's own turn rate, as its sources tell it.
+
+Between the middles of two contacts the wheel turns once, so the mean rate of the turn before a
+contact is exact. How the rate runs within that turn, up to the contact and a little beyond, is
+
+.. math:: \omega(t) = g\, s(t)\, \bigl(1 + r\,(t - t_0)\bigr),
+          \qquad \int_{m_{k-1}}^{m_k} \omega\, dt = 2\pi
+
+- s(t), the course of a **source**: the measured turn rate where there is one, else the travel
+  speed, else one (`tirelib.signal.course`).
+- r, the **change from turn to turn** of what the source leaves: of q = mean rate / mean of s, which
+  is the slip ratio's if the source is the speed, the rate's own without a source, and noise if the
+  source is the turn rate. Of the last two slopes of q over time the smaller is followed, and none
+  where their signs differ: the limiter *minmod* (P. L. Roe, Annu. Rev. Fluid Mech. 18, 1986). So a
+  lasting change is followed exactly; noise and a single jump are not.
+
+What the fit of the source leaves, and what the last slopes differ by, is the uncertainty.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from numpy.polynomial.polynomial import polyval
+
+from tirelib.arrays import FloatArray
+from tirelib.signal.course import Course
+
+SOURCES = ("omega", "speed")
+"""Conditions whose course tells how the turn rate runs, best first."""
+REMEMBERED = 4
+"""Turns whose q is kept: two slopes to be followed or not, and one before them."""
+NEWTON = 8
+"""Steps of Newton's method: with a rate that doubles within the turn six reach rounding."""
+LARGEST_RATIO = 2.0
+"""A rate beyond this ratio to the turn's mean, either way, is not followed: the wheel stops,
+starts or locks, and polynomials say nothing of that."""
+
+Past = tuple[tuple[float, ...], ...]
+"""Of each of the last turns: its middle in time [samples], and q for each source and without."""
+
+
+@dataclass(frozen=True, slots=True)
+class AngleLaw:
+    """Wheel angle over sample numbers about one contact.
+
+    Attributes
+    ----------
+    middle : float, [samples since the start]
+        Where the angle is zero.
+    turn : float, [samples]
+        Length of the preceding turn.
+    angle : tuple of float
+        Coefficients of the angle [rad] by the powers of turns from the middle.
+    step : float, [rad]
+        Angle of a sample, at the middle.
+    std : float, [1]
+        Relative standard deviation of `step`, hence of angles about the contact.
+    speed : float, [m/s]
+        Travel speed at the contact, to which `step` is in the proportion of the slip ratio there.
+    slip_std : float, [1]
+        Relative standard deviation of ``step / speed``.
+    past : Past
+        What the law of the next turn needs.
+    """
+
+    middle: float
+    turn: float
+    angle: tuple[float, ...]
+    step: float
+    std: float
+    speed: float
+    slip_std: float
+    past: Past
+
+    def at(self, sample: npt.NDArray[np.number]) -> FloatArray:
+        """Return the wheel angle, [rad], at sample numbers."""
+        return np.asarray(polyval((sample - self.middle) / self.turn, self.angle))
+
+    def sample(self, phi: float) -> float:
+        """Return the sample number, not necessarily whole, at a wheel angle [rad]."""
+        x = phi / (2.0 * np.pi)
+        for _ in range(NEWTON):
+            angle = rate = 0.0
+            for coefficient in reversed(self.angle):
+                angle, rate = angle * x + coefficient, rate * x + angle
+            x -= (angle - phi) / rate
+        return self.middle + x * self.turn
+
+
+def angle_law(
+    middle: float, turn: float, ahead: float, courses: Mapping[str, Course | None], past: Past
+) -> AngleLaw:
+    """Return the law of one turn.
+
+    Parameters
+    ----------
+    middle, turn : float, [samples]
+        Of the contact; since the one before.
+    ahead : float, [samples]
+        How far beyond the middle the courses reach.
+    courses : mapping of name to Course
+        Of `SOURCES`, as far as they are known.
+    past : Past
+        From the law of the preceding turn; empty if there is none.
+    """
+    known = [courses.get(name) for name in SOURCES]
+    means = [np.nan if course is None else course.mean for course in known]
+    now = (middle - 0.5 * turn, *(1.0 / (turn * mean) for mean in (*means, 1.0)))
+    past = (*past, now)[-REMEMBERED:]
+    shape, fit_std, row = np.ones(1), 0.0, len(SOURCES)
+    for index, course in enumerate(known):
+        if course is not None and course.known:
+            shape, fit_std, row = course.shape, course.std, index
+            break
+    slope, slope_std = _followed(past, 1 + row, turn)
+    rate = np.convolve(shape, (1.0 + 0.5 * slope, slope))
+    rate /= rate @ _means(rate.size)
+    if not _steady_enough(rate, ahead / turn):
+        rate, fit_std = np.ones(1), 1.0
+    contact_rate = float(rate[0]) / turn
+    slip_slope, slip_std = _followed(past, _SPEED, turn)
+    whole = 2.0 * np.pi * rate / np.arange(1, rate.size + 1)
+    return AngleLaw(
+        middle=middle,
+        turn=turn,
+        angle=(0.0, *whole.tolist()),
+        step=2.0 * np.pi * contact_rate,
+        std=float(np.hypot(fit_std, slope_std)),
+        speed=contact_rate / (now[_SPEED] * (1.0 + 0.5 * slip_slope)),
+        slip_std=slip_std,
+        past=past,
+    )
+
+
+_SPEED = 1 + SOURCES.index("speed")
+
+
+def _means(size: int) -> FloatArray:
+    """Return the means of the powers over the turn, from -1 to 0."""
+    k = np.arange(size)
+    return np.asarray((-1.0) ** k / (k + 1.0))
+
+
+def _steady_enough(rate: FloatArray, ahead: float) -> bool:
+    """Tell whether a rate, over its mean, can be followed from one contact to beyond the next."""
+    seen = polyval(np.linspace(-1.0, ahead, 33), rate)
+    return bool(seen.min() > 1.0 / LARGEST_RATIO and seen.max() < LARGEST_RATIO)
+
+
+def minmod(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the smaller of two numbers of one sign, and zero for others."""
+    return np.where(a * b > 0.0, np.sign(a) * np.minimum(np.abs(a), np.abs(b)), 0.0)
+
+
+def _followed(past: Past, column: int, turn: float) -> tuple[float, float]:
+    """Return the slope of q that is followed, and the doubt of q at the contact.
+
+    Both are relative to the last q; the slope is a turn's.
+    """
+    time = [row[0] for row in past]
+    q = [row[column] for row in past]
+    slopes = [
+        (q[i] - q[i - 1]) / (time[i] - time[i - 1]) * turn / q[-1]
+        for i in range(len(past) - 1, 0, -1)
+    ]
+    first, second, third = (*slopes, np.nan, np.nan, np.nan)[:3]
+    slope = float(minmod(np.array(first), np.array(second)))
+    apart = (first - slope, first - second, second - third)
+    doubt = 0.5 * max((abs(x) for x in apart if x == x), default=0.0)
+    return slope, doubt

@@ -1,0 +1,117 @@
+r"""How a held condition runs over one turn: a cubic at most, as certain as its scatter lets it be.
+
+A source of a wheel's motion is noisy, quantised, and held from one value to the next. It is fitted
+over a turn by Legendre polynomials, whose coefficients are independent of each other: each has the
+sampling variance :math:`v_j = (2j + 1)\,\sigma^2 / n`, with the scatter :math:`\sigma` about the
+fit and n the number of values that were told. A coefficient c is then shrunk to
+
+.. math:: c\,\max\left(0,\ 1 - \frac{v}{c^2}\right),
+
+its posterior mean when it has a Gaussian prior about zero of the width that makes the data most
+likely (empirical Bayes; C. M. Bishop, Pattern Recognition and Machine Learning, section 7.2). So a
+noisy source says next to nothing of a wheel that turns steadily, and all of one that does not.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial.legendre import legvander
+
+from tirelib.arrays import FloatArray
+
+DEGREE = 3
+"""Highest degree: braking may begin and end within one turn."""
+FEWEST = 3
+"""Values that must be told within the turn: a line, and one to show the scatter about it."""
+BINS = 64
+"""Means into which the samples are gathered before the fit; a cubic needs no more."""
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """How a source runs over one turn.
+
+    Attributes
+    ----------
+    shape : array, shape (k,)
+        Coefficients of the powers of turns from the contact's middle, in the source's unit.
+    mean : float
+        Over the turn, in the source's unit; not shrunk.
+    std : float, [1]
+        Relative standard deviation of the shape at the contact over its mean.
+    known : bool
+        Whether the source told enough values to have a course; else it is its mean.
+    """
+
+    shape: FloatArray
+    mean: float
+    std: float
+    known: bool
+
+
+def course(samples: FloatArray, first: float, turn: float) -> Course | None:
+    """Return how a source runs from the middle of one contact to beyond the next.
+
+    Parameters
+    ----------
+    samples : array, shape (n,)
+        What was held at each sample.
+    first : float, [samples]
+        Where the first of them lies, from the contact's middle.
+    turn : float, [samples]
+        Length of the turn that ends at the contact's middle.
+
+    Returns
+    -------
+    Course or None
+        None where the source is unknown at any sample, stands still or changes its sign.
+
+    Examples
+    --------
+    >>> found = course(20.0 + 0.01 * np.arange(-100, 11), -100.0, 100.0)
+    >>> round(found.mean, 6), round(float(found.shape[0]), 6), found.known
+    (19.5, 20.0, True)
+    """
+    if not np.isfinite(samples).all() or samples.min() * samples.max() <= 0.0:
+        return None
+    told = 1 + int(np.count_nonzero(samples[1:] != samples[:-1]))
+    if told < FEWEST:
+        part = samples[: max(1, round(-first))]
+        mean = float(samples[0] if told == 1 else part.mean())
+        return Course(np.array([mean]), mean, 0.0, known=False)
+    n = samples.size
+    edges = np.linspace(0, n, min(BINS, n) + 1).astype(np.int64)
+    y = np.add.reduceat(samples, edges[:-1]) / np.diff(edges)
+    told = min(told, y.size)
+    size = 1 + min(DEGREE, told - FEWEST + 1)
+    half = 0.5 * (first + n - 1 + turn) / turn  # of the span from -1 to its end, in turns
+    z = (0.5 * (edges[:-1] + edges[1:] - 1) + first + turn) / (turn * half) - 1.0
+    design = legvander(z, size - 1)
+    fitted = np.linalg.solve(design.T @ design, y @ design)
+    scatter = float(np.mean((y - design @ fitted) ** 2)) / (1.0 - size / told)
+    variance = scatter * (2.0 * np.arange(size) + 1.0) / told
+    square = np.maximum(fitted**2, np.finfo(np.float64).tiny)
+    keep = np.maximum(1.0 - variance / square, 0.0)
+    keep[0] = 1.0
+    terms = _LEGENDRE[:size, :size] @ _moved(1.0 / half, 1.0 / half - 1.0)[:size, :size]
+    means = terms @ _MEANS[:size]
+    mean = float(fitted @ means)
+    std = float(np.sqrt((terms[:, 0] - means) ** 2 @ variance)) / abs(mean)
+    return Course((fitted * keep) @ terms, mean, std, known=True)
+
+
+_LEGENDRE = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [-0.5, 0.0, 1.5, 0.0],
+                      [0.0, -1.5, 0.0, 2.5]])  # fmt: skip
+"""Rows: Legendre polynomials by their powers."""
+_MEANS = np.array([1.0, -1.0 / 2.0, 1.0 / 3.0, -1.0 / 4.0])
+"""Means of the powers from -1 to 0."""
+
+
+def _moved(gain: float, shift: float) -> FloatArray:
+    """Return the matrix whose row k is ``(gain x + shift)^k`` by the powers of x."""
+    rows = np.zeros((DEGREE + 1, DEGREE + 1))
+    rows[0, 0] = 1.0
+    for k in range(DEGREE):
+        rows[k + 1] = shift * rows[k]
+        rows[k + 1, 1:] += gain * rows[k, :-1]
+    return rows
