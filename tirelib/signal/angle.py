@@ -17,7 +17,7 @@ contact is exact. How the rate runs within that turn, up to the contact and a li
 What the fit of the source leaves, and what the last slopes differ by, is the uncertainty.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -120,7 +120,7 @@ def angle_law(
     if not _steady_enough(rate, ahead / turn):
         rate, fit_std = np.ones(1), 1.0
     contact_rate = float(rate[0]) / turn
-    slip_slope, slip_std = _followed(past, _SPEED, turn)
+    slip, slip_std = _slip(known, *_followed(past, _SPEED, turn), slope_std)
     whole = 2.0 * np.pi * rate / np.arange(1, rate.size + 1)
     return AngleLaw(
         middle=middle,
@@ -128,10 +128,35 @@ def angle_law(
         angle=(0.0, *whole.tolist()),
         step=2.0 * np.pi * contact_rate,
         std=float(np.hypot(fit_std, slope_std)),
-        speed=contact_rate / (now[_SPEED] * (1.0 + 0.5 * slip_slope)),
+        speed=contact_rate / (now[_SPEED] * slip),
         slip_std=slip_std,
         past=past,
     )
+
+
+def _slip(
+    known: Sequence[Course | None], slope: float, slope_std: float, rate_std: float
+) -> tuple[float, float]:
+    """Return q of the speed at the contact over its mean of the turn, and its relative doubt.
+
+    From turn to turn it is told precisely, but late; where turn rate and speed both have a course,
+    these tell it at once, but with their noise. What they tell beyond the former is shrunk as their
+    own coefficients are. What a measured turn rate and the contacts differ by from turn to turn
+    (`rate_std` is half of it) is how far a change of traction moves the pulse's middle.
+    """
+    slip = 1.0 + 0.5 * slope
+    if any(course is None or not course.known for course in known):
+        return slip, slope_std
+    rate, speed = (
+        (float(course.shape[0] / (course.shape @ _means(course.shape.size))), course.std)
+        for course in known
+        if course is not None
+    )
+    apart, variance = rate[0] / speed[0] - slip, rate[1] ** 2 + speed[1] ** 2
+    told = 1.0 - variance / apart**2 if apart**2 > variance else 0.0
+    left = np.hypot(slope_std, apart) * (1.0 - told)
+    direct = told * np.hypot(np.sqrt(variance), 2.0 * rate_std)
+    return slip + told * apart, float(np.hypot(left, direct))
 
 
 _SPEED = 1 + SOURCES.index("speed")

@@ -80,7 +80,9 @@ class ContactFinder:
         self._count = 0  # samples taken, after the median
         self._tail: FloatArray = np.empty(0)  # last two raw samples, for the median of three
         self._held = np.nan  # last finite sample
-        self._missing = np.empty(0, dtype=np.int64)  # numbers of samples missing since the pulse
+        self._missing = np.empty(
+            0, dtype=np.int64
+        )  # numbers of samples missing since the last rise
         self._restart()
 
     def _restart(self) -> None:
@@ -258,13 +260,13 @@ class ContactFinder:
             self._level = own_level
             self._low_level = self._lowest + FALL * swing
             self._swing = swing
-        self._missing = self._missing[self._missing >= self._count]
         self._armed = False  # the new levels may lie below the strain just reached
         self._lowest = self._highest = self._before
         rise = i - 1 + (level - pulse[i - 1]) / (pulse[i] - pulse[i - 1])
         fall = j + (pulse[j] - level) / (pulse[j] - pulse[j + 1])
         shift = self._pulse_start + 1  # the median of three lags by one sample
         contact = Contact(float(rise + shift), float(fall + shift), fresh)
+        self._missing = self._missing[self._missing > contact.rise]
         self._since = self._count
         if fresh or self._last_middle is None:
             self._last_period = None

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.synthetic import RATE, frames, record, synthetic_run, waveform
+from tests.synthetic import RATE, frames, record, synthetic_run, waveform, wrapped
 from tirelib.signal import Contact, ContactFinder
 
 
@@ -135,3 +135,17 @@ def test_a_new_level_below_the_strain_just_reached_starts_no_pulse() -> None:
     assert run.strain is not None
     found = ContactFinder(int(3 * RATE)).push(run.strain[2])
     assert [contact.fresh for contact in found] == [True, False, False, False]
+
+
+@pytest.mark.parametrize("start", [-60, -40, -20, 0, 20])
+def test_a_gap_that_hides_an_extreme_moves_no_later_contact(start: int) -> None:
+    """The levels follow the extremes, and a tilted pulse has another middle at another level."""
+    phi = np.linspace(np.pi, 15.0 * np.pi, 7001)
+    x = waveform(phi) * (1.0 + 2.0 * wrapped(phi))
+    clean = middles(ContactFinder(int(3 * RATE)).push(x))
+    holed = x.copy()
+    at = round(clean[2]) + start
+    holed[at : at + 50] = np.nan
+    found = middles(ContactFinder(int(3 * RATE)).push(holed))
+    assert len(found) == len(clean)
+    np.testing.assert_allclose(found[3:], clean[3:], atol=0.02)

@@ -1,0 +1,179 @@
+"""Laws of wheel angle over time: exact under an even acceleration, unmoved by noise."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.synthetic import LATERAL, RATE, waveform
+from tirelib.features.extract import Features, extract_features
+from tirelib.flags import TurnFlag, flag_names
+from tirelib.signal import TurnCutter, cut_turns
+from tirelib.signal.angle import AngleLaw, angle_law
+from tirelib.signal.course import Course, course
+
+RADIUS = 0.305
+SOURCES = ("omega", "speed", "none")
+
+
+class Wheel:
+    """A wheel whose rate changes evenly: its angle, strain and conditions over time."""
+
+    def __init__(self, first: float, gain: float, seconds: float) -> None:
+        self.first, self.gain = first, gain
+        self.time = np.arange(int(seconds * RATE)) / RATE
+        self.omega = first + gain * self.time
+        self.strain = np.tile(waveform(self.angle(self.time)), (5, 1)) + 2.7e-3
+
+    def angle(self, time: np.ndarray) -> np.ndarray:
+        return np.asarray(np.pi + self.first * time + 0.5 * self.gain * time**2)
+
+    def held(self, source: str) -> dict[str, np.ndarray]:
+        told = {"omega": {"omega": self.omega}, "speed": {"speed": RADIUS * self.omega}, "none": {}}
+        return told[source]
+
+    def features(self, source: str) -> Features:
+        return extract_features(cut_turns(self.strain, RATE, LATERAL, **self.held(source)))
+
+
+BRAKING = Wheel(48.0, -26.0, 1.0)  # -8 m/s2 from 53 to 24 km/h
+DRIVING = Wheel(25.0, 26.0, 1.0)
+
+
+def laws(wheel: Wheel, source: str) -> list[AngleLaw]:
+    """Of the turns between contacts whose times are known exactly."""
+    turns = np.arange(2.0 * np.pi, wheel.angle(wheel.time)[-1], 2.0 * np.pi)
+    root = np.sqrt(wheel.first**2 + 2.0 * wheel.gain * (turns - np.pi))
+    middles = (root - wheel.first) / wheel.gain * RATE
+    past, found = (), []
+    for before, middle in pairwise(middles):
+        first, stop = int(np.ceil(before)), int(middle + 0.1 * (middle - before))
+        told = {
+            name: course(x[first:stop], first - middle, middle - before)
+            for name, x in wheel.held(source).items()
+        }
+        found.append(angle_law(middle, middle - before, stop - middle, told, past))
+        past = found[-1].past
+    return found
+
+
+@pytest.mark.parametrize("wheel", [BRAKING, DRIVING], ids=["braking", "driving"])
+@pytest.mark.parametrize("source", SOURCES)
+def test_an_even_acceleration_is_followed_exactly(wheel: Wheel, source: str) -> None:
+    for law in laws(wheel, source)[2:]:
+        samples = law.middle + np.linspace(-1.0, 0.1, 12) * law.turn
+        there = wheel.angle(samples / RATE) - wheel.angle(np.array(law.middle / RATE))
+        np.testing.assert_allclose(law.at(samples), there, atol=1e-6)
+        assert law.step * RATE == pytest.approx(
+            wheel.first + wheel.gain * law.middle / RATE, rel=1e-6
+        )
+        assert law.std < 1e-6
+        assert law.sample(-2.0) == pytest.approx(np.interp(-2.0, law.at(samples), samples), abs=1.0)
+        assert float(law.at(np.array(law.sample(-2.0)))) == pytest.approx(-2.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("wheel", [BRAKING, DRIVING], ids=["braking", "driving"])
+@pytest.mark.parametrize("source", SOURCES)
+def test_features_of_a_wheel_that_brakes_are_those_of_steady_rolling(
+    wheel: Wheel, source: str
+) -> None:
+    found, steady = wheel.features(source), Wheel(40.0, 1e-9, 1.0).features("none")
+    first = 3 if source == "none" else 1  # without a source three turns tell the acceleration
+    assert len(found) > first + 1
+    for name in ("contact_angle", "rate_lead", "rate_trail", "cp1", "cp2", "tp", "e_vertical"):
+        wanted = getattr(steady, name)[2]
+        got = getattr(found, name)[first:]
+        np.testing.assert_allclose(got, np.tile(wanted, (len(got), 1)), rtol=3e-4, err_msg=name)
+    assert (found.flags[first:] & ~int(TurnFlag.NO_SPEED) == 0).all()
+
+
+@given(turn=st.floats(300.0, 3000.0), middle=st.floats(1e3, 1e6))
+def test_a_steady_wheel_turns_evenly(turn: float, middle: float) -> None:
+    still = Course(np.ones(1), 18.0, 0.0, known=False)
+    past = tuple((middle - (k + 0.5) * turn, np.nan, 1.0 / turn / 18.0, 1.0 / turn)
+                 for k in (4, 3, 2, 1))  # fmt: skip
+    law = angle_law(middle, turn, 0.1 * turn, {"speed": still}, past)
+    samples = middle + np.linspace(-1.0, 0.1, 12) * turn
+    np.testing.assert_allclose(law.at(samples), (samples - middle) * 2.0 * np.pi / turn, atol=1e-12)
+    assert (law.std, law.slip_std) == pytest.approx((0.0, 0.0), abs=1e-9)
+    assert law.speed == pytest.approx(18.0, rel=1e-9)
+
+
+@given(seed=st.integers(0, 999), held=st.sampled_from([1, 10, 100]))
+def test_noise_of_a_source_moves_a_steady_wheel_less_than_the_noise_of_its_mean(
+    seed: int, held: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    noise = np.repeat(rng.standard_normal((40, 1200 // held)), held, axis=1)
+    found = [course(18.0 * (1.0 + 5e-3 * row), -1090.0, 1090.0) for row in noise]
+    ratio = np.array([c.shape[0] / (c.shape @ [1, -1 / 2, 1 / 3, -1 / 4][: c.shape.size])
+                      for c in found])  # fmt: skip
+    told = min(1200 // held, 64)
+    apart = 5e-3 * np.sqrt(min(held * 64 / 1200, 1.0) / told * 1.0)
+    assert ratio.std() < 3.0 * apart
+    assert ratio.std() < 1.5 * np.mean([c.std for c in found])
+
+
+def test_a_source_that_was_hardly_renewed_has_no_course() -> None:
+    steps = np.repeat([18.0, 17.5], 500)
+    held = course(steps, -900.0, 900.0)
+    assert held is not None
+    assert not held.known
+    assert held.mean == pytest.approx((500 * 18.0 + 400 * 17.5) / 900)
+    assert course(np.full(1000, np.nan), -900.0, 900.0) is None
+    assert course(np.linspace(-1.0, 1.0, 1000), -900.0, 900.0) is None
+
+
+def test_a_single_jump_is_not_followed_and_widens_the_doubt() -> None:
+    turn, rates = 1000.0, (1.0, 1.0, 1.0, 0.95, 0.95, 0.95, 0.95, 0.95)
+    past, middle, doubts = (), 0.0, []
+    for rate in rates:
+        middle += turn / rate
+        law = angle_law(middle, turn / rate, 100.0, {}, past)
+        past = law.past
+        assert law.step == pytest.approx(2.0 * np.pi / turn * rate, rel=1e-12)
+        doubts.append(law.std)
+    assert doubts[3] > 0.02
+    assert doubts[4] > 0.02
+    assert doubts[:3] + doubts[6:] == pytest.approx([0.0] * 5, abs=1e-12)
+
+
+def test_what_cannot_be_followed_is_flagged() -> None:
+    time = np.arange(int(0.8 * RATE)) / RATE
+    jump = 45.0 * time - 15.0 * np.maximum(time - 0.45, 0.0)  # a third of the rate is lost at once
+    strain = np.tile(waveform(np.pi + jump), (5, 1)) + 2.7e-3
+    turns = cut_turns(strain, RATE, LATERAL, speed=45.0 * RADIUS)
+    names = [flag_names(flags) for flags in turns.flags.tolist()]
+    late = int(np.argmax(turns.time > 0.45))
+    assert "accelerating" in names[late]
+    assert not any("accelerating" in flags for flags in names[:late])
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_frames_give_the_turns_of_the_whole_record_while_braking(source: str) -> None:
+    held = BRAKING.held(source)
+    whole = TurnCutter(LATERAL, RATE).push(BRAKING.strain, **held)
+    for size in (1, 16, 333):
+        cutter, pieces = TurnCutter(LATERAL, RATE), []
+        for start in range(0, BRAKING.time.size, size):
+            part = slice(start, start + size)
+            told = {name: x[part] for name, x in held.items()}
+            pieces += cutter.push(BRAKING.strain[:, part], **told)
+        assert repr(pieces) == repr(whole)
+
+
+def test_the_speed_told_is_that_at_the_contact() -> None:
+    found = BRAKING.features("speed")
+    here = RADIUS * (BRAKING.first + BRAKING.gain * found.time)
+    np.testing.assert_allclose(found.speed[1:], here[1:], rtol=1e-4)
+    np.testing.assert_allclose(found.omega[1:] * RADIUS / found.speed[1:], 1.0, rtol=1e-4)
+
+
+def test_a_slip_that_grows_evenly_is_told_at_the_contact() -> None:
+    wheel, slip = DRIVING, 0.05
+    speed = RADIUS * wheel.omega / (1.0 + slip * wheel.time)
+    turns = cut_turns(wheel.strain, RATE, LATERAL, speed=speed)
+    found = turns.trace.conditions.omega * RADIUS / turns.trace.conditions.speed - 1.0
+    np.testing.assert_allclose(found[3:], slip * turns.time[3:], atol=2e-4)
