@@ -92,7 +92,8 @@ def inputs(lateral: tuple[float, ...], samples: int, *, buffered: bool = False) 
         Variable("camber", "Real", "input", "camber angle; NaN: unknown", NAN, "rad", "deg", 0.1,
                  -RIGHT, RIGHT, type="Angle"),
         Variable("omega", "Real", "input",
-                 "measured turn rate, for the watchdog only (zero: standing); NaN: unknown", NAN,
+                 "measured turn rate: its change within the turn is the wheel angle's; zero: "
+                 "standing; NaN: unknown", NAN,
                  "rad/s", "rpm", 10.0, -1e3, 1e3, type="TurnRate"),
         Variable("friction", "Real", "input",
                  "coefficient of friction between tread and road; NaN: unknown", NAN, "1", None,
