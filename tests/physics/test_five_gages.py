@@ -64,11 +64,22 @@ def read(trace: StrainTrace) -> Features:
     flat = np.zeros((n, gages), dtype=np.int64)
     return extract_features(
         Turns(
-            trace=trace, time=zero, ready=zero, period=zero + 0.1, angle_std=zero, slip_std=zero,
-            offset=none, offset_std=none, mean=none, friction=zero, tread_depth=zero,
-            tread_temperature=zero, gage_flags=flat, flags=np.zeros(n, dtype=np.int64), rate_hz=1e4,
-        )  # fmt: skip
-    )
+            trace=trace,
+            time=zero,
+            ready=zero,
+            period=zero + 0.1,
+            angle_std=zero,
+            slip_std=zero,
+            offset=none,
+            offset_std=none,
+            mean=none,
+            friction=zero,
+            tread_depth=zero,
+            tread_temperature=zero,
+            gage_flags=flat,
+            flags=np.zeros(n, dtype=np.int64),
+            rate_hz=1e4,
+        )
     )
 
 
