@@ -1,6 +1,7 @@
 """Several sources in one run: told apart, contradictions refused, replayed to the bit."""
 
 import os
+import pickle
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import closing
@@ -22,7 +23,7 @@ from bench.decoder import SerialDecoder
 from bench.device import Device
 from bench.document import turn_document
 from bench.emulator import write_script
-from bench.errors import BenchError, DeviceError
+from bench.errors import BenchError, DeviceError, UnpluggedError
 from bench.estimation import Estimation, News
 from bench.faults import Faults
 from bench.fmu_archive import read_fmu
@@ -32,6 +33,9 @@ from bench.links import Read
 from bench.links.opening import PortPlan
 from bench.links.replay import ReplayLink
 from bench.live.chain import LiveChain, LivePlan
+from bench.live.exchange import Exchange
+from bench.live.kept import CONTEXT
+from bench.live.ports import GatheredLink, PortState
 from bench.live.reader import ReaderPlan
 from bench.protocols import SLCAN, slcan
 from bench.protocols.plan import ProtocolPlan
@@ -206,6 +210,59 @@ def test_a_port_of_several_that_is_killed_is_read_again(tmp_path: Path) -> None:
     reads = list(recording.reads())
     recording.close()
     assert {read.source for read in reads if read.data} == {0, 1}
+
+
+@pytest.fixture
+def exchange() -> Iterator[Exchange]:
+    made = Exchange.create(CONTEXT, 1, 0, 2)
+    for number in range(2):
+        made.ports[number].put(pickle.dumps(PortState(f"port {number}"), 5))
+    yield made
+    made.close()
+
+
+def put(exchange: Exchange, source: int, *arrivals: int) -> None:
+    for arrival in arrivals:
+        exchange.reads[source].put(pickle.dumps(Read(arrival, b"x", "", source), 5))
+
+
+def test_reads_of_several_ports_come_in_the_order_of_the_clock(exchange: Exchange) -> None:
+    put(exchange, 0, 1, 4, 5)
+    put(exchange, 1, 2, 3, 5)
+    link = GatheredLink(exchange, {})
+    assert link.name == "port 0 + port 1"
+    reads = [link.receive(Deadline.after(1.0)) for _ in range(6)]
+    assert [(r.arrival, r.source) for r in reads if r] == [
+        (1, 0), (2, 1), (3, 1), (4, 0), (5, 0), (5, 1),
+    ]  # fmt: skip
+    nothing = link.receive(Deadline.after(0.0))
+    assert nothing is not None
+    assert nothing.data == b""
+
+
+def test_a_reader_after_another_takes_nothing_twice_and_loses_nothing(exchange: Exchange) -> None:
+    put(exchange, 0, 1, 3)
+    put(exchange, 1, 2)
+    first = GatheredLink(exchange, {})
+    assert [getattr(first.receive(Deadline.after(1.0)), "arrival", 0) for _ in range(2)] == [1, 2]
+    other = Exchange(exchange.address)  # the first one ended while it was busy with the second read
+    rest = GatheredLink(other, {0: 1, 1: 2}).receive(Deadline.after(1.0))
+    assert rest is not None
+    assert (rest.arrival, rest.source) == (3, 0)
+    other.close()
+
+
+def test_a_port_that_stays_away_is_told_after_what_it_brought(exchange: Exchange) -> None:
+    put(exchange, 1, 1)
+    gone = PortState("port 1", error=("UnpluggedError", "port 1: it went away"))
+    exchange.ports[1].put(pickle.dumps(gone, 5))
+    link = GatheredLink(exchange, {})
+    read = link.receive(Deadline.after(1.0))
+    assert read is not None
+    assert read.data == b"x"
+    link._next_look = 0.0
+    with pytest.raises(UnpluggedError, match="port 1: it went away"):
+        link.receive(Deadline.after(1.0))
 
 
 def test_an_emulator_plays_one_source_of_several(tmp_path: Path) -> None:
