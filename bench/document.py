@@ -104,7 +104,9 @@ def turn_document(turn: Turn) -> dict[str, Any]:
         entry[f"{name}_valid"] = quantity_valid(turn, name)
     for gage in range(1, len(turn.saturated) + 1):
         length = outputs.get(f"contact_length_{gage}", math.nan)
+        length_std = outputs.get(f"contact_length_std_{gage}", math.nan)
         entry[f"contact_length_{gage}_mm"] = _number(1e3 * length)
+        entry[f"contact_length_{gage}_std_mm"] = _number(1e3 * length_std)
     entry["omega_rad_s"] = _number(outputs.get("turn_rate", math.nan))
     entry["rolling"] = turn.texts.get("rolling", "unknown")
     entry["valid"] = turn.valid

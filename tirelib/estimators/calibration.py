@@ -8,6 +8,7 @@ import numpy as np
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.errors import CalibrationError
 from tirelib.estimators.chain import QUANTITIES, Chain
+from tirelib.estimators.contact_length import contact_lengths
 from tirelib.estimators.doubt import doubt, with_moved
 from tirelib.estimators.reference_turn import ReferenceTurn
 from tirelib.estimators.regressors import compute_regressors
@@ -43,7 +44,9 @@ class Estimates:
         ``free``, ``braking``, ``driving`` or ``unknown``, from CP1 against CP2.
     radius : array, shape (n,), [m]
         Effective rolling radius.
-    contact_length : array, shape (n, n_gages), [m]
+    contact_length, contact_length_std : arrays, shape (n, n_gages), [m]
+        Corrected for the bias of the reading; what is read is `Features.contact_angle` times the
+        radius.
     """
 
     value: dict[str, FloatArray]
@@ -55,6 +58,7 @@ class Estimates:
     rolling: tuple[str, ...]
     radius: FloatArray
     contact_length: FloatArray
+    contact_length_std: FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,6 +237,7 @@ class Calibration:
         for quantity in QUANTITIES:
             value[quantity] = np.where(bad, np.nan, value[quantity])
             std[quantity] = np.where(bad, np.nan, std[quantity])
+        length, length_std = contact_lengths(features.contact_angle, radius)
         return Estimates(
             value=value,
             std=std,
@@ -242,7 +247,8 @@ class Calibration:
             notes=tuple(tuple(row) for row in notes),
             rolling=self.rolling.classify(traction),
             radius=radius,
-            contact_length=features.contact_angle * radius[:, None],
+            contact_length=length,
+            contact_length_std=length_std,
         )
 
 

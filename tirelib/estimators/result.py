@@ -122,8 +122,10 @@ def _turn(
         turn[f"{quantity}_std"] = _number(estimates.std[quantity][row] * factor)
         turn[f"{quantity}_valid"] = bool(estimates.valid[quantity][row])
     for gage in range(len(calibration.lateral)):
-        length = estimates.contact_length[row, gage]
-        turn[f"contact_length_{gage + 1}_mm"] = _number(1e3 * length)
+        turn[f"contact_length_{gage + 1}_mm"] = _number(1e3 * estimates.contact_length[row, gage])
+        turn[f"contact_length_{gage + 1}_std_mm"] = _number(
+            1e3 * estimates.contact_length_std[row, gage]
+        )
     turn["omega_rad_s"] = _number(features.omega[row])
     turn["rolling"] = estimates.rolling[row]
     turn["valid"] = bool(estimates.turn_valid[row])

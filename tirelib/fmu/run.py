@@ -156,6 +156,7 @@ class LoadedFmu:
             *QUANTITIES,
             *(f"{quantity}_std" for quantity in QUANTITIES),
             *(f"contact_length_{gage}" for gage in gages),
+            *(f"contact_length_std_{gage}" for gage in gages),
             "rolling_radius",
             "turn_rate",
             "contact_time",
@@ -304,6 +305,9 @@ def _estimates(rows: list[dict[str, Any]], calibration: Calibration) -> Estimate
         rolling=tuple(row["rolling"] for row in rows),
         radius=_column(rows, "rolling_radius"),
         contact_length=np.stack([_column(rows, f"contact_length_{g}") for g in gages], axis=1),
+        contact_length_std=np.stack(
+            [_column(rows, f"contact_length_std_{g}") for g in gages], axis=1
+        ),
     )
 
 

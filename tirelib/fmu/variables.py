@@ -131,9 +131,16 @@ def outputs(lateral: tuple[float, ...]) -> list[Variable]:
     ]  # fmt: skip
     table += [
         Variable(f"contact_length_{gage}", "Real", "output",
-                 f"contact length at lateral position {1e3 * y:+g} mm of the chosen axes", NAN,
-                 "m", "mm", 0.1, 0.0, 1.0, type="Length")
+                 f"contact length, corrected for the reading's bias, at lateral position "
+                 f"{1e3 * y:+g} mm of the chosen axes", NAN, "m", "mm", 0.1, 0.0, 1.0,
+                 type="Length")
         for gage, y in enumerate(lateral, start=1)
+    ]  # fmt: skip
+    table += [
+        Variable(f"contact_length_std_{gage}", "Real", "output",
+                 f"standard deviation of contact_length_{gage}", NAN, "m", "mm", 0.01, 0.0, 1.0,
+                 type="Length")
+        for gage in range(1, len(lateral) + 1)
     ]  # fmt: skip
     return [
         *table,

@@ -187,11 +187,13 @@ class Wheel:
 
     def _reals(self, latest: TurnEstimate | None) -> tuple[float, ...]:
         if latest is None:
-            return (math.nan,) * (2 * len(QUANTITIES) + self._estimator.gages + 3)
+            return (math.nan,) * (2 * (len(QUANTITIES) + self._estimator.gages) + 3)
         values = (s * latest.value(q) for s, q in zip(self._sign, QUANTITIES, strict=True))
         stds = (latest.std(quantity) for quantity in QUANTITIES)
-        lengths = np.empty(self._estimator.gages)
-        lengths[:] = latest.estimates.contact_length[0][np.argsort(self._order)]
+        order, found = np.argsort(self._order), latest.estimates
+        lengths = np.concatenate(
+            (found.contact_length[0][order], found.contact_length_std[0][order])
+        )
         return (
             *values,
             *stds,

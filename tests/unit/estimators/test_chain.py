@@ -11,6 +11,7 @@ from tirelib.campaign import Campaign, read_campaign
 from tirelib.errors import CalibrationError
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
+from tirelib.estimators.contact_length import contact_lengths
 from tirelib.estimators.dissertation import fit_all
 from tirelib.estimators.result import estimate_document
 from tirelib.estimators.train import Trained, take, train
@@ -180,10 +181,17 @@ def test_without_speed_there_is_no_slip_ratio_but_a_load(trained: Trained) -> No
     assert abs(np.nanmean(found.value["Fz"]) - 5000.0) < 75.0
 
 
-def test_a_contact_length_is_the_angle_times_the_rolling_radius(trained: Trained) -> None:
+def test_a_contact_length_is_the_corrected_angle_times_the_rolling_radius(
+    trained: Trained,
+) -> None:
     features = features_of()
     found = trained.calibration.estimate(features)
-    np.testing.assert_allclose(found.contact_length, features.contact_angle * found.radius[:, None])
+    length, std = contact_lengths(features.contact_angle, found.radius)
+    np.testing.assert_array_equal(found.contact_length, length)
+    np.testing.assert_array_equal(found.contact_length_std, std)
+    read = features.contact_angle[1:] * found.radius[1:, None]
+    short = found.contact_length[1:] / read - 1.0
+    assert ((short > 0.07) & (short < 0.25)).all()
     np.testing.assert_allclose(found.radius[1:], 0.312 - 1e-6 * 4000.0, atol=1e-4)
 
 
