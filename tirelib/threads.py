@@ -23,12 +23,8 @@ VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS",
 
 
 def bound_process() -> None:
-    """Let this process and those that it starts use one thread, unless the user says otherwise.
-
-    Call it before numpy is imported.
-    """
-    for name in VARIABLES:
-        os.environ.setdefault(name, "1")
+    """Let this process and those that it starts use one thread; call it before numpy is imported."""
+    os.environ.update(dict.fromkeys(VARIABLES, "1"))
 
 
 @contextmanager
