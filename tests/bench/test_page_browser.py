@@ -431,6 +431,36 @@ def test_what_may_not_be_used_is_struck_out_and_says_why(browser: Any) -> None:
         page.context.close()
 
 
+BLUE = """(loads) => {
+  const { plot } = document.querySelector('#q-Fz .chart');
+  const [top, bottom] = loads.map((value) => Math.round(plot.valToPos(value, 'y', true)));
+  const { left, width } = plot.bbox;
+  const { data } = plot.ctx.getImageData(left, top, width, bottom - top);
+  let blue = 0;
+  for (let i = 0; i < data.length; i += 4) blue += data[i + 2] - data[i] > 20 ? 1 : 0;
+  return blue;
+}"""
+"""Pixels of line or band between two loads."""
+
+
+def test_nothing_is_drawn_from_one_load_to_another_over_a_gap(browser: Any) -> None:
+    """3000 N, turns that may not be used or a new segment, 6000 N; and back, again and again."""
+    source, turns = FakeSource(0), []
+    for number in range(1, 61):
+        load = 3000.0 if number // 10 % 2 else 6000.0
+        turn = made_turn(number, Fz=load, Fz_std=50.0, valid=float(number % 10 > 0))
+        turns.append(replace(turn, segment=number // 20))
+    with LivePage(PageChoice(), source, About("port"), None) as run:
+        page = opened(browser, run.url, Visit())
+        run.watch(News(turns))
+        wait_for(page, f"({ROWS})(0).length >= 60 && tirebench.drawn.count > 20")
+        wait_for(page, "document.querySelector('#q-Fz .chart').plot.data[0].length >= 60")
+        wait_until(lambda: page.evaluate(BLUE, [6100, 5900]) > 40)
+        assert page.evaluate(BLUE, [3100, 2900]) > 40
+        assert page.evaluate(BLUE, [5600, 3400]) == 0
+        page.context.close()
+
+
 def test_single_turns_shortly_after_each_other_all_arrive(browser: Any) -> None:
     """News that come while the page looks away are not slept through."""
     source = FakeSource(0)

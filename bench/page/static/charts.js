@@ -65,12 +65,70 @@ function alone(plot, index) {
   return found;
 }
 
+// A line with the pen up where a value is missing. uPlot's own draws on to the next value and hides
+// that part, but for a pixel at both ends: a spike of hundreds of newtons where the load has changed.
+function broken(plot, index) {
+  const [x, y] = [plot.data[0], plot.data[index]];
+  const stroke = new Path2D();
+  let down = false;
+  for (let i = 0; i < x.length; i += 1) {
+    if (y[i] == null) { down = false; continue; }
+    const [across, up] = [plot.valToPos(x[i], "x", true), plot.valToPos(y[i], "y", true)];
+    if (down) stroke.lineTo(across, up); else stroke.moveTo(across, up);
+    down = true;
+  }
+  return { stroke, fill: null, clip: null, band: null, gaps: null, flags: 1 };
+}
+
+// Fill shapes between the two limits, inside the chart.
+function filled(plot, draw) {
+  const { left, top, width, height } = plot.bbox;
+  const [path, [x, high, low]] = [new Path2D(), plot.data];
+  const place = (value, scale) => Math.round(plot.valToPos(value, scale, true));
+  draw(path, x, high, low, place);
+  plot.ctx.save();
+  plot.ctx.beginPath();
+  plot.ctx.rect(left, top, width, height);
+  plot.ctx.clip();
+  plot.ctx.fillStyle = colors.band;
+  plot.ctx.fill(path);
+  plot.ctx.restore();
+}
+
+// The band along an angle: one shape for each stretch without a hole.
+function alongAngle(path, x, high, low, place) {
+  for (let start = 0; start < x.length;) {
+    if (high[start] == null) { start += 1; continue; }
+    let end = start;
+    while (end < x.length && high[end] != null) end += 1;
+    for (let i = start; i < end; i += 1) path.lineTo(place(x[i], "x"), place(high[i], "y"));
+    for (let i = end - 1; i >= start; i -= 1) path.lineTo(place(x[i], "x"), place(low[i], "y"));
+    path.closePath();
+    path.moveTo(0, 0);
+    start = end;
+  }
+}
+
+// The band of each turn: as long as the turn.
+function ofTurns(path, x, high, low, place) {
+  const steps = x.map((t, i) => t - x[i - 1]).filter((t) => t > 0).sort((a, b) => a - b);
+  const usual = steps.length ? steps[steps.length >> 1] : 0;
+  for (let i = 0; i < x.length; i += 1) {
+    if (high[i] == null) continue;
+    const step = x[i] - x[i - 1];
+    const [left, right] = [place(x[i] - (step > 0 && step < 3 * usual ? step : usual), "x"), place(x[i], "x")];
+    const [top, bottom] = [place(high[i], "y"), place(low[i], "y")];
+    path.rect(left, top, Math.max(right - left, 1), bottom - top);
+  }
+}
+
 const count = { draw: [() => { drawn.count += 1; }] };
-const invisible = { stroke: "transparent", points: { show: false }, spanGaps: false };
+const hooks = (shape) => ({ ...count, drawAxes: [(plot) => filled(plot, shape)] });
+const invisible = { paths: () => null, points: { show: false } };
 
 export function traceChart(place, last) {
   const plot = new uPlot({
-    width: 300, height: 80, legend: { show: false }, hooks: count,
+    width: 300, height: 80, legend: { show: false }, hooks: hooks(alongAngle),
     cursor: { sync: { key: "angle" }, points: { show: false }, drag: { setScale: false } },
     padding: [4, 18, last ? 0 : 4, 0],
     scales: { x: { time: false, range: () => [-180, 180] }, y: { range: steady(20) } },
@@ -81,8 +139,7 @@ export function traceChart(place, last) {
       axis({ size: 56, space: 26 }),
     ],
     series: [{}, invisible, invisible,
-      { stroke: () => colors.value, width: 1.6, points: { show: false }, spanGaps: false }],
-    bands: [{ series: [1, 2], fill: () => colors.band }],
+      { stroke: () => colors.value, width: 1.6, paths: broken, points: { show: false } }],
   }, [[0, 1], [null, null], [null, null], [null, null]], place);
   plot.scales.x.range = () => (place.zoomed ? [-40, 40] : [-180, 180]);
   return fitted(plot, place);
@@ -91,9 +148,8 @@ export function traceChart(place, last) {
 // Time from left to right. The band of a turn is as long as the turn, and a value that may not be
 // used has no height: a red dot at the bottom tells when it was.
 export function timeChart(place, least, label = "", space = 30) {
-  const turn = { ...invisible, paths: uPlot.paths.stepped({ align: -1 }) };
   const plot = new uPlot({
-    width: 300, height: 100, legend: { show: false }, hooks: count,
+    width: 300, height: 100, legend: { show: false }, hooks: hooks(ofTurns),
     cursor: { sync: { key: "time" }, points: { show: false }, drag: { setScale: false } },
     padding: [6, 18, 0, 0],
     scales: {
@@ -104,12 +160,11 @@ export function timeChart(place, least, label = "", space = 30) {
       axis({ size: 22, values: (_, ticks) => ticks.map((tick) => `${tick} s`) }),
       axis({ size: 52, space }),
     ],
-    series: [{}, turn, turn,
-      { stroke: () => colors.value, width: 2, spanGaps: false,
+    series: [{}, invisible, invisible,
+      { stroke: () => colors.value, width: 2, paths: broken,
         points: { show: true, filter: alone, size: 4, fill: () => colors.value } },
       { stroke: () => colors.bad, width: 0, scale: "mark", paths: () => null,
         points: { show: true, size: 5, fill: () => colors.bad } }],
-    bands: [{ series: [1, 2], fill: () => colors.band }],
   }, [[0], [null], [null], [null], [null]], place);
   if (label) {
     const name = document.createElement("b");

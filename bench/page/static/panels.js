@@ -75,7 +75,8 @@ export function drawUse(list, state, number) {
   };
   for (const [name, { value, unit, source }] of Object.entries(wheel ? wheel.in_use : {})) {
     const digits = unit === "km/h" ? 1 : 2;
-    const cell = value === null ? row(name, "not known") : row(name, `${shown(value, digits)} ${unit}`, source);
+    const said = unit === "1" ? shown(value, digits) : `${shown(value, digits)} ${unit}`;
+    const cell = value === null ? row(name, "not known") : row(name.replaceAll("_", " "), said, source);
     cell.dataset.use = name;
     cell.classList.toggle("none", value === null);
   }
