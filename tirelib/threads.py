@@ -23,7 +23,7 @@ VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS",
 
 
 def bound_process() -> None:
-    """Let this process and those that it starts use one thread; call it before numpy is imported."""
+    """Let this process and all that it starts use one thread; call it before numpy is imported."""
     os.environ.update(dict.fromkeys(VARIABLES, "1"))
 
 
