@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
 
 from bench.conditions import Conditions, condition
 from bench.device import Device
@@ -17,6 +18,7 @@ from bench.fmu_archive import read_fmu
 from bench.fmu_model import FmuFile, FmuModel
 from tests.bench.campaigns import tiny_runs
 from tests.bench.in_process import InProcess
+from tests.fmu import live
 
 STEADY = Conditions.constant(18.0, 2.3e5, 0.0)
 
@@ -107,3 +109,19 @@ def test_another_fmu_is_refused(
     path = edited(toy_fmus[16], tmp_path / "x.fmu", old, new)
     with pytest.raises(FmuError, match=message), FmuFile(read_fmu(path)) as file:
         FmuModel(file)
+
+
+def test_each_wheel_hears_its_own_fmu_also_when_another_is_gone() -> None:
+    def complains(wheel: FmuModel) -> None:
+        with pytest.raises(FMICallException):
+            wheel._slave.doStep(0.0, 1.5 / live.RATE)
+
+    with FmuFile(read_fmu(live.fmu_file(10))) as file, FmuModel(file) as first:
+        with FmuModel(file) as second:
+            complains(first)
+            assert (len(first.take_messages()), second.take_messages()) == (1, [])
+        del second
+        gc.collect()
+        first.start(1.0 / live.RATE)
+        complains(first)
+        assert "a whole number of samples is needed" in first.take_messages()[-1]
