@@ -1,5 +1,6 @@
 """What a run is told: its sources, and what is known beside the strain."""
 
+import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -8,7 +9,7 @@ from pathlib import Path
 from rich.console import Console
 
 from bench.cli.options import devices_of_text
-from bench.conditions import Conditions, read_conditions
+from bench.conditions import QUANTITIES, Conditions, read_conditions
 from bench.deadline import Deadline
 from bench.device import Device
 from bench.errors import DeviceError, RecordingError
@@ -119,30 +120,50 @@ def port_of_file(file: Path, wait: float, console: Console) -> str:
 
 
 def conditions_of(
-    speed: float | None, pressure: float | None, camber: float | None, sidecar: Path | None
+    options: Mapping[str, float | None], named: Sequence[str], sidecar: Path | None
 ) -> Conditions | None:
     """Return conditions of the options; None when there are none.
+
+    Parameters
+    ----------
+    options : mapping of name to value
+        In the units of files; None: not given.
+    named : sequence of str
+        ``NAME=VALUE``, in the same units.
+    sidecar : Path or None
 
     Raises
     ------
     DeviceError
-        If a file is given beside values, or has faults.
+        If a condition is given twice, is unknown or no number; if a file is given beside values, or
+        has faults.
     """
-    values = {"speed": (speed, "km/h", "speed"), "pressure": (pressure, "bar", "pressure"),
-              "camber": (camber, "deg", "angle")}  # fmt: skip
-    given = {
-        name: to_si(value, unit, dimension)
-        for name, (value, unit, dimension) in values.items()
-        if value is not None
-    }
+    given = {name: value for name, value in options.items() if value is not None}
+    for text in named:
+        name, _, number = text.partition("=")
+        if name not in QUANTITIES or name in given or not _is_number(number):
+            units = ", ".join(f"{known} [{unit}]" for known, (unit, _) in QUANTITIES.items())
+            raise DeviceError(
+                f"--condition {text}: NAME=VALUE is needed, each name once; names are {units}; "
+                "write it so"
+            )
+        given[name] = float(number)
     if sidecar is None:
-        return Conditions.constant(**given) if given else None
+        si = {name: float(to_si(value, *QUANTITIES[name])) for name, value in given.items()}
+        return Conditions.constant(**si) if si else None
     if given:
         raise DeviceError(
-            f"--{', --'.join(given)} and --conditions {sidecar} are given; one or the other says "
+            f"{', '.join(given)} and --conditions {sidecar} are given; one or the other says "
             "what holds; leave one out"
         )
     return read_conditions(sidecar)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
 
 
 def given_live(
@@ -218,17 +239,21 @@ def missing(given: Given, calibration: Calibration) -> tuple[dict[str, str], dic
     return needed, {name: words[name] for name in _WITHOUT if name in words.keys() - needed}
 
 
+def _option(name: str) -> str:
+    return _OPTIONS.get(name, f"--condition {name}=VALUE, ")
+
+
 def say_missing(given: Given, calibration: Calibration, console: Console) -> None:
     """Say what is not known before the first turn shows it."""
     needed, useful = missing(given, calibration)
     for name, words in needed.items():
         console.print(
             f"WARNING: no {words}: this calibration needs it, and NO TURN WILL BE VALID; give "
-            f"{_OPTIONS.get(name, '')}--conditions FILE, or a map with [{name}]", style="bold red",
+            f"{_option(name)}--conditions FILE, or a map with [{name}]", style="bold red",
             soft_wrap=True, markup=False,
         )  # fmt: skip
     for name, words in useful.items():
         console.print(
-            f"note: no {words}: {_WITHOUT[name]}; give {_OPTIONS.get(name, '')}"
+            f"note: no {words}: {_WITHOUT[name]}; give {_option(name)}"
             f"--conditions FILE, or a map with [{name}]", soft_wrap=True, markup=False,
         )  # fmt: skip

@@ -82,6 +82,8 @@ Exit code: 0 done, 1 unplugged or not one valid turn, 2 bad input. Ctrl-C ends i
 @click.option("--speed", metavar="KMH", type=float, help="Travel speed.")
 @click.option("--pressure", metavar="BAR", type=click.FloatRange(min=0.0), help="Gauge pressure.")
 @click.option("--camber", metavar="DEG", type=float, help="ISO 8855.")
+@click.option("--condition", "named", metavar="NAME=VALUE", multiple=True,
+              help="Any condition by its name, such as friction=0.8, tread_depth=5 (mm).")  # fmt: skip
 @click.option("--conditions", "sidecar", metavar="F.json", type=FILE,
               help="The three over time, as `emulate --conditions` writes them.")  # fmt: skip
 @click.option("--device", "device_texts", metavar="[WHEEL=]D.toml", multiple=True,
@@ -118,6 +120,7 @@ def run(
     speed: float | None,
     pressure: float | None,
     camber: float | None,
+    named: tuple[str, ...],
     sidecar: Path | None,
     device_texts: tuple[str, ...],
     numbers: tuple[int, ...],
@@ -162,7 +165,8 @@ def run(
         ports = (port_of_file(port_file, wait, console),)
     elif wait and replay is None:
         console.print(f"ports that are not there yet are waited for, {wait:g} s")
-    conditions = conditions_of(speed, pressure, camber, sidecar)
+    options = {"speed": speed, "pressure": pressure, "camber": camber}
+    conditions = conditions_of(options, named, sidecar)
     console.print(f"FMU {fmu_file}, sha256 {archive.sha256}", soft_wrap=True)
     console.print(f"FMU {check_trust(archive, trust=trust)}", soft_wrap=True)
     with ExitStack() as stack:

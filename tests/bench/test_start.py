@@ -9,18 +9,25 @@ import pytest
 from click.testing import CliRunner
 from rich.console import Console
 
+from bench.chain import Outputs
 from bench.cli import program
-from bench.cli.given import Given, port_of_file, say_missing
-from bench.conditions import Conditions
+from bench.cli.given import Given, conditions_of, port_of_file, say_missing
+from bench.conditions import TELLABLE, UNITS, Condition, Conditions
 from bench.deadline import Deadline
 from bench.errors import DeviceError, LinkError, UnpluggedError
+from bench.estimation import Estimation
 from bench.links import BACK, Link, Read
+from bench.links.opening import PortPlan
 from bench.links.reconnecting import ReconnectingLink
-from bench.source_plan import SourcePlan
+from bench.source_plan import SourcePlan, wheels_of
 from tests.bench.clocks import Clock
 from tests.bench.conftest import Spawn
 from tests.bench.programs import A_TURN, PATIENCE
 from tests.bench.test_sources import serial, vehicle
+from tests.bench.test_user_line import THREE, plan_of
+from tirelib.arrays import FloatArray
+from tirelib.held import HELD
+from tirelib.units import to_si
 
 
 def said(given: Given, *needed: str) -> str:
@@ -161,3 +168,65 @@ def test_without_a_wait_a_port_that_is_not_there_is_refused(
     assert "no port; the file that `tirebench emulate --port-file` writes" in (
         str(outcome.exception) + outcome.output
     )
+
+
+class Heard:
+    """An estimator that remembers the conditions that it was given."""
+
+    samples = 16
+
+    def __init__(self) -> None:
+        self.seen: set[tuple[float, ...]] = set()
+
+    def start(self, period: float) -> None:
+        self.seen.clear()
+
+    def step(self, strain: FloatArray, conditions: Condition, valid: bool) -> Outputs | None:
+        self.seen.add(conditions)
+        return None
+
+
+@pytest.mark.parametrize("name", TELLABLE)
+def test_every_condition_reaches_the_estimator_by_its_name(name: str) -> None:
+    """From a line of text, and from the command line; those of another wheel do not."""
+    condition, dimension = TELLABLE[name]
+    unit = UNITS[condition][0]
+    text = (
+        THREE
+        + f"""
+[[message]]
+name = "C"
+starts = "C"
+columns = ["x"]
+[[{name}]]
+wheel = 1
+message = "C"
+signal = "x"
+unit = "{unit}"
+"""
+    )
+    source = SourcePlan(PortPlan("p"), plan_of(text))
+    heard, wheels = Heard(), wheels_of([source])
+    estimation = Estimation(lambda _: heard, Conditions.constant())
+    lines = [f"{number},1,2,3\n" for number in range(64)]
+    estimation.take(wheels.push("".join(["C,2.5\n", *lines]).encode()))
+    (held,) = heard.seen
+    wanted = to_si(2.5, unit, dimension)
+    place = HELD.index(condition)
+    assert held[place] == pytest.approx(wanted)
+    assert sum(value == value for value in held) == 1
+    given = conditions_of({}, [f"{condition}=2.5"], None)
+    assert given is not None
+    assert given.values[0][place] == pytest.approx(wanted)
+    assert [place for place, _ in source.told] == [condition]
+
+
+@pytest.mark.parametrize("text", ["grip=1", "speed=fast", "speed", "friction=nan", "speed=70"])
+def test_a_wrong_condition_says_which_there_are(text: str) -> None:
+    with pytest.raises(
+        DeviceError, match=r"NAME=VALUE is needed.*speed \[km/h\], .*friction \[1\]"
+    ):
+        conditions_of({"speed": 65.0}, [text], None)
+    known = conditions_of({"speed": 65.0, "camber": None}, ["friction=0.8"], None)
+    assert known is not None
+    assert known.known == ("speed", "friction")
