@@ -83,7 +83,7 @@ Exit code: 0 done, 1 unplugged or not one valid turn, 2 bad input. Ctrl-C ends i
 @click.option("--pressure", metavar="BAR", type=click.FloatRange(min=0.0), help="Gauge pressure.")
 @click.option("--camber", metavar="DEG", type=float, help="ISO 8855.")
 @click.option("--condition", "named", metavar="NAME=VALUE", multiple=True,
-              help="Any condition by its name, such as friction=0.8, tread_depth=5 (mm).")  # fmt: skip
+              help="Any condition by its name: friction=0.8, tread_depth=5 (mm).")  # fmt: skip
 @click.option("--conditions", "sidecar", metavar="F.json", type=FILE,
               help="The three over time, as `emulate --conditions` writes them.")  # fmt: skip
 @click.option("--device", "device_texts", metavar="[WHEEL=]D.toml", multiple=True,
