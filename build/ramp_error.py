@@ -1,0 +1,145 @@
+"""Error of the load while the speed changes, over a T / (2 v): ``python build/ramp_error.py``.
+
+The virtual tire rolls straight at a held load and brakes or accelerates evenly; its strain goes
+through the calibration of the co-simulations. "Even turn" is wheel angle as time times the mean
+rate of the preceding turn. Writes ``docs/ramp_error.png`` and prints the table of steps in
+``docs/estimators.md``.
+"""
+
+import sys
+from functools import partial
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tirelib.estimators.calibration_file import read_calibration
+from tirelib.features.extract import extract_features
+from tirelib.fmu.virtual.options import Options
+from tirelib.fmu.virtual.spec import default_surface
+from tirelib.fmu.virtual.surface import read_surface
+from tirelib.fmu.virtual.wheel import VirtualWheel
+from tirelib.signal import LowPass, cut_turns, turns
+from tirelib.signal.angle import angle_law
+
+ROOT = Path(__file__).parents[1]
+RATE, SAMPLES = 1e4, 20
+CALIBRATION = read_calibration(ROOT / "build/cosim/calibration.toml")
+SURFACE = read_surface(default_surface())
+RESTING = {"Fz": 4000.0, "alpha": 0.0, "kappa": 0.0, "camber": 0.0, "speed": 20.0,
+           "pressure": 2.3e5}  # fmt: skip
+STEADY = 0.5
+"""Time before the speed begins to change, [s]."""
+
+
+def play(seconds: float, law: Any) -> dict[str, np.ndarray]:
+    """Return strain, turn rate and inputs of the virtual tire along a manoeuvre."""
+    wheel = VirtualWheel(SURFACE, Options(rate=RATE, seed=1), SAMPLES)
+    wheel.begin([{**RESTING, **law(0.0)}[name] for name in SURFACE.inputs])
+    rows, strain = [], []
+    for frame in range(int(seconds * RATE / SAMPLES)):
+        inputs = {**RESTING, **law(frame * SAMPLES / RATE)}
+        wheel.step(SAMPLES / RATE, [inputs[name] for name in SURFACE.inputs])
+        reals = wheel.outputs()[0]
+        strain.append(np.array(reals[: 5 * SAMPLES]).reshape(SAMPLES, 5))
+        rows.append([*(inputs[name] for name in SURFACE.inputs), reals[5 * SAMPLES]])
+    held = np.repeat(np.array(rows), SAMPLES, axis=0).T
+    columns = dict(zip((*SURFACE.inputs, "omega"), held, strict=True))
+    return {"strain": np.concatenate(strain).T, **columns}
+
+
+def estimate(made: dict[str, np.ndarray], *told: str) -> Any:
+    """Return features and estimates where these conditions are told."""
+    held: Any = {name: made[name] for name in (*told, "pressure", "camber")}
+    low_pass = LowPass(CALIBRATION.order, CALIBRATION.cut_off)
+    found = cut_turns(made["strain"], RATE, CALIBRATION.lateral, low_pass=low_pass, **held)
+    features = extract_features(found)
+    return features, CALIBRATION.estimate(features)
+
+
+def even(middle: float, turn: float, *_: Any) -> Any:
+    """Return the law of a wheel that turns evenly."""
+    return angle_law(middle, turn, 0.0, {}, ())
+
+
+def ramp(acceleration: float, load: float, t: float) -> dict[str, float]:
+    """Return the inputs of a ramp between 80 and 29 km/h."""
+    first = 80.0 / 3.6 if acceleration < 0.0 else 8.0
+    return {"Fz": load, "speed": first + acceleration * max(t - STEADY, 0.0)}
+
+
+def draw() -> None:
+    """Draw the error of every turn of all ramps."""
+    figure = Figure(figsize=(9.0, 4.0), layout="constrained")
+    left, right = figure.subplots(1, 2, sharex=True)
+    for load, mark in ((2000.0, "o"), (4000.0, "s")):
+        for acceleration in (-8.0, -6.0, -4.0, -2.0, 2.0, 4.0, 6.0, 8.0):
+            made = play(STEADY + abs(14.0 / acceleration), partial(ramp, acceleration, load))
+            with mock.patch.object(turns, "angle_law", even):
+                before = estimate(made, "speed")
+            for axes, color, (features, told) in (
+                (left, "tab:red", before),
+                (right, "tab:green", estimate(made, "speed")),
+                (right, "tab:blue", estimate(made, "speed", "omega")),
+            ):
+                shape = "+" if color == "tab:blue" else mark
+                late = (features.time > STEADY + 0.1) & told.turn_valid
+                speed = np.interp(features.time * RATE, np.arange(made["speed"].size),
+                                  made["speed"])  # fmt: skip
+                x = 50.0 * acceleration * features.period / speed
+                error = 100.0 * (told.value["Fz"] / load - 1.0)
+                axes.plot(x[late], error[late], shape, color=color, markersize=3, alpha=0.6)
+                print(
+                    load, acceleration, color, np.abs(error[late]).max().round(2), file=sys.stderr
+                )
+    left.set(title="even turn", ylabel="error of Fz [%]", xlabel="a T / (2 v) [%]")
+    right.set(title="wheel's own rate: + omega, o speed", xlabel="a T / (2 v) [%]",
+              ylim=(-5.0, 5.0))  # fmt: skip
+    for axes in (left, right):
+        axes.grid(alpha=0.3)
+        axes.axhspan(-3.0, 3.0, color="0.9", zorder=0)
+    left.text(0.98, 0.97, "circles 2 kN, squares 4 kN; grey: 3 %", transform=left.transAxes,
+              ha="right", va="top", fontsize=8)  # fmt: skip
+    figure.savefig(ROOT / "docs/ramp_error.png", dpi=110)
+
+
+def steps() -> None:
+    """Print the error of the first turns after a step, worst over when in the turn it comes."""
+    changes = {
+        "load 3 to 4 kN": {"Fz": (3000.0, 4000.0)},
+        "slip angle 0 to 2 deg": {"alpha": (0.0, np.radians(2.0))},
+        "slip ratio 0 to -0.05": {"kappa": (0.0, -0.05)},
+    }
+    for label, change in changes.items():
+        for told in (("speed", "omega"), ("speed",)):
+            rows: dict[int, list[Any]] = {}
+            for phase in np.linspace(0.0, 1.0, 9)[:-1]:
+                at = 0.6 + 0.097 * phase
+                made = play(1.3, partial(_step, change, at))
+                features, found = estimate(made, *told)
+                first = int(np.argmax(features.time > at))
+                for turn in range(4):
+                    row = first + turn
+                    here = min(int(features.time[row] * RATE), made["Fz"].size - 1)
+                    truth = {"Fz": made["Fz"][here], "alpha": made["alpha"][here],
+                             "kappa": made["kappa"][here]}  # fmt: skip
+                    rows.setdefault(turn, []).append(
+                        (*(found.value[q][row] - truth[q] for q in truth), found.turn_valid[row])
+                    )
+            for turn, values in rows.items():
+                table = np.array([value[:3] for value in values if value[3]])
+                worst = np.abs(table).max(axis=0) if len(table) else np.full(3, np.nan)
+                row = (label, ", ".join(told), turn + 1, f"{worst[0]:.0f}",
+                       f"{np.degrees(worst[1]):.2f}", f"{worst[2]:.4f}", f"{len(table)} of 8")  # fmt: skip
+                sys.stdout.write(f"| {' | '.join(map(str, row))} |\n")
+
+
+def _step(change: dict[str, tuple[float, float]], at: float, t: float) -> dict[str, float]:
+    return {name: values[int(t >= at)] for name, values in change.items()}
+
+
+if __name__ == "__main__":
+    steps()
+    draw()
