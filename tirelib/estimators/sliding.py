@@ -35,7 +35,7 @@ MOMENT_DOUBT = 0.06
 """Standard deviation of the moment on roads that were not calibrated, over the largest Mz / Fz."""
 CURVE_DOUBT = 0.3
 """Relative standard deviation of what another friction changes in the slip angle."""
-LOAD_DOUBT, FORCE_DOUBT = 0.02, 0.2
+LOAD_DOUBT, FORCE_DOUBT = 0.02, 0.25
 """Relative standard deviation of Fz and Fy per unit of sliding share that was not calibrated."""
 BRUSH = (3.0, 2.0)
 """Sharpness and fading of a brush with a parabola of pressure."""
@@ -192,13 +192,15 @@ class SlidingCurve:
         _, open_ = _moments(angle, weight)
         # where the moment tells nothing the angle stays that of the calibrated road
         with np.errstate(invalid="ignore", divide="ignore"):
-            learnt = np.clip(1.0 - variance / open_, 0.0, 1.0)
-        change = np.nan_to_num(learnt) * (middle - usual)
+            learnt = np.nan_to_num(np.clip(1.0 - variance / open_, 0.0, 1.0))
+        change = learnt * (middle - usual)
         rest = middle - usual - change
         std = np.sqrt(variance + rest**2 + (CURVE_DOUBT * change) ** 2)
         at, scatter = _moments(t, weight * likely)
         sliding = np.sqrt(scatter + (at - usual_t[:, 0]) ** 2)
-        return Told(usual + change, std, change, self._slope(at, c[:, 0]), sliding)
+        # at a share that is known the angle grows with u in proportion
+        slope = learnt * middle / used[:, 0] + (1.0 - learnt) * self._slope(at, c[:, 0])
+        return Told(usual + change, std, change, slope, sliding)
 
     def _slope(self, t: FloatArray, c: FloatArray) -> FloatArray:
         rest = np.maximum(1.0 - t, STEEPEST)

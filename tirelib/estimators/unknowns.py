@@ -15,12 +15,12 @@ angle read from the strain loses :math:`e L / R` at the same load: a constant lo
 grows evenly with the contact angle. The tread that wears carries the wheel where the belt is still
 bent, so it takes part in the rolling radius by the share :math:`b / \varphi` of the contact angle.
 The lateral stiffness of the tread is one of the springs behind the cornering stiffness, which
-grows as :math:`C \propto k^{0.3}`.
+grows as :math:`C \propto k^{0.13}`.
 
 **Friction** acts through sliding: `tirelib.estimators.sliding`.
 
 Constants were measured on the numerical rig and are held against other tires by
-``python build/road/coverage.py``; `docs/estimators.md` shows half and double of each.
+``python build/road_coverage.py``; `docs/estimators.md` shows half and double of each.
 """
 
 from collections.abc import Mapping
@@ -40,13 +40,13 @@ TEMPERATURE = 15.0
 """An unknown tread temperature is that of the calibration within so much, [K]."""
 UNDER_GROOVES = 0.0035
 """Rubber between the grooves' bottom and the belt, [m]."""
-SOFTENING = 0.006
+SOFTENING = 0.004
 """Relative loss of the tread's modulus per kelvin, [1/K]."""
-EDGE = 0.012
+EDGE = 0.0114
 """Contact length that a tread of e times the stiffness loses, both ends together, [m]."""
 BENT = 0.145
 """Contact angle over which the belt is still bent, [rad]."""
-CORNERING = 0.3
+CORNERING = 0.13
 """Power of the tread's stiffness with which the cornering stiffness grows."""
 FORCE = 0.08
 """Relative standard deviation of Fy per unit of L."""

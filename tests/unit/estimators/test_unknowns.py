@@ -127,7 +127,7 @@ def test_a_worn_and_a_cold_tread_are_stiffer() -> None:
     assert 0.3 < worn[0] < 0.5
     assert left[0] == 0.0
     cold, _ = road.hardened(conditions(tread_depth=0.008, tread_temperature=293.0))
-    assert cold[0] == pytest.approx(0.12)
+    assert cold[0] == pytest.approx(0.08)
 
 
 def test_friction_that_was_calibrated_is_no_longer_unseen() -> None:

@@ -1,0 +1,163 @@
+"""How often the 95 % intervals hold on slippery roads and worn treads that were not calibrated.
+
+    python build/road_coverage.py --out build/out/road
+
+Calibrates on the rig's plan `set1` (dry, new), without a word of friction or tread, and judges on
+runs whose friction and tread depth are drawn from the declared ranges. Campaigns are kept in the
+folder; with none there, the rig takes some minutes. `coverage.md` and `coverage.png` are written.
+"""
+
+import argparse
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import click
+import numpy as np
+
+from bench.rig.campaign import run_plan
+from bench.rig.plans import Plan, plan
+from bench.rig.tire import NEW_DEPTH, Condition, tire
+from tirelib.arrays import BoolArray, FloatArray
+from tirelib.campaign import read_campaign
+from tirelib.estimators.calibration import Calibration, Estimates
+from tirelib.estimators.result import EDGE_UNIT, TRUTH
+from tirelib.estimators.train import train
+from tirelib.estimators.unknowns import DEPTH, FRICTION, TWO_SIGMA
+from tirelib.observations import ROAD, Observations, observe
+from tirelib.report.style import BLUE, ORANGE, new_figure, save, styled
+
+BANDS: Mapping[str, tuple[tuple[float, float], ...]] = {
+    "friction": ((0.3, 0.5), (0.5, 0.7), (0.7, 0.9), (0.9, 1.1)),
+    "wear [mm]": ((0.0, 1.0), (1.0, 2.0), (2.0, 3.0), (3.0, 4.0)),
+}
+
+
+def drawn(runs: int) -> Plan:
+    """Return runs of any load, slip angle, friction and wear."""
+    rng = np.random.default_rng(7)
+    conditions = tuple(
+        Condition(
+            rng.uniform(1500.0, 8000.0), 2.3e5, 65.0 / 3.6, np.deg2rad(rng.uniform(-5.0, 5.0)),
+            friction=rng.uniform(*FRICTION),
+            tread_depth=NEW_DEPTH - rng.uniform(0.0, DEPTH[1] - DEPTH[0]),
+        )
+        for _ in range(runs)
+    )  # fmt: skip
+    return Plan("drawn", "load, slip angle, friction and tread depth drawn", conditions)
+
+
+def measured(folder: Path, chosen: Plan, name: str, seed: int, jobs: int) -> Observations:
+    """Return what the rig shows of a plan, measured once."""
+    if not (folder / "runs.csv").exists():
+        run_plan(chosen, tire(name), folder, seed=seed, jobs=jobs, overwrite=True)
+    return observe([read_campaign(folder)])
+
+
+def silent(seen: Observations) -> Observations:
+    """Return observations in which nobody says a word of friction or tread."""
+    nothing = dict.fromkeys(ROAD, np.full(len(seen), np.nan))
+    return replace(seen, features=replace(seen.features, **nothing))
+
+
+def rows_of(
+    estimates: Estimates, seen: Observations, quantity: str, rows: BoolArray
+) -> tuple[int, float, float, float, float]:
+    """Return turns, share of them that are valid, coverage of those, rms error and rms std."""
+    factor = EDGE_UNIT[quantity][1]
+    use = rows & estimates.valid[quantity]
+    if quantity == "alpha":
+        use &= np.isfinite(estimates.std[quantity])
+    error = factor * (estimates.value[quantity] - seen.truth[TRUTH[quantity]])[use]
+    std = factor * estimates.std[quantity][use]
+    if not use.any():
+        return int(rows.sum()), 0.0, np.nan, np.nan, np.nan
+    return (
+        int(rows.sum()), float(use.sum() / rows.sum()),
+        float(np.mean(np.abs(error) <= TWO_SIGMA * std)),
+        float(np.sqrt(np.mean(error**2))), float(np.sqrt(np.mean(std**2))),
+    )  # fmt: skip
+
+
+def table(calibration: Calibration, dry: Observations, seen: Observations) -> list[str]:
+    """Return the lines of coverage.md."""
+    at = {
+        "friction": seen.features.friction,
+        "wear [mm]": 1e3 * (NEW_DEPTH - seen.features.tread_depth),
+    }
+    lines = ["| what is said | part | quantity | valid | in the 95 % interval | rms error | std |",
+             "|---|---|---|---|---|---|---|"]  # fmt: skip
+    for label, given in (("nothing", silent(seen)), ("friction and tread", seen)):
+        estimates = calibration.estimate(given.features)
+        parts = {"all": seen.usable} | {
+            f"{name} {low:g} to {high:g}": seen.usable & (x >= low) & (x < high)
+            for name, x in at.items()
+            for low, high in BANDS[name]
+        }
+        for part, rows in parts.items():
+            for quantity, (unit, _) in EDGE_UNIT.items():
+                _, valid, held, rms, std = rows_of(estimates, seen, quantity, rows)
+                lines.append(
+                    f"| {label} | {part} | {quantity} | {100 * valid:.0f} % | {100 * held:.0f} % | "
+                    f"{rms:.3g} {unit} | {std:.3g} |"
+                )
+    lines += ["", "| quantity | growth of the std, dry and new | lost on the drawn roads | ratio |",
+              "|---|---|---|---|"]  # fmt: skip
+    known, unknown = calibration.estimate(dry.features), calibration.estimate(silent(dry).features)
+    estimates = calibration.estimate(silent(seen).features)
+    for quantity, (unit, factor) in EDGE_UNIT.items():
+        good = known.valid[quantity] & unknown.valid[quantity]
+        more = unknown.std[quantity][good] ** 2 - known.std[quantity][good] ** 2
+        growth = factor * float(np.sqrt(max(more.mean(), 0.0)))
+        lost = rows_of(estimates, seen, quantity, seen.usable)[3]
+        lines.append(f"| {quantity} | {growth:.3g} {unit} | {lost:.3g} | {growth / lost:.2f} |")
+    return lines
+
+
+@styled
+def draw(calibration: Calibration, seen: Observations, folder: Path) -> None:
+    """Draw error over friction and over wear, beside twice the standard deviation."""
+    estimates = calibration.estimate(silent(seen).features)
+    figure = new_figure(11.0, 9.0)
+    axes = figure.subplots(4, 2, sharex="col")
+    across: tuple[tuple[str, FloatArray], ...] = (
+        ("friction [1]", seen.features.friction),
+        ("tread lost [mm]", 1e3 * (NEW_DEPTH - seen.features.tread_depth)),
+    )
+    for row, (quantity, (unit, factor)) in enumerate(EDGE_UNIT.items()):
+        good = seen.usable & estimates.valid[quantity]
+        error = factor * (estimates.value[quantity] - seen.truth[TRUTH[quantity]])[good]
+        reach = TWO_SIGMA * factor * estimates.std[quantity][good]
+        for column, (label, x) in enumerate(across):
+            axis = axes[row, column]
+            axis.errorbar(x[good], np.zeros(good.sum()), yerr=reach, fmt="none", ecolor=ORANGE,
+                          elinewidth=2.0, alpha=0.35, label="95 % interval")  # fmt: skip
+            axis.plot(x[good], error, "o", color=BLUE, label="estimate less truth")
+            axis.set_ylabel(f"{quantity} [{unit}]")
+            if row == 3:
+                axis.set_xlabel(label)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    figure.suptitle("Nothing said of friction and tread; calibrated on a dry road with a new tread")
+    save(figure, folder, "coverage")
+
+
+def main() -> None:
+    """Measure, calibrate, judge, write."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("build/out/road"))
+    parser.add_argument("--tire", default="reference")
+    parser.add_argument("--runs", type=int, default=64)
+    parser.add_argument("--jobs", type=int, default=2)
+    given = parser.parse_args()
+    folder: Path = given.out / given.tire
+    dry = measured(folder / "set1", plan("set1"), given.tire, 1, given.jobs)
+    seen = measured(folder / "drawn", drawn(given.runs), given.tire, 5, given.jobs)
+    calibration = train(silent(dry)).calibration
+    lines = table(calibration, dry, seen)
+    (folder / "coverage.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    draw(calibration, seen, folder)
+    click.echo("\n".join(lines))
+
+
+if __name__ == "__main__":
+    main()
