@@ -21,6 +21,7 @@ import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.estimators.laws import (
+    CAMBER_DOUBT,
     RADIUS_DOUBT,
     RADIUS_SHARE,
     UNKNOWN_CAMBER,
@@ -189,7 +190,7 @@ class Chain:
         calibrated = calibrated & laws.allowed(values)
         force, std = model.predict(values)
         factor, doubt = laws.force_factor(values)
-        tilted = np.where(np.isnan(values["camber"]), UNKNOWN_CAMBER * np.abs(load), 0.0)
+        tilted = self._tilt(model, values["camber"])
         law = np.hypot(doubt * np.abs(force) + laws.spread(values, factor * force), tilted)
         force, std = factor * force, np.hypot(factor * std, law)
         result["Fy"] = Estimate(force, std, self._valid("Fy", values, force, std) & calibrated)
@@ -270,6 +271,16 @@ class Chain:
                          or [WIDEST])  # fmt: skip
             told = told.where(known, curve.told(np.abs(used), moment, std, load, widest))
         return replace(told, change=side * told.change, sliding=unseen * told.sliding)
+
+    def _tilt(self, model: Polynomial, camber: FloatArray) -> FloatArray:
+        """Return the deviation of Fy from a camber that its model does not know, [N]."""
+        away = np.zeros_like(camber)
+        if not any(variable.name == "camber" for variable in model.variables):
+            for guard in self.guards["Fy"]:
+                if guard.name == "camber":
+                    away = np.fmax(np.maximum(camber - guard.high, guard.low - camber), 0.0)
+        away = np.where(np.isnan(camber), UNKNOWN_CAMBER, away)
+        return np.where(away > 0.0, CAMBER_DOUBT * self.mean_load * away, 0.0)
 
     def _rolling_radius(
         self, values: Mapping[str, FloatArray], load: Estimate | None

@@ -47,8 +47,11 @@ FORCE_DOUBT = 0.3
 """Relative standard deviation of that correction."""
 UNKNOWN_PRESSURE = 0.15
 """Relative standard deviation of a pressure that nobody measures."""
-UNKNOWN_CAMBER = 0.04
-"""Standard deviation of Fy / Fz where the camber is unknown (2 deg of it)."""
+UNKNOWN_CAMBER = float(np.deg2rad(2.0))
+"""Standard deviation of a camber that nobody measures, [rad]."""
+CAMBER_DOUBT = float(0.12 / np.deg2rad(1.0))
+"""Error of Fy over the mean load per radian of a camber that a calibration does not know: 390 to
+530 N per degree on the rig's tire (1.7 to 7 kN), 510 to 670 on another virtual one (4.8 kN)."""
 FASTEST = 60.0
 """Highest speed for which a calibration at another speed is taken to hold, [m/s]."""
 SLOWEST = 2.5

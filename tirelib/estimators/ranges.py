@@ -47,6 +47,8 @@ OWN_MARGIN = 0.01
 """The same for the quantity itself and the utilisation: twice a set point's scatter of 0.5 %."""
 MIRRORED = (*ODD, "camber")
 """What turns its sign in the mirror image: calibrated on one side, it is on the other as well."""
+UPRIGHT = float(np.deg2rad(0.05))
+"""Camber beyond its range where no model knows it, [rad]: three times the scatter of set points."""
 GAIN_SLACK = 0.3
 """Share by which the tension may leave its range: gains drift, but a wrong unit is caught."""
 
@@ -62,6 +64,7 @@ def with_ranges(
         if name in MIRRORED:
             low, high = min(low, -high), max(high, -low)
         slack = GAIN_SLACK * high if name == "tension" else SLACK[name]
+        slack = slack if needed else UPRIGHT
         margin = OWN_MARGIN if name == "utilisation" else MARGIN
         return Range(name, low, high, max(slack, margin * (high - low)), needed)
 

@@ -10,6 +10,7 @@ import tomli_w
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
 from tirelib.estimators.polynomial import Cloud, Polynomial, Variable
 from tirelib.estimators.ranges import AROUND, MIRRORED, REACH, with_ranges
@@ -140,6 +141,28 @@ def test_near_is_half_as_far_again_as_calibrated_combinations_lie_apart(
     np.testing.assert_allclose(found.scale, [0.3, 0.02])  # a floor where nothing varied
     still = values | {"traction": 0.1 * even["traction"]}
     assert with_ranges(chain, still, links.truth).cloud is None
+
+
+def test_a_camber_that_was_not_calibrated_widens_fy_and_is_soon_out_of_range(
+    trained: Trained,
+) -> None:
+    """A tilt of 0.5 deg reads as 200 N of lateral force and more."""
+    from tests.synthetic import header, synthetic_run
+    from tirelib.observations import measure_run
+
+    features = measure_run(synthetic_run(0, noise=0.0), header())[0]
+
+    def at(degrees: float) -> Estimates:
+        tilted = np.full(len(features), np.deg2rad(degrees))
+        return trained.calibration.estimate(replace(features, camber=tilted))
+
+    upright, slack, beyond = at(0.0), at(0.04), at(0.5)
+    assert upright.valid["Fy"][1:].all()
+    assert slack.valid["Fy"][1:].all()
+    assert not beyond.valid["Fy"].any()
+    grown = np.sqrt(beyond.std["Fy"][1:] ** 2 - upright.std["Fy"][1:] ** 2)
+    assert (grown > 0.03 * trained.calibration.chains[-1].mean_load).all()
+    assert (grown > 150.0).all()
 
 
 @pytest.mark.parametrize("count", [2, 3])
