@@ -91,9 +91,6 @@ def draw() -> None:
                 x = 50.0 * acceleration * features.period / speed
                 error = 100.0 * (told.value["Fz"] / load - 1.0)
                 axes.plot(x[late], error[late], shape, color=color, markersize=3, alpha=0.6)
-                print(
-                    load, acceleration, color, np.abs(error[late]).max().round(2), file=sys.stderr
-                )
     left.set(title="even turn", ylabel="error of Fz [%]", xlabel="a T / (2 v) [%]")
     right.set(title="wheel's own rate: + omega, o speed", xlabel="a T / (2 v) [%]",
               ylim=(-5.0, 5.0))  # fmt: skip
@@ -131,9 +128,10 @@ def steps() -> None:
             for turn, values in rows.items():
                 table = np.array([value[:3] for value in values if value[3]])
                 worst = np.abs(table).max(axis=0) if len(table) else np.full(3, np.nan)
-                row = (label, ", ".join(told), turn + 1, f"{worst[0]:.0f}",
-                       f"{np.degrees(worst[1]):.2f}", f"{worst[2]:.4f}", f"{len(table)} of 8")  # fmt: skip
-                sys.stdout.write(f"| {' | '.join(map(str, row))} |\n")
+                worst[1] = np.degrees(worst[1])
+                numbers = [f"{value:.4f}" for value in worst]
+                cells = (label, ", ".join(told), str(turn + 1), *numbers, str(len(table)))
+                sys.stdout.write(f"| {' | '.join(cells)} |\n")
 
 
 def _step(change: dict[str, tuple[float, float]], at: float, t: float) -> dict[str, float]:
