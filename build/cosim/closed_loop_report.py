@@ -41,7 +41,8 @@ def parts(study: Study) -> list[Part]:
     words = " ".join(sentence(study, road) for road in roads)
     return [
         Part(
-            "Closed loop: slip control", "closed_loop", words, tables=[table(study)],
+            "Closed loop: slip control (14-DOF vehicle)", "closed_loop", words,
+            tables=[table(study)],
             plots=[_plot(study, road) for road in roads],
         )
     ]  # fmt: skip

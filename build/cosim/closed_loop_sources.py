@@ -7,7 +7,7 @@ virtual tires.
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -124,9 +124,17 @@ class Strain:
         """Start the tires."""
         self._four.start(_states(wheels, omega))
 
-    def step(self, time: float, wheels: Wheels, omega: FloatArray) -> Known:
-        """Step the tires and return what they say."""
-        told = self._four.step(time, STEP, _states(wheels, omega))
+    def step(
+        self, time: float, wheels: Wheels, omega: FloatArray, told_speed: float = math.nan
+    ) -> Known:
+        """Step the tires and return what they say.
+
+        The strain tires are told the true speed, or `told_speed` [m/s] where it is given.
+        """
+        states = _states(wheels, omega)
+        if math.isfinite(told_speed):
+            states = replace(states, told_speed=np.full(4, told_speed))
+        told = self._four.step(time, STEP, states)
         self.out_of_range += int((~told.tire_valid).sum())
         new = told.turn != self._turn
         self.delays += (time + STEP - told.contact_time[new & told.valid]).tolist()

@@ -27,7 +27,7 @@ NOTE = (
 def part(outcomes: Sequence[StabilityOutcome]) -> Part:
     """Return the part of a page."""
     return Part(
-        "Closed loop: stability control", "stability", sentence(outcomes),
+        "Closed loop: stability control (14-DOF vehicle)", "stability", sentence(outcomes),
         tables=[table(outcomes)], plots=[_plot(outcomes)],
     )  # fmt: skip
 

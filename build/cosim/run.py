@@ -2,8 +2,8 @@
 
 A multi-body vehicle drives; four ``VirtualTire.fmu`` turn its wheels' states into strain, four
 ``StrainTire.fmu`` turn the strain into estimates, which are held against the truth. The same
-tires then close two loops: a slip controller brakes with what they tell, and a stability
-controller holds the vehicle. Everything lands in ``build/out/cosim``.
+tires then close loops on the 14-DOF vehicle: slip control, stability control, anti-lock braking on
+roads of unknown friction, and a drive into water. Everything lands in ``build/out/cosim``.
 """
 
 import argparse
@@ -24,7 +24,15 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from rich.console import Console
 
 from bench.rig.campaign import THREADS
-from cosim import closed_loop, closed_loop_report, closed_loop_stability
+from cosim import (
+    antilock,
+    antilock_report,
+    closed_loop,
+    closed_loop_report,
+    closed_loop_stability,
+    hydroplaning,
+    hydroplaning_report,
+)
 from cosim import closed_loop_stability_report as stability_report
 from cosim.calibrate import CALIBRATION
 from cosim.drill import drill
@@ -38,14 +46,16 @@ from tirelib.report.cosim import Series, write_cosim
 from tirelib.threads import one_thread
 
 ROOT = Path(__file__).parents[2]
-DRILL, STABILITY = "range", "stability"
+DRILL, STABILITY, WATER = "range", "stability", "hydroplaning"
 BRAKING = {f"closed_loop_{road.name}": road for road in closed_loop.SHOWN_ROADS}
-LOOPS = (*BRAKING, STABILITY)
+ANTILOCK = {f"antilock_{road.name}": road for road in antilock.ROADS}
+LOOPS = (*BRAKING, STABILITY, *ANTILOCK, WATER)
 LONG = "closed_loop_split"
 """Half of the work: on a split road the way to a stop is long, and every source goes it."""
 ON_FRICTION = ("alpha",)
 """What the friction of the road changes at the same strain."""
-OTHERS = {DRILL: 4.0, STABILITY: 15.0, **dict.fromkeys(BRAKING, 20.0)}
+OTHERS = {DRILL: 4.0, STABILITY: 15.0, WATER: 8.0, **dict.fromkeys(BRAKING, 20.0),
+          **dict.fromkeys(ANTILOCK, 6.0)}  # fmt: skip
 """As long as a manoeuvre of so many seconds."""
 EVERY = 10
 """The page shows every so many steps of the truth."""
@@ -67,6 +77,10 @@ def work(name: str, fmus: Fmus) -> tuple[str, Any]:
         return name, closed_loop.study(*fmus, [BRAKING[name]])
     if name == STABILITY:
         return name, closed_loop_stability.stability(*fmus)
+    if name in ANTILOCK:
+        return name, antilock.study(*fmus, [ANTILOCK[name]])
+    if name == WATER:
+        return name, hydroplaning.study(*fmus)
     with FourWheels(*fmus) as wheels:
         if name == DRILL:
             return name, drill(wheels)
@@ -146,7 +160,10 @@ def main() -> None:
         epilog=_EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
     parser.add_argument(
-        "manoeuvres", nargs="*", metavar="MANOEUVRE", help=f"of {', '.join(MANOEUVRES)}"
+        "manoeuvres",
+        nargs="*",
+        metavar="MANOEUVRE",
+        help=f"or loop, of {', '.join([*MANOEUVRES, *LOOPS])}",
     )
     parser.add_argument("--all", action="store_true", help=f"with the long part, {LONG}")
     parser.add_argument("--calibration", type=Path, default=CALIBRATION, metavar="CAL.toml")
@@ -154,24 +171,32 @@ def main() -> None:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures as JSON too")
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="processes")
     given = parser.parse_args()
-    unknown = [name for name in given.manoeuvres if name not in MANOEUVRES]
+    known = (*MANOEUVRES, *LOOPS)
+    unknown = [name for name in given.manoeuvres if name not in known]
     if unknown or given.jobs < 1 or not given.calibration.is_file():
         parser.error(
             f"manoeuvres {', '.join(unknown) or 'are fine'}, jobs = {given.jobs}, calibration "
-            f"{given.calibration}; allowed are {', '.join(MANOEUVRES)}, 1 or more, a file made by "
+            f"{given.calibration}; allowed are {', '.join(known)}, 1 or more, a file made by "
             "build/cosim/calibrate.py or `tirelib calibrate`"
         )
     console, began = Console(), time.monotonic()
-    names = given.manoeuvres or list(MANOEUVRES)
+    every = not given.manoeuvres
+    names = [name for name in given.manoeuvres if name in MANOEUVRES] or (every * list(MANOEUVRES))
     given.out.mkdir(parents=True, exist_ok=True)
     fmus = build_fmus(given.out, given.calibration)
     parts = dict.fromkeys([*names, DRILL], fmus)
-    if not given.manoeuvres:
+    loops = [name for name in LOOPS if (every and (given.all or name != LONG))
+             or name in given.manoeuvres]  # fmt: skip
+    if loops:
         slow = build_fmus(given.out / "closed_loop", given.calibration, closed_loop.STEP)
-        parts |= {name: slow for name in LOOPS if given.all or name != LONG}
+        parts |= dict.fromkeys(loops, slow)
     found = run(parts, given.jobs)
     scores, checks = [found[name][0] for name in names], found[DRILL]
+    stops = [found[name] for name in ANTILOCK if name in found]
+    brakes, water = antilock.joined(stops) if stops else None, found.get(WATER)
     missed = reached(scores, checks)
+    missed += antilock.missed(brakes) if brakes else []
+    missed += hydroplaning.missed(water) if water else []
     studies = [found[name] for name in BRAKING if name in found]
     stability = found.get(STABILITY)
     study = closed_loop.joined(studies) if studies else None
@@ -180,6 +205,7 @@ def main() -> None:
         "tirelib": __version__,
         "date": datetime.now(UTC).date().isoformat(),
         "vehicle": f"CommonRoad multi-body, parameter set {VEHICLE}",
+        "loop_vehicle": "14 degrees of freedom",
         "step_s": STEP,
         "calibration": given.calibration.name,
         "limits": dict(LIMITS),
@@ -188,9 +214,13 @@ def main() -> None:
         "range": checks,
         "closed_loop": study.document() if study else None,
         "stability": closed_loop_stability.document(stability) if stability else None,
+        "antilock": brakes.document() if brakes else None,
+        "hydroplaning": hydroplaning.document(water) if water else None,
     }
     more = closed_loop_report.parts(study) if study else []
     more += [stability_report.part(stability)] if stability else []
+    more += [antilock_report.part(brakes)] if brakes else []
+    more += [hydroplaning_report.part(water)] if water else []
     page = write_cosim(document, [found[name][1] for name in names], given.out, more)
     if given.json:
         given.json.parent.mkdir(parents=True, exist_ok=True)

@@ -14,7 +14,7 @@ from ctypes import c_double, c_uint32
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from shutil import rmtree
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from fmpy import extract, read_model_description
@@ -27,6 +27,9 @@ from tirelib.fmu.run import LoadedFmu
 from tirelib.fmu.virtual.coordinates import FRICTION, INPUTS
 from tirelib.fmu.virtual.table import START
 from tirelib.held import HELD
+
+if TYPE_CHECKING:
+    from cosim.water import WaterTable
 
 WHEELS = ("FL", "FR", "RL", "RR")
 """Order of the wheels in every array: front left, front right, rear left, rear right."""
@@ -70,6 +73,8 @@ class WheelStates:
         Coefficient of friction under each wheel, 0.3 to 1.1.
     told_speed : array, [m/s]
         Speed that the strain tires are told; NaN: the true one.
+    wedge : array, [Pa]
+        Pressure of a wedge of water ahead of each contact; needs a `cosim.water.WaterTable`.
     """
 
     load: FloatArray
@@ -81,6 +86,7 @@ class WheelStates:
     omega: FloatArray = field(default_factory=_nan)
     friction: FloatArray = field(default_factory=lambda: np.full(len(WHEELS), OWN_FRICTION))
     told_speed: FloatArray = field(default_factory=_nan)
+    wedge: FloatArray = field(default_factory=lambda: np.zeros(len(WHEELS)))
 
     def rows(self) -> FloatArray:
         """Return the inputs of the virtual tires, shape (4, 7): `INPUTS`, then the friction."""
@@ -240,6 +246,8 @@ class FourWheels:
         Where the gages of each wheel stand at time zero: contacts of the wheels are not in step.
     parameters : dict, optional
         Further parameters of all virtual tires, for example ``relaxation_length``.
+    water : WaterTable, optional
+        What a wedge of water changes.
     """
 
     def __init__(
@@ -252,8 +260,9 @@ class FourWheels:
         seed: int = 1,
         start_angles: Sequence[float] = (-3.1, -1.6, 0.6, 2.2),
         parameters: dict[str, float] | None = None,
+        water: "WaterTable | None" = None,
     ) -> None:
-        self.rate = rate
+        self.rate, self._water = rate, water
         self._options = [
             {"sample_rate": rate, "noise_std": noise, "seed": seed + at, "start_angle": angle,
              **(parameters or {})}
@@ -304,12 +313,26 @@ class FourWheels:
         for wheel, state in enumerate(truth.rows()):
             frame, shown = self.tires[wheel].step(time, step, state)
             new, good = self.tires[wheel].frame()
+            if truth.wedge[wheel]:
+                frame = frame + self._wet(state[0], float(truth.wedge[wheel]), shown, len(frame))
             for name, value in zip(_TIRE, shown, strict=True):
                 parts[name][wheel] = value
             parts["tire_valid"][wheel] = good
             self._estimate(wheel, frame[:new], good, told_conditions(truth, wheel), parts)
         self.told = Estimates(**parts)
         return self.told
+
+    def _wet(self, load: float, wedge: float, shown: list[float], n: int) -> FloatArray:
+        """Return what a wedge of water changes in a whole frame of n samples."""
+        if self._water is None:
+            raise ParameterError(
+                f"wedge = {wedge:g} Pa, but these wheels have no table of what water does; allowed "
+                "is 0; give one by cosim.water.water_table"
+            )
+        omega, angle = shown[:2]
+        return self._water.at(
+            load, wedge, angle - omega * np.arange(n - 1.0, -1.0, -1.0) / self.rate
+        )
 
     def _estimate(
         self, wheel: int, frame: FloatArray, good: bool, known: FloatArray, parts: dict[str, Any]

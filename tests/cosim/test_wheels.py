@@ -16,6 +16,7 @@ from cosim.recording import STEP, VEHICLE, Recording, build_fmus, follow, record
 from cosim.run import reached, series
 from cosim.score import LIMITS, in_range, score, turns_of
 from cosim.vehicle import Controls, G, Motion, Vehicle
+from cosim.water import WaterTable
 from cosim.wheels import NAMES, OWN_FRICTION, WHEELS, FourWheels, WheelStates
 
 from tests.fmu import live, virtual_host
@@ -201,6 +202,23 @@ def test_a_slippery_road_is_refused_by_a_virtual_tire_that_knows_one_friction(
         slippery = replace(state, friction=np.array([OWN_FRICTION, 0.5, 0.5, 0.5]))
         with pytest.raises(ParameterError, match=r"tire_FR: friction = 0.5, .*allowed is 0.95"):
             wheels.step(STEP, STEP, slippery)
+
+
+def test_water_is_refused_without_a_table_and_added_with_one(wheels: FourWheels) -> None:
+    size = len(WHEELS)
+    dry = WheelStates(*(np.full(size, x) for x in (4000.0, 0.0, 0.0, 0.0, 20.0)))
+    wet = replace(dry, wedge=np.array([0.0, 1e5, 0.0, 0.0]))
+    wheels.start(dry)
+    with pytest.raises(ParameterError, match=r"wedge = 100000 Pa, .*cosim.water.water_table"):
+        wheels.step(0.0, STEP, wet)
+    angle = np.linspace(-np.pi, np.pi, 9)[:-1]
+    change = np.zeros((2, 2, 8, 5))
+    change[:, 1] = angle[:, None]
+    wheels._water = WaterTable(np.array([3e3, 5e3]), np.array([0.0, 1e5]), change)
+    added = wheels._wet(4000.0, 1e5, [50.0, 0.4], 10)
+    wheels._water = None
+    # the last sample is that of the wheel's angle, a sample is 0.005 rad
+    np.testing.assert_allclose(added[:, 2], 0.4 - 0.005 * np.arange(9.0, -1.0, -1.0), atol=1e-12)
 
 
 def test_the_vehicle_tells_the_friction_under_its_wheels() -> None:

@@ -84,9 +84,11 @@ def write_cosim(
 
 
 def _summary(document: Mapping[str, Any]) -> str:
+    loops = document.get("loop_vehicle")
+    closed = f" Closed loops drive the vehicle of {loops}." if loops else ""
     return (
-        f"{document['vehicle']}; four virtual tires and four strain tires under FMPy, "
-        f"{1e3 * document['step_s']:g} ms a step, open loop."
+        f"Manoeuvres: {document['vehicle']}, open loop, {1e3 * document['step_s']:g} ms a step; "
+        f"four virtual tires and four strain tires under FMPy.{closed}"
     )
 
 

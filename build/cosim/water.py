@@ -1,0 +1,103 @@
+"""What a wedge of water ahead of the contact does to the strain: solved on the numerical rig.
+
+The virtual tire's surface knows no water. So the rig is solved with its water wedge
+(`bench.rig.laws.WaterWedge`) and without, rolling freely straight ahead, and the difference of the
+waveforms is added to what the virtual tire shows. Speed acts by the dynamic pressure: the wedge
+presses with s rho v^2 / 2, and nothing else of it depends on the speed.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bench.rig.laws import WaterWedge
+from bench.rig.observe import contact, trace
+from bench.rig.solve import State, solve
+from bench.rig.tire import Condition, RigTire, tire
+from cosim.wheels import PRESSURE
+from tirelib.arrays import FloatArray
+
+DENSITY = 1000.0
+"""Of water [kg/m^3]."""
+LOADS = (2700.0, 3100.0, 3500.0, 3900.0, 4300.0, 4700.0)
+WEDGES = (0.0, 6e4, 1.2e5, 1.8e5, 2.4e5)
+"""Loads [N] and pressures of the wedge [Pa] that are solved."""
+SPEED = 22.0
+"""At which they are [m/s]."""
+POINTS = 1440
+"""Wheel angles of a waveform."""
+_WEDGE = WaterWedge(1.0)
+SPREAD = 0.5 * (_WEDGE.length + _WEDGE.fade) * RigTire().belt_width
+"""Lift per pressure of the wedge [m^2]: a triangle ahead of the contact and one into it."""
+
+
+def wedge_pressure(strength: float, speed: FloatArray | float) -> FloatArray:
+    """Return s rho v^2 / 2 [Pa] of a strength [1] at speeds [m/s]."""
+    return np.asarray(strength * 0.5 * DENSITY * np.square(speed), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class WaterTable:
+    """Differences of strain over load, pressure of the wedge and wheel angle.
+
+    Attributes
+    ----------
+    loads, wedges : array, shapes (l,), (w,), [N], [Pa]
+    change : array, shape (l, w, n, 5)
+        Strain with the wedge less strain without; n wheel angles from -pi on, evenly.
+    """
+
+    loads: FloatArray
+    wedges: FloatArray
+    change: FloatArray
+
+    def at(self, load: float, wedge: float, angle: FloatArray) -> FloatArray:
+        """Return the change of the strain, shape (n, 5), at wheel angles [rad], linear between.
+
+        Outside of the table the nearest load or pressure holds.
+        """
+        i, a = _place(self.loads, load)
+        j, b = _place(self.wedges, wedge)
+        rows = self.change[i : i + 2, j : j + 2]
+        wave = np.tensordot(np.outer((1.0 - a, a), (1.0 - b, b)), rows, axes=2)
+        n = wave.shape[0]
+        at = np.mod(angle + np.pi, 2.0 * np.pi) * n / (2.0 * np.pi)
+        first = np.floor(at).astype(np.int64)
+        part = (at - first)[:, None]
+        found: FloatArray = (1.0 - part) * wave[first % n] + part * wave[(first + 1) % n]
+        return found
+
+
+def _place(knots: FloatArray, value: float) -> tuple[int, float]:
+    """Return the knot below a value, and the share of the way to the next, 0 .. 1."""
+    i = int(np.clip(np.searchsorted(knots, value) - 1, 0, knots.size - 2))
+    return i, float(np.clip((value - knots[i]) / (knots[i + 1] - knots[i]), 0.0, 1.0))
+
+
+def solved(load: float, wedge: float, speed: float = SPEED, start: State | None = None) -> State:
+    """Return the rig's state that rolls freely on a wedge of a pressure [Pa], from a near one."""
+    rolling = tire("reference")
+    if wedge:
+        law = WaterWedge(wedge / float(wedge_pressure(1.0, speed)))
+        rolling = replace(rolling, road_laws=(law,))
+    return solve(rolling, Condition(load, PRESSURE, speed, 0.0, 0.0, None), start)
+
+
+def lift_of(state: State) -> float:
+    """Return what the water carries in a state [N]: the load less that of the same tread, dry."""
+    wet = contact(state)
+    dry = contact(replace(state, tire=replace(state.tire, road_laws=())))
+    return float(np.sum(wet.area * (wet.q - dry.q)))
+
+
+def water_table(loads: Sequence[float] = LOADS, wedges: Sequence[float] = WEDGES) -> WaterTable:
+    """Solve the rig at every load and pressure of the wedge, the first of which is 0; a minute."""
+    change = []
+    for load in loads:
+        states = [solved(load, 0.0)]
+        for wedge in wedges[1:]:
+            states.append(solved(load, wedge, start=states[-1]))
+        waves = np.array([trace(state, POINTS).strain for state in states])
+        change.append(waves - waves[0])
+    return WaterTable(np.array(loads), np.array(wedges), np.array(change))
