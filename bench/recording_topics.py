@@ -10,6 +10,7 @@ import math
 from typing import Any
 
 import numpy as np
+import orjson
 
 from bench.conditions import QUANTITIES as CONDITION_UNITS
 from bench.conditions import Measured
@@ -24,6 +25,7 @@ STRAIN, ESTIMATE, LINK, TOLD = (
 )  # fmt: skip
 SAMPLES = 16
 """Samples of a message of strain: one of SERIAL v1. The first of each alone is a wave of 625 Hz."""
+_ARRAYS = orjson.OPT_SERIALIZE_NUMPY  # which writes NaN as null
 _GAGES = [f"gage_{number}" for number in range(1, GAGES + 1)]
 
 Schema = tuple[str, bytes]
@@ -83,22 +85,18 @@ TOLD_SCHEMA = _schema(
 
 def strain_messages(samples: Samples) -> list[tuple[int, bytes]]:
     """Return samples as messages: offset of the first sample [ns], and JSON."""
-    period = samples.period
-    tenths = np.round(1e6 * samples.strain.T, 1)
-    missing = bool(np.isnan(tenths).any())
+    period, tenths = samples.period, np.round(1e6 * samples.strain.T, 1)
     messages = []
     for start in range(0, tenths.shape[1], SAMPLES):
-        piece = tenths[:, start : start + SAMPLES].tolist()
-        if missing:
-            piece = [[None if x != x else x for x in row] for row in piece]
         offset = start * period
-        document = {
+        document: dict[str, Any] = {
             "segment": samples.segment,
             "t_us": samples.t_us + round(1e6 * offset),
             "period_us": round(1e6 * period, 4),
-            **{f"gage_{number}": row for number, row in enumerate(piece, start=1)},
         }
-        messages.append((round(1e9 * offset), json.dumps(document).encode()))
+        for number, row in enumerate(tenths, start=1):
+            document[f"gage_{number}"] = row[start : start + SAMPLES].copy()
+        messages.append((round(1e9 * offset), orjson.dumps(document, option=_ARRAYS)))
     return messages
 
 

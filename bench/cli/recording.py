@@ -13,7 +13,7 @@ from bench.live.space import free_at
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-HOURLY = 0.8e9
+HOURLY = 0.7e9
 """What a wheel at 10 kHz takes in an hour, with strain and estimates, [bytes]; see the docs."""
 LITTLE = 1e9
 """Room below which there is a warning, [bytes]: about an hour of one wheel."""
