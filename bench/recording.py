@@ -35,7 +35,7 @@ from mcap.records import Channel, Message, Metadata
 from bench.chain import Jump, Place
 from bench.conditions import Conditions, parse_conditions
 from bench.errors import DeviceError, RecordingError
-from bench.links import BACK, LOST, RESUMED, Read
+from bench.links import BACK, DECODED, LOST, PASSED, RESUMED, Read
 from bench.recorder import Recorder, jump_event
 from bench.recording_header import FORMER, RecordingHeader, header_of, json_of, moment, part_path
 from bench.recording_topics import CONDITIONS, EVENTS, RAW
@@ -102,7 +102,7 @@ class Recording:
                 yield Read(time, data, "", source)
             elif channel.topic == EVENTS:
                 event = _event(data)
-                if event.get("event") in (LOST, BACK, RESUMED):
+                if event.get("event") in (LOST, BACK, RESUMED, PASSED, DECODED):
                     yield Read(time, b"", str(event["event"]), self._number(event.get("source")))
 
     def messages(self) -> Iterator[tuple[Channel, int, bytes]]:

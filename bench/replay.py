@@ -5,7 +5,7 @@ from typing import Any
 
 from bench.deadline import Deadline
 from bench.estimation import Estimation, News, skipped
-from bench.links import BACK, RESUMED, Link
+from bench.links import BACK, DECODED, PASSED, RESUMED, Link
 from bench.wheels import Wheels
 
 
@@ -30,6 +30,7 @@ class ReplayChain:
         self.heard: float | None = None
         self.last_byte: float | None = None
         self._link = link
+        self._passing = False
         self._estimation = estimation
 
     def poll(self, deadline: Deadline) -> News:
@@ -40,7 +41,10 @@ class ReplayChain:
             return News()
         if read.event in (BACK, RESUMED):
             self.wheels.interrupt(read.source)
-        if not read.data:
+        if read.event in (PASSED, DECODED):
+            self._passing = read.event == PASSED
+            self.wheels.forget()
+        if not read.data or self._passing:
             return News()
         self.heard, self.last_byte = time.time(), time.monotonic()
         return self._estimation.take(self.wheels.push(read.data, read.arrival, read.source))

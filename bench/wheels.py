@@ -277,6 +277,11 @@ class Wheels:
         decoder.interrupt()
         decoder.counts.reconnects += 1
 
+    def forget(self) -> None:
+        """Forget half frames of all lines: what follows on them is not decoded."""
+        for line in self.lines:
+            line.decoder.interrupt()
+
     def _wanted(self, wheel: int, heard: int) -> bool:
         if self._chosen:
             return wheel in self._chosen

@@ -1,6 +1,6 @@
 """What a recording takes of disk and processor: raw bytes alone, and with all that stands beside.
 
-    python build/bench_recording.py [--seconds 60]
+    python build/bench_recording.py CAMPAIGN
 
 Turns of the numerical rig roll on at 10 kHz, once over SERIAL v1 and once as four wheels over slcan
 FD, through decoder and recorder as fast as they go, with a chunk closed every 0.25 s of their time.
@@ -8,10 +8,15 @@ FD, through decoder and recorder as fast as they go, with a chunk closed every 0
 
 import argparse
 import json
+import math
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
+from bench.chain import Turn
 from bench.conditions import Conditions
 from bench.device import Device
 from bench.document import line_document, turn_document, wheel_document
@@ -25,8 +30,6 @@ from bench.recorder import Recorder
 from bench.recording_header import RecordingHeader
 from bench.transmitter import transmitter
 from bench.wheels import Wheels
-
-from bench.chain import Turn
 from tirelib.campaign import read_campaign
 
 READ, CHUNK = 0.004, 0.25
@@ -36,11 +39,16 @@ TURNS = 14
 
 
 def pieces(
-    campaign: Path, line: str, kind: str, wheels: tuple[int, ...]
+    campaign: Path, line: str, kind: str, wheels: tuple[int, ...], seconds: float = 10.0
 ) -> tuple[float, list[bytes]]:
-    """Return seconds of a campaign's first runs, and their bytes read by read."""
+    """Return the length of a campaign's first run, again and again, and its bytes read by read."""
     source = read_campaign(campaign)
-    runs = [run for _, run in zip(range(6), source.runs(), strict=False)]
+    run = next(source.runs())
+    if run.strain is None:
+        raise SystemExit(f"{campaign}: its first run has no strain; name a campaign that has")
+    times = math.ceil(seconds * run.rate / run.strain.shape[1])
+    runs = [replace(run, strain=np.tile(run.strain, (1, times)), trigger=None, rig={},
+                    rig_time=None)]  # fmt: skip
     tape = record_tape(runs, Device(), Faults({}), wheels, source.header)
     frames = [(due, frame) for piece in Player(transmitter(kind), line, Faults({})).pieces(tape)
               for due, frame in zip(piece.due, piece.frames, strict=True)]  # fmt: skip

@@ -15,6 +15,7 @@ from bench.document import line_document, wheel_document
 from bench.estimation import News
 from bench.links.opening import PortPlan
 from bench.live.chain import LiveChain, LivePlan
+from bench.live.priority import ordinary, realtime
 from bench.live.reader import ReaderPlan
 from bench.live.recording_state import RecordingRule
 from bench.protocols.plan import ProtocolPlan
@@ -84,11 +85,13 @@ def record(
                                 "data_bitrate": data_bitrate}  # fmt: skip
     first, *more = (source.as_header() for source in known.sources)
     header = RecordingHeader(settings, text, "", first, tuple(more))
-    reader = ReaderPlan(known.sources, reconnect, strain=rule.strain)
+    priority = realtime(None)
+    reader = ReaderPlan(known.sources, reconnect, strain=rule.strain, apart=ordinary(priority))
     with LiveChain(LivePlan(reader, None, known.conditions, header, out, rule=rule)) as chain:
         session = Session(chain, limits=Limits(duration, silence), watch=_alarm)
         click.echo(f"{chain.name} -> {out}")
         click.echo(room(out, 1))
+        click.echo(f"priority: {priority}")
         with on_stop(session.stop):
             outcome = session.run()
         wheels, recorded, counts = chain.wheels, chain.recorded.bytes, chain.counts()

@@ -32,7 +32,7 @@ from bench.journal import Journal
 from bench.links.opening import PortPlan
 from bench.links.replay import ReplayLink
 from bench.live.chain import LiveChain, LivePlan
-from bench.live.priority import realtime
+from bench.live.priority import ordinary, realtime
 from bench.live.reader import ReaderPlan
 from bench.live.recording_state import RecordingRule
 from bench.page.alarms import RULES, read_alarms
@@ -198,7 +198,7 @@ def run(
             header = RecordingHeader(settings, device_text, archive.sha256, first, tuple(more))
             recorded = record is not None or shown.anything
             reader = ReaderPlan(known.sources, reconnect, numbers, recorded, every_turn,
-                                rule.strain, wait)  # fmt: skip
+                                rule.strain, wait, ordinary(priority))  # fmt: skip
             chain = stack.enter_context(LiveChain(
                 LivePlan(reader, file, known.conditions, header, record, shown.anything, rule)
             ))  # fmt: skip

@@ -20,7 +20,7 @@ class Read(NamedTuple):
         Empty if nothing came.
     event : str
         `LOST` or `BACK` when the port went away or came back, `RESUMED` when the process that
-        reads it was started again; else empty.
+        reads it was started again, `PASSED` or `DECODED`; else empty.
     source : int
         Which of the run's sources it is of.
     """
@@ -32,6 +32,8 @@ class Read(NamedTuple):
 
 
 LOST, BACK, RESUMED = "lost", "back", "resumed"
+PASSED, DECODED = "not decoded from here", "decoded from here"
+"""Between the two bytes were recorded and not decoded, for want of processor."""
 
 
 class Link(Protocol):
@@ -69,4 +71,4 @@ class Link(Protocol):
         """Return how often a buffer below was full, as far as the system tells."""
 
 
-__all__ = ["BACK", "LOST", "RESUMED", "Link", "Read"]
+__all__ = ["BACK", "DECODED", "LOST", "PASSED", "RESUMED", "Link", "Read"]

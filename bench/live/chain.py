@@ -22,6 +22,7 @@ from bench.live.estimator import EstimatorPlan, Report, estimate
 from bench.live.exchange import FINISH, STOP, Exchange, woken
 from bench.live.kept import CONTEXT, Kept
 from bench.live.ports import read_source
+from bench.live.priority import RIGHT
 from bench.live.reader import LineState, ReaderPlan, load, read_port
 from bench.live.recorder import record
 from bench.live.recording_state import Order, RecorderState, RecordingRule
@@ -42,6 +43,11 @@ LEAVE, AT_ONCE = 60.0, 5.0
 """A process that was told to end and goes on for so long is ended, [s]: in good order; where
 nothing is left to be kept."""
 RECORDED_AGAIN = "recording goes on"
+TOO_BUSY = (
+    "this machine is too busy to decode what comes: bytes are only recorded, and estimates pause; "
+    f"end other programs, or allow real-time priority ({RIGHT})"
+)
+DECODED_AGAIN = "estimates go on"
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +113,7 @@ class LiveChain:
         self._recorder: Kept | None = None
         self._estimators: dict[int, Kept] = {}
         self._finished = False
+        self._passing = False
         self._alarm = ""  # what the recorder has said last
 
     def __enter__(self) -> "LiveChain":
@@ -187,7 +194,8 @@ class LiveChain:
                       **{f"estimator {slot}": cpu for slot, cpu in self._cpu.items()}},
             "restarts": {name: kept.starts - 1 for name, kept in self._processes().items()},
             "raw": {"lost_reads": refused, "lost_bytes": refused_bytes,
-                    "most_waiting_bytes": exchange.raw.high},
+                    "most_waiting_bytes": exchange.raw.high,
+                    "not_decoded_bytes": self._state.passed},
             "recording": self._recorded.as_document(refused_bytes),
             "wheels": {wheel: self.wheel_counts(wheel) for wheel in self.wheels.heard},
         }  # fmt: skip
@@ -366,6 +374,9 @@ class LiveChain:
         if recorded is not None:
             self._recorded = pickle.loads(recorded)
         state = self._state
+        if state.passing != self._passing:
+            self._passing = state.passing
+            self._pending.alarms.append(TOO_BUSY if state.passing else DECODED_AGAIN)
         if state.error:
             kind, text = state.error
             raise getattr(errors, kind)(text)

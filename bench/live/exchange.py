@@ -16,7 +16,7 @@ does not fit is missing beside the raw bytes, which hold it."""
 SAMPLES, LEAST = 27 * 2**18, 2**21
 """Samples of a wheel that wait for its estimator, [bytes]: 13 s at 10 kHz; 4 s where memory is
 short, which is more than the age at which samples are left out."""
-PORT, PORT_STATE = 2**21, 2**13
+PORT, PORT_STATE = 2**22, 2**13
 """Reads of one port of several that wait for the reader, [bytes], and how the port is."""
 NEWS = 2**20
 ORDERS = 2**18

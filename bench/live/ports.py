@@ -17,6 +17,7 @@ from bench.links.opening import PortPlan
 from bench.links.reconnecting import ReconnectingLink
 from bench.live.exchange import STOP, Address, Exchange, woken
 from bench.live.kept import orphaned, settled
+from bench.live.priority import own_share
 
 WAIT = 0.1
 """The longest wait for bytes before it is looked whether the run goes on, [s]."""
@@ -66,6 +67,7 @@ def read_source(
             sender.send(Read(time.monotonic_ns(), b"", RESUMED, number))
         sender.publish()
         settled()
+        own_share()
         sender.run(link)
         link.close()
     except BenchError as error:

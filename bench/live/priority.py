@@ -6,7 +6,7 @@ from bench.errors import DeviceError
 
 PRIORITY = 5
 """Real-time priority of a run."""
-_RIGHT = (
+RIGHT = (
     f"the right to it is needed, such as a line '* - rtprio {PRIORITY}' in "
     "/etc/security/limits.conf (then log in anew)"
 )
@@ -45,11 +45,16 @@ def realtime(asked: bool | None) -> str:
     except PermissionError:
         if asked:
             raise DeviceError(
-                f"--realtime: this user may not have real-time priority; {_RIGHT}; add it, or "
+                f"--realtime: this user may not have real-time priority; {RIGHT}; add it, or "
                 "leave --realtime out"
             ) from None
-        return f"ordinary; for real-time {_RIGHT}"
+        return f"ordinary; for real-time {RIGHT}"
     return f"real-time {PRIORITY}"
+
+
+def ordinary(said: str) -> bool:
+    """Tell whether a run has no other priority than all programs, from what `realtime` said."""
+    return said.startswith("ordinary")
 
 
 def as_parent() -> None:
@@ -62,6 +67,19 @@ def as_parent() -> None:
             _set()
     except (AttributeError, OSError):
         return  # another system, a parent that is gone, no right to it: it goes on as it is
+
+
+def own_share() -> None:
+    """Give this process a share of the processor of its own, unless it goes before others anyway.
+
+    Linux shares the processor between sessions first (autogroup), so that a session of its own gets
+    as much as all jobs of another together.
+    """
+    try:
+        if os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK != os.SCHED_RR:
+            os.setsid()
+    except (AttributeError, OSError):
+        return  # another system, or it has a session already
 
 
 def _set() -> None:

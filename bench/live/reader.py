@@ -9,11 +9,12 @@ from dataclasses import dataclass, field
 
 from bench.deadline import Deadline
 from bench.errors import BenchError, UnpluggedError
-from bench.links import BACK, LOST, RESUMED, Link, Read
+from bench.links import BACK, DECODED, LOST, PASSED, RESUMED, Link, Read
 from bench.links.reconnecting import ReconnectingLink
 from bench.live.exchange import RAW, STOP, Address, Exchange
 from bench.live.kept import orphaned, settled
 from bench.live.ports import GatheredLink
+from bench.live.priority import own_share
 from bench.rings import ByteQueue
 from bench.source_plan import SourcePlan, wheels_of
 from bench.wheels import MOST, Wheels
@@ -23,6 +24,9 @@ WAIT = 0.1
 FULL = 0.01
 """Wait for those that are behind, [s]."""
 TRIES = 2
+TOO_LATE, CAUGHT_UP = 2.0, 0.2
+"""Reads that have waited for the reader for longer are recorded and not decoded, until they wait
+no longer than the second, [s]. A queue of reads holds 4 s of four wheels on CAN FD."""
 RAW_LOST = "raw bytes lost: "
 """Begins the event of a recording that tells of bytes that the recorder had no room for."""
 
@@ -47,6 +51,9 @@ class ReaderPlan:
         Whether it records decoded samples too.
     wait : float, [s]
         How long a port that is not there is waited for at the start.
+    apart : bool
+        Whether a process of its own reads the only port too: where the processor is short it goes
+        on while another one decodes.
     """
 
     sources: tuple[SourcePlan, ...]
@@ -56,11 +63,12 @@ class ReaderPlan:
     every_turn: bool = False
     strain: bool = True
     wait: float = 0.0
+    apart: bool = False
 
     @property
     def ports(self) -> int:
         """Processes that read a port each; 0 where the reader reads the only one."""
-        return len(self.sources) if len(self.sources) > 1 else 0
+        return len(self.sources) if len(self.sources) > 1 or self.apart else 0
 
     @property
     def expected(self) -> int:
@@ -101,6 +109,10 @@ class LineState:
         Ports that went away, and when, on `time.time`.
     newest : dict of source to int, [ns]
         Arrival of the newest read that was taken.
+    passing : bool
+        Whether bytes are only recorded at the moment, because the reader is too late.
+    passed : int
+        Bytes that were not decoded.
     error : tuple of str
         Name of the class and text of an error that ends the run; empty without one.
     """
@@ -117,6 +129,8 @@ class LineState:
     cpu: float = 0.0
     away: dict[int, float] = field(default_factory=dict)
     newest: dict[int, int] = field(default_factory=dict)
+    passing: bool = False
+    passed: int = 0
     error: tuple[str, str] | tuple[()] = ()
 
     @property
@@ -153,6 +167,8 @@ def read_port(plan: ReaderPlan, address: Address) -> None:
         state.name = link.name
         reader.publish()
         settled()
+        if plan.ports:
+            own_share()
         reader.run(link)
         link.close()
     except BenchError as error:
@@ -195,7 +211,19 @@ class _Reader:
                 return
             if read.data or read.event:
                 self._look(link)
+                self._pass_or_decode(read)
                 self.take(read)
+
+    def _pass_or_decode(self, read: Read) -> None:
+        """Leave the decoding out when reads have waited too long, and go on when they have not."""
+        if self._plan.every_turn or not self._plan.ports:
+            return
+        late = 1e-9 * (time.monotonic_ns() - read.arrival)
+        if late > (CAUGHT_UP if self.state.passing else TOO_LATE):
+            if not self.state.passing:
+                self.take(Read(read.arrival, b"", PASSED, read.source))
+        elif self.state.passing:
+            self.take(Read(read.arrival, b"", DECODED, read.source))
 
     def take(self, read: Read) -> None:
         """Hand a read to the recorder, decode it, and hand its samples to the estimators.
@@ -254,6 +282,9 @@ class _Reader:
         state.newest[read.source] = read.arrival
         if read.event in (BACK, RESUMED):
             state.wheels.interrupt(read.source)
+        if read.event in (PASSED, DECODED):
+            state.passing = read.event == PASSED
+            state.wheels.forget()
         if read.event == LOST:
             state.away[read.source] = time.time()
         elif read.event == BACK or read.data:
@@ -261,6 +292,9 @@ class _Reader:
         if not read.data:
             return []
         state.heard, state.last_byte = time.time(), time.monotonic()
+        if state.passing:
+            state.passed += len(read.data)
+            return []
         blocks = state.wheels.push(read.data, read.arrival, read.source)
         slots = {wheel: slot for slot, wheel in enumerate(state.wheels.heard)}
         return [(slots[block.wheel], pickle.dumps(block, 5)) for block in blocks]

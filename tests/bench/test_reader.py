@@ -2,21 +2,30 @@
 
 import pickle
 from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from bench.conditions import Conditions
+from bench.deadline import Deadline
 from bench.decoder import SerialDecoder
 from bench.device import Device
 from bench.emulator import write_script
+from bench.estimation import News
 from bench.faults import Faults
-from bench.links import RESUMED, Read
+from bench.links import DECODED, PASSED, RESUMED, Read
 from bench.links.opening import PortPlan
+from bench.links.replay import ReplayLink
 from bench.live.exchange import Exchange
 from bench.live.kept import CONTEXT
 from bench.live.reader import ReaderPlan, _Reader
+from bench.recorder import Recorder
+from bench.recording_header import RecordingHeader
+from bench.replay import ReplayChain
 from bench.source_plan import SourcePlan
-from bench.wheels import Wheels
+from bench.wheels import Block, Wheels
 from tests.bench.campaigns import tiny_runs
 
 
@@ -135,3 +144,39 @@ def test_samples_of_a_read_that_could_not_be_recorded_never_come_twice(killed_be
     for messages in given:
         places = [pickle.loads(message).content.start for message in messages]
         assert places == sorted(set(places))
+
+
+def test_what_waits_too_long_is_recorded_and_a_replay_leaves_it_out_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [0]
+    monkeypatch.setattr("bench.live.reader.time.monotonic_ns", lambda: now[0])
+    exchange = Exchange.create(CONTEXT, 1, ports=1)
+    reader = _Reader(ReaderPlan((SourcePlan(PortPlan("p")),), 60.0, apart=True), exchange)
+    reader.publish()
+    late = [0.0, 0.1, 3.0, 1.0, 0.5, 0.1, 0.0, 1.9, 2.1, 0.0]  # of each read, [s]
+    for number, seconds in enumerate(late):
+        read = Read((number + 10) * 10**9, b"".join(WIRE[3 * number : 3 * number + 3]))
+        now[0] = read.arrival + round(seconds * 1e9)
+        reader._pass_or_decode(read)
+        reader.take(read)
+    given = [pickle.loads(message) for message in iter(exchange.samples[0].read, None)]
+    recorded: list[Read] = [pickle.loads(message) for message in iter(exchange.raw.read, None)]
+    passed = [read for read in recorded if read.event in (PASSED, DECODED)]
+    assert [(read.arrival // 10**9 - 10, read.event) for read in passed] == [
+        (2, PASSED), (5, DECODED), (8, PASSED), (9, DECODED)]  # fmt: skip
+    assert b"".join(read.data for read in recorded) == b"".join(WIRE[:30])
+    with Recorder(tmp_path / "a.mcap", RecordingHeader({}), Conditions.constant()) as recorder:
+        for read in recorded:
+            recorder.read(read)
+    blocks: list[Block] = []
+    with ReplayLink(tmp_path / "a.mcap") as link:
+        wheels = Wheels.of_one(SerialDecoder(), {None: Device()})
+        estimation: Any = SimpleNamespace(take=lambda found: blocks.extend(found) or News())
+        chain = ReplayChain(link, wheels, estimation)
+        while not chain.ended:
+            chain.poll(Deadline.never())
+    assert [pickle.dumps(block) for block in blocks] == [pickle.dumps(block) for block in given]
+    assert wheels.counts == reader.state.wheels.counts
+    assert reader.state.passed == sum(map(len, [*WIRE[6:15], *WIRE[24:27]]))
+    exchange.close()
