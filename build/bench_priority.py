@@ -14,9 +14,10 @@ import multiprocessing
 import os
 import time
 import tty
+from contextlib import suppress
 from pathlib import Path
 
-from bench_recording import READ, pieces
+from bench_recording import READ, pieces, write
 
 from bench.conditions import Conditions
 from bench.deadline import Deadline
@@ -35,10 +36,8 @@ FIFO = 16 * 1024
 
 def send(master: int, reads: list[bytes], seconds: float, results: object) -> None:
     """Write at the pace of the wheels; count what the buffer did not hold."""
-    try:
+    with suppress(OSError):
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(20))
-    except OSError:
-        pass
     os.set_blocking(master, False)
     fifo, sent, lost, start = bytearray(), 0, 0, time.monotonic()
     steps = 8  # of a read: half a millisecond each
@@ -55,11 +54,9 @@ def send(master: int, reads: list[bytes], seconds: float, results: object) -> No
             else:
                 fifo += piece
             number += 1
-        try:
+        with suppress(BlockingIOError):
             while fifo:
                 del fifo[: os.write(master, fifo[:4096])]
-        except BlockingIOError:
-            pass
         time.sleep(2e-4)
     results.put((sent, lost))  # type: ignore[attr-defined]
 
@@ -93,8 +90,9 @@ def main() -> None:
     said = realtime(given.realtime)
     source = SourcePlan(PortPlan(f"slcan:{os.ttyname(slave)}", bitrate=1_000_000,
                                  data_bitrate=5_000_000), ProtocolPlan(SLCAN, 1e4))  # fmt: skip
-    plan = LivePlan(ReaderPlan((source,), 5.0, apart=not (given.realtime or given.together)), None, Conditions.constant(),
-                    RecordingHeader({}), given.out)  # fmt: skip
+    apart = not (given.realtime or given.together)
+    reader = ReaderPlan((source,), 5.0, apart=apart)
+    plan = LivePlan(reader, None, Conditions.constant(), RecordingHeader({}), given.out)
     with LiveChain(plan) as chain:
         for process in (*hogs, sender):
             process.start()
@@ -105,11 +103,12 @@ def main() -> None:
             process.terminate()
         chain.finish("stopped")
         counts = chain.counts()
-        frames, timeline = chain.wheels.counts
-    print(f"{said}; load {os.getloadavg()[0]:.0f}; {given.hogs} hogs, {given.wheels} wheels: "
+        timeline = chain.wheels.counts[1]
+    write(f"{said}; load {os.getloadavg()[0]:.0f}; {given.hogs} hogs, {given.wheels} wheels: "
           f"{100 * lost / sent:.1f} % of {sent / 1e6:.1f} MB lost in the adapter's buffer, "
           f"{counts['raw']['lost_bytes']} bytes for want of a recorder; "
-          f"{timeline.lost_samples} samples lost, {counts['raw']['not_decoded_bytes']} bytes not decoded; cpu {counts['cpu_s']}")  # fmt: skip
+          f"{timeline.lost_samples} samples lost, "
+          f"{counts['raw']['not_decoded_bytes']} bytes not decoded; cpu {counts['cpu_s']}")  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ FD, through decoder and recorder as fast as they go, with a chunk closed every 0
 import argparse
 import json
 import math
+import sys
 import tempfile
 import time
 from dataclasses import replace
@@ -76,7 +77,7 @@ def recorded(
                 recorder.block(block)
             if number % round(CHUNK / READ) == 0:
                 recorder.flush()
-            second, rest = divmod(number, round(1.0 / READ))
+            rest = number % round(1.0 / READ)
             if beside and rest < TURNS:
                 for wheel in wheels.heard:
                     recorder.estimate(wheel, read.arrival, ESTIMATE)
@@ -86,6 +87,11 @@ def recorded(
                 recorder.link(None, line_document(*wheels.counts))
             used += time.process_time() - before
     return used, path.stat().st_size, sum(map(len, reads))
+
+
+def write(text: str) -> None:
+    """Print a line."""
+    sys.stdout.write(f"{text}\n")
 
 
 OUTPUTS = {
@@ -104,7 +110,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("campaign", type=Path, help="any campaign with strain")
     campaign = parser.parse_args().campaign
-    print("line                   raw        file, raw alone   file, all    CPU, raw   CPU, all")
+    write("line                   raw        file, raw alone   file, all    CPU, raw   CPU, all")
     with tempfile.TemporaryDirectory() as folder:
         for name, line, kind, wheels in (
             ("SERIAL v1, 1 wheel", SERIAL, "serial", (0,)),
@@ -117,9 +123,10 @@ def main() -> None:
                 row.append(recorded(path, line, reads, length, beside=beside))
             hour = 3600.0 / length / 1e9
             (bare, small, raw), (full, large, _) = row
-            print(
+            write(
                 f"{name}  {raw * hour:6.2f} GB/h  {small * hour:6.2f} GB/h     "
-                f"{large * hour:6.2f} GB/h  {100 * bare / length:5.1f} %  {100 * full / length:5.1f} %"
+                f"{large * hour:6.2f} GB/h  {100 * bare / length:5.1f} %  "
+                f"{100 * full / length:5.1f} %"
             )
 
 
