@@ -108,7 +108,7 @@ def main() -> None:
           f"{100 * lost / sent:.1f} % of {sent / 1e6:.1f} MB lost in the adapter's buffer, "
           f"{counts['raw']['lost_bytes']} bytes for want of a recorder; "
           f"{timeline.lost_samples} samples lost, "
-          f"{counts['raw']['not_decoded_bytes']} bytes not decoded; cpu {counts['cpu_s']}")  # fmt: skip
+          f"{counts['raw']['not_decoded_bytes']} bytes not decoded; {counts['cpu_s']}")  # fmt: skip
 
 
 if __name__ == "__main__":

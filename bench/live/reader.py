@@ -216,7 +216,7 @@ class _Reader:
 
     def _pass_or_decode(self, read: Read) -> None:
         """Leave the decoding out when reads have waited too long, and go on when they have not."""
-        if self._plan.every_turn or not self._plan.ports:
+        if self._plan.every_turn or not self._plan.apart:
             return
         late = 1e-9 * (time.monotonic_ns() - read.arrival)
         if late > (CAUGHT_UP if self.state.passing else TOO_LATE):
