@@ -58,7 +58,7 @@ def room(path: Path, wheels: int) -> str:
     hours = free / (HOURLY * max(wheels, 1))
     said = f"room for the recording: {free / 1e9:.1f} GB, about {hours:.0f} h"
     if hours < 1.0:
-        said = f"room for the recording: {free / 1e9:.2f} GB, about {60.0 * hours:.0f} min"
+        said = f"room for the recording: {free / 1e6:.0f} MB, about {60.0 * hours:.0f} min"
     said += f" of {wheels} wheels at 10 kHz" if wheels > 1 else " of a wheel at 10 kHz"
     return f"warning: {said}; free some or name another place" if free < LITTLE else said
 

@@ -319,7 +319,7 @@ class _Recorder:
     def _fail(self, error: RecordingError) -> None:
         """Note that nothing can be written, and go back to what is on disk."""
         state, recorder = self._state, self._recorder
-        state.error = str(error)
+        state.error = state.error or str(error)
         if recorder is not None and state.path is not None:
             state.length = recorder.abandon()
             self._unfinished.append(_Unfinished(state.path, state.length, NO_ROOM))
