@@ -63,23 +63,17 @@ function size(bytes) {
   return bytes >= 1e9 ? `${shown(bytes / 1e9, 1)} GB` : `${shown(bytes / 1e6, 1)} MB`;
 }
 
-// Conditions of a wheel with their source, the recording, the last notes.
+// The recording, the conditions of a wheel with their source, the last notes.
 export function drawUse(list, state, number) {
   const wheel = state.wheels[String(number)];
   const rows = [];
   const row = (name, text, quiet) => {
     const value = node("dd", text);
     if (quiet) value.append(" ", node("small", quiet));
+    value.title = value.textContent;
     rows.push(node("dt", name), value);
     return value;
   };
-  for (const [name, { value, unit, source }] of Object.entries(wheel ? wheel.in_use : {})) {
-    const digits = unit === "km/h" ? 1 : 2;
-    const said = unit === "1" ? shown(value, digits) : `${shown(value, digits)} ${unit}`;
-    const cell = value === null ? row(name, "not known") : row(name.replaceAll("_", " "), said, source);
-    cell.dataset.use = name;
-    cell.classList.toggle("none", value === null);
-  }
   const chain = (state.chain || {}).recording || {};
   const { on = false, name = "", bytes = 0 } = state.recording || {};
   const file = chain.file || name;
@@ -88,6 +82,13 @@ export function drawUse(list, state, number) {
   if (on && chain.free_bytes !== undefined) {
     row("room", `${size(chain.free_bytes)} free`, chain.minutes_left === null ? ""
       : `for ${minutes(chain.minutes_left)}`).dataset.use = "room";
+  }
+  for (const [name, { value, unit, source }] of Object.entries(wheel ? wheel.in_use : {})) {
+    const digits = unit === "km/h" ? 1 : 2;
+    const said = unit === "1" ? shown(value, digits) : `${shown(value, digits)} ${unit}`;
+    const cell = value === null ? row(name, "not known") : row(name.replaceAll("_", " "), said, source);
+    cell.dataset.use = name;
+    cell.classList.toggle("none", value === null);
   }
   for (const { time, text } of [...(state.notes || [])].reverse().slice(0, 3)) row(clock(1000 * time), text);
   list.replaceChildren(...rows);
