@@ -108,13 +108,13 @@ def truth_rows(motions: Mapping[int, Motion]) -> Iterator[dict[str, float]]:
             }  # fmt: skip
 
 
-def recording_pieces(recording: Recording, source: int | None = None) -> Iterator[Script]:
-    """Yield the reads of a source in pieces at their recorded times, bad frames included.
+def chosen_source(recording: Recording, source: int | None) -> int:
+    """Return the source of a recording that is played: the one that was asked for, or the only one.
 
     Raises
     ------
     DeviceError
-        If the recording has no such source, or several and none was chosen.
+        If there is no such source, or several and none was asked for.
     """
     sources = recording.header.sources
     if source not in range(len(sources)) and (source is not None or len(sources) > 1):
@@ -123,11 +123,22 @@ def recording_pieces(recording: Recording, source: int | None = None) -> Iterato
             f"{recording.path}: source {'none' if source is None else source}; its sources are "
             f"{', '.join(names)}; one line carries one of them; choose with --source"
         )
-    chosen = source or 0
+    return source or 0
+
+
+def recording_pieces(recording: Recording, source: int | None = None) -> Iterator[Script]:
+    """Yield the reads of a source in pieces at their recorded times, bad frames included.
+
+    Raises
+    ------
+    DeviceError
+        As `chosen_source`.
+    """
+    chosen = chosen_source(recording, source)
     start: int | None = None
     due: list[float] = []
     frames: list[Any] = []
-    packed = encoding_of(sources[chosen]) == CAN
+    packed = encoding_of(recording.header.sources[chosen]) == CAN
     for arrival, data, _, number in recording.reads():
         if number != chosen or not data:
             continue

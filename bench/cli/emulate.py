@@ -140,6 +140,8 @@ def emulate(
         tape, runs = _campaign(folder, numbers, everything, device, faults, wheels)
     elif manoeuvre_file is not None:
         tape = _manoeuvre(manoeuvre_file, device, faults, wheels, rate, seed, truth_file)
+    elif recording is not None:
+        _check(recording, number)
     line = CAN if bus is not None else SERIAL if kind == "serial" else SLCAN
     sink: TerminalSink | BusSink
     sink = TerminalSink(link, unplug, replug) if bus is None else open_bus(bus, fd=kind != "RAW12C")
@@ -233,6 +235,15 @@ def _manoeuvre(
     if truth_file is not None:
         write_truth(truth_file, motions)
     return tape
+
+
+def _check(recording: Path, source: int | None) -> None:
+    """Refuse a recording before anybody waits for it."""
+    from bench.recording import Recording
+    from bench.sources import chosen_source
+
+    with closing(Recording(recording)) as opened:
+        chosen_source(opened, source)
 
 
 def _recorded(recording: Path | None, source: int | None) -> Iterator[Script]:

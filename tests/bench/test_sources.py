@@ -279,6 +279,8 @@ def test_an_emulator_plays_one_source_of_several(tmp_path: Path) -> None:
             pieces = recording_pieces(recording, wrong)
             with pytest.raises(DeviceError, match=r"its sources are 0 left, 1 right; .* --source"):
                 next(pieces)
+    outcome = CliRunner().invoke(program, ["emulate", "--recording", str(tmp_path / "a.mcap")])
+    assert "choose with --source" in str(outcome.exception) + outcome.output  # before it waits
 
 
 def test_a_wheel_that_comes_from_two_sources_is_refused() -> None:
