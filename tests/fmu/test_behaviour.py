@@ -53,6 +53,21 @@ def test_after_every_step_the_outputs_are_those_of_the_library(fmu: LoadedFmu) -
     assert "reduced_gages" in values["status"]
 
 
+def test_road_and_tread_reach_the_estimate_as_in_the_library(ten: LoadedFmu) -> None:
+    samples, road = strain(), {"friction": 0.6, "tread_depth": 0.005, "tread_temperature": 300.0}
+    estimator = StreamEstimator(live.calibration(), live.RATE)
+    known = {"speed": live.SPEED, "pressure": live.PRESSURE, "camber": 0.0}
+    latest = estimator.push(samples, **known, **road)[-1]
+    silent = StreamEstimator(live.calibration(), live.RATE).push(samples, **known)[-1]
+    ten.start(live.RATE)
+    told = play(ten, samples, held(**road))[-1]
+    for quantity in ("Fz", "alpha", "Fy"):
+        given = (told[quantity], told[f"{quantity}_std"])
+        np.testing.assert_allclose(given, (latest.value(quantity), latest.std(quantity)), rtol=1e-9)
+    assert latest.std("Fz") < silent.std("Fz")
+    assert latest.value("Fz") > silent.value("Fz") + 20.0  # a worn tread hides load
+
+
 def test_a_step_shorter_than_the_frame_takes_its_first_samples(ten: LoadedFmu) -> None:
     samples = strain()
     ten.start(live.RATE)
