@@ -305,5 +305,7 @@ def test_wheels_with_other_gages_than_the_calibration_are_refused() -> None:
     with pytest.raises(DeviceError, match=r"X.fmu: gages lie at .*, the device 'map' has 3 of"):
         given.check_layout((0.06, 0.03, 0.0, -0.03, -0.06), "X.fmu")
     device = Device("wheel 1", zero=(1.0, 2.0, 3.0))
-    with pytest.raises(DeviceError, match="'wheel 1' has zeros of 3 gages, its wheel sends 5"):
+    with pytest.raises(
+        DeviceError, match="'wheel 1' has zeros or gains of 3 gages, its wheel sends 5"
+    ):
         device.strain(np.zeros((1, 2, 5), np.int16), np.zeros(1, np.int64))
