@@ -22,7 +22,7 @@ from bench.standing import STILL, Level, Levels, standing_mean
 from bench.timeline import Samples
 from bench.wheels import Wheels
 from tirelib.arrays import FloatArray
-from tirelib.cli.common import FILE, output
+from tirelib.cli.common import NEW_FILE, output
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 NOBODY = 30.0
@@ -39,7 +39,7 @@ _OPTIONS = (
     click.option("--still", default=1e6 * STILL, show_default=True, metavar="MICROSTRAIN",
                  type=click.FloatRange(min=0.0, min_open=True),
                  help="A wheel whose strain moves by more turns."),
-    click.option("--out", required=True, type=FILE, metavar="NEW.toml",
+    click.option("--out", required=True, type=NEW_FILE, metavar="NEW.toml",
                  help="Device file to write; a new one."),
 )  # fmt: skip
 

@@ -5,6 +5,7 @@ Also for a program in the background.
 
 import os
 import signal
+import stat
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,8 +19,8 @@ def silence() -> None:
     """Let output to a terminal that is gone go nowhere; files and pipes are kept."""
     for stream in (sys.stdout, sys.stderr):
         try:
-            if not stream.isatty():
-                continue
+            if not stat.S_ISCHR(os.fstat(stream.fileno()).st_mode):
+                continue  # once it is gone, a terminal does not tell that it was one
             nowhere = os.open(os.devnull, os.O_WRONLY)
             os.dup2(nowhere, stream.fileno())
             os.close(nowhere)
