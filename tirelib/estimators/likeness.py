@@ -13,7 +13,7 @@ calibrated tire exceeds with the probability `FALSE_ALARM` (Hotelling; Johnson a
 Multivariate Statistical Analysis*, section 5.4).
 
 Pressures and speeds that were not calibrated shift the regressors by `DRIFT`, as the rig's tires
-show it. The shift with pressure is taken off, and half of it is doubt; of that with speed tires
+show it. The shift with pressure is taken off, and as much is doubt; of that with speed tires
 agree less: twice its size is doubt. K holds both. Where a regressor that says where a turn lies is
 beyond its calibrated range, nobody knows what the tire looks like. Predicting needs numpy only.
 """
@@ -46,7 +46,7 @@ DRIFT = {
 """Shift (SI) at the same contact angle, for a pressure that is doubled and for a squared speed that
 grows by (40 m/s)^2: of the rig's tires `reference`, `soft` and `stiff` over the plan `set3`, mean
 with the pressure and rms with the speed. Odd regressors have none in the mean."""
-PRESSURE_DOUBT, SPEED_DOUBT = 0.5, 2.0
+PRESSURE_DOUBT, SPEED_DOUBT = 1.0, 2.0
 """Tires differ: standard deviation of another tire's shift, as a share of `DRIFT`."""
 FEWEST_UNLIKE, SHARE_UNLIKE = 5, 0.05
 """Turns, and share of them, that must look like another tire's: fifty times chance."""
