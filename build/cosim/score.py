@@ -253,9 +253,13 @@ def _validity(recording: Recording, wheels: list[int]) -> dict[str, Any]:
 
 
 def in_range(recording: Recording, wheel: int) -> tuple[BoolArray, BoolArray]:
-    """Tell where the truth was in the calibrated range, and where outside, for two turns."""
+    """Tell where the truth was in the calibrated range, and where outside, for two turns.
+
+    A road of another friction is neither: what it does to an estimate depends on the slip.
+    """
     n = recording.time.size
     inside, outside = np.ones(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
+    inside &= np.isclose(recording.truth[FRICTION][:, wheel], OWN_FRICTION)
     for name, (low, high) in RANGE.items():
         x, slack = recording.truth[name][:, wheel], SLACK * (high - low)
         inside &= (x >= low) & (x <= high)

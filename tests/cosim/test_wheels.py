@@ -156,6 +156,10 @@ def test_all_is_in_range_and_told_so(left: Recording) -> None:
     assert good[-1]
     assert not bad.any()
     assert np.all(left.told["tire_valid"] == 1.0)
+    slippery = 0.5 * left.truth["friction"]
+    good, bad = in_range(replace(left, truth=left.truth | {"friction": slippery}), 0)
+    assert not good.any()
+    assert not bad.any()
 
 
 def test_out_of_range_valid_drops_within_two_turns(fmus: tuple[Path, Path]) -> None:
