@@ -15,15 +15,15 @@
     wheel = 1                      # left out: for every wheel without points of its own
 
 or as CSV with those columns. The rig is solved at the points and between them wherever a condition
-moves by more than `STEPS`; strain between two solutions is a straight line at each wheel angle. The
-rig is steady at each of them: transients of the tire (relaxation) are not in it.
+moves by more than `bench.rig.ramp.STEPS`; strain between two solutions is a straight line at each
+wheel angle. The rig is steady at each of them: transients of the tire (relaxation) are not in it.
 """
 
 import csv
 import math
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -33,6 +33,7 @@ import numpy as np
 from bench.errors import DeviceError, cause
 from bench.rig.measure import Chain, gages
 from bench.rig.observe import forces, trace
+from bench.rig.ramp import Point, dense
 from bench.rig.solve import LIMITS, State, solve
 from bench.rig.tire import TIRES, Condition, RigTire
 from tirelib.arrays import FloatArray
@@ -50,18 +51,7 @@ COLUMNS: Mapping[str, tuple[str, str, str]] = {
 """Column, condition, unit and dimension."""
 REQUIRED = ("t_s", "load_N", "speed_kmh")
 USUAL = {"slip_angle": 0.0, "camber": 0.0, "pressure": 2.3e5}
-STEPS = {"load": 400.0, "slip_angle": 0.01, "slip_ratio": 0.01, "speed": 3.0, "pressure": 2e4,
-         "camber": 0.02}  # fmt: skip
-"""Farthest that two solutions lie apart, SI."""
 MOST_SOLUTIONS = 2000
-
-
-@dataclass(frozen=True, slots=True)
-class Point:
-    """Conditions at a time of the manoeuvre, [s]."""
-
-    time: float
-    condition: Condition
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,36 +213,20 @@ def _order(wheel: int | None, points: Sequence[Point], where: str) -> Iterator[s
 
 
 def nodes(points: Sequence[Point]) -> tuple[Point, ...]:
-    """Return the points and as many between them as `STEPS` asks for.
+    """Return the points and as many between them as `bench.rig.ramp.STEPS` asks for.
 
     Raises
     ------
     DeviceError
         If there are too many to be solved.
     """
-    dense: list[Point] = [points[0]]
-    for a, b in pairwise(points):
-        moves = [
-            abs((getattr(b.condition, n) or 0.0) - (getattr(a.condition, n) or 0.0)) / step
-            for n, step in STEPS.items()
-        ]
-        parts = max(1, math.ceil(max(moves)))
-        dense += [_between(a, b, part / parts) for part in range(1, parts + 1)]
-    if len(dense) > MOST_SOLUTIONS:
+    path = dense(points)
+    if len(path) > MOST_SOLUTIONS:
         raise DeviceError(
-            f"manoeuvre: {len(dense)} solutions of the rig; {MOST_SOLUTIONS} are allowed (0.7 s "
+            f"manoeuvre: {len(path)} solutions of the rig; {MOST_SOLUTIONS} are allowed (0.7 s "
             "each); move less, or more slowly"
         )
-    return tuple(dense)
-
-
-def _between(a: Point, b: Point, share: float) -> Point:
-    names = [n for n in STEPS if getattr(a.condition, n) is not None]
-    mixed = {
-        n: (1.0 - share) * getattr(a.condition, n) + share * getattr(b.condition, n) for n in names
-    }
-    time = (1.0 - share) * a.time + share * b.time
-    return Point(time, replace(a.condition, **mixed))
+    return path
 
 
 class Rig:

@@ -11,10 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from bench.rig.hidden import hidden
-from bench.rig.measure import Chain, Recording, record, settle, slip_ratio
+from bench.rig.measure import Chain, Recording, Stage, record, settle, slip_ratio
 from bench.rig.mesh import mesh
 from bench.rig.observe import Forces, edges, forces, trace
 from bench.rig.plans import Plan, kind, with_repeats
+from bench.rig.ramp import Nominal, Point, Ramp, changed, dense, points_of, set_point
 from bench.rig.shown import Shown, fixed_angle
 from bench.rig.solve import State, solve
 from bench.rig.tire import NEW_DEPTH, Array, Condition, RigTire, on_road
@@ -37,9 +38,10 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 @dataclass(frozen=True)
 class Truth:
-    """The noise-free state behind a run, SI and ISO."""
+    """A noise-free state behind a run, SI and ISO; `time` is when the wheel passes through it."""
 
     run: int
+    time: float
     condition: Condition
     force: Forces
     slip_ratio: float
@@ -53,6 +55,7 @@ class Truth:
         """One row of truth.csv; units are in the names."""
         out = {
             "run": float(self.run),
+            "time_s": self.time,
             "Fx_N": self.force.fx,
             "Fy_N": self.force.fy,
             "Fz_N": self.force.fz,
@@ -80,7 +83,7 @@ class Job:
     """A run to be made; `friction` is the tire's own, for roads that do not say another."""
 
     run: int
-    nominal: Condition
+    nominal: Nominal
     seed: int
     chain: Chain
     planted: tuple[tuple[str, float], ...] = ()
@@ -99,10 +102,24 @@ def _prepare(references: tuple[State, ...]) -> None:
     _Worker.references = tuple(replace(s, grid=grid) for s in references)
 
 
-def _make(job: Job) -> tuple[Recording, Truth]:
-    cond = settle(job.nominal, job.chain, job.seed, job.run)
-    start = min(_Worker.references, key=lambda s: abs(s.condition.load - cond.load))
-    tire = on_road(start.tire, cond)
+def _make(job: Job) -> tuple[Recording, tuple[Truth, ...]]:
+    """Measure the states that a run passes through, each from the one before."""
+    run = changed(job.nominal, lambda c: settle(c, job.chain, job.seed, job.run))
+    points = dense(points_of(run))
+    load = points[0].condition.load
+    start = min(_Worker.references, key=lambda s: abs(s.condition.load - load))
+    stages, truths = [], []
+    for point in points:
+        stage, truth = _pass(job, point, start)
+        stages.append(stage)
+        truths.append(truth)
+        start = stage.state
+    return record(stages, job.chain, job.seed, job.run), tuple(truths)
+
+
+def _pass(job: Job, point: Point, start: State) -> tuple[Stage, Truth]:
+    cond = point.condition
+    tire = on_road(_Worker.references[0].tire, cond)
     for name, strength in job.planted:
         tire = hidden(name).tire(tire, cond, job.place, strength)
     lower = tire.free_radius - start.tire.free_radius
@@ -117,6 +134,7 @@ def _make(job: Job) -> tuple[Recording, Truth]:
         seen = hidden(name).trace(shown, strength)
     truth = Truth(
         run=job.run,
+        time=point.time,
         condition=cond,
         force=force,
         slip_ratio=slip_ratio(state),
@@ -126,7 +144,7 @@ def _make(job: Job) -> tuple[Recording, Truth]:
         edge=angle,
         length=length,
     )
-    return record(state, seen, force, job.chain, job.seed, job.run), truth
+    return Stage(state, seen, force, point.time), truth
 
 
 def references(tire: RigTire, conditions: tuple[Condition, ...]) -> tuple[State, ...]:
@@ -157,6 +175,8 @@ def run_plan(
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Truth]:
     """Measure a plan and write the campaign; return the truth of each run.
+
+    A ramp has several truths, one for each state that it was solved at.
 
     Parameters
     ----------
@@ -195,10 +215,11 @@ def run_plan(
     truths: list[Truth] = []
 
     def finished() -> Iterator[Run]:
-        for job, (recording, truth) in zip(tasks, _all(tire, tasks, jobs), strict=True):
-            truths.append(truth)
+        made = zip(tasks, _all(tire, tasks, jobs), strict=True)
+        for count, (job, (recording, truth)) in enumerate(made, start=1):
+            truths.extend(truth)
             if progress is not None:
-                progress(len(truths), len(tasks))
+                progress(count, len(tasks))
             yield _run(job, recording)
 
     write_campaign(
@@ -208,11 +229,13 @@ def run_plan(
     return truths
 
 
-def _all(tire: RigTire, tasks: list[Job], jobs: int) -> Iterator[tuple[Recording, Truth]]:
+def _all(
+    tire: RigTire, tasks: list[Job], jobs: int
+) -> Iterator[tuple[Recording, tuple[Truth, ...]]]:
     before = {name: os.environ.get(name) for name in THREADS}
     os.environ.update(dict.fromkeys(THREADS, "1"))
     try:
-        start = references(tire, tuple(t.nominal for t in tasks))
+        start = references(tire, tuple(points_of(t.nominal)[0].condition for t in tasks))
         if jobs == 1:
             _prepare(start)
             yield from map(_make, tasks)
@@ -230,20 +253,22 @@ def _all(tire: RigTire, tasks: list[Job], jobs: int) -> Iterator[tuple[Recording
 
 
 def _run(job: Job, recording: Recording) -> Run:
-    c = job.nominal
+    run = job.nominal
+    road = points_of(run)[0].condition
     plan = RunPlan(
         run=job.run,
         file=f"runs/{job.run:03d}.mf4",
-        kind=kind(c),
-        load=c.load,
-        pressure=c.pressure,
-        speed=c.speed,
-        slip_angle=c.slip_angle,
-        camber=c.camber,
-        slip_ratio=c.slip_ratio or 0.0,
+        kind=kind(run),
+        load=set_point(run, "load"),
+        pressure=set_point(run, "pressure"),
+        speed=set_point(run, "speed"),
+        slip_angle=set_point(run, "slip_angle"),
+        camber=set_point(run, "camber"),
+        slip_ratio=set_point(run, "slip_ratio"),
         start=job.run * job.chain.run_spacing,
-        friction=job.friction if c.friction is None else c.friction,
-        tread_depth=NEW_DEPTH if c.tread_depth is None else c.tread_depth,
+        extra={"ramp": run.about} if isinstance(run, Ramp) else {},
+        friction=job.friction if road.friction is None else road.friction,
+        tread_depth=NEW_DEPTH if road.tread_depth is None else road.tread_depth,
         tread_temperature=TREAD_TEMPERATURE,
     )
     return Run(
@@ -278,12 +303,12 @@ def _header(plan: Plan, tire: RigTire, chain: Chain, axes: str) -> CampaignHeade
             gain=chain.gain_repeatability,
         ),
         rig_name="tirelib numerical flat-belt rig",
-        rig_note=f"{plan.about}; five turns a run; the truth is in {TRUTH_FILE}",
+        rig_note=f"{plan.about}; five turns of a steady run; the truth is in {TRUTH_FILE}",
     )
 
 
 def write_truth(path: Path, truths: list[Truth]) -> None:
-    """Write truth.csv: a row a run, SI and ISO signs whatever the campaign's axes."""
+    """Write truth.csv: a row a solved state, SI and ISO signs whatever the campaign's axes."""
     rows = [t.row() for t in truths]
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)

@@ -6,12 +6,15 @@ Everything random comes from seeds: the tire's name for the gages, the campaign'
 for the rest, one stream a run.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from zlib import crc32
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bench.rig.observe import Forces, Trace
+from bench.rig.observe import Forces, Trace, winding
 from bench.rig.solve import State
 from bench.rig.tire import N_STRIPS, Array, Condition, RigTire
 from tirelib.campaign import BoolArray
@@ -58,6 +61,16 @@ class Gages:
     gain: Array
     offset: Array
     run_out_angle: float
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A solved state, what it shows, and the time at which the wheel passes through it [s]."""
+
+    state: State
+    trace: Trace
+    force: Forces
+    time: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -108,23 +121,26 @@ def slip_ratio(state: State) -> float:
     return state.omega * state.free_radius / state.condition.speed - 1.0
 
 
-def record(
-    state: State, trace: Trace, force: Forces, chain: Chain, seed: int, run: int
-) -> Recording:
-    """Measure a state.
+def record(stages: Sequence[Stage], chain: Chain, seed: int, run: int) -> Recording:
+    """Measure a state for some turns, or the states that a wheel passes through.
 
-    The rim turns evenly, phi(t) = phi_0 + Omega t. Run-out a makes the load swing by
-    k_z a cos(phi - phi_a) once per turn; the strain follows by its derivative with load.
+    Between two stages the turn rate, the rig's channels and the strain at each wheel angle lie on
+    straight lines over time; the wheel angle is the integral of the turn rate. Run-out a makes the
+    load swing by k_z a cos(phi - phi_a) once per turn; the strain follows by its derivative with
+    load.
     """
     rng = np.random.default_rng([seed, run, 1])
-    sensors = gages(state.tire, chain)
-    omega = state.omega
-    n = int(np.ceil(chain.turns * 2.0 * np.pi / omega * chain.gage_rate))
+    if len(stages) == 1:
+        (stage,) = stages
+        end = chain.turns * 2.0 * np.pi / stage.state.omega
+        stages = (stage, replace(stage, time=end))
+    sensors = gages(stages[0].state.tire, chain)
+    n = int(np.ceil(stages[-1].time * chain.gage_rate))
     time = np.arange(n) / chain.gage_rate
     start = -np.pi - 0.05 * 2.0 * np.pi * float(rng.uniform(0.2, 1.0))
-    phi = start + omega * time
-    swing = state.stiffness * chain.run_out
-    strain = _sample(trace, phi, swing * np.cos(phi - sensors.run_out_angle))
+    phi = start + _turned(stages, time)
+    swing = chain.run_out * _along(stages, time, [s.state.stiffness for s in stages])
+    strain = _strain(stages, time, phi, swing * np.cos(phi - sensors.run_out_angle))
     drift = _drift(chain, seed) * (run * chain.run_spacing + time)
     gain = sensors.gain * (1.0 + chain.gain_repeatability * rng.standard_normal(N_STRIPS))
     noise = chain.gage_noise * rng.standard_normal(strain.shape)
@@ -132,9 +148,46 @@ def record(
     turn = np.floor((phi + np.pi) / (2.0 * np.pi))
     trigger = np.concatenate([[False], np.diff(turn) > 0.0])
     rig_time = np.arange(int(time[-1] * chain.rig_rate) + 1) / chain.rig_rate
-    wheel = start + omega * rig_time
-    rig = _rig(state, force, swing * np.cos(wheel - sensors.run_out_angle), chain, rng)
+    wheel = start + _turned(stages, rig_time)
+    swing = chain.run_out * _along(stages, rig_time, [s.state.stiffness for s in stages])
+    rig = _rig(stages, rig_time, swing * np.cos(wheel - sensors.run_out_angle), chain, rng)
     return Recording(_quantise(raw, chain), trigger, rig, rig_time)
+
+
+def _along(stages: Sequence[Stage], time: Array, values: Sequence[float]) -> Array:
+    """Return what has these values at the stages, at any times."""
+    return np.asarray(np.interp(time, [s.time for s in stages], values), dtype=np.float64)
+
+
+def _segments(stages: Sequence[Stage], time: Array) -> NDArray[np.intp]:
+    """Return the number of the stage that each time follows; the last one ends a segment."""
+    inner = [s.time for s in stages[1:-1]]
+    return np.searchsorted(inner, time, side="right")
+
+
+def _turned(stages: Sequence[Stage], time: Array) -> Array:
+    """Return the angle by which the gages have turned since the start [rad].
+
+    The belt's wind-up under torque is the gages' own way beyond the rim's.
+    """
+    at, omega = np.array([s.time for s in stages]), np.array([s.state.omega for s in stages])
+    whole = np.concatenate(([0.0], np.cumsum(0.5 * (omega[1:] + omega[:-1]) * np.diff(at))))
+    k = _segments(stages, time)
+    rim = whole[k] + 0.5 * (omega[k] + np.interp(time, at, omega)) * (time - at[k])
+    wound = [winding(s.state) for s in stages]
+    return np.asarray(rim + (_along(stages, time, wound) - wound[0]))
+
+
+def _strain(stages: Sequence[Stage], time: Array, phi: Array, extra_load: Array) -> Array:
+    """Strain of the gages along the stages at angles phi, shape (5, n)."""
+    out = np.empty((N_STRIPS, len(time)))
+    number = _segments(stages, time)
+    for k, (a, b) in enumerate(pairwise(stages)):
+        here = number == k
+        share = (time[here] - a.time) / (b.time - a.time)
+        before, after = (_sample(s.trace, phi[here], extra_load[here]) for s in (a, b))
+        out[:, here] = before + share * (after - before)
+    return out
 
 
 def _sample(trace: Trace, phi: Array, extra_load: Array) -> Array:
@@ -161,23 +214,42 @@ def _quantise(strain: Array, chain: Chain) -> Array:
 
 
 def _rig(
-    state: State, force: Forces, swing: Array, chain: Chain, rng: np.random.Generator
+    stages: Sequence[Stage], time: Array, swing: Array, chain: Chain, rng: np.random.Generator
 ) -> dict[str, Array]:
-    cond = state.condition
-    true: dict[str, tuple[Array | float, float]] = {
-        "Fx": (force.fx, chain.force_noise),
-        "Fy": (force.fy, chain.force_noise),
-        "Fz": (force.fz + swing, chain.force_noise),
-        "Mz": (force.aligning, chain.moment_noise),
-        "slip_angle": (cond.slip_angle, chain.angle_noise),
-        "camber": (cond.camber, chain.angle_noise),
-        "slip_ratio": (slip_ratio(state), chain.slip_noise),
-        "speed": (cond.speed, chain.speed_noise),
-        "omega": (state.omega, chain.omega_noise),
-        "pressure": (cond.pressure, chain.pressure_noise),
-        "loaded_radius": (state.height / np.cos(cond.camber), chain.radius_noise),
+    sigma = {
+        "Fx": chain.force_noise,
+        "Fy": chain.force_noise,
+        "Fz": chain.force_noise,
+        "Mz": chain.moment_noise,
+        "slip_angle": chain.angle_noise,
+        "camber": chain.angle_noise,
+        "slip_ratio": chain.slip_noise,
+        "speed": chain.speed_noise,
+        "omega": chain.omega_noise,
+        "pressure": chain.pressure_noise,
+        "loaded_radius": chain.radius_noise,
     }
+    true = [_true(stage) for stage in stages]
+    out = {}
+    for name, size in sigma.items():
+        value = _along(stages, time, [t[name] for t in true])
+        value = value + swing if name == "Fz" else value
+        out[name] = np.asarray(value + size * rng.standard_normal(len(time)))
+    return out
+
+
+def _true(stage: Stage) -> dict[str, float]:
+    state, force, cond = stage.state, stage.force, stage.state.condition
     return {
-        name: np.asarray(value + sigma * rng.standard_normal(len(swing)))
-        for name, (value, sigma) in true.items()
+        "Fx": force.fx,
+        "Fy": force.fy,
+        "Fz": force.fz,
+        "Mz": force.aligning,
+        "slip_angle": cond.slip_angle,
+        "camber": cond.camber,
+        "slip_ratio": slip_ratio(state),
+        "speed": cond.speed,
+        "omega": state.omega,
+        "pressure": cond.pressure,
+        "loaded_radius": float(state.height / np.cos(cond.camber)),
     }

@@ -4,12 +4,13 @@ Loads in percent refer to `REFERENCE_LOAD`. Table 3-1 is `set1`, Table 3-2 `set2
 `brake_drive`, Table 3-3 `set3` and `set3_cornering`.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
 
+from bench.rig.ramp import Nominal, Point, Ramp, changed
 from bench.rig.tire import Condition
 from tirelib.errors import ParameterError
 
@@ -22,20 +23,24 @@ SWEEP = (-2, 0, 2, 4, 5, 3, 1, -1, -3, -5, -4)
 """Slip angles of Table 3-1 in the order in which the sweep passes them [deg]."""
 WIDE_SWEEP = (-2, 0, 2, 4, 6, 9, 12, 15, 10, 8, 5, 3, 1, -1, -3, -5, -8, -10, -15, -12, -6, -4)
 SLIPS = (0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3, 0.45, 0.6)
+BEFORE, AFTER = 0.6, 0.3
+"""Time that a ramp's ends are held, [s]: a turn takes 0.24 s at 30 km/h."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Conditions in order of measurement, what they are for, and the usual number of repeats."""
+    """Runs in order of measurement, what they are for, and the usual number of repeats."""
 
     name: str
     about: str
-    conditions: tuple[Condition, ...]
+    conditions: tuple[Nominal, ...]
     repeats: int = 0
 
 
-def kind(cond: Condition) -> str:
+def kind(cond: Nominal) -> str:
     """Name the kind of a run as `runs.csv` does."""
+    if isinstance(cond, Ramp):
+        return "sweep"
     slip = cond.slip_ratio or 0.0
     if slip and (cond.slip_angle or cond.camber):
         return "combined"
@@ -46,7 +51,7 @@ def kind(cond: Condition) -> str:
     return "corner" if cond.slip_angle else "free"
 
 
-def with_repeats(plan: Plan, repeats: int) -> tuple[Condition, ...]:
+def with_repeats(plan: Plan, repeats: int) -> tuple[Nominal, ...]:
     """Append repeats: conditions spread evenly over the plan, whatever the seed."""
     n = len(plan.conditions)
     if not 0 <= repeats <= n:
@@ -61,8 +66,9 @@ def with_repeats(plan: Plan, repeats: int) -> tuple[Condition, ...]:
 def on_one_road(plan: Plan, friction: float | None, tread_depth: float | None) -> Plan:
     """Return the plan on a road of this friction [1] with this tread left [m]; None: as it was."""
     given = {"friction": friction, "tread_depth": tread_depth}
-    changed = {name: value for name, value in given.items() if value is not None}
-    return replace(plan, conditions=tuple(replace(c, **changed) for c in plan.conditions))
+    said = {name: value for name, value in given.items() if value is not None}
+    runs = tuple(changed(run, lambda c: replace(c, **said)) for run in plan.conditions)
+    return replace(plan, conditions=runs)
 
 
 def _at(
@@ -131,6 +137,38 @@ def _straight() -> Plan:
     return Plan("straight", "5 loads x 3 pressures x 4 speeds and 6 repeats", runs, repeats=6)
 
 
+def _along(about: str, start: Condition, name: str, *corners: tuple[float, float]) -> Ramp:
+    """Return a ramp of one condition, held before and after; corners are times [s], values."""
+    first, last = corners[0], corners[-1]
+    held = (
+        (0.0, first[1]),
+        *((BEFORE + time, value) for time, value in corners),
+        (BEFORE + last[0] + AFTER, last[1]),
+    )
+    return Ramp(about, tuple(Point(t, replace(start, **{name: value})) for t, value in held))
+
+
+def _ramps_at(load: float) -> Iterator[Ramp]:
+    slow, fast = 30.0 * KMH, 90.0 * KMH
+    for rate in (2.0, -2.0, 4.0, -4.0, -8.0):
+        first, last = (slow, fast) if rate > 0.0 else (fast, slow)
+        ends = (0.0, first), ((last - first) / rate, last)
+        yield _along(f"speed {rate:+g} m/s2", _at(load), "speed", *ends)
+    for about, corners in (
+        ("brake", ((0.0, 0.0), (0.5, -0.06), (1.0, 0.0))),
+        ("throttle", ((0.0, 0.0), (0.5, 0.02))),
+    ):
+        yield _along(about, _at(load, slip_ratio=0.0), "slip_ratio", *corners)
+    for rate in (2.0, 8.0):
+        turned = ((0.0, 0.0), (4.0 / rate, 4.0 * DEG), (8.0 / rate, 0.0))
+        yield _along(f"steering {rate:g} deg/s", _at(load), "slip_angle", *turned)
+
+
+def _ramps() -> Plan:
+    runs = tuple(ramp for load in _loads((62.5, 100.0)) for ramp in _ramps_at(load))
+    return Plan("ramps", "2 loads x 5 speed, brake, throttle and 2 steering ramps", runs)
+
+
 PLANS: Mapping[str, Callable[[], Plan]] = MappingProxyType(
     {
         "set1": _set1,
@@ -140,6 +178,7 @@ PLANS: Mapping[str, Callable[[], Plan]] = MappingProxyType(
         "set3_cornering": _set3_cornering,
         "combined": _combined,
         "straight": _straight,
+        "ramps": _ramps,
     }
 )
 """The presets by name."""

@@ -14,12 +14,13 @@ from bench.emulator import Player, Tape, record_tape
 from bench.errors import DeviceError
 from bench.faults import Faults, parse_faults
 from bench.links.can_bus import packed
-from bench.manoeuvre import Motion, Point, nodes, read_manoeuvre, waveform
+from bench.manoeuvre import Motion, nodes, read_manoeuvre, waveform
 from bench.protocols import CAN, SERIAL, SLCAN
 from bench.protocols.layouts import RAW12, RAW12C, RAW16
 from bench.protocols.plan import ProtocolPlan
 from bench.rig.measure import Chain as MeasuringChain
 from bench.rig.measure import gages
+from bench.rig.ramp import Point
 from bench.rig.tire import Condition, tire
 from bench.timeline import Samples, Timeline
 from bench.transmitter import transmitter

@@ -1,8 +1,10 @@
 """Checks of the turns: enough of them, and a trigger that agrees with the rig."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from tirelib.campaign.finding import Finding, finding
 from tirelib.campaign.model import CampaignHeader, FloatArray, Run
@@ -45,18 +47,33 @@ def turn_findings(run: Run, header: CampaignHeader) -> list[Finding]:
                 )
             )
         return found
-    return found + _periods(run, np.diff(pulses), pulses[:-1].astype(float), expected)
+    gaps, period = np.diff(pulses), float(np.median(np.diff(pulses)))
+    if run.plan.kind == "sweep":  # its turns differ: means, over the same time, are compared
+        expected, period = expected_period(_between(run, pulses), header), float(np.mean(gaps))
+    return found + _periods(run, gaps, period, pulses[:-1].astype(float), expected)
+
+
+def _between(run: Run, pulses: npt.NDArray[np.intp]) -> Run:
+    """Return a run with what the rig measured between the first pulse and the last."""
+    if run.rig_time is None:
+        return run
+    first, last = run.time()[pulses[[0, -1]]]
+    inside = (run.rig_time >= first) & (run.rig_time <= last)
+    rig = {name: values[inside] for name, values in run.rig.items()}
+    return replace(run, rig=rig, rig_time=run.rig_time[inside])
 
 
 def _periods(
-    run: Run, gaps: FloatArray, begins: FloatArray, expected: tuple[float, str, float] | None
+    run: Run,
+    gaps: FloatArray,
+    samples: float,
+    begins: FloatArray,
+    expected: tuple[float, str, float] | None,
 ) -> list[Finding]:
-    """Compare the trigger's periods with the rig and with each other."""
+    """Compare the trigger's period, in samples, with the rig, and its gaps with each other."""
     file = run.plan.file
-    period = float(np.median(gaps)) / run.rate
-    if expected is not None and abs(period / expected[0] - 1.0) > expected[2] + 2.0 / np.median(
-        gaps
-    ):
+    period = samples / run.rate
+    if expected is not None and abs(period / expected[0] - 1.0) > expected[2] + 2.0 / samples:
         return [
             finding(
                 "trigger",

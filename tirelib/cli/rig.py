@@ -20,7 +20,8 @@ Example:
 
 \b
 The folder is a campaign (campaign.toml, runs.csv, runs/*.mf4). truth.csv in it holds
-the noise-free forces, slip, contact lengths and edges of each run, in SI and ISO signs.
+the noise-free forces, slip, contact lengths and edges of each run (of each solved state of a ramp),
+in SI and ISO signs.
 """
 
 
@@ -84,7 +85,7 @@ def rig(
             overwrite=force,
             progress=lambda done, total: advance(f"run {done} of {total}"),
         )
-    click.echo(f"{len(truths)} runs of {plan_name} in {out} (axes {axes}, seed {seed})")
+    click.echo(f"{count} runs of {plan_name} in {out} (axes {axes}, seed {seed})")
     if json_file is not None:
         write_json(json_file, _document(plan_name, out, seed, tire_name, axes, truths))
 
@@ -117,7 +118,7 @@ def _document(
         "seed": seed,
         "tire": tire_name,
         "axes": axes,
-        "runs": len(truths),
+        "runs": len({t.run for t in truths}),
         "Fz_N": [min(t.force.fz for t in truths), max(t.force.fz for t in truths)],
         "Fy_N": [min(t.force.fy for t in truths), max(t.force.fy for t in truths)],
         "Fx_N": [min(t.force.fx for t in truths), max(t.force.fx for t in truths)],

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.rig.measure import Chain, Recording, gages, record, settle
+from bench.rig.measure import Chain, Recording, Stage, gages, record, settle
 from bench.rig.mesh import mesh
 from bench.rig.observe import Forces, Trace
 from bench.rig.solve import State
@@ -30,7 +30,7 @@ def made_up() -> tuple[State, Trace, Forces]:
 
 def measure(chain: Chain, seed: int = 0, run: int = 0) -> Recording:
     state, trace, force = made_up()
-    return record(state, trace, force, chain, seed, run)
+    return record([Stage(state, trace, force)], chain, seed, run)
 
 
 def test_a_seed_gives_the_same_recording_and_another_gives_another() -> None:
@@ -57,7 +57,7 @@ def test_gage_noise_is_white_and_of_the_stated_size() -> None:
     chain = replace(QUIET, gage_noise=4e-5)
     state, trace, force = made_up()
     flat = replace(trace, strain=np.full_like(trace.strain, 2e-3))
-    strain = record(state, flat, force, chain, 0, 0).strain - 2e-3
+    strain = record([Stage(state, flat, force)], chain, 0, 0).strain - 2e-3
     assert strain.std() == pytest.approx(4e-5, rel=0.03)  # 27,000 samples: 0.4 % one sigma
     following = np.mean(strain[:, 1:] * strain[:, :-1]) / strain.var()
     assert abs(following) < 0.03
@@ -79,7 +79,7 @@ def test_strain_is_quantised_to_14_bits() -> None:
 def test_range_saturates() -> None:
     state, trace, force = made_up()
     huge = replace(trace, strain=10.0 * trace.strain)
-    strain = record(state, huge, force, Chain(), 0, 0).strain
+    strain = record([Stage(state, huge, force)], Chain(), 0, 0).strain
     assert strain.max() == pytest.approx(0.02, rel=1e-3)
 
 
