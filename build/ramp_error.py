@@ -2,12 +2,13 @@
 
 The virtual tire rolls straight at a held load and brakes or accelerates evenly; its strain goes
 through the calibration of the co-simulations. "Even turn" is wheel angle as time times the mean
-rate of the preceding turn. Writes ``docs/ramp_error.png`` and prints the table of steps in
-``docs/estimators.md``.
+rate of the preceding turn. Writes ``docs/ramp_error.png`` and prints the tables of steps and of
+slip ratios in ``docs/estimators.md``.
 """
 
 import sys
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -21,7 +22,7 @@ from tirelib.fmu.virtual.options import Options
 from tirelib.fmu.virtual.spec import default_surface
 from tirelib.fmu.virtual.surface import read_surface
 from tirelib.fmu.virtual.wheel import VirtualWheel
-from tirelib.signal import LowPass, cut_turns, turns
+from tirelib.signal import LowPass, cut_turns, slip, turns
 from tirelib.signal.angle import angle_law
 
 ROOT = Path(__file__).parents[1]
@@ -134,10 +135,55 @@ def steps() -> None:
                 sys.stdout.write(f"| {' | '.join(cells)} |\n")
 
 
+def brake(speed: float, begins: float, t: float) -> dict[str, float]:
+    """Return the inputs of a brake that takes hold within 0.15 s."""
+    x = min(max(t - begins, 0.0), 0.15)
+    passed = 0.5 * x**2 / 0.15 + max(t - begins - 0.15, 0.0)
+    return {"Fz": 3500.0, "speed": speed - 8.0 * passed, "kappa": -0.04 * x / 0.15}
+
+
+def pulses(speed: float, begins: float, t: float) -> dict[str, float]:
+    """Return the inputs of three pulses of the brake a second."""
+    x, w = max(t - begins, 0.0), 6.0 * np.pi
+    lost = 2.0 * (x - np.sin(w * x) / w)
+    return {"Fz": 3500.0, "speed": speed - lost, "kappa": -0.025 * (1.0 - np.cos(w * x))}
+
+
+def press(speed: float, begins: float, t: float) -> dict[str, float]:
+    """Return the inputs of a load that jumps."""
+    return {"Fz": 3000.0 if t < begins else 4000.0, "speed": speed}
+
+
+def slips() -> None:
+    """Print the worst error of the slip ratio, itself and over its standard deviation."""
+    road = {"friction": 1.0, "tread_depth": 8e-3, "tread_temperature": 300.0}
+    for law in (brake, pulses, press):
+        for told in (("speed", "omega"), ("speed",)):
+            rows = []
+            for speed, phase in product((12.0, 20.0), np.linspace(0.0, 1.0, 9)[:-1]):
+                made = play(0.9, partial(law, speed, 0.4 + phase * 1.92 / speed))
+                made |= {name: np.full(made["Fz"].size, x) for name, x in road.items()}
+                for stiffness in (0.5, 1.0, 2.0):
+                    known = stiffness * slip.SLIP_STIFFNESS
+                    with mock.patch.object(slip, "SLIP_STIFFNESS", known):
+                        features, found = estimate(made, *told, *road)
+                    here = np.minimum((features.time * RATE).astype(int), made["Fz"].size - 1)
+                    good = found.turn_valid & (np.arange(here.size) > 0)
+                    error = np.abs(found.value["kappa"] - made["kappa"][here])[good]
+                    over = error / found.std["kappa"][good]
+                    rows.append((stiffness, error.max(), over.max()))
+            table = np.array(rows)
+            half, one, double = (table[table[:, 0] == x] for x in (0.5, 1.0, 2.0))
+            cells = (law.__name__, ", ".join(told), f"{one[:, 1].max():.4f}",
+                     *(f"{x[:, 2].max():.1f}" for x in (half, one, double)))  # fmt: skip
+            sys.stdout.write(f"| {' | '.join(cells)} |\n")
+
+
 def _step(change: dict[str, tuple[float, float]], at: float, t: float) -> dict[str, float]:
     return {name: values[int(t >= at)] for name, values in change.items()}
 
 
 if __name__ == "__main__":
+    slips()
     steps()
     draw()

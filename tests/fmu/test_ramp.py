@@ -1,6 +1,7 @@
 """Laws of estimates while the wheel's speed changes: one definition, right to 8 m/s2."""
 
-from functools import cache
+from functools import cache, partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,8 @@ from tirelib.signal import LowPass, cut_turns
 from tirelib.stream import StreamEstimator
 
 SOURCES = {"omega": ("speed", "omega"), "speed": ("speed",), "turns": ()}
+ROAD = {"friction": 1.0, "tread_depth": 8e-3, "tread_temperature": 300.0}
+"""A road and a tread that are known, so that the rolling radius is."""
 
 
 def estimate(
@@ -143,3 +146,68 @@ def test_load_and_slip_are_right_while_the_speed_changes(
     assert np.abs(error).max() < 0.03 * load
     assert np.abs(error / told.std["Fz"][good]).max() < 3.0
     assert np.abs(told.value["kappa"][good] / told.std["kappa"][good]).max() < 3.0
+
+
+PHASES = (0.0, 0.35, 0.7)
+"""When in the turn a change begins: its share of a turn."""
+
+
+def rising(t: float, begins: float, lasts: float) -> tuple[float, float]:
+    """A share that rises evenly from 0 to 1, and its integral."""
+    x = min(max(t - begins, 0.0), lasts)
+    return x / lasts, 0.5 * x**2 / lasts + max(t - begins - lasts, 0.0)
+
+
+def brake(speed: float, phase: float, t: float) -> dict[str, float]:
+    """Slip ratio and deceleration come together within 0.15 s."""
+    share, passed = rising(t, 0.4 + phase * 1.92 / speed, 0.15)
+    return steadily(3500.0, speed - 8.0 * passed, -0.04 * share)
+
+
+def pulse(speed: float, phase: float, t: float) -> dict[str, float]:
+    """Three pulses of the brake a second."""
+    x, w = max(t - 0.4 - phase / 3.0, 0.0), 6.0 * np.pi
+    slip = 0.5 * (1.0 - np.cos(w * x))
+    return steadily(3500.0, speed - 2.0 * (x - np.sin(w * x) / w), -0.05 * slip)
+
+
+def press(speed: float, phase: float, t: float) -> dict[str, float]:
+    """A load that jumps."""
+    return steadily(3000.0 if t < 0.4 + phase * 1.92 / speed else 4000.0, speed)
+
+
+@cache
+def transient(law: Any, speed: float, phase: float) -> dict[str, Any]:
+    return play(0.85, partial(law, speed, phase))
+
+
+@pytest.mark.parametrize("law", [brake, pulse, press])
+@pytest.mark.parametrize("source", ["omega", "speed"])
+def test_the_interval_of_the_slip_ratio_holds_while_slip_or_load_change(
+    source: str, law: Any
+) -> None:
+    apart, still = [], []
+    for speed, phase in product((12.0, 20.0), PHASES):
+        made = transient(law, speed, phase)
+        held = {name: made[name] for name in (*SOURCES[source], "pressure", "camber")}
+        held |= {name: np.full(made["Fz"].size, x) for name, x in ROAD.items()}
+        features, told = estimate(calibration(), made["strain"], RATE, held)
+        here = np.minimum((features.time * RATE).astype(int), made["Fz"].size - 1)
+        good = told.turn_valid.copy()
+        good[0] = False  # no turn before it
+        apart += ((told.value["kappa"] - made["kappa"][here]) / told.std["kappa"])[good].tolist()
+        still += told.std["kappa"][good & (features.time < 0.4)].tolist()
+    assert np.abs(apart).max() < 3.0
+    assert np.max(still) < 5e-4  # where nothing changes it is as narrow as ever
+
+
+@pytest.mark.parametrize("source", ["omega", "speed"])
+def test_an_interval_of_slip_is_no_wider_than_its_errors(source: str) -> None:
+    """What is doubted is there: over the manoeuvres the worst error is a half of it or more."""
+    made = transient(brake, 12.0, 0.35)
+    held = {name: made[name] for name in (*SOURCES[source], "pressure", "camber")}
+    held |= {name: np.full(made["Fz"].size, x) for name, x in ROAD.items()}
+    features, told = estimate(calibration(), made["strain"], RATE, held)
+    here = np.minimum((features.time * RATE).astype(int), made["Fz"].size - 1)
+    apart = (told.value["kappa"] - made["kappa"][here]) / told.std["kappa"]
+    assert np.abs(apart[told.turn_valid]).max() > 0.5

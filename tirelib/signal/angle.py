@@ -60,7 +60,9 @@ class AngleLaw:
     speed : float, [m/s]
         Travel speed at the contact, to which `step` is in the proportion of the slip ratio there.
     slip_std : float, [1]
-        Relative standard deviation of ``step / speed``.
+        Relative standard deviation of ``step / speed``, without `late`.
+    late : float, [1]
+        Share of a change of slip within the turn that the law does not tell.
     past : Past
         What the law of the next turn needs.
     """
@@ -72,6 +74,7 @@ class AngleLaw:
     std: float
     speed: float
     slip_std: float
+    late: float
     past: Past
 
     def at(self, sample: npt.NDArray[np.number]) -> FloatArray:
@@ -120,7 +123,7 @@ def angle_law(
     if not _steady_enough(rate, ahead / turn):
         rate, fit_std = np.ones(1), 1.0
     contact_rate = float(rate[0]) / turn
-    slip, slip_std = _slip(known, *_followed(past, _SPEED, turn), slope_std)
+    slip, slip_std, late = _slip(known, *_followed(past, _SPEED, turn), slope_std)
     whole = 2.0 * np.pi * rate / np.arange(1, rate.size + 1)
     return AngleLaw(
         middle=middle,
@@ -130,33 +133,40 @@ def angle_law(
         std=float(np.hypot(fit_std, slope_std)),
         speed=contact_rate / (now[_SPEED] * slip),
         slip_std=slip_std,
+        late=late,
         past=past,
     )
 
 
 def _slip(
     known: Sequence[Course | None], slope: float, slope_std: float, rate_std: float
-) -> tuple[float, float]:
-    """Return q of the speed at the contact over its mean of the turn, and its relative doubt.
+) -> tuple[float, float, float]:
+    """Return q of the speed at the contact over its mean of the turn, its doubt, and what is late.
 
     From turn to turn it is told precisely, but late; where turn rate and speed both have a course,
     these tell it at once, but with their noise. What they tell beyond the former is shrunk as their
-    own coefficients are. What a measured turn rate and the contacts differ by from turn to turn
+    own coefficients are. Where the speed was hardly renewed, a turn rate that moves within the turn
+    is slip as likely as not. What a measured turn rate and the contacts differ by from turn to turn
     (`rate_std` is half of it) is how far a change of traction moves the pulse's middle.
     """
     slip = 1.0 + 0.5 * slope
-    if any(course is None or not course.known for course in known):
-        return slip, slope_std
-    rate, speed = (
-        (float(course.shape[0] / (course.shape @ _means(course.shape.size))), course.std)
-        for course in known
-        if course is not None
-    )
-    apart, variance = rate[0] / speed[0] - slip, rate[1] ** 2 + speed[1] ** 2
-    told = 1.0 - variance / apart**2 if apart**2 > variance else 0.0
+    turn_rate, speed = (_at_contact(course) for course in known)
+    if turn_rate is None or known[1] is None:
+        return slip, slope_std, 1.0
+    at_once = speed is not None
+    speed = speed or (1.0, 0.0)
+    apart, variance = turn_rate[0] / speed[0] - slip, turn_rate[1] ** 2 + speed[1] ** 2
+    told = 1.0 - variance / apart**2 if at_once and apart**2 > variance else 0.0
     left = np.hypot(slope_std, apart) * (1.0 - told)
     direct = told * np.hypot(np.sqrt(variance), 2.0 * rate_std)
-    return slip + told * apart, float(np.hypot(left, direct))
+    return slip + told * apart, float(np.hypot(left, direct)), 1.0 - told
+
+
+def _at_contact(course: Course | None) -> tuple[float, float] | None:
+    """Return a source at the contact over its mean of the turn, and its standard deviation."""
+    if course is None or not course.known:
+        return None
+    return float(course.shape[0] / (course.shape @ _means(course.shape.size))), course.std
 
 
 _SPEED = 1 + SOURCES.index("speed")

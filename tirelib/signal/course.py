@@ -41,12 +41,15 @@ class Course:
         Relative standard deviation of the shape at the contact over its mean.
     known : bool
         Whether the source told enough values to have a course; else it is its mean.
+    surge : float
+        Slope at the contact less the turn's mean slope, in the source's unit a turn.
     """
 
     shape: FloatArray
     mean: float
     std: float
     known: bool
+    surge: float = 0.0
 
 
 def course(samples: FloatArray, first: float, turn: float) -> Course | None:
@@ -88,16 +91,35 @@ def course(samples: FloatArray, first: float, turn: float) -> Course | None:
     z = (0.5 * (edges[:-1] + edges[1:] - 1) + first + turn) / (turn * half) - 1.0
     design = legvander(z, size - 1)
     fitted = np.linalg.solve(design.T @ design, y @ design)
-    scatter = float(np.mean((y - design @ fitted) ** 2)) / (1.0 - size / told)
-    variance = scatter * (2.0 * np.arange(size) + 1.0) / told
+    left = y - design @ fitted
+    scatter = float(np.mean(left**2)) / (1.0 - size / told)
+    independent = told / _alike(left, -(-y.size // told))
+    variance = scatter * (2.0 * np.arange(size) + 1.0) / independent
     square = np.maximum(fitted**2, np.finfo(np.float64).tiny)
-    keep = np.maximum(1.0 - variance / square, 0.0)
-    keep[0] = 1.0
+    kept = np.maximum(1.0 - variance / square, 0.0) * fitted
+    kept[0] = fitted[0]
     terms = _LEGENDRE[:size, :size] @ _moved(1.0 / half, 1.0 / half - 1.0)[:size, :size]
     means = terms @ _MEANS[:size]
     mean = float(fitted @ means)
     std = float(np.sqrt((terms[:, 0] - means) ** 2 @ variance)) / abs(mean)
-    return Course((fitted * keep) @ terms, mean, std, known=True)
+    bent = terms @ _BENT[:size]
+    surge = float(kept @ bent)
+    noise = float(bent**2 @ variance)
+    surge = surge - noise / surge if surge**2 > noise else 0.0
+    return Course(kept @ terms, mean, std, known=True, surge=surge)
+
+
+def _alike(left: FloatArray, lag: int) -> float:
+    """Return how many values in a row count as one, from what a fit leaves of them.
+
+    Noise leaves values that know nothing of each other; a course that no cubic follows leaves
+    waves. With the correlation r of neighbours, `lag` apart, (1 + r) / (1 - r) of them tell as much
+    as one (M. S. Bartlett, J. R. Stat. Soc. 98, 1935). Fewer than one are not believed.
+    """
+    square = float(left @ left)
+    product = float(left[lag:] @ left[:-lag])
+    correlation = product / square if square > 0.0 else 0.0
+    return max((1.0 + correlation) / (1.0 - correlation), 1.0)
 
 
 _LEGENDRE = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [-0.5, 0.0, 1.5, 0.0],
@@ -105,6 +127,8 @@ _LEGENDRE = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [-0.5, 0.0, 1.
 """Rows: Legendre polynomials by their powers."""
 _MEANS = np.array([1.0, -1.0 / 2.0, 1.0 / 3.0, -1.0 / 4.0])
 """Means of the powers from -1 to 0."""
+_BENT = np.array([0.0, 0.0, 1.0, -1.0])
+"""Of the powers: slope at 0 less the mean slope from -1 to 0."""
 
 
 def _moved(gain: float, shift: float) -> FloatArray:

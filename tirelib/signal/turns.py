@@ -30,6 +30,7 @@ from tirelib.signal.contacts import Contact, ContactFinder
 from tirelib.signal.course import course
 from tirelib.signal.lowpass import LowPass, half_width, smooth_to_angle
 from tirelib.signal.quality import UNUSABLE, inspect
+from tirelib.signal.slip import unseen_change
 from tirelib.signal.turn import PHI, Turn, Turns, stack_turns
 
 __all__ = ["PHI", "Turn", "TurnCutter", "Turns", "cut_turns", "stack_turns"]
@@ -202,6 +203,10 @@ class TurnCutter:
             for name in SOURCES
         }
         law = angle_law(contact.middle, turn, stop - contact.middle, told, self._past)
+        unseen = unseen_change(
+            told["speed"], turn / self.rate, _pulse(contact, law), _pulse(before, law)
+        )
+        law = replace(law, slip_std=float(np.hypot(law.slip_std, law.late * unseen)))
         return law, max(stop, self._stop(contact, law))
 
     def _sigma(self, law: AngleLaw) -> float | None:
