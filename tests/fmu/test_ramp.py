@@ -197,17 +197,5 @@ def test_the_interval_of_the_slip_ratio_holds_while_slip_or_load_change(
         good[0] = False  # no turn before it
         apart += ((told.value["kappa"] - made["kappa"][here]) / told.std["kappa"])[good].tolist()
         still += told.std["kappa"][good & (features.time < 0.4)].tolist()
-    assert np.abs(apart).max() < 3.0
+    assert 0.5 < np.abs(apart).max() < 3.0  # what is doubted is there, and is enough
     assert np.max(still) < 5e-4  # where nothing changes it is as narrow as ever
-
-
-@pytest.mark.parametrize("source", ["omega", "speed"])
-def test_an_interval_of_slip_is_no_wider_than_its_errors(source: str) -> None:
-    """What is doubted is there: over the manoeuvres the worst error is a half of it or more."""
-    made = transient(brake, 12.0, 0.35)
-    held = {name: made[name] for name in (*SOURCES[source], "pressure", "camber")}
-    held |= {name: np.full(made["Fz"].size, x) for name, x in ROAD.items()}
-    features, told = estimate(calibration(), made["strain"], RATE, held)
-    here = np.minimum((features.time * RATE).astype(int), made["Fz"].size - 1)
-    apart = (told.value["kappa"] - made["kappa"][here]) / told.std["kappa"]
-    assert np.abs(apart[told.turn_valid]).max() > 0.5
