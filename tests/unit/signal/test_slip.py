@@ -53,8 +53,8 @@ def test_what_a_cubic_cannot_follow_is_more_uncertain_than_noise_of_its_size() -
     time = after_the_last_contact()
     kink = 20.0 - 8.0 * np.maximum(time + 0.03, 0.0)
     scatter = np.std(kink - np.polyval(np.polyfit(time, kink, 3), time))
-    noise = 20.0 + scatter * np.random.default_rng(4).standard_normal((50, time.size))
-    usual = np.median([told(row).std for row in noise])
+    noise = scatter * np.random.default_rng(4).standard_normal((50, time.size // 20))
+    usual = np.median([told(20.0 + np.repeat(row, 20)).std for row in noise])
     assert told(kink).std > 2.0 * usual
     at_contact = abs(float(told(kink).shape[0]) - (20.0 - 8.0 * 0.03)) / told(kink).mean
     assert at_contact < 3.0 * told(kink).std
