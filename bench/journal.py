@@ -14,6 +14,7 @@ from typing import Any
 from bench.chain import Turn
 from bench.document import QUANTITIES, empty_summary, turn_document
 from bench.errors import RecordingError, cause
+from bench.new_file import keep_recordings
 from tirelib.cli.common import plain
 from tirelib.estimators.result import FORMAT
 
@@ -39,10 +40,11 @@ class Journal:
     Raises
     ------
     RecordingError
-        If the file cannot be written.
+        If the file cannot be written, or is a recording.
     """
 
     def __init__(self, path: Path) -> None:
+        keep_recordings(path)
         self.error = ""
         self._name = path
         self._path = path.resolve()

@@ -18,6 +18,7 @@ from bench.export import (
     write_table,
 )
 from bench.export_results import write_mdf, write_results
+from bench.new_file import keep_recordings
 from bench.recording import Recording
 from bench.segments import segments
 from tirelib.campaign import CampaignHeader
@@ -73,6 +74,7 @@ def export(
         )
     if out.exists():
         raise RecordingError(f"{out}: it exists; nothing is overwritten; name another place")
+    keep_recordings(json_file, recording)
     out.parent.mkdir(parents=True, exist_ok=True)
     beside: list[Path] = []
     with closing(Recording(recording)) as opened:

@@ -18,6 +18,7 @@ from bench.live.chain import LiveChain, LivePlan
 from bench.live.priority import ordinary, realtime
 from bench.live.reader import ReaderPlan
 from bench.live.recording_state import RecordingRule
+from bench.new_file import keep_recordings
 from bench.protocols.plan import ProtocolPlan
 from bench.recording_header import RecordingHeader
 from bench.session import Limits, Session
@@ -75,6 +76,7 @@ def record(
     """Record the raw bytes of a port; Ctrl-C ends in good order."""
     if bool(ports) == (setup is not None):
         raise click.UsageError("just one of --port and --setup is needed")
+    keep_recordings(json_file, out)
     devices, text = devices_of(device_texts)
     plan = PortPlan("", baud, bitrate, data_bitrate, bus_options)
     usual = SourcePlan(plan, ProtocolPlan(rate=rate), devices, None, text)

@@ -35,6 +35,7 @@ from bench.live.chain import LiveChain, LivePlan
 from bench.live.priority import ordinary, realtime
 from bench.live.reader import ReaderPlan
 from bench.live.recording_state import RecordingRule
+from bench.new_file import keep_recordings
 from bench.page.alarms import RULES, read_alarms
 from bench.page.recording_switch import RecordingSwitch
 from bench.protocols.plan import ProtocolPlan
@@ -153,6 +154,7 @@ def run(
         raise click.UsageError("just one of --port, --setup, --port-file and --replay is needed")
     if replay is not None and record is not None:
         raise click.UsageError("--record goes with --port: a recording is there already")
+    keep_recordings(json_file, record, replay)
     priority = realtime(asked) if replay is None else ""
     paced = replay is None or pace is not None
     rules = RULES if alarms is None else read_alarms(alarms)

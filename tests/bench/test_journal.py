@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,10 +13,14 @@ from typing import Any
 import pytest
 
 from bench.chain import Turn
+from bench.cli import program
 from bench.cli.stop import on_stop
+from bench.conditions import Conditions
 from bench.document import turn_document
 from bench.errors import RecordingError
 from bench.journal import Journal, completed
+from bench.recorder import Recorder
+from bench.recording_header import RecordingHeader
 from tests.bench.test_bridges import OUTPUTS
 
 TURNS = [
@@ -104,6 +109,38 @@ def test_a_document_that_cannot_be_written_leaves_the_turns(
     document = completed(path.read_text())
     assert document is not None
     assert len(document["turns"]) == 5
+
+
+@pytest.mark.parametrize("name", ["a.mcap", "a.part2.mcap", "./b/../a.mcap"])
+def test_no_json_takes_the_place_of_a_recording(tmp_path: Path, name: str) -> None:
+    (tmp_path / "b").mkdir()
+    recording, fmu = tmp_path / "a.mcap", tmp_path / "x.fmu"
+    fmu.touch()
+    runs = ["run", "--port", "tcp://127.0.0.1:9", "--fmu", fmu, "--record", recording]
+    records = ["record", "--port", "tcp://127.0.0.1:9", "--out", recording]
+    for command in (runs, records):
+        said = refused(*command, "--json", tmp_path / name)
+        assert "a recording is never overwritten" in said
+        assert not recording.exists()
+    Recorder(recording, RecordingHeader({}), Conditions.constant()).close("closed")
+    shutil.copy(recording, tmp_path / "a.part2.mcap")
+    shutil.copy(recording, tmp_path / "another.mcap")
+    before = {path: path.read_bytes() for path in tmp_path.glob("*.mcap")}
+    replays = ["run", "--replay", recording, "--fmu", fmu]
+    exports = ["export", recording, "--out", tmp_path / "a.csv"]
+    for command in (replays, exports):
+        for file in (tmp_path / name, tmp_path / "another.mcap"):
+            assert "a recording is never overwritten" in refused(*command, "--json", file)
+    with pytest.raises(RecordingError, match="never overwritten"):
+        Journal(tmp_path / "another.mcap")
+    assert {path: path.read_bytes() for path in tmp_path.glob("*.mcap")} == before
+
+
+def refused(*words: object) -> str:
+    """Return the error of a command that must be refused."""
+    with pytest.raises(RecordingError) as refusal:
+        program([str(word) for word in words], standalone_mode=False)
+    return str(refusal.value)
 
 
 def test_a_path_that_cannot_be_written_is_refused_and_a_pipe_gets_the_document_alone(
