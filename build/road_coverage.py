@@ -3,8 +3,9 @@
     python build/road_coverage.py --out build/out/road
 
 Calibrates on the rig's plan `set1` (dry, new), without a word of friction or tread, and judges on
-runs whose friction and tread depth are drawn from the declared ranges. Campaigns are kept in the
-folder; with none there, the rig takes some minutes. `coverage.md` and `coverage.png` are written.
+runs whose friction and tread depth are drawn from the declared ranges. Campaigns
+and calibration are kept in the folder; with none there, the rig takes some minutes. `--tire` and
+`--seed` choose others. `coverage.md` and `coverage.png` are written.
 """
 
 import argparse
@@ -14,13 +15,15 @@ from pathlib import Path
 
 import click
 import numpy as np
+from proof.tires import tire as random_tire
 
 from bench.rig.campaign import run_plan
 from bench.rig.plans import Plan, plan
-from bench.rig.tire import NEW_DEPTH, Condition, tire
+from bench.rig.tire import NEW_DEPTH, TIRES, Condition, RigTire, tire
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration import Calibration, Estimates
+from tirelib.estimators.calibration_file import read_calibration, write_calibration
 from tirelib.estimators.result import EDGE_UNIT, TRUTH
 from tirelib.estimators.train import train
 from tirelib.estimators.unknowns import DEPTH, FRICTION, TWO_SIGMA
@@ -33,9 +36,9 @@ BANDS: Mapping[str, tuple[tuple[float, float], ...]] = {
 }
 
 
-def drawn(runs: int) -> Plan:
+def drawn(runs: int, seed: int) -> Plan:
     """Return runs of any load, slip angle, friction and wear."""
-    rng = np.random.default_rng(7)
+    rng = np.random.default_rng(seed)
     conditions = tuple(
         Condition(
             rng.uniform(1500.0, 8000.0), 2.3e5, 65.0 / 3.6, np.deg2rad(rng.uniform(-5.0, 5.0)),
@@ -47,10 +50,15 @@ def drawn(runs: int) -> Plan:
     return Plan("drawn", "load, slip angle, friction and tread depth drawn", conditions)
 
 
-def measured(folder: Path, chosen: Plan, name: str, seed: int, jobs: int) -> Observations:
+def tire_of(name: str, seed: int) -> RigTire:
+    """Return a tire of the rig, or with `random` one whose constants are drawn."""
+    return random_tire(seed) if name == "random" else tire(name)
+
+
+def measured(folder: Path, chosen: Plan, own: RigTire, seed: int, jobs: int) -> Observations:
     """Return what the rig shows of a plan, measured once."""
     if not (folder / "runs.csv").exists():
-        run_plan(chosen, tire(name), folder, seed=seed, jobs=jobs, overwrite=True)
+        run_plan(chosen, own, folder, seed=seed, jobs=jobs, overwrite=True)
     return observe([read_campaign(folder)])
 
 
@@ -145,14 +153,19 @@ def main() -> None:
     """Measure, calibrate, judge, write."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("build/out/road"))
-    parser.add_argument("--tire", default="reference")
+    parser.add_argument("--tire", default="reference", choices=(*TIRES, "random"))
     parser.add_argument("--runs", type=int, default=64)
+    parser.add_argument("--seed", type=int, default=21, help="of the noise and of what is drawn")
     parser.add_argument("--jobs", type=int, default=2)
     given = parser.parse_args()
-    folder: Path = given.out / given.tire
-    dry = measured(folder / "set1", plan("set1"), given.tire, 1, given.jobs)
-    seen = measured(folder / "drawn", drawn(given.runs), given.tire, 5, given.jobs)
-    calibration = train(silent(dry)).calibration
+    folder: Path = given.out / f"{given.tire}-{given.seed}"
+    own, seed = tire_of(given.tire, given.seed), given.seed
+    dry = measured(folder / "set1", plan("set1"), own, seed, given.jobs)
+    seen = measured(folder / "drawn", drawn(given.runs, seed + 2), own, seed + 1, given.jobs)
+    file = folder / "calibration.toml"
+    if not file.exists():
+        write_calibration(train(silent(dry)).calibration, file)
+    calibration = read_calibration(file)
     lines = table(calibration, dry, seen)
     (folder / "coverage.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
     draw(calibration, seen, folder)

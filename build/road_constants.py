@@ -1,0 +1,143 @@
+"""What the rig says of the constants of tread and road, and what half and double of each does.
+
+    python build/road_constants.py build/out/road/reference-21 [more folders] --out build/out/road
+    python build/road_constants.py --measure reference
+
+Folders are those of `build/road_coverage.py`. With `--measure`, straight and 1 deg runs of one tire
+on a tread of 8, 6 and 4 mm give `EDGE`, `BENT` and `CORNERING`; nothing is estimated there.
+"""
+
+import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import ModuleType
+
+import click
+import numpy as np
+from road_coverage import measured, rows_of, silent, tire_of
+
+from bench.rig.plans import Plan
+from bench.rig.tire import NEW_DEPTH, Condition
+from tirelib.campaign import read_campaign
+from tirelib.estimators import chain, sliding, unknowns
+from tirelib.estimators.calibration import Calibration
+from tirelib.estimators.calibration_file import read_calibration
+from tirelib.estimators.regressors import compute_regressors
+from tirelib.estimators.result import EDGE_UNIT
+from tirelib.observations import Observations, mean_by, observe
+
+TRIED: tuple[tuple[ModuleType, str, str], ...] = (
+    (chain, "EDGE", "Fz"), (unknowns, "UNDER_GROOVES", "Fz"), (unknowns, "SOFTENING", "Fz"),
+    (unknowns, "TEMPERATURE", "Fz"), (chain, "BENT", "kappa"), (chain, "CORNERING", "alpha"),
+    (chain, "MOMENT_DOUBT", "alpha"), (sliding, "CURVE_DOUBT", "alpha"),
+    (chain, "FORCE_DOUBT", "Fy"), (chain, "FORCE", "Fy"), (chain, "LAW_DOUBT", "kappa"),
+)  # fmt: skip
+"""Module that uses a constant, its name, and the quantity on which it acts most."""
+DEPTHS = (0.008, 0.006, 0.004)
+LOADS = (2000.0, 4000.0, 6000.0)
+
+
+@contextmanager
+def times(module: ModuleType, name: str, factor: float) -> Iterator[None]:
+    """Multiply a constant for a while."""
+    own = getattr(module, name)
+    setattr(module, name, factor * own)
+    try:
+        yield
+    finally:
+        setattr(module, name, own)
+
+
+def judged(calibration: Calibration, dry: Observations, seen: Observations, quantity: str) -> str:
+    """Return coverage with nothing said (all said), and the growth over what is lost."""
+    factor = EDGE_UNIT[quantity][1]
+    held, lost = [], np.nan
+    for given in (silent(seen), seen):
+        found = rows_of(calibration.estimate(given.features), seen, quantity, seen.usable)
+        held.append(100.0 * found[2])
+        lost = found[3] if len(held) == 1 else lost
+    known, unknown = (calibration.estimate(x.features) for x in (dry, silent(dry)))
+    good = known.valid[quantity] & unknown.valid[quantity]
+    more = unknown.std[quantity][good] ** 2 - known.std[quantity][good] ** 2
+    growth = factor * float(np.sqrt(max(more.mean(), 0.0)))
+    return f"{held[0]:.0f} ({held[1]:.0f}) %, {growth / lost:.2f}"
+
+
+def halves(folder: Path) -> list[str]:
+    """Return the table of half and double for a tire."""
+    dry, seen = (observe([read_campaign(folder / name)]) for name in ("set1", "drawn"))
+    calibration = read_calibration(folder / "calibration.toml")
+    lines = [
+        "",
+        f"{folder.name}: in the 95 % interval, nothing said (all said); growth over lost",
+        "",
+        "| constant | quantity | half | as it is | double |",
+        "|---|---|---|---|---|",
+    ]
+    for module, name, quantity in TRIED:
+        cells = []
+        for factor in (0.5, 1.0, 2.0):
+            with times(module, name, factor):
+                cells.append(judged(calibration, dry, seen, quantity))
+        lines.append(f"| `{name}` | {quantity} | {' | '.join(cells)} |")
+    return lines
+
+
+def measure(name: str, seed: int, out: Path, jobs: int) -> list[str]:
+    """Return the three constants as straight and 1 deg runs of one tire give them."""
+    own = tire_of(name, seed)
+    runs = tuple(
+        Condition(load, 2.3e5, 65.0 / 3.6, angle, friction=own.friction, tread_depth=depth)
+        for depth in DEPTHS for angle in (0.0, np.deg2rad(1.0)) for load in LOADS
+    )  # fmt: skip
+    seen = measured(out / f"worn-{name}-{seed}", Plan("worn", "worn treads", runs), own, seed, jobs)
+    regressors = compute_regressors(seen.features, range(5))
+
+    def mean(x: np.ndarray) -> np.ndarray:
+        return mean_by(seen.run, x, seen.usable)
+
+    load, angle, force = (mean(seen.truth[n]) for n in ("Fz", "slip_angle", "Fy"))
+    contact = mean(regressors["contact_angle"])
+    radius = mean(regressors["speed"] / regressors["omega"])
+    worn = NEW_DEPTH - mean(seen.features.tread_depth)
+    under = own.tread_thickness - NEW_DEPTH
+    harder = np.log(own.tread_thickness / (own.tread_thickness - worn))
+    x = np.log(load / 4000.0)
+    curve = np.stack((np.ones_like(x), x, x**2), axis=1)
+    straight = np.abs(angle) < np.deg2rad(0.5)
+
+    def fitted(y: np.ndarray, last: np.ndarray, rows: np.ndarray) -> tuple[float, float]:
+        design = np.column_stack((curve, last))[rows]
+        answer, *_ = np.linalg.lstsq(design, y[rows], rcond=None)
+        left = y[rows] - design @ answer
+        spread = np.sqrt(left @ left / (rows.sum() - 4) * np.linalg.inv(design.T @ design)[3, 3])
+        return float(answer[3]), float(spread)
+
+    edge, edge_std = fitted(-contact * own.free_radius, harder, straight)
+    bent, bent_std = fitted(-radius, worn / contact, straight)
+    corner, corner_std = fitted(np.log(np.abs(force / np.tan(angle))), harder, ~straight)
+    return [
+        f"{own.name}: under the grooves {1e3 * under:.1f} mm; "
+        f"EDGE {1e3 * edge:.1f} +- {1e3 * edge_std:.1f} mm; BENT {bent:.3f} +- {bent_std:.3f} rad; "
+        f"CORNERING {corner:.3f} +- {corner_std:.3f}"
+    ]
+
+
+def main() -> None:
+    """Measure, or try half and double."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folders", type=Path, nargs="*")
+    parser.add_argument("--out", type=Path, default=Path("build/out/road"))
+    parser.add_argument("--measure", metavar="TIRE")
+    parser.add_argument("--seed", type=int, default=21)
+    parser.add_argument("--jobs", type=int, default=2)
+    given = parser.parse_args()
+    lines = [line for folder in given.folders for line in halves(folder)]
+    if given.measure:
+        lines += measure(given.measure, given.seed, given.out, given.jobs)
+    click.echo("\n".join(lines))
+
+
+if __name__ == "__main__":
+    main()
