@@ -4,7 +4,8 @@
     python build/road_constants.py --measure reference
 
 Folders are those of `build/road_coverage.py`. With `--measure`, straight and 1 deg runs of one tire
-on a tread of 8, 6 and 4 mm give `EDGE`, `BENT` and `CORNERING`; nothing is estimated there.
+on a tread of 8, 6 and 4 mm give `EDGE`, `BENT` and `CORNERING`; nothing is estimated there. The
+columns below are what L and a sliding share of one shift (`ROAD_DRIFT`).
 """
 
 import argparse
@@ -23,7 +24,8 @@ from tirelib.campaign import read_campaign
 from tirelib.estimators import chain, sliding, unknowns
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration
-from tirelib.estimators.regressors import compute_regressors
+from tirelib.estimators.likeness import DRIFT
+from tirelib.estimators.regressors import ODD, compute_regressors
 from tirelib.estimators.result import EDGE_UNIT
 from tirelib.observations import Observations, mean_by, observe
 
@@ -124,6 +126,39 @@ def measure(name: str, seed: int, out: Path, jobs: int) -> list[str]:
     ]
 
 
+def shifts(name: str, seed: int, out: Path, jobs: int) -> np.ndarray:
+    """Return what L and a sliding share of one shift in `DRIFT`'s regressors, shape (2, m)."""
+    own = tire_of(name, seed)
+    runs = tuple(
+        Condition(load, 2.3e5, 65.0 / 3.6, np.deg2rad(angle), friction=friction)
+        for friction in (0.4, 0.6) for angle in (-3.0, 1.5, 4.0) for load in LOADS
+    )  # fmt: skip
+    slid = measured(
+        out / f"slid-{name}-{seed}", Plan("slid", "slippery roads", runs), own, seed, jobs
+    )
+    worn = observe([read_campaign(out / f"worn-{name}-{seed}")])
+    full = read_calibration(out / f"{name}-{seed}" / "calibration.toml").chains[-1]
+    if full.likeness is None or full.sliding is None:
+        raise SystemExit(f"{name}: run build/road_coverage.py for this tire first")
+    found = []
+    for seen in (worn, slid):
+        use, truth = seen.usable, seen.truth
+        values = compute_regressors(seen.features, range(5))
+        rest = full.likeness.rest({**values, "speed_squared": values["speed"] ** 2})[use]
+        lost = own.tread_thickness - NEW_DEPTH + seen.features.tread_depth
+        at = np.abs(truth["slip_angle"]), truth["Fz"]
+        share = full.sliding.forward(*at, seen.features.friction)[2]
+        share = share - full.sliding.forward(*at, full.sliding.friction)[2]
+        side = np.where(truth["slip_angle"] < 0.0, -1.0, 1.0)
+        column = (np.log(own.tread_thickness / lost) if seen is worn else share)[use]
+        odd = np.array([regressor in ODD for regressor in full.likeness.names])
+        even = np.stack((np.ones_like(column), column), axis=1)
+        sided = column * side[use]
+        shift = np.linalg.lstsq(even, rest, rcond=None)[0][1]
+        found.append(np.where(odd, 0.0 if seen is worn else sided @ rest / (sided @ sided), shift))
+    return np.array(found)
+
+
 def main() -> None:
     """Measure, or try half and double."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -135,7 +170,10 @@ def main() -> None:
     given = parser.parse_args()
     lines = [line for folder in given.folders for line in halves(folder)]
     if given.measure:
-        lines += measure(given.measure, given.seed, given.out, given.jobs)
+        asked = (given.measure, given.seed, given.out, given.jobs)
+        lines += measure(*asked)
+        for name, (hard, slid) in zip(DRIFT, shifts(*asked).T, strict=True):
+            lines.append(f"{name:18} {hard:9.4f} {slid:9.4f}")
     click.echo("\n".join(lines))
 
 

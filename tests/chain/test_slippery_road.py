@@ -1,12 +1,15 @@
 """A calibration from a dry road meets the virtual tire's strain on roads of any friction."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+import pytest
 
+from tirelib.arrays import FloatArray
 from tirelib.campaign import CampaignHeader, TireGeometry
 from tirelib.estimators.calibrate import calibrate_chain
 from tirelib.estimators.calibration import LARGEST_ANGLE_STD
+from tirelib.estimators.chain import Chain, Estimate
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.unknowns import FRICTION, TWO_SIGMA
 from tirelib.features.extract import extract_features
@@ -22,10 +25,13 @@ HEADER = CampaignHeader(
 )  # fmt: skip
 
 
-def shown(conditions: Sequence[tuple[float, float, float]], *, told: bool) -> Observations:
-    """Two turns of strain at each load, slip angle and friction; `told`: the friction is known."""
+MEASURED = {"Fz": "Fz", "alpha": "slip_angle", "kappa": "slip_ratio", "Fy": "Fy"}
+
+
+def shown(conditions: Sequence[tuple[float, float, float]], day: int = 0) -> Observations:
+    """Two turns of strain at each load, slip angle and friction."""
     surface, parts, truths = read_surface(friction_surface()), [], []
-    rng = np.random.default_rng([len(conditions), told])
+    rng = np.random.default_rng([len(conditions), day])
     for load, angle, friction in conditions:
         at = np.array([load, angle, np.cos(angle) - 1.0, 0.0, SPEED, PRESSURE, friction])
         answer = surface.answers(at[None])
@@ -38,7 +44,7 @@ def shown(conditions: Sequence[tuple[float, float, float]], *, told: bool) -> Ob
         strain = strain + 4e-6 * rng.standard_normal(strain.shape)
         turns = cut_turns(
             strain, RATE, surface.lateral.tolist(), speed=SPEED, pressure=PRESSURE, camber=0.0,
-            friction=friction if told else np.nan, tread_depth=0.008, tread_temperature=313.0,
+            friction=friction, tread_depth=0.008, tread_temperature=313.0,
         )  # fmt: skip
         parts.append(extract_features(turns))
         measured = (force[0], force[1], load, force[2], angle, at[2])
@@ -52,38 +58,115 @@ def shown(conditions: Sequence[tuple[float, float, float]], *, told: bool) -> Ob
     )  # fmt: skip
 
 
-def test_a_dry_calibration_tells_slip_angles_of_any_road_within_its_intervals() -> None:
+@pytest.fixture(scope="module")
+def chain() -> Chain:
+    """A chain calibrated on one dry road with a new tread, both written down."""
     angles = np.deg2rad(np.arange(-5.0, 6.0))
-    dry = shown(
-        [(load, a, DRY) for load in (1300.0, 2900.0, 4500.0, 6100.0, 7700.0) for a in angles],
-        told=True,
-    )
-    chain, _ = calibrate_chain(dry, range(5))
-    assert chain.moment is not None
+    loads = (1300.0, 2900.0, 4500.0, 6100.0, 7700.0)
+    dry = shown([(load, a, DRY) for load in loads for a in angles], day=1)
+    return calibrate_chain(dry, range(5))[0]
+
+
+@pytest.fixture(scope="module")
+def seen() -> Observations:
+    """Roads of any friction, a new tread."""
     rng = np.random.default_rng(4)
-    drawn = [
-        (rng.uniform(2000.0, 7000.0), np.deg2rad(rng.uniform(-5.0, 5.0)), rng.uniform(*FRICTION))
-        for _ in range(60)
-    ]
-    seen = shown(drawn, told=False)
-    good = seen.usable
-    found, _ = chain.predict(compute_regressors(seen.features, range(5)))
-    angle, truth = found["alpha"], seen.truth["slip_angle"]
-    valid = good & angle.valid & (angle.std <= LARGEST_ANGLE_STD)
-    assert valid.sum() > 0.75 * good.sum()
-    error = np.abs(angle.value - truth)[valid]
-    assert np.mean(error <= TWO_SIGMA * angle.std[valid]) >= 0.9
-    # by the dry curve alone it would be further off
-    alone, _ = chain.predict(
-        compute_regressors(seen.features, range(5)) | {"friction": np.full(len(seen), DRY)}
+    return shown(
+        [
+            (
+                rng.uniform(2000.0, 7000.0),
+                np.deg2rad(rng.uniform(-5.0, 5.0)),
+                rng.uniform(*FRICTION),
+            )
+            for _ in range(60)
+        ]
     )
-    own, dry_error = ((told["alpha"].value - truth)[good] for told in (found, alone))
-    assert np.sqrt(np.mean(own**2)) < 0.8 * np.sqrt(np.mean(dry_error**2))
-    for name, measured in (("Fz", "Fz"), ("Fy", "Fy")):
-        sure = good & found[name].valid
-        apart = np.abs(found[name].value - seen.truth[measured])[sure]
-        assert np.mean(apart <= TWO_SIGMA * found[name].std[sure]) >= 0.9
-    # straight on, a slippery road is as good as a dry one
-    straight = shown([(4000.0, 0.0, 0.4)], told=False)
-    plain, _ = chain.predict(compute_regressors(straight.features, range(5)))
+
+
+def told(chain: Chain, seen: Observations, **said: float | FloatArray) -> dict[str, Estimate]:
+    """Estimates where these conditions are said instead of the true ones; NaN: nobody knows."""
+    regressors = compute_regressors(seen.features, range(5))
+    n = len(seen)
+    return chain.predict(regressors | {name: np.full(n, x) for name, x in said.items()})[0]
+
+
+def errors(found: Mapping[str, Estimate], seen: Observations, name: str) -> tuple[FloatArray, ...]:
+    """Error and standard deviation of a quantity over the turns that are valid."""
+    estimate = found[name]
+    rows = seen.usable & estimate.valid
+    if name == "alpha":
+        rows &= estimate.std <= LARGEST_ANGLE_STD
+    return (estimate.value - seen.truth[MEASURED[name]])[rows], estimate.std[rows]
+
+
+def held(error: FloatArray, std: FloatArray) -> float:
+    return float(np.mean(np.abs(error) <= TWO_SIGMA * std))
+
+
+def rms(x: FloatArray) -> float:
+    return float(np.sqrt(np.mean(x**2)))
+
+
+def test_a_dry_calibration_tells_slip_angles_of_any_road_within_its_intervals(
+    chain: Chain, seen: Observations
+) -> None:
+    assert chain.moment is not None
+    found = told(chain, seen, friction=np.nan)
+    error, std = errors(found, seen, "alpha")
+    assert len(error) > 0.7 * seen.usable.sum()
+    assert held(error, std) >= 0.95
+    assert rms(std) < 2.0 * rms(error)  # an interval that says something
+    dry, too_narrow = errors(told(chain, seen, friction=DRY), seen, "alpha")
+    assert rms(error) < 0.5 * rms(dry)  # the moment told more than the dry curve
+    assert rms(too_narrow) < 0.5 * rms(dry)
+    for name in ("Fz", "Fy"):
+        assert held(*errors(found, seen, name)) >= 0.9
+
+
+def test_a_road_that_slides_more_leaves_load_and_force_less_certain(
+    chain: Chain, seen: Observations
+) -> None:
+    unknown, dry = (told(chain, seen, friction=x) for x in (np.nan, DRY))
+    for name, least in (("Fz", 1.2), ("Fy", 1.4)):
+        assert rms(errors(unknown, seen, name)[1]) > least * rms(errors(dry, seen, name)[1])
+
+
+def test_a_friction_that_is_given_is_used(chain: Chain, seen: Observations) -> None:
+    mu = seen.features.friction
+    error, std = errors(told(chain, seen, friction=mu), seen, "alpha")
+    wrong, _ = errors(told(chain, seen, friction=DRY), seen, "alpha")
+    _, unknown = errors(told(chain, seen, friction=np.nan), seen, "alpha")
+    assert held(error, std) >= 0.9
+    assert rms(error) < 0.5 * rms(wrong)
+    assert rms(std) < 0.95 * rms(unknown)
+
+
+def test_straight_on_a_slippery_road_is_as_good_as_a_dry_one(chain: Chain) -> None:
+    straight = shown([(4000.0, 0.0, 0.4)])
+    plain = told(chain, straight, friction=np.nan)
     assert (plain["alpha"].std[straight.usable] < np.deg2rad(0.2)).all()
+
+
+def test_a_tread_that_nobody_knows_widens_every_interval(chain: Chain, seen: Observations) -> None:
+    known, unknown = told(chain, seen), told(chain, seen, tread_depth=np.nan)
+    cold = told(chain, seen, tread_temperature=np.nan)
+    # a tread of 4 to 8 mm is up to L = ln(11.5 / 7.5) stiffer: a standard deviation near 0.2
+    for name, share in (("Fz", 130.0), ("kappa", 0.0025), ("alpha", 0.0015), ("Fy", 12.0)):
+        use = seen.usable & known[name].valid & unknown[name].valid
+        more = np.sqrt(unknown[name].std ** 2 - known[name].std ** 2)[use]
+        assert np.median(more) > share
+        assert np.median(more) < 3.0 * share
+        np.testing.assert_array_equal(unknown[name].value[use], known[name].value[use])
+        assert (cold[name].std[use] > known[name].std[use]).all()
+
+
+def test_a_worn_tread_that_is_known_is_corrected_for(chain: Chain, seen: Observations) -> None:
+    new, worn = told(chain, seen), told(chain, seen, tread_depth=0.005)
+    use = seen.usable & (np.abs(seen.truth["slip_angle"]) > np.deg2rad(1.0))
+    # it hides load, rolls on a smaller radius, and makes more force at the same angle
+    assert ((worn["Fz"].value - new["Fz"].value)[use] > 150.0).all()
+    assert (worn["kappa"].value < new["kappa"].value - 0.002)[use].all()
+    angles = np.abs(worn["alpha"].value) < np.abs(new["alpha"].value)
+    assert angles[use & new["alpha"].valid & worn["alpha"].valid].all()
+    for name in ("Fz", "kappa"):
+        assert (worn[name].std > new[name].std)[use].all()

@@ -169,7 +169,7 @@ class Calibration:
             many = int(rows.sum())
             part, radius[rows] = {name: x[:many] for name, x in part.items()}, radii[:many]
             traction[rows] = part["traction"]
-            unlike[rows] = chain.unlike(part)
+            unlike[rows] = chain.unlike(part, estimates)
             extrapolated[rows] = chain.laws.extrapolated(part) | (
                 chain.force_laws.extrapolated(part) if chain.has("Fy") else False
             )

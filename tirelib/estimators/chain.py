@@ -123,12 +123,26 @@ class Chain:
         model = {"Fz": self.load, "kappa": self.radius, "Fy": self.force, "alpha": self.angle}
         return model[quantity] is not None
 
-    def unlike(self, regressors: Mapping[str, FloatArray]) -> BoolArray:
-        """Tell which turns show strain that the calibrated tire does not, shape (n,)."""
+    def unlike(
+        self, regressors: Mapping[str, FloatArray], found: Mapping[str, Estimate]
+    ) -> BoolArray:
+        """Tell which turns show strain that the calibrated tire does not, shape (n,).
+
+        `found` is what `predict` says of the same turns.
+        """
+        n = regressors["omega"].shape[0]
         if self.likeness is None:
-            return np.zeros(regressors["omega"].shape, dtype=np.bool_)
+            return np.zeros(n, dtype=np.bool_)
         values = {**regressors, "speed_squared": regressors["speed"] ** 2}
-        apart = self.likeness.apart(values, self.laws)
+        sliding = None
+        if {"Fz", "Fy"} <= set(found):
+            load, force = (found[quantity].value[:n] for quantity in ("Fz", "Fy"))
+            slip = found["kappa"].value[:n] if "kappa" in found else np.full(n, np.nan)
+            at = {**values, "load": load, "slip_ratio": slip, "slip_size": np.abs(slip)}
+            slid = self._slid(at, force, load)
+            if slid is not None:  # where no slip angle fits, any share may slide
+                sliding = np.where(force > 0.0, -1.0, 1.0) * np.nan_to_num(slid.sliding, nan=1.0)
+        apart = self.likeness.apart(values, self.laws, self.road.hardened(values), sliding)
         return np.asarray(apart > self.likeness.limit, dtype=np.bool_)
 
     def predict(

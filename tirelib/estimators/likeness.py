@@ -14,8 +14,10 @@ Multivariate Statistical Analysis*, section 5.4).
 
 Pressures and speeds that were not calibrated shift the regressors by `DRIFT`, as the rig's tires
 show it. The shift with pressure is taken off, and as much is doubt; of that with speed tires
-agree less: twice its size is doubt. K holds both. Where a regressor that says where a turn lies is
-beyond its calibrated range, nobody knows what the tire looks like. Predicting needs numpy only.
+agree less: twice its size is doubt. A tread that is stiffer than calibrated and a larger share of
+it that slides shift the regressors by `ROAD_DRIFT`: all together, so K has one direction for each,
+as wide as `tirelib.estimators.unknowns` leaves it. Where a regressor that says where a turn lies
+is beyond its calibrated range, nobody knows what the tire looks like. Predicting needs numpy only.
 """
 
 from collections.abc import Mapping
@@ -26,6 +28,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.polynomial import Term, Variable, design
+from tirelib.estimators.regressors import ODD
 
 DRIFT = {
     "compression": (0.0168, 0.0018),
@@ -46,6 +49,28 @@ DRIFT = {
 """Shift (SI) at the same contact angle, for a pressure that is doubled and for a squared speed that
 grows by (40 m/s)^2: of the rig's tires `reference`, `soft` and `stiff` over the plan `set3`, mean
 with the pressure and rms with the speed. Odd regressors have none in the mean."""
+ROAD_DRIFT = {
+    "compression": (-0.0053, 0.0080),
+    "cp2_slope": (0.0000, 0.0563),
+    "angle_slope": (0.0000, -0.0126),
+    "tp_slope": (0.0000, -0.0103),
+    "angle_bow": (0.0029, 0.0001),
+    "tp_bow": (0.0301, 0.0575),
+    "cp1_bow": (-0.0155, -0.0031),
+    "cp2_bow": (-0.0179, -0.0035),
+    "fullness": (0.0051, -0.0027),
+    "skew": (-0.0001, 0.0020),
+    "steepness": (0.4199, -0.3629),
+    "steepness_change": (0.0481, -0.2342),
+    "lead_bend": (-0.0014, -0.0244),
+    "trail_bend": (-0.0041, 0.0065),
+}
+"""Shift (SI) at the same contact angle for a tread of e times the stiffness, and for a sliding
+share that grows by one at a positive slip angle (odd regressors change their sign with it): mean of
+the rig's tires `reference` and `soft` on treads of 4 to 8 mm and frictions of 0.4 and 0.6, measured
+by ``python build/road_constants.py --measure reference`` (and ``soft``)."""
+ROAD_DOUBT = 0.5
+"""Standard deviation of another tire's shift with tread and sliding, as a share of `ROAD_DRIFT`."""
 PRESSURE_DOUBT, SPEED_DOUBT = 1.0, 2.0
 """Tires differ: standard deviation of another tire's shift, as a share of `DRIFT`."""
 FEWEST_UNLIKE, SHARE_UNLIKE = 5, 0.05
@@ -83,19 +108,55 @@ class Likeness:
         seen = np.stack([values[name] for name in self.names], axis=1)
         return seen - design(self.variables, self.terms, values) @ self.coefficients
 
-    def apart(self, values: Mapping[str, FloatArray], laws: ConditionLaws) -> FloatArray:
-        """Return D^2 of each turn, shape (n,); NaN where it cannot be told."""
+    def apart(
+        self,
+        values: Mapping[str, FloatArray],
+        laws: ConditionLaws,
+        tread: tuple[FloatArray, FloatArray] | None = None,
+        sliding: FloatArray | None = None,
+    ) -> FloatArray:
+        """Return D^2 of each turn, shape (n,); NaN where it cannot be told.
+
+        Parameters
+        ----------
+        values : mapping of arrays, shape (n,)
+            Regressors and conditions.
+        laws : ConditionLaws
+        tread : two arrays, shape (n,), optional
+            How much stiffer the tread is than calibrated, L, and its standard deviation.
+        sliding : shape (n,), optional
+            Standard deviation of the sliding share, with the sign of the slip angle.
+        """
         pressure, unknown = laws.pressure_departure(values)
         speed = laws.speed_departure(values)
         with_pressure, with_speed = np.array([DRIFT[name] for name in self.names]).T
         rest = self.rest(values) - pressure[:, None] * with_pressure
         doubt = np.hypot(PRESSURE_DOUBT * pressure, unknown)[:, None] * with_pressure
         doubt = np.hypot(doubt, SPEED_DOUBT * np.nan_to_num(speed)[:, None] * with_speed)
-        spread = self.covariance + doubt[:, :, None] ** 2 * np.eye(len(self.names))
+        spread = self.covariance + _each(doubt)
+        with_tread, with_sliding = np.array([ROAD_DRIFT[name] for name in self.names]).T
+        if tread is not None:
+            rest -= tread[0][:, None] * with_tread
+            spread = spread + _along(tread[1][:, None] * with_tread)
+            spread = spread + _each(ROAD_DOUBT * tread[0][:, None] * with_tread)
+        if sliding is not None:
+            odd = np.array([name in ODD for name in self.names])
+            side = np.where(odd, np.sign(sliding)[:, None], 1.0)
+            spread = spread + _along(np.abs(sliding)[:, None] * side * with_sliding)
         found = np.linalg.solve(spread, rest[:, :, None])[..., 0]
         within = [np.abs(v.standardise(values[v.name])) <= EDGE for v in self.variables]
         square = np.sum(rest * found, axis=1) / len(self.names)
         return np.where(np.all(within, axis=0), square, np.nan)
+
+
+def _each(shift: FloatArray) -> FloatArray:
+    """Return the covariance of shifts that have nothing to do with each other, (n, m, m)."""
+    return np.asarray(shift[:, :, None] ** 2 * np.eye(shift.shape[1]))
+
+
+def _along(shift: FloatArray) -> FloatArray:
+    """Return the covariance of one shift of all regressors, (n, m, m); tires differ in it."""
+    return np.asarray(shift[:, :, None] * shift[:, None, :] + _each(ROAD_DOUBT * shift))
 
 
 def suspected(unlike: int, judged: int) -> bool:

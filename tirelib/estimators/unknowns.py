@@ -15,12 +15,14 @@ angle read from the strain loses :math:`e L / R` at the same load: a constant lo
 grows evenly with the contact angle. The tread that wears carries the wheel where the belt is still
 bent, so it takes part in the rolling radius by the share :math:`b / \varphi` of the contact angle.
 The lateral stiffness of the tread is one of the springs behind the cornering stiffness, which
-grows as :math:`C \propto k^{0.13}`.
+grows as :math:`C \propto k^{0.22}`.
 
 **Friction** acts through sliding: `tirelib.estimators.sliding`.
 
-Constants were measured on the numerical rig and are held against other tires by
-``python build/road_coverage.py``; `docs/estimators.md` shows half and double of each.
+`EDGE`, `BENT` and `CORNERING` were measured on two tires of the numerical rig by
+``python build/road_constants.py --measure reference`` (and ``soft``), `FORCE` was chosen on runs of
+one; `UNDER_GROOVES`, `SOFTENING` and `TEMPERATURE` are assumed. ``python build/road_coverage.py``
+holds them against any tire; `docs/estimators.md` shows half and double of each.
 """
 
 from collections.abc import Mapping
@@ -42,11 +44,11 @@ UNDER_GROOVES = 0.0035
 """Rubber between the grooves' bottom and the belt, [m]."""
 SOFTENING = 0.004
 """Relative loss of the tread's modulus per kelvin, [1/K]."""
-EDGE = 0.0114
+EDGE = 0.0117
 """Contact length that a tread of e times the stiffness loses, both ends together, [m]."""
-BENT = 0.145
+BENT = 0.115
 """Contact angle over which the belt is still bent, [rad]."""
-CORNERING = 0.13
+CORNERING = 0.22
 """Power of the tread's stiffness with which the cornering stiffness grows."""
 FORCE = 0.08
 """Relative standard deviation of Fy per unit of L."""

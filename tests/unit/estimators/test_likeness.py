@@ -1,5 +1,6 @@
 """Another tire is told by its name, by its dimensions and by its strain; this one is not."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,16 +8,21 @@ import numpy as np
 import pytest
 
 from tests.synthetic import LATERAL, header, synthetic_run
+from tirelib.arrays import FloatArray
 from tirelib.campaign import Campaign
 from tirelib.errors import CalibrationError
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
+from tirelib.estimators.likeness import ROAD_DRIFT
 from tirelib.estimators.mixed import strangers
+from tirelib.estimators.regressors import ODD, compute_regressors
 from tirelib.estimators.result import estimate_document
 from tirelib.estimators.train import Trained
 from tirelib.features import Features
 from tirelib.flags import TurnFlag
 from tirelib.observations import Observations, measure_run, observe, same_tire
+
+Regressors = Mapping[str, FloatArray]
 
 
 def other(features: Features) -> Features:
@@ -107,3 +113,36 @@ def test_a_calibration_of_two_tires_says_so(cornering: Campaign, another_day: Ca
     )
     (found,) = strangers(replace(both, features=features))
     assert found.turns > 0.5 * found.judged
+
+
+def test_a_worn_tread_and_a_sliding_one_are_not_another_tire(
+    trained: Trained, another_day: Campaign
+) -> None:
+    chain, day = trained.calibration.chains[-1], observe([another_day])
+    likeness = chain.likeness
+    assert likeness is not None
+    seen = compute_regressors(day.features, range(5))
+    values = {name: x[day.usable] for name, x in seen.items()}
+    values["speed_squared"] = values["speed"] ** 2
+    n = int(day.usable.sum())
+    none, harder = np.zeros(n), 3.0 * np.ones(n)
+    odd = np.array([name in ODD for name in likeness.names])
+    for column, flip in ((0, 1.0), (1, 1.0), (1, -1.0)):
+        moved = dict(values)
+        for name, is_odd in zip(likeness.names, odd, strict=True):
+            side = flip if is_odd else 1.0
+            moved[name] = values[name] + side * 3.0 * ROAD_DRIFT[name][column]
+
+        def unlike(
+            tread: tuple[FloatArray, FloatArray], sliding: FloatArray, at: Regressors = moved
+        ) -> float:
+            apart = likeness.apart(at, chain.laws, tread, sliding)
+            return float(np.mean(apart[np.isfinite(apart)] > likeness.limit))
+
+        assert unlike((none, none), none) > 0.9  # where the road is known
+        if column == 0:
+            assert unlike((none, harder), none) < 0.1
+            assert unlike((harder, none), none) < 0.1
+        else:
+            assert unlike((none, none), flip * harder) < 0.1
+            assert unlike((none, none), -flip * harder) > 0.1  # slid to the other side
