@@ -209,6 +209,12 @@ class Recorder:
         self.close("closed" if kind is None else kind.__name__)
 
 
+def alarm_event(name: str, text: str, *, on: bool) -> dict[str, Any]:
+    """Return an alarm of the run that begins or ends, as an event of a recording."""
+    return {"event": "alarm", "state": "on" if on else "off", "name": name, "wheel": None,
+            "value": None, "text": text}  # fmt: skip
+
+
 def jump_event(jump: Jump, *, whole: bool = True) -> dict[str, Any]:
     """Return a jump as an event of a recording.
 

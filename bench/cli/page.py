@@ -124,10 +124,10 @@ class Shown:
         if page.url:
             console.print(f"live page: {page.url}", soft_wrap=True, markup=False, highlight=False)
 
-    def watch(self, news: News) -> None:
-        """Show what is new; called again and again."""
+    def watch(self, news: News, unwritten: str = "") -> None:
+        """Show what is new, and why turns cannot be written; called again and again."""
         if self._page is not None:
-            self._page.watch(news)
+            self._page.watch(news, unwritten)
 
     def cpu_time(self) -> float:
         """Return what the page's process has used, [s]."""

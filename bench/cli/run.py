@@ -224,7 +224,7 @@ def run(
             stack.callback(journal.close)
         limits = Limits(duration, silence, turns)
         session = Session(source, limits=limits, keep=json_file is not None)
-        outcome, used = _session(session, source, console, bridges, shown, journal)
+        outcome, used = _session(session, source, console, bridges, shown, journal, switch)
         _summary(console, outcome, source, used, link, switch)
         if journal is not None:
             origin = {"link": source.name, "fmu_sha256": archive.sha256, "ended": outcome.reason,
@@ -257,6 +257,7 @@ def _session(
     bridges: Bridges,
     shown: Shown,
     journal: Journal | None,
+    switch: RecordingSwitch | None,
 ) -> tuple[Outcome, float]:
     """Run until something ends it; return what came of it and the share of a core it took."""
     with ExitStack() as stack:
@@ -270,11 +271,14 @@ def _session(
                 journal.add(news.turns)
                 if journal.error != said:
                     said = journal.error
-                    news.alarms.append(said or "every turn is in the file again")
+                    text = said or "every turn is in the file again"
+                    news.alarms.append(text)
+                    if switch is not None:
+                        switch.alarm("json", text, on=bool(said))
             if screen is not None:
                 screen.watch(news)
             bridges.send(news.turns)
-            shown.watch(news)
+            shown.watch(news, said)
 
         session.watch = watch
         start = time.monotonic(), _cpu_time(source, shown)

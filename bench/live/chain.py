@@ -27,7 +27,7 @@ from bench.live.reader import LineState, ReaderPlan, load, read_port
 from bench.live.recorder import record
 from bench.live.recording_state import Order, RecorderState, RecordingRule
 from bench.page.board import SIZE
-from bench.recorder import jump_event
+from bench.recorder import alarm_event, jump_event
 from bench.recording_header import RecordingHeader, part_path
 from bench.wheels import MOST, Wheels
 
@@ -195,7 +195,8 @@ class LiveChain:
             "restarts": {name: kept.starts - 1 for name, kept in self._processes().items()},
             "raw": {"lost_reads": refused, "lost_bytes": refused_bytes,
                     "most_waiting_bytes": exchange.raw.high,
-                    "not_decoded_bytes": self._state.passed},
+                    "not_decoded_bytes": self._state.passed,
+                    "alarm": TOO_BUSY if self._state.passing else ""},
             "recording": self._recorded.as_document(refused_bytes),
             "wheels": {wheel: self.wheel_counts(wheel) for wheel in self.wheels.heard},
         }  # fmt: skip
@@ -376,7 +377,9 @@ class LiveChain:
         state = self._state
         if state.passing != self._passing:
             self._passing = state.passing
-            self._pending.alarms.append(TOO_BUSY if state.passing else DECODED_AGAIN)
+            said = TOO_BUSY if state.passing else DECODED_AGAIN
+            self._pending.alarms.append(said)
+            self.order("event", alarm_event("busy", said, on=state.passing))
         if state.error:
             kind, text = state.error
             raise getattr(errors, kind)(text)

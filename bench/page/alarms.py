@@ -19,7 +19,7 @@ Limits stand in a file (``tirebench-alarms/1``); what it does not name keeps the
 
 import tomllib
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -155,15 +155,15 @@ class Alarm:
         On `time.time`.
     until : float or None, [s]
         When it ended; None while it goes on.
-    value : float
-        The newest one.
+    value : float or None
+        The newest one; None where the alarm has no limit.
     """
 
     name: str
     text: str
     wheel: int | None
     since: float
-    value: float
+    value: float | None
     until: float | None = None
 
 
@@ -200,10 +200,30 @@ class Alarms:
                     changed.append(alarm)
                 alarm.value, alarm.text = value, _text(rule, value, wheel)
             elif alarm is not None:
-                alarm.until = now
-                self._past.append(self._active.pop(key))
-                changed.append(alarm)
+                changed += self.end((name,), wheel, now)
         return changed
+
+    def end(self, names: Iterable[str], wheel: int | None, now: float) -> list[Alarm]:
+        """End those alarms of a wheel, or of the run, that go on; return them."""
+        ended = [self._active.pop((name, wheel)) for name in names if (name, wheel) in self._active]
+        for alarm in ended:
+            alarm.until = now
+        self._past.extend(ended)
+        return ended
+
+    def tell(self, name: str, text: str, now: float) -> list[Alarm]:
+        """Take what is wrong with the run, in words, empty if nothing is: an alarm without a limit.
+
+        Return the alarm if it begins or ends with it.
+        """
+        if not text:
+            return self.end((name,), None, now)
+        alarm = self._active.get((name, None))
+        if alarm is not None:
+            alarm.text = text
+            return []
+        self._active[name, None] = alarm = Alarm(name, text, None, now, None)
+        return [alarm]
 
     def document(self) -> dict[str, Any]:
         """Return what the page shows: alarms that go on, those that ended, and the limits."""

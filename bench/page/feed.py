@@ -34,6 +34,8 @@ MESSAGES = 5
 FLAGS = 8
 FLAG_LENGTH = 160
 """Flags and notes of a turn that the page gets: so many, so long; the document has all."""
+OF_DECODED = ("silence", "rate", "loss", "delay")
+"""Alarms that say nothing of the transmitter while what it sends is only recorded."""
 NOTHING_KNOWN = Conditions((0,), (UNKNOWN,))
 
 
@@ -102,11 +104,16 @@ class Feed:
         self._latency: deque[float] = deque(maxlen=LATENCIES)
         self._said: deque[str] = deque(maxlen=MESSAGES)
         self._ended = ""
+        self._unwritten = ""
         self._next = 0.0
         self._started = time.time()
 
-    def watch(self, news: News) -> None:
-        """Take what is new, also when nothing is; called again and again."""
+    def watch(self, news: News, unwritten: str = "") -> None:
+        """Take what is new, also when nothing is; called again and again.
+
+        `unwritten` says why turns cannot be written at the moment; empty if they can.
+        """
+        self._unwritten = unwritten
         self._said.extend(news.messages)
         self._latency.extend(news.latency)
         self._left_out += news.left_out
@@ -182,11 +189,18 @@ class Feed:
         """Let alarms begin and end with what is known now; a replay has none."""
         if not self._source.live or self._ended:
             return
-        now = time.time()
+        now, chain = time.time(), extra.get("chain", {})
+        busy = chain.get("raw", {}).get("alarm", "")
         changed = []
         for number, entry in wheels.items():
-            changed += self._alarms.look(self._watched(number, entry, now), number, now)
-        recorded = extra.get("chain", {}).get("recording", {})
+            values = self._watched(number, entry, now)
+            if busy:
+                changed += self._alarms.end(OF_DECODED, number, now)
+                values = {name: x for name, x in values.items() if name not in OF_DECODED}
+            changed += self._alarms.look(values, number, now)
+        self._alarms.tell("busy", busy, now)  # the run writes these two into the recording
+        self._alarms.tell("json", self._unwritten, now)
+        recorded = chain.get("recording", {})
         free = recorded.get("free_bytes")
         room = {"minutes_left": recorded.get("minutes_left"),
                 "disk": None if free is None else 1e-9 * free}  # fmt: skip

@@ -142,10 +142,13 @@ class LivePage:
     ) -> None:
         self._stack.close()
 
-    def watch(self, news: News) -> None:
-        """Show what is new, take commands and look after the page; called again and again."""
+    def watch(self, news: News, unwritten: str = "") -> None:
+        """Show what is new, take commands and look after the page; called again and again.
+
+        `unwritten` says why turns cannot be written at the moment; empty if they can.
+        """
         self._gages.watch(news.levels)
-        self.feed.watch(news)
+        self.feed.watch(news, unwritten)
         self.desk.poll()
         now = time.monotonic()
         if now >= self._next_look:

@@ -7,6 +7,7 @@ from typing import Any
 from bench.deadline import Deadline
 from bench.errors import RecordingError
 from bench.live.chain import LiveChain
+from bench.recorder import alarm_event
 from bench.recording_header import numbered
 
 PATIENCE = 5.0
@@ -56,9 +57,9 @@ class RecordingSwitch:
         """Write an event of this moment."""
         self._chain.order("event", dict(event))
 
-    def alarm(self, text: str) -> None:
-        """Write an alarm of this moment; a recording that waits for a trigger begins."""
-        self._chain.order("event", {"event": "alarm", "text": text})
+    def alarm(self, name: str, text: str, *, on: bool) -> None:
+        """Write an alarm of the run that begins or ends at this moment."""
+        self._chain.order("event", alarm_event(name, text, on=on))
 
     def start(self) -> str:
         """Begin a recording, unless one is going on; return the name of its file.

@@ -2,8 +2,11 @@
 
 import json
 import math
+import pickle
+import time
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -16,6 +19,9 @@ from bench.device import Device
 from bench.errors import DeviceError
 from bench.estimation import News
 from bench.line_counts import LineCounts
+from bench.live.chain import LiveChain
+from bench.live.reader import LineState
+from bench.live.recording_state import RecorderState
 from bench.page.alarms import RULES, Alarms, Rule, event_of, read_alarms
 from bench.page.board import RINGS, Board
 from bench.page.condition_lines import in_use
@@ -167,3 +173,42 @@ def test_alarms_are_on_the_page_and_in_the_recording_and_a_full_disk_is_one() ->
     assert lines[0] == "recording: full"
     assert any("signal -95 dBm" in line for line in lines)
     assert np.all([event["event"] == "alarm" for event in noted])
+
+
+def test_a_busy_machine_and_an_unwritten_file_are_alarms_and_the_transmitter_is_not_blamed() -> (
+    None
+):
+    source, raw, noted = FakeSource(0), {"alarm": ""}, []
+    source.heard = time.time() - 60.0
+    with Board() as board:
+        feed = Feed(board, source, About("p"), lambda: {"chain": {"raw": raw}},
+                    note=noted.append)  # fmt: skip
+        active = [alarm["name"] for alarm in feed.state()["alarms"]["active"]]
+        assert active == ["silence"]
+        raw["alarm"] = "too busy"
+        feed.watch(News(), "a.json: the disk is full")
+        state = feed.state()
+        assert alarm_lines(state) == ["too busy", "a.json: the disk is full"]
+        assert [event["state"] for event in noted] == ["on", "off"]  # of the silence
+        raw["alarm"] = ""
+        feed.watch(News())
+        active = [alarm["name"] for alarm in feed.state()["alarms"]["active"]]
+        assert active == ["silence"]
+
+
+def test_a_busy_machine_is_an_alarm_of_the_recording_when_it_begins_and_when_it_ends() -> None:
+    state, orders = LineState(FakeSource(0).wheels, passing=True), []
+    chain = LiveChain.__new__(LiveChain)
+    chain._state, chain._recorded, chain._pending = state, RecorderState(), News()
+    chain._passing, chain._alarm, chain._orders = False, "", 0
+    chain._exchange = cast(Any, SimpleNamespace(
+        line=SimpleNamespace(get=lambda: pickle.dumps(state)),
+        recorded=SimpleNamespace(get=lambda: None),
+        orders=SimpleNamespace(put=lambda order: orders.append(pickle.loads(order)) or True),
+    ))  # fmt: skip
+    for state.passing in (True, True, False):
+        chain._see()
+    assert [(order.what["name"], order.what["state"]) for order in orders] == [
+        ("busy", "on"),
+        ("busy", "off"),
+    ]
