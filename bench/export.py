@@ -190,9 +190,11 @@ def write_can_log(recording: Recording, path: Path) -> int:
                 writer(message_of(batch, row, 1e-9 * (arrival + offset)))
             count += len(batch)
             first = next(frames, None)
-    finally:
-        with suppress(OSError):
+    except BaseException:
+        with suppress(OSError):  # the first failure is the one that is told
             writer.stop()
+        raise
+    writer.stop()
     return count
 
 

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from bench.document import QUANTITIES
-from bench.errors import RecordingError, cause
+from bench.errors import RecordingError
+from bench.new_file import whole
 from bench.recording import Recording
 from bench.recording_topics import ESTIMATE, EVENTS
 from bench.segments import Segment
@@ -79,15 +80,11 @@ def write_results(path: Path, out: Path, ending: str, wheel: int | None = None) 
         if not rows["utc_s"]:
             continue
         table = pd.DataFrame(rows)
-        try:
+        with whole(file) as new:
             if ending == ".parquet":
-                table.to_parquet(file, index=False)
+                table.to_parquet(new, index=False)
             else:
-                table.to_csv(file, index=False)
-        except OSError as error:
-            raise RecordingError(
-                f"{file}: it cannot be written ({cause(error)}); free space or name another place"
-            ) from None
+                table.to_csv(new, index=False)
         written.append(file)
     return written
 

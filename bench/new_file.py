@@ -1,5 +1,9 @@
-"""Files that the bench writes never take the place of a recording."""
+"""Files that the bench writes: whole or not at all, and never in the place of a recording."""
 
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from mcap.writer import MCAP0_MAGIC
@@ -30,6 +34,35 @@ def keep_recordings(file: Path | None, *recordings: Path | None) -> None:
             f"{file}: it is a recording, or a part of one, and a recording is never overwritten; "
             "a file of its own is needed; name another one"
         )
+
+
+@contextmanager
+def whole(out: Path) -> Iterator[Path]:
+    """Give the path beside ``out`` to write a new file or folder to; it gets its name in the end.
+
+    What was written is removed again where anything fails. Nothing written gives no file.
+
+    Raises
+    ------
+    RecordingError
+        If it cannot be written, as on a full disk.
+    """
+    new = out.with_name(f".{out.stem}.{os.getpid()}{out.suffix}")
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        yield new
+        if new.exists():
+            new.replace(out)
+    except OSError as error:
+        raise RecordingError(
+            f"{out}: it cannot be written ({cause(error)}), and nothing of it is left; free space "
+            "or name another place"
+        ) from None
+    finally:
+        if new.is_dir():
+            shutil.rmtree(new, ignore_errors=True)
+        else:
+            new.unlink(missing_ok=True)
 
 
 def _is_recording(file: Path) -> bool:

@@ -8,6 +8,7 @@ from mcap.records import Channel, McapRecord, Message, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
 from bench.errors import RecordingError, cause
+from bench.new_file import whole
 from bench.records import records
 
 CHUNK = 2**20
@@ -39,8 +40,13 @@ def repair(path: Path, out: Path) -> Repaired:
     RecordingError
         If nothing can be read, or the new file not be written.
     """
+    with whole(out) as new:
+        return _repaired(path, new)
+
+
+def _repaired(path: Path, new: Path) -> Repaired:
     try:
-        with path.open("rb") as file, out.open("xb") as target:
+        with path.open("rb") as file, new.open("xb") as target:
             writer = Writer(target, CHUNK, CompressionType.ZSTD)
             writer.start("", "tirebench")
             found = _copied(records(file), writer)
@@ -48,11 +54,10 @@ def repair(path: Path, out: Path) -> Repaired:
             finish()
     except OSError as error:
         raise RecordingError(
-            f"{path} -> {out}: it cannot be read or written ({cause(error)}); a recording and a "
-            "new file are needed; check both"
+            f"{path}: it cannot be read, or its whole copy cannot be written ({cause(error)}); "
+            "nothing of the copy is left; a recording and room on the disk are needed; check both"
         ) from None
     if not found.topics:
-        out.unlink()
         raise RecordingError(
             f"{path}: nothing can be read of it ({found.damage}); a file of `tirebench run "
             "--record` or its JSON is needed; name one"

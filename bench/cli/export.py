@@ -18,9 +18,9 @@ from bench.export import (
     write_table,
 )
 from bench.export_results import write_mdf, write_results
-from bench.new_file import keep_recordings
+from bench.new_file import keep_recordings, whole
 from bench.recording import Recording
-from bench.segments import segments
+from bench.segments import Segment, segments
 from tirelib.campaign import CampaignHeader
 from tirelib.campaign.header import parse_header
 from tirelib.cli.common import FILE, NEW_FILE, NewPath, write_json
@@ -75,26 +75,27 @@ def export(
     if out.exists():
         raise RecordingError(f"{out}: it exists; nothing is overwritten; name another place")
     keep_recordings(json_file, recording)
-    out.parent.mkdir(parents=True, exist_ok=True)
     beside: list[Path] = []
     with closing(Recording(recording)) as opened:
         header = opened.header
         sources = recorded_sources(header, str(recording), devices_of(device_texts)[0])
-        if suffix in CAN_LOGS:
-            count, what = write_can_log(opened, out), "frames"
-        elif suffix in TABLES:
-            found = segments(opened, sources, wheel)
-            count, what = write_table(found, opened.conditions, out), "samples"
+        with whole(out) as new:
+            if suffix in CAN_LOGS:
+                count, what = write_can_log(opened, new), "frames"
+            elif suffix in TABLES:
+                found = segments(opened, sources, wheel)
+                count, what = write_table(found, opened.conditions, new), "samples"
+            elif suffix == MDF:
+                every = list(segments(opened, sources, wheel))
+                count, what = write_mdf(recording, every, opened.conditions, new), "samples"
+            else:
+                mine = _of_one_wheel(list(segments(opened, sources, wheel)))
+                count = write_campaign_of(opened, mine, new, _header(opened, like))
+                what = "runs"
+        if suffix in TABLES:
             beside = write_results(recording, out, suffix, wheel)
-        elif suffix == MDF:
-            every = list(segments(opened, sources, wheel))
-            count, what = write_mdf(recording, every, opened.conditions, out), "samples"
-        else:
-            campaign = _header(opened, like)
-            every = list(segments(opened, sources, wheel))
-            chosen = every[0].wheel if every and wheel is None else wheel
-            mine = [segment for segment in every if segment.wheel == chosen]
-            count, what = write_campaign_of(opened, mine, out, campaign), "runs"
+        elif not suffix:
+            chosen = mine[0].wheel if mine else wheel
             beside = write_results(recording, out, ".csv", chosen)
             left = sum(left_out(segment, opened.conditions) for segment in mine)
             if left:
@@ -109,6 +110,11 @@ def export(
         write_json(json_file, {"format": "tirebench-export/1", "out": str(out), what: count,
                                "complete": not damage})  # fmt: skip
     context.exit(0 if count and not damage else 1)
+
+
+def _of_one_wheel(found: list[Segment]) -> list[Segment]:
+    """Return the segments of the wheel that was heard first."""
+    return [segment for segment in found if segment.wheel == found[0].wheel]
 
 
 def _header(recording: Recording, like: Path | None) -> CampaignHeader:

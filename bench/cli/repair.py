@@ -1,13 +1,15 @@
 """``tirebench repair``: a recording or JSON that breaks off, with its end."""
 
+import json
 from pathlib import Path
 
 import click
 
 from bench.errors import RecordingError
 from bench.journal import HEAD, completed
+from bench.new_file import whole
 from bench.repair import repair as repaired
-from tirelib.cli.common import FILE, NEW_FILE, write_json
+from tirelib.cli.common import FILE, NEW_FILE, plain
 
 _EXAMPLE = """\b
 Examples:
@@ -33,7 +35,8 @@ def repair(file: Path, out: Path) -> None:
         document = completed(file.read_text(encoding="utf-8", errors="replace"))
         if document is None:
             raise RecordingError(f"{file}: no turns stand in it; JSON of `tirebench run` is needed")
-        write_json(out, document)
+        with whole(out) as new:
+            new.write_text(json.dumps(plain(document), indent=1, allow_nan=False) + "\n")
         click.echo(f"{len(document['turns'])} turns in {out}")
         return
     found = repaired(file, out)

@@ -23,6 +23,7 @@ from bench.protocols.plan import ProtocolPlan
 from bench.recording import Recorder, RecordingHeader
 from bench.transmitter import transmitter
 from tests.bench.campaigns import tiny_runs
+from tests.bench.disks import little_room
 from tirelib.campaign import check_campaign, read_campaign
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.result import estimate_document
@@ -126,6 +127,19 @@ def test_a_serial_recording_is_no_can_log(serial: Path, tmp_path: Path) -> None:
     assert code == 2
     assert "it is of a serial line; a CAN log needs a recording of a bus" in said
     assert not (tmp_path / "a.blf").exists()
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.parquet", "a.mf4", "a.asc", "a.blf", "campaign"])
+def test_an_export_that_a_full_disk_ends_leaves_nothing(
+    request: pytest.FixtureRequest, tmp_path: Path, name: str
+) -> None:
+    recording = request.getfixturevalue("bus" if name in ("a.asc", "a.blf") else "serial")
+    with little_room():
+        code, said = invoke("export", recording, "--out", tmp_path / name)
+    assert code == 2
+    assert f"{name}: it cannot be written (" in said
+    assert list(tmp_path.iterdir()) == []
+    assert invoke("export", recording, "--out", tmp_path / name)[0] == 0
 
 
 def test_a_recording_that_breaks_off_is_exported_up_to_there(serial: Path, tmp_path: Path) -> None:

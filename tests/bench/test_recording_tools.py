@@ -28,6 +28,7 @@ from bench.recording_header import RecordingHeader
 from bench.timeline import Samples
 from bench.wheels import Told, Wheels
 from tests.bench.campaigns import tiny_runs
+from tests.bench.disks import little_room
 from tests.bench.test_bridges import TURN
 from tests.bench.test_journal import DOCUMENTS, TURNS
 from tests.bench.test_recording import READS
@@ -205,6 +206,15 @@ def test_the_json_of_a_killed_run_is_repaired(tmp_path: Path) -> None:
     journal.close()
     assert invoke("repair", tmp_path / "r.json", "--out", tmp_path / "w.json")[0] == 0
     assert json.loads((tmp_path / "w.json").read_text())["turns"] == DOCUMENTS
+
+
+def test_a_repair_that_a_full_disk_ends_leaves_nothing(recording: Path, tmp_path: Path) -> None:
+    words = ("repair", recording, "--out", tmp_path / "whole.mcap")
+    with little_room():
+        code, said = invoke(*words)
+    assert (code, "nothing of the copy is left" in said) == (2, True)
+    assert list(tmp_path.iterdir()) == []
+    assert invoke(*words)[0] == 0
 
 
 def test_a_chunk_that_was_altered_is_not_believed(tmp_path: Path) -> None:
