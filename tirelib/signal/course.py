@@ -10,6 +10,10 @@ fit and n the number of values that were told. A coefficient c is then shrunk to
 its posterior mean when it has a Gaussian prior about zero of the width that makes the data most
 likely (empirical Bayes; C. M. Bishop, Pattern Recognition and Machine Learning, section 7.2). So a
 noisy source says next to nothing of a wheel that turns steadily, and all of one that does not.
+
+A value is held from its measurement until the next, so what is held is half that time old on
+average; the fit lies that much earlier. At 100 values a second these 5 ms would be a slip ratio of
+0.002 at -8 m/s^2 and 20 m/s. A source that is rounded but not held is moved by half a step.
 """
 
 from dataclasses import dataclass
@@ -85,10 +89,11 @@ def course(samples: FloatArray, first: float, turn: float) -> Course | None:
     n = samples.size
     edges = np.linspace(0, n, min(BINS, n) + 1).astype(np.int64)
     y = np.add.reduceat(samples, edges[:-1]) / np.diff(edges)
+    late = 0.5 * (n / told - 1.0)  # samples since its measurement, on average
     told = min(told, y.size)
     size = 1 + min(DEGREE, told - FEWEST + 1)
     half = 0.5 * (first + n - 1 + turn) / turn  # of the span from -1 to its end, in turns
-    z = (0.5 * (edges[:-1] + edges[1:] - 1) + first + turn) / (turn * half) - 1.0
+    z = (0.5 * (edges[:-1] + edges[1:] - 1) - late + first + turn) / (turn * half) - 1.0
     design = legvander(z, size - 1)
     fitted = np.linalg.solve(design.T @ design, y @ design)
     left = y - design @ fitted

@@ -177,3 +177,12 @@ def test_a_slip_that_grows_evenly_is_told_at_the_contact() -> None:
     turns = cut_turns(wheel.strain, RATE, LATERAL, speed=speed)
     found = turns.trace.conditions.omega * RADIUS / turns.trace.conditions.speed - 1.0
     np.testing.assert_allclose(found[3:], slip * turns.time[3:], atol=2e-4)
+
+
+def test_a_held_value_is_taken_at_the_time_of_its_measurement() -> None:
+    sample = np.arange(-1000, 100)
+    measured = 100 * (sample // 100)  # 100 values a second
+    found = course(20.0 - 8.0 * measured / RATE, -1000.0, 1000.0)
+    assert found is not None
+    assert found.shape[0] == pytest.approx(20.0, rel=3e-4)  # 20.04 as if measured when held
+    assert found.mean == pytest.approx(20.0 + 8.0 * 500.0 / RATE, rel=3e-4)
