@@ -138,6 +138,10 @@ def test_a_friction_that_is_given_is_used(chain: Chain, seen: Observations) -> N
     _, unknown = errors(told(chain, seen, friction=np.nan), seen, "alpha")
     assert held(error, std) >= 0.9
     assert rms(error) < 0.5 * rms(wrong)
+    given, dry = (told(chain, seen, friction=x)["alpha"] for x in (mu, DRY))
+    rows = seen.usable & given.valid & (given.std <= LARGEST_ANGLE_STD)
+    truth = seen.truth["slip_angle"]
+    assert rms((given.value - truth)[rows]) < 0.9 * rms((dry.value - truth)[rows])
     assert rms(std) < 0.95 * rms(unknown)
 
 
