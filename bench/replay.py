@@ -47,11 +47,17 @@ class ReplayChain:
         if not read.data or self._passing:
             return News()
         self.heard, self.last_byte = time.time(), time.monotonic()
-        return self._estimation.take(self.wheels.push(read.data, read.arrival, read.source))
+        known = self.wheels.contradicted
+        blocks = self.wheels.push(read.data, read.arrival, read.source)
+        news = self._estimation.take(self.wheels.agreeing(blocks))
+        news.alarms += [text for n, text in self.wheels.contradicted.items() if n not in known]
+        return news
 
     def finish(self, reason: str) -> News:
         """Step what is left."""
-        return self._estimation.finish()
+        news, wrong = self._estimation.finish(), self.wheels.contradicted
+        news.turns = [turn for turn in news.turns if turn.wheel not in wrong]
+        return news
 
     def counts(self) -> dict[str, Any]:
         """Return nothing: there are no other processes."""

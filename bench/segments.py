@@ -1,6 +1,6 @@
 """A recording as stretches of samples without a break in time, with what was known beside them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -76,9 +76,16 @@ class Segment:
 
 
 def segments(
-    recording: Recording, sources: Sequence[SourcePlan], wheel: int | None = None
+    recording: Recording,
+    sources: Sequence[SourcePlan],
+    wheel: int | None = None,
+    note: Callable[[str], object] = str,
 ) -> Iterator[Segment]:
-    """Yield the segments of all wheels, or of one, each when it is complete."""
+    """Yield the segments of all wheels, or of one, each when it is complete.
+
+    `note` is called for each wheel whose clock contradicts its sample rate: its samples are as it
+    sent them, their times are not to be trusted.
+    """
     wheels = wheels_of(sources, EVERY_WHEEL if wheel is None else (wheel,))
     current: dict[int, Segment] = {}
     told: dict[int, dict[str, float]] = {}
@@ -103,3 +110,5 @@ def segments(
                                           content.period, told=before)  # fmt: skip
             current[number].blocks.append(content)
     yield from current.values()
+    for said in wheels.contradicted.values():
+        note(said)

@@ -61,7 +61,10 @@ class SourcePlan:
     def line(self) -> Line:
         """Return what decodes it, fresh."""
         devices = self.devices or {None: self.protocol.device}
-        return Line(self.protocol.decoder(), devices, self.wheel, self.port.port)
+        user, known = self.protocol.user_map, len(self.known_wheels)
+        expected = max(known, 1) if user is None else known
+        said_by = self.protocol.rate_said_by
+        return Line(self.protocol.decoder(), devices, self.wheel, self.port.port, said_by, expected)
 
     def as_header(self) -> dict[str, Any]:
         """Return the plan as the header of a recording holds it."""

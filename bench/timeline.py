@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from bench.device import Device
 from bench.frames import GAGES, TICK, FrameFlag, Frames, select
-from bench.rate_check import RateCheck
+from bench.rate_check import PERIOD, RateCheck
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 
 LONGEST_FILL = 1.0
@@ -118,9 +118,13 @@ class Timeline:
         Counts to strain.
     wheel : int, optional
         Wheel to look at; by default that of the first frame.
+    rate_said_by : str
+        Where the sample rate is said, for a message.
     """
 
-    def __init__(self, device: Device, wheel: int | None = None) -> None:
+    def __init__(
+        self, device: Device, wheel: int | None = None, rate_said_by: str = PERIOD
+    ) -> None:
         self.counts = TimelineCounts()
         self.received = 0  # samples so far
         self.wheel = wheel
@@ -134,16 +138,10 @@ class Timeline:
         self._period = 0  # ticks
         self._gages = GAGES
         self._flagged = False  # last frame had the time-reset flag
-        self._rate = RateCheck()
+        self._rate = RateCheck(rate_said_by)
 
     def push(self, frames: Frames) -> list[Samples]:
-        """Take frames in the order of the wire and return what they add.
-
-        Raises
-        ------
-        DeviceError
-            If their clock contradicts the sample period.
-        """
+        """Take frames in the order of the wire and return what they add."""
         if self.wheel is None and len(frames):
             self.wheel = int(frames.wheel[0])
         mine = frames.wheel == self.wheel
@@ -224,6 +222,11 @@ class Timeline:
     def end_us(self) -> int:
         """Unwrapped device time of the sample that comes next, [us]."""
         return self._time + self._frame_time
+
+    @property
+    def contradiction(self) -> str:
+        """What the wheel's clock shows against the sample rate that was said; empty: it agrees."""
+        return self._rate.contradiction
 
     @property
     def device(self) -> Device:

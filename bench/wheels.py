@@ -16,6 +16,7 @@ from bench.frames import Frames, select
 from bench.line_counts import LineCounts
 from bench.protocols import Decoder
 from bench.protocols.layouts import Health
+from bench.rate_check import PERIOD
 from bench.timeline import Samples, Timeline, TimelineCounts
 
 MOST = 4
@@ -64,8 +65,8 @@ class Wheel:
         As the last frame says.
     """
 
-    def __init__(self, device: Device, number: int) -> None:
-        self.timeline = Timeline(device, number)
+    def __init__(self, device: Device, number: int, rate_said_by: str = PERIOD) -> None:
+        self.timeline = Timeline(device, number, rate_said_by)
         self.clock = ClockFit()
         self.told: dict[str, float] = {}
         self.rssi: int | None = None
@@ -122,12 +123,18 @@ class Line:
         Number that the only wheel of this line gets; None: numbers are as sent.
     name : str
         For messages.
+    rate_said_by : str
+        Where the sample rate is said, for messages.
+    expected : int
+        Wheels that it brings, at least.
     """
 
     decoder: Decoder
     devices: Mapping[int | None, Device]
     wheel: int | None = None
     name: str = "the line"
+    rate_said_by: str = PERIOD
+    expected: int = 1
 
     def push(self, data: bytes, arrival: int) -> list[Frames | Measured]:
         """Return what bytes bring, with the wheels' numbers of the run.
@@ -249,6 +256,26 @@ class Wheels:
         self._told |= told
         told.clear()
 
+    @property
+    def contradicted(self) -> dict[int, str]:
+        """Wheels whose clock contradicts the sample rate that was said, and how."""
+        said = {number: wheel.timeline.contradiction for number, wheel in self.heard.items()}
+        return {number: text for number, text in said.items() if text}
+
+    def agreeing(self, blocks: Sequence[Block]) -> list[Block]:
+        """Return the blocks of wheels whose clock agrees with their rate: those may be estimated.
+
+        Raises
+        ------
+        DeviceError
+            If no such wheel is left, and no other is expected.
+        """
+        wrong = self.contradicted
+        expected = len(self._chosen) or min(sum(line.expected for line in self.lines), MOST)
+        if wrong and len(wrong) == len(self.heard) >= expected:
+            raise DeviceError(list(wrong.values()))
+        return [block for block in blocks if block.wheel not in wrong]
+
     def line_counts(self, wheel: int) -> LineCounts:
         """Return what the line of a wheel has seen and lost."""
         return self.lines[self._sources.get(wheel, 0)].decoder.counts
@@ -290,7 +317,7 @@ class Wheels:
     def _wheel(self, number: int) -> Wheel:
         if number not in self.heard:
             line = self.lines[self._sources.get(number, 0)]
-            self.heard[number] = Wheel(line.device(number), number)
+            self.heard[number] = Wheel(line.device(number), number, line.rate_said_by)
         return self.heard[number]
 
     def _twice(self, wheel: int, source: int) -> DeviceError:

@@ -83,13 +83,13 @@ def export(
             if suffix in CAN_LOGS:
                 count, what = write_can_log(opened, new), "frames"
             elif suffix in TABLES:
-                found = segments(opened, sources, wheel)
+                found = segments(opened, sources, wheel, _note)
                 count, what = write_table(found, opened.conditions, new), "samples"
             elif suffix == MDF:
-                every = list(segments(opened, sources, wheel))
+                every = list(segments(opened, sources, wheel, _note))
                 count, what = write_mdf(recording, every, opened.conditions, new), "samples"
             else:
-                mine = _of_one_wheel(list(segments(opened, sources, wheel)))
+                mine = _of_one_wheel(list(segments(opened, sources, wheel, _note)))
                 count = write_campaign_of(opened, mine, new, _header(opened, like))
                 what = "runs"
         if suffix in TABLES:
@@ -110,6 +110,10 @@ def export(
         write_json(json_file, {"format": "tirebench-export/1", "out": str(out), what: count,
                                "complete": not damage})  # fmt: skip
     context.exit(0 if count and not damage else 1)
+
+
+def _note(said: str) -> None:
+    click.echo(f"note: {said}; samples are as they were sent, their times follow the rate said")
 
 
 def _of_one_wheel(found: list[Segment]) -> list[Segment]:

@@ -88,7 +88,8 @@ def record(
     first, *more = (source.as_header() for source in known.sources)
     header = RecordingHeader(settings, text, "", first, tuple(more))
     priority = realtime(None)
-    reader = ReaderPlan(known.sources, reconnect, strain=rule.strain, apart=ordinary(priority))
+    reader = ReaderPlan(known.sources, reconnect, strain=rule.strain, apart=ordinary(priority),
+                        estimated=False)  # fmt: skip
     with LiveChain(LivePlan(reader, None, known.conditions, header, out, rule=rule)) as chain:
         session = Session(chain, limits=Limits(duration, silence), watch=_alarm)
         click.echo(f"{chain.name} -> {out}")

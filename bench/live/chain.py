@@ -115,6 +115,7 @@ class LiveChain:
         self._finished = False
         self._passing = False
         self._alarm = ""  # what the recorder has said last
+        self._contradicted: set[int] = set()  # wheels of which was told
 
     def __enter__(self) -> "LiveChain":
         try:
@@ -338,6 +339,8 @@ class LiveChain:
             self._cursors[slot] = report.cursor
             self._cpu[slot] = report.cpu
             self._turns[slot] += len(report.news.turns)
+            wrong = self.wheels.contradicted
+            report.news.turns = [turn for turn in report.news.turns if turn.wheel not in wrong]
             report.news.latency = [1e-9 * (now - turn.arrival) for turn in report.news.turns]
             news.add(report.news)
             for turn in report.news.turns if self._recorder is not None else ():
@@ -380,6 +383,12 @@ class LiveChain:
             said = TOO_BUSY if state.passing else DECODED_AGAIN
             self._pending.alarms.append(said)
             self.order("event", alarm_event("busy", said, on=state.passing))
+        for wheel, said in state.wheels.contradicted.items():
+            if wheel not in self._contradicted:
+                self._contradicted.add(wheel)
+                told = f"{said}; no turn of it is told" if self._plan.file else said
+                self._pending.alarms.append(told)
+                self.order("event", alarm_event("sample rate", told, on=True))
         if state.error:
             kind, text = state.error
             raise getattr(errors, kind)(text)

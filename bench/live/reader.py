@@ -54,6 +54,8 @@ class ReaderPlan:
     apart : bool
         Whether a process of its own reads the only port too: where the processor is short it goes
         on while another one decodes.
+    estimated : bool
+        Whether there are estimators: a wheel whose clock contradicts its rate gets none.
     """
 
     sources: tuple[SourcePlan, ...]
@@ -64,6 +66,7 @@ class ReaderPlan:
     strain: bool = True
     wait: float = 0.0
     apart: bool = False
+    estimated: bool = True
 
     @property
     def ports(self) -> int:
@@ -296,6 +299,8 @@ class _Reader:
             state.passed += len(read.data)
             return []
         blocks = state.wheels.push(read.data, read.arrival, read.source)
+        if self._plan.estimated:
+            blocks = state.wheels.agreeing(blocks)
         slots = {wheel: slot for slot, wheel in enumerate(state.wheels.heard)}
         return [(slots[block.wheel], pickle.dumps(block, 5)) for block in blocks]
 

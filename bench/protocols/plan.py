@@ -17,6 +17,7 @@ from bench.protocols.user_can import UserCan
 from bench.protocols.user_line import UserLine
 from bench.protocols.user_map import parse_map
 from bench.protocols.wheel_can import WheelCan
+from bench.rate_check import PERIOD
 
 RATE = 10_000.0
 """Default sample rate, [Hz]; frames of SERIAL v1 say their own."""
@@ -60,6 +61,13 @@ class ProtocolPlan:
     def device(self) -> Device:
         """What a count means where no device file says it."""
         return Device() if self.user_map is None else self.user_map.device
+
+    @property
+    def rate_said_by(self) -> str:
+        """Where the sample rate is said, for messages."""
+        if self.user_map is not None:
+            return "rate_hz of the map"
+        return PERIOD if self.encoding == SERIAL else "--rate"
 
     def as_header(self) -> dict[str, Any]:
         """Return the plan as the header of a recording holds it."""

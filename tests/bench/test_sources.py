@@ -5,6 +5,7 @@ import pickle
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -40,6 +41,7 @@ from bench.live.reader import ReaderPlan
 from bench.protocols import SLCAN, slcan
 from bench.protocols.plan import ProtocolPlan
 from bench.protocols.user_map import parse_map
+from bench.rate_check import JUDGED
 from bench.recording import Recorder, Recording, RecordingHeader
 from bench.replay import ReplayChain
 from bench.setup_file import check_sources, read_setup
@@ -184,6 +186,48 @@ def test_two_wheels_and_the_vehicle_on_one_clock_are_replayed_to_the_bit(
     again, wheels = replayed(tmp_path / "a.mcap", file)
     assert by_wheel(again) == live
     assert wheels.counts == counts
+
+
+def wrong_clock(count: int = 3 * JUDGED, wheel: int = 0) -> list[bytes]:
+    """Frames of a turned gage that say 10 kHz, of a wheel whose clock shows 3 % more time."""
+    frames = strain_frames(np.zeros((16 * count, 5), np.int16), period=1000, wheel=wheel)
+    return encode(replace(frames, t_us=np.rint(np.arange(count) * 1648.0).astype(np.int64)))
+
+
+def test_a_wheel_with_a_wrong_rate_is_recorded_to_the_end_and_exported(tmp_path: Path) -> None:
+    frames = wrong_clock()
+    server = Server(frames)
+    plan = ReaderPlan((SourcePlan(PortPlan(server.url)),), 60.0, estimated=False)
+    news, size = News(), sum(map(len, frames))
+    with LiveChain(LivePlan(plan, None, Conditions.constant(), RecordingHeader({}),
+                            tmp_path / "a.mcap", laps=False)) as chain:  # fmt: skip
+        gathered(chain, news, lambda: chain.wheels.line_counts(0).bytes == size)
+        news.add(chain.poll(Deadline.after(0.2)))
+        chain.finish("stopped")
+        news.add(chain.poll(Deadline.after(0.0)))
+    server.close()
+    assert [said for said in news.alarms if "9709 samples a second, 10000 were said" in said]
+    with closing(Recording(tmp_path / "a.mcap")) as recording:
+        assert b"".join(read.data for read in recording.reads()) == b"".join(frames)
+    arguments = ["export", str(tmp_path / "a.mcap"), "--out", str(tmp_path / "a.csv")]
+    outcome = CliRunner().invoke(program, arguments)
+    assert outcome.exit_code == 0, outcome.output
+    assert "note: wheel 0: its clock shows 9709 samples a second" in outcome.output
+
+
+def test_a_wheel_with_a_wrong_rate_gets_no_estimates_and_the_others_do() -> None:
+    good = encode(strain_frames(np.zeros((48 * JUDGED, 5), np.int16), period=1000, wheel=1))
+    both = Wheels([Line(SerialDecoder(), {}), Line(SerialDecoder(), {})])
+    seen = []
+    for one, two in zip(wrong_clock(), good, strict=True):
+        seen.append({block.wheel for number, data in enumerate((one, two))
+                     for block in both.agreeing(both.push(data, 1, number))})  # fmt: skip
+    assert seen[-1] == {1}
+    assert list(both.contradicted) == [0]
+    alone = Wheels([Line(SerialDecoder(), {})])
+    blocks = alone.push(b"".join(wrong_clock()), 1)
+    with pytest.raises(DeviceError, match="9709 samples a second"):
+        alone.agreeing(blocks)
 
 
 def test_a_port_of_several_that_is_killed_is_read_again(tmp_path: Path) -> None:
