@@ -81,7 +81,7 @@ def work(name: str, fmus: Fmus) -> tuple[str, Any]:
         return name, antilock.study(*fmus, [ANTILOCK[name]])
     if name == WATER:
         return name, hydroplaning.study(*fmus)
-    with FourWheels(*fmus) as wheels:
+    with FourWheels(*fmus, speed_sensors=True) as wheels:
         if name == DRILL:
             return name, drill(wheels)
         recording = record(MANOEUVRES[name], wheels)

@@ -1,10 +1,9 @@
 """Hold the estimates of a co-simulation against the truth, turn by turn.
 
-An estimate is of one contact. It is held against the truth at the middle of that contact (the slip
-ratio, which comes from the time between two contacts, against the mean between them). A turn is
-**steady** when, from the contact before to the moment of output, the truth of every quantity has
-changed by less than `STEADY`: the change that the figures to reach allow as an error. All other
-turns are transient.
+An estimate is of one contact, and is held against the truth at the middle of that contact; the slip
+ratio too, as the wheel's turn rate is told as it is there. A turn is **steady** when, from the
+contact before to the moment of output, the truth of every quantity has changed by less than
+`STEADY`: the change that the figures to reach allow as an error. All other turns are transient.
 """
 
 from collections.abc import Mapping
@@ -106,16 +105,13 @@ def turns_of(recording: Recording, wheel: int) -> Turns:
             for a, b in zip(first.tolist(), rows.tolist(), strict=True)
         ]
         steady &= np.array(spread) < size
-    means = [
-        truth["kappa"][a : b + 1].mean() for a, b in zip(first.tolist(), at.tolist(), strict=True)
-    ]
     return Turns(
         row=rows,
         contact=contact,
         told={name: told[name][rows] for name in LIMITS},
         std={name: told[f"{name}_std"][rows] for name in LIMITS},
         truth={
-            "Fz": truth["Fz"][at], "alpha": truth["alpha"][at], "kappa": np.array(means),
+            "Fz": truth["Fz"][at], "alpha": truth["alpha"][at], "kappa": truth["kappa"][at],
             "Fy": told["tire_fy"][at],
         },
         valid={name: told[f"{name}_valid"][rows] > 0.0 for name in LIMITS},

@@ -9,6 +9,7 @@ estimates), stepped by FMPy. The vehicle is anything that can fill a `WheelState
             told = wheels.step(k * h, h, truth)  # truth holds over (t, t + h]; told is at t + h
 """
 
+import math
 from collections.abc import Sequence
 from ctypes import c_double, c_uint32
 from dataclasses import dataclass, field, fields
@@ -67,8 +68,8 @@ class WheelStates:
     pressure : array, [Pa]
         Inflation pressure (gauge).
     omega : array, [rad/s]
-        Turn rate that a wheel speed sensor measures; only the estimators' watchdog reads it. NaN:
-        there is none.
+        Turn rate that a wheel speed sensor measures, by which the strain tires follow the wheel
+        angle within a turn. NaN: there is none.
     friction : array, [1]
         Coefficient of friction under each wheel, 0.3 to 1.1.
     told_speed : array, [m/s]
@@ -248,6 +249,9 @@ class FourWheels:
         Further parameters of all virtual tires, for example ``relaxation_length``.
     water : WaterTable, optional
         What a wedge of water changes.
+    speed_sensors : bool
+        Whether the strain tires are told the turn rates of the virtual tires where the states have
+        none, as by a wheel speed sensor.
     """
 
     def __init__(
@@ -261,8 +265,9 @@ class FourWheels:
         start_angles: Sequence[float] = (-3.1, -1.6, 0.6, 2.2),
         parameters: dict[str, float] | None = None,
         water: "WaterTable | None" = None,
+        speed_sensors: bool = False,
     ) -> None:
-        self.rate, self._water = rate, water
+        self.rate, self._water, self._speed_sensors = rate, water, speed_sensors
         self._options = [
             {"sample_rate": rate, "noise_std": noise, "seed": seed + at, "start_angle": angle,
              **(parameters or {})}
@@ -318,7 +323,9 @@ class FourWheels:
             for name, value in zip(_TIRE, shown, strict=True):
                 parts[name][wheel] = value
             parts["tire_valid"][wheel] = good
-            self._estimate(wheel, frame[:new], good, told_conditions(truth, wheel), parts)
+            measured = parts["tire_omega"][wheel] if self._speed_sensors else math.nan
+            told = told_conditions(truth, wheel, measured)
+            self._estimate(wheel, frame[:new], good, told, parts)
         self.told = Estimates(**parts)
         return self.told
 
@@ -355,14 +362,17 @@ class FourWheels:
         parts["turn"][wheel], parts["flags"][wheel] = turn, flags
 
 
-def told_conditions(truth: WheelStates, wheel: int) -> FloatArray:
-    """Return what a strain tire is told beside the strain, in the order of `HELD`; NaN: nothing."""
-    speed = truth.told_speed[wheel]
+def told_conditions(truth: WheelStates, wheel: int, measured: float = math.nan) -> FloatArray:
+    """Return what a strain tire is told beside the strain, in the order of `HELD`; NaN: nothing.
+
+    `measured` is the turn rate [rad/s] where the states have none.
+    """
+    speed, omega = truth.told_speed[wheel], truth.omega[wheel]
     known = {
         "speed": speed if np.isfinite(speed) else truth.speed[wheel],
         "pressure": truth.pressure[wheel],
         "camber": truth.camber[wheel],
-        "omega": truth.omega[wheel],
+        "omega": omega if np.isfinite(omega) else measured,
     }
     return np.array([known.get(name, np.nan) for name in HELD])
 

@@ -22,6 +22,7 @@ from cosim.wheels import NAMES, OWN_FRICTION, WHEELS, FourWheels, WheelStates
 from tests.fmu import live, virtual_host
 from tirelib.errors import ParameterError
 from tirelib.flags import TurnFlag
+from tirelib.held import HELD
 from tirelib.report.cosim import write_cosim
 
 
@@ -57,7 +58,9 @@ def fmus() -> tuple[Path, Path]:
 @pytest.fixture(scope="module")
 def wheels(fmus: tuple[Path, Path]) -> Iterator[FourWheels]:
     """Wheels without noise whose gages start alike left and right, so that mirrors are exact."""
-    with FourWheels(*fmus, noise=0.0, start_angles=(-3.1, -3.1, 0.6, 0.6)) as found:
+    with FourWheels(
+        *fmus, noise=0.0, start_angles=(-3.1, -3.1, 0.6, 0.6), speed_sensors=True
+    ) as found:
         yield found
 
 
@@ -151,6 +154,16 @@ def test_an_estimate_is_of_its_contact_and_comes_in_time(left: Recording) -> Non
         assert np.all(turns.lag <= turns.allowed)
 
 
+def test_an_estimate_is_held_against_the_truth_at_its_contact(braked: Recording) -> None:
+    """The slip ratio too, and not against its mean over the turn before."""
+    for wheel in range(len(WHEELS)):
+        turns = turns_of(braked, wheel)
+        at = (turns.contact / STEP).astype(int)
+        for name in ("Fz", "alpha", "kappa"):
+            np.testing.assert_array_equal(turns.truth[name], braked.truth[name][at, wheel])
+        assert np.ptp(turns.truth["kappa"]) > 0.005
+
+
 def test_all_is_in_range_and_told_so(left: Recording) -> None:
     good, bad = in_range(left, 0)
     assert good[-1]
@@ -206,6 +219,20 @@ def test_a_slippery_road_is_refused_by_a_virtual_tire_that_knows_one_friction(
         slippery = replace(state, friction=np.array([OWN_FRICTION, 0.5, 0.5, 0.5]))
         with pytest.raises(ParameterError, match=r"tire_FR: friction = 0.5, .*allowed is 0.95"):
             wheels.step(STEP, STEP, slippery)
+
+
+def test_a_wheel_speed_sensor_tells_the_turn_rate_of_the_tire_that_is_seen(
+    wheels: FourWheels, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Unless the vehicle tells another, as vehicles do that have the same tire."""
+    seen: list[np.ndarray] = []
+    monkeypatch.setattr(wheels, "_estimate", lambda *given: seen.append(given[3]))
+    state = WheelStates(*(np.full(len(WHEELS), x) for x in (4000.0, 0.0, 0.0, 0.0, 20.0)))
+    state = replace(state, omega=np.array([np.nan, 50.0, np.nan, np.nan]))
+    wheels.start(state)
+    own = wheels.step(0.0, STEP, state).tire_omega
+    told = np.array(seen)[:, HELD.index("omega")]
+    np.testing.assert_array_equal(told, [own[0], 50.0, own[2], own[3]])
 
 
 def test_water_is_refused_without_a_table_and_added_with_one(wheels: FourWheels) -> None:
