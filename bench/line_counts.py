@@ -2,6 +2,12 @@
 
 from dataclasses import dataclass
 
+NOTHING = "no byte came: is the transmitter on, and is this its port?"
+NO_FRAME = (
+    "bytes came, but no frame of a wheel: check the rate (--baud; --bitrate and --data-bitrate), "
+    "the kind of port (PORT, slcan:PORT), and --map for another make"
+)
+
 
 @dataclass(slots=True)
 class LineCounts:
@@ -41,3 +47,10 @@ class LineCounts:
     def bad(self) -> int:
         """Frames that were damaged."""
         return self.crc + self.framing
+
+    @property
+    def hint(self) -> str:
+        """What to look at where no good frame came; empty where one did."""
+        if self.ok:
+            return ""
+        return NO_FRAME if self.bytes else NOTHING

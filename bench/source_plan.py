@@ -64,7 +64,8 @@ class SourcePlan:
         user, known = self.protocol.user_map, len(self.known_wheels)
         expected = max(known, 1) if user is None else known
         said_by = self.protocol.rate_said_by
-        return Line(self.protocol.decoder(), devices, self.wheel, self.port.port, said_by, expected)
+        return Line(self.protocol.decoder(), devices, self.wheel, self.port.port, said_by, expected,
+                    tuple(self.known_wheels))  # fmt: skip
 
     def as_header(self) -> dict[str, Any]:
         """Return the plan as the header of a recording holds it."""

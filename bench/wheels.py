@@ -127,6 +127,8 @@ class Line:
         Where the sample rate is said, for messages.
     expected : int
         Wheels that it brings, at least.
+    known : tuple of int
+        Its wheels, as far as they are known before anything is heard.
     """
 
     decoder: Decoder
@@ -135,6 +137,7 @@ class Line:
     name: str = "the line"
     rate_said_by: str = PERIOD
     expected: int = 1
+    known: tuple[int, ...] = ()
 
     def push(self, data: bytes, arrival: int) -> list[Frames | Measured]:
         """Return what bytes bring, with the wheels' numbers of the run.
@@ -297,6 +300,19 @@ class Wheels:
         names = [field.name for field in fields(LineCounts)]
         seen = LineCounts(*(sum(getattr(line, name) for line in lines) for name in names))
         return seen, total
+
+    def hints(self) -> dict[int, str]:
+        """Return what to look at on each line from which no good frame came, by its source."""
+        said = {source: line.decoder.counts.hint for source, line in enumerate(self.lines)}
+        many = len(self.lines) > 1
+        return {source: f"{self.lines[source].name}: {hint}" if many else hint
+                for source, hint in said.items() if hint}  # fmt: skip
+
+    @property
+    def missing(self) -> list[int]:
+        """Wheels that are chosen or known beforehand and were not heard so far."""
+        known = self._chosen or [wheel for line in self.lines for wheel in line.known]
+        return sorted(set(known) - set(self.heard))
 
     def interrupt(self, source: int = 0) -> None:
         """Note that a line was broken here: a half frame is forgotten."""

@@ -27,11 +27,6 @@ UNITS = [f"{name} [{unit}]" if unit else name for name, (_, unit) in FORMATS.ite
 HEADINGS = ("wheel", "run", "t [s]", *UNITS, "valid", "flags")
 LOSSES = ("crc_bad", "framing_bad", "lost_frames", "duplicates", "out_of_order", "resets",
           "unknown_type", "other_wheel", "unplaced_samples", "overruns", "reconnects")  # fmt: skip
-NOTHING = "no byte came: is the transmitter on, and is this its port?"
-NO_FRAME = (
-    "bytes came, but no frame of a wheel: check the rate (--baud; --bitrate and --data-bitrate), "
-    "the kind of port (PORT, slcan:PORT), and --map for another make"
-)
 
 
 class Screen:
@@ -95,15 +90,17 @@ class Screen:
 def counters(wheels: Wheels) -> str:
     """Return the state of the line in one line; what is zero is left out but for the frames.
 
-    Where no frame came at all, it says what to look at.
+    Where no frame came of a line or of a wheel that is known beforehand, it says so.
     """
     counts = line_document(*wheels.counts)
     parts = [f"{counts['frames']} frames"]
     parts += [f"{counts[name]} {name}" for name in LOSSES if counts[name]]
     saturated = {f"gage {i}": n for i, n in enumerate(counts["saturated_samples"], 1) if n}
     parts += [f"{n} saturated samples of {gage}" for gage, n in saturated.items()]
-    hint = "" if counts["frames"] else f"; {NO_FRAME if counts['bytes'] else NOTHING}"
-    return ", ".join(parts) + hint
+    hints = list(wheels.hints().values())
+    if counts["frames"]:
+        hints += [f"wheel {number}: no frame came" for number in wheels.missing]
+    return "; ".join([", ".join(parts), *hints])
 
 
 def _cells(turn: Turn) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from bench.chain import Turn
 from bench.conditions import UNKNOWN, Conditions
 from bench.document import turn_document, wheel_document
 from bench.estimation import News
-from bench.page.alarms import RULES, Alarms, Rule, event_of
+from bench.page.alarms import RULES, Alarm, Alarms, Rule, event_of
 from bench.page.board import Board
 from bench.page.condition_lines import in_use
 from bench.page.quantities import UNITS
@@ -198,6 +198,7 @@ class Feed:
                 changed += self._alarms.end(OF_DECODED, number, now)
                 values = {name: x for name, x in values.items() if name not in OF_DECODED}
             changed += self._alarms.look(values, number, now)
+        changed += [] if busy else self._unheard(now)
         self._alarms.tell("busy", busy, now)  # the run writes these two into the recording
         self._alarms.tell("json", self._unwritten, now)
         recorded = chain.get("recording", {})
@@ -208,6 +209,17 @@ class Feed:
         if self._note is not None:
             for alarm in changed:
                 self._note(event_of(alarm))
+
+    def _unheard(self, now: float) -> list[Alarm]:
+        """Watch sources without a frame, and wheels that are known and were not heard."""
+        wheels, waited = self._source.wheels, now - self._started
+        rung = self._alarms.rules["silence"].beyond(waited, already=False)
+        hints, changed = wheels.hints() if rung else {}, []
+        for source in range(len(wheels.lines)):
+            changed += self._alarms.tell(f"source {source}", hints.get(source, ""), now)
+        for number in wheels.missing:
+            changed += self._alarms.look({"silence": waited}, number, now)
+        return changed
 
     def _watched(self, number: int, entry: dict[str, Any], now: float) -> dict[str, float | None]:
         """Return the values of a wheel that have limits."""

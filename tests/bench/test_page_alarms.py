@@ -14,11 +14,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bench.can_batch import pack, same_kind
+from bench.cli.live import counters
 from bench.conditions import Conditions, Measured
 from bench.device import Device
 from bench.errors import DeviceError
 from bench.estimation import News
-from bench.line_counts import LineCounts
+from bench.line_counts import NO_FRAME, NOTHING, LineCounts
+from bench.links.opening import PortPlan
 from bench.live.chain import LiveChain
 from bench.live.reader import LineState
 from bench.live.recording_state import RecorderState
@@ -33,6 +35,7 @@ from bench.protocols import layouts
 from bench.protocols.frame_decoder import PackedDecoder
 from bench.protocols.layouts import Health
 from bench.protocols.wheel_can import WheelCan
+from bench.source_plan import SourcePlan, wheels_of
 from bench.wheels import Wheels
 from tests.bench.in_process import FakeSource
 from tests.bench.test_protocols import RAW16, some_raw
@@ -212,3 +215,34 @@ def test_a_busy_machine_is_an_alarm_of_the_recording_when_it_begins_and_when_it_
         ("busy", "on"),
         ("busy", "off"),
     ]
+
+
+def test_a_source_without_a_frame_and_a_wheel_that_never_sends_are_told() -> None:
+    """Three sources: one good, one at a wrong rate, one silent."""
+    source, noted = FakeSource(), []
+    source.wheels = wheels_of([SourcePlan(PortPlan(name), wheel=number)
+                               for number, name in enumerate(("good", "garbage", "silent"))]
+                              )  # fmt: skip
+    source.hear(0)
+    source.wheels.push(b"temperature 23.1\r\n" * 9, source=1)
+    line = counters(source.wheels)
+    assert "good" not in line
+    assert f"; garbage: {NO_FRAME}; silent: {NOTHING}" in line
+    assert line.endswith("; wheel 1: no frame came; wheel 2: no frame came")
+    with Board() as board:
+        feed = Feed(board, source, About("p"), note=noted.append)
+        feed._started = time.time()
+        assert feed.state()["alarms"]["active"] == []
+        feed._started -= 60.0
+        texts = [alarm["text"] for alarm in feed.state()["alarms"]["active"]]
+        assert texts[:2] == [f"garbage: {NO_FRAME}", f"silent: {NOTHING}"]
+        assert [text.partition(" 6")[0] for text in texts[2:]] == [
+            "wheel 1: no sample for",
+            "wheel 2: no sample for",
+        ]
+        assert [event["wheel"] for event in noted] == [None, None, 1, 2]
+        source.heard = time.time()
+        for number in (1, 2):
+            source.hear(number)
+            source.wheels.lines[number].decoder.counts.ok = 1
+        assert feed.state()["alarms"]["active"] == []
