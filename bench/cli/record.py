@@ -8,7 +8,7 @@ import click
 from bench.cli.given import given_live, live_sources
 from bench.cli.live import counters
 from bench.cli.options import PORTS, devices_of, port_options
-from bench.cli.recording import recording_options, room
+from bench.cli.recording import at_start, recording_options
 from bench.cli.stop import on_stop
 from bench.conditions import read_conditions
 from bench.document import line_document, wheel_document
@@ -93,7 +93,7 @@ def record(
     with LiveChain(LivePlan(reader, None, known.conditions, header, out, rule=rule)) as chain:
         session = Session(chain, limits=Limits(duration, silence), watch=_alarm)
         click.echo(f"{chain.name} -> {out}")
-        click.echo(room(out, 1))
+        click.echo(at_start(out, reader, rule, watched=False))
         click.echo(f"priority: {priority}")
         with on_stop(session.stop):
             outcome = session.run()

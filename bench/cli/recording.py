@@ -8,13 +8,15 @@ from typing import Any, TypeVar
 
 import click
 
+from bench.live.reader import ReaderPlan
 from bench.live.recording_state import RecordingRule
 from bench.live.space import free_at
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-HOURLY = 0.7e9
-"""What a wheel at 10 kHz takes in an hour, with strain and estimates, [bytes]; see the docs."""
+HOURLY, HOURLY_RAW = 0.75e9, 0.26e9
+"""What a wheel at 10 kHz takes in an hour, [bytes]: with its strain and without; measured in
+docs/bench_proof.md."""
 LITTLE = 1e9
 """Room below which there is a warning, [bytes]: about an hour of one wheel."""
 
@@ -26,8 +28,9 @@ _OPTIONS = (
     click.option("--strain/--no-strain", default=True,
                  help="Record decoded strain beside the raw bytes, for other programs."),
     click.option("--trigger", metavar="BEFORE,AFTER", callback=lambda _c, _p, text: _around(text),
-                 help="Record only around markers, alarms and a lost port: so many seconds before "
-                      "and after, a file for each."),
+                 help="Record only around a lost port and, with the page or --tui of `run`, around "
+                      "markers and alarms that begin: so many seconds before and after, a file for "
+                      "each."),
 )  # fmt: skip
 
 
@@ -50,12 +53,32 @@ def recording_options(command: Command) -> Command:
     return decorated  # type: ignore[no-any-return]
 
 
-def room(path: Path, wheels: int) -> str:
-    """Return what is to be said of the room where a recording will be."""
+def at_start(path: Path, reader: ReaderPlan, rule: RecordingRule, *, watched: bool) -> str:
+    """Return what is to be said of a recording at the start.
+
+    Parameters
+    ----------
+    path : Path
+    reader : ReaderPlan
+    rule : RecordingRule
+    watched : bool
+        Whether there is a page or a terminal view, which know limits and markers.
+    """
+    said = room(path, max(reader.expected, len(reader.sources)), strain=rule.strain)
+    if rule.around is not None and not watched:
+        said += (
+            "\n--trigger: a lost port triggers, and an alarm of the program itself; markers and "
+            "the limits of alarms need `tirebench run` with its page or with --tui"
+        )
+    return said
+
+
+def room(path: Path, wheels: int, *, strain: bool = True) -> str:
+    """Return what is to be said of the room where a recording of so many wheels will be."""
     free = free_at(path)
     if free != free:
         return "room for the recording: the system does not tell"
-    hours = free / (HOURLY * max(wheels, 1))
+    hours = free / ((HOURLY if strain else HOURLY_RAW) * wheels)
     said = f"room for the recording: {free / 1e9:.1f} GB, about {hours:.0f} h"
     if hours < 1.0:
         said = f"room for the recording: {free / 1e6:.0f} MB, about {60.0 * hours:.0f} min"

@@ -22,7 +22,7 @@ from bench.cli.given import (
 from bench.cli.live import Screen, counters
 from bench.cli.options import PORTS, devices_of, port_options
 from bench.cli.page import Shown, page_choice, page_options
-from bench.cli.recording import recording_options, room
+from bench.cli.recording import at_start, recording_options
 from bench.cli.stop import on_stop
 from bench.document import document
 from bench.estimation import Estimation, News
@@ -211,7 +211,8 @@ def run(
             source = _in_process(link, file, known, stack, laps=shown.anything)
         console.print(f"{source.name} -> {file.name}, {file.samples} samples a step")
         if record is not None:
-            console.print(room(record, len(numbers)), soft_wrap=True, markup=False)
+            console.print(at_start(record, reader, rule, watched=shown.anything),
+                          soft_wrap=True, markup=False)  # fmt: skip
         if priority:
             console.print(f"priority: {priority}", soft_wrap=True, markup=False)
         stack.enter_context(shown)

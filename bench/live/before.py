@@ -4,6 +4,7 @@ import pickle
 from collections import deque
 from typing import Any
 
+from bench.links import LOST
 from bench.live.exchange import Exchange
 
 
@@ -33,7 +34,7 @@ class Before:
         while (message := exchange.raw.read()) is not None:
             read = pickle.loads(message)
             found.append((read.arrival, "read", read))
-            lost = read.arrival if read.event else lost
+            lost = read.arrival if read.event == LOST else lost
         while (message := exchange.strain.read()) is not None:
             block = pickle.loads(message)
             found.append((block.arrival, "block", block))

@@ -17,10 +17,11 @@ from uuid import uuid4
 from bench.conditions import Conditions
 from bench.document import line_document, wheel_document
 from bench.errors import RecordingError
+from bench.links import LOST
 from bench.live.before import Before
 from bench.live.exchange import Address, Exchange
 from bench.live.kept import orphaned, settled
-from bench.live.recording_state import TRIGGERS, Order, RecorderState, RecordingRule
+from bench.live.recording_state import Order, RecorderState, RecordingRule, triggers
 from bench.live.space import Space
 from bench.recorder import Recorder, finish
 from bench.recording_header import RecordingHeader, numbered, part_path
@@ -125,7 +126,7 @@ class _Recorder:
 
     def _event(self, order: Order) -> None:
         """Write an event; it is kept until it is on disk."""
-        if order.what.get("event") in TRIGGERS:
+        if triggers(order.what):
             self._trigger(order.moment)
         if self._state.path is None:
             return
@@ -147,7 +148,7 @@ class _Recorder:
         state, around = self._state, self._rule.around
         if state.waits is None or around is None:
             return
-        state.until = moment + round(1e9 * around[1])
+        state.until = max(state.until, moment + round(1e9 * around[1]))
         if state.path is None:
             path = numbered(state.waits)
             error = self._begin(path)
@@ -201,7 +202,10 @@ class _Recorder:
         recorder = self._recorder
         while recorder is not None and (message := exchange.raw.read()) is not None:
             busy = True
-            recorder.read(pickle.loads(message))
+            read = pickle.loads(message)
+            recorder.read(read)
+            if read.event == LOST:
+                self._trigger(read.arrival)
             if recorder.waiting > CHUNK_BYTES:
                 self._flush()
         while recorder is not None and (message := exchange.strain.read()) is not None:

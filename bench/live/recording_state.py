@@ -1,12 +1,20 @@
 """What the run wants of the recorder, and how far that is."""
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-TRIGGERS = ("marker", "alarm")
-"""Events that start a recording where it waits for one; a port that goes away does as well."""
+
+def triggers(event: Mapping[str, Any]) -> bool:
+    """Return whether an event starts a recording that waits for one, or lets it go on for longer.
+
+    A marker and an alarm that begins do; an alarm that ends does not. A port that goes away does as
+    well, see `bench.links.LOST`.
+    """
+    kind = event.get("event")
+    return kind == "marker" or (kind == "alarm" and event.get("state") == "on")
 
 
 class Order(NamedTuple):

@@ -9,7 +9,7 @@ import pytest
 
 from bench.conditions import Conditions
 from bench.errors import RecordingError
-from bench.links import LOST, Read
+from bench.links import BACK, LOST, PASSED, RESUMED, Read
 from bench.live.exchange import Exchange
 from bench.live.kept import CONTEXT
 from bench.live.recorder import _Recorder
@@ -196,11 +196,32 @@ def test_a_trigger_records_what_was_before_and_after_it(
     assert recorded(tmp_path / "a-2.mcap") == (PIECES[7:], True)
 
 
+def test_only_what_begins_triggers(disk: Disk, tmp_path: Path, clock: list[int]) -> None:
+    bench = Bench(tmp_path / "a.mcap", RecordingRule(around=(2.0, 3.0)))
+    bench.order("event", {"event": "alarm", "state": "off", "text": "Fz"})
+    for event in (BACK, RESUMED, PASSED, "raw bytes lost: 9"):
+        bench.exchange.raw.put(pickle.dumps(Read(1, b"", event)))
+    assert bench.step(PIECES[0]).path is None
+    bench.exchange.raw.put(pickle.dumps(Read(1, b"", LOST)))
+    assert bench.step().path is not None
+    clock[0] = 3 * SECOND  # before the recording ends
+    bench.exchange.raw.put(pickle.dumps(Read(clock[0], b"", LOST)))
+    bench.step(arrival=clock[0])
+    clock[0] = 5 * SECOND
+    bench.exchange.orders.put(
+        pickle.dumps(Order("event", {"event": "alarm", "state": "off"}, clock[0]))
+    )
+    assert bench.step().path is not None  # for longer, because the port was lost again
+    clock[0] = 7 * SECOND
+    assert bench.step().path is None  # an alarm that ends does not
+    assert bench.close().recordings == 1
+
+
 def test_what_was_before_a_trigger_waits_for_room(disk: Disk, tmp_path: Path) -> None:
     bench = Bench(tmp_path / "a.mcap", RecordingRule(around=(9.0, 1e9)))
     bench.step(*PIECES[:4])
     disk.full = True
-    bench.order("event", {"event": "alarm", "text": "Fz"})
+    bench.order("event", {"event": "alarm", "state": "on", "text": "Fz"})
     assert "No space left" in bench.step(PIECES[4]).error
     disk.full = False
     assert bench.step(PIECES[5]).error == ""
