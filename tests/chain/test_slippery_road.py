@@ -28,15 +28,16 @@ HEADER = CampaignHeader(
 MEASURED = {"Fz": "Fz", "alpha": "slip_angle", "kappa": "slip_ratio", "Fy": "Fy"}
 
 
-def shown(conditions: Sequence[tuple[float, float, float]], day: int = 0) -> Observations:
-    """Two turns of strain at each load, slip angle and friction."""
+def shown(conditions: Sequence[tuple[float, ...]], day: int = 0) -> Observations:
+    """Two turns of strain at each load, slip angle and friction; a fourth number: slip ratio."""
     surface, parts, truths = read_surface(friction_surface()), [], []
     rng = np.random.default_rng([len(conditions), day])
-    for load, angle, friction in conditions:
-        at = np.array([load, angle, np.cos(angle) - 1.0, 0.0, SPEED, PRESSURE, friction])
+    for load, angle, friction, *slip in conditions:
+        rolls = slip[0] if slip else np.cos(angle) - 1.0
+        at = np.array([load, angle, rolls, 0.0, SPEED, PRESSURE, friction])
         answer = surface.answers(at[None])
         force = surface.forces_of(answer)[0]
-        omega = SPEED * np.cos(angle) / surface.rolling_radius(load, SPEED, PRESSURE)
+        omega = SPEED * (1.0 + rolls) / surface.rolling_radius(load, SPEED, PRESSURE)
         angles = -0.2 + omega * np.arange(int(4.6 * np.pi / omega * RATE)) / RATE
         phi = angles % (2.0 * np.pi) - np.pi
         strain = surface.strain(answer, phi, surface.waveform(answer)).T
@@ -174,3 +175,25 @@ def test_a_worn_tread_that_is_known_is_corrected_for(chain: Chain, seen: Observa
     assert angles[use & new["alpha"].valid & worn["alpha"].valid].all()
     for name in ("Fz", "kappa"):
         assert (worn[name].std > new[name].std)[use].all()
+
+
+def test_brake_and_drive_are_not_taken_for_a_slippery_road() -> None:
+    angles, loads = np.deg2rad(np.arange(-5.0, 6.0)), (1300.0, 2900.0, 4500.0, 6100.0, 7700.0)
+    rolling = [(load, a, DRY) for load in loads for a in angles]
+    driven = [
+        (load, np.deg2rad(a), DRY, slip)
+        for load in loads[1:4]
+        for a in (-4.0, 0.0, 4.0)
+        for slip in (-0.1, -0.03, 0.03, 0.1)
+    ]
+    own = shown(rolling + driven)
+    chain, _ = calibrate_chain(own, range(5))
+    known, unknown = told(chain, own)["alpha"], told(chain, own, friction=np.nan)["alpha"]
+    truth = own.truth["slip_angle"]
+    rows = own.usable & (np.abs(own.truth["slip_ratio"]) > 0.02)
+    assert rms((unknown.value - truth)[rows]) < 2.0 * rms((known.value - truth)[rows])
+    assert (unknown.std[rows] >= 0.99 * known.std[rows]).all()
+    # without a speed nobody knows whether the wheel is driven
+    still = told(chain, own, friction=np.nan, speed=np.nan)["alpha"]
+    far = rows & (np.abs(truth) > np.deg2rad(3.0))
+    assert (still.std[far] > LARGEST_ANGLE_STD).all()

@@ -29,7 +29,14 @@ from tirelib.estimators.laws import (
 )
 from tirelib.estimators.likeness import Likeness
 from tirelib.estimators.polynomial import Cloud, Polynomial, Range, all_inside
-from tirelib.estimators.sliding import FORCE_DOUBT, LOAD_DOUBT, MOMENT_DOUBT, SlidingCurve, Told
+from tirelib.estimators.sliding import (
+    FORCE_DOUBT,
+    FREE,
+    LOAD_DOUBT,
+    MOMENT_DOUBT,
+    SlidingCurve,
+    Told,
+)
 from tirelib.estimators.unknowns import BENT, CORNERING, EDGE, FORCE, LAW_DOUBT, Road
 
 LEAST_REACH = 0.01
@@ -280,7 +287,8 @@ class Chain:
                 moment, std = self.moment.predict(values)
                 moment = (moment / load - curve.camber[1] * camber) * side
                 doubt = np.hypot(curve.misfit, MOMENT_DOUBT * unseen * curve.largest)
-                std = np.hypot(std / load, doubt)
+                free = np.abs(values["slip_ratio"]) <= FREE  # not where it is unknown
+                std = np.where(free, np.hypot(std / load, doubt), np.inf)
             widest = max([known.high for known in self.guards["alpha"] if known.name == "alpha"]
                          or [WIDEST])  # fmt: skip
             told = told.where(known, curve.told(np.abs(used), moment, std, load, widest))

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from tirelib.arrays import FloatArray
-from tirelib.estimators.sliding import BRUSH, SlidingCurve
+from tirelib.estimators.sliding import BRUSH, FREE, SlidingCurve
 
 USUAL_FRICTION = (1.0, 0.1)
 """Friction of a calibration that does not say, and its standard deviation."""
@@ -16,8 +16,6 @@ FEWEST = 12
 LEAST_LOADS = 0.2
 """Spread of ln(load) above which c and q0 vary with the load; twice it: c quadratically."""
 LEAST_CAMBER = 0.02
-FREE = 0.02
-"""Slip ratio up to which a run counts as freely rolling."""
 
 
 def fit_sliding(

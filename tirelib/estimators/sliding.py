@@ -18,7 +18,8 @@ their ranges give t the density :math:`\propto [1 - (1 - t)^n]^{-2}`; beyond t =
 as a whole, u is the friction and the slip angle any larger one. This density, times the
 likelihood of the moment that was read from the strain, has the mean and the standard deviation
 that are told. Where the moment says nothing, the angle stays that of the calibrated road, and how
-far the mean lies from it is doubt.
+far the mean lies from it is doubt. So it is under brake and drive, whose force turns the contact
+too: the trail is that of a wheel that rolls freely.
 """
 
 from dataclasses import dataclass, fields
@@ -46,6 +47,8 @@ ROUGHER = 1.15
 NODES = 64
 WHOLE = 6
 """Slip angles that stand for those beyond full sliding."""
+FREE = 0.02
+"""Slip ratio up to which a wheel counts as freely rolling: the curve is fitted to such runs."""
 LEAST_UTILISATION = 1e-3
 STEEPEST = 0.1
 """Least 1 - t at which the slope d alpha / d u is taken."""
