@@ -90,7 +90,8 @@ def record(
     priority = realtime(None)
     reader = ReaderPlan(known.sources, reconnect, strain=rule.strain, apart=ordinary(priority),
                         estimated=False)  # fmt: skip
-    with LiveChain(LivePlan(reader, None, known.conditions, header, out, rule=rule)) as chain:
+    live = LivePlan(reader, None, known.conditions, header, out, rule=rule)
+    with LiveChain(live, click.echo) as chain:
         session = Session(chain, limits=Limits(duration, silence), watch=_alarm)
         click.echo(f"{chain.name} -> {out}")
         click.echo(at_start(out, reader, rule, watched=False))

@@ -202,7 +202,8 @@ def run(
             reader = ReaderPlan(known.sources, reconnect, numbers, recorded, every_turn,
                                 rule.strain, wait, ordinary(priority))  # fmt: skip
             chain = stack.enter_context(LiveChain(
-                LivePlan(reader, file, known.conditions, header, record, shown.anything, rule)
+                LivePlan(reader, file, known.conditions, header, record, shown.anything, rule),
+                lambda text: console.print(text, soft_wrap=True, markup=False),
             ))  # fmt: skip
             file_name = record or Path(time.strftime("tirebench-%Y%m%d-%H%M%S.mcap"))
             switch = RecordingSwitch(chain, file_name, started=record is not None)

@@ -33,6 +33,8 @@ from bench.wheels import MOST, Wheels
 
 START = 300.0
 """Processes that are not ready after so long do not start, even on a busy machine, [s]."""
+SAY = 5.0
+"""After so long it is said what is awaited, then again after twice the time, and so on, [s]."""
 TRIES = 3
 """So often the FMU may crash when it is loaded."""
 LOOK = 0.05
@@ -81,6 +83,12 @@ class LivePlan:
 class LiveChain:
     """The processes of a run; see `bench.session.Source`. A context manager that ends them.
 
+    Parameters
+    ----------
+    plan : LivePlan
+    say : callable, optional
+        Takes a sentence on what is awaited while the start takes long.
+
     Raises
     ------
     BenchError
@@ -89,12 +97,12 @@ class LiveChain:
 
     live = True
 
-    def __init__(self, plan: LivePlan) -> None:
+    def __init__(self, plan: LivePlan, say: Callable[[str], None] = lambda _: None) -> None:
         for source in plan.reader.sources:
             source.port.check()  # before all that takes time
         self.ended = self.message = ""
         self.jumps: list[Jump] = []
-        self._plan = plan
+        self._plan, self._say = plan, say
         self._slots = len(plan.reader.wheels) or MOST
         beside = SIZE if plan.laps else 0
         self._exchange = Exchange.create(CONTEXT, self._slots, beside, plan.reader.ports)
@@ -130,15 +138,16 @@ class LiveChain:
                 known = range(self._plan.reader.expected)
                 for slot in known:  # those of other wheels start when they are heard
                     self._start_estimator(slot)
-                self._wait(lambda: self._ready.issuperset(known))
-            self._wait(lambda: self.obeyed(Deadline.after(0.0)))
+                self._wait(lambda: self._ready.issuperset(known), self._loading)
+            self._wait(lambda: self.obeyed(Deadline.after(0.0)),
+                       lambda: f"the recorder to begin {self._plan.record}")  # fmt: skip
             # ports are opened last: from then on bytes come
             for number in range(self._plan.reader.ports):
                 self._start_port(number)
             self._reader = Kept(
                 read_port, lambda _: (self._plan.reader, self._exchange.address), stand_by=load
             )
-            self._wait(lambda: bool(self._state.name))
+            self._wait(lambda: bool(self._state.name), self._opening)
             gc.collect()
             gc.freeze()
         except BaseException:
@@ -303,9 +312,23 @@ class LiveChain:
 
         self._estimators[slot] = Kept(estimate, arguments)
 
-    def _wait(self, ready: Callable[[], bool]) -> None:
+    def _loading(self) -> str:
+        """Say which estimators are awaited."""
+        slots = [f"estimator {slot}" for slot in self._estimators if slot not in self._ready]
+        return f"{', '.join(slots)} to load {self._plan.file and self._plan.file.path}"
+
+    def _opening(self) -> str:
+        """Say which ports are awaited."""
+        states = [cell.get() for cell in self._exchange.ports]
+        opened = {n for n, state in enumerate(states) if state and pickle.loads(state).name}
+        sources = enumerate(self._plan.reader.sources)
+        ports = [source.port.port for n, source in sources if n not in opened]
+        return f"the reader to open {', '.join(ports)}" if ports else "the reader"
+
+    def _wait(self, ready: Callable[[], bool], awaited: Callable[[], str]) -> None:
         """Wait until the processes are so far."""
-        end = Deadline.after(START)
+        end, pause = Deadline.after(START), SAY
+        due = Deadline.after(pause)
         while not ready():
             woken(self._exchange.address.news, LOOK)
             self._pending.add(self._gather())
@@ -318,10 +341,14 @@ class LiveChain:
                 )
             if self._recorded.answer:
                 raise RecordingError(self._recorded.answer)
+            if due.expired:
+                self._say(f"waiting for: {awaited()}; Ctrl-C ends")
+                pause *= 2.0
+                due = Deadline.after(pause)
             if end.expired:
                 raise LinkTimeoutError(
-                    f"{self._plan.reader.sources[0].port.port}: the processes of the run are not "
-                    f"ready after {START:.0f} s; a machine with time for them is needed; try again"
+                    f"waited {START:.0f} s for: {awaited()}; a machine with time for it is needed; "
+                    "end other programs, then try again"
                 )
 
     def _gather(self) -> News:

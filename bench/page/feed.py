@@ -199,7 +199,9 @@ class Feed:
                 values = {name: x for name, x in values.items() if name not in OF_DECODED}
             changed += self._alarms.look(values, number, now)
         changed += [] if busy else self._unheard(now)
-        self._alarms.tell("busy", busy, now)  # the run writes these two into the recording
+        for number, said in self._source.wheels.contradicted.items():
+            self._alarms.tell(f"sample rate of wheel {number}", said, now)
+        self._alarms.tell("busy", busy, now)  # the run writes these into the recording
         self._alarms.tell("json", self._unwritten, now)
         recorded = chain.get("recording", {})
         free = recorded.get("free_bytes")

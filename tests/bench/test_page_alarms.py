@@ -194,6 +194,10 @@ def test_a_busy_machine_and_an_unwritten_file_are_alarms_and_the_transmitter_is_
         assert alarm_lines(state) == ["too busy", "a.json: the disk is full"]
         assert [event["state"] for event in noted] == ["on", "off"]  # of the silence
         raw["alarm"] = ""
+        source.wheels.heard[0].timeline._rate.contradiction = "wheel 0: another rate"
+        assert "wheel 0: another rate" in alarm_lines(feed.state())
+        source.wheels.heard[0].timeline._rate.contradiction = ""
+        feed._alarms.end(["sample rate of wheel 0"], None, time.time())
         feed.watch(News())
         active = [alarm["name"] for alarm in feed.state()["alarms"]["active"]]
         assert active == ["silence"]

@@ -8,7 +8,8 @@ import time
 from collections.abc import Callable, Iterator
 from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from mcap.reader import make_reader
@@ -20,7 +21,7 @@ from bench.decoder import SerialDecoder
 from bench.device import Device
 from bench.document import flags, turn_document
 from bench.emulator import write_script
-from bench.errors import DeviceError
+from bench.errors import DeviceError, LinkTimeoutError
 from bench.estimation import Estimation, News
 from bench.faults import Faults
 from bench.fmu_archive import read_fmu
@@ -348,4 +349,23 @@ def test_an_estimator_goes_on_behind_what_it_has_reported(tmp_path: Path) -> Non
     chain._drain(0, news)
     order = pickle.loads(chain._exchange.orders.read() or b"")
     assert order.what["event"] == "jump of the run"
+    chain._close()
+
+
+def test_a_start_that_takes_long_says_what_is_awaited(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing was started, so nothing gets ready."""
+    monkeypatch.setattr("bench.live.chain.SAY", 0.0)
+    monkeypatch.setattr("bench.live.chain.START", 0.0)
+    said: list[str] = []
+    chain = LiveChain(plan_of("p", None, tmp_path / "a.mcap"), said.append)
+    chain._estimators = dict.fromkeys(range(3), cast(Any, SimpleNamespace(starts=1, look=int)))
+    chain._ready = {1}
+    for awaited, text in ((chain._opening, "the reader to open p"),
+                          (chain._loading, "estimator 0, estimator 2 to load ")):  # fmt: skip
+        with pytest.raises(LinkTimeoutError, match=f"waited 0 s for: {text}"):
+            chain._wait(lambda: False, awaited)
+        assert said.pop().startswith(f"waiting for: {text}")
+    chain._estimators = {}
     chain._close()
