@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 from bench.chain import Turn
 from bench.deadline import Deadline
+from bench.errors import BenchError
 from bench.estimation import News
 from bench.wheels import Wheels
 
@@ -106,6 +107,8 @@ class Outcome:
         Turns so far, and those that may be used.
     turns : list of Turn
         In the order in which their bytes came; empty unless they are to be kept.
+    error : BenchError or None
+        What ended it after the first turn, to be raised when all is written (``error``).
     latency : deque of float, [s]
         Arrival of the bytes that ended a turn to its estimate; the last 10,000.
     """
@@ -115,6 +118,7 @@ class Outcome:
     count: int = 0
     valid: int = 0
     turns: list[Turn] = field(default_factory=list)
+    error: BenchError | None = None
     latency: deque[float] = field(default_factory=lambda: deque(maxlen=10_000))
 
 
@@ -171,8 +175,13 @@ class Session:
             elif self._silent():
                 outcome.reason = "silence"
             else:
-                self._note(self._source.poll(end.sooner(WAIT)))
-                continue
+                try:
+                    self._note(self._source.poll(end.sooner(WAIT)))
+                    continue
+                except BenchError as error:
+                    if not outcome.count:
+                        raise
+                    outcome.reason, outcome.error = "error", error
             break
         self._note(self._source.finish(outcome.reason))
         order = {wheel: place for place, wheel in enumerate(self._source.wheels.heard)}

@@ -235,6 +235,8 @@ def run(
             journal.finish(document(outcome.turns, known.conditions.runs, source.wheels,
                                     origin, calibration))  # fmt: skip
             console.print(f"written: {json_file}", soft_wrap=True)
+    if outcome.error is not None:
+        raise outcome.error
     good = outcome.valid > 0 and outcome.reason != "unplugged"
     context.exit(0 if good else 1)
 

@@ -27,6 +27,13 @@ class ReconnectingLink:
         Name of a port that may be away now: it is waited for.
     wait : float, [s]
         How long, where it was never open before; 0: it was, and `patience` holds.
+    forever : bool
+        After that it is not raised, but stands in `gone`, and the port is still tried.
+
+    Attributes
+    ----------
+    gone : str
+        What was to be raised, where it is tried forever; empty while there is patience.
 
     Raises
     ------
@@ -37,8 +44,16 @@ class ReconnectingLink:
     live = True
 
     def __init__(
-        self, open_link: Callable[[], Link], patience: float, away: str = "", *, wait: float = 0.0
+        self,
+        open_link: Callable[[], Link],
+        patience: float,
+        away: str = "",
+        *,
+        wait: float = 0.0,
+        forever: bool = False,
     ) -> None:
+        self.gone = ""
+        self._forever = forever
         self._open = open_link
         self._patience = patience
         self._link: Link | None = None
@@ -68,7 +83,7 @@ class ReconnectingLink:
         try:
             return self._link.receive(deadline)
         except UnpluggedError as error:
-            if self._patience <= 0.0:
+            if self._patience <= 0.0 and not self._forever:
                 raise
             self._lose(error)
             return Read(time.monotonic_ns(), b"", LOST)
@@ -108,7 +123,9 @@ class ReconnectingLink:
                 self._next = time.monotonic() + self._wait
             self._seen = there
             if time.monotonic() > self._given_up:
-                raise self._loss
+                if not self._forever:
+                    raise self._loss
+                self.gone = str(self._loss)
             if deadline.expired:
                 return Read(time.monotonic_ns(), b"")
             left = min(GLANCE, deadline.remaining, max(self._next - time.monotonic(), 0.0))
@@ -119,7 +136,7 @@ class ReconnectingLink:
             self._link = self._open()
         except LinkError:
             return False
-        self.name, self.encoding = self._link.name, self._link.encoding
+        self.name, self.encoding, self.gone = self._link.name, self._link.encoding, ""
         return True
 
     def _there(self) -> bool:

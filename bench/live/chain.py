@@ -124,6 +124,7 @@ class LiveChain:
         self._passing = False
         self._alarm = ""  # what the recorder has said last
         self._contradicted: set[int] = set()  # wheels of which was told
+        self._gone: dict[int, str] = {}  # sources that are given up, and why
 
     def __enter__(self) -> "LiveChain":
         try:
@@ -331,7 +332,8 @@ class LiveChain:
         due = Deadline.after(pause)
         while not ready():
             woken(self._exchange.address.news, LOOK)
-            self._pending.add(self._gather())
+            news = self._gather()  # first: it begins the pending news afresh
+            self._pending.add(news)
             self._look()
             if any(kept.starts > TRIES for kept in self._estimators.values()):
                 raise FmuError(
@@ -416,13 +418,26 @@ class LiveChain:
                 told = f"{said}; no turn of it is told" if self._plan.file else said
                 self._pending.alarms.append(told)
                 self.order("event", alarm_event("sample rate", told, on=True))
-        if state.error:
+        self._see_ports()
+        if state.error and not self._finished:
             kind, text = state.error
             raise getattr(errors, kind)(text)
         if self._recorded.error != self._alarm:
             self._alarm = self._recorded.error
             self._pending.alarms.append(self._alarm or RECORDED_AGAIN)
         self.ended, self.message = state.ended, state.message
+
+    def _see_ports(self) -> None:
+        """Tell of ports that are given up, and of those that are back; the others go on."""
+        for number, cell in enumerate(self._exchange.ports):
+            found = cell.get()
+            gone = "" if found is None else pickle.loads(found).gone
+            if gone != self._gone.get(number, ""):
+                self._gone[number] = gone
+                port = self._plan.reader.sources[number].port.port
+                said = f"{gone}; the port is still tried" if gone else f"{port}: it is back"
+                self._pending.alarms.append(said)
+                self.order("event", alarm_event(f"source {number}", said, on=bool(gone)))
 
     def _remove_empty(self) -> None:
         """Remove the recording of a run that did not begin, so that its name is free again."""

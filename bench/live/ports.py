@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from bench import errors
 from bench.deadline import Deadline
-from bench.errors import BenchError
+from bench.errors import BenchError, UnpluggedError
 from bench.links import RESUMED, Read
 from bench.links.opening import PortPlan
 from bench.links.reconnecting import ReconnectingLink
@@ -38,6 +38,8 @@ class PortState:
     overruns : int
     cpu : float, [s]
         Time that its process has used.
+    gone : str
+        Why it is given up, one of several that is still tried; empty if it is not.
     error : tuple of str
         Name of the class and text of an error that ends the run; empty without one.
     """
@@ -46,6 +48,7 @@ class PortState:
     ended: bool = False
     overruns: int = 0
     cpu: float = 0.0
+    gone: str = ""
     error: tuple[str, str] | tuple[()] = ()
 
 
@@ -61,7 +64,7 @@ def read_source(
     sender = _Sender(number, exchange, state)
     try:
         link = ReconnectingLink(port.open, patience, state.name or (port.port if wait else ""),
-                                wait=0.0 if again else wait)  # fmt: skip
+                                wait=0.0 if again else wait, forever=address.ports > 1)  # fmt: skip
         state.name = link.name
         if again:
             sender.send(Read(time.monotonic_ns(), b"", RESUMED, number))
@@ -94,8 +97,8 @@ class _Sender:
                 return
             if read.data or read.event:
                 self.send(read._replace(source=self._number))
-            if time.monotonic() > self._next_look:
-                self._next_look = time.monotonic() + 1.0
+            if time.monotonic() > self._next_look or self._state.gone != link.gone:
+                self._next_look, self._state.gone = time.monotonic() + 1.0, link.gone
                 self._state.overruns = link.overruns()
                 self.publish()
 
@@ -200,12 +203,17 @@ class GatheredLink:
         ------
         BenchError
             That ended one of them.
+        UnpluggedError
+            If all of them are given up.
         """
         states = self._look()
         for state, queue in zip(states, self._exchange.reads, strict=True):
             if state.error and not queue.waiting:
                 kind, text = state.error
                 raise getattr(errors, kind)(text)
+        waiting = any(queue.waiting for queue in self._exchange.reads)
+        if not waiting and all(state.gone for state in states):
+            raise UnpluggedError("; ".join(state.gone for state in states))
         return states
 
     def _look(self) -> list[PortState]:

@@ -3,11 +3,13 @@
 import os
 import pickle
 import signal
+import socket
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from threading import Event
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -44,11 +46,13 @@ from bench.protocols.user_map import parse_map
 from bench.rate_check import JUDGED
 from bench.recording import Recorder, Recording, RecordingHeader
 from bench.replay import ReplayChain
+from bench.session import Session
 from bench.setup_file import check_sources, read_setup
 from bench.source_plan import SourcePlan, wheels_of
 from bench.sources import recording_pieces
 from bench.wheels import Line, Wheels
 from tests.bench.campaigns import tiny_runs
+from tests.bench.in_process import FakeSource
 from tests.bench.programs import PATIENCE
 from tests.bench.servers import Server
 
@@ -307,6 +311,58 @@ def test_a_port_that_stays_away_is_told_after_what_it_brought(exchange: Exchange
     link._next_look = 0.0
     with pytest.raises(UnpluggedError, match="port 1: it went away"):
         link.receive(Deadline.after(1.0))
+
+
+def test_a_source_that_is_given_up_is_an_alarm_and_the_other_goes_on(tmp_path: Path) -> None:
+    more = Event()
+    held = Server(wire()[:20], lambda number: more.wait() if number > 9 else None)
+    away = socket.create_server(("127.0.0.1", 0))
+    url = f"tcp://127.0.0.1:{away.getsockname()[1]}"
+    away.close()  # nobody is there
+    sources = (SourcePlan(PortPlan(held.url)), SourcePlan(PortPlan(url), wheel=3))
+    plan = LivePlan(ReaderPlan(sources, 60.0, wait=0.1), None, Conditions.constant(),
+                    RecordingHeader({}, more=({},)), tmp_path / "a.mcap", laps=False)  # fmt: skip
+    news = News()
+    with LiveChain(plan) as chain:
+        gathered(chain, news, lambda: any(url in said for said in news.alarms))
+        assert not chain.ended
+        before = chain.wheels.line_counts(0).ok
+        more.set()
+        gathered(chain, news, lambda: chain.wheels.line_counts(0).ok > before)
+        chain.finish("stopped")
+    held.close()
+    with closing(Recording(tmp_path / "a.mcap")) as recording:
+        assert [read for read in recording.reads() if read.data]
+        assert recording.complete
+
+
+def test_an_error_after_the_first_turn_is_raised_when_all_is_written() -> None:
+    source: Any = FakeSource(0)
+    turn: Any = SimpleNamespace(wheel=0, valid=True, arrival=1)
+    coming = iter([News([turn])])
+
+    def poll(_: Deadline) -> News:
+        for news in coming:
+            return news
+        raise DeviceError("wheel 3 comes twice")
+
+    source.poll = poll
+    outcome = Session(source).run()
+    assert (outcome.reason, outcome.turns, str(outcome.error)) == (
+        "error", [turn], "wheel 3 comes twice")  # fmt: skip
+    with pytest.raises(DeviceError):
+        Session(source).run()
+
+
+def test_several_ports_are_unplugged_when_the_last_one_is_given_up(exchange: Exchange) -> None:
+    link = GatheredLink(exchange, {})
+    for number in range(2):
+        assert link.receive(Deadline.after(0.0)) is not None
+        gone = PortState(f"port {number}", gone=f"port {number}: it went away")
+        exchange.ports[number].put(pickle.dumps(gone, 5))
+        link._next_look = 0.0
+    with pytest.raises(UnpluggedError, match="port 0: it went away; port 1: it went away"):
+        link.receive(Deadline.after(0.0))
 
 
 def test_an_emulator_plays_one_source_of_several(tmp_path: Path) -> None:
