@@ -86,7 +86,7 @@ Exit code: 0 done, 1 unplugged or not one valid turn, 2 bad input. Ctrl-C ends i
 @click.option("--condition", "named", metavar="NAME=VALUE", multiple=True,
               help="Any condition by its name: friction=0.8, tread_depth=5 (mm).")  # fmt: skip
 @click.option("--conditions", "sidecar", metavar="F.json", type=FILE,
-              help="The three over time, as `emulate --conditions` writes them.")  # fmt: skip
+              help="Conditions over time, as `emulate --conditions` writes them.")  # fmt: skip
 @click.option("--device", "device_texts", metavar="[WHEEL=]D.toml", multiple=True,
               help="Scale and zero of the gages; one for all wheels, or for each.")  # fmt: skip
 @click.option("--wheel", "numbers", multiple=True, type=click.IntRange(0, 255),
