@@ -12,6 +12,7 @@ from tirelib.estimators.contact_length import contact_lengths
 from tirelib.estimators.doubt import doubt, with_moved
 from tirelib.estimators.reference_turn import ReferenceTurn
 from tirelib.estimators.regressors import compute_regressors
+from tirelib.estimators.unknowns import PLAUSIBLE
 from tirelib.features.extract import Features
 from tirelib.flags import INVALIDATING, TurnFlag
 from tirelib.signal.quality import UNUSABLE
@@ -231,6 +232,10 @@ class Calibration:
             notes[row].append("alpha_saturated")
         for row in np.flatnonzero(extrapolated & measured):
             notes[row].append("condition_extrapolated")
+        said = {name: getattr(features, name) for name in PLAUSIBLE}
+        for name, plausible in full.road.plausible(said).items():
+            for row in np.flatnonzero(measured & ~plausible):
+                notes[row].append(f"{name}_implausible")
         flags = flags | np.where(measured & ~in_range, int(TurnFlag.OUT_OF_RANGE), 0)
         flags = flags | np.where(other, int(TurnFlag.OTHER_TIRE), 0)
         bad = ~measured

@@ -165,7 +165,8 @@ class Chain:
         values = dict(regressors)
         n = values["contact_angle"].shape[0]
         values["speed_squared"] = values["speed"] ** 2
-        calibrated = self.laws.allowed(values)
+        plausible = np.logical_and.reduce(list(self.road.plausible(values).values()))
+        calibrated = self.laws.allowed(values) & plausible
         if self.cloud is not None:
             calibrated &= self.cloud.inside(values)
         result: dict[str, Estimate] = {}
@@ -187,7 +188,7 @@ class Chain:
             kappa = np.where(values["speed"] > 0.0, kappa, np.nan)
             std = np.abs(gain) * radius_std
             values["slip_ratio"] = kappa
-            valid = self._valid("kappa", values, kappa, std)
+            valid = self._valid("kappa", values, kappa, std) & plausible
             result["kappa"] = Estimate(kappa, std, valid)
         values["slip_size"] = np.abs(values["slip_ratio"])
         if self.force is not None:
@@ -274,7 +275,7 @@ class Chain:
         curve = self.sliding
         if curve is None:
             return None
-        camber, friction = np.nan_to_num(values["camber"]), values["friction"]
+        camber, friction = np.nan_to_num(values["camber"]), self.road.said(values, "friction")
         load = np.maximum(load, 1.0)
         used = -force / load - curve.camber[0] * camber
         side = np.where(used < 0.0, -1.0, 1.0)

@@ -30,7 +30,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.arrays import BoolArray, FloatArray
 
 Pair = tuple[float, float]
 
@@ -55,6 +55,13 @@ FORCE = 0.08
 LAW_DOUBT = 0.3
 """Relative standard deviation of a correction for a known tread."""
 TWO_SIGMA = 1.96
+PLAUSIBLE: Mapping[str, Pair] = {
+    "friction": (0.05, 1.6),
+    "tread_depth": (0.0005, 0.004),
+    "tread_temperature": (230.0, 400.0),
+}
+"""What can be said: wet ice to warm racing rubber; bare grooves to that much above the calibrated
+depth; a winter night to rubber that decays. Anything else is a wrong unit or a default of zero."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +80,19 @@ class Road:
         """Calibrated tread depth, [m]; that of a new tread where it is not known."""
         return (DEPTH[1], DEPTH[1]) if np.isnan(self.tread_depth[0]) else self.tread_depth
 
+    def plausible(self, values: Mapping[str, FloatArray]) -> dict[str, BoolArray]:
+        """Tell for each of the three which turns have a value that can be; unknown ones have."""
+        ends = dict(PLAUSIBLE)
+        ends["tread_depth"] = (ends["tread_depth"][0], self.depth[1] + ends["tread_depth"][1])
+        return {
+            name: np.asarray(~(values[name] < low) & ~(values[name] > high), dtype=np.bool_)
+            for name, (low, high) in ends.items()
+        }
+
+    def said(self, values: Mapping[str, FloatArray], name: str) -> FloatArray:
+        """Return friction, depth or temperature; NaN where it is unknown or cannot be."""
+        return np.where(self.plausible(values)[name], values[name], np.nan)
+
     def unseen_friction(self, reference: float) -> float:
         """Return which share of the way down to the lowest friction no data cover, 0 to 1."""
         lowest = reference if np.isnan(self.friction[0]) else self.friction[0]
@@ -83,7 +103,7 @@ class Road:
 
     def worn(self, values: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
         """Return the tread lost beyond what was calibrated and its standard deviation, [m]."""
-        depth = values["tread_depth"]
+        depth = self.said(values, "tread_depth")
         lost = -beyond(depth, self.depth)
         known = np.isfinite(lost)
         unknown = spread(beyond(np.linspace(*DEPTH, 81), self.depth))
@@ -91,11 +111,11 @@ class Road:
 
     def hardened(self, values: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
         """Return L, how much stiffer the tread is than calibrated, and its standard deviation."""
-        depth, low_high = values["tread_depth"], self.depth
+        depth, low_high = self.said(values, "tread_depth"), self.depth
         wear = -_log_height(depth, low_high)
         known = np.isfinite(wear)
         std = np.where(known, 0.0, spread(_log_height(np.linspace(*DEPTH, 81), low_high)))
-        warmer = beyond(values["tread_temperature"], self.tread_temperature)
+        warmer = beyond(self.said(values, "tread_temperature"), self.tread_temperature)
         told = np.isfinite(warmer)
         unknown = SOFTENING * spread(np.linspace(-TEMPERATURE, TEMPERATURE, 81))
         value = np.where(known, wear, 0.0) - np.where(told, SOFTENING * warmer, 0.0)

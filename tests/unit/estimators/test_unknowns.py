@@ -1,5 +1,7 @@
 """Friction, tread depth and tread temperature: declared unknowns."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,7 +11,10 @@ from tirelib.arrays import FloatArray
 from tirelib.estimators.calibration import LARGEST_ANGLE_STD
 from tirelib.estimators.fit_sliding import fit_sliding
 from tirelib.estimators.sliding import SlidingCurve
+from tirelib.estimators.train import Trained
 from tirelib.estimators.unknowns import DEPTH, FRICTION, TWO_SIGMA, Road, spread
+from tirelib.flags import TurnFlag
+from tirelib.observations import Observations
 
 CURVE = SlidingCurve(
     friction=0.95, sharpness=2.5, fading=1.8, stiffness=(2.5, -0.3), trail=(-3.6, 0.6),
@@ -134,3 +139,25 @@ def test_friction_that_was_calibrated_is_no_longer_unseen() -> None:
     assert Road().unseen_friction(0.95) == 1.0
     assert Road(friction=(0.3, 1.0)).unseen_friction(1.0) == 0.0
     assert 0.2 < Road(friction=(0.5, 0.95)).unseen_friction(0.95) < 0.7
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("friction", 0.0), ("friction", 100.0), ("tread_depth", 0.0), ("tread_depth", -0.0035),
+     ("tread_depth", 8.0), ("tread_temperature", 40.0)],
+)  # fmt: skip
+def test_a_friction_or_tread_that_cannot_be_is_named_and_nothing_is_valid(
+    trained: Trained, observed: Observations, name: str, value: float
+) -> None:
+    day = observed.features
+    found, unknown = (
+        trained.calibration.estimate(replace(day, **{name: np.full(len(day), x)}))  # type: ignore[arg-type]
+        for x in (value, np.nan)
+    )
+    rows = np.flatnonzero(unknown.turn_valid)
+    assert rows.size > 0
+    assert not any(valid.any() for valid in found.valid.values())
+    assert all(f"{name}_implausible" in found.notes[row] for row in rows)
+    assert (found.flags[rows] & int(TurnFlag.OUT_OF_RANGE) != 0).all()
+    for quantity in ("Fz", "Fy"):  # the numbers are those of an unknown value
+        np.testing.assert_allclose(found.value[quantity], unknown.value[quantity])
