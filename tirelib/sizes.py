@@ -2,8 +2,10 @@
 
 from collections.abc import Iterator, Mapping
 
-SAME_SIZE = 0.01
-"""Relative difference in a dimension up to which two headers may speak of one tire."""
+SAME_SIZE = {"free_radius": 0.01, "ring_radius": 0.01, "belt_width": 0.1, "innerliner_offset": 0.2}
+"""Relative difference in a dimension up to which two headers may speak of one tire: radii are known
+to a millimetre or two, a belt's width and the innerliner's depth are read off a cut. The tread's
+thickness is none of them: it wears."""
 
 
 def differing(
@@ -15,7 +17,9 @@ def differing(
     --------
     >>> list(differing({"free_radius": 0.3, "belt_width": 0.17}, {"free_radius": 0.33}))
     [('free_radius', 0.3, 0.33)]
+    >>> list(differing({"tread_thickness": 0.004}, {"tread_thickness": 0.008}))
+    []
     """
-    for name in sorted(set(one) & set(other)):
-        if abs(one[name] - other[name]) > SAME_SIZE * abs(other[name]):
+    for name in sorted(set(one) & set(other) & set(SAME_SIZE)):
+        if abs(one[name] - other[name]) > SAME_SIZE[name] * abs(other[name]):
             yield name, one[name], other[name]

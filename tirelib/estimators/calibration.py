@@ -168,9 +168,9 @@ class Calibration:
             part = {name: x[np.tile(rows, 3)] for name, x in part.items()}
             estimates, radii = chain.predict(part)
             many = int(rows.sum())
+            unlike[rows] = chain.unlike(part, estimates, features.angle_std[rows])
             part, radius[rows] = {name: x[:many] for name, x in part.items()}, radii[:many]
             traction[rows] = part["traction"]
-            unlike[rows] = chain.unlike(part, estimates)
             extrapolated[rows] = chain.laws.extrapolated(part) | (
                 chain.force_laws.extrapolated(part) if chain.has("Fy") else False
             )
@@ -242,7 +242,9 @@ class Calibration:
         for quantity in QUANTITIES:
             value[quantity] = np.where(bad, np.nan, value[quantity])
             std[quantity] = np.where(bad, np.nan, std[quantity])
-        length, length_std = contact_lengths(features.contact_angle, radius)
+        length, length_std = contact_lengths(
+            features.contact_angle, radius, features.angle_std
+        )
         return Estimates(
             value=value,
             std=std,

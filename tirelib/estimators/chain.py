@@ -20,6 +20,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
+from tirelib.estimators.doubt import moved_by
 from tirelib.estimators.laws import (
     CAMBER_DOUBT,
     RADIUS_DOUBT,
@@ -131,16 +132,27 @@ class Chain:
         return model[quantity] is not None
 
     def unlike(
-        self, regressors: Mapping[str, FloatArray], found: Mapping[str, Estimate]
+        self,
+        moved: Mapping[str, FloatArray],
+        found: Mapping[str, Estimate],
+        angle_std: FloatArray,
     ) -> BoolArray:
         """Tell which turns show strain that the calibrated tire does not, shape (n,).
 
-        `found` is what `predict` says of the same turns.
+        Parameters
+        ----------
+        moved : mapping of name to array, shape (3 n,)
+            Regressors of `tirelib.estimators.doubt.with_moved`.
+        found : mapping of quantity to Estimate
+            What `predict` says of the same turns.
+        angle_std : array, shape (n,), [1]
         """
-        n = regressors["omega"].shape[0]
+        n = angle_std.size
         if self.likeness is None:
             return np.zeros(n, dtype=np.bool_)
-        values = {**regressors, "speed_squared": regressors["speed"] ** 2}
+        every = {**moved, "speed_squared": moved["speed"] ** 2}
+        moves = moved_by(self.likeness.rest(every), angle_std)
+        values = {name: x[:n] for name, x in every.items()}
         sliding = None
         if {"Fz", "Fy"} <= set(found):
             load, force = (found[quantity].value[:n] for quantity in ("Fz", "Fy"))
@@ -149,7 +161,8 @@ class Chain:
             slid = self._slid(at, force, load)
             if slid is not None:  # where no slip angle fits, any share may slide
                 sliding = np.where(force > 0.0, -1.0, 1.0) * np.nan_to_num(slid.sliding, nan=1.0)
-        apart = self.likeness.apart(values, self.laws, self.road.hardened(values), sliding)
+        tread = self.road.hardened(values)
+        apart = self.likeness.apart(values, self.laws, tread, sliding, moves)
         return np.asarray(apart > self.likeness.limit, dtype=np.bool_)
 
     def predict(

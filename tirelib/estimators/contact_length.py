@@ -23,7 +23,9 @@ SHORT_STD, SHORT_WIDTH = 0.04, 0.15
 """... and what a short one adds at an angle of 0, falling by e over this angle, [rad]."""
 
 
-def contact_lengths(angle: FloatArray, radius: FloatArray) -> tuple[FloatArray, FloatArray]:
+def contact_lengths(
+    angle: FloatArray, radius: FloatArray, angle_std: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Return corrected contact lengths and their standard deviation, each shape (n, g), [m].
 
     Parameters
@@ -32,13 +34,16 @@ def contact_lengths(angle: FloatArray, radius: FloatArray) -> tuple[FloatArray, 
         Contact angles read at the gages.
     radius : array, shape (n,), [m]
         Effective rolling radius.
+    angle_std : array, shape (n,), [1]
+        Relative standard deviation of the turn's angles.
 
     Examples
     --------
-    >>> length, std = contact_lengths(np.array([[0.4]]), np.array([0.31]))
+    >>> length, std = contact_lengths(np.array([[0.4]]), np.array([0.31]), np.zeros(1))
     >>> float(length[0, 0].round(4)), float(std[0, 0].round(4))
     (0.1398, 0.0025)
     """
     true = angle + BIAS / (1.0 + np.exp((MIDDLE - angle) / WIDTH))
-    std = np.hypot(LEAST_STD, SHORT_STD * np.exp(-angle / SHORT_WIDTH))
+    read = np.hypot(LEAST_STD, SHORT_STD * np.exp(-angle / SHORT_WIDTH))
+    std = np.hypot(read, angle * angle_std[:, None])
     return true * radius[:, None], std * radius[:, None]

@@ -38,14 +38,24 @@ def with_moved(features: Features) -> Features:
     return Features(lateral=features.lateral, **joined)
 
 
-def doubt(value: FloatArray, angle_std: FloatArray) -> FloatArray:
-    """Return the standard deviation that angle and offset leave, shape (n,).
+def moved_by(value: FloatArray, angle_std: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return what one standard deviation of the angle, and of the offset, moves a value by.
 
     Parameters
     ----------
-    value : array, shape (3 n,)
-        What is estimated from `with_moved`.
+    value : array, shape (3 n, ...)
+        Of `with_moved`.
     angle_std : array, shape (n,), [1]
+
+    Returns
+    -------
+    by angle, by offset : arrays, shape (n, ...)
     """
-    here, longer, higher = value.reshape(3, -1)
-    return np.hypot((longer - here) / ANGLE_STEP * angle_std, higher - here)
+    here, longer, higher = value.reshape(3, -1, *value.shape[1:])
+    share = angle_std.reshape(-1, *(1,) * (value.ndim - 1)) / ANGLE_STEP
+    return (longer - here) * share, higher - here
+
+
+def doubt(value: FloatArray, angle_std: FloatArray) -> FloatArray:
+    """Return the standard deviation that angle and offset leave, shape (n,); as `moved_by`."""
+    return np.hypot(*moved_by(value, angle_std))

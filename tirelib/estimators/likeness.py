@@ -16,11 +16,12 @@ Pressures and speeds that were not calibrated shift the regressors by `DRIFT`, a
 show it. The shift with pressure is taken off, and as much is doubt; of that with speed tires
 agree less: twice its size is doubt. A tread that is stiffer than calibrated and a larger share of
 it that slides shift the regressors by `ROAD_DRIFT`: all together, so K has one direction for each,
-as wide as `tirelib.estimators.unknowns` leaves it. Where a regressor that says where a turn lies
-is beyond its calibrated range, nobody knows what the tire looks like. Predicting needs numpy only.
+as wide as `tirelib.estimators.unknowns` leaves it; an uncertain wheel angle and offset of the turn
+itself have one each. Where a regressor that says where a turn lies is beyond its calibrated range,
+nobody knows what the tire looks like. Predicting needs numpy only.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -114,6 +115,7 @@ class Likeness:
         laws: ConditionLaws,
         tread: tuple[FloatArray, FloatArray] | None = None,
         sliding: FloatArray | None = None,
+        moves: Sequence[FloatArray] = (),
     ) -> FloatArray:
         """Return D^2 of each turn, shape (n,); NaN where it cannot be told.
 
@@ -126,6 +128,8 @@ class Likeness:
             How much stiffer the tread is than calibrated, L, and its standard deviation.
         sliding : shape (n,), optional
             Standard deviation of the sliding share, with the sign of the slip angle.
+        moves : sequence of arrays, shape (n, m)
+            What one standard deviation of an uncertain angle or offset adds to `rest`.
         """
         pressure, unknown = laws.pressure_departure(values)
         speed = laws.speed_departure(values)
@@ -143,6 +147,8 @@ class Likeness:
             odd = np.array([name in ODD for name in self.names])
             side = np.where(odd, np.sign(sliding)[:, None], 1.0)
             spread = spread + _along(np.abs(sliding)[:, None] * side * with_sliding)
+        for move in moves:
+            spread = spread + move[:, :, None] * move[:, None, :]
         found = np.linalg.solve(spread, rest[:, :, None])[..., 0]
         within = [np.abs(v.standardise(values[v.name])) <= EDGE for v in self.variables]
         square = np.sum(rest * found, axis=1) / len(self.names)
