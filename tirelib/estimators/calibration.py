@@ -242,9 +242,7 @@ class Calibration:
         for quantity in QUANTITIES:
             value[quantity] = np.where(bad, np.nan, value[quantity])
             std[quantity] = np.where(bad, np.nan, std[quantity])
-        length, length_std = contact_lengths(
-            features.contact_angle, radius, features.angle_std
-        )
+        length, length_std = contact_lengths(features.contact_angle, radius, features.angle_std)
         return Estimates(
             value=value,
             std=std,

@@ -93,7 +93,13 @@ class AngleLaw:
 
 
 def angle_law(
-    middle: float, turn: float, ahead: float, courses: Mapping[str, Course | None], past: Past
+    middle: float,
+    turn: float,
+    ahead: float,
+    courses: Mapping[str, Course | None],
+    past: Past,
+    *,
+    unknown: float = 0.0,
 ) -> AngleLaw:
     """Return the law of one turn.
 
@@ -107,6 +113,9 @@ def angle_law(
         Of `SOURCES`, as far as they are known.
     past : Past
         From the law of the preceding turn; empty if there is none.
+    unknown : float, [1]
+        Relative standard deviation of the rate at the contact over the turn's mean where nothing
+        tells it: no source, and no turn before.
     """
     known = [courses.get(name) for name in SOURCES]
     means = [np.nan if course is None else course.mean for course in known]
@@ -118,12 +127,16 @@ def angle_law(
             shape, fit_std, row = course.shape, course.std, index
             break
     slope, slope_std = _followed(past, 1 + row, turn)
+    if len(past) == 1 and all(course is None for course in known):
+        slope_std = unknown
     rate = np.convolve(shape, (1.0 + 0.5 * slope, slope))
     rate /= rate @ _means(rate.size)
     if not _steady_enough(rate, ahead / turn):
         rate, fit_std = np.ones(1), 1.0
     contact_rate = float(rate[0]) / turn
     slip, slip_std, late = _slip(known, *_followed(past, _SPEED, turn), slope_std)
+    if not 1.0 / LARGEST_RATIO < slip < LARGEST_RATIO:
+        slip, slip_std, fit_std = 1.0, 1.0, 1.0
     whole = 2.0 * np.pi * rate / np.arange(1, rate.size + 1)
     return AngleLaw(
         middle=middle,

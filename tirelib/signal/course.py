@@ -118,11 +118,13 @@ def _alike(left: FloatArray, lag: int) -> float:
     """Return how many values in a row count as one, from what a fit leaves of them.
 
     Noise leaves values that know nothing of each other; a course that no cubic follows leaves
-    waves. With the correlation r of neighbours, `lag` apart, (1 + r) / (1 - r) of them tell as much
-    as one (M. S. Bartlett, J. R. Stat. Soc. 98, 1935). Fewer than one are not believed.
+    waves. Each value stands `lag` times in a row, whose mean is looked at: steps of a held value are
+    no waves. With the correlation r of neighbours, (1 + r) / (1 - r) of them tell as much as
+    one (M. S. Bartlett, J. R. Stat. Soc. 98, 1935). Fewer than one are not believed.
     """
-    square = float(left @ left)
-    product = float(left[lag:] @ left[:-lag])
+    value = left[: left.size // lag * lag].reshape(-1, lag).mean(axis=1)
+    square = float(value @ value)
+    product = float(value[1:] @ value[:-1])
     correlation = product / square if square > 0.0 else 0.0
     return max((1.0 + correlation) / (1.0 - correlation), 1.0)
 

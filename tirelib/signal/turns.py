@@ -49,6 +49,12 @@ MISSED_RATIO = 1.5
 """A turn with a gap that lasts this many times the one before has hidden a contact in it."""
 LARGEST_ANGLE_STD = 0.02
 """Relative uncertainty of the wheel angle's scale beyond which a turn is `accelerating`."""
+USUAL_ACCELERATION = 2.0
+"""Standard deviation of a vehicle's acceleration of which nothing is known, [m/s^2]: comfortable
+braking and accelerating (AASHTO, Green Book, takes 3.4 as what nine of ten drivers exceed when they
+have to stop)."""
+CIRCUMFERENCE = 2.0
+"""Way of a turn, [m], with which an acceleration becomes a change of the turn rate."""
 LONGEST_TURN = 3.0
 """A turn that lasts longer is standstill, [s]."""
 
@@ -202,7 +208,11 @@ class TurnCutter:
             )
             for name in SOURCES
         }
-        law = angle_law(contact.middle, turn, stop - contact.middle, told, self._past)
+        seconds = turn / self.rate
+        law = angle_law(
+            contact.middle, turn, stop - contact.middle, told, self._past,
+            unknown=USUAL_ACCELERATION * seconds**2 / (2.0 * CIRCUMFERENCE),
+        )  # fmt: skip
         unseen = unseen_change(
             told["speed"], turn / self.rate, _pulse(contact, law), _pulse(before, law)
         )

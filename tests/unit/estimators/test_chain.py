@@ -186,7 +186,7 @@ def test_a_contact_length_is_the_corrected_angle_times_the_rolling_radius(
 ) -> None:
     features = features_of()
     found = trained.calibration.estimate(features)
-    length, std = contact_lengths(features.contact_angle, found.radius)
+    length, std = contact_lengths(features.contact_angle, found.radius, features.angle_std)
     np.testing.assert_array_equal(found.contact_length, length)
     np.testing.assert_array_equal(found.contact_length_std, std)
     read = features.contact_angle[1:] * found.radius[1:, None]

@@ -13,6 +13,7 @@ from tirelib.campaign import Campaign
 from tirelib.errors import CalibrationError
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
+from tirelib.estimators.doubt import ANGLE_STEP, with_moved
 from tirelib.estimators.likeness import ROAD_DRIFT
 from tirelib.estimators.mixed import strangers
 from tirelib.estimators.regressors import ODD, compute_regressors
@@ -93,6 +94,34 @@ def test_a_tire_of_other_dimensions_is_refused(trained: Trained) -> None:
         same_tire([first, wider])
 
 
+def test_a_worn_tread_and_a_width_read_off_a_cut_are_the_same_tire(trained: Trained) -> None:
+    size = trained.calibration.geometry
+    told = {
+        "tread_thickness": 0.5 * size["tread_thickness"],
+        "belt_width": 1.02 * size["belt_width"],
+    }
+    trained.calibration.check_layout("made-up tire", LATERAL, "here", told)
+
+
+def test_an_uncertain_wheel_angle_is_no_other_tire(trained: Trained) -> None:
+    features = measure_run(synthetic_run(0), header())[0]
+    longer = with_moved(features)
+    n = len(features)
+    scale = 0.03 / ANGLE_STEP  # the angles of every turn 3 % too long
+
+    def stretched(name: str) -> np.ndarray:
+        values = getattr(longer, name)
+        return np.asarray(values[:n] + scale * (values[n : 2 * n] - values[:n]))
+
+    names = ("lead", "trail", "cp1_angle", "cp2_angle", "tp_angle", "rate_lead", "rate_trail",
+             "e_vertical", "skew")  # fmt: skip
+    strange = replace(features, **{name: stretched(name) for name in names})
+    known = trained.calibration.estimate(strange)
+    doubtful = trained.calibration.estimate(replace(strange, angle_std=np.full(n, 0.03)))
+    assert flagged(known).sum() > 0
+    assert not flagged(doubtful).any()
+
+
 def test_too_few_conditions_say_nothing_of_the_tire(observed: Observations) -> None:
     from tirelib.estimators.calibrate import calibrate_chain
     from tirelib.estimators.train import take
@@ -139,10 +168,14 @@ def test_a_worn_tread_and_a_sliding_one_are_not_another_tire(
             apart = likeness.apart(at, chain.laws, tread, sliding)
             return float(np.mean(apart[np.isfinite(apart)] > likeness.limit))
 
+        def distance(sliding: FloatArray, at: Regressors = moved) -> float:
+            return float(np.nanmean(likeness.apart(at, chain.laws, (none, none), sliding)))
+
         assert unlike((none, none), none) > 0.9  # where the road is known
         if column == 0:
             assert unlike((none, harder), none) < 0.1
             assert unlike((harder, none), none) < 0.1
         else:
             assert unlike((none, none), flip * harder) < 0.1
-            assert unlike((none, none), -flip * harder) > 0.1  # slid to the other side
+            # slid to the other side it lies further off
+            assert distance(-flip * harder) > 1.05 * distance(flip * harder)

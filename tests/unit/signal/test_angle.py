@@ -186,3 +186,18 @@ def test_a_held_value_is_taken_at_the_time_of_its_measurement() -> None:
     assert found is not None
     assert found.shape[0] == pytest.approx(20.0, rel=3e-4)  # 20.04 as if measured when held
     assert found.mean == pytest.approx(20.0 + 8.0 * 500.0 / RATE, rel=3e-4)
+
+
+def test_a_first_turn_of_which_nothing_is_known_has_the_doubt_of_an_acceleration() -> None:
+    first = angle_law(1000.0, 1000.0, 50.0, {}, (), unknown=0.01)
+    assert first.std == pytest.approx(0.01)
+    second = angle_law(2000.0, 1000.0, 50.0, {}, first.past, unknown=0.01)
+    assert second.std == 0.0
+
+
+def test_a_slip_ratio_that_cannot_be_followed_is_all_doubt() -> None:
+    known = course(np.full(1001, 20.0), -950.0, 950.0)
+    past = ((0.0, np.nan, 1.0, 1e-3), (1000.0, np.nan, 0.3, 1e-3))
+    law = angle_law(2500.0, 1000.0, 50.0, {"speed": known}, past)
+    assert law.speed > 0.0
+    assert (law.std, law.slip_std) == (1.0, 1.0)
