@@ -118,8 +118,8 @@ def _alike(left: FloatArray, lag: int) -> float:
     """Return how many values in a row count as one, from what a fit leaves of them.
 
     Noise leaves values that know nothing of each other; a course that no cubic follows leaves
-    waves. Each value stands `lag` times in a row, whose mean is looked at: steps of a held value are
-    no waves. With the correlation r of neighbours, (1 + r) / (1 - r) of them tell as much as
+    waves. Each value stands `lag` times in a row, whose mean is looked at: the steps of a held one
+    are no waves. With the correlation r of neighbours, (1 + r) / (1 - r) of them tell as much as
     one (M. S. Bartlett, J. R. Stat. Soc. 98, 1935). Fewer than one are not believed.
     """
     value = left[: left.size // lag * lag].reshape(-1, lag).mean(axis=1)
