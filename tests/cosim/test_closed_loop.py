@@ -95,7 +95,7 @@ def test_a_wheel_that_slips_out_of_what_can_be_told_comes_back() -> None:
     """On a split road the left wheels pass the calibrated slip; held there they would lock."""
     with FourWheels(fmus.virtual(), fmus.strain(), start_angles=closed_loop.STARTS[0]) as four:
         run = closed_loop.brake(closed_loop.ROADS[3], Strain(four), end_speed=24.5)
-    assert run.kappa[:, 2].min() < -0.08
+    assert run.kappa[:, 2].min() < -0.075  # calibrated to -0.07, with a margin of 0.003
     assert run.kappa[run.time > 0.4].min() > -0.1
     assert run.kappa[-1, 2] > -0.06
 
