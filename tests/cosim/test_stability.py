@@ -73,8 +73,8 @@ def runs() -> dict[str, StabilityOutcome]:
 
 
 @pytest.mark.xfail(
-    reason="on a road whose friction nobody tells, the slip angle's interval is too wide to act on: "
-    "the stored calibration was made before friction was a declared unknown"
+    reason="on a road whose friction nobody tells, the slip angle's interval is too wide to act "
+    "on: the stored calibration was made before friction was a declared unknown"
 )
 def test_with_strain_tires_the_rear_axle_is_held_as_with_the_truth(
     runs: dict[str, StabilityOutcome],
