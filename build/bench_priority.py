@@ -30,6 +30,7 @@ from bench.protocols.layouts import RAW16
 from bench.protocols.plan import ProtocolPlan
 from bench.recording_header import RecordingHeader
 from bench.source_plan import SourcePlan
+from tirelib.threads import one_thread
 
 FIFO = 16 * 1024
 
@@ -112,4 +113,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

@@ -32,6 +32,7 @@ from bench.recording_header import RecordingHeader
 from bench.transmitter import transmitter
 from bench.wheels import Wheels
 from tirelib.campaign import read_campaign
+from tirelib.threads import one_thread
 
 READ, CHUNK = 0.004, 0.25
 """What a read brings and what a chunk holds, [s]."""
@@ -131,4 +132,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

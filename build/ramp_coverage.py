@@ -25,6 +25,7 @@ from tirelib.estimators.train import train
 from tirelib.estimators.unknowns import TWO_SIGMA
 from tirelib.observations import measure_run, observe
 from tirelib.signal import LowPass
+from tirelib.threads import one_thread
 
 KMH, LOADS = 1.0 / 3.6, (3000.0, 4800.0, 6600.0)
 STRAIGHT = Plan(
@@ -117,4 +118,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

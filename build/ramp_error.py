@@ -24,6 +24,7 @@ from tirelib.fmu.virtual.surface import read_surface
 from tirelib.fmu.virtual.wheel import VirtualWheel
 from tirelib.signal import LowPass, cut_turns, slip, turns
 from tirelib.signal.angle import angle_law
+from tirelib.threads import one_thread
 
 ROOT = Path(__file__).parents[1]
 RATE, SAMPLES = 1e4, 20
@@ -184,6 +185,7 @@ def _step(change: dict[str, tuple[float, float]], at: float, t: float) -> dict[s
 
 
 if __name__ == "__main__":
-    slips()
-    steps()
-    draw()
+    with one_thread():
+        slips()
+        steps()
+        draw()

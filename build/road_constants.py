@@ -28,6 +28,7 @@ from tirelib.estimators.likeness import DRIFT
 from tirelib.estimators.regressors import ODD, compute_regressors
 from tirelib.estimators.result import EDGE_UNIT
 from tirelib.observations import Observations, mean_by, observe
+from tirelib.threads import one_thread
 
 TRIED: tuple[tuple[ModuleType, str, str], ...] = (
     (chain, "EDGE", "Fz"), (unknowns, "UNDER_GROOVES", "Fz"), (unknowns, "SOFTENING", "Fz"),
@@ -178,4 +179,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

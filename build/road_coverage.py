@@ -29,6 +29,7 @@ from tirelib.estimators.train import train
 from tirelib.estimators.unknowns import DEPTH, FRICTION, TWO_SIGMA
 from tirelib.observations import ROAD, Observations, observe
 from tirelib.report.style import BLUE, ORANGE, new_figure, save, styled
+from tirelib.threads import one_thread
 
 BANDS: Mapping[str, tuple[tuple[float, float], ...]] = {
     "friction": ((0.3, 0.5), (0.5, 0.7), (0.7, 0.9), (0.9, 1.1)),
@@ -173,4 +174,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

@@ -212,6 +212,7 @@ def test_a_busy_machine_is_an_alarm_of_the_recording_when_it_begins_and_when_it_
         line=SimpleNamespace(get=lambda: pickle.dumps(state)),
         recorded=SimpleNamespace(get=lambda: None),
         orders=SimpleNamespace(put=lambda order: orders.append(pickle.loads(order)) or True),
+        ports={},
     ))  # fmt: skip
     for state.passing in (True, True, False):
         chain._see()

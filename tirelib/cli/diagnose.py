@@ -126,8 +126,8 @@ def explains_forces(quantity: str | None, campaign: Campaign, file: "TireFile") 
             f"{header.name}: it has no strain gages; look at its forces: --quantity "
             f"{', '.join(QUANTITIES[1:])}"
         )
-    only_strain = bool(header.gage_lateral) and all(map(is_straight, campaign.plans))
-    if quantity == "strain" or (quantity is None and only_strain):
+    on_strain = quantity in ("strain", None) and bool(header.gage_lateral) and bool(file.missing)
+    if on_strain and (quantity == "strain" or all(map(is_straight, campaign.plans))):
         needs_ring(campaign, file)
     if quantity is None:
         return not header.gage_lateral or bool(file.missing)

@@ -1,6 +1,6 @@
 """Adding an effect, removing it, and going back."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -66,7 +66,8 @@ def test_the_model_file_holds_values_effect_and_history_and_comes_back_equal(
     done, file = added()
     write_tire(file, tmp_path / "M2.toml", "tirelib-model/1")
     back = read_tire(tmp_path / "M2.toml")
-    assert back.tire == file.tire
+    # a number in its usual unit comes back to one rounding
+    assert asdict(back.tire) == pytest.approx(asdict(file.tire), rel=4e-16)
     assert back.tire.bending_stiffness == pytest.approx(done.after.values["bending_stiffness"])
     (entry,) = back.extra["effects"]
     assert entry == {
