@@ -50,9 +50,8 @@ MISSED_RATIO = 1.5
 LARGEST_ANGLE_STD = 0.02
 """Relative uncertainty of the wheel angle's scale beyond which a turn is `accelerating`."""
 USUAL_ACCELERATION = 2.0
-"""Standard deviation of a vehicle's acceleration of which nothing is known, [m/s^2]: comfortable
-braking and accelerating (AASHTO, Green Book, takes 3.4 as what nine of ten drivers exceed when they
-have to stop)."""
+"""Standard deviation of a vehicle's acceleration of which nothing is known, [m/s^2]: assumed, as
+ordinary braking and accelerating; half and double were not studied."""
 CIRCUMFERENCE = 2.0
 """Way of a turn, [m], with which an acceleration becomes a change of the turn rate."""
 LONGEST_TURN = 3.0
