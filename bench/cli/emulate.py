@@ -156,7 +156,7 @@ def emulate(
             _announce(port_file, sink.path)
             stack.callback(_withdraw, port_file, sink.path)
         try:
-            with on_stop(_interrupt):
+            with on_stop():
                 sink.wait_for_reader(Deadline.after(patience))
                 if after is not None:
                     _wait_for(after)
@@ -187,10 +187,6 @@ def emulate(
             "faults": dict(faults.done), "unplugged": getattr(sink, "unplugged", 0),
         })  # fmt: skip
     context.exit(1 if tally.unheard and replug is None else 0)
-
-
-def _interrupt() -> None:
-    raise KeyboardInterrupt
 
 
 def _wait_for(file: Path) -> None:

@@ -9,7 +9,7 @@ from bench.cli.given import given_live, live_sources
 from bench.cli.live import counters
 from bench.cli.options import PORTS, devices_of, port_options
 from bench.cli.recording import at_start, recording_options
-from bench.cli.stop import on_stop
+from bench.cli.stop import start_in_order
 from bench.conditions import read_conditions
 from bench.document import line_document, wheel_document
 from bench.estimation import News
@@ -91,13 +91,13 @@ def record(
     reader = ReaderPlan(known.sources, reconnect, strain=rule.strain, apart=ordinary(priority),
                         estimated=False)  # fmt: skip
     live = LivePlan(reader, None, known.conditions, header, out, rule=rule)
-    with LiveChain(live, click.echo) as chain:
+    with start_in_order() as stop, LiveChain(live, click.echo) as chain:
         session = Session(chain, limits=Limits(duration, silence), watch=_alarm)
+        stop.action = session.stop
         click.echo(f"{chain.name} -> {out}")
         click.echo(at_start(out, reader, rule, watched=False))
         click.echo(f"priority: {priority}")
-        with on_stop(session.stop):
-            outcome = session.run()
+        outcome = session.run()
         wheels, recorded, counts = chain.wheels, chain.recorded.bytes, chain.counts()
     if outcome.message:
         click.echo(f"unplugged: {outcome.message}")

@@ -23,7 +23,7 @@ from bench.cli.live import Screen, counters
 from bench.cli.options import PORTS, devices_of, port_options
 from bench.cli.page import Shown, page_choice, page_options
 from bench.cli.recording import at_start, recording_options
-from bench.cli.stop import on_stop
+from bench.cli.stop import start_in_order
 from bench.document import document
 from bench.estimation import Estimation, News
 from bench.fmu_archive import read_fmu
@@ -171,7 +171,7 @@ def run(
     conditions = conditions_of(options, named, sidecar)
     console.print(f"FMU {fmu_file}, sha256 {archive.sha256}", soft_wrap=True)
     console.print(f"FMU {check_trust(archive, trust=trust)}", soft_wrap=True)
-    with ExitStack() as stack:
+    with start_in_order() as stop, ExitStack() as stack:
         file = stack.enter_context(FmuFile(archive))
         link = None if replay is None else stack.enter_context(ReplayLink(replay, pace))
         if link is None:
@@ -226,6 +226,7 @@ def run(
             stack.callback(journal.close)
         limits = Limits(duration, silence, turns)
         session = Session(source, limits=limits, keep=json_file is not None)
+        stop.action = session.stop
         outcome, used = _session(session, source, console, bridges, shown, journal, switch)
         _summary(console, outcome, source, used, link, switch)
         if journal is not None:
@@ -286,8 +287,7 @@ def _session(
 
         session.watch = watch
         start = time.monotonic(), _cpu_time(source, shown)
-        with on_stop(session.stop):
-            outcome = session.run()
+        outcome = session.run()
         spent = _cpu_time(source, shown) - start[1]
         used = spent / max(time.monotonic() - start[0], 1e-9)
         shown.end(outcome.reason)

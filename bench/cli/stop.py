@@ -9,7 +9,10 @@ import stat
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from types import FrameType
+
+import click
 
 STOPS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 """Windows has no SIGHUP."""
@@ -28,22 +31,66 @@ def silence() -> None:
             continue
 
 
-@contextmanager
-def on_stop(action: Callable[[], None]) -> Iterator[None]:
-    """Call `action` at the first Ctrl-C, SIGTERM or SIGHUP; a second Ctrl-C interrupts as usual.
+def interrupt() -> None:
+    """Interrupt whatever goes on, so that it removes what it has made."""
+    raise KeyboardInterrupt
 
-    After SIGHUP nobody reads what is said: it goes nowhere, instead of ending the program.
+
+@dataclass(slots=True)
+class Stop:
+    """What the first Ctrl-C, SIGTERM or SIGHUP does.
+
+    Attributes
+    ----------
+    action : callable
+        It may be replaced while the program goes on.
     """
 
+    action: Callable[[], None]
+
+
+@contextmanager
+def on_stop(action: Callable[[], None] = interrupt) -> Iterator[Stop]:
+    """Call the action at the first Ctrl-C, SIGTERM or SIGHUP; a second Ctrl-C interrupts as usual.
+
+    Whatever else comes after the first one is ignored, because the end is on its way. After SIGHUP
+    nobody reads what is said: it goes nowhere, instead of ending the program.
+    """
+    stop, stopped = Stop(action), False
+
     def handle(number: int, frame: FrameType | None) -> None:
+        nonlocal stopped
         signal.signal(signal.SIGINT, signal.default_int_handler)
         if number == getattr(signal, "SIGHUP", None):
             silence()
-        action()
+        if not stopped:
+            stopped = True
+            stop.action()
 
     before = {number: signal.signal(number, handle) for number in STOPS}
     try:
-        yield
+        yield stop
     finally:
         for number, old in before.items():
             signal.signal(number, old)
+
+
+@contextmanager
+def start_in_order() -> Iterator[Stop]:
+    """Let a program that is stopped while it starts remove what it has made, and say so.
+
+    Once it has begun, its `action` says what stops it.
+
+    Raises
+    ------
+    click.exceptions.Exit
+        With code 1, if it was stopped while it started.
+    """
+    with on_stop() as stop:
+        try:
+            yield stop
+        except KeyboardInterrupt:
+            if stop.action is not interrupt:
+                raise
+            click.echo("stopped while it started; nothing was read", err=True)
+            raise click.exceptions.Exit(1) from None

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import TracebackType
 from typing import Any
 
 from bench import errors
@@ -151,14 +152,18 @@ class LiveChain:
             self._wait(lambda: bool(self._state.name), self._opening)
             gc.collect()
             gc.freeze()
-        except BaseException:
-            self._close()
-            self._remove_empty()
+        except BaseException as error:
+            self._close(error)
             raise
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self._close()
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._close(error)
 
     @property
     def name(self) -> str:
@@ -439,18 +444,25 @@ class LiveChain:
                 self._pending.alarms.append(said)
                 self.order("event", alarm_event(f"source {number}", said, on=bool(gone)))
 
-    def _remove_empty(self) -> None:
-        """Remove the recording of a run that did not begin, so that its name is free again."""
-        file, begun = self._plan.record, self._orders and not self._recorded.answer
-        if file is not None and begun and self._recorded.done and not self._recorded.bytes:
-            file.unlink(missing_ok=True)
-
-    def _close(self) -> None:
-        """End what still runs and give the memory back."""
+    def _close(self, error: BaseException | None = None) -> None:
+        """End what still runs and give the memory back; `error` is what ends the run, if any."""
         self._exchange.set(STOP)
         self._exchange.set(FINISH)
         if not self._finished:
-            self.order("close", "the run ended with an error")
+            interrupted = isinstance(error, KeyboardInterrupt)
+            self.order("close", "stopped" if interrupted else "the run ended with an error")
+        loading = [self._estimators[slot] for slot in self._estimators.keys() - self._ready]
         for kept in self._processes().values():
-            kept.wait(AT_ONCE)
+            patience = LEAVE if kept is self._recorder else AT_ONCE
+            kept.wait(0.0 if kept in loading else patience)  # one that loads hears nothing
+        if not self._finished:
+            self._remove_empty()
         self._exchange.close()
+
+    def _remove_empty(self) -> None:
+        """Remove the recording of a run that did not begin, so that its name is free again."""
+        recorded = self._exchange.recorded.get()
+        state = self._recorded if recorded is None else pickle.loads(recorded)
+        file, begun = self._plan.record, self._orders and not state.answer
+        if file is not None and begun and state.done and not state.bytes:
+            file.unlink(missing_ok=True)

@@ -41,10 +41,10 @@ def calibration(tmp_path_factory: pytest.TempPathFactory) -> Calibration:
     return train(observe([read_campaign(folder)])).calibration
 
 
-def build_toy(folder: Path, samples: int) -> Path:
+def build_toy(folder: Path, samples: int, source: Path = TOY) -> Path:
     """Build the toy with k samples a step; the module name must differ within one process."""
     script = folder / f"toy_slave_{samples}.py"
-    text = TOY.read_text().replace("SAMPLES = 16", f"SAMPLES = {samples}")
+    text = source.read_text().replace("SAMPLES = 16", f"SAMPLES = {samples}")
     script.write_text(text.replace("ToyTire", f"ToyTire{samples}"))
     FmuBuilder.build_FMU(script, dest=folder)
     return folder / f"ToyTire{samples}.fmu"

@@ -4,9 +4,6 @@ import errno
 import json
 import os
 import shutil
-import signal
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +11,6 @@ import pytest
 
 from bench.chain import Turn
 from bench.cli import program
-from bench.cli.stop import on_stop
 from bench.conditions import Conditions
 from bench.document import turn_document
 from bench.errors import RecordingError
@@ -153,42 +149,3 @@ def test_a_path_that_cannot_be_written_is_refused_and_a_pipe_gets_the_document_a
     journal.add(TURNS)
     journal.finish({})
     assert Path(os.devnull).is_char_device()
-
-
-@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="this system has no SIGHUP")
-def test_a_terminal_that_closes_ends_a_run_in_order() -> None:
-    stopped = []
-    with on_stop(lambda: stopped.append(1)):
-        os.kill(os.getpid(), signal.SIGHUP)
-    assert stopped == [1]
-
-
-ON_A_TERMINAL = """
-import fcntl, sys, termios, time
-from pathlib import Path
-from bench.cli.stop import on_stop
-fcntl.ioctl(0, termios.TIOCSCTTY, 0)
-stopped = []
-with on_stop(lambda: stopped.append(1)):
-    print("ready", flush=True)
-    while not stopped:
-        time.sleep(0.01)
-print("ended", flush=True)
-Path(sys.argv[1]).write_text("in order")
-"""
-
-
-@pytest.mark.skipif(not hasattr(os, "openpty"), reason="this system has no pseudo-terminals")
-def test_what_is_said_to_a_terminal_that_closed_ends_nothing(tmp_path: Path) -> None:
-    master, slave = os.openpty()
-    command = [sys.executable, "-c", ON_A_TERMINAL, str(tmp_path / "done")]
-    process = subprocess.Popen(
-        command, stdin=slave, stdout=slave, stderr=slave, start_new_session=True
-    )
-    os.close(slave)
-    said = b""
-    while b"ready" not in said:
-        said += os.read(master, 100)
-    os.close(master)
-    assert process.wait() == 0
-    assert (tmp_path / "done").read_text() == "in order"

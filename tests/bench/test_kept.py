@@ -18,8 +18,11 @@ from tests.bench.programs import PATIENCE
 
 
 def tell(news: Any, number: int) -> None:
-    """Say who it is and what it had loaded before, and wait."""
-    news.put((number, os.getpid(), os.environ.get("LOADED", "")))
+    """Say who it is and what it had loaded before, and wait.
+
+    Through a pipe, without a lock: who is killed as soon as it was heard would keep it.
+    """
+    news.send((number, os.getpid(), os.environ.get("LOADED", "")))
     time.sleep(PATIENCE)
 
 
@@ -40,11 +43,12 @@ def until(true: Callable[[], bool], kept: Kept) -> None:
 def told(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Any, Kept]]:
     """What processes say, and one of them with another that stands by at once."""
     monkeypatch.setattr(kept_module, "STAND_BY", 0.0)
-    news = CONTEXT.SimpleQueue()
-    kept = Kept(tell, lambda starts: (news, starts), stand_by=load)
-    yield news, kept
-    kept.wait(0.0)
-    assert not kept.alive
+    news, telling = CONTEXT.Pipe(duplex=False)
+    kept = Kept(tell, lambda starts: (telling, starts), stand_by=load)
+    with news, telling:
+        yield news, kept
+        kept.wait(0.0)
+        assert not kept.alive
 
 
 def test_one_that_stands_by_takes_over_and_gets_a_successor(told: tuple[Any, Kept]) -> None:
@@ -53,16 +57,16 @@ def test_one_that_stands_by_takes_over_and_gets_a_successor(told: tuple[Any, Kep
     assert kept._spare_begun <= kept._started  # before there is anything to lose
     spares = []
     for number in (1, 2, 3):
-        until(lambda: not news.empty(), kept)
-        assert news.get() == (number, kept.process_id, str(number) if number > 1 else "")
+        until(news.poll, kept)
+        assert news.recv() == (number, kept.process_id, str(number) if number > 1 else "")
         assert kept.starts == number
         until(lambda: kept._spare_alive, kept)
         spares.append(kept._spare.pid)
         os.kill(kept.process_id or 0, signal.SIGKILL)
         until(lambda before=number: kept.starts > before, kept)
         assert kept.process_id == spares[-1]
-    until(lambda: not news.empty(), kept)
-    assert news.get() == (4, spares[-1], "4")
+    until(news.poll, kept)
+    assert news.recv() == (4, spares[-1], "4")
 
 
 def test_where_the_one_that_stands_by_has_died_a_new_one_is_started(
@@ -70,14 +74,14 @@ def test_where_the_one_that_stands_by_has_died_a_new_one_is_started(
 ) -> None:
     news, kept = told
     monkeypatch.setattr(kept_module, "LIVED", PATIENCE)
-    until(lambda: not news.empty(), kept)
-    assert news.get()[0] == 1
+    until(news.poll, kept)
+    assert news.recv()[0] == 1
     spare = kept._spare
     os.kill(spare.pid, signal.SIGKILL)
     spare.join()
     os.kill(kept.process_id or 0, signal.SIGKILL)
-    until(lambda: not news.empty(), kept)
-    assert news.get() == (2, kept.process_id, "")
+    until(news.poll, kept)
+    assert news.recv() == (2, kept.process_id, "")
     assert kept._spare is spare  # not missed at once: what ends it may end others too
     monkeypatch.setattr(kept_module, "LIVED", 0.0)
     until(lambda: kept._spare_alive, kept)
