@@ -13,6 +13,10 @@ BASELINE = 32
 microseconds or milliseconds is not blamed for its rounding."""
 JUDGED = 4 * BASELINE
 """Frames after which the rate is judged, again and again (0.2 s of SERIAL v1 at 10 kHz)."""
+LONGEST_WAIT = 4 * JUDGED
+"""A wheel that begins anew again and again, before it can be judged, is waited for so many frames;
+half of it would tell turns of a wheel whose first frames are broken off twice, double would keep
+twice as many in memory."""
 TOLERANCE = 0.005
 """What passes makes a slip ratio wrong by as much. A quartz is a hundred times better; half of it
 would refuse a clock of whole milliseconds (`BASELINE` frames of 2.56 ms leave 0.3 %), double would
@@ -37,15 +41,23 @@ class RateCheck:
     ----------
     contradiction : str
         What the clock shows and what to correct; empty while both agree. It stays.
+    judged : bool
+        Whether what came since the last restart was judged, or was waited for in vain.
     """
 
     def __init__(self, said_by: str = PERIOD) -> None:
         self.contradiction = ""
         self._said_by = said_by
+        self._unjudged = 0  # frames since the last judgement
         self.restart()
 
     def restart(self) -> None:
         """Forget what came: the clock or the period is another from here on."""
+        self.judged = False
+        self._collect()
+
+    def _collect(self) -> None:
+        """Collect frames for the next judgement."""
         self._seq = self._samples = -1
         self._places, self._times = array("q"), array("q")
 
@@ -66,7 +78,11 @@ class RateCheck:
             self._times.append(time)
             if len(self._places) == JUDGED:
                 self._judge(wheel, int(frames.period[0]))
-                self.restart()
+                self.judged, self._unjudged = True, 0
+                self._collect()
+            elif not self.judged:
+                self._unjudged += 1
+                self.judged = self._unjudged >= LONGEST_WAIT
 
     def _judge(self, wheel: int, period: int) -> None:
         places, times = self._places, self._times

@@ -5,6 +5,7 @@ from typing import Any
 
 from bench.deadline import Deadline
 from bench.estimation import Estimation, News, skipped
+from bench.judged import JudgedTurns
 from bench.links import BACK, DECODED, PASSED, RESUMED, Link
 from bench.wheels import Wheels
 
@@ -32,6 +33,7 @@ class ReplayChain:
         self._link = link
         self._passing = False
         self._estimation = estimation
+        self._judged = JudgedTurns()
 
     def poll(self, deadline: Deadline) -> News:
         """Return what the next read brings."""
@@ -50,13 +52,14 @@ class ReplayChain:
         known = self.wheels.contradicted
         blocks = self.wheels.push(read.data, read.arrival, read.source)
         news = self._estimation.take(self.wheels.agreeing(blocks))
+        news.turns = self._judged.take(news.turns, self.wheels)
         news.alarms += [text for n, text in self.wheels.contradicted.items() if n not in known]
         return news
 
     def finish(self, reason: str) -> News:
         """Step what is left."""
-        news, wrong = self._estimation.finish(), self.wheels.contradicted
-        news.turns = [turn for turn in news.turns if turn.wheel not in wrong]
+        news = self._estimation.finish()
+        news.turns = self._judged.take(news.turns, self.wheels, end=True)
         return news
 
     def counts(self) -> dict[str, Any]:

@@ -229,6 +229,11 @@ class Timeline:
         return self._rate.contradiction
 
     @property
+    def judged(self) -> bool:
+        """Whether the rate was held against the clock since the segment began."""
+        return self._rate.judged
+
+    @property
     def device(self) -> Device:
         """What the counts of the wheel mean."""
         return self._device

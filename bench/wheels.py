@@ -265,6 +265,11 @@ class Wheels:
         said = {number: wheel.timeline.contradiction for number, wheel in self.heard.items()}
         return {number: text for number, text in said.items() if text}
 
+    @property
+    def judged(self) -> set[int]:
+        """Wheels whose sample rate was held against their clock."""
+        return {number for number, wheel in self.heard.items() if wheel.timeline.judged}
+
     def agreeing(self, blocks: Sequence[Block]) -> list[Block]:
         """Return the blocks of wheels whose clock agrees with their rate: those may be estimated.
 

@@ -19,6 +19,7 @@ from bench.document import turn_document
 from bench.errors import FmuError, LinkTimeoutError, RecordingError
 from bench.estimation import News, skipped
 from bench.fmu_model import FmuFile
+from bench.judged import JudgedTurns
 from bench.live.estimator import EstimatorPlan, Report, estimate
 from bench.live.exchange import FINISH, STOP, Exchange, woken
 from bench.live.kept import CONTEXT, Kept
@@ -123,6 +124,7 @@ class LiveChain:
         self._estimators: dict[int, Kept] = {}
         self._finished = False
         self._passing = False
+        self._judged = JudgedTurns()
         self._alarm = ""  # what the recorder has said last
         self._contradicted: set[int] = set()  # wheels of which was told
         self._gone: dict[int, str] = {}  # sources that are given up, and why
@@ -245,7 +247,7 @@ class LiveChain:
         """
         while True:
             woken(self._exchange.address.news, min(deadline.remaining, LOOK))
-            news = self._gather()
+            news = self._judge(self._gather())
             if time.monotonic() >= self._next_look:
                 self._look()
             if news or deadline.expired or self.ended:
@@ -282,9 +284,10 @@ class LiveChain:
             woken(self._exchange.address.news, LOOK)
             if came := self._gather():
                 end = Deadline.after(PATIENCE)
-                news.add(came)
+                news.add(self._judge(came))
             for slot in self._estimators.keys() - self._done:
                 self._estimators[slot].look()
+        news.add(self._judge(self._gather(), end=True))
         self.order("close", reason)
         if self._recorder is not None:
             self.obeyed(Deadline.after(PATIENCE))
@@ -365,21 +368,25 @@ class LiveChain:
             self._drain(slot, news)
         return news
 
+    def _judge(self, news: News, *, end: bool = False) -> News:
+        """Let turns be told, and recorded, once the rate of their wheel is judged."""
+        news.turns = self._judged.take(news.turns, self.wheels, end=end)
+        now = time.monotonic_ns()
+        news.latency = [1e-9 * (now - turn.arrival) for turn in news.turns]
+        for turn in news.turns if self._recorder is not None else ():
+            document = json.dumps(turn_document(turn)).encode()
+            self._exchange.results.put(pickle.dumps((turn.wheel, turn.arrival, document), 5))
+        return news
+
     def _drain(self, slot: int, news: News) -> None:
-        queue, now = self._exchange.news[slot], time.monotonic_ns()
+        queue = self._exchange.news[slot]
         while (message := queue.read()) is not None:
             report: Report = pickle.loads(message)
             queue.take()
             self._cursors[slot] = report.cursor
             self._cpu[slot] = report.cpu
             self._turns[slot] += len(report.news.turns)
-            wrong = self.wheels.contradicted
-            report.news.turns = [turn for turn in report.news.turns if turn.wheel not in wrong]
-            report.news.latency = [1e-9 * (now - turn.arrival) for turn in report.news.turns]
             news.add(report.news)
-            for turn in report.news.turns if self._recorder is not None else ():
-                document = json.dumps(turn_document(turn)).encode()
-                self._exchange.results.put(pickle.dumps((turn.wheel, turn.arrival, document), 5))
             for jump in report.news.jumps:
                 self.jumps.append(jump)
                 path = self._recorded.path
@@ -398,11 +405,12 @@ class LiveChain:
         """Look after the processes, and at the line."""
         self._next_look = time.monotonic() + LOOK
         self._see()
-        for kept in self._processes().values():
+        for kept in () if self._finished else self._processes().values():
             if self._state.ended and (kept is self._reader or kept in self._ports):
                 continue
             kept.look()
-        for slot in range(len(self._estimators), min(len(self.wheels.heard), self._slots)):
+        wheels = 0 if self._finished else min(len(self.wheels.heard), self._slots)
+        for slot in range(len(self._estimators), wheels):
             self._start_estimator(slot)
 
     def _see(self) -> None:

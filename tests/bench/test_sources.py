@@ -18,6 +18,7 @@ from click.testing import CliRunner
 from rich.console import Console
 
 from bench.can_batch import same_kind
+from bench.chain import Turn
 from bench.cli import program
 from bench.cli.given import given_replayed
 from bench.conditions import Conditions
@@ -55,6 +56,7 @@ from tests.bench.campaigns import tiny_runs
 from tests.bench.in_process import FakeSource
 from tests.bench.programs import PATIENCE
 from tests.bench.servers import Server
+from tests.bench.test_processes import Turns
 
 VEHICLE = """
 format = "tirebench-map/1"
@@ -232,6 +234,37 @@ def test_a_wheel_with_a_wrong_rate_gets_no_estimates_and_the_others_do() -> None
     blocks = alone.push(b"".join(wrong_clock()), 1)
     with pytest.raises(DeviceError, match="9709 samples a second"):
         alone.agreeing(blocks)
+
+
+class Reads:
+    """Two sources that bring a frame each in turn, then nothing any more."""
+
+    name, live = "reads", False
+
+    def __init__(self, *sources: list[bytes]) -> None:
+        both = (Read(n, one[n], "", s) for n in range(len(sources[0])) for s, one in
+                enumerate(sources))  # fmt: skip
+        self._reads = iter(both)
+
+    def receive(self, deadline: Deadline) -> Read | None:
+        return next(self._reads, None)
+
+
+@pytest.mark.parametrize("frames", [JUDGED - 1, 3 * JUDGED])
+def test_no_turn_of_a_wheel_is_told_before_its_rate_is_judged_and_none_is_lost(frames: int) -> None:
+    good = encode(strain_frames(np.zeros((16 * frames, 5), np.int16), period=1000, wheel=1))
+    wheels = Wheels([Line(SerialDecoder(), {}), Line(SerialDecoder(), {})])
+    link: Any = Reads(wrong_clock(frames), good)
+    chain = ReplayChain(link, wheels, Estimation(lambda _: Turns(), Conditions.constant()))
+    told: list[Turn] = []
+    while not chain.ended:
+        news = chain.poll(Deadline.never())
+        told += news.turns
+        assert not told or wheels.judged == {0, 1}
+    told += chain.finish("end").turns
+    judged = frames >= JUDGED
+    assert [turn.wheel for turn in told].count(1) == 16 * frames // 1000
+    assert [turn.wheel for turn in told].count(0) == (0 if judged else 16 * frames // 1000)
 
 
 def test_a_port_of_several_that_is_killed_is_read_again(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 from collections import deque
 from dataclasses import replace
-from itertools import chain
+from itertools import chain, pairwise
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from bench.decoder import SerialDecoder
 from bench.device import Device
 from bench.frames import FrameFlag, Frames, encode, select, strain_frames
-from bench.rate_check import JUDGED
+from bench.rate_check import JUDGED, LONGEST_WAIT
 from bench.timeline import LATE, Samples, Timeline
 
 PERIOD = 1000  # ticks: 10 kHz
@@ -177,6 +177,23 @@ def test_a_clock_that_contradicts_the_period_is_found(
     said = timeline.contradiction
     assert f"{1e4 / (1.0 + error):.0f} samples a second, 10000 were said" in said
     assert "correct `period` in the transmitter's SERIAL v1 frames" in said
+
+
+def test_a_rate_is_judged_anew_after_each_start_and_is_not_waited_for_without_end() -> None:
+    """Here the wheel begins anew every 100 frames, before it can be judged again."""
+    begun, timeline, judged = JUDGED + 5, Timeline(Device()), []
+    for number in range(begun + LONGEST_WAIT + 150):
+        reset = number >= begun and (number - begun) % 100 == 0
+        frame = line_of(1, seq=number, t_us=1600 * number)
+        timeline.push(replace(frame, flags=np.array([FrameFlag.TIME_RESET * reset])))
+        judged.append(timeline.judged)
+    waited = begun + LONGEST_WAIT - 1
+    assert [now for now, then in pairwise(judged) if now != then] == [
+        False, True, False,
+    ]  # fmt: skip
+    assert [judged.index(True), judged.index(False, JUDGED), judged.index(True, begun)] == [
+        JUDGED - 1, begun, waited,
+    ]  # fmt: skip
 
 
 @given(
