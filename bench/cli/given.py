@@ -27,7 +27,8 @@ LOOK = 0.05
 _OPTIONS = {"speed": "--speed KMH, ", "pressure": "--pressure BAR, ", "camber": "--camber DEG, "}
 _WITHOUT = {"speed": "there will be no slip ratio",
             "pressure": "standard deviations are wider by what pressure does",
-            "camber": "the standard deviation of Fy is wider by what camber does"}  # fmt: skip
+            "camber": "standard deviations of Fy and alpha are wider by what camber does, and "
+                      "turns that owe most of theirs to it say camber_unknown"}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,7 @@
 """The main job through the command line: answers, files, exit codes, messages."""
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -63,6 +64,8 @@ def test_estimate_writes_the_contract(place: Path) -> None:
         assert set(entry) >= {"rmse", "unit", "r2", "n", "rmse_percent_of_range"}
         assert entry["unit"] == unit
         assert entry["n"] == 35
+    assert document["not_given"] == []
+    assert "was not given" not in done.stdout
     turn = next(turn for turn in document["turns"] if turn["valid"])
     assert set(turn) >= {"run", "t", "Fz", "Fz_std", "alpha", "alpha_std", "kappa", "kappa_std",
                          "Fy", "Fy_std", "valid", "flags"}  # fmt: skip
@@ -75,6 +78,23 @@ def test_estimate_writes_the_contract(place: Path) -> None:
     for turn in document["turns"]:
         if turn["valid"]:
             assert turn["Fz"] == pytest.approx(plans[turn["run"]].load, abs=6 * turn["Fz_std"])
+
+
+def test_the_condition_that_costs_most_is_named(place: Path, tmp_path: Path) -> None:
+    shutil.copytree(place / "day2", tmp_path / "day2")
+    plan = tmp_path / "day2" / "runs.csv"
+    pd.read_csv(plan).drop(columns="tread_depth_mm").to_csv(plan, index=False)
+    done = run("estimate", tmp_path / "day2", "--calibration", place / "cal.toml", "--json",
+               tmp_path / "e.json")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    rows = json.loads((tmp_path / "e.json").read_text())["not_given"]
+    (load,) = (row for row in rows if row["quantity"] == "Fz")
+    assert (load["condition"], load["column"]) == ("tread_depth", "tread_depth_mm")
+    assert load["std"] > 2.0 * load["std_if_given"]
+    said = " ".join(done.stdout.split())
+    assert "The tread depth was not given: the standard deviation of" in said
+    assert f"of Fz is {load['std']:.3g} N instead of {load['std_if_given']:.3g} N" in said
+    assert "(column tread_depth_mm of runs.csv" in said
 
 
 def test_a_quantity_without_calibration_is_null(place: Path, tmp_path: Path) -> None:

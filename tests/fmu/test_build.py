@@ -54,6 +54,15 @@ def test_inputs_and_outputs_are_those_of_the_contract(samples: int) -> None:
     assert float(description.defaultExperiment.stepSize) == samples / live.RATE
 
 
+def test_friction_and_tread_end_where_the_library_ends_them() -> None:
+    file = live.fmu_file(1)
+    ends = embedded_calibration(file).chains[-1].road.ends
+    found = {v.name: (v.min, v.max) for v in read_model_description(str(file)).modelVariables}
+    assert set(ends) == {"friction", "tread_depth", "tread_temperature"}
+    for name, pair in ends.items():
+        assert tuple(map(float, found[name])) == pytest.approx(pair, rel=1e-12), name
+
+
 @pytest.mark.parametrize("file", [live.fmu_file, virtual_host.file])
 def test_every_real_has_a_unit_and_display_units_convert_as_the_library_does(
     file: Callable[[int], Path],

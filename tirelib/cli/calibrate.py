@@ -22,9 +22,11 @@ from tirelib.cli.common import (
     write_json,
 )
 from tirelib.cli.features import make_low_pass
+from tirelib.cli.limits import not_checked, not_given
 from tirelib.errors import CalibrationError
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.estimators.chain import QUANTITIES
+from tirelib.estimators.costs import costs_of
 from tirelib.estimators.crossval import (
     FACTOR,
     REPORT_UNIT,
@@ -34,7 +36,7 @@ from tirelib.estimators.crossval import (
 )
 from tirelib.estimators.dissertation import SMALL_ANGLE, Regression
 from tirelib.estimators.mixed import strangers
-from tirelib.estimators.result import VARIED
+from tirelib.estimators.result import VARIED, cost_rows
 from tirelib.estimators.train import Trained, train
 from tirelib.estimators.typical import typical_turn
 from tirelib.observations import Observations, observe
@@ -99,6 +101,9 @@ def calibrate(
             f"that the tire of {odd['of']} does not (one in a thousand would by chance); look "
             "whether both are of one tire in one state, else calibrate them apart"
         )
+    for sentence in (not_given(document["not_given"]), *not_checked(trained.calibration)):
+        if sentence:
+            console.print(sentence)
     console.print(f"written: {target}")
     if json_file is not None:
         write_json(json_file, document)
@@ -131,7 +136,8 @@ def statistics(
     held_out: tuple[HeldOut, ...],
 ) -> dict[str, Any]:
     """Return everything a reader may want to know of a calibration."""
-    links = trained.links
+    links, features = trained.links, observations.features
+    costs = costs_of(trained.calibration, features, trained.calibration.estimate(features))
     in_use: dict[str, Any] = {}
     for quantity in QUANTITIES:
         if quantity not in links.held_out:
@@ -168,6 +174,8 @@ def statistics(
             for c in campaigns
         ],
         "other_tire": [asdict(odd) for odd in strangers(observations)],
+        "checks_other_tire": trained.calibration.knows_tire,
+        "not_given": cost_rows(costs),
         "turns": len(observations),
         "usable_turns": int(observations.usable.sum()),
         "in_use": in_use,

@@ -17,8 +17,11 @@ from tirelib.cli.common import (
     progress_bar,
     write_json,
 )
+from tirelib.cli.limits import not_checked, not_given
 from tirelib.errors import CalibrationError
+from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration
+from tirelib.estimators.costs import costs_of
 from tirelib.estimators.result import estimate_document
 from tirelib.observations import geometry_of, observe
 from tirelib.signal import LowPass
@@ -29,7 +32,9 @@ Example:
 
 \b
 JSON: N, deg, kappa without unit, ISO 8855 axes; null where a quantity has no calibration or
-cannot be told. Exit code 1: not one turn is valid, or the tire is probably another one.
+cannot be estimated; not_given: what conditions that nobody gave cost; other_tire null: the
+calibration cannot notice another tire. Exit code 1: not one turn is valid, or the tire is probably
+another one.
 """
 
 
@@ -64,9 +69,10 @@ def estimate(
     with progress_bar("reading", len(campaign.plans)) as progress:
         observations = observe([campaign], low_pass=low_pass, progress=progress)
     estimates = calibration.estimate(observations.features)
-    document = estimate_document(observations, estimates, calibration)
+    costs = costs_of(calibration, observations.features, estimates)
+    document = estimate_document(observations, estimates, calibration, costs)
     console = output()
-    valid = print_document(campaign.header.name, document)
+    print_document(campaign.header.name, document, calibration)
     if json_file is not None:
         write_json(json_file, document)
         console.print(f"written: {json_file}")
@@ -75,11 +81,18 @@ def estimate(
 
         page = write_estimate_report(observations, estimates, calibration, report)
         console.print(f"written: {page}")
-    context.exit(0 if valid and not document["other_tire"]["suspected"] else 1)
+    context.exit(exit_code(document))
 
 
-def print_document(name: str, document: dict[str, Any]) -> int:
-    """Print the summary and the flags of an estimate document; return the number of valid turns."""
+def exit_code(document: dict[str, Any]) -> int:
+    """Return 1 where not one turn is valid or the tire is probably another one, else 0."""
+    other = document["other_tire"]
+    valid = any(turn["valid"] for turn in document["turns"])
+    return 0 if valid and not (other and other["suspected"]) else 1
+
+
+def print_document(name: str, document: dict[str, Any], calibration: Calibration) -> None:
+    """Print summary, flags and limits of an estimate document."""
     console = output()
     turns = document["turns"]
     valid = sum(bool(turn["valid"]) for turn in turns)
@@ -92,13 +105,15 @@ def print_document(name: str, document: dict[str, Any]) -> int:
     for flag, count in sorted(counts.items(), key=lambda item: -item[1]):
         console.print(f"  {count:5d} turns flagged {flag}")
     other = document["other_tire"]
-    if other["suspected"]:
+    if other and other["suspected"]:
         console.print(
             f"another tire? {other['turns']} of {other['judged']} turns in range show strain that "
             f"the calibrated {document['tire']!r} does not (one in a thousand would by chance); "
             "look whether this tire is on the wheel, worn or soft; else calibrate anew"
         )
-    return valid
+    for sentence in (not_given(document["not_given"]), *not_checked(calibration)):
+        if sentence:
+            console.print(sentence)
 
 
 def _summary_table(summary: dict[str, Any]) -> Table:

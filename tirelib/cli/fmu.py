@@ -16,13 +16,16 @@ from tirelib.cli.common import (
     progress_bar,
     write_json,
 )
-from tirelib.cli.estimate import print_document
+from tirelib.cli.estimate import exit_code, print_document
 from tirelib.cli.fmu_virtual import virtual
 from tirelib.errors import FormatError
+from tirelib.estimators.costs import costs_of
 from tirelib.estimators.result import estimate_document
 from tirelib.fmu.build import DEFAULT_RATE, build_fmu, embedded_calibration
 from tirelib.fmu.check import check_fmu
 from tirelib.fmu.run import LoadedFmu, play_campaign
+from tirelib.observations import observe
+from tirelib.signal import LowPass
 
 _GROUP = """\b
 Examples:
@@ -115,12 +118,15 @@ def run(context: click.Context, file: Path, folder: Path, json_file: Path | None
     campaign = read_campaign(folder)
     with LoadedFmu(file) as loaded, progress_bar("stepping", len(campaign.plans)) as progress:
         observations, estimates = play_campaign(loaded, campaign, progress)
-        document = estimate_document(observations, estimates, loaded.calibration)
-    valid = print_document(campaign.header.name, document)
+        own = loaded.calibration
+    features = observe([campaign], low_pass=LowPass(own.order, own.cut_off)).features
+    costs = costs_of(own, features, own.estimate(features))  # an FMU puts out no features
+    document = estimate_document(observations, estimates, own, costs)
+    print_document(campaign.header.name, document, own)
     if json_file is not None:
         write_json(json_file, document)
         output().print(f"written: {json_file}")
-    context.exit(0 if valid and not document["other_tire"]["suspected"] else 1)
+    context.exit(exit_code(document))
 
 
 @fmu.command(epilog=_CHECK)

@@ -40,7 +40,8 @@ class Estimates:
     flags : int array, shape (n,)
         `TurnFlag` bits.
     notes : tuple of n tuples of str
-        Which quantity is out of range, saturated or extrapolated.
+        Which quantity is out of range or saturated, which condition was not calibrated, cannot be,
+        or decides on the standard deviation because nobody gave it.
     rolling : tuple of str, length n
         ``free``, ``braking``, ``driving`` or ``unknown``, from CP1 against CP2.
     radius : array, shape (n,), [m]
@@ -101,6 +102,8 @@ class Calibration:
         A measured turn that the calibration takes for valid.
     geometry : mapping of str to float, [m]
         Of the tire, as far as its campaigns gave it.
+    version : int
+        Of the file format that it was read from.
     """
 
     tire: str
@@ -111,6 +114,7 @@ class Calibration:
     cut_off: float | None = None
     reference: ReferenceTurn | None = None
     geometry: Mapping[str, float] = field(default_factory=dict)
+    version: int = 2
 
     def check_layout(
         self,
@@ -154,7 +158,7 @@ class Calibration:
         radius = np.full(n, np.nan)
         traction = np.full(n, np.nan)
         out = (features.gage_flags & int(UNUSABLE)) != 0
-        extrapolated, unlike = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
+        extrapolated, unlike, tilted = (np.zeros(n, dtype=np.bool_) for _ in range(3))
         moved = with_moved(features)
         missing = np.where(out.any(axis=1), out.argmax(axis=1), -1)
         missing[out.sum(axis=1) > 1] = -2
@@ -174,6 +178,7 @@ class Calibration:
             extrapolated[rows] = chain.laws.extrapolated(part) | (
                 chain.force_laws.extrapolated(part) if chain.has("Fy") else False
             )
+            tilted[rows] = chain.decided_by_camber(part, estimates)[:many]
             for quantity, estimate in estimates.items():
                 value[quantity][rows] = estimate.value[:many]
                 more = doubt(estimate.value, features.angle_std[rows])
@@ -181,9 +186,13 @@ class Calibration:
                 valid[quantity][rows] = estimate.valid[:many]
             flags[rows] |= np.where(self._unknown_condition(chain, part), _NO_CONDITION, 0)
         std["kappa"] = np.hypot(std["kappa"], (1.0 + value["kappa"]) * features.slip_std)
-        return self._finish(
-            features, value, std, valid, flags, radius, traction, extrapolated, unlike
-        )
+        said = {"condition_extrapolated": extrapolated, "camber_unknown": tilted}
+        return self._finish(features, value, std, valid, flags, radius, traction, said, unlike)
+
+    @property
+    def knows_tire(self) -> bool:
+        """Whether another tire would be noticed: the calibration knows what its own looks like."""
+        return self.chains[-1].likeness is not None
 
     @property
     def needed(self) -> tuple[str, ...]:
@@ -206,7 +215,7 @@ class Calibration:
         flags: IntArray,
         radius: FloatArray,
         traction: FloatArray,
-        extrapolated: BoolArray,
+        said: Mapping[str, BoolArray],
         unlike: BoolArray,
     ) -> Estimates:
         measured = (flags & int(INVALIDATING)) == 0
@@ -230,12 +239,12 @@ class Calibration:
         valid["alpha"] &= ~saturated
         for row in np.flatnonzero(saturated):
             notes[row].append("alpha_saturated")
-        for row in np.flatnonzero(extrapolated & measured):
-            notes[row].append("condition_extrapolated")
-        said = {name: getattr(features, name) for name in PLAUSIBLE}
-        for name, plausible in full.road.plausible(said).items():
-            for row in np.flatnonzero(measured & ~plausible):
-                notes[row].append(f"{name}_implausible")
+        given = {name: getattr(features, name) for name in PLAUSIBLE}
+        wrong = full.road.plausible(given)
+        said = {**said, **{f"{name}_implausible": ~good for name, good in wrong.items()}}
+        for note, rows in said.items():
+            for row in np.flatnonzero(rows & measured):
+                notes[row].append(note)
         flags = flags | np.where(measured & ~in_range, int(TurnFlag.OUT_OF_RANGE), 0)
         flags = flags | np.where(other, int(TurnFlag.OTHER_TIRE), 0)
         bad = ~measured

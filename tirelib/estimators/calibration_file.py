@@ -134,6 +134,7 @@ def _calibration(document: Mapping[str, Any]) -> Calibration:
         order=float(document["filter"]["order"]),
         cut_off=document["filter"].get("cut_off_hz"),
         reference=None if turn is None else ReferenceTurn.from_table(turn),
+        version=int(str(document["format"]).rpartition("/")[2]),
     )
 
 

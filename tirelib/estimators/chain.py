@@ -22,11 +22,10 @@ import numpy as np
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.estimators.doubt import moved_by
 from tirelib.estimators.laws import (
-    CAMBER_DOUBT,
     RADIUS_DOUBT,
     RADIUS_SHARE,
-    UNKNOWN_CAMBER,
     ConditionLaws,
+    camber_doubt,
 )
 from tirelib.estimators.likeness import Likeness
 from tirelib.estimators.polynomial import Cloud, Polynomial, Range, all_inside
@@ -225,7 +224,7 @@ class Chain:
         calibrated = calibrated & laws.allowed(values)
         force, std = model.predict(values)
         factor, doubt = laws.force_factor(values)
-        tilted = self._tilt(model, values["camber"])
+        tilted = self._tilt(model, values["camber"], force, load)
         law = np.hypot(doubt * np.abs(force) + laws.spread(values, factor * force), tilted)
         force, std = factor * force, np.hypot(factor * std, law)
         result["Fy"] = Estimate(force, std, self._valid("Fy", values, force, std) & calibrated)
@@ -308,15 +307,34 @@ class Chain:
             told = told.where(known, curve.told(np.abs(used), moment, std, load, widest))
         return replace(told, change=side * told.change, sliding=unseen * told.sliding)
 
-    def _tilt(self, model: Polynomial, camber: FloatArray) -> FloatArray:
+    def _tilt(
+        self, model: Polynomial, camber: FloatArray, force: FloatArray, load: FloatArray
+    ) -> FloatArray:
         """Return the deviation of Fy from a camber that its model does not know, [N]."""
-        away = np.zeros_like(camber)
-        if not any(variable.name == "camber" for variable in model.variables):
-            for guard in self.guards["Fy"]:
-                if guard.name == "camber":
-                    away = np.fmax(np.maximum(camber - guard.high, guard.low - camber), 0.0)
-        away = np.where(np.isnan(camber), UNKNOWN_CAMBER, away)
-        return np.where(away > 0.0, CAMBER_DOUBT * self.mean_load * away, 0.0)
+        known = any(variable.name == "camber" for variable in model.variables)
+        ends = [guard for guard in self.guards["Fy"] if guard.name == "camber" and not known]
+        return camber_doubt(camber, force, load, (ends[0].low, ends[0].high) if ends else None)
+
+    def decided_by_camber(
+        self, values: Mapping[str, FloatArray], found: Mapping[str, Estimate]
+    ) -> BoolArray:
+        """Tell which turns owe more than half the variance of Fy to a camber that nobody gave.
+
+        Parameters
+        ----------
+        values : mapping of name to array, shape (n,)
+        found : mapping of quantity to Estimate
+            What `predict` says of the first n or more turns.
+        """
+        camber = values["camber"]
+        n = camber.size
+        if self.force is None:
+            return np.zeros(n, dtype=np.bool_)
+        force = found["Fy"]
+        load = found["Fz"].value[:n] if "Fz" in found else np.full(n, self.mean_load)
+        doubt = self._tilt(self.force, camber, force.value[:n], load)
+        decides = doubt**2 > 0.5 * force.std[:n] ** 2
+        return np.asarray(np.isnan(camber) & decides, dtype=np.bool_)
 
     def _rolling_radius(
         self, values: Mapping[str, FloatArray], load: Estimate | None

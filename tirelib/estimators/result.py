@@ -3,6 +3,7 @@
 Units at this edge are what engineers say: N and deg. Axes are ISO 8855.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.chain import QUANTITIES, Chain
+from tirelib.estimators.costs import COLUMN, Cost
 from tirelib.estimators.likeness import suspected
 from tirelib.flags import TurnFlag, flag_names
 from tirelib.observations import Observations, mean_by
@@ -24,15 +26,22 @@ TRUTH = {"Fz": "Fz", "alpha": "slip_angle", "kappa": "slip_ratio", "Fy": "Fy"}
 
 
 def estimate_document(
-    observations: Observations, estimates: Estimates, calibration: Calibration
+    observations: Observations,
+    estimates: Estimates,
+    calibration: Calibration,
+    costs: Sequence[Cost] = (),
 ) -> dict[str, Any]:
-    """Return summary and turns; errors are of the mean of a run's valid turns."""
+    """Return summary and turns; errors are of the mean of a run's valid turns.
+
+    `costs` says what conditions that nobody gave cost.
+    """
     chain = calibration.chains[-1]
     return {
         "format": FORMAT,
         "axes": "iso",
         "tire": calibration.tire,
-        "other_tire": _other_tire(estimates),
+        "other_tire": _other_tire(estimates) if calibration.knows_tire else None,
+        "not_given": cost_rows(costs),
         "summary": {
             quantity: _summary(quantity, observations, estimates, _floor(chain, quantity))
             if chain.has(quantity)
@@ -51,6 +60,24 @@ def _other_tire(estimates: Estimates) -> dict[str, Any]:
     judged = int((estimates.turn_valid | unlike).sum())
     turns = int(unlike.sum())
     return {"turns": turns, "judged": judged, "suspected": suspected(turns, judged)}
+
+
+def cost_rows(costs: Sequence[Cost]) -> list[dict[str, Any]]:
+    """Return what unknown conditions cost in the units of the document, the dearest first."""
+    rows = []
+    for cost in costs:
+        unit, factor = EDGE_UNIT[cost.quantity]
+        rows.append({
+            "condition": cost.unknown,
+            "column": COLUMN[cost.unknown],
+            "quantity": cost.quantity,
+            "unit": unit,
+            "std": _number(factor * cost.std),
+            "std_if_given": _number(factor * cost.std_if_given),
+            "valid": cost.valid,
+            "valid_if_given": cost.valid_if_given,
+        })  # fmt: skip
+    return rows
 
 
 def run_means(

@@ -80,13 +80,17 @@ class Road:
         """Calibrated tread depth, [m]; that of a new tread where it is not known."""
         return (DEPTH[1], DEPTH[1]) if np.isnan(self.tread_depth[0]) else self.tread_depth
 
+    @property
+    def ends(self) -> dict[str, Pair]:
+        """Lowest and highest value that can be of each of the three."""
+        low, above = PLAUSIBLE["tread_depth"]
+        return {**PLAUSIBLE, "tread_depth": (low, self.depth[1] + above)}
+
     def plausible(self, values: Mapping[str, FloatArray]) -> dict[str, BoolArray]:
         """Tell for each of the three which turns have a value that can be; unknown ones have."""
-        ends = dict(PLAUSIBLE)
-        ends["tread_depth"] = (ends["tread_depth"][0], self.depth[1] + ends["tread_depth"][1])
         return {
             name: np.asarray(~(values[name] < low) & ~(values[name] > high), dtype=np.bool_)
-            for name, (low, high) in ends.items()
+            for name, (low, high) in self.ends.items()
         }
 
     def said(self, values: Mapping[str, FloatArray], name: str) -> FloatArray:

@@ -56,7 +56,7 @@ def strain_tire(
     text = Path(calibration).read_text(encoding="utf-8")
     table = [
         *parameters(sample_rate, RATES, missing),
-        *inputs(loaded.lateral, samples_per_step, buffered=buffered),
+        *inputs(loaded.lateral, samples_per_step, buffered=buffered, road=loaded.chains[-1].road),
         *outputs(loaded.lateral),
     ]
     reference = strain_reference(loaded, sample_rate, samples_per_step, buffered=buffered)

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from tirelib.estimators.chain import QUANTITIES
+from tirelib.estimators.unknowns import Road
 from tirelib.flags import TurnFlag
 
 NAN = math.nan
@@ -69,11 +70,19 @@ def parameters(
     ]  # fmt: skip
 
 
-def inputs(lateral: tuple[float, ...], samples: int, *, buffered: bool = False) -> list[Variable]:
+def inputs(
+    lateral: tuple[float, ...],
+    samples: int,
+    *,
+    buffered: bool = False,
+    road: Road | None = None,
+) -> list[Variable]:
     """Return the inputs: strain sample by sample, oldest first, then the conditions.
 
-    `buffered` adds ``samples``, which says how many of the frame are new.
+    `buffered` adds ``samples``, which says how many of the frame are new; `road` is that of the
+    calibration: nothing is valid beyond its ends of friction, tread depth and tread temperature.
     """
+    ends = (road or Road()).ends
     table = []
     for sample in range(1, samples + 1):
         for gage, y in enumerate(lateral, start=1):
@@ -89,7 +98,9 @@ def inputs(lateral: tuple[float, ...], samples: int, *, buffered: bool = False) 
                  -150.0, 150.0, type="Speed"),
         Variable("pressure", "Real", "input", "inflation pressure (gauge); NaN: unknown", NAN,
                  "Pa", "bar", 1e5, 0.0, 2e6, type="Pressure"),
-        Variable("camber", "Real", "input", "camber angle; NaN: unknown", NAN, "rad", "deg", 0.1,
+        Variable("camber", "Real", "input", "camber angle; NaN: unknown, which a calibration at "
+                 "one camber answers with a large Fy_std and alpha_std (camber_unknown in status)",
+                 NAN, "rad", "deg", 0.1,
                  -RIGHT, RIGHT, type="Angle"),
         Variable("omega", "Real", "input",
                  "measured turn rate: its change within the turn is the wheel angle's; zero: "
@@ -97,13 +108,13 @@ def inputs(lateral: tuple[float, ...], samples: int, *, buffered: bool = False) 
                  "rad/s", "rpm", 10.0, -1e3, 1e3, type="TurnRate"),
         Variable("friction", "Real", "input",
                  "coefficient of friction between tread and road; NaN: unknown", NAN, "1", None,
-                 1.0, 0.0, 2.0, type="Ratio"),
+                 1.0, *ends["friction"], type="Ratio"),
         Variable("tread_depth", "Real", "input",
                  "depth of the tread's grooves that is left; NaN: unknown", NAN, "m", "mm", 0.01,
-                 0.0, 0.03, type="Length"),
+                 *ends["tread_depth"], type="Length"),
         Variable("tread_temperature", "Real", "input",
-                 "temperature of the tread's rubber; NaN: unknown", NAN, "K", None, 300.0, 200.0,
-                 500.0, type="Temperature"),
+                 "temperature of the tread's rubber; NaN: unknown", NAN, "K", None, 300.0,
+                 *ends["tread_temperature"], type="Temperature"),
         Variable("frame_valid", "Boolean", "input",
                  "false: the frame was lost or damaged, its samples are missing", True),
     ]  # fmt: skip

@@ -1,0 +1,63 @@
+"""Sentences after a calibration or an estimate: what was not given costs, what was not checked."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from tirelib.estimators.calibration import Calibration
+
+WORTH = 1.2
+"""Ratio of standard deviations from which an unknown condition is worth a word."""
+LOST = 0.05
+"""Share of turns lost to it from which that is worth one."""
+
+
+def not_given(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return a sentence on the condition that costs most by not being given; empty if none does.
+
+    Parameters
+    ----------
+    rows : sequence of mappings
+        ``not_given`` of an estimate or calibration document, the dearest first.
+    """
+    dear = [r for r in rows if r["std"] is None or r["std"] > WORTH * r["std_if_given"]]
+    if not dear:
+        return ""
+    first = dear[0]["condition"]
+    parts = [_cost(row) for row in dear if row["condition"] == first]
+    others = list(dict.fromkeys(r["condition"] for r in dear if r["condition"] != first))
+    verb = "cost" if len(others) > 1 else "costs"
+    also = f"; {' and '.join(map(_words, others))} {verb} less, see --json" if others else ""
+    return (
+        f"The {_words(first)} was not given: the standard deviation of {', of '.join(parts)} "
+        f"(column {dear[0]['column']} of runs.csv{also})"
+    )
+
+
+def _cost(row: Mapping[str, Any]) -> str:
+    unit = "" if row["unit"] == "1" else f" {row['unit']}"
+    now = "unknown" if row["std"] is None else f"{row['std']:.3g}{unit}"
+    lost = ""
+    if row["valid"] < row["valid_if_given"] - LOST:
+        lost = f" and valid in {row['valid']:.0%} instead of {row['valid_if_given']:.0%} of turns"
+    return f"{row['quantity']} is {now} instead of {row['std_if_given']:.3g}{unit}{lost}"
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def not_checked(calibration: Calibration) -> list[str]:
+    """Return sentences on what a calibration cannot tell."""
+    found = []
+    if calibration.version < 2:
+        found.append(
+            "The calibration is of an earlier version: it knows neither friction nor its own "
+            "border, and its slip angle has a brush's curve; calibrate anew"
+        )
+    if not calibration.knows_tire:
+        found.append(
+            "Another tire would not be noticed: the calibration "
+            + ("is of an earlier version" if calibration.version < 2 else
+               "has too few conditions for that (17 are needed); calibrate on more")
+        )  # fmt: skip
+    return found
