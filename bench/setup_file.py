@@ -50,7 +50,7 @@ def read_setup(path: Path, usual: SourcePlan) -> tuple[SourcePlan, ...]:
     Raises
     ------
     DeviceError
-        With every fault of the file.
+        With every fault of the file, and of the maps and device files that it names.
     """
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -76,7 +76,15 @@ def read_setup(path: Path, usual: SourcePlan) -> tuple[SourcePlan, ...]:
         faults += _faults(table, f"{path}: source {number}")
     if faults:
         raise DeviceError(faults)
-    return tuple(_source(table, path.parent, usual) for table in tables)
+    sources = []
+    for number, table in enumerate(tables, start=1):
+        try:
+            sources.append(_source(table, path.parent, usual))
+        except DeviceError as error:
+            faults += [f"{path}: source {number}: {problem}" for problem in error.problems]
+    if faults:
+        raise DeviceError(faults)
+    return tuple(sources)
 
 
 def _faults(table: dict[str, Any], where: str) -> list[str]:

@@ -79,7 +79,7 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
     "--port-file", metavar="F", type=NEW_FILE, help="Write the port's path into this file."
 )
 @click.option("--conditions", "sidecar", metavar="F.json", type=NEW_FILE,
-              help="Write speed, pressure, camber and the rig's truth.")  # fmt: skip
+              help="Write the conditions over time and the rig's truth.")  # fmt: skip
 @click.option("--loop", is_flag=True, help="Begin again at the end, until Ctrl-C.")
 @click.option("--speedup", default=1.0, show_default=True, type=click.FloatRange(0.01, 1000.0),
               help="Faster than real time.")  # fmt: skip

@@ -36,7 +36,7 @@ Examples:
   tirebench export bus.mcap --out bus.blf                     # or .asc, .log
 
 \b
-What a bus told of speed, pressure and camber is in all of them. Estimates of the run, events and
+What a bus told of the conditions is in all of them. Estimates of the run, events and
 markers are in .mf4, else in tables beside it (live.estimates.csv, live.events.csv).
 A campaign holds one wheel. Tire and gages come from the recording where a campaign was played, else
 from the campaign that --like names. Without told set points its runs are sweeps.

@@ -90,6 +90,9 @@ class Asked:
                 "--wheel, or look at the link"
             )
         ((number, levels),) = found.items()
+        if number in wheels.contradicted:
+            click.secho(f"WARNING: {wheels.contradicted[number]}; a standing wheel's mean strain "
+                        "does not depend on it, estimates do", fg="red", err=True)  # fmt: skip
         return wheels.heard[number].timeline.device, standing_mean(levels, self.still)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from bench.cli.options import devices_of_text
+from bench.cli.options import devices_of_text, wheel_of
 from bench.conditions import QUANTITIES, Conditions, read_conditions
 from bench.deadline import Deadline
 from bench.device import Device
@@ -78,15 +78,14 @@ def live_sources(
     Raises
     ------
     DeviceError
-        With the faults of a file.
+        With the faults of a file, or if there can be no such wheel.
     """
     if setup is not None:
         return read_setup(setup, usual)
     sources = []
     for text in ports:
-        number, _, rest = text.partition("=")
-        wheel = int(number) if rest and number.isdecimal() and int(number) <= 255 else None
-        port = replace(usual.port, port=text if wheel is None else rest)
+        wheel, rest = wheel_of("--port", text)
+        port = replace(usual.port, port=rest)
         protocol = protocol_of(port, usual.protocol.rate, map_file)
         sources.append(replace(usual, port=port, protocol=protocol, wheel=wheel))
     return tuple(sources)

@@ -48,6 +48,24 @@ def port_options(command: Command) -> Command:
     return command
 
 
+def wheel_of(option: str, text: str) -> tuple[int | None, str]:
+    """Return the wheel and the rest of ``[WHEEL=]REST``; None where no wheel is said.
+
+    Raises
+    ------
+    DeviceError
+        If there can be no such wheel.
+    """
+    number, _, rest = text.partition("=")
+    if not (rest and number.isdecimal()):
+        return None, text
+    if int(number) > 255:
+        raise DeviceError(
+            f"{option} {text}: wheel {number}; 0 .. 255 is allowed; correct the number"
+        )
+    return int(number), rest
+
+
 def devices_of(texts: Sequence[str]) -> tuple[dict[int | None, Device], str]:
     """Return the device of each wheel from ``D.toml`` or ``WHEEL=D.toml``, and all texts as one.
 
@@ -61,9 +79,8 @@ def devices_of(texts: Sequence[str]) -> tuple[dict[int | None, Device], str]:
     devices: dict[int | None, Device] = {}
     parts = []
     for given in texts:
-        number, _, rest = given.partition("=")
-        wheel = int(number) if rest and number.isdecimal() else None
-        path = Path(given if wheel is None else rest)
+        wheel, rest = wheel_of("--device", given)
+        path = Path(rest)
         if wheel in devices:
             raise DeviceError(
                 f"--device {given}: a device of {'all wheels' if wheel is None else wheel} is "

@@ -45,7 +45,7 @@ Exit code: 0 done, 1 the port went away or not one good frame came, 2 bad input.
 @click.option("--out", metavar="FILE.mcap", type=NEW_FILE, required=True, help="A new file.")
 @recording_options
 @click.option("--conditions", "sidecar", metavar="F.json", type=FILE,
-              help="Speed, pressure and camber over time.")  # fmt: skip
+              help="Conditions over time, as `emulate --conditions` writes them.")  # fmt: skip
 @click.option("--device", "device_texts", metavar="[WHEEL=]D.toml", multiple=True,
               help="Scale and zero of the gages, kept in the recording.")  # fmt: skip
 @port_options

@@ -17,6 +17,9 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 HOURLY, HOURLY_RAW = 0.75e9, 0.26e9
 """What a wheel at 10 kHz takes in an hour, [bytes]: with its strain and without; measured in
 docs/bench_proof.md."""
+KEPT = 1e6
+"""Memory that a second of a wheel at 10 kHz takes before a trigger, [bytes]; measured by
+build/bench_trigger.py, rounded up. With `--no-strain` it is less."""
 LITTLE = 1e9
 """Room below which there is a warning, [bytes]: about an hour of one wheel."""
 
@@ -64,7 +67,13 @@ def at_start(path: Path, reader: ReaderPlan, rule: RecordingRule, *, watched: bo
     watched : bool
         Whether there is a page or a terminal view, which know limits and markers.
     """
-    said = room(path, max(reader.expected, len(reader.sources)), strain=rule.strain)
+    wheels = max(reader.expected, len(reader.sources))
+    said = room(path, wheels, strain=rule.strain)
+    if rule.around is not None:
+        said += (
+            f"\n--trigger: the {rule.around[0]:g} s before take up to "
+            f"{1e-6 * KEPT * wheels * rule.around[0]:.0f} MB of memory"
+        )
     if rule.around is not None and not watched:
         said += (
             "\n--trigger: a lost port triggers, and an alarm of the program itself; markers and "

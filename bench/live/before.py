@@ -1,7 +1,8 @@
-"""The last seconds before a trigger, kept in memory."""
+"""The last seconds before a trigger, kept in memory until they are on disk."""
 
 import pickle
 from collections import deque
+from itertools import islice
 from typing import Any
 
 from bench.links import LOST
@@ -11,6 +12,10 @@ from bench.live.exchange import Exchange
 class Before:
     """What has come in the last seconds; what is older is forgotten.
 
+    After a trigger it is written piece by piece, and what comes meanwhile is taken in behind it:
+    the queues of the recorder hold seconds, and minutes of four wheels take longer to write. It is
+    kept as the bytes of the queues, which the search for garbage does not look at.
+
     Parameters
     ----------
     length : float, [s]
@@ -18,10 +23,21 @@ class Before:
 
     def __init__(self, length: float) -> None:
         self._length = round(1e9 * length)
-        self._kept: deque[tuple[int, str, Any]] = deque()
+        self._kept: deque[tuple[int, str, bytes]] = deque()  # arrival, what it is, message
+        self._written = 0  # of those, the first ones: they may not be on disk yet
 
-    def take(self, exchange: Exchange) -> tuple[bool, int]:
+    def __len__(self) -> int:
+        """Return how much is to be written."""
+        return len(self._kept) - self._written
+
+    def take(self, exchange: Exchange, *, forget: bool = True) -> tuple[bool, int]:
         """Take what waits for the recorder; tell whether there was anything.
+
+        Parameters
+        ----------
+        exchange : Exchange
+        forget : bool
+            Whether what is too old is forgotten: nothing is, once there was a trigger.
 
         Returns
         -------
@@ -29,34 +45,47 @@ class Before:
         lost : int, [ns]
             Monotonic, when a port went away; 0 if none did.
         """
-        found: list[tuple[int, str, Any]] = []
+        found: list[tuple[int, str, bytes]] = []
         lost = 0
         while (message := exchange.raw.read()) is not None:
             read = pickle.loads(message)
-            found.append((read.arrival, "read", read))
+            found.append((read.arrival, "read", message))
             lost = read.arrival if read.event == LOST else lost
         while (message := exchange.strain.read()) is not None:
-            block = pickle.loads(message)
-            found.append((block.arrival, "block", block))
+            found.append((pickle.loads(message).arrival, "block", message))
         while (message := exchange.results.read()) is not None:
-            turn = pickle.loads(message)
-            found.append((turn[1], "estimate", turn))
+            found.append((pickle.loads(message)[1], "estimate", message))
         for queue in (exchange.raw, exchange.strain, exchange.results):
             queue.take()  # who reads them again finds them here
         self._kept += found
         newest = max((arrival for arrival, _, _ in found), default=0)
-        while self._kept and self._kept[0][0] < newest - self._length:
+        while forget and self._kept and self._kept[0][0] < newest - self._length:
             self._kept.popleft()
         return bool(found), lost
 
-    def write(self, recorder: Any) -> None:
-        """Write what is kept, see `bench.recorder.Recorder`."""
-        for _, kind, content in self._kept:
+    def write(self, recorder: Any, most: int) -> None:
+        """Write what is kept, until so many bytes wait for the disk; see `bench.recorder.Recorder`.
+
+        Raises
+        ------
+        RecordingError
+        """
+        for _, kind, message in islice(self._kept, self._written, None):
+            if recorder.waiting > most:
+                return
+            self._written += 1
+            content = pickle.loads(message)
             if kind == "estimate":
                 recorder.estimate(*content)
             else:
                 getattr(recorder, kind)(content)
 
-    def clear(self) -> None:
-        """Forget all of it: it is on disk."""
-        self._kept.clear()
+    def forget_written(self) -> None:
+        """Forget what was written: it is on disk."""
+        for _ in range(self._written):
+            self._kept.popleft()
+        self._written = 0
+
+    def write_again(self) -> None:
+        """Note that what was written is not on disk."""
+        self._written = 0

@@ -127,7 +127,7 @@ class LiveChain:
         self._judged = JudgedTurns()
         self._alarm = ""  # what the recorder has said last
         self._contradicted: set[int] = set()  # wheels of which was told
-        self._gone: dict[int, str] = {}  # sources that are given up, and why
+        self._gone: dict[int, str] = {}  # sources that were given up, and why; empty: it is back
 
     def __enter__(self) -> "LiveChain":
         try:
@@ -216,6 +216,7 @@ class LiveChain:
                     "not_decoded_bytes": self._state.passed,
                     "alarm": TOO_BUSY if self._state.passing else ""},
             "recording": self._recorded.as_document(refused_bytes),
+            "given_up": dict(self._gone),
             "wheels": {wheel: self.wheel_counts(wheel) for wheel in self.wheels.heard},
         }  # fmt: skip
 
@@ -445,10 +446,11 @@ class LiveChain:
         for number, cell in enumerate(self._exchange.ports):
             found = cell.get()
             gone = "" if found is None else pickle.loads(found).gone
-            if gone != self._gone.get(number, ""):
-                self._gone[number] = gone
+            told = f"{gone}; the port is still tried" if gone else ""
+            if told != self._gone.get(number, ""):
+                self._gone[number] = told
                 port = self._plan.reader.sources[number].port.port
-                said = f"{gone}; the port is still tried" if gone else f"{port}: it is back"
+                said = told or f"{port}: it is back"
                 self._pending.alarms.append(said)
                 self.order("event", alarm_event(f"source {number}", said, on=bool(gone)))
 

@@ -114,6 +114,8 @@ class _Recorder:
             if order.kind == "start":
                 self._start(Path(order.what))
             elif order.kind == "stop":
+                while self._write() and self._kept:
+                    continue  # what was before the trigger
                 self._write()
                 self._end(order.what)
                 self._state.waits = None
@@ -200,6 +202,9 @@ class _Recorder:
     def _write_queues(self) -> bool:
         exchange, busy = self._exchange, False
         recorder = self._recorder
+        if recorder is not None and self._kept:
+            self._write_kept(recorder, self._kept)
+            return True
         while recorder is not None and (message := exchange.raw.read()) is not None:
             busy = True
             read = pickle.loads(message)
@@ -219,6 +224,15 @@ class _Recorder:
         if time.monotonic() >= self._next_link:
             self._link()
         return busy
+
+    def _write_kept(self, recorder: Recorder, kept: Before) -> None:
+        """Write a piece of what was before the trigger, and take in what comes meanwhile."""
+        _, lost = kept.take(self._exchange, forget=False)
+        if lost:
+            self._trigger(lost)
+        kept.write(recorder, CHUNK_BYTES)
+        if recorder.waiting > CHUNK_BYTES:
+            self._flush()
 
     def _link(self) -> None:
         """Write the counters of all wheels."""
@@ -250,8 +264,6 @@ class _Recorder:
             self._recorder = state.path = None
             return str(error)
         state.path = path
-        if self._kept is not None:
-            self._kept.write(self._recorder)
         for event, moment in self._events:
             self._recorder.event(event, moment)
         return ""
@@ -309,6 +321,11 @@ class _Recorder:
         if not self._begin_part(path):
             self._failed()
 
+    @property
+    def _after_trigger(self) -> bool:
+        """Whether a recording around a trigger goes on and holds what was before it."""
+        return self._kept is not None and not self._kept and self._state.path is not None
+
     def _end(self, reason: str) -> None:
         recorder, self._recorder = self._recorder, None
         path, self._state.path = self._state.path, None
@@ -336,7 +353,9 @@ class _Recorder:
         self._go_back()
 
     def _go_back(self) -> None:
-        """Read again what is not on disk."""
+        """Read and write again what is not on disk."""
+        if self._kept is not None:
+            self._kept.write_again()
         state, exchange = self._state, self._exchange
         for queue, cursor in ((exchange.raw, state.raw), (exchange.strain, state.strain),
                               (exchange.results, state.results)):  # fmt: skip
@@ -356,7 +375,7 @@ class _Recorder:
             state.bytes = self._before + recorder.bytes
             self._events.clear()
             if self._kept is not None:
-                self._kept.clear()
+                self._kept.forget_written()
         state.raw, state.strain = exchange.raw.cursor, exchange.strain.cursor
         state.results = exchange.results.cursor
 
@@ -372,7 +391,7 @@ class _Recorder:
             try:
                 self._flush()
                 self._split()
-                if self._kept is not None and state.path and time.monotonic_ns() > state.until:
+                if self._after_trigger and time.monotonic_ns() > state.until:
                     self._end("the time after the trigger is over")
             except RecordingError as error:
                 self._fail(error)

@@ -201,6 +201,8 @@ class Feed:
         changed += [] if busy else self._unheard(now)
         for number, said in self._source.wheels.contradicted.items():
             self._alarms.tell(f"sample rate of wheel {number}", said, now)
+        for source, said in chain.get("given_up", {}).items():
+            self._alarms.tell(f"port of source {source}", said, now)
         self._alarms.tell("busy", busy, now)  # the run writes these into the recording
         self._alarms.tell("json", self._unwritten, now)
         recorded = chain.get("recording", {})

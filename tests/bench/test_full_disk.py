@@ -5,6 +5,7 @@ import pickle
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from bench.conditions import Conditions
@@ -227,3 +228,27 @@ def test_what_was_before_a_trigger_waits_for_room(disk: Disk, tmp_path: Path) ->
     assert bench.step(PIECES[5]).error == ""
     bench.close()
     assert recorded(tmp_path / "a.mcap") == (PIECES[:6], True)
+
+
+def test_a_long_time_before_a_trigger_is_written_piece_by_piece_and_the_queue_stays_empty(
+    disk: Disk, tmp_path: Path, clock: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What comes meanwhile stands behind it, also where the disk is full in the middle."""
+    monkeypatch.setattr("bench.live.recorder.CHUNK_BYTES", 9000)  # two pieces
+    bench = Bench(tmp_path / "a.mcap", RecordingRule(around=(60.0, 0.0)))
+    bench.step(*PIECES[:5])
+    bench.order("event", {"event": "marker", "text": "kerb"})
+    written, sent = [], list(PIECES[5:])
+    clock[0] = 10  # the time after the trigger is over
+    while bench.step(*sent[:1]).path is not None:
+        disk.full = len(sent) == 4
+        written.append(bench.recorder._state.bytes)
+        assert bench.exchange.raw.waiting == 0 or bench.recorder._state.error
+        sent = sent[1:]
+    assert len(written) > 3
+    assert max(np.diff([0, *written])) <= 4 * 5000  # two at a time, twice where there is room again
+    bench.close()
+    data, complete = recorded(tmp_path / "a.mcap")
+    assert complete
+    assert data == PIECES[: len(data)]
+    assert len(data) > 5

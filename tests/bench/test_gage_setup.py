@@ -2,6 +2,7 @@
 
 import threading
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -99,6 +100,21 @@ def test_zero_writes_a_device_file_of_a_wheel_that_stands(tmp_path: Path) -> Non
     again = call("zero", "--replay", tmp_path / "a.mcap", "--out", out)
     assert isinstance(again.exception, DeviceError)
     assert out.read_bytes() == before
+
+
+@pytest.mark.parametrize("period_us", [1600.0, 1648.0])
+def test_zero_warns_of_a_wheel_whose_clock_contradicts_its_rate(
+    tmp_path: Path, period_us: float
+) -> None:
+    counts = np.rint(np.tile(OFFSET, (40_000, 1))).astype(np.int16)
+    frames = strain_frames(counts, period=1000)
+    time = np.rint(np.arange(len(frames)) * period_us).astype(np.int64)
+    file = recorded(tmp_path / "a.mcap", encode(replace(frames, t_us=time)))
+    outcome = call("zero", "--replay", file, "--out", tmp_path / "new.toml")
+    assert outcome.exit_code == 0, outcome.output
+    wrong = period_us != 1600.0
+    assert ("WARNING: wheel 0: its clock shows 9709 samples a second" in outcome.output) == wrong
+    np.testing.assert_allclose(read_device(tmp_path / "new.toml").zero, OFFSET, atol=0.5)
 
 
 def test_zero_of_a_wheel_that_turns_is_refused(tmp_path: Path) -> None:

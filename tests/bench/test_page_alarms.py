@@ -178,13 +178,13 @@ def test_alarms_are_on_the_page_and_in_the_recording_and_a_full_disk_is_one() ->
     assert np.all([event["event"] == "alarm" for event in noted])
 
 
-def test_a_busy_machine_and_an_unwritten_file_are_alarms_and_the_transmitter_is_not_blamed() -> (
-    None
-):
-    source, raw, noted = FakeSource(0), {"alarm": ""}, []
+def test_what_is_wrong_with_the_run_is_an_alarm_and_the_transmitter_is_not_blamed() -> None:
+    """A machine too busy, a file that is not written, a port that is given up, a wrong rate."""
+    source, raw, given_up, noted = FakeSource(0), {"alarm": ""}, {1: ""}, []
     source.heard = time.time() - 60.0
     with Board() as board:
-        feed = Feed(board, source, About("p"), lambda: {"chain": {"raw": raw}},
+        feed = Feed(board, source, About("p"),
+                    lambda: {"chain": {"raw": raw, "given_up": given_up}},
                     note=noted.append)  # fmt: skip
         active = [alarm["name"] for alarm in feed.state()["alarms"]["active"]]
         assert active == ["silence"]
@@ -193,7 +193,10 @@ def test_a_busy_machine_and_an_unwritten_file_are_alarms_and_the_transmitter_is_
         state = feed.state()
         assert alarm_lines(state) == ["too busy", "a.json: the disk is full"]
         assert [event["state"] for event in noted] == ["on", "off"]  # of the silence
-        raw["alarm"] = ""
+        raw["alarm"], given_up[1] = "", "/dev/b: away for 5 s; the port is still tried"
+        assert given_up[1] in alarm_lines(feed.state())
+        given_up[1] = ""
+        assert "/dev/b" not in str(alarm_lines(feed.state()))
         source.wheels.heard[0].timeline._rate.contradiction = "wheel 0: another rate"
         assert "wheel 0: another rate" in alarm_lines(feed.state())
         source.wheels.heard[0].timeline._rate.contradiction = ""

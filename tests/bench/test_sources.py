@@ -2,6 +2,7 @@
 
 import os
 import pickle
+import re
 import signal
 import socket
 from collections.abc import Callable, Iterator
@@ -27,7 +28,7 @@ from bench.decoder import SerialDecoder
 from bench.device import Device
 from bench.document import turn_document
 from bench.emulator import write_script
-from bench.errors import BenchError, DeviceError, UnpluggedError
+from bench.errors import DeviceError, UnpluggedError
 from bench.estimation import Estimation, News
 from bench.faults import Faults
 from bench.fmu_archive import read_fmu
@@ -359,6 +360,7 @@ def test_a_source_that_is_given_up_is_an_alarm_and_the_other_goes_on(tmp_path: P
     with LiveChain(plan) as chain:
         gathered(chain, news, lambda: any(url in said for said in news.alarms))
         assert not chain.ended
+        assert chain.counts()["given_up"][1] in news.alarms  # for the page
         before = chain.wheels.line_counts(0).ok
         more.set()
         gathered(chain, news, lambda: chain.wheels.line_counts(0).ok > before)
@@ -485,7 +487,9 @@ def test_a_setup_lists_sources_and_the_options_fill_in(tmp_path: Path) -> None:
     (("wheel = 0", "weel = 0"), "source 1: weel is not known; allowed are port"),
     (('port = "/dev/ttyUSB0"', ""), "source 1: port is missing"),
     (("[[source]]", "[[sources]]"), "sources is not known"),
-    (('map = "vehicle.toml"', 'map = "none.toml"'), "none.toml: it cannot be read"),
+    (('map = "vehicle.toml"', 'map = "none.toml"'), "source 2: .*none.toml: it cannot be read"),
+    (('"vehicle.toml"', '"left.toml"'), "s.toml: source 2: .*left.toml: .*'tirebench-map/1'"),
+    (('"left.toml"', '"vehicle.toml"'), "s.toml: source 1: .*vehicle.toml: .*tirebench-device/1"),
     (("[[source]]", "[source]"), "cannot be read|tables"),
 ])  # fmt: skip
 def test_a_wrong_setup_says_what_is_wrong(
@@ -498,11 +502,14 @@ def test_a_wrong_setup_says_what_is_wrong(
         read_setup(tmp_path / "s.toml", serial(""))
 
 
-def test_ports_that_contradict_each_other_end_the_command(
-    toy_fmus: dict[int, Path], tmp_path: Path
+@pytest.mark.parametrize(("words", "message"), [
+    (("--port", "1=/dev/a", "--port", "1=/dev/b"), "wheel 1 comes from /dev/a and /dev/b"),
+    (("--port", "300=/dev/a"), r"--port 300=/dev/a: wheel 300; 0 \.\. 255 is allowed"),
+    (("--port", "/dev/a", "--device", "256=a.toml"), r"--device 256=a.toml: wheel 256; 0 \.\. 255"),
+])  # fmt: skip
+def test_options_that_cannot_be_end_the_command(
+    toy_fmus: dict[int, Path], words: tuple[str, ...], message: str
 ) -> None:
-    arguments = ["run", "--port", "1=/dev/a", "--port", "1=/dev/b", "--fmu", str(toy_fmus[16])]
-    outcome = CliRunner().invoke(program, [*arguments, "--no-page"])
-    assert isinstance(outcome.exception, BenchError | SystemExit)
-    said = str(outcome.exception) + outcome.output
-    assert "wheel 1 comes from /dev/a and /dev/b" in said
+    outcome = CliRunner().invoke(program, ["run", *words, "--fmu", str(toy_fmus[16]), "--no-page"])
+    assert isinstance(outcome.exception, DeviceError)
+    assert re.search(message, str(outcome.exception))

@@ -1,5 +1,6 @@
 """Serial lines of other makes, by a map: sync word and struct, or columns of text."""
 
+import re
 import struct
 from pathlib import Path
 
@@ -84,6 +85,9 @@ separator = " "
 columns = ["v", "", "tilt"]
 """
 GAGES = np.random.default_rng(3).integers(-4000, 4000, (400, 5))
+
+
+DOCS = Path(__file__).parents[2] / "docs" / "protocols.md"
 
 
 def binary(count: int = len(GAGES), sync: bytes = b"\xaa\x55") -> list[bytes]:
@@ -309,3 +313,18 @@ def test_wheels_with_other_gages_than_the_calibration_are_refused() -> None:
         DeviceError, match="'wheel 1' has zeros or gains of 3 gages, its wheel sends 5"
     ):
         device.strain(np.zeros((1, 2, 5), np.int16), np.zeros(1, np.int64))
+
+
+def test_the_text_line_of_the_handbook_is_read_with_its_map() -> None:
+    (example,) = [block for block in re.findall(r"```toml\n(.*?)```", DOCS.read_text(), re.DOTALL)
+                  if "starts " in block]  # fmt: skip
+    (line,) = re.findall(r"# (\$W;.*)", example)
+    source = SourcePlan(PortPlan("p"), plan_of(example))
+    wheels = wheels_of([source])
+    (block,) = wheels.push(f"{line}\r\n".encode(), 1)
+    assert isinstance(block.content, Samples)
+    np.testing.assert_allclose(
+        1e6 * block.content.strain, [[1203.5, 1187.0, 1241.5, 1190.0, 998.0]]
+    )
+    assert wheels.heard[0].timeline.rate == 1000.0
+    assert wheels.push(line.replace("998", "999").encode() + b"\n") == []  # its checksum is wrong
