@@ -3,9 +3,9 @@
     python build/camber_doubt.py --out build/out/camber
 
 Calibrates tires of the rig on `set1` (upright) and judges them on runs at cambers of -3 to 3 deg,
-four loads and three slip angles, as if nobody gave the camber. Prints the error of Fy per degree
-over the load, the camber of the co-simulations' car over its lateral utilisation, and coverage with
-half and double of the constants. Campaigns and calibrations are kept in the folder.
+four loads and three slip angles, as if nobody gave the camber. Prints what a degree of camber does
+at each load, how far cars lean in a turn, and coverage with half and double of the constants.
+Campaigns and calibrations are kept in the folder.
 """
 
 import argparse
@@ -21,11 +21,13 @@ from road_coverage import measured, rows_of, tire_of
 from bench.rig.plans import Plan, plan
 from bench.rig.tire import TIRES, Condition
 from tirelib.arrays import FloatArray
-from tirelib.estimators import laws
+from tirelib.estimators import tilt
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
+from tirelib.estimators.likeness import CAMBER_DRIFT
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.train import train
+from tirelib.flags import TurnFlag
 from tirelib.observations import Observations
 from tirelib.threads import one_thread
 
@@ -47,18 +49,28 @@ def tilted() -> Plan:
 
 
 def per_degree(calibration: Calibration, seen: Observations) -> list[str]:
-    """Return the error of Fy over the camber at each load, and the power of the load in it."""
-    upright = np.zeros(len(seen))
-    force, _ = calibration.chains[-1].predict(regressors_of(seen, upright))
-    error = force["Fy"].value - seen.truth["Fy"]
+    """Return what a degree of camber does at each load, as if the wheel stood upright."""
+    chain = calibration.chains[-1]
+    values = regressors_of(seen, np.zeros(len(seen)))
+    found, _ = chain.predict(values)
+    rest = {} if chain.likeness is None else dict(
+        zip(chain.likeness.names, chain.likeness.rest(values).T, strict=True)
+    )  # fmt: skip
+    error = {
+        "Fy [N]": found["Fy"].value - seen.truth["Fy"],
+        "alpha [deg]": np.rad2deg(found["alpha"].value - seen.truth["slip_angle"]),
+        **{name: np.rad2deg(rest[name]) for name in CAMBER_DRIFT if name in rest},
+    }
     camber, load = np.rad2deg(seen.nominal["camber"]), seen.nominal["load"]
-    slopes = []
-    for at in LOADS:
-        rows = seen.usable & (np.abs(load - at) < 1.0)
-        slopes.append(float(np.polyfit(camber[rows], error[rows], 1)[0]))
-    power = float(np.polyfit(np.log(LOADS), np.log(np.abs(slopes)), 1)[0])
-    cells = ", ".join(f"{s:.0f} N at {at:.0f} N" for s, at in zip(slopes, LOADS, strict=True))
-    return [f"Fy per degree of camber: {cells}; power of the load {power:.2f}"]
+    lines = []
+    for name, x in error.items():
+        slopes = []
+        for at in LOADS:
+            rows = seen.usable & (np.abs(load - at) < 1.0) & np.isfinite(x)
+            slopes.append(np.polyfit(camber[rows], x[rows], 1)[0] if rows.sum() > 2 else np.nan)
+        cells = ", ".join(f"{s:.3g} at {at:.0f} N" for s, at in zip(slopes, LOADS, strict=True))
+        lines.append(f"  {name} for {'a radian' if name in rest else 'a degree'}: {cells}")
+    return lines
 
 
 def regressors_of(seen: Observations, camber: FloatArray) -> dict[str, FloatArray]:
@@ -82,7 +94,8 @@ def leaning(number: int) -> float:
 def covered(calibration: Calibration, seen: Observations, part: FloatArray) -> str:
     """Return the shares of turns that are covered and valid, Fy then alpha."""
     found = calibration.estimate(replace(seen.features, camber=np.full(len(seen), np.nan)))
-    cells = []
+    other = (found.flags & int(TurnFlag.OTHER_TIRE) != 0)[seen.usable & part]
+    cells = [f"other_tire {other.sum()} of {other.size}"]
     for quantity in ("Fy", "alpha"):
         _, valid, held, _, std = rows_of(found, seen, quantity, seen.usable & part)
         cells.append(f"{quantity} {100 * held:.0f} % of {100 * valid:.0f} % valid, std {std:.3g}")
@@ -111,11 +124,10 @@ def main() -> None:
         for part in sorted(set(np.abs(CAMBERS))):
             rows = np.abs(size - part) < 0.01
             click.echo(f"  camber {part:g} deg: {covered(calibration, seen, rows)}")
-        for constant in ("STANDING_CAMBER", "LEANING_CAMBER", "CAMBER_DOUBT"):
+        for constant in ("USUAL", "FORCE", "SLOPE", "READ_DOUBT"):
             for factor in (0.5, 1.0, 2.0):
-                with times(laws, constant, factor):
-                    likely = size < 2.0
-                    click.echo(f"  {constant} x {factor:g}: {covered(calibration, seen, likely)}")
+                with times(tilt, constant, factor):
+                    click.echo(f"  {constant} x {factor:g}: {covered(calibration, seen, size < 2)}")
 
 
 if __name__ == "__main__":

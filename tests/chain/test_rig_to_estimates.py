@@ -3,6 +3,7 @@
 The rig shares no model with the library, so nothing here was made by what is being tested.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.result import estimate_document
 from tirelib.estimators.train import Trained, train
+from tirelib.flags import TurnFlag
 from tirelib.observations import Observations, observe
 
 LOADS = (1500.0, 3000.0, 4500.0, 6000.0, 7500.0)
@@ -67,6 +69,42 @@ def test_conditions_between_the_calibrated_ones_on_another_day(
     assert summary["Fy"]["rmse"] < 0.015 * 4000.0
     assert summary["kappa"]["rmse"] < 1e-3
     assert all(summary[quantity]["n"] == 9 for quantity in summary)
+
+
+def blind(observed: Observations, trained: Trained) -> Estimates:
+    """Return what is said where nobody gives the camber."""
+    nothing = np.full(len(observed), np.nan)
+    return trained.calibration.estimate(replace(observed.features, camber=nothing))
+
+
+def test_the_strain_tells_that_a_wheel_stands_upright(
+    trained: Trained, second: tuple[Observations, Estimates]
+) -> None:
+    """By the prior alone, 2 deg, the standard deviation of Fy would be 1,400 N at 4 kN."""
+    observed, given = second
+    found = blind(observed, trained)
+    assert found.valid["alpha"].sum() > 0.8 * given.valid["alpha"].sum() > 0
+    assert np.median(found.std["Fy"][found.valid["Fy"]]) < 350.0
+
+
+def test_a_tilted_wheel_whose_camber_nobody_gives_holds_its_intervals(
+    trained: Trained, tmp_path: Path
+) -> None:
+    """0.8 deg are 500 to 600 N of Fy here; they must neither be missed nor be another tire."""
+    runs = tuple(
+        Condition(load, 2.3e5, 65 / 3.6, float(np.deg2rad(angle)), float(np.deg2rad(camber)))
+        for load, angle, camber in ((3000.0, 1.5, 0.8), (4500.0, -1.5, 0.8), (6500.0, 1.5, -0.8))
+    )
+    run_plan(Plan("tilted", "tilted", runs), TIRES["reference"], tmp_path / "tilted", seed=3)
+    observed = observe([read_campaign(tmp_path / "tilted")])
+    found = blind(observed, trained)
+    assert not (found.flags & int(TurnFlag.OTHER_TIRE)).any()
+    for quantity, truth in (("Fy", "Fy"), ("alpha", "slip_angle")):
+        good = found.valid[quantity]
+        error = np.abs(found.value[quantity] - observed.truth[truth])[good]
+        assert good.sum() >= 8
+        assert (error <= 2.0 * found.std[quantity][good]).mean() > 0.9, quantity
+    assert np.median(found.std["Fy"][found.valid["Fy"]]) < 500.0
 
 
 def test_the_contact_length_holds_its_interval_on_the_rig(

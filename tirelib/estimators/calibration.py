@@ -178,8 +178,8 @@ class Calibration:
             extrapolated[rows] = chain.laws.extrapolated(part) | (
                 chain.force_laws.extrapolated(part) if chain.has("Fy") else False
             )
-            tilted[rows] = chain.decided_by_camber(part, estimates)[:many]
             for quantity, estimate in estimates.items():
+                tilted[rows] |= estimate.camber_decides[:many]
                 value[quantity][rows] = estimate.value[:many]
                 more = doubt(estimate.value, features.angle_std[rows])
                 std[quantity][rows] = np.hypot(estimate.std[:many], more)

@@ -20,12 +20,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
+from tirelib.estimators import tilt
 from tirelib.estimators.doubt import moved_by
 from tirelib.estimators.laws import (
     RADIUS_DOUBT,
     RADIUS_SHARE,
     ConditionLaws,
-    camber_doubt,
 )
 from tirelib.estimators.likeness import Likeness
 from tirelib.estimators.polynomial import Cloud, Polynomial, Range, all_inside
@@ -48,15 +48,26 @@ QUANTITIES = ("Fz", "alpha", "kappa", "Fy")
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """One quantity for n turns: value, standard deviation (SI), and whether it may be trusted."""
+    """One quantity for n turns: value, standard deviation (SI), and whether it may be trusted.
+
+    `by_camber` is the part of the standard deviation that a camber leaves which nobody gave.
+    """
 
     value: FloatArray
     std: FloatArray
     valid: BoolArray
+    by_camber: FloatArray | None = None
+
+    @property
+    def camber_decides(self) -> BoolArray:
+        """Which turns owe more than half their variance to a camber that nobody gave."""
+        if self.by_camber is None:
+            return np.zeros(self.value.shape, dtype=np.bool_)
+        return np.asarray(self.by_camber**2 > 0.5 * self.std**2, dtype=np.bool_)
 
     def widened(self, more: FloatArray) -> "Estimate":
         """Return it with a further standard deviation; valid only where that is a number."""
-        return Estimate(self.value, np.hypot(self.std, more), self.valid & np.isfinite(more))
+        return replace(self, std=np.hypot(self.std, more), valid=self.valid & np.isfinite(more))
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +172,8 @@ class Chain:
             if slid is not None:  # where no slip angle fits, any share may slide
                 sliding = np.where(force > 0.0, -1.0, 1.0) * np.nan_to_num(slid.sliding, nan=1.0)
         tread = self.road.hardened(values)
-        apart = self.likeness.apart(values, self.laws, tread, sliding, moves)
+        camber = np.where(np.isnan(values["camber"]), tilt.USUAL, 0.0)
+        apart = self.likeness.apart(values, self.laws, tread, sliding, moves, camber)
         return np.asarray(apart > self.likeness.limit, dtype=np.bool_)
 
     def predict(
@@ -224,10 +236,12 @@ class Chain:
         calibrated = calibrated & laws.allowed(values)
         force, std = model.predict(values)
         factor, doubt = laws.force_factor(values)
-        tilted = self._tilt(model, values["camber"], force, load)
-        law = np.hypot(doubt * np.abs(force) + laws.spread(values, factor * force), tilted)
-        force, std = factor * force, np.hypot(factor * std, law)
-        result["Fy"] = Estimate(force, std, self._valid("Fy", values, force, std) & calibrated)
+        law = doubt * np.abs(force) + laws.spread(values, factor * force)
+        leaning, tilted = self._tilt(model, values, factor * force, load)
+        force, std = factor * force - leaning, np.hypot(np.hypot(factor * std, law), tilted)
+        valid = self._valid("Fy", values, force, std) & calibrated
+        owed = np.where(np.isnan(values["camber"]), tilted, 0.0)
+        result["Fy"] = Estimate(force, std, valid, by_camber=owed)
         load_std = result["Fz"].std if "Fz" in result else np.zeros_like(load)
         with np.errstate(invalid="ignore", divide="ignore"):
             values["utilisation"] = force / load
@@ -308,33 +322,37 @@ class Chain:
         return replace(told, change=side * told.change, sliding=unseen * told.sliding)
 
     def _tilt(
-        self, model: Polynomial, camber: FloatArray, force: FloatArray, load: FloatArray
-    ) -> FloatArray:
-        """Return the deviation of Fy from a camber that its model does not know, [N]."""
-        known = any(variable.name == "camber" for variable in model.variables)
-        ends = [guard for guard in self.guards["Fy"] if guard.name == "camber" and not known]
-        return camber_doubt(camber, force, load, (ends[0].low, ends[0].high) if ends else None)
+        self,
+        model: Polynomial,
+        values: Mapping[str, FloatArray],
+        force: FloatArray,
+        load: FloatArray,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the part of Fy that is a camber's and its standard deviation, [N].
 
-    def decided_by_camber(
-        self, values: Mapping[str, FloatArray], found: Mapping[str, Estimate]
-    ) -> BoolArray:
-        """Tell which turns owe more than half the variance of Fy to a camber that nobody gave.
-
-        Parameters
-        ----------
-        values : mapping of name to array, shape (n,)
-        found : mapping of quantity to Estimate
-            What `predict` says of the first n or more turns.
+        Both are zero where the model knows the camber, or the camber is a calibrated one.
         """
         camber = values["camber"]
-        n = camber.size
-        if self.force is None:
-            return np.zeros(n, dtype=np.bool_)
-        force = found["Fy"]
-        load = found["Fz"].value[:n] if "Fz" in found else np.full(n, self.mean_load)
-        doubt = self._tilt(self.force, camber, force.value[:n], load)
-        decides = doubt**2 > 0.5 * force.std[:n] ** 2
-        return np.asarray(np.isnan(camber) & decides, dtype=np.bool_)
+        nothing = np.zeros_like(camber)
+        if any(variable.name == "camber" for variable in model.variables):
+            return nothing, nothing
+        per_camber = tilt.force_per_camber(load)
+        ends = [guard for guard in self.guards["Fy"] if guard.name == "camber"]
+        away = nothing
+        if ends:
+            away = np.abs(np.nan_to_num(camber - np.clip(camber, ends[0].low, ends[0].high)))
+        unknown = np.isnan(camber)
+        if not unknown.any():
+            return nothing, per_camber * away
+        leaning, std = nothing, np.full_like(camber, tilt.USUAL)
+        if self.likeness is not None:
+            slid = self._slid(values, force, load)
+            sliding = nothing if slid is None else slid.sliding
+            leaning, std = tilt.read(*self.likeness.slope_left(values, sliding))
+        std = np.hypot(std, tilt.READ_DOUBT * leaning)
+        return np.where(unknown, per_camber * leaning, 0.0), per_camber * np.where(
+            unknown, std, away
+        )
 
     def _rolling_radius(
         self, values: Mapping[str, FloatArray], load: Estimate | None

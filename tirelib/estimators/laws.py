@@ -20,8 +20,8 @@ pressure, and by the belt's own bending, which does not, so at a given distortio
 
 with 30 % of the correction as doubt (assumed: between 0.5 and 1; a rig's tire showed 0.73 to 0.96).
 
-A pressure or a camber that nobody gives widens the standard deviation: 15 % of the pressure; of the
-camber 1 deg, and more in a turn, where a car leans.
+A pressure that nobody gives widens the standard deviation by 15 % of itself. An unknown camber is
+the subject of `tirelib.estimators.tilt`.
 
 **Speed.** Features are taken over wheel angle, so speed enters only through inertia and damping; no
 correction, but the standard deviation grows with the squared speed's departure from the calibrated
@@ -47,19 +47,6 @@ FORCE_DOUBT = 0.3
 """Relative standard deviation of that correction."""
 UNKNOWN_PRESSURE = 0.15
 """Relative standard deviation of a pressure that nobody measures."""
-STANDING_CAMBER = float(np.deg2rad(1.0))
-"""Standard deviation of a camber that nobody gives, of a wheel that rolls straight, [rad]: makers
-set their cars to -1.8 to 0.75 deg, tolerances included (service manuals of Toyota Echo 2003,
-Cadillac CTS 2004, Chevrolet Camaro 2014, Dodge Stratus 2000), and a rig stands upright."""
-LEANING_CAMBER = float(np.deg2rad(4.0))
-"""What it grows by per lateral utilisation, [rad]: a car leans in a turn, its wheels by 5.3, 6.8
-and 8.0 deg (``build/camber_doubt.py``: three cars of CommonRoad); those of a rig do not. Spread
-evenly between none and 6.8 deg, that has a root mean square of 3.9 deg."""
-CAMBER_DOUBT, CAMBER_LOAD, CAMBER_POWER = float(700.0 / np.deg2rad(1.0)), 4000.0, 0.33
-"""Error of Fy per radian of a camber that a calibration does not know, [N/rad], at a load [N], and
-the power of the load with which it grows (``build/camber_doubt.py``: tires of the rig)."""
-LEAST_LOAD = 100.0
-"""The same at a smaller load as at this, [N]."""
 FASTEST = 60.0
 """Highest speed for which a calibration at another speed is taken to hold, [m/s]."""
 SLOWEST = 2.5
@@ -73,31 +60,6 @@ RADIUS_DOUBT = 0.003
 """Relative standard deviation of the rolling radius per (40 m/s)^2 of speed squared."""
 CALIBRATED_SLACK = 0.05
 """A condition that stays this close (relatively) to its calibrated range needs no law."""
-
-
-def camber_doubt(
-    camber: FloatArray,
-    force: FloatArray,
-    load: FloatArray,
-    calibrated: tuple[float, float] | None,
-) -> FloatArray:
-    """Return the standard deviation of Fy that a camber leaves, [N], shape (n,).
-
-    Parameters
-    ----------
-    camber, force, load : arrays, shape (n,), [rad], [N], [N]
-        NaN where nobody gives the camber; Fy and Fz as estimated.
-    calibrated : (low, high), [rad], or None
-        Cambers of a calibration whose Fy does not know the camber; None where it does.
-    """
-    away = np.zeros_like(camber)
-    if calibrated is not None:
-        away = np.abs(camber - np.clip(camber, *calibrated))
-    size = np.maximum(load, LEAST_LOAD)
-    with np.errstate(invalid="ignore"):
-        unknown = np.hypot(STANDING_CAMBER, LEANING_CAMBER * np.minimum(np.abs(force) / size, 1.0))
-    away = np.where(np.isnan(camber), unknown, away)
-    return np.asarray(CAMBER_DOUBT * (size / CAMBER_LOAD) ** CAMBER_POWER * away)
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.arrays import BoolArray, FloatArray
+from tirelib.estimators import tilt
 from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.polynomial import Term, Variable, design
 from tirelib.estimators.regressors import ODD
@@ -70,6 +71,9 @@ ROAD_DRIFT = {
 share that grows by one at a positive slip angle (odd regressors change their sign with it): mean of
 the rig's tires `reference` and `soft` on treads of 4 to 8 mm and frictions of 0.4 and 0.6, measured
 by ``python build/road_constants.py --measure reference`` (and ``soft``)."""
+CAMBER_DRIFT = {"cp2_slope": -0.3, "angle_slope": tilt.SLOPE, "tp_slope": -1.2}
+"""Shift (SI) at the same contact angle and lateral distortion per radian of a camber, of the rig's
+tires from 3 to 7 kN: -0.8 to 0.05, -0.47 to -0.26, -1.4 to -0.8 (``build/camber_doubt.py``)."""
 ROAD_DOUBT = 0.5
 """Standard deviation of another tire's shift with tread and sliding, as a share of `ROAD_DRIFT`."""
 PRESSURE_DOUBT, SPEED_DOUBT = 1.0, 2.0
@@ -116,8 +120,9 @@ class Likeness:
         tread: tuple[FloatArray, FloatArray] | None = None,
         sliding: FloatArray | None = None,
         moves: Sequence[FloatArray] = (),
+        camber: FloatArray | None = None,
     ) -> FloatArray:
-        """Return D^2 of each turn, shape (n,); NaN where it cannot be told.
+        """Return D^2 of each turn, shape (n,); NaN where it cannot be computed.
 
         Parameters
         ----------
@@ -130,6 +135,8 @@ class Likeness:
             Standard deviation of the sliding share, with the sign of the slip angle.
         moves : sequence of arrays, shape (n, m)
             What one standard deviation of an uncertain angle or offset adds to `rest`.
+        camber : shape (n,), [rad], optional
+            Standard deviation of a camber that nobody gave; 0 where it is known.
         """
         pressure, unknown = laws.pressure_departure(values)
         speed = laws.speed_departure(values)
@@ -147,12 +154,39 @@ class Likeness:
             odd = np.array([name in ODD for name in self.names])
             side = np.where(odd, np.sign(sliding)[:, None], 1.0)
             spread = spread + _along(np.abs(sliding)[:, None] * side * with_sliding)
+        if camber is not None:
+            with_camber = np.array([CAMBER_DRIFT.get(name, 0.0) for name in self.names])
+            spread = spread + _along(camber[:, None] * with_camber)
         for move in moves:
             spread = spread + move[:, :, None] * move[:, None, :]
         found = np.linalg.solve(spread, rest[:, :, None])[..., 0]
-        within = [np.abs(v.standardise(values[v.name])) <= EDGE for v in self.variables]
         square = np.sum(rest * found, axis=1) / len(self.names)
-        return np.where(np.all(within, axis=0), square, np.nan)
+        return np.where(self.within(values), square, np.nan)
+
+    def within(self, values: Mapping[str, FloatArray]) -> BoolArray:
+        """Tell which turns lie where the tire was seen, shape (n,)."""
+        near = [np.abs(v.standardise(values[v.name])) <= EDGE for v in self.variables]
+        return np.asarray(np.all(near, axis=0), dtype=np.bool_)
+
+    def slope_left(
+        self, values: Mapping[str, FloatArray], sliding: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return what the slope of the contact angle leaves unexplained, and its deviation.
+
+        Parameters
+        ----------
+        values : mapping of arrays, shape (n,)
+            Regressors and conditions.
+        sliding : shape (n,)
+            Standard deviation of the sliding share.
+        """
+        nothing = np.full(sliding.shape, np.nan)
+        if "angle_slope" not in self.names:
+            return nothing, nothing
+        column = self.names.index("angle_slope")
+        slid = ROAD_DRIFT["angle_slope"][1] * np.nan_to_num(sliding, nan=1.0)
+        noise = np.hypot(np.sqrt(self.covariance[column, column]), slid)
+        return np.where(self.within(values), self.rest(values)[:, column], np.nan), noise
 
 
 def _each(shift: FloatArray) -> FloatArray:
