@@ -1,0 +1,1 @@
+"""A rolling continuum: a numerical tire of finite elements that shares no model with tirelib."""

@@ -1,0 +1,162 @@
+"""Newton's method for a rolling state, and the way to the first one of a tire."""
+
+from dataclasses import dataclass, replace
+from dataclasses import fields as fields_of
+
+import numpy as np
+
+from continuum.balance import Balance, balance, step
+from continuum.elements import fields
+from continuum.grid import FINE, Grid, grid
+from continuum.polar import Array, tangential
+from continuum.sidewall import SidewallLaw, law
+from continuum.tire import Condition, Tire
+
+SMALLEST, LARGEST = 1e-9, 4e-3
+"""Newton's method ends below the first and takes no step above the second [m]."""
+KEPT = 1e-5
+"""Below this step the stiffness is not factored again, as long as steps fall fast [m]."""
+ITERATIONS, HALVINGS = 25, 4
+"""Of Newton's method, and of the way from a start that is too far off."""
+
+CREEPS = (0.1, 0.03, 0.01, 5e-3)
+"""Creep of the friction on the way to a tire's own."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A tire with its mesh and its sidewalls' law, which many states share."""
+
+    tire: Tire
+    mesh: Grid
+    law: SidewallLaw
+
+
+@dataclass(frozen=True)
+class State:
+    """A solved state; `by_load` is the derivative of the displacements with the load [m/N].
+
+    `stiffness` is the vertical one at constant speed [N/m], `iterations` those of Newton's method.
+    """
+
+    model: Model
+    balance: Balance
+    by_load: Array
+    stiffness: float
+    iterations: int
+
+    @property
+    def omega(self) -> float:
+        """Turn rate [rad/s]."""
+        return self.balance.omega
+
+    @property
+    def height(self) -> float:
+        """Of the axle over the road [m]."""
+        return self.balance.height
+
+
+def model(tire: Tire, fine: float = FINE) -> Model:
+    """Mesh a tire and solve its sidewall's section."""
+    return Model(tire, grid(tire, fine), law(tire.arch))
+
+
+def solve(model: Model, cond: Condition, start: State | None = None) -> State:
+    """Solve a state of straight, free rolling.
+
+    Parameters
+    ----------
+    start : State, optional
+        Of a tire with the same mesh, near by; without one the tire is lowered on to the road.
+
+    Raises
+    ------
+    ArithmeticError
+        If Newton's method does not converge.
+    """
+    return _way(model, cond, start or _lowered(model, cond), HALVINGS)
+
+
+def _way(model: Model, cond: Condition, start: State, left: int) -> State:
+    """Solve from a start; where that is too far off, through the condition half way."""
+    old = start.balance
+    try:
+        return _newton(model, cond, old.u, old.height, old.rolling, None)
+    except ArithmeticError:
+        if left == 0:
+            raise
+    if model.tire.friction and model.tire.creep < CREEPS[0]:
+        return _gripping(model, cond, start, left)
+    half = Condition(
+        *(0.5 * (getattr(cond, f.name) + getattr(old.cond, f.name)) for f in fields_of(cond))
+    )
+    return _way(model, cond, _way(model, half, start, left - 1), left - 1)
+
+
+def _gripping(model: Model, cond: Condition, start: State, left: int) -> State:
+    """Solve with friction from a start that is too far off: let the tread creep more at first."""
+    smooth = [c for c in CREEPS if c > model.tire.creep]
+    for creep in smooth:
+        start = _way(replace(model, tire=replace(model.tire, creep=creep)), cond, start, left - 1)
+    old = start.balance
+    return _newton(model, cond, old.u, old.height, old.rolling, None)
+
+
+def _lowered(model: Model, cond: Condition) -> State:
+    """Lower the tire, without friction, step by step."""
+    model = replace(model, tire=replace(model.tire, friction=0.0))
+    radius = model.tire.free_radius
+    u = np.zeros((model.mesh.n, 2))
+    state = _newton(model, cond, u, radius, radius, radius - 2e-3)
+    for load in (600.0, 1500.0, 2800.0):
+        if load < cond.load:
+            old = state.balance
+            state = _newton(model, replace(cond, load=load), old.u, old.height, old.rolling, None)
+    return state
+
+
+def rolling_radius(model: Model, now: Balance) -> float:
+    """Return V / omega of a tire without friction: what of the belt passes the contact per radian.
+
+    The mean of |x_phi| over the contact pressure, at the belt's inner face.
+    """
+    slope = fields(now.mesh.carcass, now.u)[1]
+    line = now.mesh.carcass
+    x_phi = line.radius[..., None] * tangential(line.phi) + slope
+    passing = np.linalg.norm(x_phi, axis=-1)
+    force = now.road.q * now.road.area
+    total = float(force.sum())
+    return float(np.sum(passing * force)) / total if total > 0.0 else float(line.radius[0, 0])
+
+
+def _newton(
+    model: Model, cond: Condition, u: Array, height: float, rolling: float, target: float | None
+) -> State:
+    tire, factor, last = model.tire, None, np.inf
+    for count in range(1, ITERATIONS + 1):
+        now = balance(tire, model.law, cond, model.mesh, u, height, rolling, cond.speed / rolling)
+        try:
+            moved, higher, further = step(now, target, factor)
+        except (RuntimeError, np.linalg.LinAlgError):  # a singular matrix
+            break
+        size = max(float(np.abs(moved).max()), abs(higher), abs(further))
+        if not np.isfinite(size):
+            break
+        falls, last = size < 0.2 * last, size
+        factor = (factor or now.factor) if size < KEPT and falls else None
+        part = min(1.0, LARGEST / size)
+        u, height = u + part * moved, height + part * higher
+        before = rolling
+        rolling = rolling + part * further if tire.friction else rolling_radius(model, now)
+        if size < SMALLEST and abs(rolling - before) < SMALLEST:
+            return _state(model, now, count)
+    raise ArithmeticError(
+        f"{tire.name}: no balance at {cond.load:.0f} N, {cond.pressure / 1e5:.2f} bar, "
+        f"{3.6 * cond.speed:.0f} km/h after {count} iterations; start from a state nearer by"
+    )
+
+
+def _state(model: Model, now: Balance, count: int) -> State:
+    more = replace(now, cond=replace(now.cond, load=now.road.load + 1.0))
+    moved, higher, _ = step(more, None, now.factor)
+    return State(model, now, moved, -1.0 / higher if higher else 0.0, count)
