@@ -17,7 +17,7 @@ from tirelib.errors import CalibrationError
 from tirelib.estimators import basis
 from tirelib.estimators.chain import AngleModel, Chain
 from tirelib.estimators.ends import End, growth, outermost
-from tirelib.estimators.fit import Fit, fit_best, levels_of
+from tirelib.estimators.fit import Fit, bands_of, fit_best, levels_of
 from tirelib.estimators.fit_sliding import fit_sliding
 from tirelib.estimators.floor import with_floor
 from tirelib.estimators.grow import grow
@@ -68,6 +68,8 @@ LEAST_LOAD = 0.1
 """... range of Fz over mean Fz, and ..."""
 LEAST_ANGLE = np.deg2rad(0.5)
 """... range of slip angle, [rad], below which the quantity cannot be calibrated."""
+BETWEEN = ("load", "slip_angle", "slip_ratio")
+"""What a wheel does between the conditions of a plan."""
 LEAST_ANGLE_ERROR = np.deg2rad(0.02)
 """Floor of the slip-angle error against which the cornering curve's flatness is weighed, [rad]."""
 
@@ -96,12 +98,16 @@ class Links:
         """Return the levels at which the load was held; None if it was not held at some."""
         return levels_of(self.truth["Fz"])
 
-    def angle_step(self) -> IntArray | None:
-        """Return the levels at which the size of the slip angle was held; None if at no few."""
-        return levels_of(np.abs(self.truth["slip_angle"]))
+    def between(self) -> list[IntArray]:
+        """Return levels, or bands, of load, slip angle and slip ratio, as far as varied."""
+        varied = self._varied()
+        return [bands_of(varied[name]) for name in BETWEEN if name in varied]
 
     def outermost(self) -> list[BoolArray]:
         """Return the rows at either end of every condition that was varied."""
+        return list(outermost(self._varied()))
+
+    def _varied(self) -> dict[str, FloatArray]:
         varied = {
             "load": self.truth["Fz"],
             "side": np.abs(self.truth["Fy"]),
@@ -111,7 +117,7 @@ class Links:
             "pressure": self.values["pressure"],
             "speed_squared": self.values["speed_squared"],
         }
-        return list(outermost({name: x for name, x in varied.items() if np.ptp(x) > VARIES[name]}))
+        return {name: x for name, x in varied.items() if np.ptp(x) > VARIES[name]}
 
 
 def calibrate_chain(
@@ -271,7 +277,7 @@ def _fit_load(
     try:
         fit = fit_best(
             values, truth - correction, links.groups, candidates, odd=ODD, level=level,
-            step=links.angle_step(), outermost=links.outermost(), what="Fz",
+            between=links.between(), outermost=links.outermost(), what="Fz",
         )  # fmt: skip
     except CalibrationError as error:
         links.refused["Fz"] = str(error)
@@ -342,7 +348,7 @@ def _fit_odd(links: Links, truth: FloatArray, what: str) -> Fit:
     candidates += [grown] if grown and grown not in candidates else []
     return fit_best(
         values, truth, links.groups, candidates, odd=odd, level=links.load_level(),
-        step=links.angle_step(), outermost=links.outermost(), centre=False, what=what,
+        between=links.between(), outermost=links.outermost(), centre=False, what=what,
     )  # fmt: skip
 
 
@@ -420,7 +426,7 @@ def _fit_angle(
     for _ in range(2):
         fit = fit_best(
             values, truth, links.groups, candidates, odd=odd, level=links.load_level(),
-            step=links.angle_step(), outermost=links.outermost(), weights=weights, centre=False,
+            between=links.between(), outermost=links.outermost(), weights=weights, centre=False,
             what="alpha",
         )  # fmt: skip
         steep = np.maximum(steep, np.abs(fit.model.slope(values, "utilisation")))

@@ -24,6 +24,8 @@ LARGEST_SHARE = 0.7
 """Terms per distinct condition at the most."""
 MOST_LEVELS = 12
 """More levels than these are no levels but a sweep."""
+BANDS = 5
+"""A condition that was varied evenly is held out in so many bands, as many as a plan has loads."""
 LARGEST_LEVEL = 0.5
 """A level that holds more than this share of the data cannot be held out."""
 LEVEL_SLACK = 0.05
@@ -79,7 +81,7 @@ def fit_best(
     *,
     odd: Sequence[str] = (),
     level: IntArray | None = None,
-    step: IntArray | None = None,
+    between: Sequence[IntArray] = (),
     outermost: Sequence[BoolArray] = (),
     weights: FloatArray | None = None,
     centre: bool = True,
@@ -98,8 +100,9 @@ def fit_best(
     odd : names of regressors that are standardised about zero
     level : int array, shape (n,), optional
         Load level, growing from 0; inner ones are held out whole.
-    step : int array, shape (n,), optional
-        Level of another condition; inner ones are held out to learn the border, not to choose.
+    between : sequence of int arrays, shape (n,)
+        Levels or bands of what was varied; inner ones are held out to learn the border, not to
+        choose.
     outermost : sequence of bool arrays, shape (n,)
         Rows at the ends of what was varied: held out, they say how errors grow beyond the data.
     weights : array, shape (n,), optional
@@ -132,7 +135,7 @@ def fit_best(
         found = ridge_fit(x, y, weights, centre)
         # held-out errors, not the fit's own residuals, say how large an error to expect
         inflation = max(1.0, float(np.average(error**2 / held_variance, weights=weights)))
-        ends, reach = _ends(x, y, (level, step), outermost, weights, centre)
+        ends, reach = _ends(x, y, between, outermost, weights, centre)
         reach = found.noise**2 * max(reach, float(np.quantile(held_leverage, FAR)))
         root = np.sqrt(weights)
         model = Polynomial(
@@ -183,13 +186,13 @@ def _cross_validate(
 def _ends(
     x: FloatArray,
     y: FloatArray,
-    levels: Sequence[IntArray | None],
+    levels: Sequence[IntArray],
     outermost: Sequence[BoolArray],
     weights: FloatArray,
     centre: bool,
 ) -> tuple[tuple[End, ...], float]:
     """Return what was left out, and the leverage (share of squared noise) of levels between."""
-    between = [one for level in levels if level is not None for one in inner_levels(x, level)]
+    between = [one for level in levels for one in inner_levels(x, level)]
     sets = [*(rows for rows, _ in between), *outermost]
     ends = left_out(x, y, weights, centre, sets)
     reach = [
@@ -217,6 +220,21 @@ def levels_of(x: FloatArray, share: float = 0.05) -> IntArray | None:
     number = np.empty(x.size, dtype=np.int64)
     number[order] = np.concatenate(([0], np.cumsum(steps)))
     return number if 3 <= number.max() + 1 <= MOST_LEVELS else None
+
+
+def bands_of(x: FloatArray) -> IntArray:
+    """Return the number of the level at which a condition was held; of a band, where at none.
+
+    Examples
+    --------
+    >>> bands_of(np.arange(20.0))
+    array([0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4])
+    """
+    level = levels_of(x)
+    if level is not None:
+        return level
+    share = (x - x.min()) / np.ptp(x)
+    return np.asarray(np.minimum(BANDS * share, BANDS - 1.0).astype(np.int64))
 
 
 def inner_levels(x: FloatArray, level: IntArray) -> Iterator[tuple[BoolArray, BoolArray]]:

@@ -7,7 +7,7 @@ import pytest
 
 from tirelib.estimators.border import Border
 from tirelib.estimators.ends import growth, outermost
-from tirelib.estimators.fit import Fit, fit_best
+from tirelib.estimators.fit import Fit, bands_of, fit_best
 from tirelib.estimators.laws import SLOWEST, ConditionLaws
 
 
@@ -102,3 +102,20 @@ def test_a_crawling_calibration_holds_as_slow_as_it_was_made() -> None:
     of = ConditionLaws((2.3e5, 2.3e5), (1.0, 2.0), False, True, 0.16, 0.3)
     values = {"speed": np.array([0.9, 0.96, 2.0]), "pressure": np.full(3, 2.3e5)}
     assert of.allowed(values).tolist() == [False, True, True]
+
+
+def evenly(n: int, *, banded: bool) -> Fit:
+    """A polynomial through n conditions that lie evenly, none at a level."""
+    rng = np.random.default_rng(7)
+    a = np.sort(rng.uniform(-1.0, 1.0, n))
+    y = np.sin(3.0 * a) + 0.01 * rng.standard_normal(n)
+    terms = [{}, *({"a": k} for k in range(1, 9))]
+    return fit_best({"a": a}, y, np.arange(n), [terms], between=[bands_of(a)] if banded else [])
+
+
+def test_more_conditions_of_the_same_range_do_not_make_it_narrower() -> None:
+    """Leverage falls as conditions are added; so does a border learned from single ones."""
+    outer = {"a": np.array([-0.98, 0.95])}
+    for n in (120, 240, 480):
+        assert evenly(n, banded=True).model.within(outer).all()
+    assert not evenly(240, banded=False).model.within(outer).any()
