@@ -160,7 +160,7 @@ def _of_strain(
         strengths=[np.atleast_1d(np.asarray(each.strength, dtype=float)) for each in used],
         members=members, seed=seed, progress=progress,
     )  # fmt: skip
-    told = assess(found, seed=seed, progress=progress)
+    told = assess(found, model, progress=progress)
     document = diagnosis_document(told)
     if document["verdict"] == "indistinguishable":
         try:

@@ -2,15 +2,18 @@
 
 from math import isnan
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from tirelib.campaign import read_campaign
+from tirelib.campaign import Campaign, read_campaign
 from tirelib.cli.common import CAMPAIGN, NEW_FILE, output, progress_bar, write_json
+
+if TYPE_CHECKING:
+    from tirelib.identify.whole import Whole
 
 MOST_ROWS = 12
 """Rows of the table of contact angles on the screen."""
@@ -55,7 +58,7 @@ def identify(
     campaign = read_campaign(folder)
     with progress_bar("identifying") as progress:
         whole = identify_whole(campaign, start, progress=progress)
-    document = whole_document(campaign, whole)
+    document = whole_document(campaign, whole) | _errors(campaign, whole)
     write_tire(whole.file, out, "tirelib-model/1")
     console = output()
     if whole.ring_failed:
@@ -82,12 +85,28 @@ def identify(
     context.exit(0 if told and not whole.ring_failed else 1)
 
 
+def _errors(campaign: Campaign, whole: "Whole") -> dict[str, Any]:
+    """Return the errors of the identified model, as every other verb tells them."""
+    from tirelib.compare.error import error_of
+    from tirelib.compare.forces import compare_forces
+    from tirelib.compare.model import model_of
+
+    told: dict[str, Any] = {}
+    if whole.ring is not None:
+        told |= error_of(whole.ring.runs, model_of(whole.file)).told
+    if whole.brush is not None:
+        every = [compare_forces(campaign, whole.file, name) for name in whole.brush.fit.rmse]
+        told["force_errors"] = {found.quantity: found.told for found in every}
+    return told
+
+
 def _say_ring(console: Console, document: dict[str, Any], gages: int) -> None:
     console.print(
         f"{document['campaign']}: {len(document['runs'])} straight runs, "
         f"{len(document['gages'])} of {gages} gages averaged; strain rms left "
         f"{document['rms_ustrain']:.0f} "
-        f"of {document['strain_rms_ustrain']:.0f} microstrain"
+        f"of {document['strain_rms_ustrain']:.0f} microstrain; error {document['error']:.3g} "
+        f"[{'noise' if document['error_unit'] == 'noise' else 'microstrain'}]"
     )
     _say_parameters(console, document["parameters"])
     stiffness = document["vertical_stiffness"]

@@ -112,6 +112,7 @@ def next_test(
     **ranges: tuple[float, float] | None,
 ) -> None:
     """Tell which further run would separate the suspects of CAMPAIGN best."""
+    from tirelib.compare.error import error_of
     from tirelib.compare.model import model_of
     from tirelib.diagnose.diagnose import diagnose
     from tirelib.diagnose.document import assess, diagnosis_document
@@ -166,7 +167,7 @@ def next_test(
                 runs, model.values, list(catalogue.values()), effects=effects,
                 strengths=strengths, members=members, seed=seed, progress=progress,
             )  # fmt: skip
-            told = diagnosis_document(assess(found, seed=seed, progress=progress))
+            told = diagnosis_document(assess(found, model, progress=progress))
             suspects, base = suspects_of(told, catalogue), found.base
         elif suspects.effects:
             base = refit(data, model.values, effects, strengths, progress=progress)
@@ -175,7 +176,7 @@ def next_test(
             data, base, suspects, envelope, noise=noise, campaign=campaign.header.name,
             wanted=wanted, progress=progress,
         )  # fmt: skip
-    document = plan_document(plan)
+    document = plan_document(plan) | error_of(runs, model).told
     if told is not None:
         document["verdict"] = told["verdict"]
     _give(document, plan, out, json_file)
@@ -218,7 +219,7 @@ def _for_force(
             suspects = given_suspects(given, has, catalogue, case.quantity)
         envelope = force_envelope(case, sweep, **declared) if suspects.effects else None
         plan = plan_force_test(case, suspects, envelope, wanted=wanted, progress=progress)
-    document = plan_document(plan)
+    document = plan_document(plan) | {"error": case.given, "error_unit": case.unit}
     if told is not None:
         document |= {"verdict": told["verdict"],
                      "would_revive": told["next_test"]["would_revive"]}  # fmt: skip

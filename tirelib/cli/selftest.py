@@ -68,6 +68,7 @@ def selftest(
     json_file: Path | None,
 ) -> None:
     """Plant each effect at the plan and noise of CAMPAIGN and tell the chance of finding it."""
+    from tirelib.compare.error import error_of
     from tirelib.compare.model import model_of
     from tirelib.identify.campaign_data import straight_runs
     from tirelib.model.registration import registered_effects
@@ -90,7 +91,7 @@ def selftest(
             only=only, ratios=tuple(dict.fromkeys(ratios)), repeats=repeats, members=members,
             seed=seed, progress=progress,
         )  # fmt: skip
-    document = selftest_document(found)
+    document = selftest_document(found) | error_of(runs, model).told
     _say(document)
     console = output()
     targets = [path for path in (json_file, out and out / "selftest.json") if path]

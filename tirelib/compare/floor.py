@@ -8,6 +8,7 @@ import numpy as np
 from scipy import linalg
 
 from tirelib.arrays import FloatArray
+from tirelib.compare.error import ModelError
 from tirelib.compare.model import Model, Prediction
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.random_effects import Whitening
@@ -20,17 +21,13 @@ LEAST_ERROR = 1.1
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """Structural floor as far as known.
+    """Structural floor as far as known, in units of the noise.
 
     Attributes
     ----------
     value : float
-        Error that the last identification left, in noise units; NaN where the model does not say.
-        A model identified from these very data leaves what it leaves now, in proportion to `rms`.
-    source : str
-        history, identification, or empty.
-    rms : float, [-]
-        Rms strain that it left; NaN where unknown.
+        Part of the error that noise and the tire's structure explained when the model was last
+        changed on these data (`tirelib.diagnose.floor`); NaN where its history does not say.
     smooth : float
         Error that stays when a smooth misfit of angle, load and pressure is taken out: no change
         of the model that acts smoothly can go below. NaN without noise.
@@ -39,74 +36,47 @@ class Floor:
     """
 
     value: float
-    source: str
-    rms: float
     smooth: float
     share: float
 
 
-def floor_of(
-    model: Model,
-    data_hash: str,
-    rest: FloatArray,
-    prediction: Prediction,
-    points: Operating,
-    whiten: Whitening | None,
-    raw: float,
-) -> Floor:
+def floor_of(model: Model, data_hash: str, error: ModelError, points: Operating) -> Floor:
     """Return what is known of the floor.
 
     Parameters
     ----------
     model : Model
     data_hash : str
-        Of the campaign: an identification on other data is no floor here.
-    rest : shape (n_runs, n_phi), [-]
-        Measured less model of the counted runs.
-    prediction, points
+        Of the campaign: a floor on other data is none here.
+    error : ModelError
+        Of the counted runs.
+    points : Operating
         Of the same runs.
-    whiten : Whitening or None
-        None without noise.
-    raw : float, [-]
-        Rms difference with the delay left in, as an identification leaves it.
     """
-    value, source, rms = _from_file(model, data_hash)
     smooth, share = float("nan"), float("nan")
-    if whiten is not None:
-        before, smooth = _without_smooth(rest, prediction, points, whiten)
-        if before > LEAST_ERROR:
-            share = (before**2 - smooth**2) / (before**2 - 1.0)
-        if np.isfinite(rms) and not np.isfinite(value):
-            value = before * rms / raw
-    return Floor(value, source, rms, smooth, share)
+    if error.whiten is not None:
+        smooth = _without_smooth(error.rest, error.prediction, points, error.whiten)
+        if error.value > LEAST_ERROR:
+            share = (error.value**2 - smooth**2) / (error.value**2 - 1.0)
+    return Floor(last_floor(model.history, "strain", data_hash), smooth, share)
 
 
-def _from_file(model: Model, data_hash: str) -> tuple[float, str, float]:
-    """Return error, where it is from, and rms strain as the model's file has them."""
-    rms = _number(model.provenance, "rms_microstrain") * 1e-6
-    if any(entry.get("quantity", "strain") == "strain" for entry in model.history):
-        value = last_error(model.history, "strain")
-        return value, "history" if np.isfinite(value) else "", float("nan")
-    if np.isfinite(rms) and model.provenance.get("data_sha256") == data_hash:
-        return float("nan"), "identification", rms
-    return float("nan"), "", float("nan")
+def last_floor(history: Sequence[Mapping[str, Any]], quantity: str, data_hash: str) -> float:
+    """Return the floor in noise units by the last change for a quantity.
 
-
-def last_error(history: Sequence[Mapping[str, Any]], quantity: str) -> float:
-    """Return the error in noise units after the last change for a quantity; NaN where unknown."""
+    NaN where the history does not say it, or says it of other data.
+    """
     told = [entry for entry in history if entry.get("quantity", "strain") == quantity]
-    return _number(told[-1], "error_after") if told else float("nan")
-
-
-def _number(table: Mapping[str, Any], key: str) -> float:
-    value = table.get(key)
+    if not told or told[-1].get("data_sha256") != data_hash:
+        return float("nan")
+    value = told[-1].get("floor")
     return float(value) if isinstance(value, int | float) else float("nan")
 
 
 def _without_smooth(
     rest: FloatArray, prediction: Prediction, points: Operating, whiten: Whitening
-) -> tuple[float, float]:
-    """Return the error as it is and with a smooth misfit taken out."""
+) -> float:
+    """Return the error with a smooth misfit taken out."""
     half = 0.5 * (prediction.edges[:, 1] - prediction.edges[:, 0])
     shapes = Discrepancy().columns(prediction.strain, half, points, GRID)
     rows = whiten(shapes).reshape(len(shapes), -1)
@@ -114,4 +84,4 @@ def _without_smooth(
     normal = rows @ rows.T + np.eye(len(rows))
     weights = linalg.cho_solve(linalg.cho_factor(normal), rows @ white)
     left = white - weights @ rows
-    return float(np.sqrt(np.mean(white**2))), float(np.sqrt(np.mean(left**2)))
+    return float(np.sqrt(np.mean(left**2)))

@@ -1,12 +1,14 @@
 """A model's brush held against the forces of a campaign.
 
 Points are runs, or passes of a sweep through a cell of conditions. Points in the same cell are the
-repeats. The model is computed at the measured conditions, so a set point that is off moves both.
+repeats, which give the noise (`tirelib.compare.force_noise`). The model is computed at the measured
+conditions, so a set point that is off moves both.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy import special
@@ -14,9 +16,10 @@ from scipy import special
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.brush.predict import PointParameters
 from tirelib.campaign import Campaign
-from tirelib.compare.floor import last_error
+from tirelib.compare.floor import last_floor
 from tirelib.compare.force_model import ForceBench, ForceModel, force_model_of
-from tirelib.compare.force_points import CELL_ANGLE, ForcePoints, force_points, noise_of
+from tirelib.compare.force_noise import force_noise
+from tirelib.compare.force_points import CELL_ANGLE, ForcePoints, force_points
 from tirelib.compare.model import UsedEffect
 from tirelib.compare.sentences import told
 from tirelib.compare.strain import verdict_of
@@ -88,7 +91,7 @@ class ForceComparison:
     repeats : int
         Cells with more than one point.
     error : float
-        Rms of model less measured over the noise; NaN without repeats.
+        Rms of model less measured over the noise; in N or N m without repeats.
     rms, measured_rms : float
     p : float
     verdict : str
@@ -97,8 +100,8 @@ class ForceComparison:
     used : tuple of UsedEffect
         Effects that the model has.
     floor : float
-        Error that the last change of the model for this force left, by its history, in noise
-        units; NaN where unknown.
+        Part of the error that noise and the brush's structure explained when the model was last
+        changed for this force on these data, in noise units; NaN where unknown.
     """
 
     quantity: str
@@ -120,6 +123,19 @@ class ForceComparison:
     messages: tuple[str, ...]
     used: tuple[UsedEffect, ...] = ()
     floor: float = float("nan")
+
+    @property
+    def error_unit(self) -> str:
+        """In which the error is told: noise, N or Nm."""
+        return "noise" if np.isfinite(self.noise) else UNITS[self.quantity]
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """The keys under which every document tells an error: value, unit, noise, raw rms."""
+        return {
+            "error": self.error, "error_unit": self.error_unit, "noise": self.noise,
+            "residual_rms_raw": self.rms,
+        }  # fmt: skip
 
     @property
     def difference(self) -> FloatArray:
@@ -165,14 +181,13 @@ def compare_forces(
     wanted = quantities_of(campaign, points, quantity)
     points = usable_points(campaign, model, points)
     bench = ForceBench.of(model, points)
-    found, plain = bench.forces(model.values, model.changes), bench.forces(model.values)
+    found, data_hash = bench.forces(model.values, model.changes), campaign.content_hash()
     left_out = tuple(
         f"the model's effect {name} acts on strain and has no part in the forces"
         for name in strain_effects(file, model)
     )
     every = [
-        _compare(campaign, model, points, getattr(found, name), getattr(plain, name), name)
-        for name in wanted
+        _compare(campaign, model, points, getattr(found, name), name, data_hash) for name in wanted
     ]
     best = max(every, key=_lack)
     return replace(best, messages=(*best.messages, *left_out))
@@ -238,7 +253,7 @@ def slips(data: ForceData, name: str) -> bool:
 
 
 def _lack(found: ForceComparison) -> float:
-    return found.error if np.isfinite(found.error) else found.rms / found.measured_rms
+    return found.error if np.isfinite(found.noise) else found.rms / found.measured_rms
 
 
 def _compare(
@@ -246,19 +261,19 @@ def _compare(
     model: ForceModel,
     points: ForcePoints,
     predicted: FloatArray,
-    plain: FloatArray,
     name: str,
+    data_hash: str,
 ) -> ForceComparison:
-    """Return the comparison of one force; `plain` is predicted without the model's effects."""
+    """Return the comparison of one force."""
     keep = np.isfinite(getattr(points.data, name))
-    points, predicted, plain = points.take(keep), predicted[keep], plain[keep]
+    points, predicted = points.take(keep), predicted[keep]
     data = points.data
     measured = getattr(data, name)
     difference = predicted - measured
-    noise, freedom, repeats = noise_of(plain - measured, points.cell)
+    noise, freedom, repeats = force_noise(points, measured)
     rms = float(np.sqrt(np.mean(difference**2)))
     size = float(np.sqrt(np.mean(measured**2)))
-    error, p = float("nan"), float("nan")
+    error, p = rms, float("nan")
     if freedom:
         error = rms / noise
         p = float(special.fdtrc(difference.size, freedom, error**2))
@@ -269,7 +284,7 @@ def _compare(
         name, campaign.header.name, model.name, data, data.block, measured, predicted, noise,
         repeats, error, rms, size, p, verdict, table, said,
         _messages(campaign, name, points, verdict, rms / size, repeats), model.used,
-        last_error(model.history, name),
+        last_floor(model.history, name, data_hash),
     )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from tirelib.arrays import FloatArray
+from tirelib.contact.exact import ExactContact
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.errors import CalibrationError, FormatError, ParameterError, TirelibError
 from tirelib.model.base import Correction, large_displacements, predict, values_of
@@ -55,6 +56,22 @@ class Model:
     history: tuple[Mapping[str, Any], ...]
     provenance: Mapping[str, Any]
     sources: Mapping[str, str]
+
+    @classmethod
+    def fitted(
+        cls,
+        values: Mapping[str, float | FloatArray],
+        effects: Sequence[Effect],
+        strengths: Sequence[FloatArray],
+    ) -> "Model":
+        """Return the model of a fit: values of a tire, and effects with arrays of components."""
+        used = tuple(
+            UsedEffect(
+                effect, float(s[0]) if effect.components == 1 else tuple(float(x) for x in s)
+            )
+            for effect, s in zip(effects, strengths, strict=True)
+        )
+        return cls("fitted", values, used, True, (), {}, {})
 
     @property
     def changes(self) -> Changes:
@@ -151,7 +168,12 @@ class Prediction:
 
 
 def predict_runs(
-    model: Model, points: Operating, lateral: Sequence[float], low_pass: LowPass
+    model: Model,
+    points: Operating,
+    lateral: Sequence[float],
+    low_pass: LowPass,
+    *,
+    start: ExactContact | None = None,
 ) -> Prediction:
     """Return what the model says at operating points, with slopes by load and pressure.
 
@@ -163,6 +185,8 @@ def predict_runs(
         Positions of the gages that are averaged (left positive).
     low_pass : LowPass
         Of the measured waveforms.
+    start : ExactContact, optional
+        Of the same points and a model nearby; saves time, the result is the same.
 
     Raises
     ------
@@ -170,7 +194,8 @@ def predict_runs(
         If the model cannot be computed there; with the model's own message.
     """
     try:
-        return _predict_runs(model, points, np.asarray(lateral, dtype=float), low_pass)
+        places = np.asarray(lateral, dtype=float)
+        return _predict_runs(model, points, places, low_pass, start)
     except TirelibError as error:
         raise CalibrationError(
             f"model {model.name}: it has no solution at the campaign's conditions ({error}); "
@@ -179,13 +204,17 @@ def predict_runs(
 
 
 def _predict_runs(
-    model: Model, points: Operating, lateral: FloatArray, low_pass: LowPass
+    model: Model,
+    points: Operating,
+    lateral: FloatArray,
+    low_pass: LowPass,
+    start: ExactContact | None,
 ) -> Prediction:
     n = len(points)
     places = lateral if model.across else np.zeros(1)
     correction = None
     if model.large:
-        correction = large_displacements(model.values, points, low_pass=low_pass)
+        correction = large_displacements(model.values, points, low_pass=low_pass, start=start)
     three = points.tiled(3)
     load, pressure = three.load.copy(), three.pressure.copy()
     load[n : 2 * n] *= 1.0 + TRIAL

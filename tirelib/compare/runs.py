@@ -7,12 +7,10 @@ import numpy as np
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.campaign import Tolerance
 from tirelib.errors import CalibrationError
-from tirelib.identify.campaign_data import working_gages
+from tirelib.identify.campaign_data import TYPICAL_TOLERANCE, usable, working_gages
 from tirelib.identify.error_bands import levels
 from tirelib.waveforms import Waveforms
 
-TYPICAL_TOLERANCE = Tolerance(0.005, 0.002, 0.001, 0.003)
-"""Where a campaign does not say its own."""
 _STEP = {"load": 50.0, "pressure": 5e3, "speed": 1.0 / 3.6}
 """To what levels are rounded: 50 N, 0.05 bar, 1 km/h."""
 _SLIP_STEP = {
@@ -76,24 +74,30 @@ def choose(waves: Waveforms) -> Chosen:
     """
     name = waves.header.name
     c = waves.conditions
-    known = np.isfinite(c["Fz"]) & np.isfinite(c["pressure"]) & np.isfinite(c["omega"])
+    known = usable(waves)
     if not known.any():
-        lacking = [q for q in ("Fz", "pressure", "omega") if not np.isfinite(c[q]).any()]
+        lacking = [q for q in ("Fz", "pressure") if not np.isfinite(c[q]).any()]
         raise CalibrationError(
-            f"{name}: {len(waves)} runs with strain, none with load, pressure and turn rate "
-            f"({', '.join(lacking) or 'never all of them'} is missing); record them"
+            f"{name}: {len(waves)} runs with strain, none with load, pressure and a gage that "
+            f"works ({', '.join(lacking) or 'never all of them'} is missing); record them"
         )
     notes = [f"run {run} is left out: it {why}" for run, why in list(waves.left_out.items())[:5]]
     if not known.all():
         notes.append(
-            f"{int((~known).sum())} runs are left out: load, pressure or turn rate is unknown"
+            f"{int((~known).sum())} runs are left out: load or pressure is unknown, or no gage "
+            "gives a whole waveform"
         )
     chosen = waves.take(known)
-    gages = working_gages(chosen)
+    straight = chosen.straight
+    gages = working_gages(chosen.take(straight) if straight.any() else chosen)
+    whole = np.asarray(np.isfinite(chosen.strain[:, gages]).all(axis=(1, 2)))
+    if not whole.all():
+        lost_runs = ", ".join(str(run) for run in chosen.run[~whole])
+        notes.append(f"run {lost_runs} left out: a gage that works in straight runs fails there")
+        chosen, straight = chosen.take(whole), straight[whole]
     if len(gages) < len(chosen.header.gage_lateral):
         lost = sorted(set(range(len(chosen.header.gage_lateral))) - set(gages))
         notes.append(f"gage {', '.join(str(g + 1) for g in lost)} does not take part")
-    straight = chosen.straight
     if not straight.any():
         straight = np.ones(len(chosen), dtype=np.bool_)
         notes.append(

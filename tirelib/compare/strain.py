@@ -6,9 +6,10 @@ import numpy as np
 from scipy import special
 
 from tirelib.arrays import FloatArray, IntArray
+from tirelib.compare.error import ModelError, Yardstick
 from tirelib.compare.floor import Floor, floor_of
 from tirelib.compare.gages import Gage, compare_gages, gage_sentences
-from tirelib.compare.lag import fitted_delay, lag_message, late_prediction
+from tirelib.compare.lag import lag_message, late_prediction
 from tirelib.compare.model import Model, Prediction, predict_runs
 from tirelib.compare.regions import SLIPS, Region, find_regions
 from tirelib.compare.runs import Chosen, choose
@@ -17,10 +18,10 @@ from tirelib.compare.sentences import sentences
 from tirelib.compare.set_points import NAMES, SetPoints, predict_set_points, tangents
 from tirelib.compare.track_words import track_sentences
 from tirelib.compare.tracks import Track, tracks
-from tirelib.identify.noise import LEAST_NOISE, RepeatNoise, repeat_noise
-from tirelib.identify.random_effects import scales, whitening_of
+from tirelib.identify.campaign_data import straight_noise
+from tirelib.identify.noise import RepeatNoise
+from tirelib.identify.random_effects import scales
 from tirelib.model.base import operating_points
-from tirelib.model.state import Operating
 from tirelib.waveforms import Waveforms
 
 NO_FIT = 0.5
@@ -39,12 +40,8 @@ class Fit:
     ----------
     verdict : str
         One of `VERDICTS`.
-    error : float
-        Rms whitened residual over noise; NaN without repeats.
     rms : float, [-]
         Rms of model less measured, set points and delay taken out.
-    raw_rms : float, [-]
-        The same with both left in.
     strain_rms : float, [-]
         Of the measurement.
     p : float
@@ -54,9 +51,7 @@ class Fit:
     """
 
     verdict: str
-    error: float
     rms: float
-    raw_rms: float
     strain_rms: float
     p: float
     beyond: tuple[str, ...]
@@ -71,8 +66,8 @@ class Comparison:
     chosen : Chosen
         Runs, gages and conditions.
     model : Model
-    delay, delay_std : float, [s]
-        Of the gages against the trigger, in all runs (`tirelib.compare.lag`).
+    error : ModelError
+        Over the counted (straight) runs, with the delay.
     prediction : Prediction
         With the delay.
     points : SetPoints
@@ -101,8 +96,7 @@ class Comparison:
 
     chosen: Chosen
     model: Model
-    delay: float
-    delay_std: float
+    error: ModelError
     prediction: Prediction
     points: SetPoints
     noise: RepeatNoise
@@ -157,21 +151,17 @@ def compare_strain(waves: Waveforms, model: Model, data_hash: str = "") -> Compa
     lateral = [waves.header.gage_lateral[g] for g in chosen.gages]
     prediction = predict_runs(model, at, lateral, waves.low_pass)
     counted = chosen.straight
-    tangent = tangents(prediction)
-    repeats = repeat_noise(chosen.strain[counted], waves.group[counted], tangent[counted])
-    if not repeats.known and not counted.all():
-        repeats = repeat_noise(chosen.strain, waves.group, tangent)
+    repeats = straight_noise(waves.take(counted), chosen.strain[counted])
     scale = scales(chosen.tolerance, waves.angle_std)
-    raw = chosen.strain - prediction.strain
-    delay, delay_std = _delay(raw, tangent, scale, repeats.std, chosen, prediction, at)
-    prediction = late_prediction(prediction, at.omega, delay)
+    yardstick = Yardstick(
+        chosen.strain, at, scale, repeats.std, tuple(lateral), waves.low_pass
+    ).take(counted)
+    error = yardstick.of_prediction(_part(prediction, counted))
+    prediction = late_prediction(prediction, at.omega, error.delay)
     tangent, rest = tangents(prediction), chosen.strain - prediction.strain
     points = _set_points(rest, tangent, scale, repeats.std, chosen)
     difference = points.shift - rest
-    whiten = None
-    if repeats.known:
-        whiten = whitening_of(tangent[counted], scale[counted], repeats.std)
-    fit = _fit(rest, difference, whiten, repeats, points, chosen, _rms(raw[counted]))
+    fit = _fit(error, difference, repeats, points, chosen)
     sector = sectors_of(prediction.edges)
     regions: tuple[Region, ...] = ()
     if fit.verdict == "lack_of_fit":
@@ -190,8 +180,7 @@ def compare_strain(waves: Waveforms, model: Model, data_hash: str = "") -> Compa
     return Comparison(
         chosen,
         model,
-        delay,
-        delay_std,
+        error,
         prediction,
         points,
         repeats,
@@ -200,15 +189,7 @@ def compare_strain(waves: Waveforms, model: Model, data_hash: str = "") -> Compa
         sector,
         np.sqrt(np.mean(difference**2, axis=1)),
         fit,
-        floor_of(
-            model,
-            data_hash,
-            rest[counted],
-            _part(prediction, counted),
-            at.take(counted),
-            whiten,
-            _rms(raw[counted]),
-        ),
+        floor_of(model, data_hash, error, at.take(counted)),
         cells(difference, sector, counted, chosen.factors, repeats, points),
         regions,
         said,
@@ -216,33 +197,10 @@ def compare_strain(waves: Waveforms, model: Model, data_hash: str = "") -> Compa
         gages,
         (
             *_messages(chosen, repeats, fit),
-            *lag_message(delay, delay_std, at.omega[counted]),
+            *lag_message(error.delay, error.delay_std, at.omega[counted]),
             *chosen.notes,
         ),
     )
-
-
-def _delay(
-    rest: FloatArray,
-    tangent: FloatArray,
-    scale: FloatArray,
-    noise: float,
-    chosen: Chosen,
-    prediction: Prediction,
-    at: Operating,
-) -> tuple[float, float]:
-    """Return the common delay of the straight runs and its standard deviation [s].
-
-    What is left beside the set points, misfit and all, counts as noise.
-    """
-    counted = chosen.straight
-    first = predict_set_points(rest[counted], tangent[counted], scale[counted], noise)
-    left = _rms(rest[counted] - first.shift)
-    whiten = whitening_of(tangent[counted], scale[counted], max(left, LEAST_NOISE))
-    return fitted_delay(
-        chosen.strain[counted], prediction.strain[counted], at.omega[counted], whiten,
-        first.independent,
-    )  # fmt: skip
 
 
 def _set_points(
@@ -266,27 +224,25 @@ def _part(prediction: Prediction, rows: np.ndarray) -> Prediction:
 
 
 def _fit(
-    rest: FloatArray,
+    error: ModelError,
     difference: FloatArray,
-    whiten: object,
     noise: RepeatNoise,
     points: SetPoints,
     chosen: Chosen,
-    raw: float,
 ) -> Fit:
     counted = chosen.straight
     rms = _rms(difference[counted])
     strain_rms = _rms(chosen.strain[counted])
-    error, p = float("nan"), float("nan")
-    if callable(whiten):
-        error = _rms(whiten(rest[counted]))
-        p = float(special.fdtrc(points.independent * int(counted.sum()), noise.freedom, error**2))
+    p = float("nan")
+    if error.known:
+        freedom = points.independent * int(counted.sum())
+        p = float(special.fdtrc(freedom, noise.freedom, error.value**2))
     scaled = np.sqrt(np.mean(points.scaled[counted] ** 2, axis=0))
     beyond = tuple(name for name, size in zip(NAMES, scaled, strict=True) if size > BEYOND)
     verdict = verdict_of(rms / strain_rms, p)
     if verdict == "fits" and beyond:
         verdict = "lack_of_fit"
-    return Fit(verdict, error, rms, raw, strain_rms, p, beyond)
+    return Fit(verdict, rms, strain_rms, p, beyond)
 
 
 def verdict_of(share: float, p: float) -> str:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.ensemble import MEMBERS
+from tirelib.diagnose.floor import usual_size
 from tirelib.diagnose.guess import Guess, guess_law
 from tirelib.diagnose.left import left_of
 from tirelib.diagnose.noise import noise_in, white_noise
@@ -93,6 +94,8 @@ class Diagnosis:
     data : Data
     beyond : shape (n_runs, n_phi)
         Whitened part of model less measured that neither the model nor structure explains.
+    usual : float
+        Rms whitened residual that 19 of 20 variants stay below after such a fit.
     guess : Guess or None
         A law for it, if it is more than variants leave and a sparse one holds.
     like : Finding or None
@@ -115,6 +118,7 @@ class Diagnosis:
     runs: StraightRuns
     data: Data
     beyond: FloatArray
+    usual: float
     guess: Guess | None
     like: Finding | None
     by_share: tuple[str, ...]
@@ -176,8 +180,8 @@ def diagnose(
     dead = {name: why for name, why in first.found.dead.items() if name not in extra}
     return Diagnosis(
         verdict, tuple(named), findings, dead, base, last.model, left, floor, found.count, runs,
-        data, beyond, guess, like, tuple(name for name in found.by_share if name in named),
-        refitted,
+        data, beyond, usual_size(last.model, last.ranking.structure.members), guess, like,
+        tuple(name for name in found.by_share if name in named), refitted,
     )  # fmt: skip
 
 

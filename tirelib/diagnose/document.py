@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from tirelib.compare.error import ModelError, Yardstick, named_errors
+from tirelib.compare.model import Model
 from tirelib.diagnose.diagnose import Diagnosis, Finding
-from tirelib.diagnose.floor import FLOOR_MEMBERS, ErrorUnit, structural_floor
+from tirelib.diagnose.floor import MapUnit, floor_of
 from tirelib.diagnose.guess import Guess
-from tirelib.diagnose.held_out import Fold, folds, held_out_errors, pooled
+from tirelib.diagnose.held_out import Fold, fold_entry, folds, held_out_errors, pooled
 from tirelib.diagnose.left import Left, left_of, told_powers
 from tirelib.diagnose.plain import BELT
 from tirelib.diagnose.refit import Refit, inside
@@ -29,35 +31,42 @@ class Assessment:
     Attributes
     ----------
     diagnosis : Diagnosis
-    unit : ErrorUnit
+    unit : MapUnit
+        Of the maps of the residual.
     verdict : str
     named : tuple of str
         Empty without repeats.
     findings : tuple of Finding
         At most hints without repeats.
-    error_before, error_after, floor : float
-        Without and with the named effects; what the structure leaves. In `unit`.
+    before, refitted, after : ModelError
+        Of the model as it is given, fitted anew, and with the named effects.
+    floor : float
+        Part of `after` that noise and structure explain.
     folds : tuple of Fold
     held_before : tuple of float
         One error per fold, of the model without the named effects; empty if nothing is named.
     held_after : mapping of name to tuple of float
         With one named effect alone.
+    held_final : tuple of float
+        With all named effects; empty if nothing is named.
     left : Left
         What no effect explains.
     messages : tuple of str
     """
 
     diagnosis: Diagnosis
-    unit: ErrorUnit
+    unit: MapUnit
     verdict: str
     named: tuple[str, ...]
     findings: tuple[Finding, ...]
-    error_before: float
-    error_after: float
+    before: ModelError
+    refitted: ModelError
+    after: ModelError
     floor: float
     folds: tuple[Fold, ...]
     held_before: tuple[float, ...]
     held_after: dict[str, tuple[float, ...]]
+    held_final: tuple[float, ...]
     left: Left
     messages: tuple[str, ...]
 
@@ -66,38 +75,49 @@ class Assessment:
         """The model with the named effects."""
         return self.diagnosis.final if self.named else self.diagnosis.base
 
+    def error_with(self, finding: Finding) -> float:
+        """Return the error with one effect alone: of a sole named one exact, else of first order.
+
+        To first order the effect takes the share of the refitted error that it takes of the fit's.
+        """
+        if self.named == (finding.effect.name,):
+            return self.after.value
+        return self.refitted.value * finding.error_after / self.diagnosis.base.error
+
 
 def assess(
-    found: Diagnosis,
-    *,
-    members: int = FLOOR_MEMBERS,
-    seed: int = 0,
-    progress: Callable[[str], None] | None = None,
+    found: Diagnosis, given: Model, *, progress: Callable[[str], None] | None = None
 ) -> Assessment:
     """Return a diagnosis with floor, held-out errors and what is left.
 
     Parameters
     ----------
     found : Diagnosis
-    members, seed : int
-        Of the ensemble for the floor.
+    given : Model
+        The model that was diagnosed, as its file has it.
     progress : callable, optional
     """
-    data, unit = found.data, ErrorUnit.of(found.runs, found.data)
+    data, yardstick = found.data, Yardstick.of(found.runs)
+    unit = MapUnit.of(found.runs, data)
     verdict, named, findings, messages = found.verdict, found.named, found.findings, []
     if not unit.known:
         verdict, named = "none", ()
         findings = tuple(_hint(finding) for finding in findings)
         messages.append(NO_REPEATS)
     final = found.final if named else found.base
-    floor = structural_floor(data, final, unit, members=members, seed=seed, progress=progress)
+    near = found.base.correction.contact
+    refitted = yardstick.error(found.base.model, start=near)
+    after = yardstick.error(final.model, start=final.correction.contact) if named else refitted
+    floor = floor_of(after, found.runs, data, final, found.beyond, found.usual)
     chosen = folds(data) if named else ()
-    held_before = held_out_errors(data, found.base, chosen, unit, progress=progress)
+    held_before = held_out_errors(data, found.base, chosen, yardstick, progress=progress)
     held_after = {
-        name: held_out_errors(data, single, chosen, unit, progress=progress)
+        name: held_out_errors(data, single, chosen, yardstick, progress=progress)
         for name in [name for name in named if name not in BELT] or named
         if (single := _with_one(found, name)) is not None
     }
+    alone = next((held_after[name] for name in named if (name,) == named), None)
+    held_final = alone or held_out_errors(data, final, chosen, yardstick, progress=progress)
     if named and not chosen:
         messages.append(
             "nothing can be held out: three loads or two pressures, and four other runs, are needed"
@@ -109,9 +129,9 @@ def assess(
     if others and verdict in ("none", "named"):
         messages.append(_not_needed(others))
     return Assessment(
-        found, unit, verdict, named, findings, unit.factor * found.base.error,
-        unit.factor * final.error, floor, chosen, held_before, held_after,
-        _left(found, data, final), tuple(messages),
+        found, unit, verdict, named, findings, yardstick.error(given, start=near), refitted, after,
+        floor, chosen, held_before, held_after, held_final, _left(found, data, final),
+        tuple(messages),
     )  # fmt: skip
 
 
@@ -158,21 +178,25 @@ def _with_one(found: Diagnosis, name: str) -> Refit | None:
 
 def diagnosis_document(told: Assessment) -> dict[str, Any]:
     """Return the numbers as ``tirelib-diagnosis/1``; strains in microstrain, angles in deg."""
-    found, unit = told.diagnosis, told.unit
+    found = told.diagnosis
     return {
         "format": FORMAT,
         "campaign": found.runs.waves.header.name,
         "axes": "iso",
         "quantity": "strain",
         "unit": "ustrain",
-        "noise": 1e6 * unit.noise,
+        **named_errors(told.before, told.after),
+        "error_refitted": told.refitted.value,
         "repeats": found.runs.noise.repeats,
-        "error_unit": unit.name,
         "floor": told.floor,
-        "error_before": told.error_before,
-        "error_after": told.error_after,
         "heldout_error_before": pooled(told.held_before, told.folds),
-        "held_out": [{"condition": f.name, "runs": int(f.out.sum())} for f in told.folds],
+        "heldout_error_after": pooled(told.held_final, told.folds),
+        "held_out": [
+            fold_entry(fold, before, after)
+            for fold, before, after in zip(
+                told.folds, told.held_before, told.held_final, strict=True
+            )
+        ],
         "delay_us": 1e6 * found.final.delay,
         "misfit": found.left,
         "misfit_floor": found.floor,
@@ -189,10 +213,7 @@ def diagnosis_document(told: Assessment) -> dict[str, Any]:
 
 
 def _candidate(finding: Finding, rank: int, told: Assessment) -> dict[str, Any]:
-    name, unit = finding.effect.name, told.unit
-    error = unit.factor * finding.error_after
-    if told.named == (name,):
-        error = told.error_after
+    name = finding.effect.name
     return {
         "effect": name,
         "title": finding.effect.title,
@@ -205,7 +226,7 @@ def _candidate(finding: Finding, rank: int, told: Assessment) -> dict[str, Any]:
         "unit": finding.effect.unit,
         "range": [finding.effect.low, finding.effect.high],
         "in_range": finding.in_range,
-        "error_after": error,
+        "error_after": told.error_with(finding),
         "heldout_error_after": pooled(told.held_after.get(name, ()), told.folds),
         "share": finding.share,
         "twins": [
@@ -243,7 +264,7 @@ def exceeds(told: Assessment) -> bool:
 
 def _unexplained(told: Assessment) -> dict[str, Any]:
     left, guess = told.left, told.diagnosis.guess
-    like = None if told.diagnosis.like is None else _like(told.diagnosis.like, told.unit)
+    like = None if told.diagnosis.like is None else _like(told.diagnosis.like, told)
     if not exceeds(told):
         return {"where": None, "scaling": None, "guess": None, "like": like}
     start, stop = np.rad2deg(left.span)
@@ -269,7 +290,7 @@ def _unexplained(told: Assessment) -> dict[str, Any]:
     }
 
 
-def _like(like: Finding, unit: ErrorUnit) -> dict[str, Any]:
+def _like(like: Finding, told: Assessment) -> dict[str, Any]:
     return {
         "title": like.effect.title,
         "score": like.score,
@@ -277,7 +298,7 @@ def _like(like: Finding, unit: ErrorUnit) -> dict[str, Any]:
         "strength": _plain(like.strength),
         "std": _plain(like.std),
         "unit": like.effect.unit,
-        "error_after": unit.factor * like.error_after,
+        "error_after": told.error_with(like),
     }
 
 

@@ -2,19 +2,21 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
 from tirelib.arrays import BoolArray
-from tirelib.diagnose.floor import ErrorUnit
+from tirelib.compare.error import Yardstick
 from tirelib.diagnose.refit import Refit, refit
 from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import LEAST_RUNS
 from tirelib.identify.error_bands import levels
-from tirelib.identify.random_effects import whitening
 from tirelib.identify.waveform_fit import Data
-from tirelib.model.base import Correction, large_displacements, predict
+from tirelib.model.base import Correction
+from tirelib.units import from_si
 
+_TOLD = {"load": ("N", "force"), "pressure": ("bar", "pressure")}
 LEAST_LOADS, LEAST_PRESSURES = 3, 2
 
 
@@ -60,7 +62,7 @@ def held_out_errors(
     data: Data,
     model: Refit,
     chosen: Sequence[Fold],
-    unit: ErrorUnit,
+    yardstick: Yardstick,
     *,
     progress: Callable[[str], None] | None = None,
 ) -> tuple[float, ...]:
@@ -74,7 +76,8 @@ def held_out_errors(
     model : Refit
         Its values and strengths are the start; effects that it has stay.
     chosen : sequence of Fold
-    unit : ErrorUnit
+    yardstick : Yardstick
+        Of the campaign: the unit is that of every other error of it.
     progress : callable, optional
     """
     errors = []
@@ -84,8 +87,10 @@ def held_out_errors(
                 part_of(data, ~fold.out), model.values, model.effects, model.strengths,
                 delay=model.delay, near=_near(model.correction, ~fold.out), progress=progress,
             )  # fmt: skip
+            seen = yardstick.take(fold.out)
             near = _near(model.correction, fold.out)
-            errors.append(unit.factor * error_on(part_of(data, fold.out), trained, near))
+            start = near.contact if near is not None else None
+            errors.append(seen.error(trained.model, trained.delay, start=start).value)
         except TirelibError:
             errors.append(float("nan"))
     return tuple(errors)
@@ -106,22 +111,17 @@ def _near(correction: Correction, chosen: BoolArray) -> Correction | None:
     return Correction(correction.waveform[rows], correction.deflection[rows], part)
 
 
-def error_on(data: Data, model: Refit, near: Correction | None = None) -> float:
-    """Return the rms whitened residual of a fitted model on runs, which may be others'.
-
-    `near` is a correction of these runs at values nearby; it saves time.
-    """
-    points = data.points
-    correction = large_displacements(
-        model.values, points, low_pass=data.low_pass, start=near.contact if near else None
-    )
-    wave = predict(
-        model.values, points, model.changes, low_pass=data.low_pass, correction=correction
-    ).wave
-    whiten = whitening(
-        wave, model.values, points, data.tolerance, data.angle_std, data.noise, data.low_pass
-    )
-    return float(np.sqrt(np.mean(whiten(data.strain - wave) ** 2)))
+def fold_entry(fold: Fold, before: float, after: float) -> dict[str, Any]:
+    """Return a left-out part with its errors as documents tell them."""
+    unit, dimension = _TOLD[fold.name]
+    return {
+        "condition": fold.name,
+        "value": float(from_si(fold.value, unit, dimension)),
+        "unit": unit,
+        "runs": int(fold.out.sum()),
+        "error_before": before,
+        "error_after": after,
+    }
 
 
 def pooled(errors: Sequence[float], chosen: Sequence[Fold]) -> float:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tirelib.arrays import FloatArray
+from tirelib.compare.model import Model
 from tirelib.diagnose.fitter import BASE, Fitter, changes_of
 from tirelib.effects import Effect
 from tirelib.errors import ConvergenceError, ParameterError, TirelibError
@@ -73,6 +74,11 @@ class Refit:
     whiten: Whitening
     covariance: FloatArray
     error: float
+
+    @property
+    def model(self) -> Model:
+        """The tire with its effects, without the delay: what a model file holds."""
+        return Model.fitted(self.values, self.effects, self.strengths)
 
     @property
     def changes(self) -> Changes:

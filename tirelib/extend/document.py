@@ -3,45 +3,35 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tirelib.diagnose.held_out import pooled
+from tirelib.compare.error import named_errors
+from tirelib.diagnose.held_out import fold_entry, pooled
 from tirelib.extend.extension import Extension
 from tirelib.extend.model_file import plain
 from tirelib.extend.step import Step
 from tirelib.parameters import TireFile
-from tirelib.units import from_si
 
 FORMAT = "tirelib-extension/1"
 NO_REPEATS = (
     "no runs were repeated at equal set points, so the noise is unknown and errors are in "
     "microstrain; repeat some runs"
 )
-_TOLD = {"load": ("N", "force"), "pressure": ("bar", "pressure")}
 
 
 def extension_document(done: Extension, file: TireFile) -> dict[str, Any]:
     """Return the numbers of an extension and the history of the model that came out."""
-    messages = [] if done.unit.known else [NO_REPEATS]
+    messages = [] if done.given.known else [NO_REPEATS]
     if not done.folds:
         messages.append(
             "nothing can be held out: three loads or two pressures, and four other runs, are needed"
         )
     held_out = [
-        {
-            "condition": fold.name,
-            "value": float(from_si(fold.value, *_TOLD[fold.name])),
-            "unit": _TOLD[fold.name][0],
-            "runs": int(fold.out.sum()),
-            "error_before": old,
-            "error_after": new,
-        }
+        fold_entry(fold, old, new)
         for fold, old, new in zip(done.folds, done.held_before, done.held_after, strict=True)
     ]
     head = {
         "campaign": done.runs.waves.header.name, "quantity": "strain",
-        "noise": 1e6 * done.unit.noise, "error_unit": done.unit.name,
-        "error_before": done.unit.factor * done.before.error,
-        "error_after": done.unit.factor * done.after.error, "floor": done.floor,
-        "delay_us": 1e6 * done.after.delay,
+        **named_errors(done.given, done.reached), "error_refitted": done.refitted.value,
+        "floor": done.floor, "delay_us": 1e6 * done.after.delay,
         "heldout_error_before": pooled(done.held_before, done.folds),
         "heldout_error_after": pooled(done.held_after, done.folds),
     }  # fmt: skip

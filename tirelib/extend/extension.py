@@ -7,9 +7,10 @@ from difflib import get_close_matches
 import numpy as np
 
 from tirelib.arrays import FloatArray
+from tirelib.compare.error import ModelError, Yardstick
 from tirelib.compare.model import Model
 from tirelib.diagnose.candidates import IN_BASE, candidates
-from tirelib.diagnose.floor import FLOOR_MEMBERS, ErrorUnit, structural_floor
+from tirelib.diagnose.floor import FLOOR_MEMBERS, structural_floor
 from tirelib.diagnose.held_out import Fold, folds, held_out_errors
 from tirelib.diagnose.refit import Refit, refit
 from tirelib.effects import Effect
@@ -28,12 +29,14 @@ class Extension(Step[Refit]):
 
     Attributes
     ----------
-    unit : ErrorUnit
-        Of floor and held-out errors.
+    given, refitted, reached : ModelError
+        Of the model as it was given, with its numbers fitted anew, and with the change.
     runs : StraightRuns
     """
 
-    unit: ErrorUnit
+    given: ModelError
+    refitted: ModelError
+    reached: ModelError
     runs: StraightRuns
 
 
@@ -117,11 +120,17 @@ class _Strain:
         self.name = model.name
         self.used = [each for each in model.used if each.effect.hook != "brush"]
         self.data = runs.data(with_deflection=False)
-        self.unit = ErrorUnit.of(runs, self.data)
+        self.yardstick = Yardstick.of(runs)
 
     def extension(self, step: Step[Refit]) -> Extension:
-        """Return a step with its runs."""
-        return Extension(**vars(step), unit=self.unit, runs=self.runs)
+        """Return a step with its runs and errors."""
+        near = step.before.correction.contact
+        return Extension(
+            **vars(step), given=self.yardstick.error(self.model, start=near),
+            refitted=self.yardstick.error(step.before.model, start=near),
+            reached=self.yardstick.error(step.after.model, start=step.after.correction.contact),
+            runs=self.runs,
+        )  # fmt: skip
 
     @property
     def effects(self) -> list[Effect]:
@@ -172,10 +181,11 @@ class _Strain:
 
     def held_out(self, fit: Refit, left: Sequence[Fold]) -> tuple[float, ...]:
         """Return the errors on left-out runs."""
-        return held_out_errors(self.data, fit, tuple(left), self.unit, progress=self.progress)
+        return held_out_errors(self.data, fit, tuple(left), self.yardstick, progress=self.progress)
 
     def floor(self, after: Refit) -> float:
         """Return the error that the structure of the ring leaves."""
         return structural_floor(
-            self.data, after, self.unit, members=self.members, progress=self.progress
-        )
+            self.yardstick.error(after.model, start=after.correction.contact), self.runs,
+            self.data, after, members=self.members, progress=self.progress,
+        )  # fmt: skip

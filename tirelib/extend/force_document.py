@@ -41,14 +41,20 @@ def force_extension_document(done: ForceExtension, file: TireFile) -> dict[str, 
 
 def _errors(done: ForceExtension) -> dict[str, float]:
     """Return the errors of a step as they are told."""
+    case = done.case
     errors = {
-        "error_before": done.before.error,
-        "error_after": done.after.error,
+        "error_before": case.given,
+        "error_refitted": case.error(done.before),
+        "error_after": case.error(done.after),
         "floor": done.floor,
-        "heldout_error_before": pooled(done.held_before, done.folds),
-        "heldout_error_after": pooled(done.held_after, done.folds),
+        "heldout_error_before": case.factor * pooled(done.held_before, done.folds),
+        "heldout_error_after": case.factor * pooled(done.held_after, done.folds),
     }
-    return {name: done.case.factor * error for name, error in errors.items()}
+    return {
+        **errors,
+        "residual_rms_before": errors["error_before"] / case.factor,
+        "residual_rms_after": errors["error_after"] / case.factor,
+    }
 
 
 def force_extended_file(file: TireFile, done: ForceExtension, data_hash: str) -> TireFile:

@@ -9,6 +9,7 @@ from tirelib.diagnose.forces.assess import ForceCase
 from tirelib.diagnose.forces.candidates import ForceCandidates, force_candidates
 from tirelib.diagnose.forces.ensemble import force_ensemble
 from tirelib.diagnose.forces.fit import ForceFit, fit_force, with_effect
+from tirelib.diagnose.forces.floor import force_floor
 from tirelib.diagnose.forces.held_out import ForceFold, errors_of, force_folds
 from tirelib.diagnose.forces.ranking import ForceRanking
 from tirelib.effects import Effect
@@ -164,11 +165,13 @@ class _Force:
         return errors_of(self.case.problem, fit, folds)
 
     def floor(self, after: ForceFit) -> float:
-        """Return the median error that variants of a model leave to it, [N] or [N m]."""
+        """Return the part of the error that noise and structure explain, as errors are told."""
         case, nothing = self.case, ForceCandidates((), {}, np.zeros((0, 0)))
-        noise = case.noise if np.isfinite(case.noise) else 0.0
-        left = force_ensemble(
-            case.problem, after, ForceRanking(case.problem, after, nothing), noise=noise,
+        if not np.isfinite(case.noise):
+            return float("nan")
+        rests = force_ensemble(
+            case.problem, after, ForceRanking(case.problem, after, nothing), noise=case.noise,
             members=self.members, progress=self.progress,
-        ).before  # fmt: skip
-        return case.problem.scale * float(np.median(left)) if left.size else float("nan")
+        ).rests  # fmt: skip
+        share = force_floor(case.problem, after, rests, case.noise) / after.error
+        return case.error(after) * share

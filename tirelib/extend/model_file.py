@@ -113,10 +113,10 @@ def _brush_effects(file: TireFile, done: Extension) -> list[dict[str, Any]]:
 def _entry(file: TireFile, done: Extension, data_hash: str) -> dict[str, Any]:
     header = done.runs.waves.header
     # an error without noise is in another unit, under another name
-    suffix = "" if done.unit.known else "_ustrain"
+    suffix = "" if done.given.known else "_ustrain"
     errors = {
-        "error_before": done.unit.factor * done.before.error,
-        "error_after": done.unit.factor * done.after.error,
+        "error_before": done.given.value,
+        "error_after": done.reached.value,
         "floor": done.floor,
         "heldout_error_before": pooled(done.held_before, done.folds),
         "heldout_error_after": pooled(done.held_after, done.folds),

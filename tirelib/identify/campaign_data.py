@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.arrays import BoolArray, FloatArray
 from tirelib.campaign import Tolerance
 from tirelib.errors import CalibrationError
 from tirelib.identify.fit_cost import Data
@@ -21,7 +21,11 @@ from tirelib.identify.strain_notes import (
 from tirelib.model.base import operating_points
 from tirelib.waveforms import GRID, Waveforms
 
-__all__ = ["LEAST_RUNS", "StraightRuns", "straight_runs", "working_gages"]
+__all__ = ["LEAST_RUNS", "StraightRuns", "straight_noise", "straight_runs", "usable",
+           "working_gages"]  # fmt: skip
+
+TYPICAL_TOLERANCE = Tolerance(0.005, 0.002, 0.001, 0.003)
+"""Of set points, where a campaign does not say its own."""
 
 STRUCTURE = 0.016
 """White part of the structural misfit, relative to the rms strain."""
@@ -54,6 +58,11 @@ class StraightRuns:
     noise: RepeatNoise
     deflection: FloatArray
 
+    @property
+    def tolerance(self) -> Tolerance:
+        """Of the set points: the campaign's, else the typical one."""
+        return self.waves.header.tolerance or TYPICAL_TOLERANCE
+
     def data(self, *, with_deflection: bool = True) -> Data:
         """Return the runs as data of a fit."""
         typical = float(np.sqrt(np.mean(self.strain**2)))
@@ -62,7 +71,7 @@ class StraightRuns:
             strain=self.strain,
             points=operating_points(self.waves),
             angle_std=self.waves.angle_std,
-            tolerance=self.waves.header.tolerance or Tolerance(0.005, 0.002, 0.001, 0.003),
+            tolerance=self.tolerance,
             noise=float(np.hypot(noise, STRUCTURE * typical)),
             low_pass=self.waves.low_pass,
             deflection=self.deflection if with_deflection else np.full(len(self.waves), np.nan),
@@ -79,9 +88,8 @@ def straight_runs(waves: Waveforms) -> StraightRuns:
         numbers.
     """
     name = waves.header.name
-    known = np.isfinite(waves.conditions["Fz"]) & np.isfinite(waves.conditions["pressure"])
     works = some_gage_works(waves)
-    chosen = waves.take(waves.straight & known & works)
+    chosen = waves.take(waves.straight & usable(waves))
     if len(chosen) < LEAST_RUNS and (waves.straight & ~works).any():
         finder = int(np.argmin(np.abs(waves.header.gage_lateral)))
         raise CalibrationError(
@@ -121,8 +129,26 @@ def straight_runs(waves: Waveforms) -> StraightRuns:
             f"{1e3 * radius:.1f} mm; it has to be smaller, by less than 30 %; correct "
             "tire.free_radius_m or the channel"
         )
-    noise = repeat_noise(strain, chosen.group, measured_tangents(chosen, strain))
-    return StraightRuns(chosen, strain, gages, noise, deflection)
+    return StraightRuns(chosen, strain, gages, straight_noise(chosen, strain), deflection)
+
+
+def usable(waves: Waveforms) -> BoolArray:
+    """Return which runs a model can be held against: load and pressure known, a gage that works."""
+    known = np.isfinite(waves.conditions["Fz"]) & np.isfinite(waves.conditions["pressure"])
+    return np.asarray(known & some_gage_works(waves))
+
+
+def straight_noise(waves: Waveforms, strain: FloatArray) -> RepeatNoise:
+    """Return the noise of straight runs from their repeats: of the data alone, whatever the model.
+
+    Parameters
+    ----------
+    waves : Waveforms
+        Of straight runs.
+    strain : shape (n_runs, n_phi), [-]
+        Mean over the gages in use.
+    """
+    return repeat_noise(strain, waves.group, measured_tangents(waves, strain))
 
 
 def working_gages(waves: Waveforms) -> tuple[int, ...]:

@@ -15,6 +15,9 @@ LEAST_NOISE = 1e-7
 """Standard deviation that equal repeats still have, [-]."""
 NEIGHBOUR = 0.03
 """Relative spread within which two runs have the same condition."""
+ALIKE_FAR = 1.05
+"""Distance over that of the nearest run, up to which a slope takes runs together: those repeated,
+and those to either side."""
 LEAST_CHANGE = 0.02
 """Relative difference of a condition that shows a slope."""
 
@@ -110,8 +113,8 @@ def measured_tangents(waves: Waveforms, strain: FloatArray) -> FloatArray:
     Returns
     -------
     shape (n_runs, n_phi, 4)
-        By relative load, relative pressure (to the nearest run that differs in nothing else; zero
-        without one), gain and angle zero.
+        By relative load, relative pressure (to the nearest runs that differ in nothing else; zero
+        without any), gain and angle zero.
     """
     by_load = _neighbour_slopes(waves, strain, "Fz", ("pressure", "speed"))
     by_pressure = _neighbour_slopes(waves, strain, "pressure", ("Fz", "speed"))
@@ -129,11 +132,11 @@ def _neighbour_slopes(
     for other in others:
         held = waves.conditions[other]
         usable &= np.isclose(held[None, :], held[:, None], rtol=NEIGHBOUR, equal_nan=True)
-    nearest = np.argmin(np.where(usable, np.abs(apart), np.inf), axis=1)
-    row = np.arange(len(strain))
-    found = usable[row, nearest]
-    step = np.where(found, apart[row, nearest], 1.0)
-    slope: FloatArray = (strain[nearest] - strain) * (found / step)[:, None]
+    far = np.where(usable, np.abs(apart), np.inf)
+    chosen = usable & (far <= ALIKE_FAR * far.min(axis=1, keepdims=True))
+    share = chosen / np.maximum(chosen.sum(axis=1, keepdims=True), 1)
+    weight = np.divide(share, apart, out=np.zeros_like(apart), where=chosen)
+    slope: FloatArray = weight @ strain - weight.sum(axis=1)[:, None] * strain
     return slope
 
 

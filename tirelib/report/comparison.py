@@ -71,7 +71,7 @@ class Part:
 def answer_of(found: Comparison | ForceComparison) -> str:
     """Say the result in a sentence."""
     verdict = found.verdict if isinstance(found, ForceComparison) else found.fit.verdict
-    error = found.error if isinstance(found, ForceComparison) else found.fit.error
+    error = found.error if isinstance(found, ForceComparison) else found.error.value
     left = _left(found)
     but = (
         " Single gages, the contact or the deflection differ, see below." if found.sentences else ""
@@ -104,19 +104,12 @@ def floor_text(found: Comparison) -> str:
     """Say what is known of the structural floor."""
     floor, parts = found.floor, []
     if np.isfinite(floor.value):
-        where = {
-            "history": "the last entry of the model's history",
-            "identification": "its identification from these very runs",
-        }[floor.source]
-        parts.append(f"Floor as far as known: error {number(floor.value, 3)}, by {where}.")
-    elif np.isfinite(floor.rms):
         parts.append(
-            f"Its identification from these very runs left {1e6 * floor.rms:.0f} microstrain rms."
+            f"Of the error, noise and the tire's structure explain {number(floor.value, 3)} (the "
+            "floor, by the last entry of the model's history)."
         )
     else:
-        parts.append(
-            "The model's file tells no floor for these data: it was not identified from them."
-        )
+        parts.append("The model's history tells no floor for these data.")
     if np.isfinite(floor.share):
         parts.append(
             f"A smooth misfit of angle, load and pressure explains {100 * floor.share:.0f} % of "
@@ -129,10 +122,10 @@ def force_floor_text(found: ForceComparison) -> str:
     """Say what is known of a force's floor."""
     if np.isfinite(found.floor):
         return (
-            f"Floor as far as known: error {number(found.floor, 3)}, by the last entry for "
-            f"{found.quantity} in the model's history."
+            f"Of the error, noise and the brush's structure explain {number(found.floor, 3)} (the "
+            f"floor, by the last entry for {found.quantity} in the model's history)."
         )
-    return f"The model's history tells no floor for {found.quantity}: nothing was added for it."
+    return f"The model's history tells no floor for {found.quantity} on these data."
 
 
 def write_comparison(found: Comparison | ForceComparison, folder: Path) -> tuple[Path, Path]:

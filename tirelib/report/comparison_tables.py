@@ -21,17 +21,17 @@ def number_table(found: Comparison) -> Table:
     rows = [
         [f"noise of a run's waveform, from {noise.repeats} repeated set points [microstrain]",
          number(1e6 * noise.std, 3)],
-        ["error: rms whitened difference over noise", number(fit.error, 4)],
+        [f"error [{found.error.unit}]", number(found.error.value, 4)],
         ["delay of the gages against the trigger, counted out [microseconds]",
-         f"{number(1e6 * found.delay, 3)} \u00b1 {number(1e6 * found.delay_std, 2)}"],
+         f"{number(1e6 * found.error.delay, 3)} \u00b1 {number(1e6 * found.error.delay_std, 2)}"],
         ["rms difference, set points and delay taken out [noise]", number(fit.rms / noise.std, 4)],
         ["rms difference, set points and delay taken out [microstrain]", number(1e6 * fit.rms, 4)],
-        ["rms difference, both left in [microstrain]", number(1e6 * fit.raw_rms, 4)],
+        ["rms difference, both left in [microstrain]", number(1e6 * found.error.rms, 4)],
         ["rms measured strain [microstrain]", number(1e6 * fit.strain_rms, 4)],
         ["floor as far as known [noise]", number(found.floor.value, 4)],
         ["error without a smooth misfit [noise]", number(found.floor.smooth, 4)],
     ]  # fmt: skip
-    note = "The error counts straight, freely rolling runs." if np.isfinite(fit.error) else ""
+    note = "The error counts straight, freely rolling runs." if found.error.known else ""
     return Table("Noise, error and floor", ["", "value"], rows, note=note)
 
 
@@ -150,7 +150,7 @@ def force_tables(found: ForceComparison, curves: tuple[Curve, ...]) -> tuple[Tab
         "Noise and error", ["", "value"],
         [[f"noise of a point, from {found.repeats} repeated conditions [{unit}]",
           number(found.noise, 3)],
-         ["error: rms difference over noise", number(found.error, 4)],
+         [f"error [{found.error_unit}]", number(found.error, 4)],
          ["floor as far as known [noise]", number(found.floor, 4)],
          [f"rms difference [{unit}]", number(found.rms, 4)],
          [f"rms measured [{unit}]", number(found.measured_rms, 4)]],

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from tirelib.diagnose.diagnose import Finding
 from tirelib.diagnose.document import Assessment, exceeds, next_test, told_like
 from tirelib.diagnose.held_out import pooled
 from tirelib.diagnose.left import Left, left_of
@@ -41,21 +40,21 @@ def answer_of(told: Assessment) -> str:
     """Say the verdict in plain words."""
     names = ", ".join(told.named)
     fall = (
-        f"the error falls from {number(told.error_before, 3)} to {number(told.error_after, 3)} "
+        f"the error falls from {number(told.before.value, 3)} to {number(told.after.value, 3)} "
         f"(floor {number(told.floor, 3)})"
     )
     like = told.diagnosis.like
     looks = "" if like is None else f" Here {told_like(like)}."
     return {
         "none": "No effect stands out: the error "
-        f"{number(told.error_before, 3)} (floor {number(told.floor, 3)}) is no reason to name one.",
+        f"{number(told.before.value, 3)} (floor {number(told.floor, 3)}) is no reason to name one.",
         "named": f"Missing: {names}. With it {fall}.",
         "form_inadequate": f"{names} acts here, but its law has the wrong form: {fall}, and more "
         "is left than the structure of the ring explains.",
         "indistinguishable": f"One of {names} is missing; this campaign cannot tell which. With "
         f"{told.named[0] if told.named else 'it'} {fall}.",
         "unknown": "Something is missing that no effect of the catalogue explains; error "
-        f"{number(told.error_before, 3)} (floor {number(told.floor, 3)}).{looks}",
+        f"{number(told.before.value, 3)} (floor {number(told.floor, 3)}).{looks}",
     }[told.verdict]
 
 
@@ -125,7 +124,7 @@ def _candidates(told: Assessment) -> Table:
             f.effect.name, f.level, "yes" if f.in_range else "no",
             ", ".join(f"{twin} {np.rad2deg(angle):.0f}\u00b0" for twin, angle in f.twins),
             number(f.score / f.threshold, 3), _strength(f.strength), _strength(f.std),
-            f.effect.unit, number(_error_after(told, f), 3),
+            f.effect.unit, number(told.error_with(f), 3),
             number(pooled(told.held_after.get(f.effect.name, ()), told.folds), 3),
             number(f.power, 2),
         ]
@@ -142,19 +141,24 @@ def _candidates(told: Assessment) -> Table:
     )  # fmt: skip
 
 
-def _error_after(told: Assessment, finding: Finding) -> float:
-    if told.named == (finding.effect.name,):
-        return told.error_after
-    return told.unit.factor * finding.error_after
-
-
 def _errors(told: Assessment) -> Table:
     found, unit = told.diagnosis, _unit(told)
     rows = [
-        ["noise of a run's waveform, from repeats [microstrain]", number(1e6 * told.unit.noise, 3)],
-        [f"error without the named effects [{unit}]", number(told.error_before, 4)],
-        [f"error with them [{unit}]", number(told.error_after, 4)],
-        [f"floor: median error of variants that lack no effect [{unit}]", number(told.floor, 4)],
+        [
+            "noise of a run's waveform, from repeats [microstrain]",
+            number(1e6 * told.before.noise, 3),
+        ],
+        [f"error of the model as it is given [{unit}]", number(told.before.value, 4)],
+        [f"error with its numbers fitted anew [{unit}]", number(told.refitted.value, 4)],
+        [f"error with the named effects [{unit}]", number(told.after.value, 4)],
+        [
+            f"floor: part of it that noise and the ring's structure explain [{unit}]",
+            number(told.floor, 4),
+        ],
+        [
+            "raw rms of model less measured, as given and with the named effects [microstrain]",
+            f"{number(1e6 * told.before.rms, 4)}; {number(1e6 * told.after.rms, 4)}",
+        ],
         [
             "misfit beyond structure, over the largest of the variants",
             number(found.left / found.floor, 3),

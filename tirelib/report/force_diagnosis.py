@@ -31,10 +31,7 @@ METHOD_TEXT = (
 def answer_of(told: ForceAssessment) -> str:
     """Say the verdict in plain words."""
     names, unit = ", ".join(told.named), told.case.unit
-    factor, found = told.case.factor, told.diagnosis
-    before, after, floor = (
-        number(factor * e, 3) for e in (found.base.error, found.final.error, found.floor)
-    )
+    before, after, floor = (number(e, 3) for e in (told.before, told.after, told.floor))
     fall = f"the error falls from {before} to {after} {unit} (floor {floor})"
     return {
         "none": f"No effect stands out: the error {before} {unit} (floor {floor}) is no reason to "
@@ -119,10 +116,11 @@ def _errors(told: ForceAssessment) -> Table:
     rows = [
         [f"noise of a point, from {told.case.repeats} repeated cells "
          f"[{'Nm' if told.case.quantity == 'Mz' else 'N'}]", number(told.case.noise, 3)],
-        [f"error without the named effects [{unit}]", number(factor * found.base.error, 4)],
-        [f"error with them [{unit}]", number(factor * found.final.error, 4)],
-        [f"floor: median error of variants that lack no effect [{unit}]",
-         number(factor * found.floor, 4)],
+        [f"error of the model as it is given [{unit}]", number(told.before, 4)],
+        [f"error with its numbers fitted anew [{unit}]", number(told.case.error(found.base), 4)],
+        [f"error with the named effects [{unit}]", number(told.after, 4)],
+        [f"floor: part of it that noise and the brush's structure explain [{unit}]",
+         number(told.floor, 4)],
         [f"left when all effects are fitted at once [{unit}]", number(scale * found.left, 4)],
         [f"the same, largest of the variants [{unit}]", number(scale * found.most_left, 4)],
     ]  # fmt: skip
@@ -142,7 +140,7 @@ def _fall(told: ForceAssessment) -> list[Plot]:
     first = Step("base", factor * found.base.error, factor * pooled(found.held_before, found.folds))
     steps = [Step(name, factor * e, factor * h) for name, e, h in found.steps]
     history = waterfall_of(told.case.model.history, told.case.quantity)
-    plots = [waterfall([first, *steps], told.case.unit, factor * found.floor, "fall",
+    plots = [waterfall([first, *steps], told.case.unit, told.floor, "fall",
                        "The named effects one after the other")]  # fmt: skip
     if history is not None:
         plots.append(history)

@@ -22,9 +22,9 @@ from tirelib.report.comparison import strain_parts, write_comparison
 KEYS = {
     "format", "campaign", "model", "effects", "axes", "quantity", "unit", "verdict", "error", "p",
     "noise", "repeats", "residual_rms", "residual_rms_noise", "residual_rms_raw", "measured_rms",
-    "delay_us", "delay_std_us", "floor", "floor_source", "smooth_floor", "smooth_share",
-    "statements", "regions", "messages", "table", "set_points", "tracks", "gages", "curves",
-    "runs", "ranked", "sources",
+    "error_unit", "delay_us", "delay_std_us", "floor", "floor_source", "smooth_floor",
+    "smooth_share", "statements", "regions", "messages", "table", "set_points", "tracks", "gages",
+    "curves", "runs", "ranked", "sources",
 }  # fmt: skip
 
 
@@ -138,7 +138,7 @@ def test_unknown_noise_is_null_and_the_page_speaks_microstrain(tmp_path: Path) -
     found = compare_strain(waveforms(plan()[:20]), model_of(model_file()))
     document = plain(comparison_document(found))
     assert document["noise"] is None
-    assert document["error"] is None
+    assert document["error_unit"] == "ustrain"
     assert document["p"] is None
     assert document["verdict"] == "noise_unknown"
     html, words = write_comparison(found, tmp_path)

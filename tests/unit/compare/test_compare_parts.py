@@ -1,6 +1,7 @@
 """Laws of the parts: set points, noise, contact length, floor, forces' words."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -106,23 +107,18 @@ def test_pooled_deviation_knows_only_repeats() -> None:
     assert freedom == 0
 
 
-def test_the_floor_is_what_the_file_says_and_only_for_these_data() -> None:
-    waves = waveforms(plant=bump(-0.1, 0.1, 3e-4))
-    file = model_file()
-    unknown = compare_strain(waves, MODEL, "hash").floor
-    assert np.isnan(unknown.value)
-    assert unknown.source == ""
-    history = {"history": [{"error_after": 3.0}, {"error_after": 2.5}]}
-    said = compare_strain(waves, model_of(replace(file, extra=history)), "hash").floor
-    assert (said.value, said.source) == (2.5, "history")
-    mixed = {"history": [*history["history"], {"quantity": "Fy", "error_after": 9.0}]}
-    other = compare_strain(waves, model_of(replace(file, extra=mixed)), "hash").floor
-    assert other.value == 2.5
-    now = compare_strain(waves, MODEL).fit
-    made = {"provenance": {"data_sha256": "hash", "rms_microstrain": 1e6 * now.raw_rms}}
-    model = model_of(replace(file, extra=made))
-    assert compare_strain(waves, model, "hash").floor.value == pytest.approx(now.error)
-    assert np.isnan(compare_strain(waves, model, "other").floor.value)
+def test_the_floor_is_what_the_history_says_and_only_for_these_data() -> None:
+    waves, file = waveforms(plant=bump(-0.1, 0.1, 3e-4)), model_file()
+
+    def floor(*entries: dict[str, Any], data: str = "hash") -> float:
+        model = model_of(replace(file, extra={"history": list(entries)}))
+        return compare_strain(waves, model, data).floor.value
+
+    assert np.isnan(floor())
+    last = {"floor": 2.5, "data_sha256": "hash"}
+    assert floor({"floor": 3.0, "data_sha256": "hash"}, last) == 2.5
+    assert floor(last, {"floor": 9.0, "data_sha256": "hash", "quantity": "Fy"}) == 2.5
+    assert np.isnan(floor(last, data="other"))
 
 
 def test_a_smooth_misfit_is_known_as_smooth_and_a_ripple_is_not() -> None:

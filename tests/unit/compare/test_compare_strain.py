@@ -36,7 +36,7 @@ def test_a_model_fits_its_own_data_and_nothing_is_said(seed: int) -> None:
     found = compared(waveforms(seed=seed))
     assert found.fit.verdict == "fits"
     # eight repeats tell the noise to 4 %, eight hundred samples of 28 runs the error to 3 %
-    assert 0.88 < found.fit.error < 1.12
+    assert 0.88 < found.error.value < 1.12
     assert found.fit.p > 0.01
     assert found.sentences == ()
     assert found.regions == ()
@@ -47,7 +47,7 @@ def test_a_model_fits_its_own_data_and_nothing_is_said(seed: int) -> None:
 def test_set_points_inside_their_tolerance_are_no_lack_of_fit(seed: int) -> None:
     found = compared(waveforms(seed=seed))
     # what they add is three times the noise, and all of it is taken out
-    assert found.fit.raw_rms > 2.0 * found.noise.std
+    assert found.error.rms > 2.0 * found.noise.std
     assert found.fit.rms < 1.1 * found.noise.std
     spread = np.sqrt(np.mean(found.points.scaled**2, axis=0))
     assert (spread < 1.5).all()
@@ -147,7 +147,7 @@ def test_the_order_of_the_runs_does_not_matter() -> None:
     waves = waveforms(plant=bump(-0.1, 0.1, 3e-4, 3900.0))
     order = np.random.default_rng(1).permutation(len(waves))
     first, second = compared(waves), compared(waves.take(order))
-    assert second.fit.error == pytest.approx(first.fit.error, rel=1e-9)
+    assert second.error.value == pytest.approx(first.error.value, rel=1e-9)
     assert second.sentences == first.sentences
     # the fixed number of steps of the set points is summed in another order
     assert [c.mean for c in second.table] == pytest.approx([c.mean for c in first.table], rel=1e-6)
@@ -206,7 +206,8 @@ def test_a_model_with_an_effect_fits_data_of_that_effect_only() -> None:
 def test_without_repeats_the_noise_is_unknown_and_nothing_is_said() -> None:
     found = compared(waveforms(plan()[:20], plant=bump(-0.1, 0.1, 3e-4)))
     assert found.fit.verdict == "noise_unknown"
-    assert np.isnan(found.fit.error)
+    assert found.error.unit == "ustrain"
+    assert found.error.value == pytest.approx(1e6 * found.error.rms, rel=0.05)
     assert np.isnan(found.noise.std)
     assert found.sentences == ()
     assert "has no repeated run" in found.messages[0]

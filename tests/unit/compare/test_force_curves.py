@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tirelib.compare.document import comparison_document
-from tirelib.compare.floor import last_error
+from tirelib.compare.floor import last_floor
 from tirelib.compare.force_curves import curves_of, ranked
 from tirelib.compare.forces import ForceComparison
 from tirelib.identify.force_data import ForceData
@@ -56,14 +56,17 @@ def test_few_points_make_no_curve_and_unknown_pressure_is_no_fault() -> None:
 
 def test_the_floor_is_of_the_same_force() -> None:
     said = (("strain", 7.0), ("Fy", 3.0), ("Fy", 2.0), ("Mz", 5.0))
-    history: list[dict[str, Any]] = [{"quantity": q, "error_after": error} for q, error in said]
+    history: list[dict[str, Any]] = [
+        {"quantity": q, "floor": floor, "data_sha256": "hash"} for q, floor in said
+    ]
     del history[0]["quantity"]
-    assert last_error(history, "Fy") == 2.0
-    assert last_error(history, "strain") == 7.0
-    assert np.isnan(last_error(history, "Fx"))
+    assert last_floor(history, "Fy", "hash") == 2.0
+    assert last_floor(history, "strain", "hash") == 7.0
+    assert np.isnan(last_floor(history, "Fx", "hash"))
+    assert np.isnan(last_floor(history, "Fy", "other"))
     made = replace(comparison(), floor=2.0)
     assert comparison_document(made)["floor"] == 2.0
-    assert "error 2, by the last entry for Fy" in force_parts(made)[0].text
+    assert "explain 2 (the floor, by the last entry for Fy" in force_parts(made)[0].text
     assert "tells no floor for Fy" in force_parts(comparison())[0].text
 
 

@@ -32,18 +32,18 @@ def on_time() -> Comparison:
 @pytest.mark.parametrize("delay", [-4e-5, 6e-5])
 def test_a_delay_is_found_told_and_counted_out(on_time: Comparison, delay: float) -> None:
     found = compared(delay)
-    assert found.delay == pytest.approx(on_time.delay + delay, abs=3e-6)
-    assert found.fit.error == pytest.approx(on_time.fit.error, rel=0.02)
-    assert found.fit.raw_rms > on_time.fit.raw_rms
+    assert found.error.delay == pytest.approx(on_time.error.delay + delay, abs=3e-6)
+    assert found.error.value == pytest.approx(on_time.error.value, rel=0.02)
+    assert found.error.rms > on_time.error.rms
     side = "after" if delay > 0.0 else "before"
     told = [text for text in found.messages if "microseconds" in text]
     assert len(told) == 1
-    assert f"{1e6 * abs(found.delay):.0f} microseconds {side} the trigger" in told[0]
+    assert f"{1e6 * abs(found.error.delay):.0f} microseconds {side} the trigger" in told[0]
 
 
 def test_none_is_told_where_there_is_none(on_time: Comparison) -> None:
-    assert on_time.delay_std < 0.3 * STD, "two speeds tell of it"
-    assert abs(on_time.delay) < 2.0 * on_time.delay_std
+    assert on_time.error.delay_std < 0.3 * STD, "two speeds tell of it"
+    assert abs(on_time.error.delay) < 2.0 * on_time.error.delay_std
     assert not [text for text in on_time.messages if "microseconds" in text]
 
 

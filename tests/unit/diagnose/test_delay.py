@@ -9,7 +9,6 @@ from tests.unit.diagnose.planted import model_file, runs
 from tests.unit.identify.model_waves import TIRE
 from tirelib.arrays import FloatArray
 from tirelib.compare.model import model_of
-from tirelib.diagnose.floor import ErrorUnit, structural_floor
 from tirelib.diagnose.refit import Refit, refit
 from tirelib.effects import CATALOGUE
 from tirelib.extend.extension import _Strain
@@ -93,16 +92,6 @@ def test_the_model_shows_the_delay_wherever_it_is_solved(
 def test_without_a_trigger_there_is_nothing_to_fit(data: Data) -> None:
     free = replace(data, strain=shown(data, DELAY), angle_std=np.full(len(data.points), np.inf))
     assert abs(refit(free, values_of(TIRE)).delay) < 1e-6
-
-
-def test_the_floor_is_of_fits_that_have_a_delay_too(
-    data: Data, fitted: tuple[Refit, Refit], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    unit = ErrorUnit(1.0, "noise", 1e-6)
-    told = structural_floor(data, fitted[0], unit, members=6)
-    monkeypatch.setattr("tirelib.diagnose.ensemble.STD", 1e-12)  # variants that are not late
-    # the draws are the same
-    assert told == pytest.approx(structural_floor(data, fitted[0], unit, members=6), rel=0.01)
 
 
 def test_an_effect_that_comes_late_is_added_from_what_no_delay_could_do() -> None:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from tests.unit.diagnose.planted import EFFECT, STRENGTH, added, model_file, runs
+from tirelib.compare.error import error_of
 from tirelib.compare.model import model_of
-from tirelib.diagnose.floor import ErrorUnit
 from tirelib.effects import CATALOGUE
 from tirelib.errors import CalibrationError, FormatError, ParameterError
 from tirelib.extend.document import extension_document
@@ -32,28 +32,29 @@ def test_the_error_falls_on_runs_that_were_left_out() -> None:
     assert np.all(np.array(done.held_after) < np.array(done.held_before))
 
 
-def test_errors_are_told_in_units_of_the_repeats_noise() -> None:
+def test_errors_are_those_of_the_model_files_before_and_after() -> None:
     done, file = added()
     told = extension_document(done, file)
-    data = done.runs.data()
+    measured = runs(EFFECT, STRENGTH)
     assert told["error_unit"] == "noise"
-    assert told["error_before"] == pytest.approx(
-        done.before.error * data.noise / done.runs.noise.std
-    )
+    assert told["error_before"] == pytest.approx(error_of(measured, model_of(model_file())).value)
+    assert told["error_after"] == pytest.approx(error_of(measured, model_of(file)).value)
+    assert told["error_after"] < told["error_refitted"] <= told["error_before"]
     assert told["noise"] == pytest.approx(1e6 * done.runs.noise.std)
-    assert {"error_after", "floor", "heldout_error_before", "heldout_error_after", "strength",
-            "std"} <= set(told)  # fmt: skip
+    assert told["floor"] <= told["error_after"]
+    assert {"heldout_error_before", "heldout_error_after", "strength", "std"} <= set(told)
     assert told["format"] == "tirelib-extension/1"
     assert "before" not in told["history"][0]
 
 
 def test_without_repeats_errors_are_in_microstrain_and_not_in_the_history_as_noise() -> None:
     alone = runs(EFFECT, STRENGTH, 0)
-    done = replace(added()[0], runs=alone, unit=ErrorUnit.of(alone, alone.data()))
+    given = error_of(alone, model_of(model_file()))
+    done = replace(added()[0], runs=alone, given=given, reached=given)
     new = extended_file(model_file(), done, "hash")
     told = extension_document(done, new)
     assert told["error_unit"] == "ustrain"
-    assert told["error_after"] == pytest.approx(1e6 * done.after.error * alone.data().noise)
+    assert told["error_after"] == given.value
     assert np.isnan(told["noise"])
     assert "repeat" in told["messages"][0]
     assert "error_after" not in new.extra["history"][0]

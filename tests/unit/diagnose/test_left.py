@@ -7,12 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.unit.diagnose.planted import LOADS, runs
+from tests.unit.diagnose.planted import EFFECT, LOADS, STRENGTH, model_file, runs
 from tests.unit.identify.model_waves import TIRE
+from tirelib.compare.error import Yardstick, error_of
+from tirelib.compare.model import model_of
 from tirelib.diagnose.document import next_test
-from tirelib.diagnose.floor import ErrorUnit, structural_floor
-from tirelib.diagnose.held_out import error_on, folds, held_out_errors, part_of, pooled
+from tirelib.diagnose.floor import floor_of, structural_floor
+from tirelib.diagnose.held_out import folds, held_out_errors, part_of, pooled
 from tirelib.diagnose.left import left_of
+from tirelib.diagnose.noise import white_noise
 from tirelib.diagnose.refit import Refit, refit
 from tirelib.effects import CATALOGUE
 from tirelib.identify.waveform_fit import Data
@@ -70,12 +73,6 @@ def test_pooled_errors_are_weighed_by_runs_and_nothing_is_no_number() -> None:
     assert np.isnan(pooled((3.0, np.nan), chosen))
 
 
-def test_the_error_on_the_runs_of_the_fit_is_the_fits(fitted: tuple[Data, Refit]) -> None:
-    data, model = fitted
-    # the correction for large displacements is brought up to the last values: a small change
-    assert error_on(data, model) == pytest.approx(model.error, abs=0.01)
-
-
 def test_held_out_errors_are_of_runs_that_the_fit_has_not_seen(
     fitted: tuple[Data, Refit], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -86,30 +83,47 @@ def test_held_out_errors_are_of_runs_that_the_fit_has_not_seen(
         lambda part, *_, **__: seen.append(part.points.load) or model,
     )
     strain = data.strain + 1e-3 * load.out[:, None] * np.cos(3.0 * GRID)
-    spoiled = replace(data, strain=strain)
-    (error,) = held_out_errors(spoiled, model, [load], ErrorUnit(2.0, "noise", 1e-6))
+    spoiled = Yardstick.of(replace(runs(), strain=strain))
+    (error,) = held_out_errors(data, model, [load], spoiled)
     assert seen[0].max() < LOADS[-1]
-    assert error == pytest.approx(2.0 * error_on(part_of(spoiled, load.out), model))
-    assert error > 10.0 * error_on(part_of(spoiled, ~load.out), model)
+    assert error == pytest.approx(spoiled.take(load.out).error(model.model, model.delay).value)
+    assert error > 10.0 * spoiled.take(~load.out).error(model.model, model.delay).value
 
 
-def test_the_floor_grows_with_the_noise_of_the_variants(fitted: tuple[Data, Refit]) -> None:
+def test_the_floor_is_the_error_without_what_neither_noise_nor_structure_explains() -> None:
+    planted = runs(EFFECT, STRENGTH)
+    data = planted.data(with_deflection=False)
+    model = refit(data, values_of(TIRE))
+    error = Yardstick.of(planted).error(model.model)
+    nothing, white = np.zeros_like(data.strain), model.whiten(data.strain - model.waveform)
+    assert floor_of(error, planted, data, model, nothing, np.inf) == error.value
+    # all of the residual beyond structure: the noise is left
+    noise = white_noise(planted, model, data.strain).sample / np.sqrt(np.mean(white**2))
+    told = floor_of(error, planted, data, model, white, np.inf)
+    assert told == pytest.approx(noise * error.value)
+    # nor more than variants leave
+    usual = 0.1 * float(np.sqrt(np.mean(white**2)))
+    assert floor_of(error, planted, data, model, nothing, usual) == pytest.approx(0.1 * error.value)
+    told = structural_floor(error, planted, data, model, members=4)
+    assert 1.0 < told < 0.9 * error.value, "an effect is missing"
+
+
+def test_nothing_but_structure_leaves_the_error_at_the_floor(fitted: tuple[Data, Refit]) -> None:
     data, model = fitted
-    low = structural_floor(data, model, ErrorUnit(1.0, "noise", 1e-6), members=4)
-    high = structural_floor(data, model, ErrorUnit(1.0, "noise", 3e-4), members=4)
-    twice = structural_floor(data, model, ErrorUnit(2.0, "noise", 1e-6), members=4)
-    assert 0.0 < low < high
-    assert twice == pytest.approx(2.0 * low)
+    error = Yardstick.of(runs()).error(model.model)
+    told = structural_floor(error, runs(), data, model, members=4)
+    assert told == pytest.approx(error.value, rel=0.05)
+    assert told <= error.value
 
 
 def test_errors_are_in_noise_or_without_repeats_in_microstrain() -> None:
     known, unknown = runs(), runs(repeats=0)
-    data = known.data()
-    unit = ErrorUnit.of(known, data)
-    assert unit.factor == pytest.approx(data.noise / known.noise.std)
-    assert unit.known
-    other = ErrorUnit.of(unknown, unknown.data())
-    assert (other.name, other.factor) == ("ustrain", pytest.approx(1e6 * unknown.data().noise))
+    told = error_of(known, model_of(model_file()))
+    assert (told.unit, told.known) == ("noise", True)
+    other = error_of(unknown, model_of(model_file()))
+    assert other.unit == "ustrain"
+    assert np.isnan(other.noise)
+    assert other.value == pytest.approx(1e6 * other.rms, rel=0.1)
 
 
 def _told(verdict: str, *named: str) -> Any:

@@ -7,9 +7,9 @@ import pytest
 
 from tests.unit.diagnose.planted import runs
 from tests.unit.identify.model_waves import TIRE
+from tirelib.compare.error import Yardstick
 from tirelib.contact.exact import ExactContact
 from tirelib.diagnose import fitter, held_out, refit
-from tirelib.diagnose.floor import ErrorUnit
 from tirelib.model.base import Correction, large_displacements, values_of
 
 
@@ -27,11 +27,10 @@ def test_a_start_nearby_is_used_and_changes_no_result(monkeypatch: pytest.Monkey
     found = {}
     for name, solve in (("near", watched), ("cold", cold)):
         monkeypatch.setattr(fitter, "large_displacements", solve)
-        monkeypatch.setattr(held_out, "large_displacements", solve)
+        monkeypatch.setattr("tirelib.compare.model.large_displacements", solve)
         model = refit.refit(data, values_of(TIRE))
         folds = held_out.folds(data)
-        unit = ErrorUnit(1.0, "noise", 1.0)
-        found[name] = (model, held_out.held_out_errors(data, model, folds, unit))
+        found[name] = (model, held_out.held_out_errors(data, model, folds, Yardstick.of(runs())))
     # only the very first solution has nothing nearby
     assert [start is None for start in starts] == [True] + [False] * (len(starts) - 1)
     near, cold_one = found["near"], found["cold"]

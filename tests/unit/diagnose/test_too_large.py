@@ -28,7 +28,7 @@ def test_what_explains_all_is_named_and_told_to_be_too_large() -> None:
     best = found.findings[0]
     assert (best.level, best.in_range) == ("alarm", False)
     assert best.strength[0] == pytest.approx(STRENGTH, rel=0.05)
-    (told,) = (text for text in assess(found, members=4).messages if EFFECT in text)
+    (told,) = (text for text in assess(found, model_of(model_file())).messages if EFFECT in text)
     assert f"0 to {high:g} is plausible" in told
 
 
@@ -39,8 +39,9 @@ def test_what_is_named_for_its_share_is_told_to_be_so() -> None:
     )  # fmt: skip
     assert found.named == (EFFECT,)
     assert found.by_share == (), "its score names it"
+    given = model_of(model_file())
     shares = [
-        [text for text in assess(one, members=4).messages if "share of the error" in text]
+        [text for text in assess(one, given).messages if "share of the error" in text]
         for one in (found, replace(found, by_share=(EFFECT,)))
     ]
     assert shares[0] == []

@@ -55,7 +55,7 @@ def test_a_gain_that_goes_with_pressure_is_unknown_and_told_by_its_law(
 
 def test_a_candidate_of_no_catalogue_is_in_no_table(by_pressure: Diagnosis) -> None:
     names = {effect.name for effect in UNLISTED}
-    document = diagnosis_document(assess(by_pressure, members=4))
+    document = diagnosis_document(assess(by_pressure, model_of(model_file())))
     shown = {entry["effect"] for entry in document["candidates"]}
     twins = {twin["effect"] for entry in document["candidates"] for twin in entry["twins"]}
     assert not names & (shown | twins | set(document["dead"]))

@@ -93,7 +93,8 @@ def test_errors_are_told_in_the_noise_of_a_point(
     added: ForceExtension, case: ForceCase, model: TireFile
 ) -> None:
     document = force_extension_document(added, force_extended_file(model, added, "hash"))
-    assert document["error_before"] == pytest.approx(added.before.error / case.noise)
+    assert document["error_before"] == pytest.approx(case.given)
+    assert document["error_refitted"] == pytest.approx(added.before.error / case.noise)
     assert document["heldout_error_after"] == pytest.approx(added.held_after[0] / case.noise)
     assert (document["held_out"][0]["condition"], document["held_out"][0]["unit"]) == ("load", "N")
     assert document["held_out"][0]["value"] == pytest.approx(6000.0)

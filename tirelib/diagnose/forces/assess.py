@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tirelib.campaign import Campaign
-from tirelib.compare.force_model import ForceBench, ForceModel, force_model_of
-from tirelib.compare.force_points import ForcePoints, force_points, noise_of
+from tirelib.compare.force_model import Changes, ForceBench, ForceModel, force_model_of
+from tirelib.compare.force_noise import force_noise
+from tirelib.compare.force_points import ForcePoints, force_points
 from tirelib.compare.forces import UNITS, quantities_of, slips, usable_points
 from tirelib.diagnose.forces.candidates import varies
 from tirelib.diagnose.forces.diagnose import ForceDiagnosis, ForceFinding, diagnose_force
 from tirelib.diagnose.forces.ensemble import MEMBERS
-from tirelib.diagnose.forces.fit import Problem, fit_force
+from tirelib.diagnose.forces.fit import ForceFit, Problem
 from tirelib.diagnose.forces.left import ForceLeft, left_of
 from tirelib.effects import Effect
 from tirelib.errors import CalibrationError
@@ -42,6 +43,9 @@ class ForceCase:
         Of the campaign.
     model : ForceModel
     problem : Problem
+        At the points that are fitted.
+    whole : Problem
+        At all points: those that errors are told of.
     noise : float, [N] or [N m]
         Of a point; NaN without repeats.
     repeats : int
@@ -51,6 +55,7 @@ class ForceCase:
     name: str
     model: ForceModel
     problem: Problem
+    whole: Problem
     noise: float
     repeats: int
     messages: tuple[str, ...]
@@ -69,6 +74,20 @@ class ForceCase:
     def factor(self) -> float:
         """By which an rms in SI becomes an error as it is told."""
         return 1.0 / self.noise if np.isfinite(self.noise) else 1.0
+
+    def rms(self, values: Mapping[str, float], changes: Changes) -> float:
+        """Return the rms of measured less predicted over all points, SI."""
+        rest = self.whole.measured - self.whole.predict(values, changes)
+        return float(np.sqrt(np.mean(rest**2)))
+
+    def error(self, fit: ForceFit) -> float:
+        """Return the error of a fitted brush as it is told."""
+        return self.factor * self.rms(fit.values, fit.changes)
+
+    @property
+    def given(self) -> float:
+        """The error of the model as its file has it."""
+        return self.factor * self.rms(self.model.values, self.model.changes)
 
     @property
     def effects(self) -> list[Effect]:
@@ -128,23 +147,16 @@ def _case(name: str, model: ForceModel, points: ForcePoints, quantity: str) -> F
         messages.append(
             f"{len(whole)} points, passes of the sweep; one in {step} is fitted ({len(points)})"
         )
-    # of all passes, about the brush without effects: the noise is then the same at every step
-    draft = Problem.of(ForceBench.of(model, points), quantity, np.nan)
-    plain = fit_force(draft, model.values)
-    every = Problem.of(ForceBench.of(model, whole), quantity, np.nan)
-    noise, _, repeats = noise_of(every.predict(plain.values, ()) - every.measured, whole.cell)
-    return ForceCase(
-        name, model, Problem.of(draft.bench, quantity, noise), noise, repeats, tuple(messages)
-    )
+    noise, _, repeats = force_noise(whole, getattr(whole.data, quantity))
+    problem = Problem.of(ForceBench.of(model, points), quantity, noise)
+    every = Problem.of(ForceBench.of(model, whole), quantity, noise)
+    return ForceCase(name, model, problem, every, noise, repeats, tuple(messages))
 
 
 def _lack(case: ForceCase) -> float:
-    model = case.model
-    rest = case.problem.predict(model.values, model.changes) - case.problem.measured
-    rms = float(np.sqrt(np.mean(rest**2)))
     if np.isfinite(case.noise):
-        return rms / case.noise
-    return rms / float(np.sqrt(np.mean(case.problem.measured**2)))
+        return case.given
+    return case.given / float(np.sqrt(np.mean(case.whole.measured**2)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -175,6 +187,26 @@ class ForceAssessment:
     left: ForceLeft
     messages: tuple[str, ...]
     held_back: Mapping[str, tuple[str, ...]]
+
+    @property
+    def final(self) -> ForceFit:
+        """The brush with the named effects."""
+        return self.diagnosis.final if self.named else self.diagnosis.base
+
+    @property
+    def before(self) -> float:
+        """The error of the model as it is given."""
+        return self.case.given
+
+    @property
+    def after(self) -> float:
+        """The error with the named effects."""
+        return self.case.error(self.final)
+
+    @property
+    def floor(self) -> float:
+        """The part of that error which noise and the brush's structure explain."""
+        return self.after * self.diagnosis.floor / self.final.error
 
 
 def assess_forces(

@@ -9,6 +9,7 @@ from tirelib.arrays import FloatArray
 from tirelib.diagnose.forces.candidates import ForceCandidates, force_candidates
 from tirelib.diagnose.forces.ensemble import MEMBERS, ForceEnsemble, force_ensemble
 from tirelib.diagnose.forces.fit import ForceFit, Problem, fit_force, with_effect
+from tirelib.diagnose.forces.floor import force_floor
 from tirelib.diagnose.forces.held_out import ForceFold, errors_of, force_folds, pooled
 from tirelib.diagnose.forces.ranking import ForceRanking, ForceScores
 from tirelib.diagnose.forces.search import ALARM, ROUNDS, Search, alarms, ratio_of
@@ -63,7 +64,7 @@ class ForceDiagnosis:
     base, final : ForceFit
         Without and with the named effects.
     floor : float, [N] or [N m]
-        Median error that variants without effect leave to the base.
+        Part of the final error that noise and the brush's structure explain; NaN without repeats.
     left, most_left : float, [-]
         Scaled rms after the joint fit with the named effects, and the ensemble's largest.
     folds : tuple of ForceFold
@@ -165,7 +166,7 @@ def diagnose_force(
     findings = _findings(problem, base, search, scores, first, ensemble, named, alone, folds)
     return ForceDiagnosis(
         problem, noise, repeats, verdict, tuple(named), findings, first.dead, base, final,
-        float(np.median(ensemble.before)) * problem.scale, search.now.after,
+        force_floor(problem, final if named else base, ensemble.rests, noise), search.now.after,
         float(ensemble.after.max()), folds, held_before, held_final, steps, search.rounds, doubts,
     )  # fmt: skip
 

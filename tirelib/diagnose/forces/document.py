@@ -21,7 +21,6 @@ def force_diagnosis_document(told: ForceAssessment) -> dict[str, Any]:
     """Return the numbers; errors are in the noise of a point, in N or Nm without repeats."""
     found, case = told.diagnosis, told.case
     factor = case.factor
-    final = found.final if told.named else found.base
     held_final = found.held_final if told.named else found.held_before
     return {
         "format": FORMAT,
@@ -33,9 +32,13 @@ def force_diagnosis_document(told: ForceAssessment) -> dict[str, Any]:
         "repeats": case.repeats,
         "points": len(case.problem),
         "error_unit": case.unit,
-        "floor": factor * found.floor,
-        "error_before": factor * found.base.error,
-        "error_after": factor * final.error,
+        "floor": told.floor,
+        "error_before": told.before,
+        "error_refitted": case.error(found.base),
+        "error_after": told.after,
+        "residual_rms_before": told.before / factor,
+        "residual_rms_after": told.after / factor,
+        "residual_rms_unit": UNITS[case.quantity],
         "heldout_error_before": factor * pooled(found.held_before, found.folds),
         "heldout_error_after": factor * pooled(held_final, found.folds),
         "held_out": [

@@ -58,6 +58,7 @@ class ForceEnsemble:
     scores: FloatArray
     after: FloatArray
     before: FloatArray
+    rests: FloatArray
 
     @property
     def threshold(self) -> FloatArray:
@@ -93,6 +94,7 @@ def force_ensemble(
     scores: list[FloatArray] = []
     after: list[float] = []
     before: list[float] = []
+    rests: list[FloatArray] = []
     attempts = 0
     while len(scores) < members and attempts < 3 * members:
         attempts += 1
@@ -105,12 +107,14 @@ def force_ensemble(
         scores.append(found.score)
         after.append(found.after)
         before.append(found.before)
+        rests.append(rest / problem.scale)
         if progress is not None:
             progress(f"variant {len(scores)}")
     n = len(ranking.found.living)
     return ForceEnsemble(
-        np.array(scores).reshape(len(scores), n), np.array(after), np.array(before)
-    )
+        np.array(scores).reshape(len(scores), n), np.array(after), np.array(before),
+        np.array(rests).reshape(len(rests), len(problem)),
+    )  # fmt: skip
 
 
 def variant(

@@ -1,0 +1,49 @@
+"""The noise of forces is of the data alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.magic_sweep import Sweep, magic_sweep
+from tirelib.compare.force_noise import force_noise
+from tirelib.compare.force_points import force_points, noise_of
+from tirelib.identify.force_data import ForceData
+
+PLAN = Sweep(pressures=(0.8e5,), cambers=(0.0,))
+
+
+def test_the_slope_of_the_force_within_a_cell_is_no_noise() -> None:
+    points = force_points(magic_sweep(81, {}, PLAN))
+    repeated = np.bincount(points.cell)[points.cell] > 1
+    truth = PLAN.noise * np.sqrt(np.mean(1.0 / points.samples[repeated]))
+    told, freedom, cells = force_noise(points, points.data.Fy)
+    # a few hundred degrees of freedom, and slopes that are not known exactly
+    assert told == pytest.approx(truth, rel=0.15)
+    assert noise_of(points.data.Fy, points.cell)[0] > 1.5 * told
+    assert (freedom, cells) == noise_of(points.data.Fy, points.cell)[1:]
+
+
+def test_set_points_that_repeat_badly_are_no_noise_and_a_flat_condition_no_slope() -> None:
+    random = np.random.default_rng(2)
+    angle = np.deg2rad(np.tile(np.arange(-4.0, 5.0), 6)) + np.deg2rad(0.1) * random.uniform(
+        -1, 1, 54
+    )
+    load = np.repeat([2e3, 4e3, 6e3], 18) * (1.0 + 0.004 * random.uniform(-1, 1, 54))
+    pressure = 2e5 * (1.0 + 0.002 * random.standard_normal(54))
+    force = -load * np.tanh(12.0 * angle) + 3.0 * random.standard_normal(54)
+    nothing, flat = np.full(54, np.nan), np.zeros(54)
+    data = ForceData(
+        load, pressure, angle, flat, flat, nothing, nothing, force, nothing, np.arange(54)
+    )
+    points = force_points(data)
+    told, _, cells = force_noise(points, force)
+    raw = noise_of(force, points.cell)[0]
+    assert cells > 15
+    assert told < 0.3 * raw
+
+
+def test_without_repeats_the_noise_is_unknown() -> None:
+    points = force_points(magic_sweep(81, {}, PLAN))
+    alone = replace(points, cell=np.arange(len(points)))
+    assert np.isnan(force_noise(alone, points.data.Fy)[0])
