@@ -6,7 +6,7 @@ the rig measured, the summary holds the errors of each run's mean; else its numb
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,9 +15,11 @@ from bench.conditions import RunMark
 from bench.line_counts import LineCounts
 from bench.timeline import TimelineCounts
 from bench.wheels import Wheels
-from tirelib.estimators.calibration import Calibration
-from tirelib.estimators.result import EDGE_UNIT, FORMAT, VARIED
+from tirelib.estimators.edge import EDGE_UNIT, FORMAT, VARIED
 from tirelib.flags import flag_names
+
+if TYPE_CHECKING:
+    from tirelib.estimators.calibration import Calibration
 
 QUANTITIES = EDGE_UNIT
 """Unit and factor of each quantity in the document."""
@@ -28,7 +30,7 @@ def document(
     runs: Iterable[RunMark],
     wheels: Wheels,
     source: Mapping[str, Any],
-    calibration: Calibration | None = None,
+    calibration: "Calibration | None" = None,
 ) -> dict[str, Any]:
     """Return summary, turns, what the line and each wheel lost, and where all came from.
 

@@ -16,7 +16,7 @@ from bench.document import QUANTITIES, empty_summary, turn_document
 from bench.errors import RecordingError, cause
 from bench.new_file import keep_recordings
 from tirelib.cli.common import plain
-from tirelib.estimators.result import FORMAT
+from tirelib.estimators.edge import FORMAT
 
 HEAD = f'{{"format": "{FORMAT}", "axes": "iso", "turns": [\n'
 _BETWEEN = b",\n"

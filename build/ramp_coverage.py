@@ -20,7 +20,8 @@ from bench.rig.plans import Plan, plan
 from bench.rig.tire import Condition, tire
 from tirelib.campaign import Campaign, Run, read_campaign
 from tirelib.estimators.calibration import Calibration
-from tirelib.estimators.result import EDGE_UNIT, TRUTH
+from tirelib.estimators.edge import EDGE_UNIT
+from tirelib.estimators.result import TRUTH
 from tirelib.estimators.train import train
 from tirelib.estimators.unknowns import TWO_SIGMA
 from tirelib.observations import measure_run, observe

@@ -24,9 +24,9 @@ from tirelib.campaign import read_campaign
 from tirelib.estimators import chain, sliding, unknowns
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration
+from tirelib.estimators.edge import EDGE_UNIT
 from tirelib.estimators.likeness import DRIFT
 from tirelib.estimators.regressors import ODD, compute_regressors
-from tirelib.estimators.result import EDGE_UNIT
 from tirelib.observations import Observations, mean_by, observe
 from tirelib.threads import one_thread
 

@@ -24,7 +24,8 @@ from tirelib.arrays import BoolArray, FloatArray
 from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
-from tirelib.estimators.result import EDGE_UNIT, TRUTH
+from tirelib.estimators.edge import EDGE_UNIT
+from tirelib.estimators.result import TRUTH
 from tirelib.estimators.train import train
 from tirelib.estimators.unknowns import DEPTH, FRICTION, TWO_SIGMA
 from tirelib.observations import ROAD, Observations, observe

@@ -4,7 +4,6 @@ import gc
 import json
 import pickle
 import time
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,20 +15,20 @@ from bench.chain import Jump
 from bench.conditions import Conditions
 from bench.deadline import Deadline
 from bench.document import turn_document
-from bench.errors import FmuError, LinkTimeoutError, RecordingError
+from bench.errors import LinkTimeoutError, RecordingError
 from bench.estimation import News, skipped
 from bench.fmu_model import FmuFile
 from bench.judged import JudgedTurns
-from bench.live.estimator import EstimatorPlan, Report, estimate
+from bench.live.estimators import Estimators
 from bench.live.exchange import FINISH, STOP, Exchange, woken
 from bench.live.kept import CONTEXT, Kept
-from bench.live.ports import read_source
-from bench.live.priority import RIGHT
+from bench.live.ports import PortState, read_source
 from bench.live.reader import LineState, ReaderPlan, load, read_port
 from bench.live.recorder import record
 from bench.live.recording_state import Order, RecorderState, RecordingRule
+from bench.live.run_alarms import TOO_BUSY, RunAlarms
 from bench.page.board import SIZE
-from bench.recorder import alarm_event, jump_event
+from bench.recorder import jump_event
 from bench.recording_header import RecordingHeader, part_path
 from bench.wheels import MOST, Wheels
 
@@ -37,8 +36,6 @@ START = 300.0
 """Processes that are not ready after so long do not start, even on a busy machine, [s]."""
 SAY = 5.0
 """After so long it is said what is awaited, then again after twice the time, and so on, [s]."""
-TRIES = 3
-"""So often the FMU may crash when it is loaded."""
 LOOK = 0.05
 """Time between two looks after the processes and the line, [s]."""
 PATIENCE = 60.0
@@ -46,12 +43,6 @@ PATIENCE = 60.0
 LEAVE, AT_ONCE = 60.0, 5.0
 """A process that was told to end and goes on for so long is ended, [s]: in good order; where
 nothing is left to be kept."""
-RECORDED_AGAIN = "recording goes on"
-TOO_BUSY = (
-    "this machine is too busy to decode what comes: bytes are only recorded, and estimates pause; "
-    f"end other programs, or allow real-time priority ({RIGHT})"
-)
-DECODED_AGAIN = "estimates go on"
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,22 +103,21 @@ class LiveChain:
         self._recorded = RecorderState()
         self._orders = 0
         self._pending = News()
-        self._turns: Counter[int] = Counter()  # of each slot
-        self._cursors: Counter[int] = Counter()
-        self._cpu: dict[int, float] = {}
-        self._ready: set[int] = set()
-        self._done: set[int] = set()
         self._next_look = 0.0
         self._ports: list[Kept] = []
         self._reader: Kept | None = None
         self._recorder: Kept | None = None
-        self._estimators: dict[int, Kept] = {}
+        self._estimators = Estimators(
+            plan.file, plan.conditions, self._exchange, self._jumped, laps=plan.laps,
+            every=plan.reader.every_turn,
+        )  # fmt: skip
         self._finished = False
-        self._passing = False
         self._judged = JudgedTurns()
-        self._alarm = ""  # what the recorder has said last
-        self._contradicted: set[int] = set()  # wheels of which was told
-        self._gone: dict[int, str] = {}  # sources that were given up, and why; empty: it is back
+        self._alarms = RunAlarms(
+            [source.port.port for source in plan.reader.sources],
+            estimated=plan.file is not None,
+            write=lambda event: self.order("event", event),
+        )
 
     def __enter__(self) -> "LiveChain":
         try:
@@ -139,10 +129,9 @@ class LiveChain:
                     record, lambda _: (plan.header, plan.conditions, plan.rule, address)
                 )
             if self._plan.file is not None:
-                known = range(self._plan.reader.expected)
-                for slot in known:  # those of other wheels start when they are heard
-                    self._start_estimator(slot)
-                self._wait(lambda: self._ready.issuperset(known), self._loading)
+                known = self._plan.reader.expected
+                self._estimators.start(known)  # those of other wheels start when they are heard
+                self._wait(lambda: len(self._estimators.ready) >= known, self._estimators.awaited)
             self._wait(lambda: self.obeyed(Deadline.after(0.0)),
                        lambda: f"the recorder to begin {self._plan.record}")  # fmt: skip
             # ports are opened last: from then on bytes come
@@ -209,21 +198,24 @@ class LiveChain:
         return {
             "processes": self.process_ids,
             "cpu_s": {"reader": self._state.cpu, "recorder": self._recorded.cpu, **self._port_cpu(),
-                      **{f"estimator {slot}": cpu for slot, cpu in self._cpu.items()}},
+                      **{f"estimator {slot}": cpu for slot, cpu in self._estimators.cpu.items()}},
             "restarts": {name: kept.starts - 1 for name, kept in self._processes().items()},
             "raw": {"lost_reads": refused, "lost_bytes": refused_bytes,
                     "most_waiting_bytes": exchange.raw.high,
                     "not_decoded_bytes": self._state.passed,
                     "alarm": TOO_BUSY if self._state.passing else ""},
             "recording": self._recorded.as_document(refused_bytes),
-            "given_up": dict(self._gone),
+            "given_up": dict(self._alarms.given_up),
             "wheels": {wheel: self.wheel_counts(wheel) for wheel in self.wheels.heard},
         }  # fmt: skip
 
     def _port_cpu(self) -> dict[str, float]:
-        states = [cell.get() for cell in self._exchange.ports]
-        known = [(number, state) for number, state in enumerate(states) if state]
-        return {f"port {number}": pickle.loads(state).cpu for number, state in known}
+        return {f"port {n}": state.cpu for n, state in enumerate(self._port_states()) if state}
+
+    def _port_states(self) -> list[PortState | None]:
+        """Return how the ports are that a process of their own reads; None before it says."""
+        found = [cell.get() for cell in self._exchange.ports]
+        return [None if one is None else pickle.loads(one) for one in found]
 
     def cpu_time(self) -> float:
         """Return what reader, recorder and estimators have used so far, [s]."""
@@ -281,13 +273,12 @@ class LiveChain:
         self._see()
         self._exchange.set(FINISH)
         end = Deadline.after(PATIENCE)
-        while len(self._done) < len(self._estimators) and not end.expired:
+        while len(self._estimators.done) < len(self._estimators.kept) and not end.expired:
             woken(self._exchange.address.news, LOOK)
             if came := self._gather():
                 end = Deadline.after(PATIENCE)
                 news.add(self._judge(came))
-            for slot in self._estimators.keys() - self._done:
-                self._estimators[slot].look()
+            self._estimators.look()
         news.add(self._judge(self._gather(), end=True))
         self.order("close", reason)
         if self._recorder is not None:
@@ -299,7 +290,7 @@ class LiveChain:
     def _processes(self) -> dict[str, Kept]:
         named = {"reader": self._reader, "recorder": self._recorder}
         named |= {f"port {number}": kept for number, kept in enumerate(self._ports)}
-        named |= {f"estimator {slot}": kept for slot, kept in self._estimators.items()}
+        named |= {f"estimator {slot}": kept for slot, kept in self._estimators.kept.items()}
         return {name: kept for name, kept in named.items() if kept is not None}
 
     def _start_port(self, number: int) -> None:
@@ -308,29 +299,9 @@ class LiveChain:
                 self._exchange.address)  # fmt: skip
         self._ports.append(Kept(read_source, lambda _: plan))
 
-    def _start_estimator(self, slot: int) -> None:
-        file = self._plan.file
-        if file is None:
-            return
-
-        def arguments(starts: int) -> tuple[Any, ...]:
-            self._drain(slot, self._pending)
-            plan = EstimatorPlan(file, self._plan.conditions, slot, self._plan.laps,
-                                 self._turns[slot], self._cursors[slot], starts > 1,
-                                 self._plan.reader.every_turn)  # fmt: skip
-            return plan, self._exchange.address
-
-        self._estimators[slot] = Kept(estimate, arguments)
-
-    def _loading(self) -> str:
-        """Say which estimators are awaited."""
-        slots = [f"estimator {slot}" for slot in self._estimators if slot not in self._ready]
-        return f"{', '.join(slots)} to load {self._plan.file and self._plan.file.path}"
-
     def _opening(self) -> str:
         """Say which ports are awaited."""
-        states = [cell.get() for cell in self._exchange.ports]
-        opened = {n for n, state in enumerate(states) if state and pickle.loads(state).name}
+        opened = {n for n, state in enumerate(self._port_states()) if state and state.name}
         sources = enumerate(self._plan.reader.sources)
         ports = [source.port.port for n, source in sources if n not in opened]
         return f"the reader to open {', '.join(ports)}" if ports else "the reader"
@@ -344,12 +315,7 @@ class LiveChain:
             news = self._gather()  # first: it begins the pending news afresh
             self._pending.add(news)
             self._look()
-            if any(kept.starts > TRIES for kept in self._estimators.values()):
-                raise FmuError(
-                    f"{self._plan.file and self._plan.file.path}: the process that loads it ended "
-                    f"{TRIES} times, as native code does when it crashes; an FMU that loads is "
-                    "needed; build it again with `tirelib fmu build`"
-                )
+            self._estimators.check()
             if self._recorded.answer:
                 raise RecordingError(self._recorded.answer)
             if due.expired:
@@ -363,10 +329,9 @@ class LiveChain:
                 )
 
     def _gather(self) -> News:
-        """Return what the estimators have told since the last time."""
+        """Return what there was to tell since the last time."""
         news, self._pending = self._pending, News()
-        for slot in self._estimators:
-            self._drain(slot, news)
+        news.add(self._estimators.gather())
         return news
 
     def _judge(self, news: News, *, end: bool = False) -> News:
@@ -379,28 +344,12 @@ class LiveChain:
             self._exchange.results.put(pickle.dumps((turn.wheel, turn.arrival, document), 5))
         return news
 
-    def _drain(self, slot: int, news: News) -> None:
-        queue = self._exchange.news[slot]
-        while (message := queue.read()) is not None:
-            report: Report = pickle.loads(message)
-            queue.take()
-            self._cursors[slot] = report.cursor
-            self._cpu[slot] = report.cpu
-            self._turns[slot] += len(report.news.turns)
-            news.add(report.news)
-            for jump in report.news.jumps:
-                self.jumps.append(jump)
-                path = self._recorded.path
-                whole = path is None or part_path(path, 1) == self._plan.record
-                self.order("event", jump_event(jump, whole=whole))
-            if report.ready:
-                self._ready.add(slot)
-            if report.done:
-                self._done.add(slot)
-            if report.error and slot not in self._ready:
-                raise FmuError(report.error)
-            if report.error:
-                news.messages.append(report.error)
+    def _jumped(self, jump: Jump) -> None:
+        """Keep a jump, and let the recording tell of it."""
+        self.jumps.append(jump)
+        path = self._recorded.path
+        whole = path is None or part_path(path, 1) == self._plan.record
+        self.order("event", jump_event(jump, whole=whole))
 
     def _look(self) -> None:
         """Look after the processes, and at the line."""
@@ -410,9 +359,8 @@ class LiveChain:
             if self._state.ended and (kept is self._reader or kept in self._ports):
                 continue
             kept.look()
-        wheels = 0 if self._finished else min(len(self.wheels.heard), self._slots)
-        for slot in range(len(self._estimators), wheels):
-            self._start_estimator(slot)
+        if not self._finished:
+            self._estimators.start(min(len(self.wheels.heard), self._slots))
 
     def _see(self) -> None:
         line, recorded = self._exchange.line.get(), self._exchange.recorded.get()
@@ -421,38 +369,11 @@ class LiveChain:
         if recorded is not None:
             self._recorded = pickle.loads(recorded)
         state = self._state
-        if state.passing != self._passing:
-            self._passing = state.passing
-            said = TOO_BUSY if state.passing else DECODED_AGAIN
-            self._pending.alarms.append(said)
-            self.order("event", alarm_event("busy", said, on=state.passing))
-        for wheel, said in state.wheels.contradicted.items():
-            if wheel not in self._contradicted:
-                self._contradicted.add(wheel)
-                told = f"{said}; no turn of it is told" if self._plan.file else said
-                self._pending.alarms.append(told)
-                self.order("event", alarm_event("sample rate", told, on=True))
-        self._see_ports()
+        self._pending.alarms += self._alarms.look(state, self._recorded, self._port_states())
         if state.error and not self._finished:
             kind, text = state.error
             raise getattr(errors, kind)(text)
-        if self._recorded.error != self._alarm:
-            self._alarm = self._recorded.error
-            self._pending.alarms.append(self._alarm or RECORDED_AGAIN)
         self.ended, self.message = state.ended, state.message
-
-    def _see_ports(self) -> None:
-        """Tell of ports that are given up, and of those that are back; the others go on."""
-        for number, cell in enumerate(self._exchange.ports):
-            found = cell.get()
-            gone = "" if found is None else pickle.loads(found).gone
-            told = f"{gone}; the port is still tried" if gone else ""
-            if told != self._gone.get(number, ""):
-                self._gone[number] = told
-                port = self._plan.reader.sources[number].port.port
-                said = told or f"{port}: it is back"
-                self._pending.alarms.append(said)
-                self.order("event", alarm_event(f"source {number}", said, on=bool(gone)))
 
     def _close(self, error: BaseException | None = None) -> None:
         """End what still runs and give the memory back; `error` is what ends the run, if any."""
@@ -461,7 +382,8 @@ class LiveChain:
         if not self._finished:
             interrupted = isinstance(error, KeyboardInterrupt)
             self.order("close", "stopped" if interrupted else "the run ended with an error")
-        loading = [self._estimators[slot] for slot in self._estimators.keys() - self._ready]
+        estimators = self._estimators
+        loading = [estimators.kept[slot] for slot in estimators.kept.keys() - estimators.ready]
         for kept in self._processes().values():
             patience = LEAVE if kept is self._recorder else AT_ONCE
             kept.wait(0.0 if kept in loading else patience)  # one that loads hears nothing

@@ -33,7 +33,7 @@ from bench.page.terminal import numbers, picture
 from bench.timeline import Samples
 from bench.wheels import Block
 from tests.bench.in_process import FakeSource
-from tirelib.estimators.result import EDGE_UNIT
+from tirelib.estimators.edge import EDGE_UNIT
 
 PERIOD = 1e-4
 OMEGA = 2.0 * math.pi * 12.5  # 800 samples a turn

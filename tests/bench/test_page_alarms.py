@@ -2,11 +2,9 @@
 
 import json
 import math
-import pickle
 import time
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,9 +19,10 @@ from bench.errors import DeviceError
 from bench.estimation import News
 from bench.line_counts import NO_FRAME, NOTHING, LineCounts
 from bench.links.opening import PortPlan
-from bench.live.chain import LiveChain
+from bench.live.ports import PortState
 from bench.live.reader import LineState
 from bench.live.recording_state import RecorderState
+from bench.live.run_alarms import DECODED_AGAIN, RECORDED_AGAIN, TOO_BUSY, RunAlarms
 from bench.page.alarms import RULES, Alarms, Rule, event_of, read_alarms
 from bench.page.board import RINGS, Board
 from bench.page.condition_lines import in_use
@@ -206,23 +205,30 @@ def test_what_is_wrong_with_the_run_is_an_alarm_and_the_transmitter_is_not_blame
         assert active == ["silence"]
 
 
-def test_a_busy_machine_is_an_alarm_of_the_recording_when_it_begins_and_when_it_ends() -> None:
-    state, orders = LineState(FakeSource(0).wheels, passing=True), []
-    chain = LiveChain.__new__(LiveChain)
-    chain._state, chain._recorded, chain._pending = state, RecorderState(), News()
-    chain._passing, chain._alarm, chain._orders = False, "", 0
-    chain._exchange = cast(Any, SimpleNamespace(
-        line=SimpleNamespace(get=lambda: pickle.dumps(state)),
-        recorded=SimpleNamespace(get=lambda: None),
-        orders=SimpleNamespace(put=lambda order: orders.append(pickle.loads(order)) or True),
-        ports={},
-    ))  # fmt: skip
-    for state.passing in (True, True, False):
-        chain._see()
-    assert [(order.what["name"], order.what["state"]) for order in orders] == [
-        ("busy", "on"),
-        ("busy", "off"),
-    ]
+def test_what_is_wrong_with_a_run_is_told_once_and_recorded_when_it_begins_and_ends() -> None:
+    line, recorded, written = LineState(FakeSource(0).wheels), RecorderState(), []
+    alarms = RunAlarms(["/dev/a", "/dev/b"], estimated=True, write=written.append)
+
+    def told(*ports: PortState | None) -> list[str]:
+        first = alarms.look(line, recorded, ports)
+        assert alarms.look(line, recorded, ports) == []
+        return first
+
+    assert told(None, PortState("/dev/b")) == []
+    line.passing, away = True, PortState("/dev/b", gone="/dev/b: away for 5 s")
+    assert told(None, away) == [TOO_BUSY, f"{away.gone}; the port is still tried"]
+    assert alarms.given_up == {1: f"{away.gone}; the port is still tried"}
+    line.passing, recorded.error = False, "the disk is full"
+    assert told(None, PortState("/dev/b")) == [
+        DECODED_AGAIN, "/dev/b: it is back", "the disk is full",
+    ]  # fmt: skip
+    line.wheels.heard[0].timeline._rate.contradiction = "wheel 0: another rate"
+    recorded.error = ""
+    assert told() == ["wheel 0: another rate; no turn of it is told", RECORDED_AGAIN]
+    assert [(event["name"], event["state"]) for event in written] == [
+        ("busy", "on"), ("source 1", "on"), ("busy", "off"), ("source 1", "off"),
+        ("sample rate", "on"),
+    ]  # fmt: skip
 
 
 def test_a_source_without_a_frame_and_a_wheel_that_never_sends_are_told() -> None:

@@ -29,13 +29,14 @@ from bench.fmu_model import FmuFile, FmuModel
 from bench.links import BACK, LOST, RESUMED, Read
 from bench.links.opening import PortPlan
 from bench.links.replay import ReplayLink
-from bench.live.chain import RECORDED_AGAIN, LiveChain, LivePlan
+from bench.live.chain import LiveChain, LivePlan
 from bench.live.estimator import EstimatorPlan, Report, _Estimator
 from bench.live.exchange import Address, Exchange
 from bench.live.kept import CONTEXT
 from bench.live.reader import ReaderPlan, load
 from bench.live.recorder import _Recorder
 from bench.live.recording_state import Order, RecorderState, RecordingRule
+from bench.live.run_alarms import RECORDED_AGAIN
 from bench.recording import Recorder, Recording, RecordingHeader, jump_event
 from bench.recording_header import parts_of
 from bench.replay import ReplayChain
@@ -339,14 +340,14 @@ def test_an_estimator_goes_on_behind_what_it_has_reported(tmp_path: Path) -> Non
     jump = Jump(0, Place(0, 0), Place(0, 16), SKIPPED, 16, 1)
     chain._exchange.news[0].put(pickle.dumps(Report(News(jumps=[jump]), cursor=4711)))
     news = News()
-    chain._drain(0, news)
-    assert chain._cursors[0] == 4711
+    chain._estimators._drain(0, news)
+    assert chain._estimators._cursors[0] == 4711
     assert news.jumps == chain.jumps == [jump]
     order: Order = pickle.loads(chain._exchange.orders.read() or b"")
     assert order.what == jump_event(jump)
     chain._recorded = RecorderState(tmp_path / "a-2.mcap")  # begun later: other places
     chain._exchange.news[0].put(pickle.dumps(Report(News(jumps=[jump]))))
-    chain._drain(0, news)
+    chain._estimators._drain(0, news)
     order = pickle.loads(chain._exchange.orders.read() or b"")
     assert order.what["event"] == "jump of the run"
     chain._close()
@@ -360,12 +361,13 @@ def test_a_start_that_takes_long_says_what_is_awaited(
     monkeypatch.setattr("bench.live.chain.START", 0.0)
     said: list[str] = []
     chain = LiveChain(plan_of("p", None, tmp_path / "a.mcap"), said.append)
-    chain._estimators = dict.fromkeys(range(3), cast(Any, SimpleNamespace(starts=1, look=int)))
-    chain._ready = {1}
+    chain._estimators.kept = dict.fromkeys(range(3), cast(Any, SimpleNamespace(starts=1, look=int)))
+    chain._estimators.ready = {1}
+    loading = chain._estimators.awaited
     for awaited, text in ((chain._opening, "the reader to open p"),
-                          (chain._loading, "estimator 0, estimator 2 to load ")):  # fmt: skip
+                          (loading, "estimator 0, estimator 2 to load ")):  # fmt: skip
         with pytest.raises(LinkTimeoutError, match=f"waited 0 s for: {text}"):
             chain._wait(lambda: False, awaited)
         assert said.pop().startswith(f"waiting for: {text}")
-    chain._estimators = {}
+    chain._estimators.kept = {}
     chain._close()

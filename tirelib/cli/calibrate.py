@@ -35,8 +35,9 @@ from tirelib.estimators.crossval import (
     leave_levels_out,
 )
 from tirelib.estimators.dissertation import SMALL_ANGLE, Regression
+from tirelib.estimators.edge import VARIED
 from tirelib.estimators.mixed import strangers
-from tirelib.estimators.result import VARIED, cost_rows
+from tirelib.estimators.result import cost_rows
 from tirelib.estimators.train import Trained, train
 from tirelib.estimators.typical import typical_turn
 from tirelib.observations import Observations, observe

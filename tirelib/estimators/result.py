@@ -12,16 +12,11 @@ from tirelib.arrays import FloatArray
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.chain import QUANTITIES, Chain
 from tirelib.estimators.costs import COLUMN, Cost
+from tirelib.estimators.edge import EDGE_UNIT, FORMAT, VARIED
 from tirelib.estimators.likeness import suspected
 from tirelib.flags import TurnFlag, flag_names
 from tirelib.observations import Observations, mean_by
 
-FORMAT = "tirelib-estimate/1"
-EDGE_UNIT = {"Fz": ("N", 1.0), "alpha": ("deg", 180.0 / np.pi), "kappa": ("1", 1.0),
-             "Fy": ("N", 1.0)}  # fmt: skip
-"""Unit and factor of each quantity in the document."""
-VARIED = {"Fz": 300.0, "alpha": 0.5, "kappa": 0.01, "Fy": 300.0}
-"""Range below which a quantity stood still: R2 and a share of the range would say nothing."""
 TRUTH = {"Fz": "Fz", "alpha": "slip_angle", "kappa": "slip_ratio", "Fy": "Fy"}
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from tirelib.errors import CalibrationError
-from tirelib.estimators.result import EDGE_UNIT
+from tirelib.estimators.edge import EDGE_UNIT
 from tirelib.report.accuracy import TITLE
 from tirelib.report.page import DASH, Table
 
