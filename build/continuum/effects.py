@@ -125,7 +125,8 @@ def _poles(seen: Trace, tire: Tire, run: Run, s: float) -> Trace:
 
 def _yields(seen: Trace, tire: Tire, run: Run, s: float) -> Trace:
     size = s * np.abs(seen.strain) / 5e-3
-    shown = seen.strain * np.log1p(size) / np.where(size > 0.0, size, 1.0)
+    safe = np.where(size > 0.0, size, 1.0)
+    shown = seen.strain * np.where(size > 0.0, np.log1p(size) / safe, 1.0)
     return replace(seen, strain=shown, by_load=seen.by_load / (1.0 + size))
 
 

@@ -231,12 +231,12 @@ def _draw(rng: np.random.Generator, name: str) -> Tire:
     arch = replace(
         base.arch,
         height=height,
-        lower=float(rng.uniform(1.1, 1.5)),
+        lower=float(rng.uniform(0.95, 1.55)),
         upper=float(rng.uniform(1.43, 1.57)),
         ply=times(base.arch.ply, 1.5),
-        thickness=times(base.arch.thickness, 1.3),
-        along=times(base.arch.along, 1.6),
-        shear=times(base.arch.shear, 1.7),
+        thickness=times(base.arch.thickness, 1.5),
+        along=times(base.arch.along, 2.0),
+        shear=times(base.arch.shear, 2.0),
     )
     return replace(
         base,
