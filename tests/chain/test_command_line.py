@@ -45,6 +45,12 @@ def test_calibrate_prints_and_stores_statistics(place: Path) -> None:
         assert document["in_use"][quantity]["cross_validated_rmse"] > 0.0
     held = {(row["held_out"], row["level"]) for row in document["held_out"]}
     assert ("load", "4500 N") in held
+    loads = [row for row in document["held_out"] if row["held_out"] == "load"]
+    for row in loads:  # what is not flagged is no worse than the dissertation's
+        if row["quantity"] in ("Fz", "Fy") and not row["inside"]:
+            assert row["in_range"] == 0.0, row
+        if row["in_use_in_range"] is not None and row["dissertation"] is not None:
+            assert row["in_use_in_range"] < row["dissertation"], row
     assert document["data"][0]["sha256"] == read_campaign(place / "set1").content_hash()
     text = (place / "cal.toml").read_text()
     assert 'format = "tirelib-calibration/2"' in text

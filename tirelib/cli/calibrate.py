@@ -127,6 +127,8 @@ def vars_of(row: HeldOut) -> dict[str, Any]:
         "n": row.n,
         "dissertation": row.dissertation,
         "in_use": row.in_use,
+        "in_range": row.in_range,
+        "in_use_in_range": row.in_use_in_range,
     }
 
 
@@ -288,18 +290,24 @@ def _print(console: Console, trained: Trained, document: dict[str, Any]) -> None
 def _held_out_table(rows: list[dict[str, Any]]) -> Table:
     """Worst rmse over the levels of each condition: the dissertation's and ours."""
     table = Table(title="Worst level held out, within the others (rmse over run means)",
-                  box=SIMPLE_HEAD, title_justify="left")  # fmt: skip
-    for column in ("held out", "quantity", "dissertation", "in use", "unit", "levels"):
+                  box=SIMPLE_HEAD, title_justify="left",
+                  caption="in use: turns in range; flagged: most turns of a level that are out of "
+                          "range; with these: rmse of all", caption_justify="left")  # fmt: skip
+    for column in ("held out", "quantity", "dissertation", "in use", "flagged", "with these",
+                   "unit", "levels"):  # fmt: skip
         table.add_column(
-            column, justify="right" if column in ("dissertation", "in use") else "left"
+            column, justify="left" if column in ("held out", "quantity", "unit") else "right"
         )
     keys = dict.fromkeys((r["held_out"], r["quantity"]) for r in rows if r["inside"])
     for condition, quantity in keys:
         part = [r for r in rows if (r["held_out"], r["quantity"]) == (condition, quantity)]
         part = [r for r in part if r["inside"]]
         old = [r["dissertation"] for r in part if r["dissertation"] is not None]
+        seen = [r["in_use_in_range"] for r in part if r["in_use_in_range"] is not None]
+        flagged = 1.0 - min(r["in_range"] for r in part)
         table.add_row(
             condition, quantity, f"{max(old):.4g}" if old else "-",
+            f"{max(seen):.4g}" if seen else "-", f"{flagged:.0%}",
             f"{max(r['in_use'] for r in part):.4g}", part[0]["unit"], str(len(part)),
         )  # fmt: skip
     return table

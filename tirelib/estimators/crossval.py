@@ -5,9 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.errors import CalibrationError
 from tirelib.estimators.calibrate import calibrate_chain
+from tirelib.estimators.calibration import LARGEST_ANGLE_STD
 from tirelib.estimators.dissertation import FREE, SMALL_ANGLE, UPRIGHT, Means
 from tirelib.estimators.fit import LARGEST_LEVEL
 from tirelib.estimators.regressors import compute_regressors
@@ -27,10 +28,11 @@ MOST_LEVELS = 9
 class HeldOut:
     """Errors at one level of one condition, by fits that never saw this level.
 
-    `inside` is False for the outermost levels: there a fit without them extrapolates, and an
-    estimate would carry an out-of-range flag. `dissertation` is the rmse of the dissertation's
-    regression, None where it has none or cannot be fitted without the level; `in_use` that of the
-    estimator. Both in `unit`, over run means.
+    `inside` is False for the outermost levels: there a fit without them extrapolates.
+    `dissertation` is the rmse of the dissertation's regression, None where it has none or cannot be
+    fitted without the level; `in_use` that of the estimator. Both in `unit`, over run means.
+    `in_range` is the share of turns that the estimator calls valid, `in_use_in_range` its rmse over
+    run means of these, None where there are none: what it says of the others is flagged.
     """
 
     condition: str
@@ -41,6 +43,8 @@ class HeldOut:
     n: int
     dissertation: float | None
     in_use: float
+    in_range: float
+    in_use_in_range: float | None
 
 
 def leave_levels_out(
@@ -69,17 +73,27 @@ def leave_levels_out(
             good &= np.isfinite(truth)
             if not good.any() or not trained.calibration.chains[-1].has(quantity):
                 continue
-            unit = observations.unit
-            error = mean_by(unit, estimate.value - truth, good)
-            factor = FACTOR[REPORT_UNIT[quantity]]
+            error = estimate.value - truth
+            valid = good & estimate.valid
+            if quantity == "alpha":
+                valid &= estimate.std <= LARGEST_ANGLE_STD
+            factor, unit = FACTOR[REPORT_UNIT[quantity]], observations.unit
             made.append(
                 HeldOut(
-                    condition, label, quantity, REPORT_UNIT[quantity], inside, error.size,
-                    _dissertation(trained.means, observations, quantity, test),
-                    factor * float(np.sqrt(np.mean(error**2))),
+                    condition, label, quantity, REPORT_UNIT[quantity], inside,
+                    n=int(np.unique(unit[good]).size),
+                    dissertation=_dissertation(trained.means, observations, quantity, test),
+                    in_use=factor * _rmse(error, unit, good),
+                    in_range=float(valid.sum() / good.sum()),
+                    in_use_in_range=factor * _rmse(error, unit, valid) if valid.any() else None,
                 )
             )  # fmt: skip
     return tuple(made)
+
+
+def _rmse(error: FloatArray, unit: IntArray, rows: BoolArray) -> float:
+    """Return the root mean square over the means of each unit."""
+    return float(np.sqrt(np.mean(mean_by(unit, error, rows) ** 2)))
 
 
 def _levels(observations: Observations) -> Iterator[tuple[str, str, bool, BoolArray]]:

@@ -217,7 +217,8 @@ def held_out_table(rows: Sequence[Mapping[str, Any]]) -> Table:
     """Return the cross-validation by level: each level of a condition left out of the fit."""
     return Table(
         "Error at a level that the fit had not seen",
-        ("held out", "level", "quantity", "unit", "where", "runs", "dissertation", "in use"),
+        ("held out", "level", "quantity", "unit", "where", "runs", "dissertation", "in use",
+         "in range", "in use, in range"),
         [
             (
                 str(row["held_out"]).replace("_", " "),
@@ -228,12 +229,15 @@ def held_out_table(rows: Sequence[Mapping[str, Any]]) -> Table:
                 str(row.get("n", "")),
                 number(row["dissertation"]),
                 number(row["in_use"]),
+                f"{row['in_range']:.0%}" if "in_range" in row else DASH,
+                number(row.get("in_use_in_range")),
             )
             for row in rows
         ],
         texts=5,
-        note="A level beyond the others is an extrapolation. Root mean square over run means.",
-    )
+        note="A level beyond the others is an extrapolation. Root mean square over run means. What "
+        "is not in range is flagged: the last column is of what is.",
+    )  # fmt: skip
 
 
 def refused_table(trained: Trained) -> Table:

@@ -1,0 +1,159 @@
+"""Which tires are noticed as another one, and how pressure and speed shift what a tire looks like.
+
+    python build/other_tire.py --out build/out/other_tire --tire reference --tire soft --tire stiff
+
+Calibrates each tire on `set1` (65 km/h, 2.3 bar) and judges every tire with every calibration, on
+another day of `set1` and on `set3` (1.3 to 2.5 bar, 10 to 150 km/h). Prints how many turns in range
+are flagged `other_tire`, with friction and tread given and not; the same with half and double of
+what decides; and the shifts of which `DRIFT` is the mean. `--tire random-41` draws a tire. The rig
+takes some minutes a tire; campaigns and calibrations are kept in the folder.
+"""
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+
+import click
+import numpy as np
+from road_constants import times
+from road_coverage import measured, silent, tire_of
+
+from bench.rig.plans import Plan, plan
+from bench.rig.tire import Condition
+from tirelib.estimators import likeness
+from tirelib.estimators.calibration import Calibration
+from tirelib.estimators.calibration_file import read_calibration, write_calibration
+from tirelib.estimators.likeness import DRIFT, suspected
+from tirelib.estimators.regressors import ODD, compute_regressors
+from tirelib.estimators.train import train
+from tirelib.flags import TurnFlag
+from tirelib.observations import Observations
+from tirelib.threads import one_thread
+
+PRESSURE, SPEED = 2.3e5, 65.0 / 3.6
+SEED = 51
+TRIED = ("PRESSURE_DOUBT", "SPEED_DOUBT", "ROAD_DOUBT")
+"""Doubts of which half and double are tried; `DRIFT` and `ROAD_DRIFT` are tried as a whole."""
+
+
+def drifting() -> Plan:
+    """Return runs at other pressures and at other speeds, straight and at 3 deg."""
+    away = [(p * 1e5, SPEED) for p in (1.5, 1.9, 2.3, 2.7)]
+    away += [(PRESSURE, v / 3.6) for v in (20.0, 100.0, 140.0)]
+    runs = tuple(
+        Condition(load, pressure, speed, np.deg2rad(angle))
+        for load in (2500.0, 4500.0, 6500.0) for pressure, speed in away for angle in (0.0, 3.0)
+    )  # fmt: skip
+    return Plan("drift", "3 loads x 4 pressures and 3 speeds x 2 slip angles", runs)
+
+
+def shifts(calibration: Calibration, seen: Observations) -> Mapping[str, tuple[float, float]]:
+    """Return the shift of each regressor per doubled pressure, and per (40 m/s)^2."""
+    known = calibration.chains[-1].likeness
+    if known is None:
+        raise SystemExit("too few conditions")
+    values = compute_regressors(seen.features, range(seen.features.lateral.size))
+    values["speed_squared"] = values["speed"] ** 2
+    rest = known.rest(values)
+    use = seen.usable & np.isfinite(rest).all(axis=1)
+    pressure = values["pressure"] / PRESSURE - 1.0
+    speed = (values["speed_squared"] - SPEED**2) / 1600.0
+    cornering = np.abs(seen.truth["slip_angle"]) > np.deg2rad(1.0)
+    found = {}
+    for column, name in enumerate(known.names):
+        side = np.where(name in ODD, np.sign(seen.truth["slip_angle"]), 1.0)
+        rows = use & cornering if name in ODD else use
+        design = np.stack((np.ones_like(pressure), pressure, speed), axis=1) * side[:, None]
+        answer = np.linalg.lstsq(design[rows], rest[rows, column], rcond=None)[0]
+        found[name] = (float(answer[1]), float(answer[2]))
+    return found
+
+
+def flagged(calibration: Calibration, seen: Observations) -> tuple[int, int]:
+    """Return how many turns are flagged, and how many are in range."""
+    found = calibration.estimate(seen.features)
+    other = (found.flags & int(TurnFlag.OTHER_TIRE)) != 0
+    return int(other.sum()), int((found.turn_valid | other).sum())
+
+
+def row(calibration: Calibration, days: Mapping[str, Observations]) -> list[str]:
+    """Return a cell for each campaign: flagged of those in range, in brackets with nothing said."""
+    cells = []
+    for seen in days.values():
+        given, unsaid = flagged(calibration, seen), flagged(calibration, silent(seen))
+        mark = "!" if suspected(*given) else ""
+        cells.append(f"{given[0]} of {given[1]}{mark} ({unsaid[0]})")
+    return cells
+
+
+def halves(
+    calibrations: Mapping[str, Calibration], days: Mapping[str, Mapping[str, Observations]]
+) -> list[str]:
+    """Return for half and double of each constant the flagged turns of own and of other tires."""
+    lines = ["| constant | factor | own tire | other tires, set1 | other tires, set3 |",
+             "|---|---|---|---|---|"]  # fmt: skip
+
+    def judge(label: str, factor: float) -> None:
+        count = dict.fromkeys(("own", "set1", "set3"), (0, 0))
+        for name, calibration in calibrations.items():
+            for other, campaigns in days.items():
+                for kind, seen in campaigns.items():
+                    key = "own" if name == other else kind
+                    found = flagged(calibration, seen)
+                    count[key] = (count[key][0] + found[0], count[key][1] + found[1])
+        cells = " | ".join(f"{a} of {b}" for a, b in count.values())
+        lines.append(f"| {label} | {factor:g} | {cells} |")
+
+    judge("as it is", 1.0)
+    for name in TRIED:
+        for factor in (0.5, 2.0):
+            with times(likeness, name, factor):
+                judge(f"`{name}`", factor)
+    for name in ("DRIFT", "ROAD_DRIFT"):
+        table = getattr(likeness, name)
+        own = dict(table)
+        for factor in (0.5, 2.0):
+            table.update({key: tuple(factor * x for x in pair) for key, pair in own.items()})
+            judge(f"`{name}`", factor)
+        table.update(own)
+    return lines
+
+
+def main() -> None:
+    """Measure, calibrate, judge, print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("build/out/other_tire"))
+    parser.add_argument("--tire", action="append", required=True)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--no-halves", action="store_true")
+    given = parser.parse_args()
+    calibrations, days, moved = {}, {}, {}
+    for name in given.tire:
+        kind, _, seed = name.partition("-")
+        own, folder = tire_of(kind, int(seed or 0)), given.out / name
+        day = measured(folder / "set1", plan("set1"), own, SEED, given.jobs)
+        file = folder / "calibration.toml"
+        if not file.exists():
+            write_calibration(train(day).calibration, file)
+        calibrations[name] = read_calibration(file)
+        days[name] = {
+            "set1": measured(folder / "day2", plan("set1"), own, SEED + 1, given.jobs),
+            "set3": measured(folder / "set3", plan("set3"), own, SEED + 2, given.jobs),
+        }
+        drift = measured(folder / "drift", drifting(), own, SEED + 3, given.jobs)
+        moved[name] = shifts(calibrations[name], drift)
+    click.echo("| calibrated | judged | set1 | set3 |\n|---|---|---|---|")
+    for name, calibration in calibrations.items():
+        for other, campaigns in days.items():
+            click.echo(f"| {name} | {other} | {' | '.join(row(calibration, campaigns))} |")
+    if not given.no_halves:
+        click.echo("\n".join(["", *halves(calibrations, days)]))
+    click.echo("\nshift with a doubled pressure, and with (40 m/s)^2; now, then tire by tire")
+    for name, (pressure, speed) in DRIFT.items():
+        cells = [f"{moved[tire][name][k]:8.4f}" for k in (0, 1) for tire in moved]
+        click.echo(f"{name:18}{pressure:8.4f}{speed:8.4f}  " + " ".join(cells))
+
+
+if __name__ == "__main__":
+    with one_thread():
+        main()
