@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,10 @@ import pytest
 from click.testing import CliRunner
 
 from tests.chain.test_command_line import run
+from tests.unit.diagnose.planted import model_file, waves
 from tirelib.cli import main, program
+from tirelib.compare.model import model_of, predict_runs
+from tirelib.model.base import operating_points
 from tirelib.parameters import read_tire, write_tire
 
 
@@ -136,8 +140,8 @@ def test_effects_of_a_model_are_named_as_left_out(tmp_path: Path) -> None:
     path = tmp_path / "model.toml"
     write_tire(read_tire("table-6-1"), path, "tirelib-model/1")
     with path.open("a") as file:
-        file.write("\n[effects.tread_friction]\nstrength = 0.4\n")
-    found = document(tmp_path, "--model", path, "--load", 4000)
+        file.write('\n[[effects]]\neffect = "tread_friction"\nstrength = 0.4\n')
+    found = document(tmp_path, "--model", path, "--load", 4000, "--contact", "shear")
     assert found["effects_left_out"] == ["tread_friction"]
     shown = CliRunner().invoke(program, ["simulate", "--model", str(path), "--load", "4000"])
     assert "left out here: tread_friction" in shown.output
@@ -253,3 +257,75 @@ def test_the_installed_program_is_the_same() -> None:
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "5128.7" in done.stdout
+
+
+EFFECTS = (("sidewall_damping", 0.08), ("sidewall_load", 0.2), ("gage_length", 400.0))
+
+
+@pytest.fixture
+def identified(tmp_path: Path) -> Path:
+    """Return a model file as `identify` and `add` write them."""
+    file = model_file(*EFFECTS)
+    extra = {**file.extra, "model": {"ring": "large displacements", "contact": "radial"}}
+    write_tire(replace(file, extra=extra), tmp_path / "M.toml", "tirelib-model/1")
+    return tmp_path / "M.toml"
+
+
+def test_a_model_file_gives_the_waveforms_that_compare_uses(
+    identified: Path, tmp_path: Path
+) -> None:
+    measured = waves()
+    at, model = operating_points(measured), model_of(read_tire(identified))
+    predicted = predict_runs(model, at, [0.0], measured.low_pass)
+    words = [
+        name
+        for option, unit, values in (
+            ("--load", 1.0, at.load), ("--pressure", 1e5, at.pressure), ("--omega", 1.0, at.omega)
+        )
+        for name in (option, ",".join(repr(float(x / unit)) for x in values))
+    ]  # fmt: skip
+    found = document(tmp_path, "--model", identified, *words, "--out", tmp_path / "out")
+    assert (found["ring"], found["effects_left_out"]) == ("large displacements", [])
+    assert found["effects"] == [name for name, _ in EFFECTS]
+    table = pd.read_csv(tmp_path / "out" / "simulation.csv")
+    curves = table["gage_ustrain"].to_numpy().reshape(len(at), -1)[:, :-1:4]
+    # the file has nine digits
+    np.testing.assert_allclose(curves, 1e6 * predicted.strain, atol=1e-4)
+    depth = [point["deflection_mm"] for point in found["points"]]
+    np.testing.assert_allclose(depth, 1e3 * predicted.deflection, rtol=1e-9)
+    edges = np.array([point["edges_rad"] for point in found["points"]])
+    middle = 1e3 * predicted.edges.mean(axis=1)
+    np.testing.assert_allclose(1e3 * edges.mean(axis=1), middle, atol=0.5)
+    normal = table["normal_N_per_m"].to_numpy().reshape(len(at), -1)[:, :-1]
+    step = 2.0 * np.pi * read_tire(identified).tire.ring_radius / normal.shape[1]
+    carried = step * normal.sum(axis=1)
+    # a quarter of a degree is coarse for the edges of the contact
+    np.testing.assert_allclose(carried, at.load, rtol=3e-3)
+
+
+def test_a_deflection_of_a_model_file_is_that_of_its_load(identified: Path, tmp_path: Path) -> None:
+    by_load = document(tmp_path, "--model", identified, "--load", "2500,6000", "--speed", 80)
+    depths = ",".join(repr(point["deflection_mm"]) for point in by_load["points"])
+    back = document(tmp_path, "--model", identified, "--deflection", depths, "--speed", 80)
+    assert [p["Fz_N"] for p in back["points"]] == pytest.approx([2500.0, 6000.0], rel=1e-5)
+
+
+def test_another_ring_and_the_sheared_contact_are_told(identified: Path, tmp_path: Path) -> None:
+    linear = document(tmp_path, "--model", identified, "--load", 6000, "--ring", "linear")
+    large = document(tmp_path, "--model", identified, "--load", 6000)
+    assert linear["ring"] == "linear"
+    assert linear["deflection_mm"] < 0.97 * large["deflection_mm"]
+    sheared = document(tmp_path, "--model", identified, "--load", 6000, "--contact", "shear")
+    assert sheared["effects_left_out"] == [name for name, _ in EFFECTS]
+    assert any("linear ring" in note for note in sheared["notes"])
+    bare = document(tmp_path, "--model", "table-6-1", "--load", 4000)
+    assert (bare["ring"], bare["effects"]) == ("linear", [])
+    big = document(tmp_path, "--model", "table-6-1", "--load", 4000, "--ring", "large")
+    assert big["deflection_mm"] > bare["deflection_mm"]
+
+
+def test_conditions_without_an_effect_that_knows_them_are_refused() -> None:
+    found = CliRunner().invoke(
+        program, ["simulate", "--model", "table-6-1", "--load", "4000", "--camber", "2"]
+    )
+    assert "leave them out" in str(found.exception)

@@ -1,6 +1,7 @@
 """``tirelib simulate``: the ring model of a tire on the road."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,10 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from tirelib.arrays import FloatArray
-from tirelib.cli.common import NEW_FILE, NEW_FOLDER, output, write_json
+from tirelib.cli.common import FILE, NEW_FILE, NEW_FOLDER, output, write_json
+from tirelib.compare.model import Model, UsedEffect, model_of
 from tirelib.errors import ConvergenceError, ParameterError
+from tirelib.model.registration import registered_effects
 from tirelib.parameters import Tire, TireFile, read_tire
 from tirelib.report.simulation import (
     CONTACTS,
@@ -20,9 +23,11 @@ from tirelib.report.simulation import (
 )
 from tirelib.report.simulation import simulate as simulate_tire
 from tirelib.report.simulation_document import FORMAT, point_document, write_curves
+from tirelib.report.simulation_model import simulate_file
 from tirelib.report.simulation_series import MOST_MODES, bending_length, wanted_modes
 from tirelib.units import from_si, to_si
 
+RINGS = {"large": "large displacements", "linear": "linear"}
 LARGEST_DEFLECTION = 0.2
 """Share of the free radius: half of a passenger car's sidewall, which is about 0.4 of it high."""
 
@@ -32,8 +37,11 @@ Examples:
   tirelib simulate --model table-6-1 --deflection 25 --omega 59 --damping 0.04 --json s.json
   tirelib simulate --model table-6-2-195-65r15 --load 1500,3000,4500 --pressure 2.3 --speed 65 \\
                    --out build/out/simulate
+  tirelib simulate --model build/out/M.toml --load 1500,4500,7500 --speed 80 --out build/out/mine
 
 \b
+A file of `identify` or `add` is simulated as these fitted it: large displacements, and the effects
+that it has. A tire file is the dissertation's linear ring, unless --ring large is given.
 Values with commas are operating points, drawn together; an option with one value holds for all.
 Wheel angle 0 is below the axle, entry < 0 < exit; strain is positive in tension.
 """
@@ -68,6 +76,13 @@ def _numbers(
 @click.option("--omega", metavar="RAD_S", callback=_numbers, help="Turn rate, instead of --speed.")
 @click.option("--contact", type=click.Choice(CONTACTS), default=CONTACTS[0], show_default=True,
               help="Tread springs: along the radius, or pressed and sheared.")  # fmt: skip
+@click.option("--ring", type=click.Choice(tuple(RINGS)),
+              help="Default: the model file's; linear for a tire file.")  # fmt: skip
+@click.option("--camber", metavar="DEG", callback=_numbers, help="For effects of it; default 0.")
+@click.option("--temperature", metavar="DEGC", callback=_numbers,
+              help="Of the tread, for effects of it; unknown by default.")  # fmt: skip
+@click.option("--effects", "effect_files", metavar="FILE.py", type=FILE, multiple=True,
+              help="Effects of your own that the model has; may be given again.")  # fmt: skip
 @click.option("--damping", metavar="LAMBDA", type=float,
               help="lambda of c_n = 2 lambda sqrt(m_n k_n); default: tire's.")  # fmt: skip
 @click.option(
@@ -83,12 +98,17 @@ def simulate(
     speed: tuple[float, ...] | None,
     omega: tuple[float, ...] | None,
     contact: str,
+    ring: str | None,
+    camber: tuple[float, ...] | None,
+    temperature: tuple[float, ...] | None,
+    effect_files: tuple[Path, ...],
     damping: float | None,
     json_file: Path | None,
     folder: Path | None,
 ) -> None:
     """Press the rolling ring onto the road: shape, pressure, shear, strain and strain rate."""
     file = read_tire(model)
+    chosen = _model(file, ring, contact, effect_files)
     tire = file.tire if damping is None else file.tire.changed(damping=damping)
     if speed is not None and omega is not None:
         raise ParameterError("simulate: both --speed and --omega are given; give one of them")
@@ -100,25 +120,57 @@ def simulate(
     turn_rate = np.zeros(1) if omega is None else np.array(omega)
     if speed is not None:
         turn_rate = _turn_rate(_si(speed, "km/h", "speed"), tire)
-    done = simulate_tire(
-        tire,
-        load=None if load is None else np.array(load),
-        deflection=None if deflection is None else _si(deflection, "mm", "length"),
-        inflation=None if pressure is None else _si(pressure, "bar", "pressure"),
-        turn_rate=turn_rate,
-        contact=contact,
-    )
-    notes = _notes(file, done)
+    pressed = {
+        "load": None if load is None else np.array(load),
+        "deflection": None if deflection is None else _si(deflection, "mm", "length"),
+    }
+    inflation = None if pressure is None else _si(pressure, "bar", "pressure")
+    if chosen is not None:
+        done = simulate_file(
+            chosen, tire, inflation=inflation, turn_rate=turn_rate,
+            camber=None if camber is None else _si(camber, "deg", "angle"),
+            temperature=None if temperature is None else _si(temperature, "degC", "temperature"),
+            **pressed,
+        )  # fmt: skip
+    elif camber is None and temperature is None:
+        done = simulate_tire(
+            tire, inflation=inflation, turn_rate=turn_rate, contact=contact, **pressed
+        )
+    else:
+        raise ParameterError(
+            "simulate: --camber and --temperature act on the effects of a model, and this "
+            "simulation has none; leave them out"
+        )
+    notes = _notes(file, done, chosen)
     _print(file, done, notes)
     written = [] if json_file is None else [json_file]
     if folder is not None:
         written += _write(done, file.name, folder)
     targets = [path for path in (json_file, folder and folder / "simulation.json") if path]
-    document = _document(file, model, done, notes) if targets else {}
+    document = _document(file, model, done, notes, chosen) if targets else {}
     for target in targets:
         write_json(target, document)
     for path in written:
         output().print(f"written: {path}")
+
+
+def _model(
+    file: TireFile, ring: str | None, contact: str, effect_files: Sequence[Path]
+) -> Model | None:
+    """Return the model of a file with its effects; None for the linear ring of a bare tire.
+
+    The contact with tread shear knows the linear ring only.
+    """
+    if contact == "shear":
+        if ring == "large":
+            raise ParameterError(
+                "simulate: --ring large has no tread shear; leave out --contact shear or --ring"
+            )
+        return None
+    if ring is None and not ("model" in file.extra or file.extra.get("effects")):
+        return None
+    model = model_of(file, registered_effects(tuple(effect_files)))
+    return model if ring is None else replace(model, large=ring == "large")
 
 
 def _si(values: Sequence[float], unit: str, dimension: str) -> FloatArray:
@@ -140,7 +192,9 @@ def _turn_rate(speed: FloatArray, tire: Tire) -> FloatArray:
     return rate
 
 
-def _document(file: TireFile, model: str, done: Simulation, notes: Sequence[str]) -> dict[str, Any]:
+def _document(
+    file: TireFile, model: str, done: Simulation, notes: Sequence[str], chosen: Model | None
+) -> dict[str, Any]:
     points = [point_document(done, point) for point in range(len(done))]
     document = {
         "format": FORMAT,
@@ -150,7 +204,9 @@ def _document(file: TireFile, model: str, done: Simulation, notes: Sequence[str]
         "damping": done.tire.damping,
         "signs": "wheel angle 0 below the axle, entry < 0 < exit; u outward, shear toward "
                  "the exit, pressure inward, tension positive",
-        "effects_left_out": _effects(file),
+        "ring": RINGS["large" if chosen is not None and chosen.large else "linear"],
+        "effects": [] if chosen is None else [used.effect.name for used in _acting(chosen)],
+        "effects_left_out": _left_out(file, chosen),
         "notes": list(notes),
         **points[0],
     }  # fmt: skip
@@ -159,27 +215,41 @@ def _document(file: TireFile, model: str, done: Simulation, notes: Sequence[str]
     return document
 
 
-def _effects(file: TireFile) -> list[str]:
-    """Return the names of effects that a model has and this simulation does not."""
-    found = file.extra.get("effects", {})
-    if isinstance(found, dict):
-        return [str(name) for name in found]
-    return [str(item.get("name", item) if isinstance(item, dict) else item) for item in found]
+def _acting(model: Model) -> list[UsedEffect]:
+    """Return the effects of a model that act on the ring."""
+    return [used for used in model.used if used.effect.hook != "brush"]
 
 
-def _notes(file: TireFile, done: Simulation) -> list[str]:
+def _left_out(file: TireFile, chosen: Model | None) -> list[str]:
+    """Return the names of effects that a file has and this simulation does not."""
+    names = [str(e.get("effect", e)) for e in file.extra.get("effects", []) if isinstance(e, dict)]
+    acting = [] if chosen is None else [used.effect.name for used in _acting(chosen)]
+    return [name for name in names if name not in acting]
+
+
+def _notes(file: TireFile, done: Simulation, chosen: Model | None) -> list[str]:
     """Say what a reader of the figures should know."""
-    notes = []
-    if effects := _effects(file):
-        notes.append(f"the model's effects are left out here: {', '.join(effects)}")
-    tire = done.tire
+    notes, tire = [], done.tire
+    if left_out := _left_out(file, chosen):
+        where = "the brush" if chosen is not None else "what this simulation is without"
+        notes.append(f"the model's effects of {where} are left out: {', '.join(left_out)}")
+    if chosen is None and "model" in file.extra:
+        notes.append(
+            "the contact with tread shear is that of the linear ring; identify fitted the ring "
+            "with large displacements, which `--contact radial` simulates"
+        )
+    if done.contact == "shear" and not tire.tread_shear_stiffness:
+        notes.append(
+            "the file states no tread shear stiffness (0): the tread carries no shear, and the "
+            "result is that of a frictionless road"
+        )
     slopes = tire.radial_pressure_slope, tire.tangential_pressure_slope
     if not any(slopes) and not np.allclose(done.inflation, tire.pressure, rtol=1e-9):
         notes.append(
             "the tire does not say how its sidewall stiffens with inflation (slopes of k_u and k_v "
             "are 0): inflation acts through the tension of the belt only"
         )
-    if wanted_modes(tire, done.inflation) > MOST_MODES:
+    if chosen is None and wanted_modes(tire, done.inflation) > MOST_MODES:
         length = 1e3 * bending_length(tire, done.inflation)
         notes.append(
             f"the belt bends within {length:.1f} mm, too little for {MOST_MODES} harmonics: strain "
@@ -227,7 +297,8 @@ def _print(file: TireFile, done: Simulation, notes: Sequence[str]) -> None:
     """Print a row for each operating point, in tables that fit a terminal."""
     console = output()
     damping = f"lambda {done.tire.damping:g}"
-    console.print(f"{file.name}, {done.contact} contact, {damping}; entry < 0 < exit")
+    ring = "" if done.gage is None else ", the model's own ring and effects"
+    console.print(f"{file.name}{ring}, {done.contact} contact, {damping}; entry < 0 < exit")
     for note in notes:
         console.print(f"note: {note}")
     points = [point_document(done, point) for point in range(len(done))]

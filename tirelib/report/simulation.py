@@ -98,6 +98,8 @@ class Simulation:
     fine_peaks : Peaks or None
         Extremes between the angles of `phi`, where they are known: the strain rate has a kink where
         the tread begins to slide.
+    gage : shape (n_points, n_phi) or None, [-]
+        Of a model file: the waveform as the gage and its filter give it, which `compare` uses.
     """
 
     tire: Tire
@@ -121,6 +123,7 @@ class Simulation:
     torque: FloatArray | None = None
     sliding_onset: FloatArray | None = None
     fine_peaks: Peaks | None = None
+    gage: FloatArray | None = None
 
     def __len__(self) -> int:
         return int(self.load.size)
@@ -198,8 +201,8 @@ def simulate(
         )
     pressed = load if load is not None else deflection
     own = tire.pressure if inflation is None else inflation
-    target, p, omega = _points(pressed, own, turn_rate)
-    _check_range("inflation pressure", p, FIELDS["pressure"].highest, "bar", "pressure")
+    target, p, omega = points_of(pressed, own, turn_rate)
+    check_range("inflation pressure", p, FIELDS["pressure"].highest, "bar", "pressure")
     check_turn_rate(tire, omega)
     n_modes, tread = modes(tire, p), Tread.of(tire)
     at = _ring_at(tire, p, omega, n_modes)
@@ -250,7 +253,7 @@ def find_peaks(phi: FloatArray, strain: FloatArray, rate: FloatArray, edges: Flo
                  cp1[0], tp[0], cp2[0], up[0], down[0])  # fmt: skip
 
 
-def _points(*given: Any) -> tuple[FloatArray, ...]:
+def points_of(*given: Any) -> tuple[FloatArray, ...]:
     """Return the values of every operating point, one shape."""
     arrays = [np.atleast_1d(np.asarray(value, dtype=float)) for value in given]
     count = max(array.size for array in arrays)
@@ -270,17 +273,23 @@ def check_turn_rate(tire: Tire, turn_rate: FloatArray) -> None:
     ------
     ParameterError
     """
-    _check_range(
+    check_range(
         "turn rate", turn_rate, LARGEST_BELT_SPEED / tire.ring_radius, "rad/s", "angular_speed",
         f"no tire's belt runs faster than {from_si(LARGEST_BELT_SPEED, 'km/h', 'speed'):.0f} km/h; "
         "check value and unit",
     )  # fmt: skip
 
 
-def _check_range(
+def check_range(
     what: str, value: FloatArray, highest: float, unit: str, dimension: str,
     reason: str = "check value and unit",
 ) -> None:  # fmt: skip
+    """Refuse values below 0 or above the highest, and what is no number.
+
+    Raises
+    ------
+    ParameterError
+    """
     good = (value >= 0.0) & (value <= highest)  # NaN is not
     if not good.all():
         most, found = (from_si(x, unit, dimension) for x in (highest, float(value[~good][0])))

@@ -54,7 +54,7 @@ def _known(values: FloatArray | None, point: int, factor: float) -> float | None
 
 def columns(done: Simulation) -> Mapping[str, FloatArray]:
     """Return the curves in the units of files, each of shape (n_points, n_phi), by column name."""
-    return {
+    table = {
         "u_mm": 1e3 * done.u,
         "v_mm": 1e3 * done.v,
         "pressure_N_per_m": done.pressure,
@@ -63,6 +63,9 @@ def columns(done: Simulation) -> Mapping[str, FloatArray]:
         "strain_ustrain": MICRO * done.strain,
         "strain_rate_ustrain_per_rad": MICRO * done.rate,
     }
+    if done.gage is not None:
+        table["gage_ustrain"] = MICRO * done.gage
+    return table
 
 
 def write_curves(done: Simulation, path: Path) -> None:
