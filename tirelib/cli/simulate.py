@@ -231,8 +231,8 @@ def _notes(file: TireFile, done: Simulation, chosen: Model | None) -> list[str]:
     """Say what a reader of the figures should know."""
     notes, tire = [], done.tire
     if left_out := _left_out(file, chosen):
-        where = "the brush" if chosen is not None else "what this simulation is without"
-        notes.append(f"the model's effects of {where} are left out: {', '.join(left_out)}")
+        which = "effects are left out here" if chosen is None else "brush effects have no part here"
+        notes.append(f"the model's {which}: {', '.join(left_out)}")
     if chosen is None and "model" in file.extra:
         notes.append(
             "the contact with tread shear is that of the linear ring; identify fitted the ring "
