@@ -86,8 +86,8 @@ def balance(
         pressure_work(inner, cond.pressure * mesh.of_strip(width, inner), u),
         _sidewalls(tire, law, cond, mesh, u, omega),
         road_work(mesh, contact),
-        _ties(tire, law, cond, mesh, u),
-        _carried(tire, mesh, u, omega),
+        tie_part(tire, law, cond, mesh, u),
+        carried_part(tire, mesh, u, omega),
     )
     force, stiff = zip(*work, strict=True)
     return Balance(
@@ -132,7 +132,8 @@ def _sidewalls(
     return line_work(line, weight, *sidewall_force(tire, law, cond, mesh, u, omega))
 
 
-def _carried(tire: Tire, mesh: Grid, u: Array, omega: float) -> tuple[Array, Array]:
+def carried_part(tire: Tire, mesh: Grid, u: Array, omega: float) -> tuple[Array, Array]:
+    """Return residual (E, 12) and stiffness of the tread's and liner's mass on the belt."""
     mass, height = (np.array(part) for part in zip(*map(tire.carried, range(3)), strict=True))
     line = mesh.back
     lever = mesh.of_strip(height / tire.belt_thickness + 0.5, line)
@@ -140,10 +141,10 @@ def _carried(tire: Tire, mesh: Grid, u: Array, omega: float) -> tuple[Array, Arr
     return carried_work(line, mesh.carcass, lever, per_radian, u, omega)
 
 
-def _ties(
+def tie_part(
     tire: Tire, law: SidewallLaw, cond: Condition, mesh: Grid, u: Array
 ) -> tuple[Array, Array]:
-    """Residual (E, 18) and stiffness of the crown between the strips; both halves of the width."""
+    """Return residual (E, 18) and stiffness of the crown between the strips, of the whole width."""
     line, step = mesh.carcass, STRIPS[1] - STRIPS[0]
     count = len(mesh.tied)
     value, phi = line.value[:count], line.phi[:count]

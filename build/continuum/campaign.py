@@ -23,6 +23,7 @@ from tirelib.campaign import (
     write_campaign,
 )
 from tirelib.campaign import Run as Written
+from tirelib.errors import ParameterError
 
 KMH, BAR = 1.0 / 3.6, 1e5
 LOADS = (2400.0, 3600.0, 4800.0, 6000.0, 7200.0)
@@ -54,7 +55,7 @@ def plan(runs: int, seed: int) -> tuple[Condition, ...]:
             for i in range(4)
         ]
     elif runs != 66:
-        raise ValueError(f"continuum plan, runs = {runs}; allowed are 66 and 15; choose one")
+        raise ParameterError(f"plan, runs = {runs}; allowed are 66 and 15; choose one")
     again = rng.choice(len(every), runs - len(every), replace=False)
     order = rng.permutation(len(every))
     return tuple(every[i] for i in (*order, *again))
@@ -110,7 +111,15 @@ def make(
     hidden : mapping of effect to strength, optional
     tire : Tire, optional
         Instead of the one that the seed draws.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such effect or plan, or a strength is out of its range.
+    ArithmeticError
+        If a run finds no balance.
     """
+    _check(seed, hidden or {})
     campaign = Campaign(tire or draw(seed), laboratory(seed), plan(runs, seed), dict(hidden or {}))
     truth: list[dict[str, float]] = []
 
@@ -138,6 +147,22 @@ def make(
         "runs": truth,
     }
     (out / "truth.json").write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+
+
+def _check(seed: int, hidden: Mapping[str, float]) -> None:
+    if seed < 0:
+        raise ParameterError(f"seed = {seed}; allowed are 0 and above; give another one")
+    for name, strength in hidden.items():
+        if name not in EFFECTS:
+            raise ParameterError(
+                f"effect {name!r} is unknown; allowed are {', '.join(EFFECTS)}; choose one"
+            )
+        largest, unit = EFFECTS[name].largest, EFFECTS[name].unit
+        if not 0.0 <= strength <= largest:
+            raise ParameterError(
+                f"effect {name}, strength = {strength:g} {unit}; allowed are 0 to {largest:g} "
+                f"{unit}; give another one"
+            )
 
 
 def ring_numbers(tire: Tire) -> dict[str, float]:

@@ -48,7 +48,7 @@ def _same_trace(seen: Trace, tire: Tire, run: Run, s: float) -> Trace:
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect: its law in words, a strength that shows clearly and its unit.
+    """An effect: its law in words, a strength that shows clearly, the largest, and their unit.
 
     `known` says whether the library's catalogue has an effect of this name.
     """
@@ -56,6 +56,7 @@ class Effect:
     name: str
     words: str
     visible: float
+    largest: float
     unit: str
     known: bool = True
     tire: Callable[[Tire, Run, float], Tire] = _same_tire
@@ -160,44 +161,45 @@ def _swollen(tire: Tire, run: Run, s: float) -> Tire:
 
 
 _ALL = (
-    Effect("sidewall_load", "share of the arch's own nonlinear force over deflection", 0.4, "1",
-           tire=lambda t, r, s: replace(t, softening=s)),
+    Effect("sidewall_load", "share of the arch's own nonlinear force over deflection", 0.4, 1.0,
+           "1", tire=lambda t, r, s: replace(t, softening=s)),
     Effect("sidewall_pressure", "radial stiffness 1 - s x^2 / (x^2 + .15^2), x = p / 2.1 bar - 1",
-           0.1, "1", law=_buckled),
-    Effect("sidewall_damping", "force k (w + s dw/dt): one relaxation time", 3e-4, "s",
+           0.1, 0.4, "1", law=_buckled),
+    Effect("sidewall_damping", "force k (w + s dw/dt): one relaxation time", 3e-4, 2e-3, "s",
            tire=lambda t, r, s: replace(t, damping=s)),
     Effect("temperature", "rubber of tread and sidewalls, not their tension, 1 - s sqrt(order)",
-           0.2, "1", tire=lambda t, r, s: _rubber(t, _warm(r, s)),
+           0.2, 0.6, "1", tire=lambda t, r, s: _rubber(t, _warm(r, s)),
            law=lambda w, r, s: _rubber_walls(w, _warm(r, s))),
-    Effect("dynamic_stiffening", "rubber 1 + s x / (1 + x), x = (v / 20 m/s)^2", 0.3, "1",
+    Effect("dynamic_stiffening", "rubber 1 + s x / (1 + x), x = (v / 20 m/s)^2", 0.3, 1.5, "1",
            tire=lambda t, r, s: _rubber(t, _zener(r, s)),
            law=lambda w, r, s: _rubber_walls(w, _zener(r, s))),
-    Effect("tread_friction", "Coulomb friction of the rolling tread", 0.5, "1",
+    Effect("tread_friction", "Coulomb friction of the rolling tread", 0.5, 1.2, "1",
            tire=lambda t, r, s: replace(t, friction=s)),
-    Effect("tread_load", "tread modulus 1 + s tanh((Fz - 4500 N) / 2500 N)", 0.2, "1",
+    Effect("tread_load", "tread modulus 1 + s tanh((Fz - 4500 N) / 2500 N)", 0.2, 0.6, "1",
            tire=_grooves),
-    Effect("tread_wear", "thinner tread of the same rubber, thickness 1 - s order", 0.3, "1",
+    Effect("tread_wear", "thinner tread of the same rubber, thickness 1 - s order", 0.3, 0.6, "1",
            tire=lambda t, r, s: replace(t, tread_thickness=t.tread_thickness * (1 - s * r.order))),
     Effect("roughness", "asperities of exponential height: q = k s ln(1 + exp(depth / s))", 2e-4,
-           "m", tire=lambda t, r, s: replace(t, roughness=s)),
-    Effect("hydroplaning", "water pressed out of the gap ahead, s rho v^2 / 2 at 1 mm", 0.3, "1",
-           tire=lambda t, r, s: replace(t, water=s * 500.0 * r.cond.speed**2)),
-    Effect("nonuniformity", "splice: s cos^3 of the angle from it", 1e-4, "1", shown=_splice),
-    Effect("gage_length", "Gaussian window of standard deviation s / sqrt(12)", 0.02, "m",
+           1e-3, "m", tire=lambda t, r, s: replace(t, roughness=s)),
+    Effect("hydroplaning", "water pressed out of the gap ahead, s rho v^2 / 2 at 1 mm", 0.3, 0.6,
+           "1", tire=lambda t, r, s: replace(t, water=s * 500.0 * r.cond.speed**2)),
+    Effect("nonuniformity", "splice: s cos^3 of the angle from it", 1e-4, 1e-3, "1",
+           shown=_splice),
+    Effect("gage_length", "Gaussian window of standard deviation s / sqrt(12)", 0.02, 0.06, "m",
            shown=_bonded),
-    Effect("low_pass", "two equal poles at 1 / s", 2e-4, "s", shown=_poles),
+    Effect("low_pass", "two equal poles at 1 / s", 2e-4, 1e-3, "s", shown=_poles),
     Effect("gage_saturation", "ln(1 + x) / x of the strain, x = s |eps| / 5000 microstrain", 0.03,
-           "1", shown=_yields),
-    Effect("gage_drift", "gain 1 - s sqrt(order)", 0.05, "1",
+           1.0, "1", shown=_yields),
+    Effect("gage_drift", "gain 1 - s sqrt(order)", 0.05, 0.5, "1",
            shown=lambda t, _, r, s: _scaled(t, 1.0 - s * float(np.sqrt(r.order)))),
-    Effect("angle_zero", "angle read s too late", 0.01, "rad", shown=_turned),
-    Effect("oval_rim", "rim oval by s: the load swings twice a turn", 2e-4, "m", False,
+    Effect("angle_zero", "angle read s too late", 0.01, 0.05, "rad", shown=_turned),
+    Effect("oval_rim", "rim oval by s: the load swings twice a turn", 2e-4, 2e-3, "m", False,
            shown=_oval),
-    Effect("warm_side", "gain falls with order and from one side to the other", 0.05, "1", False,
-           shown=_warmer_side),
-    Effect("swelling_liner", "liner thicker by s order: gages move from the belt", 0.1, "1", False,
-           tire=_swollen),
-    Effect("picked_up_mass", "tread heavier by s order", 0.5, "1", False,
+    Effect("warm_side", "gain falls with order and from one side to the other", 0.05, 0.5, "1",
+           False, shown=_warmer_side),
+    Effect("swelling_liner", "liner thicker by s order: gages move from the belt", 0.1, 0.5, "1",
+           False, tire=_swollen),
+    Effect("picked_up_mass", "tread heavier by s order", 0.5, 2.0, "1", False,
            tire=lambda t, r, s: replace(t, tread_density=t.tread_density * (1 + s * r.order))),
 )  # fmt: skip
 

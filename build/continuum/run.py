@@ -22,8 +22,10 @@ from tirelib.threads import one_thread
 
 
 def _effects() -> str:
-    rows = [f"  {e.name:20s}{e.visible:8g} {e.unit:5s}{e.words}" for e in EFFECTS.values()]
-    return "effects, a strength that shows clearly, and the law:\n" + "\n".join(rows)
+    rows = [
+        f"  {e.name:20s}{e.visible:8g}{e.largest:8g} {e.unit:4s}{e.words}" for e in EFFECTS.values()
+    ]
+    return "effects: a strength that shows clearly, the largest, and the law:\n" + "\n".join(rows)
 
 
 def main() -> None:
@@ -40,8 +42,6 @@ def main() -> None:
                         help="of each effect in turn; default: one that shows clearly")  # fmt: skip
     parser.add_argument("--force", action="store_true", help="replace a campaign that is there")
     given = parser.parse_args()
-    if given.seed < 0:
-        parser.error(f"--seed {given.seed}: allowed are 0 and above; give another seed")
     if given.strength and len(given.strength) != len(given.effect):
         parser.error("give every --effect its --strength, or none")
     strengths = given.strength or [EFFECTS[name].visible for name in given.effect]
@@ -56,7 +56,7 @@ def main() -> None:
     try:
         hidden = dict(zip(given.effect, strengths, strict=True))
         make(given.out, given.seed, given.plan, hidden, None, progress, overwrite=given.force)
-    except (ArithmeticError, ValueError, TirelibError) as error:
+    except (ArithmeticError, TirelibError) as error:
         sys.stderr.write(f"\n{error}\n")
         sys.exit(2)
     sys.stderr.write(f"\n{given.out}: written\n")
