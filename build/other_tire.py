@@ -3,7 +3,8 @@
     python build/other_tire.py --out build/out/other_tire --tire reference --tire soft --tire stiff
 
 Calibrates each tire on `set1` (65 km/h, 2.3 bar) and judges every tire with every calibration, on
-another day of `set1` and on `set3` (1.3 to 2.5 bar, 10 to 150 km/h). Prints how many turns in range
+another day of `set1`, on `set3` (1.3 to 2.5 bar, 10 to 150 km/h, straight) and on `drift` (1.5 to
+2.7 bar, 20 to 140 km/h, straight and at 3 deg). Prints how many turns in range
 are flagged `other_tire`, with friction and tread given and not; the same with half and double of
 what decides; and the shifts of which `DRIFT` is the mean. `--tire random-41` draws a tire. The rig
 takes some minutes a tire; campaigns and calibrations are kept in the folder.
@@ -20,6 +21,7 @@ from road_coverage import measured, silent, tire_of
 
 from bench.rig.plans import Plan, plan
 from bench.rig.tire import Condition
+from tirelib.campaign import read_campaign
 from tirelib.estimators import likeness
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
@@ -27,7 +29,7 @@ from tirelib.estimators.likeness import DRIFT, suspected
 from tirelib.estimators.regressors import ODD, compute_regressors
 from tirelib.estimators.train import train
 from tirelib.flags import TurnFlag
-from tirelib.observations import Observations
+from tirelib.observations import Observations, observe
 from tirelib.threads import one_thread
 
 PRESSURE, SPEED = 2.3e5, 65.0 / 3.6
@@ -90,15 +92,15 @@ def halves(
     calibrations: Mapping[str, Calibration], days: Mapping[str, Mapping[str, Observations]]
 ) -> list[str]:
     """Return for half and double of each constant the flagged turns of own and of other tires."""
-    lines = ["| constant | factor | own tire | other tires, set1 | other tires, set3 |",
-             "|---|---|---|---|---|"]  # fmt: skip
+    lines = ["| constant | factor | own tire | other tires, set1 | set3 | drift |",
+             "|---|---|---|---|---|---|"]  # fmt: skip
 
     def judge(label: str, factor: float) -> None:
-        count = dict.fromkeys(("own", "set1", "set3"), (0, 0))
+        count = dict.fromkeys(("own", "set1", "set3", "drift"), (0, 0))
         for name, calibration in calibrations.items():
             for other, campaigns in days.items():
                 for kind, seen in campaigns.items():
-                    key = "own" if name == other else kind
+                    key = "own" if name.split(",")[0] == other else kind
                     found = flagged(calibration, seen)
                     count[key] = (count[key][0] + found[0], count[key][1] + found[1])
         cells = " | ".join(f"{a} of {b}" for a, b in count.values())
@@ -119,13 +121,26 @@ def halves(
     return lines
 
 
+def broad(name: str, folder: Path, jobs: int) -> Calibration:
+    """Return a calibration of one tire on all loads, cambers, speeds and pressures."""
+    kind, _, seed = name.partition("-")
+    for number, plans in enumerate(("set1", "set2", "set3")):
+        chosen, day = folder / f"broad-{plans}", SEED + 10 + number
+        measured(chosen, plan(plans), tire_of(kind, int(seed or 0)), day, jobs)
+    file = folder / "broad.toml"
+    if not file.exists():
+        folders = sorted(folder.glob("broad-set*"))
+        write_calibration(train(observe([read_campaign(f) for f in folders])).calibration, file)
+    return read_calibration(file)
+
+
 def main() -> None:
     """Measure, calibrate, judge, print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("build/out/other_tire"))
     parser.add_argument("--tire", action="append", required=True)
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--no-halves", action="store_true")
+    parser.add_argument("--broad", action="store_true", help="also a broad one of the first tire")
     given = parser.parse_args()
     calibrations, days, moved = {}, {}, {}
     for name in given.tire:
@@ -140,14 +155,16 @@ def main() -> None:
             "set1": measured(folder / "day2", plan("set1"), own, SEED + 1, given.jobs),
             "set3": measured(folder / "set3", plan("set3"), own, SEED + 2, given.jobs),
         }
-        drift = measured(folder / "drift", drifting(), own, SEED + 3, given.jobs)
-        moved[name] = shifts(calibrations[name], drift)
-    click.echo("| calibrated | judged | set1 | set3 |\n|---|---|---|---|")
+        days[name]["drift"] = measured(folder / "drift", drifting(), own, SEED + 3, given.jobs)
+        moved[name] = shifts(calibrations[name], days[name]["drift"])
+    if given.broad:
+        name = given.tire[0]
+        calibrations[f"{name}, set1 to set3"] = broad(name, given.out / name, given.jobs)
+    click.echo("| calibrated | judged | set1 | set3 | drift |\n|---|---|---|---|---|")
     for name, calibration in calibrations.items():
         for other, campaigns in days.items():
             click.echo(f"| {name} | {other} | {' | '.join(row(calibration, campaigns))} |")
-    if not given.no_halves:
-        click.echo("\n".join(["", *halves(calibrations, days)]))
+    click.echo("\n".join(["", *halves(calibrations, days)]))
     click.echo("\nshift with a doubled pressure, and with (40 m/s)^2; now, then tire by tire")
     for name, (pressure, speed) in DRIFT.items():
         cells = [f"{moved[tire][name][k]:8.4f}" for k in (0, 1) for tire in moved]

@@ -173,7 +173,9 @@ class Chain:
                 sliding = np.where(force > 0.0, -1.0, 1.0) * np.nan_to_num(slid.sliding, nan=1.0)
         tread = self.road.hardened(values)
         camber = np.where(np.isnan(values["camber"]), tilt.USUAL, 0.0)
-        apart = self.likeness.apart(values, self.laws, tread, sliding, moves, camber)
+        apart = self.likeness.apart(
+            values, self.laws, tread, sliding, moves, camber, self.force_laws
+        )
         return np.asarray(apart > self.likeness.limit, dtype=np.bool_)
 
     def predict(

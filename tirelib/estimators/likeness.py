@@ -13,12 +13,13 @@ calibrated tire exceeds with the probability `FALSE_ALARM` (Hotelling; Johnson a
 Multivariate Statistical Analysis*, section 5.4).
 
 Pressures and speeds that were not calibrated shift the regressors by `DRIFT`, as the rig's tires
-show it. The shift with pressure is taken off, and as much is doubt; of that with speed tires
-agree less: twice its size is doubt. A tread that is stiffer than calibrated and a larger share of
-it that slides shift the regressors by `ROAD_DRIFT`: all together, so K has one direction for each,
-as wide as `tirelib.estimators.unknowns` leaves it; an uncertain wheel angle and offset of the turn
-itself have one each. Where a regressor that says where a turn lies is beyond its calibrated range,
-nobody knows what the tire looks like. Predicting needs numpy only.
+show it. The shift of even regressors with pressure is taken off, and half of it is doubt; that of
+odd ones and that with speed is all doubt. A tread that is stiffer than calibrated and a larger
+share of it that slides shift the regressors by `ROAD_DRIFT`: all together, so K has one direction
+for each, as wide as `tirelib.estimators.unknowns` leaves it; a camber that nobody gave
+(`CAMBER_DRIFT`), an uncertain wheel angle and an uncertain offset of the turn have one each. Where
+a regressor that says where a turn lies is beyond its calibrated range, nobody knows what the tire
+looks like. Predicting needs numpy only.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,24 +34,25 @@ from tirelib.estimators.polynomial import Term, Variable, design
 from tirelib.estimators.regressors import ODD
 
 DRIFT = {
-    "compression": (0.0168, 0.0018),
-    "cp2_slope": (0.0, 0.0006),
-    "angle_slope": (0.0, 0.0002),
-    "tp_slope": (0.0, 0.0011),
-    "angle_bow": (0.0100, 0.0005),
-    "tp_bow": (0.0311, 0.0119),
-    "cp1_bow": (0.0037, 0.0200),
-    "cp2_bow": (0.0094, 0.0019),
-    "fullness": (-0.0112, 0.0016),
-    "skew": (-0.0004, 0.0009),
-    "steepness": (0.1210, 0.41),
-    "steepness_change": (0.3046, 0.61),
-    "lead_bend": (-0.0293, 0.0200),
-    "trail_bend": (-0.0533, 0.0338),
+    "compression": (0.0170, 0.0021),
+    "cp2_slope": (0.0132, 0.0032),
+    "angle_slope": (-0.0135, 0.0007),
+    "tp_slope": (-0.0258, 0.0004),
+    "angle_bow": (0.0114, 0.0016),
+    "tp_bow": (0.0003, 0.0502),
+    "cp1_bow": (-0.0016, 0.0186),
+    "cp2_bow": (0.0086, 0.0055),
+    "fullness": (-0.0120, 0.0027),
+    "skew": (-0.0006, 0.0011),
+    "steepness": (0.3553, 0.1099),
+    "steepness_change": (0.0997, 0.3831),
+    "lead_bend": (-0.0150, 0.0346),
+    "trail_bend": (-0.0440, 0.0286),
 }
 """Shift (SI) at the same contact angle, for a pressure that is doubled and for a squared speed that
-grows by (40 m/s)^2: of the rig's tires `reference`, `soft` and `stiff` over the plan `set3`, mean
-with the pressure and rms with the speed. Odd regressors have none in the mean."""
+grows by (40 m/s)^2: of the rig's tires `reference`, `soft` and `stiff`, mean with the pressure and
+rms with the speed, measured by ``python build/other_tire.py``. Odd regressors shift with the side,
+at 3 deg by so much."""
 ROAD_DRIFT = {
     "compression": (-0.0053, 0.0080),
     "cp2_slope": (0.0000, 0.0563),
@@ -76,8 +78,9 @@ CAMBER_DRIFT = {"cp2_slope": -0.3, "angle_slope": tilt.SLOPE, "tp_slope": -1.2}
 tires from 3 to 7 kN: -0.8 to 0.05, -0.47 to -0.26, -1.4 to -0.8 (``build/camber_doubt.py``)."""
 ROAD_DOUBT = 0.5
 """Standard deviation of another tire's shift with tread and sliding, as a share of `ROAD_DRIFT`."""
-PRESSURE_DOUBT, SPEED_DOUBT = 1.0, 2.0
-"""Tires differ: standard deviation of another tire's shift, as a share of `DRIFT`."""
+PRESSURE_DOUBT, SPEED_DOUBT = 0.5, 1.0
+"""Tires differ: standard deviation of another tire's shift, as a share of `DRIFT`; those of the rig
+by 0.35 of the shift with pressure. ``docs/estimators.md`` has half and double."""
 FEWEST_UNLIKE, SHARE_UNLIKE = 5, 0.05
 """Turns, and share of them, that must look like another tire's: fifty times chance."""
 EDGE = 1.0 + 1e-6
@@ -121,6 +124,7 @@ class Likeness:
         sliding: FloatArray | None = None,
         moves: Sequence[FloatArray] = (),
         camber: FloatArray | None = None,
+        force_laws: ConditionLaws | None = None,
     ) -> FloatArray:
         """Return D^2 of each turn, shape (n,); NaN where it cannot be computed.
 
@@ -137,12 +141,17 @@ class Likeness:
             What one standard deviation of an uncertain angle or offset adds to `rest`.
         camber : shape (n,), [rad], optional
             Standard deviation of a camber that nobody gave; 0 where it is known.
+        force_laws : ConditionLaws, optional
+            Of what was varied while there was lateral force; without, as `laws`.
         """
         pressure, unknown = laws.pressure_departure(values)
+        sided = np.hypot(*(force_laws or laws).pressure_departure(values))
         speed = laws.speed_departure(values)
         with_pressure, with_speed = np.array([DRIFT[name] for name in self.names]).T
-        rest = self.rest(values) - pressure[:, None] * with_pressure
+        odd = np.array([name in ODD for name in self.names])
+        rest = self.rest(values) - pressure[:, None] * np.where(odd, 0.0, with_pressure)
         doubt = np.hypot(PRESSURE_DOUBT * pressure, unknown)[:, None] * with_pressure
+        doubt = np.where(odd, sided[:, None] * with_pressure, doubt)
         doubt = np.hypot(doubt, SPEED_DOUBT * np.nan_to_num(speed)[:, None] * with_speed)
         spread = self.covariance + _each(doubt)
         with_tread, with_sliding = np.array([ROAD_DRIFT[name] for name in self.names]).T
@@ -151,7 +160,6 @@ class Likeness:
             spread = spread + _along(tread[1][:, None] * with_tread)
             spread = spread + _each(ROAD_DOUBT * tread[0][:, None] * with_tread)
         if sliding is not None:
-            odd = np.array([name in ODD for name in self.names])
             side = np.where(odd, np.sign(sliding)[:, None], 1.0)
             spread = spread + _along(np.abs(sliding)[:, None] * side * with_sliding)
         if camber is not None:

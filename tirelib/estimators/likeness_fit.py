@@ -15,6 +15,9 @@ FALSE_ALARM = 0.001
 D^2 of a held-out condition is allowed, though."""
 SPARE = 3
 """Conditions more than regressors without which their covariance says too little."""
+CORNERING = 0.2
+"""Share of the largest lateral distortion beyond which a wheel corners; and share of a condition's
+range that it must cover there."""
 SMALL = 1e-6
 """Penalty of the least squares, relative: terms that the data cannot tell apart stay small."""
 
@@ -50,7 +53,7 @@ def fit_likeness(
     freedom = conditions - len(names)
     if freedom < SPARE:
         return None
-    even, odd = _terms(varying)
+    even, odd = _terms(varying, _with_side(values, varying))
     variables, terms, x = design_for(values, [*even, *odd], (*ODD, "camber", "traction"))
     share = np.zeros((len(terms), len(names)))
     held_out = np.empty((x.shape[0], len(names)))
@@ -70,8 +73,22 @@ def fit_likeness(
     return Likeness(variables, terms, names, share, covariance, limit)
 
 
-def _terms(varying: set[str]) -> tuple[list[Powers], list[Powers]]:
-    """Return even and odd terms in what says where a turn lies."""
+def _with_side(values: Mapping[str, FloatArray], varying: set[str]) -> set[str]:
+    """Return the conditions that were varied while there was lateral distortion."""
+    size = np.abs(values["cp1_slope"])
+    cornering = size > CORNERING * size.max()
+    return {
+        name
+        for name in varying & {"pressure", "speed_squared"}
+        if np.ptp(values[name][cornering]) > CORNERING * np.ptp(values[name])
+    }
+
+
+def _terms(varying: set[str], with_side: set[str]) -> tuple[list[Powers], list[Powers]]:
+    """Return even and odd terms in what says where a turn lies.
+
+    A condition that was not varied with lateral distortion (`with_side`) has no odd terms.
+    """
     s: Powers = {"cp1_slope": 1}  # stands for the lateral distortion
     even = [ONE, L1, L2, T1, times(s, s), times(s, s, L1)]
     odd = [s, times(s, L1), times(s, L2), times(s, s, s)]
@@ -84,6 +101,7 @@ def _terms(varying: set[str]) -> tuple[list[Powers], list[Powers]]:
     for name, term in (("pressure", P1), ("speed_squared", V)):
         if name in varying:
             even += [term, times(term, L1)]
+        if name in with_side:
             odd += [times(term, s)]
     return even, odd
 

@@ -14,7 +14,7 @@ from tirelib.errors import CalibrationError
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
 from tirelib.estimators.doubt import ANGLE_STEP, with_moved
-from tirelib.estimators.likeness import ROAD_DRIFT
+from tirelib.estimators.likeness import DRIFT, ROAD_DRIFT
 from tirelib.estimators.mixed import strangers
 from tirelib.estimators.regressors import ODD, compute_regressors
 from tirelib.estimators.result import estimate_document
@@ -142,6 +142,48 @@ def test_a_calibration_of_two_tires_says_so(cornering: Campaign, another_day: Ca
     )
     (found,) = strangers(replace(both, features=features))
     assert found.turns > 0.5 * found.judged
+
+
+@pytest.mark.parametrize("share", [0.65, 1.2])
+def test_another_tire_is_noticed_at_another_pressure_and_this_one_is_not_taken_for_it(
+    trained: Trained, another_day: Campaign, share: float
+) -> None:
+    chain, day = trained.calibration.chains[-1], observe([another_day])
+    likeness = chain.likeness
+    assert likeness is not None
+
+    def unlike(features: Features, tires: float) -> float:
+        """Return the share of turns flagged where the tire shifts by so much of `DRIFT`."""
+        values = compute_regressors(features, range(5))
+        side = np.sign(values["cp1_slope"])
+        values["pressure"] = share * values["pressure"]
+        for name, (shift, _) in DRIFT.items():
+            values[name] = values[name] + tires * (share - 1.0) * shift * (
+                side if name in ODD else 1.0
+            )
+        values["speed_squared"] = values["speed"] ** 2
+        apart = likeness.apart(values, chain.laws, force_laws=chain.force_laws)[day.usable]
+        apart = apart[np.isfinite(apart)]
+        assert apart.size > 20
+        return float(np.mean(apart > likeness.limit))
+
+    for tires in (0.5, 1.0, 1.5):
+        assert unlike(day.features, tires) < 0.02
+    assert unlike(other(day.features), 1.0) > 0.5
+
+
+def test_a_pressure_that_was_varied_straight_only_is_not_fitted_in_a_turn(
+    cornering: Campaign, pressures: Campaign
+) -> None:
+    from tirelib.estimators.calibrate import calibrate_chain
+
+    chain, _ = calibrate_chain(observe([cornering, pressures]), range(5))
+    assert chain.likeness is not None
+    names = [variable.name for variable in chain.likeness.variables]
+    pressure, side = names.index("pressure"), names.index("cp1_slope")
+    with_pressure = [term for term in chain.likeness.terms if term[pressure]]
+    assert len(with_pressure) == 2
+    assert all(term[side] == 0 for term in with_pressure)
 
 
 def test_a_worn_tread_and_a_sliding_one_are_not_another_tire(
