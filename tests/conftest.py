@@ -1,8 +1,10 @@
 """Shared by all tests: data outside the repository, one random seed per test."""
 
 import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -12,6 +14,10 @@ settings.register_profile(
 )
 settings.load_profile("default")
 os.environ["TIRELIB_CACHE"] = "off"  # no ensemble of an earlier version, none left behind
+if sys.dont_write_bytecode:  # programs that tests start would compile all of it, each time
+    _BYTECODE = TemporaryDirectory(prefix="bytecode-")
+    os.environ["PYTHONPYCACHEPREFIX"] = _BYTECODE.name
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 
 NOT_HERE = (
