@@ -19,6 +19,7 @@ VERBS = (
     "identify",
     "compare",
     "diagnose",
+    "explain",
     "effects",
     "next-test",
     "add",

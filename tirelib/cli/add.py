@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tirelib.campaign import read_campaign
-from tirelib.cli.common import CAMPAIGN, FILE, NEW_FILE, output, progress_bar, write_json
+from tirelib.cli.common import (
+    CAMPAIGN,
+    FILE,
+    NEW_FILE,
+    NEW_FOLDER,
+    output,
+    progress_bar,
+    write_json,
+)
 from tirelib.cli.diagnose import QUANTITIES
 from tirelib.errors import ParameterError
 
@@ -18,7 +26,8 @@ if TYPE_CHECKING:
 
 _EXAMPLE = """\b
 Examples:
-  tirelib add sidewall_damping --model M.toml --data build/out/straight --out M2.toml
+  tirelib add sidewall_damping --model M.toml --data build/out/straight --out M2.toml \
+                               --report build/out/added
   tirelib add sidewall_damping --remove --model M2.toml --data build/out/straight --out M3.toml
   tirelib add --undo --model M2.toml --out M1.toml
   tirelib add friction_load --model M.toml --data build/out/cornering --out M2.toml
@@ -49,6 +58,9 @@ FORMAT = "tirelib-model/1"
 @click.option(
     "--out", "out", metavar="M2.toml", type=NEW_FILE, required=True, help="New model file."
 )
+@click.option("--report", "report", metavar="DIR", type=NEW_FOLDER,
+              help="Write extension.html and extension.md: the waterfall of the error, each run, "
+                   "what was held out.")  # fmt: skip
 @click.option(
     "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
 )
@@ -61,6 +73,7 @@ def add(
     undo: bool,
     quantity: str | None,
     out: Path,
+    report: Path | None,
     json_file: Path | None,
 ) -> None:
     """Add EFFECT to a model, fit it to CAMPAIGN and show what the error does."""
@@ -77,7 +90,7 @@ def add(
         raise ParameterError("EFFECT is missing; name an effect, or give --undo")
     if folder is None:
         raise ParameterError("--data is missing; give the campaign that the model is fitted to")
-    _change(effect_name, model_name, folder, effect_files, remove, quantity, out, json_file)
+    _change(effect_name, model_name, folder, effect_files, remove, quantity, out, report, json_file)
 
 
 def _undo(model_name: str, out: Path, json_file: Path | None) -> None:
@@ -107,6 +120,7 @@ def _change(
     remove: bool,
     quantity: str | None,
     out: Path,
+    report: Path | None,
     json_file: Path | None,
 ) -> None:
     from tirelib.extend.extension import known_effect
@@ -127,6 +141,11 @@ def _change(
     _say(document, effect)
     console = output()
     console.print(f"written: {out}")
+    if report is not None:
+        from tirelib.report.extension import write_extension
+
+        for path in write_extension(document, report):
+            console.print(f"written: {path}")
     if json_file is not None:
         write_json(json_file, document)
         console.print(f"written: {json_file}")
@@ -176,6 +195,8 @@ def _forces(
 
 
 def _say(document: dict[str, Any], effect: "Effect") -> None:
+    from tirelib.report.explanation import unmoved
+
     console = output()
     unit = {"ustrain": "microstrain"}.get(document["error_unit"], document["error_unit"])
     where = "" if document["quantity"] == "strain" else f", {document['quantity']}"
@@ -192,6 +213,8 @@ def _say(document: dict[str, Any], effect: "Effect") -> None:
             f"  {_left_out(fold)} left out: error {fold['error_before']:.3g} -> "
             f"{fold['error_after']:.3g}"
         )
+    for line in unmoved(document):
+        console.print(f"  {line}")
     for line in (*_warnings(document["flags"], effect.low, effect.high), *document["messages"]):
         console.print(f"  {line}")
 

@@ -41,6 +41,8 @@ once on.
 Exit code: 0 whatever the verdict, 2 bad input.
 """
 SHOWN = 8
+EXPLAINED = ("missing", "sure", "error", "next")
+"""Keys of a document's `explanation`, in the order of its lines."""
 QUANTITIES = ("strain", "Fy", "Fx", "Mz")
 
 
@@ -81,6 +83,7 @@ def diagnose(
     """Tell which physical effect the model lacks in CAMPAIGN."""
     from tirelib.model.registration import registered_effects
     from tirelib.parameters import read_tire
+    from tirelib.report.explanation import explained
 
     catalogue = registered_effects(effect_files)
     file = read_tire(model_name)
@@ -89,11 +92,15 @@ def diagnose(
     explain = of_forces if forces else _of_strain
     with progress_bar("diagnosing") as progress:
         told, document = explain(campaign, file, catalogue, quantity, members, seed, progress)
-    _say(document)
+    told_lines = explained(document, model_name, str(folder)).lines
+    document["explanation"] = {
+        key: said for key, (_, said) in zip(EXPLAINED, told_lines, strict=True)
+    }
+    _say(document, told_lines)
     console = output()
     targets = [path for path in (json_file, out and out / "diagnosis.json") if path]
     if out is not None:
-        for path in _write(told, out, forces, file.extra.get("history", [])):
+        for path in _write(told, out, forces, file.extra.get("history", []), told_lines):
             console.print(f"written: {path}")
     for path in targets:
         write_json(path, document)
@@ -194,18 +201,22 @@ def of_forces(
 
 
 def _write(
-    told: Any, out: Path, forces: bool, history: Sequence[Mapping[str, Any]]
+    told: Any,
+    out: Path,
+    forces: bool,
+    history: Sequence[Mapping[str, Any]],
+    lines: Sequence[tuple[str, str]],
 ) -> Sequence[Path]:
     if forces:
         from tirelib.report.force_diagnosis import write_force_diagnosis
 
-        return write_force_diagnosis(told, out)
+        return write_force_diagnosis(told, out, lines)
     from tirelib.report.diagnosis import write_diagnosis
 
-    return write_diagnosis(told, out, history)
+    return write_diagnosis(told, out, history, lines)
 
 
-def _say(document: dict[str, Any]) -> None:
+def _say(document: dict[str, Any], lines: Sequence[tuple[str, str]]) -> None:
     console = output()
     named = document["named"]
     unit = {"ustrain": "microstrain"}.get(document["error_unit"], document["error_unit"])
@@ -215,6 +226,8 @@ def _say(document: dict[str, Any]) -> None:
         f"{': ' + ', '.join(named) if named else ''}; error {document['error_before']:.3g}"
         f"{fall} [{unit}], floor {document['floor']:.3g}"
     )
+    for what, said in lines:
+        console.print(f"  {what}: {said}")
     for step in document.get("steps", []):
         console.print(
             f"  with {step['effect']}: error {step['error']:.3g}, held out "
@@ -223,7 +236,6 @@ def _say(document: dict[str, Any]) -> None:
     for line in document["messages"]:
         console.print(f"  {line}")
     console.print(_table(document["candidates"][:SHOWN]))
-    console.print(f"  next: {document['next_test']['what']}")
 
 
 def _table(candidates: list[dict[str, Any]]) -> Table:

@@ -47,7 +47,7 @@ class ModelError:
     noise : float, [-]
         Of a run's mean waveform; NaN without repeats.
     rms : float, [-]
-        Of model less measured as they stand: set points and delay left in.
+        Of model less measured, the delay taken out, set points left in.
     delay, delay_std : float, [s]
         Of the gages against the trigger.
     prediction : Prediction
@@ -72,6 +72,12 @@ class ModelError:
     def known(self) -> bool:
         """Whether there are repeats."""
         return self.unit == NOISE
+
+    @property
+    def by_run(self) -> FloatArray:
+        """The same for each run, shape (n_runs,); their mean square is that of `value`."""
+        white = 1e6 * self.rest if self.whiten is None else self.whiten(self.rest)
+        return np.asarray(np.sqrt(np.mean(white**2, axis=1)))
 
     @property
     def told(self) -> dict[str, Any]:
@@ -164,7 +170,7 @@ class Yardstick:
             whiten = whitening_of(tangents(late), self.scale, self.noise)
             value = _rms(whiten(rest))
         return ModelError(
-            value, self.unit, self.noise, _rms(raw), delay, deviation, late, rest, whiten
+            value, self.unit, self.noise, _rms(rest), delay, deviation, late, rest, whiten
         )
 
     def _delay(self, raw: FloatArray, prediction: Prediction) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from tirelib.arrays import BoolArray
-from tirelib.compare.error import Yardstick
+from tirelib.compare.error import ModelError, Yardstick
 from tirelib.diagnose.refit import Refit, refit
 from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import LEAST_RUNS
@@ -68,7 +68,23 @@ def held_out_errors(
 ) -> tuple[float, ...]:
     """Return a model's error on each fold's runs after a fit to the other runs.
 
-    NaN where the fit does not settle or the model fails there.
+    Parameters as of `held_out`; NaN where the fit does not settle or the model fails there.
+    """
+    found = held_out(data, model, chosen, yardstick, progress=progress)
+    return tuple(float("nan") if error is None else error.value for error in found)
+
+
+def held_out(
+    data: Data,
+    model: Refit,
+    chosen: Sequence[Fold],
+    yardstick: Yardstick,
+    *,
+    progress: Callable[[str], None] | None = None,
+) -> tuple[ModelError | None, ...]:
+    """Return a model's error on each fold's runs after a fit to the other runs, with its residual.
+
+    None where the fit does not settle or the model fails there.
 
     Parameters
     ----------
@@ -80,7 +96,7 @@ def held_out_errors(
         Of the campaign: the unit is that of every other error of it.
     progress : callable, optional
     """
-    errors = []
+    errors: list[ModelError | None] = []
     for fold in chosen:
         try:
             trained = refit(
@@ -90,9 +106,9 @@ def held_out_errors(
             seen = yardstick.take(fold.out)
             near = _near(model.correction, fold.out)
             start = near.contact if near is not None else None
-            errors.append(seen.error(trained.model, trained.delay, start=start).value)
+            errors.append(seen.error(trained.model, trained.delay, start=start))
         except TirelibError:
-            errors.append(float("nan"))
+            errors.append(None)
     return tuple(errors)
 
 

@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from tirelib.compare.error import named_errors
 from tirelib.diagnose.held_out import fold_entry, pooled
 from tirelib.extend.extension import Extension
@@ -31,11 +33,55 @@ def extension_document(done: Extension, file: TireFile) -> dict[str, Any]:
     head = {
         "campaign": done.runs.waves.header.name, "quantity": "strain",
         **named_errors(done.given, done.reached), "error_refitted": done.refitted.value,
-        "floor": done.floor, "delay_us": 1e6 * done.after.delay,
+        "runs": run_errors(done), "floor": done.floor, "delay_us": 1e6 * done.after.delay,
         "heldout_error_before": pooled(done.held_before, done.folds),
         "heldout_error_after": pooled(done.held_after, done.folds),
     }  # fmt: skip
     return step_document(done, file, head, held_out, messages)
+
+
+def run_errors(done: Extension) -> list[dict[str, Any]]:
+    """Return the errors of each run, and of those held out what a fit to the others leaves."""
+    waves = done.runs.waves
+    out: list[dict[str, Any]] = [
+        {
+            "run": int(waves.run[k]),
+            "load": float(waves.conditions["Fz"][k]),
+            "error_before": float(done.given.by_run[k]),
+            "error_after": float(done.reached.by_run[k]),
+            "held_out": [],
+        }
+        for k in range(len(waves))
+    ]
+    for fold, before, after in zip(done.folds, done.out_before, done.out_after, strict=True):
+        if before is None or after is None:
+            continue
+        for row, old, new in zip(
+            np.flatnonzero(fold.out), before.by_run, after.by_run, strict=True
+        ):
+            told = {"condition": fold.name, "error_before": old, "error_after": new}
+            out[row]["held_out"].append(told)
+    return out
+
+
+def waterfall(file: TireFile, quantity: str) -> list[dict[str, Any]]:
+    """Return the fall of the error over a model's history, in the unit of its last step."""
+    told = [e for e in file.extra["history"] if e.get("quantity", "strain") == quantity]
+    names = [key for key in told[-1] if key.startswith("error_after")]
+    suffix = names[0].removeprefix("error_after") if names else ""
+    unit = suffix.removeprefix("_") or "noise"
+    told = [entry for entry in told if f"error_after{suffix}" in entry]
+    if not told:
+        return []
+
+    def row(action: str, effect: str | None, entry: Mapping[str, Any], when: str) -> dict[str, Any]:
+        return {
+            "action": action, "effect": effect, "error": entry.get(f"error_{when}{suffix}"),
+            "heldout_error": entry.get(f"heldout_error_{when}{suffix}"), "unit": unit,
+        }  # fmt: skip
+
+    first = row("start", None, told[0], "before")
+    return [first, *(row(e["action"], e["effect"], e, "after") for e in told)]
 
 
 def step_document(
@@ -58,6 +104,7 @@ def step_document(
         "in_range": "out_of_range" not in done.flags,
         "flags": list(done.flags),
         **head,
+        "waterfall": waterfall(file, str(head["quantity"])),
         "held_out": list(held_out),
         "effects": list(file.extra["effects"]),
         "history": [

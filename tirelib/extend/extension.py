@@ -11,7 +11,7 @@ from tirelib.compare.error import ModelError, Yardstick
 from tirelib.compare.model import Model
 from tirelib.diagnose.candidates import IN_BASE, candidates
 from tirelib.diagnose.floor import FLOOR_MEMBERS, structural_floor
-from tirelib.diagnose.held_out import Fold, folds, held_out_errors
+from tirelib.diagnose.held_out import Fold, folds, held_out
 from tirelib.diagnose.refit import Refit, refit
 from tirelib.effects import Effect
 from tirelib.errors import ParameterError
@@ -31,12 +31,16 @@ class Extension(Step[Refit]):
     ----------
     given, refitted, reached : ModelError
         Of the model as it was given, with its numbers fitted anew, and with the change.
+    out_before, out_after : tuple of ModelError or None
+        On what was held out, one per fold.
     runs : StraightRuns
     """
 
     given: ModelError
     refitted: ModelError
     reached: ModelError
+    out_before: tuple[ModelError | None, ...]
+    out_after: tuple[ModelError | None, ...]
     runs: StraightRuns
 
 
@@ -121,6 +125,7 @@ class _Strain:
         self.used = [each for each in model.used if each.effect.hook != "brush"]
         self.data = runs.data(with_deflection=False)
         self.yardstick = Yardstick.of(runs)
+        self.seen: list[tuple[ModelError | None, ...]] = []
 
     def extension(self, step: Step[Refit]) -> Extension:
         """Return a step with its runs and errors."""
@@ -129,7 +134,7 @@ class _Strain:
             **vars(step), given=self.yardstick.error(self.model, start=near),
             refitted=self.yardstick.error(step.before.model, start=near),
             reached=self.yardstick.error(step.after.model, start=step.after.correction.contact),
-            runs=self.runs,
+            out_before=self.seen[0], out_after=self.seen[1], runs=self.runs,
         )  # fmt: skip
 
     @property
@@ -181,7 +186,9 @@ class _Strain:
 
     def held_out(self, fit: Refit, left: Sequence[Fold]) -> tuple[float, ...]:
         """Return the errors on left-out runs."""
-        return held_out_errors(self.data, fit, tuple(left), self.yardstick, progress=self.progress)
+        found = held_out(self.data, fit, tuple(left), self.yardstick, progress=self.progress)
+        self.seen.append(found)
+        return tuple(float("nan") if error is None else error.value for error in found)
 
     def floor(self, after: Refit) -> float:
         """Return the error that the structure of the ring leaves."""

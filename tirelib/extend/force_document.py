@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from tirelib import __version__
+from tirelib.compare.forces import UNITS
 from tirelib.diagnose.forces.document import fold_entry
 from tirelib.diagnose.forces.held_out import pooled
 from tirelib.errors import FormatError
@@ -32,9 +33,13 @@ def force_extension_document(done: ForceExtension, file: TireFile) -> dict[str, 
         fold_entry(fold, case.factor * old, case.factor * new)
         for fold, old, new in zip(done.folds, done.held_before, done.held_after, strict=True)
     ]
+    errors = _errors(done)
     head = {
         "campaign": case.name, "quantity": case.quantity, "noise": case.noise,
-        "error_unit": case.unit, **_errors(done),
+        "error_unit": case.unit, **errors,
+        "residual_rms_before": errors["error_before"] / case.factor,
+        "residual_rms_after": errors["error_after"] / case.factor,
+        "residual_rms_unit": UNITS[case.quantity],
     }  # fmt: skip
     return step_document(done, file, head, held_out, messages)
 
@@ -42,18 +47,13 @@ def force_extension_document(done: ForceExtension, file: TireFile) -> dict[str, 
 def _errors(done: ForceExtension) -> dict[str, float]:
     """Return the errors of a step as they are told."""
     case = done.case
-    errors = {
+    return {
         "error_before": case.given,
         "error_refitted": case.error(done.before),
         "error_after": case.error(done.after),
         "floor": done.floor,
         "heldout_error_before": case.factor * pooled(done.held_before, done.folds),
         "heldout_error_after": case.factor * pooled(done.held_after, done.folds),
-    }
-    return {
-        **errors,
-        "residual_rms_before": errors["error_before"] / case.factor,
-        "residual_rms_after": errors["error_after"] / case.factor,
     }
 
 

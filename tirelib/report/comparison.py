@@ -151,7 +151,7 @@ def write_comparison(found: Comparison | ForceComparison, folder: Path) -> tuple
     page = write_page(
         folder, "comparison.html", title=title, sections=(), parts=views,
         summary=summary_of(found), answer=answer_of(found), messages=found.messages,
-        sentences=found.sentences, sentence_note=SENTENCE_NOTE,
+        sentences=found.sentences, sentence_note=SENTENCE_NOTE, lines=(), links=(), commands=(),
         plotly=Markup(get_plotlyjs()),
         figures=Markup(figures.replace("</", "<\\/")),
     )  # fmt: skip

@@ -59,7 +59,10 @@ def answer_of(told: Assessment) -> str:
 
 
 def write_diagnosis(
-    told: Assessment, folder: Path, history: Sequence[Mapping[str, Any]] = ()
+    told: Assessment,
+    folder: Path,
+    history: Sequence[Mapping[str, Any]] = (),
+    lines: Sequence[tuple[str, str]] = (),
 ) -> tuple[Path, Path]:
     """Write ``diagnosis.html`` and ``diagnosis.md``; return their paths.
 
@@ -69,6 +72,8 @@ def write_diagnosis(
     folder : Path
     history : sequence of mapping
         Of the model, as its file holds it.
+    lines : sequence of (title, sentence)
+        The verdict in four lines (`tirelib.report.explanation`).
 
     Raises
     ------
@@ -77,7 +82,7 @@ def write_diagnosis(
     """
     return write_parts_page(
         folder, "diagnosis", parts_of(told, history), title=TITLE, summary=_summary(told),
-        answer=answer_of(told), messages=told.messages,
+        answer=answer_of(told), messages=told.messages, lines=lines,
     )  # fmt: skip
 
 

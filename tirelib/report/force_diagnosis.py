@@ -45,8 +45,17 @@ def answer_of(told: ForceAssessment) -> str:
     }[told.verdict]
 
 
-def write_force_diagnosis(told: ForceAssessment, folder: Path) -> tuple[Path, Path]:
+def write_force_diagnosis(
+    told: ForceAssessment, folder: Path, lines: Sequence[tuple[str, str]] = ()
+) -> tuple[Path, Path]:
     """Write ``diagnosis.html`` and ``diagnosis.md``; return their paths.
+
+    Parameters
+    ----------
+    told : ForceAssessment
+    folder : Path
+    lines : sequence of (title, sentence)
+        The verdict in four lines (`tirelib.report.explanation`).
 
     Raises
     ------
@@ -55,7 +64,7 @@ def write_force_diagnosis(told: ForceAssessment, folder: Path) -> tuple[Path, Pa
     """
     return write_parts_page(
         folder, "diagnosis", parts_of(told), title=f"Which effect is missing: {told.case.quantity}",
-        summary=_summary(told), answer=answer_of(told), messages=told.messages,
+        summary=_summary(told), answer=answer_of(told), messages=told.messages, lines=lines,
     )  # fmt: skip
 
 

@@ -21,8 +21,20 @@ def write_parts_page(
     summary: str,
     answer: str,
     messages: Sequence[str],
+    lines: Sequence[tuple[str, str]] = (),
+    links: Sequence[tuple[str, str]] = (),
+    commands: Sequence[str] = (),
 ) -> tuple[Path, Path]:
     """Write ``<name>.html`` and ``<name>.md`` into a folder; return their paths.
+
+    Parameters
+    ----------
+    lines : sequence of (title, sentence)
+        The result in a few lines at the head of the page, in the place of `answer`.
+    links : sequence of (title, address)
+        Of other pages, relative to the folder.
+    commands : sequence of str
+        Command lines that made it.
 
     Raises
     ------
@@ -46,11 +58,15 @@ def write_parts_page(
         made = write_page(
             Path(aside), "comparison.html", title=title, sections=(), parts=views,
             summary=summary, answer=answer, messages=messages, sentences=(), sentence_note="",
+            lines=lines, links=links, commands=commands,
             plotly=Markup(get_plotlyjs()), figures=Markup(figures.replace("</", "<\\/")),
         )  # fmt: skip
         page.write_text(made.read_text(encoding="utf-8"), encoding="utf-8")
-    lines = [f"# {title}", "", summary, "", f"**{answer}**", ""]
-    lines += [f"> {message}\n" for message in messages]
-    text = "\n".join([*lines, *markdown_parts(parts)]).rstrip() + "\n"
+    head = [f"- **{what}**: {said}" for what, said in lines] or [f"**{answer}**"]
+    out = [f"# {title}", "", summary, "", *head, ""]
+    out += [f"> {message}\n" for message in messages]
+    out += [*(f"- [{what}]({address})" for what, address in links), ""] if links else []
+    out += ["```", *commands, "```", ""] if commands else []
+    text = "\n".join([*out, *markdown_parts(parts)]).rstrip() + "\n"
     words.write_text(text, encoding="utf-8")
     return page, words

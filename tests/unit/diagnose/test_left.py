@@ -123,7 +123,7 @@ def test_errors_are_in_noise_or_without_repeats_in_microstrain() -> None:
     other = error_of(unknown, model_of(model_file()))
     assert other.unit == "ustrain"
     assert np.isnan(other.noise)
-    assert other.value == pytest.approx(1e6 * other.rms, rel=0.1)
+    assert other.value == pytest.approx(1e6 * other.rms)
 
 
 def _told(verdict: str, *named: str) -> Any:

@@ -1,0 +1,167 @@
+"""`tirelib explain`: the whole journey in one command, of strain and of forces."""
+
+import json
+import shlex
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+from tests.chain.test_diagnose import Folder
+from tests.unit.diagnose.planted import EFFECT, STRENGTH, model_file, waves
+from tests.unit.force_campaigns import brush_file, write_sweep
+from tirelib import waveforms
+from tirelib.cli import program
+from tirelib.errors import TirelibError
+from tirelib.parameters import read_tire, write_tire
+
+KEYS = {
+    "format", "campaign", "quantity", "verdict", "named", "added", "error_unit", "noise",
+    "error_before", "error_after", "floor", "heldout_error_before", "heldout_error_after",
+    "held_out", "residual_rms_before", "residual_rms_after", "residual_rms_unit", "steps", "pages",
+    "commands", "messages", "explanation",
+}  # fmt: skip
+
+
+def call(*words: object) -> Result:
+    return CliRunner().invoke(program, list(map(str, words)))
+
+
+def journey(out: Path, *words: object) -> Any:
+    target = out / "E.json"
+    found = call("explain", *words, "--out", out, "--json", target)
+    assert found.exit_code == 0, found.output + repr(found.exception)
+    told = json.loads(target.read_text())
+    page = (out / "index.html").read_text()
+    return SimpleNamespace(told=told, out=out, said=found.output, page=page)
+
+
+@pytest.fixture(scope="module")
+def strain(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    folder = tmp_path_factory.mktemp("strain")
+    write_tire(model_file(), folder / "M.toml", "tirelib-model/1")
+    measured = waves(EFFECT, STRENGTH)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TIRELIB_CACHE", "off")
+        for verb in ("compare", "diagnose", "add", "explain"):
+            patch.setattr(f"tirelib.cli.{verb}.read_campaign", lambda path: Folder(measured))
+        for module in (waveforms, sys.modules["tirelib.compare.compare"]):
+            patch.setattr(
+                module, "measure_waveforms", lambda campaign, progress=None: campaign.measured
+            )
+        return journey(folder / "out", "DIR", "--model", folder / "M.toml", "--members", 8)
+
+
+@pytest.fixture(scope="module")
+def forces(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    folder = tmp_path_factory.mktemp("forces")
+    campaign = write_sweep(folder / "sweep", 81, {"friction_load": 0.12})
+    write_tire(brush_file(campaign), folder / "M.toml", "tirelib-model/1")
+    return journey(folder / "out", folder / "sweep", "--model", folder / "M.toml", "--members", 20)
+
+
+def test_what_was_planted_is_named_added_and_the_error_falls(strain: Any) -> None:
+    told = strain.told
+    assert set(told) == KEYS
+    assert told["added"] == told["named"] == [EFFECT]
+    assert told["error_after"] < 0.2 * told["error_before"]
+    assert told["heldout_error_after"] < told["heldout_error_before"]
+    assert told["floor"] <= told["error_after"]
+    (effect,) = read_tire(told["steps"][-1]["model"]).extra["effects"]
+    assert effect["effect"] == EFFECT
+    assert effect["strength"] == pytest.approx(STRENGTH, abs=0.05)
+
+
+def test_forces_make_the_same_journey(forces: Any) -> None:
+    told = forces.told
+    assert set(told) == KEYS
+    assert told["quantity"] == "Fy"
+    assert "friction_load" in told["added"]
+    assert told["error_after"] < told["error_before"]
+    assert told["residual_rms_unit"] == "N"
+    assert forces.page.count("<h3>Before: ") == forces.page.count("<h3>After: ") == 3
+
+
+@pytest.mark.parametrize("kind", ["strain", "forces"])
+def test_console_page_and_file_say_the_same_four_lines(
+    kind: str, request: pytest.FixtureRequest
+) -> None:
+    found = request.getfixturevalue(kind)
+    lines = found.told["explanation"]
+    assert list(lines) == ["missing", "sure", "error", "next"]
+    words = (found.out / "index.md").read_text()
+    for line in lines.values():
+        assert line in words
+        assert line in found.said.replace("\n", " ")
+    for title in ("What is missing", "How sure", "The error", "What to do next"):
+        assert f"<dt>{title}</dt>" in found.page
+    assert str(round(found.told["error_before"])) in lines["error"]
+
+
+@pytest.mark.parametrize("kind", ["strain", "forces"])
+def test_every_step_is_linked_and_every_error_is_one_number(
+    kind: str, request: pytest.FixtureRequest
+) -> None:
+    found = request.getfixturevalue(kind)
+    told = found.told
+    for page in told["pages"]:
+        assert (found.out / page["path"]).is_file(), page
+        assert f'href="{page["path"]}"' in found.page
+    before, after, diagnosis = (
+        json.loads((found.out / name).read_text())
+        for name in ("compared-before.json", "compared-after.json", "diagnosis.json")
+    )
+    assert before["error"] == told["error_before"]
+    assert after["error"] == told["error_after"]
+    assert diagnosis["error_before"] == pytest.approx(before["error"], rel=1e-6)
+    assert told["steps"][-1]["error"] == pytest.approx(after["error"], rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["strain", "forces"])
+def test_its_commands_are_those_of_the_verbs(kind: str, request: pytest.FixtureRequest) -> None:
+    told = request.getfixturevalue(kind).told
+    verbs = [shlex.split(line)[:2] for line in told["commands"]]
+    adds = [["tirelib", "add"]] * len(told["added"])
+    assert verbs == [
+        ["tirelib", "compare"], ["tirelib", "diagnose"], *adds, ["tirelib", "compare"],
+    ]  # fmt: skip
+    for line in told["commands"]:
+        for word in shlex.split(line):
+            assert word in request.getfixturevalue(kind).page.replace("&#39;", "'")
+
+
+def test_the_page_shows_each_run_and_before_beside_after(strain: Any) -> None:
+    for plot in ("run-errors", "waveform-worst", "heat-runs-before", "heat-runs-after",
+                 "history-strain"):  # fmt: skip
+        assert f'id="plot-{plot}"' in strain.page, plot
+    assert 'src="http' not in strain.page
+    added = json.loads((strain.out / f"added-{EFFECT}.json").read_text())
+    rows = added["runs"]
+    mean = sum(row["error_after"] ** 2 for row in rows) / len(rows)
+    assert mean**0.5 == pytest.approx(added["error_after"])
+    assert any(row["held_out"] for row in rows)
+    assert not all(row["held_out"] for row in rows)
+
+
+def test_add_writes_its_waterfall_as_page_and_numbers(strain: Any) -> None:
+    added = json.loads((strain.out / f"added-{EFFECT}.json").read_text())
+    first, last = added["waterfall"]
+    assert (first["effect"], last["effect"], last["action"]) == (None, EFFECT, "add")
+    assert (first["error"], last["error"]) == (added["error_before"], added["error_after"])
+    assert last["heldout_error"] == added["heldout_error_after"]
+    page = (strain.out / f"added-{EFFECT}" / "extension.html").read_text()
+    assert 'id="plot-history-strain"' in page
+    assert 'id="plot-run-errors"' in page
+
+
+def test_bad_input_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    missing = call("explain", tmp_path / "nowhere", "--out", out)
+    assert isinstance(missing.exception, TirelibError)
+    assert not out.exists()
+    wrong = call("explain", tmp_path, "--out", out, "--quantity", "Fz")
+    assert "allowed are strain, Fy, Fx, Mz" in str(wrong.exception)
+    assert call("explain", tmp_path).exit_code == 2

@@ -1,0 +1,114 @@
+"""A verdict in four lines: what they say, and when."""
+
+from typing import Any
+
+import pytest
+
+from tirelib.report.explanation import error_line, explained, held_out_line, unmoved
+
+
+def candidate(effect: str, **changes: Any) -> dict[str, Any]:
+    return {
+        "effect": effect, "title": f"What {effect} does.", "score": 14.0, "threshold": 2.0,
+        "level": "alarm", "strength": 0.0812, "std": 0.0011, "unit": "1", "range": [0.0, 0.3],
+        "in_range": True,
+    } | changes  # fmt: skip
+
+
+def diagnosis(**changes: Any) -> dict[str, Any]:
+    return {
+        "quantity": "strain", "verdict": "named", "named": ["damping"], "error_unit": "noise",
+        "error_before": 30.01, "error_refitted": 23.5, "error_after": 7.74, "floor": 7.1,
+        "residual_rms_before": 84.26, "residual_rms_after": 37.6, "residual_rms_unit": "ustrain",
+        "heldout_error_before": 25.9, "heldout_error_after": 9.9, "held_out": [],
+        "candidates": [candidate("damping"), candidate("shear", level="quiet", score=0.2)],
+        "dead": [], "unexplained": {"where": None}, "next_test": {"what": "more levels of load"},
+    } | changes  # fmt: skip
+
+
+def fold(condition: str, before: float, after: float) -> dict[str, Any]:
+    return {"condition": condition, "value": 7506.0, "unit": "N", "runs": 12,
+            "error_before": before, "error_after": after}  # fmt: skip
+
+
+def test_what_is_named_is_told_with_its_size_its_fall_and_the_command_that_adds_it() -> None:
+    told = explained(diagnosis(), "M.toml", "DIR")
+    assert told.missing == "damping (what damping does), strength 0.0812 \u00b1 0.001."
+    assert told.sure == (
+        "damping 7 times as clear as the clearest effect that variants of the model show by chance "
+        "and structure alone. No other effect of the catalogue explains these measurements as well."
+    )
+    assert told.error == (
+        "It was 30 times the noise (84.3 microstrain rms), 23.5 with the model's own numbers "
+        "fitted anew, and is 7.7 with it (37.6 microstrain rms). Of that, noise and the structure "
+        "of a tire explain 7.1. On what was held out of the fit it fell as well: 25.9 before, 9.9 "
+        "after."
+    )
+    assert told.next.startswith("Add it: tirelib add damping --model M.toml --data DIR --out M2")
+    assert [title for title, _ in told.lines] == [
+        "What is missing", "How sure", "The error", "What to do next",
+    ]  # fmt: skip
+
+
+def test_what_does_not_fall_on_what_was_held_out_is_said() -> None:
+    same = diagnosis(heldout_error_before=6.7, heldout_error_after=6.68)
+    assert held_out_line(same) == (
+        "The error of the runs held out did not fall: 6.7 before, 6.7 after."
+    )
+    grown = diagnosis(held_out=[fold("load", 4.96, 7.1), fold("pressure", 8.0, 3.0)])
+    assert unmoved(grown) == [
+        "The error with the load 7506 N (12 runs) held out did not fall: 5 before, 7.1 after."
+    ]
+    assert "fell as well" in held_out_line(grown)
+    assert unmoved(grown)[0] in held_out_line(grown)
+    assert unmoved(diagnosis()) == []
+    points = diagnosis(heldout_error_before=6.7, heldout_error_after=7.9, quantity="Fy")
+    assert "of the points held out did not fall" in error_line(points)
+
+
+@pytest.mark.parametrize(
+    ("changes", "missing", "sure"),
+    [
+        ({"verdict": "none", "named": []}, "Nothing", "most conspicuous effect reaches 7 times"),
+        ({"verdict": "indistinguishable", "named": ["damping", "shear"]},
+         "cannot tell which: damping (what damping does) or shear", "equally well"),
+        ({"verdict": "unknown", "named": [], "unexplained": {"where": {"text": "in the contact"}}},
+         "no effect of the catalogue explains. It stands in the contact", "More is left"),
+        ({"verdict": "form_inadequate"}, "a law is not right, or more is missing", "7 times"),
+        ({"error_unit": "ustrain", "verdict": "none", "named": []}, "Nothing", "measured twice"),
+    ],
+)  # fmt: skip
+def test_every_verdict_has_its_words(changes: dict[str, Any], missing: str, sure: str) -> None:
+    told = explained(diagnosis(**changes))
+    assert missing in told.missing
+    assert sure in told.sure
+    for _, said in told.lines:
+        assert said[0].isupper() or said.startswith("damping")
+        assert said.endswith(".")
+
+
+def test_alternatives_and_doubts_are_named() -> None:
+    hint = candidate("drift", level="hint")
+    told = explained(diagnosis(candidates=[candidate("damping", in_range=False), hint]))
+    assert "outside the plausible 0 to 0.3" in told.sure
+    assert "not needed beside what is named: drift." in told.sure
+    blind = explained(diagnosis(dead=["camber", "a", "b", "c", "d"]))
+    assert "cannot show 5 effects at all (camber, a, b and 2 more)" in blind.sure
+
+
+def test_a_p_value_stands_in_the_place_of_a_score_where_there_is_one() -> None:
+    told = explained(diagnosis(
+        candidates=[candidate("damping", p=0.0021)], sets=[["damping"], ["shear", "drift"]]
+    ))  # fmt: skip
+    assert "damping: p = 0.0021 if it were not there" in told.sure
+    assert "Not ruled out: shear with drift." in told.sure
+    assert "times as clear" not in told.sure
+
+
+def test_without_a_name_one_error_is_told() -> None:
+    told = explained(diagnosis(verdict="none", named=[], error_after=23.5, floor=23.5))
+    assert told.error == (
+        "It is 30 times the noise (84.3 microstrain rms), 23.5 with the model's own numbers fitted "
+        "anew. All of that is noise and the structure of a tire."
+    )
+    assert "No further run" in told.next

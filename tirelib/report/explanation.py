@@ -1,0 +1,331 @@
+"""A verdict in four lines that a test engineer understands: missing, how sure, error, next.
+
+They are written from the document of a diagnosis (``tirelib-diagnosis/1``) alone, of strain or of
+forces, so that console, page and file say the same.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, TypeGuard
+
+import numpy as np
+
+from tirelib.report.page import number
+
+SENSE = 3
+"""Significant digits of an error in a sentence."""
+SHOWN = 3
+"""Other effects that a sentence lists by name."""
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """Four sentences.
+
+    Attributes
+    ----------
+    missing, sure, error, next : str
+        What is missing, how sure that is, what the error was and is, what to do.
+    """
+
+    missing: str
+    sure: str
+    error: str
+    next: str
+
+    @property
+    def lines(self) -> tuple[tuple[str, str], ...]:
+        """The sentences with what each is about."""
+        titles = ("What is missing", "How sure", "The error", "What to do next")
+        return tuple(zip(titles, asdict(self).values(), strict=True))
+
+
+def explained(told: Mapping[str, Any], model: str = "M.toml", folder: str = "DIR") -> Explanation:
+    """Return a diagnosis in four lines.
+
+    Parameters
+    ----------
+    told : mapping
+        ``tirelib-diagnosis/1``.
+    model, folder : str
+        The model file and the campaign's folder, as commands name them.
+    """
+    return Explanation(_missing(told), _sure(told), error_line(told), _next(told, model, folder))
+
+
+def _missing(told: Mapping[str, Any]) -> str:
+    named, verdict = list(told["named"]), told["verdict"]
+    if verdict == "none":
+        return "Nothing: these measurements need no effect of the catalogue beside the model."
+    if verdict == "unknown":
+        where = told["unexplained"].get("where")
+        text = where.get("text") if isinstance(where, Mapping) else where
+        stands = f" It stands {text}." if text else ""
+        return f"Something that no effect of the catalogue explains.{stands}"
+    if verdict == "indistinguishable":
+        listed = " or ".join(f"{name} ({_title(told, name)})" for name in named)
+        return f"One of these, and these measurements cannot tell which: {listed}."
+    effects = "; ".join(
+        f"{name} ({_title(told, name)}), strength {_strength(told, name)}" for name in named
+    )
+    if verdict != "form_inadequate":
+        return f"{effects}."
+    return (
+        f"{effects}. More is left than structure explains: a law is not right, or more is missing."
+    )
+
+
+def _sure(told: Mapping[str, Any]) -> str:
+    if told["error_unit"] != "noise":
+        return (
+            "That cannot be said: no set point was measured twice, so the noise is unknown and "
+            "nothing is named."
+        )
+    return " ".join([*_evidence(told), *_alternatives(told), *_blind(told)])
+
+
+def _evidence(told: Mapping[str, Any]) -> list[str]:
+    """Say how far what is named stands out, by the p-value where the document has one."""
+    out, ratios = [], []
+    for name in told["named"] if told["verdict"] != "unknown" else ():
+        entry = _candidate(told, name)
+        if entry is None:
+            continue
+        if entry.get("p") is not None:
+            out.append(f"{name}: p = {number(entry['p'], 2)} if it were not there.")
+        else:
+            ratio = entry["score"] / entry["threshold"]
+            ratios.append(f"{name} {float(f'{ratio:.2g}'):g} times")
+        if not entry["in_range"]:
+            low, high = entry["range"]
+            out.append(
+                f"The strength of {name} is outside the plausible {number(low, 3)} to "
+                f"{number(high, 3)}: measure it in another way before you believe it."
+            )
+    if ratios:
+        out.insert(
+            0,
+            f"{_and(ratios)} as clear as the clearest effect that variants of the model show by "
+            "chance and structure alone.",
+        )
+    if not told["named"]:
+        largest = max((e["score"] / e["threshold"] for e in told["candidates"]), default=0.0)
+        if told["verdict"] == "none":
+            out.append(
+                f"The most conspicuous effect reaches {number(largest, 2)} times what variants of "
+                "the model without it show, or no fit needs it."
+            )
+        else:
+            out.append("More is left than the structure of a tire explains.")
+    return out
+
+
+def _alternatives(told: Mapping[str, Any]) -> list[str]:
+    """Say what else would explain the measurements as well."""
+    if told["verdict"] == "indistinguishable":
+        return ["They explain these measurements equally well."]
+    sets = told.get("sets") or []
+    if len(sets) > 1:
+        listed = "; or ".join(" with ".join(names) for names in sets[1 : 1 + SHOWN])
+        return [f"Not ruled out: {listed}."]
+    if not told["named"]:
+        return []
+    rivals = [name for entry in told.get("held_back", ()) for name in entry["rivals"]]
+    named = set(told["named"])
+    others = [e["effect"] for e in told["candidates"]
+              if e["effect"] not in named and e["level"] != "quiet"]  # fmt: skip
+    if rivals:
+        return [f"Held back, since others would serve as well: {_some(rivals)}."]
+    if others:
+        return [f"Also conspicuous, but not needed beside what is named: {_some(others)}."]
+    return ["No other effect of the catalogue explains these measurements as well."]
+
+
+def _blind(told: Mapping[str, Any]) -> list[str]:
+    dead = told["dead"]
+    if not dead:
+        return []
+    return [f"This plan cannot show {len(dead)} effects at all ({_some(dead)})."]
+
+
+def error_line(told: Mapping[str, Any]) -> str:
+    """Say the error before and after, and on what was held out of the fit.
+
+    Parameters
+    ----------
+    told : mapping
+        ``tirelib-diagnosis/1`` or ``tirelib-extension/1``.
+    """
+    unit = {"noise": "times the noise", "ustrain": "microstrain"}.get(
+        told["error_unit"], told["error_unit"]
+    )
+    before, after = told["error_before"], told["error_after"]
+    raw = {"ustrain": "microstrain"}.get(told["residual_rms_unit"], told["residual_rms_unit"])
+    rms = [
+        f"{number(told[f'residual_rms_{when}'], SENSE)} {raw} rms" for when in ("before", "after")
+    ]
+    changed = told.get("named") or told.get("action")
+    if not changed:
+        text = f"It is {_said(before)} {unit} ({rms[0]})"
+        text += _refitted(told)
+        return f"{text}.{_floor(told, after)}"
+    text = f"It was {_said(before)} {unit} ({rms[0]}){_refitted(told)}"
+    without = " without it" if told.get("action") == "remove" else " with it"
+    if len(told.get("named", ())) > 1 and told.get("verdict") != "indistinguishable":
+        without = " with them"
+    text += f", and is {_said(after)}{without} ({rms[1]}).{_floor(told, after)}"
+    return f"{text} {held_out_line(told)}".strip()
+
+
+def journey_explained(
+    told: Mapping[str, Any], journey: Mapping[str, Any], folder: Path, out: Path
+) -> dict[str, str]:
+    """Return the four sentences of a whole journey, by key.
+
+    Parameters
+    ----------
+    told : mapping
+        ``tirelib-diagnosis/1`` of the first model.
+    journey : mapping
+        ``tirelib-explanation/1``: the errors of the models in the end.
+    folder, out : Path
+        Of the campaign, and of the journey's files.
+    """
+    lines = asdict(explained(told, journey["steps"][0]["model"], str(folder)))
+    if journey["added"]:
+        lines["error"] = error_line({**journey, "verdict": told["verdict"]})
+        last = journey["steps"][-1]["model"]
+        lines["next"] = (
+            f"The model with {_and(journey['added'])} is {last}. To look for more: tirelib "
+            f"diagnose {folder} --model {last} --out {out / 'diagnosed-again'}"
+        )
+    return lines
+
+
+def unmoved(told: Mapping[str, Any]) -> list[str]:
+    """Say which errors on what was held out of the fit did not fall.
+
+    Parameters
+    ----------
+    told : mapping
+        ``tirelib-diagnosis/1``, ``tirelib-extension/1`` or ``tirelib-explanation/1``.
+    """
+    before, after = told["heldout_error_before"], told["heldout_error_after"]
+    pairs = [(f"The error of the {_what(told)} held out", before, after)]
+    folds = told["held_out"] if len(told["held_out"]) > 1 else ()
+    pairs += [
+        (f"The error with {fold_name(fold)} held out", fold["error_before"], fold["error_after"])
+        for fold in folds
+    ]
+    return [
+        f"{what} did not fall: {_said(old)} before, {_said(new)} after."
+        for what, old, new in pairs
+        if _known(old) and _known(new) and not _fell(old, new)
+    ]
+
+
+def held_out_line(told: Mapping[str, Any]) -> str:
+    """Say whether the error fell where the fit has not looked; what did not fall is said so."""
+    before, after = told.get("heldout_error_before"), told.get("heldout_error_after")
+    if not _known(before) or not _known(after):
+        return "Nothing could be held out of the fit to check it."
+    if _fell(before, after):
+        fell = (
+            f"On what was held out of the fit it fell as well: {_said(before)} before, "
+            f"{_said(after)} after."
+        )
+        return " ".join([fell, *unmoved(told)])
+    return " ".join(unmoved(told))
+
+
+def fold_name(fold: Mapping[str, Any]) -> str:
+    """Say what was left out of a fit."""
+    names = {"time": f"part {fold['value']:.0f} of the time",
+             "cell": f"part {fold['value']:.0f} of the conditions"}  # fmt: skip
+    size = f"{fold['runs']} runs" if "runs" in fold else f"{fold['points']} points"
+    usual = f"the {fold['condition']} {number(fold['value'], 4)} {fold['unit']}"
+    return f"{names.get(fold['condition'], usual)} ({size})"
+
+
+def _fell(before: float, after: float) -> bool:
+    """Whether an error fell by what a reader of the sentence can see."""
+    return after < before and _said(after) != _said(before)
+
+
+def _refitted(told: Mapping[str, Any]) -> str:
+    again = told.get("error_refitted")
+    if not _known(again) or _said(again) == _said(told["error_before"]):
+        return ""
+    return f", {_said(again)} with the model's own numbers fitted anew"
+
+
+def _floor(told: Mapping[str, Any], after: float) -> str:
+    floor = told.get("floor")
+    if not _known(floor):
+        return ""
+    if _said(floor) == _said(after):
+        return " All of that is noise and the structure of a tire."
+    return f" Of that, noise and the structure of a tire explain {_said(floor)}."
+
+
+def _next(told: Mapping[str, Any], model: str, folder: str) -> str:
+    if told["verdict"] in ("named", "form_inadequate"):
+        option = "" if told["quantity"] == "strain" else f" --quantity {told['quantity']}"
+        return (
+            f"Add it: tirelib add {told['named'][0]} --model {model} --data {folder}{option} "
+            "--out M2.toml; then diagnose again with the new model."
+        )
+    what = str(told["next_test"]["what"]).rstrip(".")
+    if told["verdict"] == "none" and told["error_unit"] == "noise":
+        return "No further run is needed for the effects that this plan can show."
+    return f"{what[0].upper()}{what[1:]}."
+
+
+def _candidate(told: Mapping[str, Any], name: str) -> Mapping[str, Any] | None:
+    return next((entry for entry in told["candidates"] if entry["effect"] == name), None)
+
+
+def _title(told: Mapping[str, Any], name: str) -> str:
+    entry = _candidate(told, name)
+    title = str(entry["title"]).rstrip(".") if entry is not None else "in no catalogue"
+    return title[0].lower() + title[1:]
+
+
+def _strength(told: Mapping[str, Any], name: str) -> str:
+    entry = _candidate(told, name)
+    return "unknown" if entry is None else said_strength(entry)
+
+
+def said_strength(entry: Mapping[str, Any]) -> str:
+    """Say a strength with its standard deviation and unit, of a candidate or an extension."""
+    value, std = (np.atleast_1d(entry[key]) for key in ("strength", "std"))
+    unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
+    size = " and ".join(
+        f"{number(float(x), 3)} \u00b1 {number(float(s), 1)}"
+        for x, s in zip(value, std, strict=True)
+    )
+    return f"{size}{unit}"
+
+
+def _some(names: Sequence[str]) -> str:
+    listed = list(dict.fromkeys(names))
+    more = f" and {len(listed) - SHOWN} more" if len(listed) > SHOWN else ""
+    return ", ".join(listed[:SHOWN]) + more
+
+
+def _and(words: Sequence[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def _what(told: Mapping[str, Any]) -> str:
+    return "points" if told["quantity"] != "strain" else "runs"
+
+
+def _said(value: float) -> str:
+    """Say an error as sentences do: 30, 6.7, 0.48."""
+    return number(value, SENSE if abs(value) >= 10.0 else 2)
+
+
+def _known(value: Any) -> TypeGuard[float]:
+    return isinstance(value, int | float) and bool(np.isfinite(value))

@@ -1,0 +1,56 @@
+"""The page of one effect more or less: the waterfall, the errors of each run, what was held out."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from tirelib.report.comparison import Part
+from tirelib.report.explanation import error_line, fold_name, said_strength
+from tirelib.report.figures.waterfall import waterfall_of
+from tirelib.report.journey import WORDS, run_errors
+from tirelib.report.page import Table, number
+from tirelib.report.parts_page import write_parts_page
+
+
+def write_extension(told: Mapping[str, Any], folder: Path) -> tuple[Path, Path]:
+    """Write ``extension.html`` and ``extension.md`` into a folder; return their paths.
+
+    Parameters
+    ----------
+    told : mapping
+        ``tirelib-extension/1``.
+    folder : Path
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be written.
+    """
+    done = {"add": "Added", "remove": "Removed"}[told["action"]]
+    fall = waterfall_of(told["history"], told["quantity"])
+    parts = [
+        Part("The error, step by step", "error", tables=[_errors(told)],
+             plots=[fall] if fall is not None else []),
+        Part("Each run, before and after", "runs", plots=run_errors([told], told["error_unit"])),
+    ]  # fmt: skip
+    return write_parts_page(
+        folder, "extension", [part for part in parts if part.tables or part.plots],
+        title=f"{done}: {told['effect']}",
+        summary=f"Campaign {told['campaign']}, {told['quantity']}.", answer="",
+        messages=told["messages"],
+        lines=((done, f"{told['effect']} ({told['title'].rstrip('.')}), strength "
+                f"{said_strength(told)}."), ("The error", error_line(told))),
+    )  # fmt: skip
+
+
+def _errors(told: Mapping[str, Any]) -> Table:
+    unit = WORDS.get(told["error_unit"], told["error_unit"])
+    rows = [
+        ["all that is fitted, as the model was given", number(told["error_before"], 3), ""],
+        ["its numbers fitted anew", number(told["error_refitted"], 3),
+         number(told["error_after"], 3)],
+        *([f"held out of the fit: {fold_name(fold)}", number(fold["error_before"], 3),
+           number(fold["error_after"], 3)] for fold in told["held_out"]),
+        ["what noise and structure explain (floor)", "", number(told["floor"], 3)],
+    ]  # fmt: skip
+    return Table("Errors", ["", f"before [{unit}]", f"after [{unit}]"], rows)

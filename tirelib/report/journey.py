@@ -1,0 +1,266 @@
+"""The page of a whole journey: before and after, the errors of each run, links and commands."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from tirelib.compare.force_curves import curves_of
+from tirelib.compare.forces import ForceComparison
+from tirelib.compare.strain import Comparison
+from tirelib.report.comparison import Part
+from tirelib.report.figures.compare_forces import curve_plots, force_plots
+from tirelib.report.figures.compare_heat import DEGREES, heat_maps
+from tirelib.report.figures.compare_plot import ANGLE_TITLE, Plot, styled_figure
+from tirelib.report.figures.compare_waveforms import HALF
+from tirelib.report.figures.waterfall import waterfall_of
+from tirelib.report.page import Table, number
+from tirelib.report.parts_page import write_parts_page
+from tirelib.report.style import BLUE, FAINT, INK, RED
+
+TITLE = "What the model lacked"
+WORDS = {"noise": "noise", "ustrain": "microstrain"}
+
+
+@dataclass(frozen=True, slots=True)
+class Journey:
+    """What the steps of a journey found.
+
+    Attributes
+    ----------
+    before, after : Comparison or ForceComparison
+        Of the first and of the last model; the same if nothing was added.
+    document : mapping
+        ``tirelib-explanation/1``.
+    steps : sequence of mapping
+        ``tirelib-extension/1`` of each effect that was added.
+    history : sequence of mapping
+        Of the last model.
+    """
+
+    before: Comparison | ForceComparison
+    after: Comparison | ForceComparison
+    document: Mapping[str, Any]
+    steps: Sequence[Mapping[str, Any]]
+    history: Sequence[Mapping[str, Any]]
+
+
+def write_journey(journey: Journey, folder: Path) -> tuple[Path, Path]:
+    """Write ``index.html`` and ``index.md`` into a folder; return their paths.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be written.
+    """
+    told = journey.document
+    links = [(page["title"], page["path"]) for page in told["pages"]]
+    titles = ("What is missing", "How sure", "The error", "What to do next")
+    return write_parts_page(
+        folder, "index", parts_of(journey), title=TITLE, summary=_summary(told), answer="",
+        messages=told["messages"],
+        lines=list(zip(titles, told["explanation"].values(), strict=True)), links=links,
+        commands=told["commands"],
+    )  # fmt: skip
+
+
+def _summary(told: Mapping[str, Any]) -> str:
+    added = ", ".join(told["added"]) or "nothing"
+    return f"Campaign {told['campaign']}, {told['quantity']}. Added to the model: {added}."
+
+
+def parts_of(journey: Journey) -> list[Part]:
+    """Return the parts of the page."""
+    before, after = journey.before, journey.after
+    if isinstance(before, ForceComparison) or isinstance(after, ForceComparison):
+        assert isinstance(before, ForceComparison)  # noqa: S101 - both are of one quantity
+        assert isinstance(after, ForceComparison)  # noqa: S101
+        curves, maps, errors = _force_curves(before, after), _force_maps(before, after), []
+    else:
+        curves, maps = waveforms(before, after), _maps(before, after)
+        errors = run_errors(journey.steps, before.error.unit)
+    fall = waterfall_of(journey.history, journey.document["quantity"])
+    return [
+        Part("The error, step by step", "error", tables=[_table(journey)],
+             plots=[fall] if fall is not None else []),
+        Part("Each run, before and after", "runs", tables=_held_out(journey), plots=errors),
+        Part("Measured, before and after", "curves", plots=curves),
+        Part("Where the model fails, before and after", "maps", plots=maps),
+    ]  # fmt: skip
+
+
+def _table(journey: Journey) -> Table:
+    told = journey.document
+    unit = WORDS.get(told["error_unit"], told["error_unit"])
+    rows = [
+        [
+            step["model"], step["what"], number(step["error"], 3),
+            number(step["heldout_error"], 3), number(step["residual_rms_raw"], 3),
+        ]
+        for step in told["steps"]
+    ]  # fmt: skip
+    raw = WORDS.get(told["residual_rms_unit"], told["residual_rms_unit"])
+    return Table(
+        "The models", ["model", "what it has", f"error [{unit}]", f"held out [{unit}]",
+                       f"rms left [{raw}]"], rows, texts=2,
+        note="Held out: the error on runs that took no part in the fit.",
+    )  # fmt: skip
+
+
+def _held_out(journey: Journey) -> list[Table]:
+    """Return what was held out at the last step, fold by fold."""
+    folds = [fold for step in journey.steps for fold in step["held_out"]]
+    if not folds:
+        return []
+    unit = WORDS.get(journey.document["error_unit"], journey.document["error_unit"])
+    rows = [
+        [
+            step["effect"], f"{fold['condition']} {number(fold['value'], 4)} {fold['unit']}",
+            str(fold.get("runs", fold.get("points"))), number(fold["error_before"], 3),
+            number(fold["error_after"], 3),
+        ]
+        for step in journey.steps for fold in step["held_out"]
+    ]  # fmt: skip
+    size = "runs" if "runs" in folds[0] else "points"
+    return [Table("Held out of the fit", ["added", "held out", size, f"before [{unit}]",
+                                          f"after [{unit}]"], rows, texts=2)]  # fmt: skip
+
+
+def run_errors(steps: Sequence[Mapping[str, Any]], unit: str) -> list[Plot]:
+    """Return the error of each run before the first step and after the last, with those held out.
+
+    Parameters
+    ----------
+    steps : sequence of mapping
+        ``tirelib-extension/1`` of strain.
+    unit : str
+        Of the errors.
+    """
+    if not steps or "runs" not in steps[0]:
+        return []
+    told = WORDS.get(unit, unit)
+    first = {row["run"]: row for row in steps[0]["runs"]}
+    last = sorted(steps[-1]["runs"], key=lambda row: (row["load"], row["run"]))
+    names = [f"run {row['run']}: {row['load']:.0f} N" for row in last]
+    before = [first[row["run"]]["error_before"] for row in last]
+    after = [row["error_after"] for row in last]
+    out_before = [_worst(first[row["run"]], "error_before") for row in last]
+    out_after = [_worst(row, "error_after") for row in last]
+    figure = go.Figure()
+    figure.add_bar(x=names, y=before, name="before", marker={"color": RED})
+    figure.add_bar(x=names, y=after, name="after", marker={"color": BLUE})
+    for values, name, colour, symbol in (
+        (out_before, "before, held out of the fit", RED, "x"),
+        (out_after, "after, held out of the fit", BLUE, "circle-open"),
+    ):
+        figure.add_scatter(
+            x=names, y=values, mode="markers", name=name,
+            marker={"color": colour, "symbol": symbol, "size": 8, "line": {"width": 2}},
+        )  # fmt: skip
+    figure.update_yaxes(title=f"error [{told}]", rangemode="tozero")
+    figure.update_xaxes(title="runs, by load", tickangle=-60, tickfont={"size": 10})
+    styled_figure(figure, 480, barmode="group", legend={"orientation": "h", "y": 1.12, "x": 0.0})
+    rows = [list(row) for row in zip(names, before, after, out_before, out_after, strict=True)]
+    return [Plot(
+        "run-errors", "The error of each run",
+        "Bars: of the fit to all runs. Marks: of a fit that has not seen the run, with its load or "
+        "its pressure held out (the larger of both where a run is in both).",
+        figure, ["run", f"before [{told}]", f"after [{told}]", f"before, held out [{told}]",
+                 f"after, held out [{told}]"], rows,
+    )]  # fmt: skip
+
+
+def _worst(row: Mapping[str, Any], key: str) -> float | None:
+    """Return the largest held-out error of a run; None where it was in every fit."""
+    return max((fold[key] for fold in row["held_out"]), default=None)
+
+
+def waveforms(before: Comparison, after: Comparison) -> list[Plot]:
+    """Return measured and modelled waveforms of the worst, the median and the best run."""
+    plots: list[Plot] = []
+    seen: set[int] = set()
+    for name, i in zip(("worst", "median", "best"), reversed(before.ranked()), strict=True):
+        if i not in seen:
+            plots.append(_waveform(before, after, i, name))
+        seen.add(i)
+    return plots
+
+
+def _waveform(before: Comparison, after: Comparison, i: int, name: str) -> Plot:
+    c = before.chosen.waves.conditions
+    measured = 1e6 * before.chosen.strain[i]
+    models = [1e6 * found.prediction.strain[i] for found in (before, after)]
+    left = [1e6 * found.difference[i] for found in (before, after)]
+    figure = make_subplots(
+        rows=2, cols=1, shared_xaxes=True, row_heights=[0.62, 0.38], vertical_spacing=0.06
+    )
+    figure.add_scatter(x=DEGREES, y=measured, name="measured", line={"color": INK, "width": 2.5},
+                       row=1, col=1)  # fmt: skip
+    for k, (word, colour, dash) in enumerate((("before", RED, "dash"), ("after", BLUE, "solid"))):
+        figure.add_scatter(x=DEGREES, y=models[k], name=f"model {word}", row=1, col=1,
+                           line={"color": colour, "width": 1.8, "dash": dash})  # fmt: skip
+        figure.add_scatter(x=DEGREES, y=left[k], name=f"model {word} less measured", row=2, col=1,
+                           line={"color": colour, "width": 1.5, "dash": dash},
+                           showlegend=False)  # fmt: skip
+    for edge in np.rad2deg(after.prediction.edges[i]):
+        figure.add_vline(x=float(edge), line={"color": FAINT, "width": 1, "dash": "dot"})
+    figure.update_xaxes(range=[-HALF, HALF], dtick=20)
+    figure.update_xaxes(title=ANGLE_TITLE, row=2, col=1)
+    figure.update_yaxes(title="strain [microstrain]", tickformat=",", row=1, col=1)
+    figure.update_yaxes(title="difference<br>[microstrain]", row=2, col=1)
+    styled_figure(figure, 540, legend={"orientation": "h", "y": 1.1, "x": 0.0})
+    size = [1e6 * float(found.run_rms[i]) for found in (before, after)]
+    rows = np.round(np.stack([DEGREES, measured, *models, *left], axis=1), 3).tolist()
+    return Plot(
+        f"waveform-{name}",
+        f"{name.capitalize()} run of before: {before.run[i]} ({c['Fz'][i]:,.0f} N, "
+        f"{c['pressure'][i] / 1e5:.2f} bar, {c['speed'][i] * 3.6:.0f} km/h)",
+        f"The difference, set points taken out, was {size[0]:.0f} microstrain rms and is "
+        f"{size[1]:.0f}. Strain without its mean over the turn, mean over the gages, tension "
+        "positive. Dotted: edges of the contact of the model after.",
+        figure,
+        ["wheel angle [deg]", *(f"{what} [microstrain]" for what in (
+            "measured", "model before", "model after", "before less measured",
+            "after less measured"))],
+        rows,
+    )  # fmt: skip
+
+
+def _maps(before: Comparison, after: Comparison) -> list[Plot]:
+    """Return the residual of every run before and after, on one colour scale."""
+    plots = [heat_maps(found)[0] for found in (before, after)]
+    limit = max(float(plot.figure.data[0].zmax) for plot in plots)
+    for plot in plots:
+        plot.figure.data[0].update(zmin=-limit, zmax=limit)
+    return _named(plots[:1], "before") + _named(plots[1:], "after")
+
+
+def _force_curves(before: ForceComparison, after: ForceComparison) -> list[Plot]:
+    return [
+        plot
+        for found, when in ((before, "before"), (after, "after"))
+        for plot in _named(curve_plots(found, curves_of(found))[-1:], when)
+    ]
+
+
+def _force_maps(before: ForceComparison, after: ForceComparison) -> list[Plot]:
+    """Return difference over slip and load and the force over its slip, before and after."""
+    pairs = [force_plots(found)[:2] for found in (before, after)]
+    maps = [pair[0] for pair in pairs]
+    limit = max(float(plot.figure.data[0].zmax) for plot in maps)
+    for plot in maps:
+        plot.figure.data[0].update(zmin=-limit, zmax=limit)
+    return [plot for pair, when in zip(pairs, ("before", "after"), strict=True)
+            for plot in _named(pair, when)]  # fmt: skip
+
+
+def _named(plots: Sequence[Plot], when: str) -> list[Plot]:
+    """Return plots with names of their own, that say whether they are of before or after."""
+    return [
+        replace(plot, name=f"{plot.name}-{when}", title=f"{when.capitalize()}: {plot.title}")
+        for plot in plots
+    ]
