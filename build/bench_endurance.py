@@ -146,8 +146,8 @@ def hold(bench: Bench, name: str, minutes: float) -> dict[str, Any]:
     port = port if kind == "serial" else f"slcan:{port}"
     rates = () if kind == "serial" else ("--data-bitrate", 5_000_000)
     listener = Listener()
-    run = bench.run(f"{stem}.log", port, record, *rates, "--json", document, "--silence", 3,
-                    "--plotjuggler", listener.port)  # fmt: skip
+    run = bench.run(f"{stem}.log", port, record, *rates, *numbers, "--json", document, "--silence",
+                    3, "--plotjuggler", listener.port)  # fmt: skip
     log = bench.out / f"{stem}.log"
     url = address_of(log, run)
     listener.wait_after(0.0, PATIENCE)

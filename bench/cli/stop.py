@@ -54,7 +54,8 @@ def on_stop(action: Callable[[], None] = interrupt) -> Iterator[Stop]:
     """Call the action at the first Ctrl-C, SIGTERM or SIGHUP; a second Ctrl-C interrupts as usual.
 
     Whatever else comes after the first one is ignored, because the end is on its way. After SIGHUP
-    nobody reads what is said: it goes nowhere, instead of ending the program.
+    nobody reads what is said: it goes nowhere, instead of ending the program. SIGHUP and SIGTERM
+    that are ignored when this begins, as SIGHUP is under ``nohup``, stay so.
     """
     stop, stopped = Stop(action), False
 
@@ -67,7 +68,9 @@ def on_stop(action: Callable[[], None] = interrupt) -> Iterator[Stop]:
             stopped = True
             stop.action()
 
-    before = {number: signal.signal(number, handle) for number in STOPS}
+    ignored = [number for number in STOPS if signal.getsignal(number) is signal.SIG_IGN]
+    obeyed = [number for number in STOPS if number == signal.SIGINT or number not in ignored]
+    before = {number: signal.signal(number, handle) for number in obeyed}
     try:
         yield stop
     finally:

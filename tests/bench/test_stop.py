@@ -79,6 +79,16 @@ def test_each_signal_interrupts_a_program_that_starts_and_it_says_so(
     assert "stopped while it started" in capsys.readouterr().err
 
 
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="this system has no SIGHUP")
+def test_a_closed_terminal_ends_nothing_that_was_started_with_nohup() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with start_in_order():
+            os.kill(os.getpid(), signal.SIGHUP)
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
 def test_only_the_first_signal_counts_and_it_does_what_is_wanted_by_then() -> None:
     stopped: list[str] = []
     with on_stop(lambda: stopped.append("while it starts")) as stop:
