@@ -35,7 +35,8 @@ from tirelib.threads import one_thread
 PRESSURE, SPEED = 2.3e5, 65.0 / 3.6
 SEED = 51
 TRIED = ("PRESSURE_DOUBT", "SPEED_DOUBT", "ROAD_DOUBT")
-"""Doubts of which half and double are tried; `DRIFT` and `ROAD_DRIFT` are tried as a whole."""
+"""Doubts of which half and double are tried; `DRIFT` and `ROAD_DRIFT` are tried as a whole. Those
+of the road are tried where friction and tread are not given."""
 
 
 def drifting() -> Plan:
@@ -95,28 +96,29 @@ def halves(
     lines = ["| constant | factor | own tire | other tires, set1 | set3 | drift |",
              "|---|---|---|---|---|---|"]  # fmt: skip
 
-    def judge(label: str, factor: float) -> None:
+    def judge(label: str, factor: float, *, unsaid: bool = False) -> None:
         count = dict.fromkeys(("own", "set1", "set3", "drift"), (0, 0))
         for name, calibration in calibrations.items():
             for other, campaigns in days.items():
                 for kind, seen in campaigns.items():
                     key = "own" if name.split(",")[0] == other else kind
-                    found = flagged(calibration, seen)
+                    found = flagged(calibration, silent(seen) if unsaid else seen)
                     count[key] = (count[key][0] + found[0], count[key][1] + found[1])
         cells = " | ".join(f"{a} of {b}" for a, b in count.values())
         lines.append(f"| {label} | {factor:g} | {cells} |")
 
     judge("as it is", 1.0)
+    judge("as it is, nothing said", 1.0, unsaid=True)
     for name in TRIED:
         for factor in (0.5, 2.0):
             with times(likeness, name, factor):
-                judge(f"`{name}`", factor)
+                judge(f"`{name}`", factor, unsaid=name == "ROAD_DOUBT")
     for name in ("DRIFT", "ROAD_DRIFT"):
         table = getattr(likeness, name)
         own = dict(table)
         for factor in (0.5, 2.0):
             table.update({key: tuple(factor * x for x in pair) for key, pair in own.items()})
-            judge(f"`{name}`", factor)
+            judge(f"`{name}`", factor, unsaid=name == "ROAD_DRIFT")
         table.update(own)
     return lines
 

@@ -39,10 +39,9 @@ from tirelib.estimators.sliding import (
 )
 from tirelib.estimators.unknowns import BENT, CORNERING, EDGE, FORCE, LAW_DOUBT, Road
 
-LEAST_REACH = 0.01
-"""Floor of the range of contact angles by which the load's slope is taken, [rad]."""
 WIDEST = 0.5
-"""Largest slip angle and largest standard deviation of one, [rad]."""
+"""Largest slip angle and largest standard deviation of one, [rad]: for a flat cornering curve the
+latter has no end. Half and double change no validity, which ends at 1 deg."""
 QUANTITIES = ("Fz", "alpha", "kappa", "Fy")
 
 
@@ -293,7 +292,7 @@ class Chain:
         if not {"Fz", "contact_angle"} <= set(ends) or not self.laws.radius > 0.0:
             return 0.0
         load, angle = ends["Fz"], ends["contact_angle"]
-        per_angle = (load.high - load.low) / max(angle.high - angle.low, LEAST_REACH)
+        per_angle = (load.high - load.low) / (angle.high - angle.low)
         return per_angle * EDGE / self.laws.radius
 
     def _slid(

@@ -39,8 +39,9 @@ N_SHEAR_NODES = 80
 N_ANGLES = 1441
 """A quarter of a degree."""
 LARGEST_BELT_SPEED = 150.0
-"""Turn rate times ring radius up to which a tire is rolled, [m/s]: the fastest tires that race
-(540 km/h). The linear ring has no limit of its own, since its tension grows with the speed."""
+"""Turn rate times ring radius up to which a tire is rolled, [m/s], 540 km/h: tires are rated to 300
+km/h and, as (Y), beyond (UN Regulation 30). Half would refuse the symbols W and Y, double would let
+a turn rate pass that is a speed in km/h. The linear ring has no limit of its own."""
 MICRO = 1e6
 
 

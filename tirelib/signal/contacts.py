@@ -26,7 +26,8 @@ JUMP = 2.5
 """A swing this many times the one that set the levels shows that they were set by no contact."""
 GAP_REACH = 0.1
 """Turns before a pulse and after the one before within which a gap may hide an extreme: the dips
-lie within 0.6 rad of the pulse. The levels then stay as they were."""
+lie within 0.6 rad of the pulse. The levels then stay as they were. With half and double the same
+turns are valid and as exact (``python build/signal_constants.py``)."""
 PATIENCE = 2.5
 """Turns to wait for a contact before starting afresh."""
 

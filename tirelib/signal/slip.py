@@ -25,8 +25,8 @@ GRAVITY = 9.81
 RADIUS_SHARE = 0.5 / np.sqrt(3.0)
 """Root mean square of what is spread evenly from none to a half."""
 SLIP_STIFFNESS = 11.0
-"""Slip stiffness over the load of the vehicle's wheels, [1]: 22 where all brake (H. B. Pacejka,
-*Tire and Vehicle Dynamics*, appendix 3, PKX1 of a 205/60R15), half of it where one axle does.
+"""Slip stiffness over the load of the vehicle's wheels, [1]: 22.3 where all brake (`p_kx1` of the
+tire of CommonRoad's vehicles, package vehiclemodels), half of it where one axle does.
 ``python build/ramp_error.py`` shows what half and double of it do."""
 
 

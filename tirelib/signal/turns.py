@@ -46,14 +46,15 @@ NEAR_EDGE = 3
 """Samples before a pulse's edge that must be there, as those beside it, for the edge to count."""
 DRIFT_SHARE = 0.05
 MISSED_RATIO = 1.5
-"""A turn with a gap that lasts this many times the one before has hidden a contact in it."""
+"""A turn with a gap that lasts this many times the one before has hidden a contact in it: two turns
+last twice as long. ``python build/signal_constants.py`` has half and double."""
 LARGEST_ANGLE_STD = 0.02
 """Relative uncertainty of the wheel angle's scale beyond which a turn is `accelerating`."""
-USUAL_ACCELERATION = 2.0
-"""Standard deviation of a vehicle's acceleration of which nothing is known, [m/s^2]: assumed, as
-ordinary braking and accelerating; half and double were not studied."""
-CIRCUMFERENCE = 2.0
-"""Way of a turn, [m], with which an acceleration becomes a change of the turn rate."""
+USUAL_CHANGE = 1.0
+"""Standard deviation of the change of a turn rate of which nothing is known, [turns/s^2]: that of a
+car on tires of 2 m circumference with 2 m/s^2, so that 95 % lie within 3.9 m/s^2; a stop for which
+roads are designed has 3.4 m/s^2 (AASHTO, *Green Book*, stopping sight distance). A first turn is
+`accelerating` below 10 m/s; with half of it below 7, with double below 14 m/s."""
 LONGEST_TURN = 3.0
 """A turn that lasts longer is standstill, [s]."""
 
@@ -210,7 +211,7 @@ class TurnCutter:
         seconds = turn / self.rate
         law = angle_law(
             contact.middle, turn, stop - contact.middle, told, self._past,
-            unknown=USUAL_ACCELERATION * seconds**2 / (2.0 * CIRCUMFERENCE),
+            unknown=0.5 * USUAL_CHANGE * seconds**2,
         )  # fmt: skip
         unseen = unseen_change(
             told["speed"], turn / self.rate, _pulse(contact, law), _pulse(before, law)

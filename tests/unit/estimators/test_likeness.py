@@ -99,6 +99,7 @@ def test_a_worn_tread_and_a_width_read_off_a_cut_are_the_same_tire(trained: Trai
     told = {
         "tread_thickness": 0.5 * size["tread_thickness"],
         "belt_width": 1.02 * size["belt_width"],
+        "free_radius": size["free_radius"] - 0.006,  # the tread that is gone
     }
     trained.calibration.check_layout("made-up tire", LATERAL, "here", told)
 
