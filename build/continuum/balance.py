@@ -136,7 +136,7 @@ def carried_part(tire: Tire, mesh: Grid, u: Array, omega: float) -> tuple[Array,
     """Return residual (E, 12) and stiffness of the tread's and liner's mass on the belt."""
     mass, height = (np.array(part) for part in zip(*map(tire.carried, range(3)), strict=True))
     line = mesh.back
-    lever = mesh.of_strip(height / tire.belt_thickness + 0.5, line)
+    lever = mesh.of_strip(height / tire.belt_thickness, line)
     per_radian = mesh.of_strip(mass * SHARE, line) * tire.ring_radius
     return carried_work(line, mesh.carcass, lever, per_radian, u, omega)
 

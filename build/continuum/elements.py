@@ -10,7 +10,7 @@ import numpy as np
 from scipy.sparse import csc_matrix
 
 from continuum.material import stress
-from continuum.polar import Array, Bulk, Index, Line, tangential
+from continuum.polar import Array, Bulk, Index, Line, radial, tangential
 
 TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 """Turns e_t into e_r."""
@@ -111,26 +111,39 @@ def carried_work(
 ) -> tuple[Array, Array]:
     """Work of mass that a layer carries: its inertia, of points that lie on its section.
 
+    They follow the middle of the layer and swing along the circumference as the section turns. (A
+    lever on the layer's stretch as well would make short waves of the thickness unstable.)
+
     Parameters
     ----------
     outer, inner : Line
         Faces of the layer.
     lever : shape (E, 1)
-        Distance of the mass from the inner face, over the layer's thickness [1].
+        Distance of the mass from the layer's middle, over the layer's thickness [1].
     mass : shape (E, 1)
         Per radian [kg].
     """
-    parts = lever[..., None] * outer.slope, (1.0 - lever)[..., None] * inner.slope
-    slope = np.concatenate(parts, axis=2)
-    radius = lever * outer.radius + (1.0 - lever) * inner.radius
     dofs = np.concatenate([outer.dofs, inner.dofs], axis=1)
-    x_phi = radius[..., None] * tangential(outer.phi) + slope @ u[dofs]
-    test = slope * (omega**2 * mass * outer.weight)[..., None]
-    count = len(dofs)
-    stiff = np.zeros((count, 6, 2, 6, 2))
-    stiff[:, :, 0, :, 0] = stiff[:, :, 1, :, 1] = -np.swapaxes(test, 1, 2) @ slope
-    force = -np.swapaxes(test, 1, 2) @ x_phi
-    return force.reshape(count, 12), stiff.reshape(count, 12, 12)
+    out, along = radial(outer.phi), tangential(outer.phi)
+    middle = 0.5 * np.concatenate([outer.slope, inner.slope], axis=2)
+    across = np.concatenate([outer.value, -inner.value], axis=2)[..., None]
+    across_slope = np.concatenate([outer.slope, -inner.slope], axis=2)[..., None]
+    swing = lever[..., None, None] * across * along[:, :, None, :]  # (E, Q, node, component)
+    swing_slope = lever[..., None, None] * (
+        across_slope * along[:, :, None, :] - across * out[:, :, None, :]
+    )
+    # x_phi = middle' + swing' e_t - swing e_r, components first
+    b = np.einsum("eqi,eqnj->eqinj", along, swing_slope)
+    b -= np.einsum("eqi,eqnj->eqinj", out, swing)
+    b += np.einsum("eqn,ij->eqinj", middle, np.eye(2))
+    b = b.reshape(*b.shape[:3], -1)
+    thickness = outer.radius - inner.radius
+    radius = 0.5 * (outer.radius + inner.radius) + lever * thickness
+    own = u[dofs].reshape(len(dofs), -1)
+    x_phi = radius[..., None] * along + np.einsum("eqik,ek->eqi", b, own)
+    weight = (omega**2 * mass * outer.weight)[..., None, None]
+    force = -np.einsum("eqik,eqi->ek", b * weight, x_phi)
+    return force, -np.einsum("eqik,eqil->ekl", b * weight, b, optimize=True)
 
 
 @dataclass(frozen=True)
