@@ -7,11 +7,11 @@ from bench.wheels import Wheels
 
 
 class JudgedTurns:
-    """Turns on their way to whoever uses them.
+    """Turns between the estimators and whoever shows or records them.
 
-    A turn of a wheel whose rate is not judged yet waits, a few of them at most: the judgement takes
-    some hundred frames (`bench.rate_check`). One of a wheel whose clock contradicts its rate is
-    dropped.
+    A turn of a wheel whose rate is not judged yet is kept back. These are few, because a judgement
+    takes `bench.rate_check.JUDGED` frames, and `LONGEST_WAIT` at most. A turn of a wheel whose
+    clock contradicts its rate is dropped.
     """
 
     def __init__(self) -> None:

@@ -35,14 +35,14 @@ from bench.wheels import MOST, Wheels
 START = 300.0
 """Processes that are not ready after so long do not start, even on a busy machine, [s]."""
 SAY = 5.0
-"""After so long it is said what is awaited, then again after twice the time, and so on, [s]."""
+"""After so long the run says what it waits for, then again after twice the time, and so on, [s]."""
 LOOK = 0.05
 """Time between two looks after the processes and the line, [s]."""
 PATIENCE = 60.0
-"""At the end estimators and recorder get so long for each step of what still waits, [s]."""
+"""At the end, estimators and recorder may be silent for so long before they are given up, [s]."""
 LEAVE, AT_ONCE = 60.0, 5.0
-"""A process that was told to end and goes on for so long is ended, [s]: in good order; where
-nothing is left to be kept."""
+"""A process that was told to end may take so long before it is killed, [s]: one that still has
+something to save, and one that has not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -283,9 +283,23 @@ class LiveChain:
         self.order("close", reason)
         if self._recorder is not None:
             self.obeyed(Deadline.after(PATIENCE))
-            self._recorder.wait(LEAVE)
-            self._see()
+            self._let_write(self._recorder)
         return news
+
+    def _let_write(self, recorder: Kept) -> None:
+        """Wait for the recorder as long as its file grows, and say so where that takes long."""
+        end, due, before = Deadline.after(LEAVE), Deadline.after(SAY), -1
+        while recorder.alive and not end.expired:
+            time.sleep(LOOK)
+            self._see()
+            length = self._recorded.written + self._recorded.length
+            if length != before:
+                end, before = Deadline.after(LEAVE), length
+            if due.expired:
+                self._say(f"waiting for: the recorder to write {self._recorded.path}")
+                due = Deadline.after(LEAVE)
+        recorder.wait(AT_ONCE)
+        self._see()
 
     def _processes(self) -> dict[str, Kept]:
         named = {"reader": self._reader, "recorder": self._recorder}
@@ -307,7 +321,7 @@ class LiveChain:
         return f"the reader to open {', '.join(ports)}" if ports else "the reader"
 
     def _wait(self, ready: Callable[[], bool], awaited: Callable[[], str]) -> None:
-        """Wait until the processes are so far."""
+        """Wait until `ready` says yes; `awaited` names what is missing."""
         end, pause = Deadline.after(START), SAY
         due = Deadline.after(pause)
         while not ready():
@@ -329,7 +343,7 @@ class LiveChain:
                 )
 
     def _gather(self) -> News:
-        """Return what there was to tell since the last time."""
+        """Return the news of the estimators, and alarms, since the last time."""
         news, self._pending = self._pending, News()
         news.add(self._estimators.gather())
         return news

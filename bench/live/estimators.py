@@ -20,7 +20,7 @@ TRIES = 3
 
 
 class Estimators:
-    """One for each slot of the exchange, as far as it was started.
+    """The processes; each has a slot of the exchange, in the order in which wheels are heard.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Estimators:
     ----------
     kept : dict of slot to Kept
     ready, done : set of int
-        Slots whose FMU is loaded; of which nothing will come any more.
+        Slots whose FMU is loaded; slots that have ended and told all.
     cpu : dict of slot to float, [s]
         Time that they have used.
     """

@@ -1,15 +1,14 @@
-"""The process that records: reads from the queue to the file, in files that the run names.
+"""The process that records: it writes what comes through the queues into files that the run names.
 
-What is on disk and what of the queues is on it are written down together, so that a recorder that
-is started again cuts off what its predecessor left half done and goes on with what follows. Where
+The recorder notes in one step how long the file is and up to where the queues are in it. One that
+is started again cuts off what its predecessor left half written, and goes on from there. Where
 nothing can be written, as on a full disk, the queues wait; a new part begins when there is room.
 """
 
 import pickle
 import time
 from collections import deque
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
@@ -23,7 +22,8 @@ from bench.live.exchange import Address, Exchange
 from bench.live.kept import orphaned, settled
 from bench.live.recording_state import Order, RecorderState, RecordingRule, triggers
 from bench.live.space import Space
-from bench.recorder import Recorder, finish
+from bench.live.unfinished import Unfinished
+from bench.recorder import Recorder
 from bench.recording_header import RecordingHeader, numbered, part_path
 
 LOOK = 0.05
@@ -31,23 +31,14 @@ LOOK = 0.05
 CHUNK, CHUNK_BYTES = 0.25, 2**20
 """A chunk is closed after this time [s] or this length [bytes], whichever comes first."""
 RETRY = 1.0
-"""Where nothing can be written: time between two trials, [s]."""
+"""Time between two attempts where nothing can be written, [s]."""
 LINK_EVERY = 1.0
 """Time between two messages of the counters, [s]."""
 NO_ROOM = "it could not be written any more"
 MOST_EVENTS = 1000
-"""Events that are kept where nothing can be written."""
+"""So many events are kept while nothing can be written."""
 LEFT = 0.5
-"""When the run is gone, how long the last bytes are waited for, [s]."""
-
-
-@dataclass(slots=True)
-class _Unfinished:
-    """A file without its end, for want of room."""
-
-    path: Path
-    length: int
-    reason: str
+"""When the run was killed, the recorder waits so long for its last bytes, [s]."""
 
 
 def record(
@@ -74,7 +65,7 @@ class _Recorder:
         self._recorder: Recorder | None = None
         self._before = state.bytes
         self._space = Space()
-        self._unfinished: list[_Unfinished] = []
+        self._unfinished = Unfinished()
         self._events: deque[tuple[dict[str, Any], int]] = deque(maxlen=MOST_EVENTS)
         self._last = ""  # why the run ends, once it does
         self._kept = None if rule.around is None else Before(rule.around[0])
@@ -179,7 +170,7 @@ class _Recorder:
         error = state.error or self._open(path, state.length)
         if error:
             state.path, state.error = path, error
-            self._unfinished.append(_Unfinished(path, state.length, NO_ROOM))
+            self._unfinished.add(path, state.length, NO_ROOM)
 
     def _write(self) -> bool:
         """Write what has come; tell whether there was anything."""
@@ -282,15 +273,9 @@ class _Recorder:
         except RecordingError as error:
             self._fail(error)
             return False
-        self._finish_those_left()
+        self._unfinished.finish()
         self._state.error = ""
         return True
-
-    def _finish_those_left(self) -> None:
-        for left in self._unfinished[:]:
-            with suppress(RecordingError):
-                finish(left.path, left.length, left.reason)
-                self._unfinished.remove(left)
 
     def _begin_part(self, path: Path) -> bool:
         """Begin the part that follows; the one before stays the current one where that fails."""
@@ -334,8 +319,8 @@ class _Recorder:
                 recorder.close(reason)
             except RecordingError as error:
                 self._state.error = str(error)
-                self._unfinished.append(_Unfinished(path, recorder.abandon(), reason))
-        self._finish_those_left()
+                self._unfinished.add(path, recorder.abandon(), reason)
+        self._unfinished.finish()
 
     def _fail(self, error: RecordingError) -> None:
         """Note that nothing can be written, and go back to what is on disk."""
@@ -343,7 +328,7 @@ class _Recorder:
         state.error = state.error or str(error)
         if recorder is not None and state.path is not None:
             state.length = recorder.abandon()
-            self._unfinished.append(_Unfinished(state.path, state.length, NO_ROOM))
+            self._unfinished.add(state.path, state.length, NO_ROOM)
             self._before, self._recorder = state.bytes, None
         self._failed()
 

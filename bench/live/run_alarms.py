@@ -49,7 +49,7 @@ class RunAlarms:
     def look(
         self, line: LineState, recorded: RecorderState, ports: Sequence[PortState | None]
     ) -> list[str]:
-        """Return what begins or ends with the present states, in words.
+        """Return the alarms that begin or end with the present states, in words.
 
         `ports` holds the state of each port that a process of its own reads, None before the first.
         """

@@ -43,6 +43,7 @@ from bench.replay import ReplayChain
 from bench.source_plan import SourcePlan
 from bench.wheels import Block, Wheels
 from tests.bench.campaigns import tiny_runs
+from tests.bench.clocks import Clock
 from tests.bench.conftest import Spawn
 from tests.bench.programs import A_TURN, PATIENCE, port_of, wait_until
 from tirelib.arrays import FloatArray
@@ -350,6 +351,30 @@ def test_an_estimator_goes_on_behind_what_it_has_reported(tmp_path: Path) -> Non
     chain._estimators._drain(0, news)
     order = pickle.loads(chain._exchange.orders.read() or b"")
     assert order.what["event"] == "jump of the run"
+    chain._close()
+
+
+def test_a_recorder_is_waited_for_as_long_as_its_file_grows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Minutes before a trigger take minutes to write; one that hangs is given up."""
+    clock, said = Clock(), []
+    for module in ("bench.live.chain", "bench.deadline"):
+        monkeypatch.setattr(f"{module}.time", clock)
+    chain = LiveChain(plan_of("p", None, tmp_path / "a.mcap"), said.append)
+    state = RecorderState(tmp_path / "a.mcap")
+
+    def sleep(seconds: float) -> None:
+        clock.now += 50.0
+        state.length += 1000 * (clock.now < 1000.0)
+        chain._exchange.recorded.put(pickle.dumps(state))
+
+    monkeypatch.setattr(clock, "sleep", sleep)
+    recorder: Any = SimpleNamespace(alive=True, wait=lambda _: said.append("ended"))
+    chain._let_write(recorder)
+    assert 1000.0 < clock.now < 1200.0
+    assert "waiting for: the recorder to write" in said[0]
+    assert said[-1] == "ended"
     chain._close()
 
 
