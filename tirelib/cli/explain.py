@@ -17,13 +17,19 @@ from tirelib.cli.common import (
     NEW_FILE,
     NEW_FOLDER,
     output,
-    progress_bar,
     write_json,
 )
 from tirelib.cli.diagnose import QUANTITIES, explains_forces
 from tirelib.errors import CalibrationError, ParameterError, TirelibError
 
 FORMAT = "tirelib-explanation/1"
+STEPS = {
+    "identify": "identify the base model",
+    "compare": "compare the model with the measurements",
+    "diagnose": "diagnose which effect is missing",
+    "add": "add an effect that is named",
+}
+"""What each verb does on the way, as it is said while it runs."""
 _EXAMPLE = """\b
 Examples:
   tirelib rig --plan straight --out build/out/straight
@@ -118,27 +124,21 @@ class Steps:
         from tirelib.report.explanation import explained
         from tirelib.report.journey import Journey
 
-        with progress_bar("explaining") as progress:
-            progress("identify")
-            model = model_name or self._identified()
-            about = self._about(model, quantity)
-            progress("compare")
-            before = self._compared(model, about, "compared-before")
-            progress("diagnose")
-            told = self._run(
-                "diagnose", str(self.folder), "--model", model, *about, *self.effects,
-                "--members", str(self.members), "--out", str(self.out / "diagnosed"),
-                json_name="diagnosis",
-            )  # fmt: skip
-            added: list[dict[str, Any]] = []
-            last = model
-            if told["verdict"] in ("named", "form_inadequate"):
-                for effect in told["named"]:
-                    progress(f"add {effect}")
-                    last, step = self._added(effect, last, about, len(added) + 2)
-                    added += [step] if step is not None else []
-            progress("compare again")
-            after = self._compared(last, about, "compared-after") if added else before
+        model = model_name or self._identified()
+        about = self._about(model, quantity)
+        before = self._compared(model, about, "compared-before")
+        told = self._run(
+            "diagnose", str(self.folder), "--model", model, *about, *self.effects,
+            "--members", str(self.members), "--out", str(self.out / "diagnosed"),
+            json_name="diagnosis",
+        )  # fmt: skip
+        added: list[dict[str, Any]] = []
+        last = model
+        if told["verdict"] in ("named", "form_inadequate"):
+            for effect in told["named"]:
+                last, step = self._added(effect, last, about, len(added) + 2)
+                added += [step] if step is not None else []
+        after = self._compared(last, about, "compared-after") if added else before
         told_lines = explained(told, model, str(self.folder))
         self.lines = told_lines.lines
         history = _history(last)
@@ -206,6 +206,7 @@ class Steps:
         target = self.out / f"{json_name}.json"
         arguments = [*words, "--json", str(target)]
         self.commands.append(shlex.join(["tirelib", *arguments]))
+        click.echo(f"step {len(self.commands)}: {STEPS[words[0]]}", err=True)
         said = io.StringIO()
         with redirect_stdout(said):
             code = program.main(arguments, prog_name="tirelib", standalone_mode=False)

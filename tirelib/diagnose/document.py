@@ -147,9 +147,8 @@ def _too_large(finding: Finding) -> str:
 
 def _not_needed(names: Sequence[str]) -> str:
     return (
-        f"{', '.join(names)} stands out in the joint fit, but is not named: it takes too little of "
-        "the error in an exact one, shares it with what is named, or what cannot be stands out as "
-        "clearly"
+        "also conspicuous, but not needed in an exact fit, or not told apart from what cannot be: "
+        f"{', '.join(names)}"
     )
 
 

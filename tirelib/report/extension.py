@@ -7,7 +7,7 @@ from typing import Any
 from tirelib.report.comparison import Part
 from tirelib.report.explanation import error_line, fold_name, said_strength
 from tirelib.report.figures.waterfall import waterfall_of
-from tirelib.report.journey import WORDS, run_errors
+from tirelib.report.journey import WORDS, part_errors, run_errors
 from tirelib.report.page import Table, number
 from tirelib.report.parts_page import write_parts_page
 
@@ -31,7 +31,8 @@ def write_extension(told: Mapping[str, Any], folder: Path) -> tuple[Path, Path]:
     parts = [
         Part("The error, step by step", "error", tables=[_errors(told)],
              plots=[fall] if fall is not None else []),
-        Part("Each run, before and after", "runs", plots=run_errors([told], told["error_unit"])),
+        Part("Each part of the measurements, before and after", "runs",
+             plots=[*part_errors(told), *run_errors([told], told["error_unit"])]),
     ]  # fmt: skip
     return write_parts_page(
         folder, "extension", [part for part in parts if part.tables or part.plots],

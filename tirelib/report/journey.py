@@ -9,11 +9,12 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from tirelib.compare.force_curves import curves_of
-from tirelib.compare.forces import ForceComparison
+from tirelib.compare.force_curves import Curve, curves_of, ranked, slip_of
+from tirelib.compare.forces import UNITS, ForceComparison
 from tirelib.compare.strain import Comparison
 from tirelib.report.comparison import Part
-from tirelib.report.figures.compare_forces import curve_plots, force_plots
+from tirelib.report.explanation import fold_name
+from tirelib.report.figures.compare_forces import force_plots
 from tirelib.report.figures.compare_heat import DEGREES, heat_maps
 from tirelib.report.figures.compare_plot import ANGLE_TITLE, Plot, styled_figure
 from tirelib.report.figures.compare_waveforms import HALF
@@ -23,6 +24,10 @@ from tirelib.report.parts_page import write_parts_page
 from tirelib.report.style import BLUE, FAINT, INK, RED
 
 TITLE = "What the model lacked"
+_SLIPS = {
+    "slip_angle": ("slip_angle", float(np.rad2deg(1.0)), "slip angle [deg] (ISO 8855)"),
+    "slip_ratio": ("slip_ratio", 1.0, "slip ratio [-] (ISO 8855)"),
+}
 WORDS = {"noise": "noise", "ustrain": "microstrain"}
 
 
@@ -79,7 +84,11 @@ def parts_of(journey: Journey) -> list[Part]:
     if isinstance(before, ForceComparison) or isinstance(after, ForceComparison):
         assert isinstance(before, ForceComparison)  # noqa: S101 - both are of one quantity
         assert isinstance(after, ForceComparison)  # noqa: S101
-        curves, maps, errors = _force_curves(before, after), _force_maps(before, after), []
+        curves, maps, errors = (
+            _force_curves(before, after),
+            _force_maps(before, after),
+            part_errors(journey.document),
+        )
     else:
         curves, maps = waveforms(before, after), _maps(before, after)
         errors = run_errors(journey.steps, before.error.unit)
@@ -87,7 +96,8 @@ def parts_of(journey: Journey) -> list[Part]:
     return [
         Part("The error, step by step", "error", tables=[_table(journey)],
              plots=[fall] if fall is not None else []),
-        Part("Each run, before and after", "runs", tables=_held_out(journey), plots=errors),
+        Part("Each part of the measurements, before and after", "runs",
+             tables=_held_out(journey), plots=errors),
         Part("Measured, before and after", "curves", plots=curves),
         Part("Where the model fails, before and after", "maps", plots=maps),
     ]  # fmt: skip
@@ -112,22 +122,45 @@ def _table(journey: Journey) -> Table:
 
 
 def _held_out(journey: Journey) -> list[Table]:
-    """Return what was held out at the last step, fold by fold."""
-    folds = [fold for step in journey.steps for fold in step["held_out"]]
-    if not folds:
-        return []
-    unit = WORDS.get(journey.document["error_unit"], journey.document["error_unit"])
+    """Return what was held out of the fits, of the first model and of the last."""
+    told = journey.document
+    unit = WORDS.get(told["error_unit"], told["error_unit"])
     rows = [
-        [
-            step["effect"], f"{fold['condition']} {number(fold['value'], 4)} {fold['unit']}",
-            str(fold.get("runs", fold.get("points"))), number(fold["error_before"], 3),
-            number(fold["error_after"], 3),
-        ]
-        for step in journey.steps for fold in step["held_out"]
-    ]  # fmt: skip
-    size = "runs" if "runs" in folds[0] else "points"
-    return [Table("Held out of the fit", ["added", "held out", size, f"before [{unit}]",
-                                          f"after [{unit}]"], rows, texts=2)]  # fmt: skip
+        [fold_name(fold), number(fold["error_before"], 3), number(fold["error_after"], 3)]
+        for fold in told["held_out"]
+    ]
+    if not rows:
+        return []
+    return [Table("Held out of the fit", ["held out", f"before [{unit}]", f"after [{unit}]"], rows)]
+
+
+def part_errors(told: Mapping[str, Any]) -> list[Plot]:
+    """Return the errors of all that is fitted and of each part held out, before and after.
+
+    Parameters
+    ----------
+    told : mapping
+        ``tirelib-explanation/1`` or ``tirelib-extension/1``.
+    """
+    if not told["held_out"]:
+        return []
+    unit = WORDS.get(told["error_unit"], told["error_unit"])
+    names = ["fitted to all", *(f"held out: {fold_name(fold)}" for fold in told["held_out"])]
+    rows = [told, *told["held_out"]]
+    figure = go.Figure()
+    for when, colour in (("before", RED), ("after", BLUE)):
+        figure.add_bar(x=names, y=[row[f"error_{when}"] for row in rows], name=when,
+                       marker={"color": colour})  # fmt: skip
+    figure.update_yaxes(title=f"error [{unit}]", rangemode="tozero")
+    figure.update_xaxes(tickangle=-25)
+    styled_figure(figure, 420, barmode="group", legend={"orientation": "h", "y": 1.12, "x": 0.0})
+    data = [[name, row["error_before"], row["error_after"]]
+            for name, row in zip(names, rows, strict=True)]  # fmt: skip
+    return [Plot(
+        "part-errors", "All that is fitted, and each part held out",
+        "Held out: the error on what took no part in the fit.", figure,
+        ["part", f"before [{unit}]", f"after [{unit}]"], data,
+    )]  # fmt: skip
 
 
 def run_errors(steps: Sequence[Mapping[str, Any]], unit: str) -> list[Plot]:
@@ -240,11 +273,46 @@ def _maps(before: Comparison, after: Comparison) -> list[Plot]:
 
 
 def _force_curves(before: ForceComparison, after: ForceComparison) -> list[Plot]:
-    return [
-        plot
-        for found, when in ((before, "before"), (after, "after"))
-        for plot in _named(curve_plots(found, curves_of(found))[-1:], when)
-    ]
+    """Return measured and modelled forces on the worst, the median and the best curve of before."""
+    named = ranked(curves_of(before))
+    return [_force_curve(before, after, named[name], name) for name in reversed(list(named))]
+
+
+def _force_curve(before: ForceComparison, after: ForceComparison, curve: Curve, name: str) -> Plot:
+    unit, k = UNITS[before.quantity], curve.member
+    slip, factor, title = _SLIPS[slip_of(before.quantity)]
+    x, measured = factor * getattr(before.data, slip)[k], before.measured[k]
+    figure = make_subplots(
+        rows=2, cols=1, shared_xaxes=True, row_heights=[0.62, 0.38], vertical_spacing=0.06
+    )
+    figure.add_scatter(x=x, y=measured, mode="markers", name="measured", row=1, col=1,
+                       marker={"color": INK, "size": 7, "symbol": "circle-open"})  # fmt: skip
+    columns = [x, measured]
+    for found, word, colour, symbol in (
+        (before, "before", RED, "x"), (after, "after", BLUE, "circle")
+    ):  # fmt: skip
+        marker = {"color": colour, "size": 5, "symbol": symbol}
+        figure.add_scatter(x=x, y=found.predicted[k], mode="markers", name=f"model {word}",
+                           marker=marker, row=1, col=1)  # fmt: skip
+        figure.add_scatter(x=x, y=found.difference[k], mode="markers", showlegend=False,
+                           name=f"model {word} less measured", marker=marker,
+                           row=2, col=1)  # fmt: skip
+        columns += [found.predicted[k], found.difference[k]]
+    figure.add_hline(y=0.0, line={"color": FAINT, "width": 1}, row=2, col=1)
+    figure.update_xaxes(title=title, row=2, col=1)
+    figure.update_yaxes(title=f"{before.quantity} [{unit}] (ISO 8855)", row=1, col=1)
+    figure.update_yaxes(title=f"difference<br>[{unit}]", row=2, col=1)
+    styled_figure(figure, 540, legend={"orientation": "h", "y": 1.1, "x": 0.0})
+    size = [float(np.sqrt(np.mean(found.difference[k] ** 2))) for found in (before, after)]
+    return Plot(
+        f"curve-{name}", f"{name.capitalize()} curve of before: {curve.words}",
+        f"The difference was {number(size[0], 3)} {unit} rms and is {number(size[1], 3)}. The "
+        "models are computed at the conditions of each point.", figure,
+        [title, *(f"{what} [{unit}]" for what in (
+            "measured", "model before", "before less measured", "model after",
+            "after less measured"))],
+        np.round(np.stack(columns, axis=1), 5).tolist(),
+    )  # fmt: skip
 
 
 def _force_maps(before: ForceComparison, after: ForceComparison) -> list[Plot]:
