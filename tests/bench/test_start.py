@@ -53,6 +53,13 @@ def test_what_only_makes_it_worse_is_a_note() -> None:
     assert text.count("\n") == 1
 
 
+def test_a_camber_that_nobody_gives_is_said_with_what_it_costs() -> None:
+    text = said(Given((serial("a", 0),), Conditions.constant(18.0, pressure=2e5), ()))
+    assert text.startswith("note: no camber: standard deviations of Fy and alpha are wider by what")
+    assert "turns that owe most of theirs to it say camber_unknown; give --camber DEG" in text
+    assert text.count("\n") == 1
+
+
 def test_what_a_bus_tells_is_not_missed_but_for_the_wheels_it_leaves_out() -> None:
     sources = (serial("a", 0), serial("b", 3), vehicle("c"))  # pressure of wheel 3, speed of all
     text = said(Given(sources, Conditions.constant(camber=0.0), ()), "pressure")

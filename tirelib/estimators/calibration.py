@@ -101,9 +101,9 @@ class Calibration:
     reference : ReferenceTurn or None
         A measured turn that the calibration takes for valid.
     geometry : mapping of str to float, [m]
-        Of the tire, as far as its campaigns gave it.
+        Dimensions of the tire, as far as its campaigns gave them.
     version : int
-        Of the file format that it was read from.
+        Version of the file format that it was read from.
     """
 
     tire: str

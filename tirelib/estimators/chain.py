@@ -104,8 +104,8 @@ class Chain:
         For each quantity, the regressors whose calibrated range decides on validity, and the range
         of the quantity itself under its own name.
     laws, force_laws : ConditionLaws
-        Of load and radius; of lateral force and slip angle, where only conditions that were varied
-        while there was lateral force count as varied.
+        Laws of load and radius; laws of lateral force and slip angle, where only conditions that
+        were varied while there was lateral force count as varied.
     cloud : Cloud or None
         Combinations of traction and lateral distortion that were calibrated.
     mean_load : float, [N]

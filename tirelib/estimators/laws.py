@@ -73,7 +73,7 @@ class ConditionLaws:
     pressure_fitted, speed_fitted : bool
         True where the condition was varied, so that the regression holds its effect.
     contact_width, radius : float, [m]
-        Of the pressure law; NaN where the campaign does not give them.
+        Belt width and ring radius in the pressure law; NaN where the campaign does not give them.
     """
 
     pressure: tuple[float, float]

@@ -94,12 +94,12 @@ class Likeness:
     Attributes
     ----------
     variables, terms
-        Of the polynomials, as in `tirelib.estimators.polynomial.Polynomial`.
+        As in `tirelib.estimators.polynomial.Polynomial`.
     names : tuple of m str
-        Regressors that are foretold.
+        Regressors that the polynomials predict.
     coefficients : array, shape (k, m)
     covariance : array, shape (m, m)
-        Of one turn about what is foretold.
+        Covariance of one turn about what is predicted.
     limit : float
         Value of D^2 above which a turn is not of this tire.
     """
@@ -112,7 +112,7 @@ class Likeness:
     limit: float
 
     def rest(self, values: Mapping[str, FloatArray]) -> FloatArray:
-        """Return what the regressors differ from what is foretold, shape (n, m)."""
+        """Return how far the regressors lie from what is predicted, shape (n, m)."""
         seen = np.stack([values[name] for name in self.names], axis=1)
         return seen - design(self.variables, self.terms, values) @ self.coefficients
 
@@ -142,7 +142,7 @@ class Likeness:
         camber : shape (n,), [rad], optional
             Standard deviation of a camber that nobody gave; 0 where it is known.
         force_laws : ConditionLaws, optional
-            Of what was varied while there was lateral force; without, as `laws`.
+            Laws of what was varied while there was lateral force; without them, `laws` hold.
         """
         pressure, unknown = laws.pressure_departure(values)
         sided = np.hypot(*(force_laws or laws).pressure_departure(values))

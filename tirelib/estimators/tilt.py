@@ -51,7 +51,7 @@ def read(rest: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
     >>> camber.round(4).tolist(), std.round(4).tolist()
     ([0.0185, -0.0], [0.0096, 0.0349])
     """
-    told = np.isfinite(rest) & np.isfinite(noise)
-    weight = np.where(told, (SLOPE * USUAL / np.where(told, noise, 1.0)) ** 2, 0.0)
+    seen = np.isfinite(rest) & np.isfinite(noise)
+    weight = np.where(seen, (SLOPE * USUAL / np.where(seen, noise, 1.0)) ** 2, 0.0)
     share = weight / (1.0 + weight)
-    return share * np.where(told, rest, 0.0) / SLOPE, USUAL / np.sqrt(1.0 + weight)
+    return share * np.where(seen, rest, 0.0) / SLOPE, USUAL / np.sqrt(1.0 + weight)

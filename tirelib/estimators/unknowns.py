@@ -124,10 +124,10 @@ class Road:
         known = np.isfinite(wear)
         std = np.where(known, 0.0, spread(_log_height(np.linspace(*DEPTH, 81), low_high)))
         warmer = beyond(self.said(values, "tread_temperature"), self.tread_temperature)
-        told = np.isfinite(warmer)
+        given = np.isfinite(warmer)
         unknown = SOFTENING * spread(np.linspace(-TEMPERATURE, TEMPERATURE, 81))
-        value = np.where(known, wear, 0.0) - np.where(told, SOFTENING * warmer, 0.0)
-        return value, np.hypot(std, np.where(told, 0.0, unknown))
+        value = np.where(known, wear, 0.0) - np.where(given, SOFTENING * warmer, 0.0)
+        return value, np.hypot(std, np.where(given, 0.0, unknown))
 
 
 def beyond(x: FloatArray, low_high: Pair) -> FloatArray:

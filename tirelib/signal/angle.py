@@ -10,7 +10,7 @@ contact is exact. How the rate runs within that turn, up to the contact and a li
   speed, else one (`tirelib.signal.course`).
 - r, the **change from turn to turn** of what the source leaves: of q = mean rate / mean of s, which
   is the slip ratio's if the source is the speed, the rate's own without a source, and noise if the
-  source is the turn rate. Of the last two slopes of q over time the smaller is followed, and none
+  source is the turn rate. The smaller of the last two slopes of q over time is followed, and none
   where their signs differ: the limiter *minmod* (P. L. Roe, Annu. Rev. Fluid Mech. 18, 1986). So a
   lasting change is followed exactly; noise and a single jump are not.
 
@@ -38,7 +38,7 @@ LARGEST_RATIO = 2.0
 starts or locks, and polynomials say nothing of that."""
 
 Past = tuple[tuple[float, ...], ...]
-"""Of each of the last turns: its middle in time [samples], and q for each source and without."""
+"""For each of the last turns: its middle in time [samples], and q for each source and without."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +106,7 @@ def angle_law(
     Parameters
     ----------
     middle, turn : float, [samples]
-        Of the contact; since the one before.
+        Middle of the contact; samples since the one before.
     ahead : float, [samples]
         How far beyond the middle the courses reach.
     courses : mapping of name to Course
@@ -156,7 +156,7 @@ def _slip(
 ) -> tuple[float, float, float]:
     """Return q of the speed at the contact over its mean of the turn, its doubt, and what is late.
 
-    From turn to turn it is told precisely, but late; where turn rate and speed both have a course,
+    From turn to turn it is known precisely, but late; where turn rate and speed both have a course,
     these tell it at once, but with their noise. What they tell beyond the former is shrunk as their
     own coefficients are. Where the speed was hardly renewed, a turn rate that moves within the turn
     is slip as likely as not. What a measured turn rate and the contacts differ by from turn to turn
@@ -169,10 +169,10 @@ def _slip(
     at_once = speed is not None
     speed = speed or (1.0, 0.0)
     apart, variance = turn_rate[0] / speed[0] - slip, turn_rate[1] ** 2 + speed[1] ** 2
-    told = 1.0 - variance / apart**2 if at_once and apart**2 > variance else 0.0
-    left = np.hypot(slope_std, apart) * (1.0 - told)
-    direct = told * np.hypot(np.sqrt(variance), 2.0 * rate_std)
-    return slip + told * apart, float(np.hypot(left, direct)), 1.0 - told
+    share = 1.0 - variance / apart**2 if at_once and apart**2 > variance else 0.0
+    left = np.hypot(slope_std, apart) * (1.0 - share)
+    direct = share * np.hypot(np.sqrt(variance), 2.0 * rate_std)
+    return slip + share * apart, float(np.hypot(left, direct)), 1.0 - share
 
 
 def _at_contact(course: Course | None) -> tuple[float, float] | None:

@@ -43,7 +43,8 @@ LARGEST_MISSING = 0.1
 """Share of missing samples with which an offset or a mean is still formed."""
 LARGEST_PERIOD_RATIO = 2.0
 NEAR_EDGE = 3
-"""Samples before a pulse's edge that must be there, as those beside it, for the edge to count."""
+"""Samples before a pulse's edge that must be there, as the two next to it must, for the edge to
+count."""
 DRIFT_SHARE = 0.05
 MISSED_RATIO = 1.5
 """A turn with a gap that lasts this many times the one before has hidden a contact in it: two turns
@@ -202,7 +203,7 @@ class TurnCutter:
             return None, stop
         first = int(np.ceil(before.middle))
         seen = slice(max(first - self._base, 0), stop - self._base)
-        told = {
+        courses = {
             name: course(
                 self._buffer[self._gages + HELD.index(name), seen], first - contact.middle, turn
             )
@@ -210,11 +211,11 @@ class TurnCutter:
         }
         seconds = turn / self.rate
         law = angle_law(
-            contact.middle, turn, stop - contact.middle, told, self._past,
+            contact.middle, turn, stop - contact.middle, courses, self._past,
             unknown=0.5 * USUAL_CHANGE * seconds**2,
         )  # fmt: skip
         unseen = unseen_change(
-            told["speed"], turn / self.rate, _pulse(contact, law), _pulse(before, law)
+            courses["speed"], turn / self.rate, _pulse(contact, law), _pulse(before, law)
         )
         law = replace(law, slip_std=float(np.hypot(law.slip_std, law.late * unseen)))
         return law, max(stop, self._stop(contact, law))
