@@ -244,7 +244,7 @@ def _option(name: str) -> str:
 
 
 def say_missing(given: Given, calibration: Calibration, console: Console) -> None:
-    """Say what is not known before the first turn shows it."""
+    """Say what is not known, and cannot be noticed, before the first turn shows it."""
     needed, useful = missing(given, calibration)
     for name, words in needed.items():
         console.print(
@@ -256,4 +256,9 @@ def say_missing(given: Given, calibration: Calibration, console: Console) -> Non
         console.print(
             f"note: no {words}: {_WITHOUT[name]}; give {_option(name)}"
             f"--conditions FILE, or a map with [{name}]", soft_wrap=True, markup=False,
+        )  # fmt: skip
+    if not calibration.knows_tire:
+        console.print(
+            "note: this calibration cannot notice another tire on the wheel (fewer than 17 "
+            "conditions, or an earlier version); calibrate on more", soft_wrap=True, markup=False,
         )  # fmt: skip

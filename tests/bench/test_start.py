@@ -30,8 +30,8 @@ from tirelib.held import HELD
 from tirelib.units import to_si
 
 
-def said(given: Given, *needed: str) -> str:
-    calibration: Any = SimpleNamespace(needed=needed)
+def said(given: Given, *needed: str, knows_tire: bool = True) -> str:
+    calibration: Any = SimpleNamespace(needed=needed, knows_tire=knows_tire)
     console = Console(record=True, width=400, quiet=False, file=None)
     with console.capture() as captured:
         say_missing(given, calibration, console)
@@ -58,6 +58,14 @@ def test_a_camber_that_nobody_gives_is_said_with_what_it_costs() -> None:
     assert text.startswith("note: no camber: standard deviations of Fy and alpha are wider by what")
     assert "turns that owe most of theirs to it say camber_unknown; give --camber DEG" in text
     assert text.count("\n") == 1
+
+
+def test_a_calibration_that_cannot_notice_another_tire_is_said() -> None:
+    everything = Conditions.constant(18.0, pressure=2e5, camber=0.0)
+    given = Given((serial("a", 0),), everything, ())
+    assert said(given) == ""
+    text = said(given, knows_tire=False)
+    assert text.startswith("note: this calibration cannot notice another tire on the wheel")
 
 
 def test_what_a_bus_tells_is_not_missed_but_for_the_wheels_it_leaves_out() -> None:
