@@ -21,7 +21,7 @@ from road_coverage import measured, rows_of, silent, tire_of
 from bench.rig.plans import Plan
 from bench.rig.tire import NEW_DEPTH, Condition
 from tirelib.campaign import read_campaign
-from tirelib.estimators import chain, sliding, unknowns
+from tirelib.estimators import any_road, chain, sliding, unknowns
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.estimators.edge import EDGE_UNIT
@@ -33,7 +33,9 @@ from tirelib.threads import one_thread
 TRIED: tuple[tuple[ModuleType, str, str], ...] = (
     (chain, "EDGE", "Fz"), (unknowns, "UNDER_GROOVES", "Fz"), (unknowns, "SOFTENING", "Fz"),
     (unknowns, "TEMPERATURE", "Fz"), (chain, "BENT", "kappa"), (chain, "CORNERING", "alpha"),
-    (chain, "MOMENT_DOUBT", "alpha"), (sliding, "CURVE_DOUBT", "alpha"),
+    (chain, "MOMENT_DOUBT", "alpha"), (any_road, "HIDDEN", "alpha"),
+    (any_road, "HIDDEN_DOUBT", "alpha"), (any_road, "CURVE_DOUBT", "alpha"),
+    (sliding, "CURVE_DOUBT", "alpha"), (chain, "LOAD_DOUBT", "Fz"),
     (chain, "FORCE_DOUBT", "Fy"), (chain, "FORCE", "Fy"), (chain, "LAW_DOUBT", "kappa"),
 )  # fmt: skip
 """Module that uses a constant, its name, and the quantity on which it acts most."""
@@ -148,8 +150,8 @@ def shifts(name: str, seed: int, out: Path, jobs: int) -> np.ndarray:
         rest = full.likeness.rest({**values, "speed_squared": values["speed"] ** 2})[use]
         lost = own.tread_thickness - NEW_DEPTH + seen.features.tread_depth
         at = np.abs(truth["slip_angle"]), truth["Fz"]
-        share = full.sliding.forward(*at, seen.features.friction)[2]
-        share = share - full.sliding.forward(*at, full.sliding.friction)[2]
+        share = full.sliding.forward(*at, seen.features.friction)[3]
+        share = share - full.sliding.forward(*at, full.sliding.friction)[3]
         side = np.where(truth["slip_angle"] < 0.0, -1.0, 1.0)
         column = (np.log(own.tread_thickness / lost) if seen is worn else share)[use]
         odd = np.array([regressor in ODD for regressor in full.likeness.names])
@@ -158,6 +160,53 @@ def shifts(name: str, seed: int, out: Path, jobs: int) -> np.ndarray:
         shift = np.linalg.lstsq(even, rest, rcond=None)[0][1]
         found.append(np.where(odd, 0.0 if seen is worn else sided @ rest / (sided @ sided), shift))
     return np.array(found)
+
+
+def doubts(name: str, seed: int, out: Path) -> list[str]:
+    """Return what slippery roads do to one tire's estimates, as the doubts of `sliding` count it.
+
+    The runs are those of `shifts`; the calibration is dry.
+    """
+    seen = observe([read_campaign(out / f"slid-{name}-{seed}")])
+    full = read_calibration(out / f"{name}-{seed}" / "calibration.toml").chains[-1]
+    curve, truth, use = full.sliding, seen.truth, seen.usable
+    if curve is None or full.moment is None:
+        raise SystemExit(f"{name}: run build/road_coverage.py for this tire first")
+    values = compute_regressors(seen.features, range(5))
+    found = full.predict(values)[0]
+    load, angle, side = truth["Fz"], np.abs(truth["slip_angle"]), np.sign(truth["slip_angle"])
+    used = np.abs(truth["Fy"]) / load
+    friction = seen.features.friction * curve.friction / tire_of(name, seed).friction
+    told = curve.at(used, load, friction)
+    share = np.abs(
+        curve.forward(angle, load, friction)[3] - curve.share(used, curve.friction, load)
+    )
+
+    def ratio(error: np.ndarray, scale: np.ndarray, rows: np.ndarray) -> float:
+        return float(np.sqrt(np.mean(error[rows] ** 2) / np.mean(scale[rows] ** 2)))
+
+    slip = found["kappa"].value
+    at = {
+        **values, "speed_squared": values["speed"] ** 2, "load": found["Fz"].value,
+        "slip_ratio": slip, "slip_size": np.abs(slip),
+    }  # fmt: skip
+    read = side * full.moment.predict(at)[0]
+    moment = side * truth["Mz"] / (load * curve.longest(load))
+    dry = used * (1.0 - curve.share(used, curve.friction, load)) ** curve.fading
+    taken, off = dry - moment, read - moment
+    far = use & found["Fy"].valid & (taken > 0.05)
+    hidden = float(np.sum((off * taken)[far]) / np.sum(taken[far] ** 2))
+    near = use & found["Fy"].valid & ~far
+    force, heavier = np.abs(found["Fy"].value) / load - used, found["Fz"].value / load - 1.0
+    measured_doubts = {
+        "CURVE_DOUBT": ratio(angle - told.angle, told.change, use & np.isfinite(told.std)),
+        "LOAD_DOUBT": ratio(heavier, share, use & found["Fz"].valid),
+        "FORCE_DOUBT": ratio(force, share * used, use & found["Fy"].valid),
+        "HIDDEN": hidden,
+        "MOMENT_DOUBT": float(np.sqrt(np.mean(off[near] ** 2))),
+        "fitted friction": curve.friction,
+    }
+    return [f"{name}: " + "; ".join(f"{what} {x:.3f}" for what, x in measured_doubts.items())]
 
 
 def main() -> None:
@@ -175,6 +224,7 @@ def main() -> None:
         lines += measure(*asked)
         for name, (hard, slid) in zip(DRIFT, shifts(*asked).T, strict=True):
             lines.append(f"{name:18} {hard:9.4f} {slid:9.4f}")
+        lines += doubts(given.measure, given.seed, given.out)
     click.echo("\n".join(lines))
 
 

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 WHEELS = ("FL", "FR", "RL", "RR")
 """Order of the wheels in every array: front left, front right, rear left, rear right."""
+TREAD_DEPTH = 0.008
+"""Of the virtual tire, which is new [m]."""
 PRESSURE = 2.3e5
 """Inflation pressure where a vehicle has none [Pa]."""
 OWN_FRICTION = START[FRICTION]
@@ -252,6 +254,10 @@ class FourWheels:
     speed_sensors : bool
         Whether the strain tires are told the turn rates of the virtual tires where the states have
         none, as by a wheel speed sensor.
+    tread_depth : float, [m]
+        What the strain tires are told of the tread, as measured before the drive; NaN: nothing.
+    tells_friction : bool
+        Whether the strain tires are told the friction under each wheel.
     """
 
     def __init__(
@@ -266,8 +272,11 @@ class FourWheels:
         parameters: dict[str, float] | None = None,
         water: "WaterTable | None" = None,
         speed_sensors: bool = False,
+        tread_depth: float = TREAD_DEPTH,
+        tells_friction: bool = False,
     ) -> None:
         self.rate, self._water, self._speed_sensors = rate, water, speed_sensors
+        self._tread_depth, self._tells_friction = tread_depth, tells_friction
         self._options = [
             {"sample_rate": rate, "noise_std": noise, "seed": seed + at, "start_angle": angle,
              **(parameters or {})}
@@ -324,7 +333,10 @@ class FourWheels:
                 parts[name][wheel] = value
             parts["tire_valid"][wheel] = good
             measured = parts["tire_omega"][wheel] if self._speed_sensors else math.nan
-            told = told_conditions(truth, wheel, measured)
+            told = told_conditions(
+                truth, wheel, measured, self._tread_depth,
+                truth.friction[wheel] if self._tells_friction else math.nan,
+            )  # fmt: skip
             self._estimate(wheel, frame[:new], good, told, parts)
         self.told = Estimates(**parts)
         return self.told
@@ -362,8 +374,14 @@ class FourWheels:
         parts["turn"][wheel], parts["flags"][wheel] = turn, flags
 
 
-def told_conditions(truth: WheelStates, wheel: int, measured: float = math.nan) -> FloatArray:
-    """Return what a strain tire is told beside the strain, in the order of `HELD`; NaN: nothing.
+def told_conditions(
+    truth: WheelStates,
+    wheel: int,
+    measured: float = math.nan,
+    tread_depth: float = math.nan,
+    friction: float = math.nan,
+) -> FloatArray:
+    """Return what a strain tire is told with the strain, in the order of `HELD`; NaN: nothing.
 
     `measured` is the turn rate [rad/s] where the states have none.
     """
@@ -373,6 +391,8 @@ def told_conditions(truth: WheelStates, wheel: int, measured: float = math.nan) 
         "pressure": truth.pressure[wheel],
         "camber": truth.camber[wheel],
         "omega": omega if np.isfinite(omega) else measured,
+        "tread_depth": tread_depth,
+        "friction": friction,
     }
     return np.array([known.get(name, np.nan) for name in HELD])
 

@@ -72,10 +72,6 @@ def runs() -> dict[str, StabilityOutcome]:
     return {name: StabilityOutcome(name, (run,)) for name, run in found.items()}
 
 
-@pytest.mark.xfail(
-    reason="on a road whose friction nobody tells, the slip angle's interval is too wide to act "
-    "on: the stored calibration was made before friction was a declared unknown"
-)
 def test_with_strain_tires_the_rear_axle_is_held_as_with_the_truth(
     runs: dict[str, StabilityOutcome],
 ) -> None:

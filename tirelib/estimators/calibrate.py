@@ -18,7 +18,7 @@ from tirelib.estimators import basis
 from tirelib.estimators.chain import AngleModel, Chain
 from tirelib.estimators.ends import End, growth, outermost
 from tirelib.estimators.fit import Fit, bands_of, fit_best, levels_of
-from tirelib.estimators.fit_sliding import fit_sliding
+from tirelib.estimators.fit_sliding import Runs, fit_sliding
 from tirelib.estimators.floor import with_floor
 from tirelib.estimators.grow import grow
 from tirelib.estimators.laws import ConditionLaws
@@ -155,7 +155,9 @@ def calibrate_chain(
     load, mean_load = _fit_load(links, laws, say)
     radius = _or_refused(links, "kappa", lambda: _fit_radius(links, say))
     force = _or_refused(links, "Fy", lambda: _fit_force(links, say))
-    moment, sliding = _fit_moment(links, force is not None, say), fit_sliding_of(links)
+    sliding = fit_sliding_of(links)
+    moment = _fit_moment(links, force is not None, sliding, say)
+    drag = _fit_drag(links, sliding, say)
     angle = _or_refused(links, "alpha", lambda: _fit_angle(links, force is not None, sliding, say))
     chain = Chain(
         gages=tuple(gages),
@@ -168,6 +170,7 @@ def calibrate_chain(
         force=force,
         angle=angle,
         moment=moment,
+        drag=drag,
         sliding=sliding,
         road=_road(links),
     )
@@ -352,14 +355,35 @@ def _fit_odd(links: Links, truth: FloatArray, what: str) -> Fit:
     )  # fmt: skip
 
 
-def _fit_moment(links: Links, has_force: bool, say: Callable[[str], None]) -> Polynomial | None:
-    """Aligning moment, from the regressors of the lateral force; None where it was not measured."""
+def _fit_moment(
+    links: Links, has_force: bool, sliding: SlidingCurve | None, say: Callable[[str], None]
+) -> Polynomial | None:
+    """Mz / (Fz q0), from the regressors of the lateral force; None where it was not measured."""
     truth = links.truth["Mz"]
-    if not has_force or not np.isfinite(truth).all() or np.ptp(truth) == 0.0:
+    if not has_force or sliding is None or not np.isfinite(truth).all() or np.ptp(truth) == 0.0:
         return None
     say("Mz")
+    load = links.truth["Fz"]
     try:
-        return _fit_odd(links, truth, "Mz").model
+        return _fit_odd(links, truth / (load * sliding.longest(load)), "Mz").model
+    except CalibrationError:
+        return None
+
+
+def _fit_drag(
+    links: Links, sliding: SlidingCurve | None, say: Callable[[str], None]
+) -> Polynomial | None:
+    """-Fx / Fz, from the regressors of the load; None where it was not measured or not varied."""
+    if sliding is None or not np.isfinite(sliding.slant):
+        return None
+    say("Fx")
+    pull, varying = -links.truth["Fx"] / links.truth["Fz"], varying_of(links.values, list(VARIES))
+    try:
+        return fit_best(
+            links.values, pull, links.groups, basis.load_candidates(varying), odd=(*ODD, "camber"),
+            level=links.load_level(), between=links.between(), outermost=links.outermost(),
+            what="Fx",
+        ).model  # fmt: skip
     except CalibrationError:
         return None
 
@@ -371,8 +395,11 @@ def fit_sliding_of(links: Links) -> SlidingCurve | None:
     if not all(np.isfinite(x).all() for x in needed) or np.ptp(needed[0]) < LEAST_ANGLE:
         return None
     return fit_sliding(
-        *needed, truth["Mz"], links.values["camber"], truth["slip_ratio"], links.values["friction"]
-    )
+        Runs(
+            *needed, truth["Fx"], truth["Mz"], links.values["camber"], truth["slip_ratio"],
+            links.values["friction"],
+        )
+    )  # fmt: skip
 
 
 def _road(links: Links) -> Road:
@@ -443,8 +470,9 @@ def _by_friction(links: Links, sliding: SlidingCurve | None) -> tuple[FloatArray
         return none, none
     used = np.abs(links.truth["Fy"] / links.truth["Fz"])
     told = sliding.at(
-        used, links.truth["Fz"], np.where(np.isnan(friction), sliding.friction, friction)
-    )
+        used, links.truth["Fz"], np.where(np.isnan(friction), sliding.friction, friction),
+        links.truth["slip_ratio"],
+    )  # fmt: skip
     side = np.where(links.truth["slip_angle"] < 0.0, -1.0, 1.0)
     return side * told.change, np.fmin(told.std, 1.0)
 

@@ -11,7 +11,7 @@ from tirelib.estimators.reference_turn import CONDITIONS
 from tirelib.estimators.regressors import EVEN, ODD, SHAPE
 
 AXES = "iso"
-UNITS = {"Fz": "N", "R_eff": "m", "Fy": "N", "Mz": "N m", "alpha": "rad"}
+UNITS = {"Fz": "N", "R_eff": "m", "Fy": "N", "Mz": "1", "Fx": "1", "alpha": "rad"}
 """Models of a chain with the unit of their coefficients."""
 REGRESSORS = frozenset(
     (*EVEN, *ODD, *SHAPE, "pressure", "speed_squared", "camber", "load", "utilisation",
@@ -101,13 +101,13 @@ def _sliding(table: Any, where: str) -> Iterator[str]:
     if not isinstance(table, dict):
         yield f"{where}: is no table"
         return
-    for name in ("friction", "sharpness", "fading"):
+    for name in ("friction", "grip", "sharpness", "fading"):
         if not _finite(table.get(name)) or table[name] <= 0.0:
             yield f"{where}.{name} = {table.get(name)!r}; a number above 0 is needed"
-    for name in ("misfit", "largest"):
+    for name in ("friction_std", "misfit", "slant"):
         if not _number(table.get(name)) or not table[name] >= 0.0:
             yield f"{where}.{name} = {table.get(name)!r}; a number from 0 is needed"
-    for name, most in (("stiffness", 3), ("trail", 3), ("camber", 2)):
+    for name, most in (("stiffness", 3), ("trail", 3), ("ratio", 3), ("camber", 2)):
         row: Any = table.get(name)
         good = isinstance(row, list) and 0 < len(row) <= most and all(map(_finite, row))
         if not good or (name == "camber" and len(row) != most):

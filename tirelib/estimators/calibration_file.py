@@ -32,7 +32,7 @@ FORMAT = "tirelib-calibration/2"
 FIRST_FORMAT = "tirelib-calibration/1"
 _ROAD = tuple(field.name for field in fields(Road))
 _NUMBERS = re.compile(r"\[\n((?:\s+[-+.\w]+,\n)+)\s*\]")
-_MODEL_UNITS = {"Fz": "N", "R_eff": "m", "Fy": "N", "Mz": "N m", "alpha": "rad"}
+_MODEL_UNITS = {"Fz": "N", "R_eff": "m", "Fy": "N", "Mz": "1", "Fx": "1", "alpha": "rad"}
 
 
 def write_calibration(
@@ -168,7 +168,10 @@ def _chain_table(chain: Chain) -> dict[str, Any]:
             field.name: list(x) if isinstance(x := getattr(curve, field.name), tuple) else x
             for field in fields(curve)
         }
-    models = {"Fz": chain.load, "R_eff": chain.radius, "Fy": chain.force, "Mz": chain.moment}
+    models = {
+        "Fz": chain.load, "R_eff": chain.radius, "Fy": chain.force, "Mz": chain.moment,
+        "Fx": chain.drag,
+    }  # fmt: skip
     if chain.likeness is not None:
         table["likeness"] = _likeness_table(chain.likeness)
     for name, model in models.items():
@@ -236,6 +239,7 @@ def _chain(table: Mapping[str, Any]) -> Chain:
         angle=angle,
         cloud=cloud,
         moment=_polynomial(table["Mz"]) if "Mz" in table else None,
+        drag=_polynomial(table["Fx"]) if "Fx" in table else None,
         sliding=_sliding(table, angle),
         road=Road(**{name: _pair(pair) for name, pair in table.get("road", {}).items()}),
         likeness=_likeness(table["likeness"]) if "likeness" in table else None,

@@ -21,6 +21,7 @@ import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.estimators import tilt
+from tirelib.estimators.any_road import Seen, tell
 from tirelib.estimators.doubt import moved_by
 from tirelib.estimators.laws import (
     RADIUS_DOUBT,
@@ -111,7 +112,9 @@ class Chain:
     mean_load : float, [N]
         Stands for the load where no load model could be calibrated.
     moment : Polynomial or None
-        Aligning moment, [N m].
+        Aligning moment over load and longest trail, Mz / (Fz q0), [1].
+    drag : Polynomial or None
+        Longitudinal force over load, -Fx / Fz, [1].
     sliding : SlidingCurve or None
         The cornering curve on roads of other friction.
     road : Road
@@ -131,6 +134,7 @@ class Chain:
     angle: AngleModel | None = None
     cloud: Cloud | None = None
     moment: Polynomial | None = None
+    drag: Polynomial | None = None
     sliding: SlidingCurve | None = None
     road: Road = field(default_factory=Road)
     likeness: Likeness | None = None
@@ -212,7 +216,7 @@ class Chain:
                 kappa = gain * radius - 1.0
             kappa = np.where(values["speed"] > 0.0, kappa, np.nan)
             std = np.abs(gain) * radius_std
-            values["slip_ratio"] = kappa
+            values["slip_ratio"], values["slip_std"] = kappa, std
             valid = self._valid("kappa", values, kappa, std) & plausible
             result["kappa"] = Estimate(kappa, std, valid)
         values["slip_size"] = np.abs(values["slip_ratio"])
@@ -281,7 +285,10 @@ class Chain:
         harder, unknown = self.road.hardened(values)
         # a stiffer tread hides load, so the utilisation seems larger, and turns it into more force
         hidden = self._load_per_hardening() / np.abs(load)
-        both = slope * np.abs(values["utilisation"]) * hidden + CORNERING * np.abs(angle)
+        lighter = slope * np.abs(values["utilisation"])
+        if self.sliding is not None:  # and the tire is stiffer for its load than it seems
+            lighter = lighter + self.sliding.load_power(np.maximum(load, 1.0)) * np.abs(angle)
+        both = np.maximum(lighter, 0.0) * hidden + CORNERING * np.abs(angle)
         doubt = both * np.hypot(unknown, LAW_DOUBT * harder)
         std = np.fmin(np.hypot(std, doubt), WIDEST)
         return Estimate(angle * (1.0 - CORNERING * harder), std, told)
@@ -303,23 +310,31 @@ class Chain:
         if curve is None:
             return None
         camber, friction = np.nan_to_num(values["camber"]), self.road.said(values, "friction")
-        load = np.maximum(load, 1.0)
+        load, slip = np.maximum(load, 1.0), values["slip_ratio"]
         used = -force / load - curve.camber[0] * camber
         side = np.where(used < 0.0, -1.0, 1.0)
         unseen = self.road.unseen_friction(curve.friction)
         known = np.isfinite(friction)
-        told = curve.at(np.abs(used), load, np.where(known, friction, curve.friction))
+        told = curve.at(np.abs(used), load, np.where(known, friction, curve.friction), slip)
         if not known.all():
             moment, std = np.zeros_like(used), np.full_like(used, np.inf)
+            pull, pull_std = moment, std
             if self.moment is not None:
                 moment, std = self.moment.predict(values)
-                moment = (moment / load - curve.camber[1] * camber) * side
-                doubt = np.hypot(curve.misfit, MOMENT_DOUBT * unseen * curve.largest)
-                free = np.abs(values["slip_ratio"]) <= FREE  # not where it is unknown
-                std = np.where(free, np.hypot(std / load, doubt), np.inf)
+                moment = (moment - curve.camber[1] * camber) * side
+                free = np.abs(slip) <= FREE  # not where it is unknown
+                doubt = np.hypot(curve.misfit, MOMENT_DOUBT * unseen)
+                std = np.where(free, np.hypot(std, doubt), np.inf)
+            if self.drag is not None:
+                pull, pull_std = self.drag.predict(values)
+                pull_std = np.where(np.isfinite(slip), pull_std, np.inf)
             widest = max([known.high for known in self.guards["alpha"] if known.name == "alpha"]
                          or [WIDEST])  # fmt: skip
-            told = told.where(known, curve.told(np.abs(used), moment, std, load, widest))
+            seen = Seen(
+                np.abs(used), load, slip, values.get("slip_std", 0.0 * used), moment, std, pull,
+                pull_std, unseen,
+            )  # fmt: skip
+            told = told.where(known, tell(curve, seen, widest))
         return replace(told, change=side * told.change, sliding=unseen * told.sliding)
 
     def _tilt(

@@ -1,25 +1,27 @@
-r"""Slip angle where the friction of the road is not known: what the pneumatic trail tells.
+r"""Slip angle where the friction of the road is not known: what moment and traction tell.
 
-In the rear of the contact the tread slides, more of it the larger the slip angle and the lower the
-friction. With the sliding share t, the lateral utilisation u = Fy / Fz, the friction mu and the
-pneumatic trail q = -Mz / Fy,
+In the rear of the contact the tread slides, more of it the larger the slip and the lower the
+friction. With the lateral slip :math:`s_y = \sin\alpha / (1 + \kappa)`, the longitudinal one
+:math:`s_x = \cos\alpha / (1 + \kappa) - 1`, the sliding share t, the friction mu and the
+utilisations :math:`u_x, u_y` (forces over Fz, in the direction of the slip),
 
-.. math:: u = \mu\,[1 - (1 - t)^n], \qquad q = q_0 (1 - t)^m, \qquad
-          \tan\alpha = \frac{n\,\mu\,t}{c}
+.. math:: \sigma = \sqrt{(r s_x)^2 + s_y^2}, \quad \sigma = \frac{n\,\mu\,t}{c}, \quad
+          u = \mu\,[1 - (1 - t)^n], \quad \frac{u_x}{r s_x} = \frac{u_y}{s_y}
+          = \frac{u}{\sigma}, \quad q = q_0 (1 - t)^m
 
-with c the cornering stiffness over the load. A brush with a parabola of pressure has n = 3 and
-nearly m = 2 (Pacejka, Tire and Vehicle Dynamics, 3.2); n and m, c and :math:`q_0` over the load are
-fitted to the calibration's own cornering curve. Friction enters by similarity: u, mu and tan alpha
-grow together, at the same t and q.
+with c the cornering stiffness over the load, r the stiffness along over that across, and q the
+pneumatic trail -Mz / Fy of a wheel that rolls freely. A brush with a parabola of pressure has n = 3
+and nearly m = 2 (Pacejka, Tire and Vehicle Dynamics, 3.2); all are fitted to the calibration's own
+runs. Friction enters by similarity: u, mu and sigma grow together, at the same t and q.
 
-So u alone leaves the slip angle open: any friction above u will do. The trail closes it: it falls
-with t whatever the friction. For given u, a friction and a slip angle that are evenly spread over
-their ranges give t the density :math:`\propto [1 - (1 - t)^n]^{-2}`; beyond t = 1 the tread slides
-as a whole, u is the friction and the slip angle any larger one. This density, times the
-likelihood of the moment that was read from the strain, has the mean and the standard deviation
-that are told. Where the moment says nothing, the angle stays that of the calibrated road, and how
-far the mean lies from it is doubt. So it is under brake and drive, whose force turns the contact
-too: the trail is that of a wheel that rolls freely.
+So :math:`u_y` alone leaves the slip angle open: any friction above it will do. Two more readings of
+the strain close it. The trail falls with t whatever the friction. And a wheel that is braked or
+driven is pulled against its slip: where :math:`s_x` is known, the direction of the force is that of
+the slip. For given :math:`u_y`, a friction and a lateral slip that are evenly spread over their
+ranges give t the density :math:`\propto (\sigma / s_y) [1 - (1 - t)^n]^{-2}`; beyond t = 1 the
+tread slides as a whole, and the slip is any larger one. This density, times the likelihood of the
+readings, has the mean and the standard deviation that are told. Where they say nothing, the angle
+stays that of the calibrated road, and how far the mean lies from it is doubt.
 """
 
 from dataclasses import dataclass, fields
@@ -28,31 +30,30 @@ import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.estimators.polynomial import Polynomial
-from tirelib.estimators.unknowns import FRICTION
 
 LOAD = 4000.0
 """Unit of the load in c and q0, [N]."""
-MOMENT_DOUBT = 0.06
-"""Standard deviation of the moment on roads that were not calibrated, over the largest Mz / Fz."""
+MOMENT_DOUBT = 0.03
+"""Standard deviation of Mz / (Fz q0) on roads that were not calibrated."""
 CURVE_DOUBT = 0.3
 """Relative standard deviation of what another friction changes in the slip angle."""
-LOAD_DOUBT, FORCE_DOUBT = 0.02, 0.25
+LOAD_DOUBT, FORCE_DOUBT = 0.025, 0.1
 """Relative standard deviation of Fz and Fy per unit of sliding share that was not calibrated."""
+USUAL_FRICTION = (1.0, 0.1)
+"""Friction of a calibration that does not say, and its standard deviation."""
 BRUSH = (3.0, 2.0)
 """Sharpness and fading of a brush with a parabola of pressure."""
 LEAST_SLOPE = 0.01
 """Floor of d alpha / d u of an earlier calibration, [rad]."""
-ROUGHER = 1.15
-"""The roughest road has this friction at least, over that of the calibration."""
-NODES = 64
-WHOLE = 6
-"""Slip angles that stand for those beyond full sliding."""
 FREE = 0.02
-"""Slip ratio up to which a wheel counts as freely rolling: the curve is fitted to such runs."""
-LEAST_UTILISATION = 1e-3
+"""Slip ratio up to which a wheel counts as freely rolling: there the trail is that of the curve."""
+HALVINGS = 26
+"""Steps in which a sliding share is found, to 1e-8."""
+LEAST_ROLLING = 0.1
+"""Floor of 1 + slip ratio: a wheel that hardly turns."""
+TINY = 1e-12
 STEEPEST = 0.1
 """Least 1 - t at which the slope d alpha / d u is taken."""
-_X, _W = np.polynomial.legendre.leggauss(NODES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,131 +92,175 @@ class SlidingCurve:
 
     Attributes
     ----------
-    friction : float
-        Of the road on which it was calibrated: given, or fitted where the data tell.
+    friction, friction_std : float
+        Of the road on which it was calibrated: given (and certain), or fitted.
+    grip : float
+        Largest utilisation over the friction.
     sharpness, fading : float
         n and m.
-    stiffness, trail : tuples of three and two floats
-        Logarithms of c [1] and q0 [m] as polynomials of ln(load / 4 kN).
-    camber : (float, float), [1/rad], [m/rad]
-        Parts of u and of Mz / Fz that a camber adds.
-    misfit : float, [m]
-        Standard deviation of Mz / Fz about the curve.
-    largest : float, [m]
-        Largest Mz / Fz that was calibrated.
+    stiffness, trail, ratio : tuples of up to three floats
+        Logarithms of c [1], q0 [m] and r [1] as polynomials of ln(load / 4 kN).
+    camber : (float, float), [1/rad]
+        Parts of u_y and of Mz / (Fz q0) that a camber adds.
+    misfit : float
+        Standard deviation of Mz / (Fz q0) about the curve.
+    slant : float
+        Relative standard deviation of u_x about the curve; infinite where it was not measured.
     """
 
     friction: float
+    friction_std: float
+    grip: float
     sharpness: float
     fading: float
     stiffness: tuple[float, ...]
     trail: tuple[float, ...]
+    ratio: tuple[float, ...]
     camber: tuple[float, float]
     misfit: float
-    largest: float
+    slant: float
 
     def cornering(self, load: FloatArray) -> FloatArray:
         """Return c, the cornering stiffness over the load."""
-        return np.exp(np.polynomial.polynomial.polyval(np.log(load / LOAD), self.stiffness))
+        return _power_series(self.stiffness, load)
+
+    def load_power(self, load: FloatArray) -> FloatArray:
+        """Return d ln c / d ln load."""
+        x = np.log(load / LOAD)
+        slope = np.polynomial.polynomial.polyder(np.array(self.stiffness))
+        return np.asarray(np.polynomial.polynomial.polyval(x, slope) if slope.size else 0.0 * x)
 
     def longest(self, load: FloatArray) -> FloatArray:
         """Return q0, the trail without sliding, [m]."""
-        return np.exp(np.polynomial.polynomial.polyval(np.log(load / LOAD), self.trail))
+        return _power_series(self.trail, load)
 
-    def share(self, used: FloatArray, friction: FloatArray | float) -> FloatArray:
-        """Return t at a utilisation; 1 where the friction is used up."""
-        rest = np.maximum(1.0 - used / friction, 0.0)
-        return np.asarray(1.0 - rest ** (1.0 / self.sharpness), dtype=np.float64)
+    def stiffer(self, load: FloatArray) -> FloatArray:
+        """Return r, the stiffness along over that across."""
+        return _power_series(self.ratio, load)
 
-    def forward(
-        self, angle: FloatArray, load: FloatArray, friction: FloatArray | float
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return u, Mz / Fz and t, sizes, at slip angles [rad]."""
-        t = np.tan(np.abs(angle)) * self.cornering(load) / (self.sharpness * friction)
-        t = np.minimum(t, 1.0)
-        used = friction * (1.0 - (1.0 - t) ** self.sharpness)
-        return used, used * self.longest(load) * (1.0 - t) ** self.fading, t
+    def along(self, angle: FloatArray, slip_ratio: FloatArray, load: FloatArray) -> FloatArray:
+        """Return r s_x at a slip angle [rad], positive under brake; 0 where no slip ratio is."""
+        slip = np.cos(angle) / np.maximum(1.0 + slip_ratio, LEAST_ROLLING) - 1.0
+        return np.asarray(self.stiffer(load) * np.nan_to_num(slip))
 
-    def at(self, used: FloatArray, load: FloatArray, friction: FloatArray) -> Told:
-        """Return what a utilisation tells on a road of known friction."""
-        c = self.cornering(load)
-        here, there = self.share(used, friction), self.share(used, self.friction)
-        angle = np.arctan(self.sharpness * friction * here / c)
-        usual = np.arctan(self.sharpness * self.friction * there / c)
-        change = np.where(friction == self.friction, 0.0, angle - usual)
-        std = np.where(used < friction, CURVE_DOUBT * np.abs(change), np.inf)
-        return Told(angle, std, change, self._slope(here, c), np.abs(here - there))
-
-    def told(
+    def share(
         self,
         used: FloatArray,
-        moment: FloatArray,
-        moment_std: FloatArray,
+        friction: FloatArray | float,
         load: FloatArray,
-        widest: float,
-    ) -> Told:
-        """Return what utilisation and moment tell where the friction is not known.
+        along: FloatArray | float = 0.0,
+    ) -> FloatArray:
+        """Return t at a lateral utilisation; 1 where the tread slides as a whole."""
+        n, effective = self.sharpness, self.grip * np.asarray(friction)
+        rest = np.maximum(1.0 - used / effective, 0.0)
+        low = np.asarray(1.0 - rest ** (1.0 / n) + 0.0 * along, dtype=np.float64)
+        if not np.any(along):
+            return low
+        pull = np.abs(self.cornering(load) * along) / (n * effective)
+        high = np.ones_like(low)
+        for _ in range(HALVINGS):
+            t = 0.5 * (low + high)
+            needs = (pull / t) ** 2 + (used / effective / (1.0 - (1.0 - t) ** n)) ** 2
+            low, high = np.where(needs > 1.0, t, low), np.where(needs > 1.0, high, t)
+        return high
 
-        Parameters
-        ----------
-        used : array, shape (n,)
-            Size of Fy / Fz.
-        moment, moment_std : arrays, shape (n,), [m]
-            Mz / Fz, positive where it aligns, and its standard deviation; infinite: not known.
-        load : array, shape (n,), [N]
-        widest : float, [rad]
-            Largest slip angle that is looked for.
-        """
+    def across(self, used: FloatArray, t: FloatArray, load: FloatArray) -> FloatArray:
+        """Return s_y at a lateral utilisation and a sliding share, below full sliding."""
         n = self.sharpness
-        used = np.maximum(used, LEAST_UTILISATION)[:, None]
-        c, longest = self.cornering(load)[:, None], self.longest(load)[:, None]
-        slippery, rough = FRICTION[0], max(FRICTION[1], ROUGHER * self.friction)
-        low, high = self.share(used, rough), self.share(used, slippery)
-        t = low + 0.5 * (high - low) * (_X + 1.0)
-        filled = np.maximum(1.0 - (1.0 - t) ** n, 1e-12)
-        angle = np.arctan(n * used * t / (c * filled))
-        weight = n * used / (c * filled**2) * 0.5 * (high - low) * _W * (angle <= widest)
-        begin = np.arctan(n * used / c)
-        room = np.maximum(widest - begin, 0.0)
-        possible = (used >= slippery) & (used <= rough)
-        beyond = begin + room * (np.arange(WHOLE) + 0.5) / WHOLE
-        angle = np.concatenate((angle, beyond), axis=1)
-        t = np.concatenate((t, np.ones_like(beyond)), axis=1)
-        weight = np.concatenate(
-            (weight, np.where(possible, room / WHOLE, 0.0) + 0.0 * beyond), axis=1
-        )
-        expected = used * longest * (1.0 - t) ** self.fading
-        with np.errstate(invalid="ignore"):
-            apart = (moment[:, None] - expected) / moment_std[:, None]
-        surprise = 0.5 * np.where(np.isfinite(apart), apart, 0.0) ** 2
-        likely = np.exp(surprise.min(axis=1, keepdims=True) - surprise)
-        middle, variance = _moments(angle, weight * likely)
-        usual_t = self.share(used, self.friction)
-        usual = np.arctan(n * self.friction * usual_t / c)[:, 0]
-        _, open_ = _moments(angle, weight)
-        # where the moment tells nothing the angle stays that of the calibrated road
-        with np.errstate(invalid="ignore", divide="ignore"):
-            learnt = np.nan_to_num(np.clip(1.0 - variance / open_, 0.0, 1.0))
-        change = learnt * (middle - usual)
-        rest = middle - usual - change
-        std = np.sqrt(variance + rest**2 + (CURVE_DOUBT * change) ** 2)
-        at, scatter = _moments(t, weight * likely)
-        sliding = np.sqrt(scatter + (at - usual_t[:, 0]) ** 2)
-        # at a share that is known the angle grows with u in proportion
-        slope = learnt * middle / used[:, 0] + (1.0 - learnt) * self._slope(at, c[:, 0])
-        return Told(usual + change, std, change, slope, sliding)
+        filled = np.maximum(1.0 - (1.0 - t) ** n, TINY)
+        return np.asarray(used / self.cornering(load) * np.where(t > 0.0, n * t / filled, 1.0))
 
-    def _slope(self, t: FloatArray, c: FloatArray) -> FloatArray:
-        rest = np.maximum(1.0 - t, STEEPEST)
-        return np.asarray(rest ** (1.0 - self.sharpness) / c, dtype=np.float64)
+    def lateral(
+        self,
+        used: FloatArray,
+        friction: FloatArray | float,
+        load: FloatArray,
+        along: FloatArray | float = 0.0,
+    ) -> FloatArray:
+        """Return s_y at a lateral utilisation; where all slides, that of the force's direction.
+
+        A utilisation above the friction has that of the begin of full sliding.
+        """
+        within = self.across(used, self.share(used, friction, load, along), load)
+        lost = lost_slip(used, self.grip * np.asarray(friction), np.abs(along))
+        return np.where(np.isfinite(lost), np.maximum(within, lost), within)
+
+    def forward(
+        self,
+        angle: FloatArray,
+        load: FloatArray,
+        friction: FloatArray | float,
+        slip_ratio: FloatArray | None = None,
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return u_y, u_x, Mz / (Fz q0) and t, sizes but of u_x, at slip angles [rad]."""
+        size = np.abs(angle)
+        rolls = np.cos(size) - 1.0 if slip_ratio is None else slip_ratio
+        x, y = self.along(size, rolls, load), np.sin(size) / np.maximum(1.0 + rolls, LEAST_ROLLING)
+        slip, effective = np.maximum(np.hypot(x, y), TINY), self.grip * np.asarray(friction)
+        t = np.minimum(slip * self.cornering(load) / (self.sharpness * effective), 1.0)
+        used = effective * (1.0 - (1.0 - t) ** self.sharpness) / slip
+        return used * y, used * x, used * y * (1.0 - t) ** self.fading, t
+
+    def at(
+        self,
+        used: FloatArray,
+        load: FloatArray,
+        friction: FloatArray,
+        slip_ratio: FloatArray | None = None,
+    ) -> Told:
+        """Return what a utilisation tells on a road of known friction."""
+        rolls = np.full_like(used, np.nan) if slip_ratio is None else slip_ratio
+        free = np.arctan(self.lateral(used, self.friction, load))
+        along = self.along(free, rolls, load)
+
+        def slid(mu: FloatArray | float) -> tuple[FloatArray, FloatArray]:
+            return (
+                self.lateral(used, mu, load, along),
+                self.share(used, mu, load, along),
+            )  # fmt: skip
+
+        (across, here), (usual, there) = slid(friction), slid(self.friction)
+        angle, more = angle_of(across, rolls), self.friction_std / self.friction
+        moved = angle_of(slid(friction * (1.0 - more))[0], rolls) - angle
+        apart = friction != self.friction
+        change = np.where(apart, angle - angle_of(usual, rolls), 0.0)
+        doubt = np.where(apart, np.hypot(CURVE_DOUBT * change, moved), 0.0)
+        std = np.where(used < self.grip * friction, doubt, np.inf)
+        slope = self.slope_at(used, here, across, load, along)
+        return Told(angle, std, change, slope, np.abs(here - there))
+
+    def slope_at(
+        self,
+        used: FloatArray,
+        t: FloatArray,
+        across: FloatArray,
+        load: FloatArray,
+        along: FloatArray | float,
+    ) -> FloatArray:
+        """Return d s_y / d u_y on one road, at a lateral utilisation, sliding share and slip."""
+        square = np.maximum(across**2 + along**2, TINY)
+        rest = np.maximum(1.0 - t, STEEPEST) ** (self.sharpness - 1.0)
+        pulled = used / np.maximum(across, TINY) * along**2
+        return np.asarray(square / (pulled + self.cornering(load) * rest * across**2 + TINY))
 
 
-def _moments(x: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return mean and variance, shape (n,); NaN where nothing has a weight."""
-    with np.errstate(invalid="ignore"):
-        share = weight / weight.sum(axis=1, keepdims=True)
-    mean = (share * x).sum(axis=1)
-    return mean, (share * (x - mean[:, None]) ** 2).sum(axis=1)
+def _power_series(logs: tuple[float, ...], load: FloatArray) -> FloatArray:
+    return np.asarray(np.exp(np.polynomial.polynomial.polyval(np.log(load / LOAD), logs)))
+
+
+def angle_of(across: FloatArray, slip_ratio: FloatArray) -> FloatArray:
+    """Return the slip angle [rad] at s_y; of a wheel that rolls freely where no slip ratio is."""
+    sine = np.minimum(across * np.maximum(1.0 + slip_ratio, LEAST_ROLLING), 1.0)
+    return np.where(np.isnan(slip_ratio), np.arctan(across), np.arcsin(np.nan_to_num(sine)))
+
+
+def lost_slip(used: FloatArray, most: FloatArray | float, along: FloatArray | float) -> FloatArray:
+    """Return s_y at which a tread that slides as a whole has this lateral utilisation.
+
+    `most` is the utilisation there in all; infinite where it is not enough.
+    """
+    room = np.sqrt(np.maximum((most / used) ** 2 - 1.0, TINY))
+    return np.asarray(np.where(most > used, along / room, np.inf))
 
 
 def brush_through(model: Polynomial, utilisation: float, load: tuple[float, float]) -> SlidingCurve:
@@ -241,8 +286,9 @@ def brush_through(model: Polynomial, utilisation: float, load: tuple[float, floa
 
     def brush(friction: float) -> SlidingCurve:
         return SlidingCurve(
-            friction, *BRUSH, tuple(stiffness.tolist()), (0.0,), (0.0, 0.0), np.inf, 0.0
-        )
+            friction, USUAL_FRICTION[1], 1.0, *BRUSH, tuple(stiffness.tolist()), (0.0,), (0.0,),
+            (0.0, 0.0), np.inf, np.inf,
+        )  # fmt: skip
 
     tried = np.linspace(max(0.7, 1.05 * utilisation), 1.3, 25)
     reached = [brush(mu).at(used[:1], middle, np.array([mu])).angle[0] for mu in tried.tolist()]

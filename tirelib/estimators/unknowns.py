@@ -52,8 +52,9 @@ CORNERING = 0.22
 """Power of the tread's stiffness with which the cornering stiffness grows."""
 FORCE = 0.08
 """Relative standard deviation of Fy per unit of L."""
-LAW_DOUBT = 0.3
-"""Relative standard deviation of a correction for a known tread."""
+LAW_DOUBT = 0.15
+"""Relative standard deviation of a correction for a known tread: `EDGE`, `BENT` and `CORNERING` of
+three tires of the rig differ from those above by as much (root mean square)."""
 TWO_SIGMA = 1.96
 PLAUSIBLE: Mapping[str, Pair] = {
     "friction": (0.05, 1.8),

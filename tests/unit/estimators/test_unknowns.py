@@ -8,23 +8,50 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tirelib.arrays import FloatArray
+from tirelib.estimators.any_road import Seen, tell
 from tirelib.estimators.calibration import LARGEST_ANGLE_STD
-from tirelib.estimators.fit_sliding import fit_sliding
-from tirelib.estimators.sliding import SlidingCurve
+from tirelib.estimators.fit_sliding import Runs, fit_sliding
+from tirelib.estimators.sliding import SlidingCurve, Told
 from tirelib.estimators.train import Trained
 from tirelib.estimators.unknowns import DEPTH, FRICTION, TWO_SIGMA, Road, spread
 from tirelib.flags import TurnFlag
 from tirelib.observations import Observations
 
 CURVE = SlidingCurve(
-    friction=0.95, sharpness=2.5, fading=1.8, stiffness=(2.5, -0.3), trail=(-3.6, 0.6),
-    camber=(0.0, 0.0), misfit=2e-4, largest=0.013,
+    friction=0.95, friction_std=0.0, grip=0.97, sharpness=2.5, fading=1.8, stiffness=(2.5, -0.3),
+    trail=(-3.6, 0.6), ratio=(0.3, 0.2), camber=(0.0, 0.0), misfit=0.01, slant=0.03,
 )  # fmt: skip
 WIDEST = np.deg2rad(8.0)
 
 
 def one(x: float) -> FloatArray:
     return np.array([x])
+
+
+def told_of(
+    used: FloatArray,
+    load: FloatArray,
+    moment: tuple[FloatArray, float] | None = None,
+    pull: tuple[FloatArray, float] | None = None,
+    slip_ratio: FloatArray | None = None,
+    unseen: float = 0.0,
+) -> Told:
+    """What readings of these standard deviations tell."""
+    nothing = 0.0 * used
+    moment, pull = (reading or (nothing, np.inf) for reading in (moment, pull))
+    slip = np.full(used.shape, np.nan) if slip_ratio is None else slip_ratio
+    seen = Seen(
+        used,
+        load,
+        slip,
+        nothing,
+        moment[0],
+        nothing + moment[1],
+        pull[0],
+        nothing + pull[1],
+        unseen,
+    )
+    return tell(CURVE, seen, WIDEST)
 
 
 @given(
@@ -35,45 +62,81 @@ def one(x: float) -> FloatArray:
 def test_the_moment_tells_the_slip_angle_on_any_road(
     friction: float, angle: float, load: float
 ) -> None:
-    used, moment, share = CURVE.forward(one(angle), one(load), friction)
+    used, _, moment, share = CURVE.forward(one(angle), one(load), friction)
     if share[0] > 0.8:
         return  # hardly any moment is left
-    told = CURVE.told(used, moment, one(1e-5), one(load), WIDEST)
-    assert told.angle[0] == pytest.approx(angle, abs=3.0 * told.std[0] + np.deg2rad(0.02))
-    sharp = CURVE.told(used, moment, one(1e-5), one(load), WIDEST)
-    blunt = CURVE.told(used, moment, one(1e-2), one(load), WIDEST)
+    sharp, blunt = (told_of(used, one(load), (moment, std)) for std in (4e-4, 0.4))
+    assert sharp.angle[0] == pytest.approx(angle, abs=3.0 * sharp.std[0] + np.deg2rad(0.02))
     assert sharp.std[0] < blunt.std[0] + 1e-4
 
 
-def test_without_a_moment_the_angle_is_that_of_the_calibrated_road_with_all_its_doubt() -> None:
-    load = np.full(3, 4000.0)
-    used, _, _ = CURVE.forward(np.deg2rad([1.0, 2.5, 4.0]), load, CURVE.friction)
-    told = CURVE.told(used, np.zeros(3), np.full(3, np.inf), load, WIDEST)
-    np.testing.assert_allclose(np.rad2deg(told.angle), [1.0, 2.5, 4.0], atol=1e-6)
-    np.testing.assert_allclose(told.change, 0.0, atol=1e-12)
-    assert told.std[0] < 0.1 * told.angle[0]  # small at small slip
-    assert (told.std[1:] > np.deg2rad(1.0)).all()
+@given(
+    friction=st.floats(0.32, 1.05),
+    angle=st.floats(np.deg2rad(0.5), np.deg2rad(6.0)),
+    load=st.floats(1500.0, 8000.0),
+    slip=st.one_of(st.floats(-0.1, -0.03), st.floats(0.03, 0.1)),
+)
+def test_the_direction_of_the_force_tells_the_slip_angle_of_a_braked_or_driven_wheel(
+    friction: float, angle: float, load: float, slip: float
+) -> None:
+    """On any road, however much of the tread slides."""
+    used, pull, *_ = CURVE.forward(one(angle), one(load), friction, one(slip))
+    found = told_of(used, one(load), pull=(pull, 0.005), slip_ratio=one(slip))
+    blind = told_of(used, one(load), slip_ratio=one(slip))
+    assert found.angle[0] == pytest.approx(angle, abs=3.0 * found.std[0] + np.deg2rad(0.02))
+    assert found.std[0] < 0.2 * angle + 0.35 * blind.std[0] + np.deg2rad(0.2)
 
 
-@pytest.mark.parametrize("noise", [5e-4, 1e-3, np.inf])
-def test_intervals_hold_the_slip_angles_of_the_roads_that_may_be(noise: float) -> None:
+def test_without_a_reading_the_angle_is_that_of_the_calibrated_road_with_all_its_doubt() -> None:
+    load, angle = np.full(3, 4000.0), np.deg2rad([1.0, 2.5, 4.0])
+    for slip in (None, np.full(3, -0.03)):
+        used, *_ = CURVE.forward(angle, load, CURVE.friction, slip)
+        told = told_of(used, load, slip_ratio=slip)
+        # the longitudinal slip is taken at the angle of a wheel that rolls freely
+        np.testing.assert_allclose(told.angle, angle, rtol=1e-6 if slip is None else 0.02)
+        np.testing.assert_allclose(told.change, 0.0, atol=1e-12)
+        if slip is None:
+            assert told.std[0] < 0.1 * told.angle[0]  # small at small slip
+        assert (told.std[1:] > np.deg2rad(1.0)).all()
+
+
+def test_where_little_slides_the_friction_is_no_doubt_even_at_light_load() -> None:
+    """A wheel that carries little, at 2 deg: the moment in the strain says that it grips."""
+    load, angle = np.array([1200.0, 4000.0]), np.deg2rad([2.0, 2.0])
+    used, _, moment, _ = CURVE.forward(angle, load, CURVE.friction)
+    assert (told_of(used, load).std > np.deg2rad(1.0)).all()
+    assert (told_of(used, load, (moment, 0.04)).std < np.deg2rad(0.3)).all()
+
+
+@pytest.mark.parametrize("noise", [0.02, 0.05, np.inf])
+@pytest.mark.parametrize("braked", [False, True])
+def test_intervals_hold_the_slip_angles_of_the_roads_that_may_be(
+    noise: float, braked: bool
+) -> None:
     rng = np.random.default_rng(3)
     load, n = rng.uniform(1500.0, 8000.0, 3000), 3000
     angle = rng.uniform(0.0, WIDEST, n)
-    used, moment, share = CURVE.forward(angle, load, rng.uniform(*FRICTION, n))
-    read = moment + (noise if np.isfinite(noise) else 0.0) * rng.standard_normal(n)
-    told = CURVE.told(used, read, np.full(n, noise), load, WIDEST)
+    slip = rng.uniform(-0.08, -0.02, n) if braked else np.cos(angle) - 1.0
+    used, pull, moment, share = CURVE.forward(angle, load, rng.uniform(*FRICTION, n), slip)
+    read, known = pull if braked else moment, np.isfinite(noise)
+    slant = CURVE.slant * pull * rng.standard_normal(n) if braked else 0.0 * load
+    read = read + slant + (noise if known else 0.0) * rng.standard_normal(n)
+    told = (
+        told_of(used, load, pull=(read, noise), slip_ratio=slip)
+        if braked else told_of(used, load, (read, noise))
+    )  # fmt: skip
     valid = told.std < LARGEST_ANGLE_STD
     inside = np.abs(told.angle - angle) <= TWO_SIGMA * told.std
-    assert valid.mean() > (0.65 if np.isfinite(noise) else 0.25)
+    assert valid.mean() > (0.6 if known else 0.25)
     assert 0.9 < inside[valid].mean() <= 0.99
-    assert valid[share >= 1.0].mean() < 0.03  # the whole tread slides: any larger angle may be
+    if not braked:  # the whole tread slides: any larger angle may be
+        assert valid[share >= 1.0].mean() < 0.03
 
 
 def test_a_known_friction_is_answered_by_similarity_and_ends_where_it_is_used_up() -> None:
     load = np.full(4, 4000.0)
     friction = np.array([0.95, 0.5, 0.5, 0.3])
-    used, _, _ = CURVE.forward(np.full(4, np.deg2rad(2.0)), load, friction)
+    used, *_ = CURVE.forward(np.full(4, np.deg2rad(2.0)), load, friction)
     told = CURVE.at(used, load, friction)
     np.testing.assert_allclose(told.angle[:3], np.deg2rad(2.0))
     assert told.change[0] == 0.0
@@ -82,28 +145,52 @@ def test_a_known_friction_is_answered_by_similarity_and_ends_where_it_is_used_up
     assert np.isinf(CURVE.at(np.array([0.31]), load[:1], np.array([0.3])).std[0])
 
 
+def test_a_given_friction_is_as_uncertain_as_the_calibrated_one_that_was_fitted() -> None:
+    """It counts against the calibration's, so what is wrong there moves the slip angle."""
+    load, angle = np.full(2, 4000.0), np.deg2rad([1.0, 4.0])
+    used, *_ = CURVE.forward(angle, load, 0.95)
+    fitted = replace(CURVE, friction=0.87, friction_std=0.08)
+    told = fitted.at(used, load, np.full(2, 0.95))
+    moved = np.abs(told.angle - CURVE.at(used, load, np.full(2, 0.95)).angle)
+    assert (told.std > replace(fitted, friction_std=0.0).at(used, load, np.full(2, 0.95)).std).all()
+    assert (moved < TWO_SIGMA * told.std).all()
+    assert told.std[0] < 0.1 * told.std[1]  # hardly any where little slides
+    own = fitted.at(used, load, np.full(2, fitted.friction))
+    np.testing.assert_array_equal(own.std, 0.0)
+
+
 def test_a_force_that_no_road_gives_is_not_answered() -> None:
-    told = CURVE.told(one(1.4), one(0.0), one(1e-3), one(4000.0), WIDEST)
+    told = told_of(one(1.4), one(4000.0), (one(0.0), 0.05))
     assert not np.isfinite(told.std[0])
 
 
 @pytest.mark.parametrize("known", [True, False])
 def test_the_curve_is_found_from_a_dry_road(known: bool) -> None:
-    load, angle = (
-        x.ravel() for x in np.meshgrid([1500.0, 4000.0, 7000.0], np.linspace(-0.12, 0.12, 13))
+    loads, angles = [1500.0, 4000.0, 7000.0], np.linspace(-0.12, 0.12, 13)
+    load, angle, slip = (
+        x.ravel() for x in np.meshgrid(loads, angles, [np.nan, -0.06, -0.03, 0.03])
     )
-    used, moment, _ = CURVE.forward(angle, load, CURVE.friction)
+    slip = np.where(np.isnan(slip), np.cos(angle) - 1.0, slip)
+    used, pull, moment, _ = CURVE.forward(angle, load, CURVE.friction, slip)
+    moment = moment * CURVE.longest(load)
     side = np.sign(angle)
     nothing = np.full(load.shape, np.nan)
     found = fit_sliding(
-        angle, load, -side * used * load, side * moment * load, 0.0 * load, 0.0 * load,
-        np.full(load.shape, CURVE.friction) if known else nothing,
+        Runs(
+            angle, load, -side * used * load, -pull * load, side * moment * load, 0.0 * load, slip,
+            np.full(load.shape, CURVE.friction) if known else nothing,
+        )
     )  # fmt: skip
     assert found is not None
-    assert found.friction == pytest.approx(CURVE.friction, rel=0.01 if known else 0.1)
+    assert found.friction * found.grip == pytest.approx(0.95 * 0.97, rel=0.01)
+    assert (found.friction_std == 0.0) == known
+    assert found.slant < 0.01
     there = np.deg2rad([1.0, 3.0]), np.array([3000.0, 3000.0])
-    for mine, own in zip(found.forward(*there, 0.5), CURVE.forward(*there, 0.5), strict=True):
-        np.testing.assert_allclose(mine, own, rtol=0.02 if known else 0.08)
+    road = 0.5 if known else 0.5 * found.friction / CURVE.friction
+    for mine, own in zip(
+        found.forward(*there, road, one(-0.02)), CURVE.forward(*there, 0.5, one(-0.02)), strict=True
+    ):
+        np.testing.assert_allclose(mine, own, rtol=0.03)
 
 
 def conditions(**known: float) -> dict[str, FloatArray]:
