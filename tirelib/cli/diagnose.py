@@ -1,6 +1,7 @@
 """``tirelib diagnose``: which effect a model lacks."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,8 +42,6 @@ once on.
 Exit code: 0 whatever the verdict, 2 bad input.
 """
 SHOWN = 8
-EXPLAINED = ("missing", "sure", "error", "next")
-"""Keys of a document's `explanation`, in the order of its lines."""
 QUANTITIES = ("strain", "Fy", "Fx", "Mz")
 
 
@@ -92,15 +91,13 @@ def diagnose(
     explain = of_forces if forces else _of_strain
     with progress_bar("diagnosing") as progress:
         told, document = explain(campaign, file, catalogue, quantity, members, seed, progress)
-    told_lines = explained(document, model_name, str(folder)).lines
-    document["explanation"] = {
-        key: said for key, (_, said) in zip(EXPLAINED, told_lines, strict=True)
-    }
-    _say(document, told_lines)
+    explanation = explained(document, model_name, str(folder))
+    document["explanation"] = asdict(explanation)
+    _say(document, explanation.lines)
     console = output()
     targets = [path for path in (json_file, out and out / "diagnosis.json") if path]
     if out is not None:
-        for path in _write(told, out, forces, file.extra.get("history", []), told_lines):
+        for path in _write(told, out, forces, file.extra.get("history", []), explanation.lines):
             console.print(f"written: {path}")
     for path in targets:
         write_json(path, document)

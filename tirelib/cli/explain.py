@@ -6,7 +6,7 @@ import shlex
 from collections.abc import Mapping
 from contextlib import redirect_stdout
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -21,6 +21,9 @@ from tirelib.cli.common import (
 )
 from tirelib.cli.diagnose import QUANTITIES, explains_forces
 from tirelib.errors import CalibrationError, ParameterError, TirelibError
+
+if TYPE_CHECKING:
+    from tirelib.report.journey import Journey
 
 FORMAT = "tirelib-explanation/1"
 STEPS = {
@@ -39,7 +42,7 @@ Examples:
 \b
 It runs identify, compare, diagnose, add for each effect that is named, and compare again.
 FOLDER/index.html has before and after, links to the page of each step, and the commands, which can
-be run one by one. Exit code: 0 whatever the verdict, 1 nothing could be identified, 2 bad input.
+be run one by one. Exit code: 0 whatever the verdict, 2 bad input or no model could be identified.
 """
 
 
@@ -59,9 +62,7 @@ be run one by one. Exit code: 0 whatever the verdict, 1 nothing could be identif
 @click.option(
     "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
 )
-@click.pass_context
 def explain(
-    context: click.Context,
     folder: Path,
     model_name: str | None,
     quantity: str | None,
@@ -71,6 +72,7 @@ def explain(
     json_file: Path | None,
 ) -> None:
     """Find what a model of CAMPAIGN lacks, add it, and show before and after."""
+    from tirelib.report.explanation import titled
     from tirelib.report.journey import write_journey
 
     if quantity is not None and quantity not in QUANTITIES:
@@ -84,7 +86,7 @@ def explain(
     document = journey.document
     console = output()
     console.print(f"{document['campaign']}, {document['quantity']}: {document['verdict']}")
-    for what, said in steps.lines:
+    for what, said in titled(document["explanation"]):
         console.print(f"  {what}: {said}")
     for line in document["messages"]:
         console.print(f"  {line}")
@@ -117,11 +119,15 @@ class Steps:
         self.effects = [word for path in effect_files for word in ("--effects", path)]
         self.commands: list[str] = []
         self.messages: list[str] = []
-        self.lines: tuple[tuple[str, str], ...] = ()
 
-    def walk(self, model_name: str | None, quantity: str | None) -> "Any":
-        """Run the journey and return it (`tirelib.report.journey.Journey`)."""
-        from tirelib.report.explanation import explained
+    def walk(self, model_name: str | None, quantity: str | None) -> "Journey":
+        """Run the journey and return it.
+
+        Raises
+        ------
+        TirelibError
+            Of any verb but `add`, whose reason becomes a message.
+        """
         from tirelib.report.journey import Journey
 
         model = model_name or self._identified()
@@ -139,19 +145,10 @@ class Steps:
                 last, step = self._added(effect, last, about, len(added) + 2)
                 added += [step] if step is not None else []
         after = self._compared(last, about, "compared-after") if added else before
-        told_lines = explained(told, model, str(self.folder))
-        self.lines = told_lines.lines
-        history = _history(last)
         document = self._document(told, before, after, added, model)
-        self.lines = tuple(
-            (title, said)
-            for (title, _), said in zip(
-                told_lines.lines, document["explanation"].values(), strict=True
-            )
-        )
         first = self._comparison(model, document["quantity"])
         second = self._comparison(last, document["quantity"]) if added else first
-        return Journey(first, second, document, added, history)
+        return Journey(first, second, document, added, _history(last))
 
     def _identified(self) -> str:
         model = str(self.out / "M.toml")

@@ -13,6 +13,11 @@ import numpy as np
 
 from tirelib.report.page import number
 
+TITLES = {
+    "missing": "What is missing", "sure": "How sure", "error": "The error",
+    "next": "What to do next",
+}  # fmt: skip
+"""What each line is about, by its key in a document's `explanation`."""
 SENSE = 3
 """Significant digits of an error in a sentence."""
 SHOWN = 3
@@ -37,8 +42,12 @@ class Explanation:
     @property
     def lines(self) -> tuple[tuple[str, str], ...]:
         """The sentences with what each is about."""
-        titles = ("What is missing", "How sure", "The error", "What to do next")
-        return tuple(zip(titles, asdict(self).values(), strict=True))
+        return titled(asdict(self))
+
+
+def titled(lines: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
+    """Return a document's `explanation` as titles and sentences."""
+    return tuple((TITLES[key], said) for key, said in lines.items())
 
 
 def explained(told: Mapping[str, Any], model: str = "M.toml", folder: str = "DIR") -> Explanation:

@@ -13,7 +13,7 @@ from tirelib.compare.force_curves import Curve, curves_of, ranked, slip_of
 from tirelib.compare.forces import UNITS, ForceComparison
 from tirelib.compare.strain import Comparison
 from tirelib.report.comparison import Part
-from tirelib.report.explanation import fold_name
+from tirelib.report.explanation import fold_name, titled
 from tirelib.report.figures.compare_forces import force_plots
 from tirelib.report.figures.compare_heat import DEGREES, heat_maps
 from tirelib.report.figures.compare_plot import ANGLE_TITLE, Plot, styled_figure
@@ -64,11 +64,9 @@ def write_journey(journey: Journey, folder: Path) -> tuple[Path, Path]:
     """
     told = journey.document
     links = [(page["title"], page["path"]) for page in told["pages"]]
-    titles = ("What is missing", "How sure", "The error", "What to do next")
     return write_parts_page(
         folder, "index", parts_of(journey), title=TITLE, summary=_summary(told), answer="",
-        messages=told["messages"],
-        lines=list(zip(titles, told["explanation"].values(), strict=True)), links=links,
+        messages=told["messages"], lines=titled(told["explanation"]), links=links,
         commands=told["commands"],
     )  # fmt: skip
 
