@@ -163,6 +163,20 @@ def test_the_held_tread_is_as_stiff_as_the_tire_in_the_file(
     assert rim["longitudinal_N_per_mm"] == pytest.approx(1e-3 / (1 / S_v + R**2 / S_theta))
 
 
+def test_identify_tells_the_error_that_compare_tells(
+    files: dict[str, Path], campaign: Path, document: dict[str, Any], tmp_path: Path
+) -> None:
+    words = ["compare", str(campaign), "--model", str(files["model"])]
+    found = CliRunner().invoke(program, [*words, "--json", str(tmp_path / "C.json")])
+    assert found.exit_code == 0, found.output
+    told = json.loads((tmp_path / "C.json").read_text())
+    # the model file's numbers come back to a rounding
+    assert document["error"] == pytest.approx(told["error"], rel=1e-6)
+    assert (document["error_unit"], document["noise"]) == (told["error_unit"], told["noise"])
+    assert document["error_unit"] == "ustrain", "four runs, none repeated"
+    assert document["error"] == pytest.approx(document["residual_rms_raw"])
+
+
 def test_simulate_takes_the_model(files: dict[str, Path], tmp_path: Path) -> None:
     target = tmp_path / "S.json"
     found = CliRunner().invoke(
