@@ -259,9 +259,10 @@ class Chain:
         harder, unknown = self.road.hardened(values)
         result["Fy"] = result["Fy"].widened(FORCE * np.hypot(harder, unknown) * np.abs(force))
         if slid is not None:
-            result["Fy"] = result["Fy"].widened(FORCE_DOUBT * slid.sliding * np.abs(force))
+            share = np.nan_to_num(slid.sliding, nan=1.0)  # any, where no slip angle fits
+            result["Fy"] = result["Fy"].widened(FORCE_DOUBT * share * np.abs(force))
             if "Fz" in result:
-                result["Fz"] = result["Fz"].widened(LOAD_DOUBT * slid.sliding * np.abs(load))
+                result["Fz"] = result["Fz"].widened(LOAD_DOUBT * share * np.abs(load))
 
     def _slip_angle(
         self,

@@ -103,3 +103,23 @@ def test_a_calibration_that_cannot_notice_another_tire_says_so(
 def test_a_file_keeps_its_version(trained: Trained) -> None:
     assert trained.calibration.version == 2
     assert cost_rows(()) == []
+
+
+def test_a_turn_that_no_slip_angle_fits_keeps_its_load(
+    trained: Trained, observed: Observations
+) -> None:
+    """Where a force is more than any slip angle gives, any share of the tread may slide."""
+    full = trained.calibration.chains[-1]
+    narrow = tuple(
+        replace(known, low=-1e-4, high=1e-4) if known.name == "alpha" else known
+        for known in full.guards["alpha"]
+    )
+    chain = replace(full, guards={**full.guards, "alpha": narrow})
+    blind = without(observed, "friction").features
+    calibration = replace(trained.calibration, chains={**trained.calibration.chains, -1: chain})
+    found, usual = calibration.estimate(blind), trained.calibration.estimate(blind)
+    lost = usual.valid["alpha"] & ~found.valid["alpha"]
+    assert lost.sum() > 20
+    for quantity in ("Fz", "Fy"):
+        np.testing.assert_array_equal(found.valid[quantity], usual.valid[quantity])
+        assert (found.std[quantity][lost] >= usual.std[quantity][lost]).all()
