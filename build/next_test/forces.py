@@ -162,7 +162,7 @@ def case_of(data: ForceData) -> ForceCase:
         "fitted", BrushModel("fitted", values, fit.reference, None), (), reference, ()
     )
     problem = Problem.of(ForceBench.of(model, force_points(data)), "Fy", NOISE)
-    return ForceCase("steady", model, problem, NOISE, len(problem) // 2, ())
+    return ForceCase("steady", model, problem, problem, NOISE, len(problem) // 2, ())
 
 
 def tire_of(test: PairCase) -> Tire:
@@ -249,7 +249,8 @@ def _with_run(
     told |= {name: getattr(off, name) for name in ("load", "pressure", "slip_angle")}
     side = tire.measured(told, 3 + 2 * before).Fy
     measured = np.concatenate([case.problem.measured, side])
-    return replace(case, problem=replace(joint, measured=measured))
+    longer = replace(joint, measured=measured)
+    return replace(case, problem=longer, whole=longer)
 
 
 def _tried(case: ForceCase, base: ForceFit, suspects: Sequence[Any]) -> ForceTrial:

@@ -48,4 +48,4 @@ def case(kind: str, size: float, seed: int = 3) -> ForceCase:
     data = ForceData(load, pressure, angle, flat, flat, nothing, nothing, side, nothing,
                      np.arange(n), np.full(n, 20.0), time=10.0 * np.arange(n))  # fmt: skip
     problem = Problem.of(ForceBench.of(MODEL, force_points(data)), "Fy", NOISE)
-    return ForceCase("in order", MODEL, problem, NOISE, n // 2, ())
+    return ForceCase("in order", MODEL, problem, problem, NOISE, n // 2, ())
