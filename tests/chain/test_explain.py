@@ -118,8 +118,21 @@ def test_every_step_is_linked_and_every_error_is_one_number(
     )
     assert before["error"] == told["error_before"]
     assert after["error"] == told["error_after"]
+    steps = [json.loads((found.out / f"added-{name}.json").read_text()) for name in told["added"]]
+    # contacts solved from another start, and points that were thinned, differ by rounding
     assert diagnosis["error_before"] == pytest.approx(before["error"], rel=1e-6)
-    assert told["steps"][-1]["error"] == pytest.approx(after["error"], rel=1e-6)
+    assert steps[0]["error_before"] == pytest.approx(before["error"], rel=1e-6)
+    assert steps[-1]["error_after"] == pytest.approx(after["error"], rel=1e-6)
+    every = [before, after, diagnosis, *steps]
+    assert {document["error_unit"] for document in every} == {"noise"}
+    # no model changes the unit
+    assert len({document["noise"] for document in every}) == 1
+    raw = (before["residual_rms_raw"], after["residual_rms_raw"])
+    assert diagnosis["residual_rms_before"] == pytest.approx(raw[0], rel=1e-6)
+    assert steps[-1]["residual_rms_after"] == pytest.approx(raw[1], rel=1e-6)
+    for document in (diagnosis, *steps):
+        assert 0.0 < document["floor"] <= document["error_after"]
+    assert after["floor"] == pytest.approx(steps[-1]["floor"])
 
 
 @pytest.mark.parametrize("kind", ["strain", "forces"])
