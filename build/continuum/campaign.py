@@ -66,13 +66,14 @@ def states(
 ) -> Iterator[tuple[State, Trace]]:
     """Solve the runs of a campaign, each from a state of its load that all runs share."""
     base = model(campaign.tire)
-    middle = Condition(0.0, PRESSURES[1], SPEEDS[1])
+    rng = np.random.default_rng([campaign.lab.seed, 4106])
+    angle, count = float(rng.uniform(-np.pi, np.pi)), len(campaign.plan)
     starts: dict[float, State] = {}
     last: State | None = None
     for load in sorted({c.load for c in campaign.plan}):
-        last = starts[load] = solve(base, replace(middle, load=load), last)
-    rng = np.random.default_rng([campaign.lab.seed, 4106])
-    angle, count = float(rng.uniform(-np.pi, np.pi)), len(campaign.plan)
+        middle = Condition(load, PRESSURES[1], SPEEDS[1])
+        there = _changed(base, Run(middle, 0.5, angle), campaign.hidden)
+        last = starts[load] = solve(there, middle, last)
     for number, nominal in enumerate(campaign.plan):
         cond = settled(campaign.lab, nominal, number)
         run = Run(cond, number / (count - 1), angle)
@@ -91,7 +92,7 @@ def _changed(base: Model, run: Run, hidden: Mapping[str, float]) -> Model:
     for name, strength in hidden.items():
         tire, law = EFFECTS[name].tire(tire, run, strength), EFFECTS[name].law(law, run, strength)
     same = all(np.array_equal(tire.radii(i), base.tire.radii(i)) for i in range(3))
-    return Model(tire, base.mesh if same else grid(tire), law)
+    return replace(base, tire=tire, mesh=base.mesh if same else grid(tire, base.fine), law=law)
 
 
 def make(

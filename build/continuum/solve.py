@@ -16,20 +16,24 @@ SMALLEST, LARGEST = 1e-9, 4e-3
 """Newton's method ends below the first and takes no step above the second [m]."""
 KEPT = 1e-5
 """Below this step the stiffness is not factored again, as long as steps fall fast [m]."""
-ITERATIONS, HALVINGS = 25, 4
+ITERATIONS, HALVINGS = 15, 4
 """Of Newton's method, and of the way from a start that is too far off."""
 
-CREEPS = (0.1, 0.03, 0.01, 5e-3)
+CREEPS = (0.03, 0.01)
 """Creep of the friction on the way to a tire's own."""
 
 
 @dataclass(frozen=True)
 class Model:
-    """A tire with its mesh and its sidewalls' law, which many states share."""
+    """A tire with its mesh and its sidewalls' law, which many states share.
+
+    `fine` is the size of the mesh's elements in the contact [rad].
+    """
 
     tire: Tire
     mesh: Grid
     law: SidewallLaw
+    fine: float = FINE
 
 
 @dataclass(frozen=True)
@@ -58,7 +62,7 @@ class State:
 
 def model(tire: Tire, fine: float = FINE) -> Model:
     """Mesh a tire and solve its sidewall's section."""
-    return Model(tire, grid(tire, fine), law(tire.arch))
+    return Model(tire, grid(tire, fine), law(tire.arch), fine)
 
 
 def solve(model: Model, cond: Condition, start: State | None = None) -> State:
@@ -81,7 +85,7 @@ def _way(model: Model, cond: Condition, start: State, left: int) -> State:
     """Solve from a start; where that is too far off, through the condition half way."""
     old = start.balance
     try:
-        return _newton(model, cond, old.u, old.height, old.rolling, None)
+        return _near(model, cond, start)
     except ArithmeticError:
         if left == 0:
             raise
@@ -98,8 +102,14 @@ def _gripping(model: Model, cond: Condition, start: State, left: int) -> State:
     smooth = [c for c in CREEPS if c > model.tire.creep]
     for creep in smooth:
         start = _way(replace(model, tire=replace(model.tire, creep=creep)), cond, start, left - 1)
+    return _near(model, cond, start)
+
+
+def _near(model: Model, cond: Condition, start: State) -> State:
+    """Solve from a state near by; a tire with less tread starts lower by that."""
     old = start.balance
-    return _newton(model, cond, old.u, old.height, old.rolling, None)
+    height = old.height + model.tire.free_radius - old.tire.free_radius
+    return _newton(model, cond, old.u, height, old.rolling, None)
 
 
 def _lowered(model: Model, cond: Condition) -> State:

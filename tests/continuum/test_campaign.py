@@ -1,5 +1,6 @@
 """A campaign of the rolling continuum: what is drawn, hidden, measured and written."""
 
+import json
 from dataclasses import asdict
 from pathlib import Path
 
@@ -110,9 +111,12 @@ def test_a_campaign_is_written_and_read(tmp_path: Path, monkeypatch: pytest.Monk
     two = (Condition(3000.0, 2.2e5, 12.0), Condition(3000.0, 1.9e5, 12.0))
     monkeypatch.setattr(made, "plan", lambda runs, seed: two)
     monkeypatch.setattr(made, "model", lambda tire: model(tire, COARSE))
-    made.make(tmp_path / "c", 4, hidden={"angle_zero": 0.01})
+    made.make(tmp_path / "c", 4, hidden={"angle_zero": 0.01, "tread_wear": 0.6})
+    truth = json.loads((tmp_path / "c" / "truth.json").read_text())
+    assert truth["hidden"] == {"angle_zero": 0.01, "tread_wear": 0.6}
+    assert truth["ring"]["EI"] > 0.0
+    # the second run is the last: 60 % of the tread is gone, and the axle is lower by more
+    first, last = (run["axle_height_m"] for run in truth["runs"])
+    assert first - last > 0.6 * draw(4).tread_thickness
     read = read_campaign(tmp_path / "c")
     assert [run.plan.pressure for run in read.runs()] == pytest.approx([2.2e5, 1.9e5])
-    text = (tmp_path / "c" / "truth.json").read_text()
-    assert '"angle_zero": 0.01' in text
-    assert '"EI"' in text
