@@ -61,7 +61,7 @@ def tell(curve: SlidingCurve, seen: Seen, widest: float) -> Told:
     n, load = curve.sharpness, seen.load[:, None]
     used = np.maximum(seen.used, LEAST_UTILISATION)[:, None]
     rolls = seen.slip_ratio[:, None]
-    free = np.arctan(curve.lateral(used, curve.friction, load))
+    free = np.arctan(curve.lateral(used, curve.friction, load)[0])
     along = curve.along(free, rolls, load)
     c, pulled = curve.cornering(load), np.abs(along)
     ends = np.array([max(FRICTION[1], ROUGHER * curve.friction), FRICTION[0], curve.friction])
@@ -77,7 +77,7 @@ def tell(curve: SlidingCurve, seen: Seen, widest: float) -> Told:
     room = np.maximum(np.minimum(np.tan(widest), slippery) - begin, 0.0)
     room = np.where(np.isfinite(begin), room, 0.0)
     beyond = np.where(room > 0.0, begin, 0.0) + room * (np.arange(WHOLE) + 0.5) / WHOLE
-    across = curve.lateral(used, curve.friction, load, along)  # on the calibrated road
+    across, _ = curve.lateral(used, curve.friction, load, along)  # on the calibrated road
     slip = np.concatenate((slip, np.maximum(beyond, TINY), across), axis=1)
     t = np.concatenate((t, np.ones_like(beyond), share[:, 2:]), axis=1)
     weight = np.concatenate((weight, room / WHOLE + 0.0 * beyond, 0.0 * used), axis=1)

@@ -316,8 +316,10 @@ class Chain:
         side = np.where(used < 0.0, -1.0, 1.0)
         unseen = self.road.unseen_friction(curve.friction)
         known = np.isfinite(friction)
-        told = curve.at(np.abs(used), load, np.where(known, friction, curve.friction), slip)
-        if not known.all():
+        told: Told | None = None
+        if known.any():
+            told = curve.at(np.abs(used), load, np.where(known, friction, curve.friction), slip)
+        if told is None or not known.all():
             moment, std = np.zeros_like(used), np.full_like(used, np.inf)
             pull, pull_std = moment, std
             if self.moment is not None:
@@ -335,7 +337,8 @@ class Chain:
                 np.abs(used), load, slip, values.get("slip_std", 0.0 * used), moment, std, pull,
                 pull_std, unseen,
             )  # fmt: skip
-            told = told.where(known, tell(curve, seen, widest))
+            open_ = tell(curve, seen, widest)
+            told = open_ if told is None else told.where(known, open_)
         return replace(told, change=side * told.change, sliding=unseen * told.sliding)
 
     def _tilt(

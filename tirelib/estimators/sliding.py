@@ -176,14 +176,15 @@ class SlidingCurve:
         friction: FloatArray | float,
         load: FloatArray,
         along: FloatArray | float = 0.0,
-    ) -> FloatArray:
-        """Return s_y at a lateral utilisation; where all slides, that of the force's direction.
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return s_y and t at a lateral utilisation; where all slides, by the force's direction.
 
-        A utilisation above the friction has that of the begin of full sliding.
+        A utilisation above the friction has the slip of the begin of full sliding.
         """
-        within = self.across(used, self.share(used, friction, load, along), load)
+        t = self.share(used, friction, load, along)
+        within = self.across(used, t, load)
         lost = lost_slip(used, self.grip * np.asarray(friction), np.abs(along))
-        return np.where(np.isfinite(lost), np.maximum(within, lost), within)
+        return np.where(np.isfinite(lost), np.maximum(within, lost), within), t
 
     def forward(
         self,
@@ -210,19 +211,18 @@ class SlidingCurve:
     ) -> Told:
         """Return what a utilisation tells on a road of known friction."""
         rolls = np.full_like(used, np.nan) if slip_ratio is None else slip_ratio
-        free = np.arctan(self.lateral(used, self.friction, load))
+        free = np.arctan(self.lateral(used, self.friction, load)[0])
         along = self.along(free, rolls, load)
 
         def slid(mu: FloatArray | float) -> tuple[FloatArray, FloatArray]:
-            return (
-                self.lateral(used, mu, load, along),
-                self.share(used, mu, load, along),
-            )  # fmt: skip
+            return self.lateral(used, mu, load, along)
 
         (across, here), (usual, there) = slid(friction), slid(self.friction)
         angle, more = angle_of(across, rolls), self.friction_std / self.friction
-        moved = angle_of(slid(friction * (1.0 - more))[0], rolls) - angle
         apart = friction != self.friction
+        moved = 0.0 * angle
+        if more > 0.0 and apart.any():
+            moved = angle_of(slid(friction * (1.0 - more))[0], rolls) - angle
         change = np.where(apart, angle - angle_of(usual, rolls), 0.0)
         doubt = np.where(apart, np.hypot(CURVE_DOUBT * change, moved), 0.0)
         std = np.where(used < self.grip * friction, doubt, np.inf)
