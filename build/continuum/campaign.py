@@ -12,7 +12,7 @@ from continuum.grid import grid
 from continuum.measure import Laboratory, laboratory, record, settled
 from continuum.observe import Trace, trace
 from continuum.polar import Array
-from continuum.sidewall import at
+from continuum.sidewall import at, law
 from continuum.solve import Model, State, model, solve
 from continuum.tire import LATERAL, Condition, Tire, draw
 from tirelib.campaign import (
@@ -168,13 +168,13 @@ def _check(seed: int, hidden: Mapping[str, float]) -> None:
 
 def ring_numbers(tire: Tire) -> dict[str, float]:
     """Return what a ring model would call the tire's constants, SI; k_u, k_v at 2 bar, slopes."""
-    law = model(tire).law
+    walls = law(tire.arch)
     return tire.section | {
-        "k_u": at(law.radial, 2.0 * BAR),
-        "k_u_slope": float(law.radial[1]),
-        "k_v": at(law.tangential, 2.0 * BAR),
-        "k_v_slope": float(law.tangential[1]),
-        "pull_over_pressure_and_width": -at(law.pull, 2.0 * BAR) / (2.0 * BAR * tire.belt_width),
+        "k_u": at(walls.radial, 2.0 * BAR),
+        "k_u_slope": float(walls.radial[1]),
+        "k_v": at(walls.tangential, 2.0 * BAR),
+        "k_v_slope": float(walls.tangential[1]),
+        "pull_over_pressure_and_width": -at(walls.pull, 2.0 * BAR) / (2.0 * BAR * tire.belt_width),
     }
 
 

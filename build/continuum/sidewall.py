@@ -12,6 +12,7 @@ goes with the radius.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.sparse.linalg import spsolve
@@ -144,6 +145,7 @@ def solve_arch(arch: Arch) -> tuple[Array, Array, Array]:
     return force, tension, tangential
 
 
+@lru_cache(maxsize=32)
 def law(arch: Arch) -> SidewallLaw:
     """Return the force law of an arch: polynomials through the section's solutions."""
     force, tension, tangential = solve_arch(arch)
