@@ -309,3 +309,18 @@ def test_what_cannot_be_stepped_is_refused(wheels: FourWheels) -> None:
         with pytest.raises(ParameterError, match=r"allowed are 1 \.\. 10 whole samples"):
             wheels.step(0.0, step, WheelStates(*(np.ones(4),) * 5))
     assert "Fz" in NAMES
+
+
+def test_strain_tires_are_told_the_tread_and_the_friction_only_where_asked(
+    fmus: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    state = WheelStates(*(np.full(len(WHEELS), x) for x in (4000.0, 0.0, 0.0, 0.0, 20.0)))
+    for asked, friction in ((False, np.nan), (True, OWN_FRICTION)):
+        seen: list[np.ndarray] = []
+        with FourWheels(*fmus, tells_friction=asked) as wheels:
+            monkeypatch.setattr(wheels, "_estimate", lambda *given, to=seen: to.append(given[3]))
+            wheels.start(state)
+            wheels.step(0.0, STEP, state)
+        told = np.array(seen)
+        np.testing.assert_array_equal(told[:, HELD.index("friction")], friction)
+        np.testing.assert_array_equal(told[:, HELD.index("tread_depth")], 0.008)
