@@ -37,7 +37,7 @@ class Laboratory:
     rate: float = 10_000.0
     rig_rate: float = 100.0
     turns: float = 5.1
-    range: float = 0.02
+    range: float = 0.025
     bits: int = 14
     force_noise: float = 30.0
     speed_noise: float = 0.01
@@ -103,8 +103,14 @@ def record(lab: Laboratory, state: State, seen: Trace, run: int, start: float) -
     slow = lab.drift[:, None] * (start + time)
     noise = lab.noise * rng.standard_normal(strain.shape)
     raw = strain * gain[:, None] + lab.offset[:, None] + slow + noise
+    if np.abs(raw).max() >= lab.range:
+        raise ArithmeticError(
+            f"run {run}: a gage shows {1e6 * np.abs(raw).max():.0f} microstrain; its range is "
+            f"{1e6 * lab.range:.0f}; give a wider range, or a tire whose innerliner is nearer to "
+            "the belt"
+        )
     step = 2.0 * lab.range / 2**lab.bits
-    shown = np.clip(np.round(raw / step) * step, -lab.range, lab.range - step)
+    shown = np.round(raw / step) * step
     turn = np.floor((phi - omega * lab.delay + np.pi) / (2.0 * np.pi))
     trigger = np.concatenate([[False], np.diff(turn) > 0.0])
     rig_time = np.arange(int(time[-1] * lab.rig_rate) + 1) / lab.rig_rate

@@ -1,7 +1,7 @@
 """A campaign of the rolling continuum: what is drawn, hidden, measured and written."""
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -81,6 +81,12 @@ def test_the_recorded_strain_is_the_state_s_through_gain_and_noise() -> None:
     # noise of 3 to 6 microstrain, quantisation of 0.7, and some of a load that swings by 25 N
     assert error.max() < 20e-6
     assert out.rig["Fz"].mean() == pytest.approx(COND.load, abs=60.0)
+
+
+def test_a_gage_beyond_its_range_is_refused() -> None:
+    s = state()
+    with pytest.raises(ArithmeticError, match=r"run 7: a gage shows .* its range is 8000"):
+        record(replace(laboratory(3), range=0.008), s, trace(s), 7, 0.0)
 
 
 def test_plans_repeat_conditions_and_errors_belong_to_the_run() -> None:
