@@ -181,7 +181,7 @@ _ALL = (
            tire=lambda t, r, s: replace(t, tread_thickness=t.tread_thickness * (1 - s * r.order))),
     Effect("roughness", "asperities of exponential height: q = k s ln(1 + exp(depth / s))", 2e-4,
            1e-3, "m", tire=lambda t, r, s: replace(t, roughness=s)),
-    Effect("hydroplaning", "water pressed out of the gap ahead, s rho v^2 / 2 at 1 mm", 0.3, 0.6,
+    Effect("hydroplaning", "water pressed out of the gap ahead, s rho v^2 / 2 at 1 mm", 0.15, 0.3,
            "1", tire=lambda t, r, s: replace(t, water=s * 500.0 * r.cond.speed**2)),
     Effect("nonuniformity", "splice: s cos^3 of the angle from it", 1e-4, 1e-3, "1",
            shown=_splice),
