@@ -9,18 +9,16 @@ from typing import Any
 import numpy as np
 
 from bench.rig.tire import RigTire
-from proof.laboratory import laboratory, press
+from proof.laboratory import CREEP, laboratory, press
 from proof.tires import CACHE, measured
 from tirelib.arrays import BoolArray, FloatArray
-from tirelib.contact.exact import load_exact
-from tirelib.contact.tread import Tread
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.identify import estimated
-from tirelib.model.base import large_displacements, operating_points, predict
-from tirelib.model.state import State
+from tirelib.model.base import operating_points, values_of
+from tirelib.model.state import Operating
+from tirelib.model.whole import solve_whole
 from tirelib.parameters import Tire
-from tirelib.ring.ring import Ring
-from tirelib.waveforms import GRID, Waveforms
+from tirelib.waveforms import Waveforms
 
 LOAD, PRESSURE = 4800.0, 2.1e5
 """Of the press test."""
@@ -35,7 +33,7 @@ def fingerprint() -> str:
              "noise", "random_effects")  # fmt: skip
     files = [root / "identify" / f"{name}.py" for name in names]
     files += [root / "model" / f"{name}.py" for name in ("base", "chain", "state", "whole")]
-    files += [root / "contact" / f"{name}.py" for name in ("exact", "exact_energy", "exact_slopes")]
+    files += [root / "model" / "rolled.py", *sorted((root / "rolling").glob("*.py"))]
     return _hash(*files, Path(__file__), *_LABORATORY)
 
 
@@ -87,6 +85,7 @@ def _make(seed: int) -> dict[str, Any]:
     took = time.perf_counter() - began
     pressure = start.tire.pressure
     found = tests_of(seed, data.tire, pressure)
+    own = definition(data.tire, pressure)
     model = vertical_stiffness(start.tire.changed(**{e.name: e.value for e in estimates}))
     return {
         "seed": seed,
@@ -96,8 +95,8 @@ def _make(seed: int) -> dict[str, Any]:
         "parameters": {
             e.name: {
                 "value": e.value, "low": e.low, "high": e.high, "fit_std": e.fit_std,
-                "flags": list(e.flags), "laboratory": found["values"][e.name],
-                "definition": definition(data.tire, pressure)[e.name],
+                "flags": list(e.flags), "laboratory": found["values"].get(e.name, own[e.name]),
+                "definition": own[e.name],
             }
             for e in estimates
         },
@@ -118,19 +117,23 @@ def definition(tire: RigTire, pressure: float) -> dict[str, float]:
         "tread_stiffness": tire.tread_normal * tire.belt_width,
         "innerliner_offset": tire.innerliner_offset,
         "extension_stiffness": tire.extension,
+        "shear_stiffness": tire.shear,
+        "rotary_inertia": 0.0,
+        "tread_shear_stiffness": tire.tread_shear_x * tire.belt_width * (tire.friction > 0.0),
+        "tread_hardening": tire.tread_hardening,
     }
 
 
 def vertical_stiffness(tire: Tire) -> float:
     """Return the slope of load over deflection of a model at the press test, [N/m]."""
-    above = PRESSURE - tire.pressure
-    at = tire.changed(
-        pressure=PRESSURE,
-        radial_stiffness=tire.radial_stiffness + tire.radial_pressure_slope * above,
-        tangential_stiffness=tire.tangential_stiffness + tire.tangential_pressure_slope * above,
-    )
     loads = LOAD * np.array([0.99, 1.01])
-    depth = load_exact(Ring.of(at, np.full(2, PRESSURE), 0.0), Tread.of(at), loads).deflection
+    none = np.zeros(2)
+    press = Operating(
+        load=loads, pressure=np.full(2, PRESSURE), omega=np.full(2, CREEP / tire.ring_radius),
+        speed=np.full(2, CREEP), camber=none, slip_angle=none, slip_ratio=none, side_force=none,
+        drive_force=none, order=none, temperature=np.full(2, np.nan),
+    )  # fmt: skip
+    depth = solve_whole(values_of(tire), press).deflection
     return float(np.diff(loads)[0] / np.diff(depth)[0])
 
 
@@ -149,9 +152,7 @@ def _ratio(waves: Waveforms, out: BoolArray) -> float:
     _, fit, _ = estimated(kept)
     rest = straight_runs(waves.take(~out | out))
     points = operating_points(rest.waves)
-    fix = large_displacements(fit.values, points, low_pass=rest.waves.low_pass)
-    state: State = predict(fit.values, points, low_pass=rest.waves.low_pass, correction=fix,
-                           phi=GRID)  # fmt: skip
-    error = np.mean((state.wave - rest.strain) ** 2, axis=1)
+    wave = solve_whole(fit.values, points, low_pass=rest.waves.low_pass).waveform
+    error = np.mean((wave - rest.strain) ** 2, axis=1)
     share: FloatArray = error / np.mean(rest.strain**2, axis=1)
     return float(np.sqrt(share[out].mean() / share[~out].mean()))

@@ -26,8 +26,12 @@ from tirelib import __version__
 from tirelib.identify.structure import STRUCTURE_STD
 from tirelib.threads import one_thread
 
-TYPICAL = {"radial_pressure_slope": 1.0, "tangential_pressure_slope": 0.35}
-"""Size [m] to which errors of slopes are related, as in `tirelib.identify`."""
+TYPICAL = {
+    "radial_pressure_slope": 1.0,
+    "tangential_pressure_slope": 0.35,
+    "tread_hardening": 1.0,
+}
+"""Size to which errors are related of what may be zero: slopes [m], as in `tirelib.identify`."""
 
 
 def table(cases: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -52,7 +56,12 @@ def table(cases: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _row(name: str, cases: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    rows = [c["parameters"][name] for c in cases]
+    # a road without friction does not let the tread's shear act, and no rig section has inertia
+    rows = [c["parameters"][name] for c in cases if c["parameters"][name]["laboratory"] != 0.0]
+    if not rows:
+        none = dict.fromkeys(("bias", "rms_error", "half_width"), 0.0)
+        told = dict.fromkeys(("coverage", "coverage_definition", "flagged"), 1.0)
+        return {**told, **none, "half_width_unflagged": None, "cases": 0}
     value, low, high, truth, own = (
         np.array([r[key] for r in rows])
         for key in ("value", "low", "high", "laboratory", "definition")
@@ -70,6 +79,7 @@ def _row(name: str, cases: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "half_width": float(np.median(half)),
         "half_width_unflagged": float(half[~flagged].max()) if (~flagged).any() else None,
         "flagged": float(flagged.mean()),
+        "cases": len(rows),
     }
 
 

@@ -33,31 +33,35 @@ class Measured:
 
 
 def tire(seed: int) -> RigTire:
-    """Draw a tire about the reference tire of the rig."""
-    rng = np.random.default_rng(seed)
+    """Draw a tire about the reference tire of the rig, every constant widely.
+
+    The road of every second tire is without friction: its tread does not hold on to it.
+    """
+    rng = np.random.default_rng([seed, 77])
     base = RigTire()
 
-    def factor(spread: float = 0.12) -> float:
+    def factor(spread: float) -> float:
         return float(np.exp(spread * rng.standard_normal()))
 
     # the order of the draws is part of a seed's meaning
     return replace(
         base,
         name=f"tire {seed}",
-        extension=base.extension * factor(0.2),
-        shear=base.shear * factor(0.2),
-        bending=base.bending * factor(0.2),
-        sidewall_radial=base.sidewall_radial * factor(),
-        sidewall_radial_offset=base.sidewall_radial_offset * factor(),
-        sidewall_tangential=base.sidewall_tangential * factor(),
-        sidewall_tangential_offset=base.sidewall_tangential_offset * factor(),
-        tread_normal=base.tread_normal * factor(0.15),
-        tread_hardening=float(rng.uniform(0.3, 2.0)),
-        crown_curvature=float(rng.uniform(0.3, 1.1)),
-        sidewall_damping=float(rng.uniform(0.0, 0.1)),
-        innerliner_offset=base.innerliner_offset * factor(0.03),
-        mass=base.mass * factor(0.08),
-        friction=float(rng.uniform(0.7, 1.1)),
+        extension=base.extension * factor(0.4),
+        shear=base.shear * factor(0.4),
+        bending=base.bending * factor(0.3),
+        mass=base.mass * factor(0.2),
+        sidewall_radial=base.sidewall_radial * factor(0.25),
+        sidewall_radial_offset=base.sidewall_radial_offset * factor(0.25),
+        sidewall_tangential=base.sidewall_tangential * factor(0.3),
+        sidewall_tangential_offset=base.sidewall_tangential_offset * factor(0.3),
+        tread_normal=base.tread_normal * factor(0.3),
+        tread_hardening=float(rng.uniform(0.0, 2.0)),
+        crown_curvature=float(rng.uniform(0.0, 1.5)),
+        sidewall_damping=float(rng.uniform(0.0, 0.08)),
+        innerliner_offset=base.innerliner_offset * factor(0.2),
+        friction=float(rng.uniform(0.5, 1.1)) * (seed % 2 == 0),
+        tread_shear_x=base.tread_shear_x * factor(0.4),
     )
 
 

@@ -84,6 +84,10 @@ def true() -> dict[str, float]:
         "radial_pressure_slope": 1e5 * TIRE.sidewall_radial,
         "tangential_pressure_slope": 1e5 * TIRE.sidewall_tangential,
         "extension_stiffness": TIRE.extension,
+        "shear_stiffness": TIRE.shear,
+        "rotary_inertia": 0.0,
+        "tread_shear_stiffness": TIRE.tread_shear_x * TIRE.belt_width,
+        "tread_hardening": TIRE.tread_hardening,
     }
 
 
@@ -100,8 +104,8 @@ def test_what_strain_tells_is_near_the_truth(
     entries = {entry["name"]: entry for entry in document["parameters"]}
     assert not entries["radial_stiffness"]["flags"]
     near = {
-        "bending_stiffness": 0.2, "radial_stiffness": 0.05, "innerliner_offset": 0.02,
-        "extension_stiffness": 0.25, "radial_pressure_slope": 0.15,
+        "bending_stiffness": 0.05, "radial_stiffness": 0.02, "innerliner_offset": 0.02,
+        "extension_stiffness": 0.15, "radial_pressure_slope": 0.1,
     }  # fmt: skip
     for name, share in near.items():
         assert entries[name]["value"] == pytest.approx(true[name], rel=share), name
@@ -112,8 +116,8 @@ def test_what_strain_tells_is_near_the_truth(
 
 
 def test_the_strain_is_explained(document: dict[str, Any]) -> None:
-    # a ring leaves 2 % of this tire's strain; one without large displacements 7 %
-    assert document["rms_ustrain"] < 0.03 * document["strain_rms_ustrain"]
+    # a ring whose belt does not shear leaves 2 % of this tire's strain, a linear one 7 %
+    assert document["rms_ustrain"] < 0.012 * document["strain_rms_ustrain"]
     stiffness = document["vertical_stiffness"]
     assert stiffness["model"] == pytest.approx(stiffness["measured"], rel=0.05)
 
@@ -126,7 +130,7 @@ def test_the_document_says_what_was_done(document: dict[str, Any], campaign: Pat
     assert document["gages"] == [1, 2, 3, 4, 5]
     assert document["noise_ustrain"] is None, "nothing was repeated"
     matrix = np.array(document["correlation"])
-    assert matrix.shape == (8, 8)
+    assert matrix.shape == (12, 12)
     assert np.diag(matrix) == pytest.approx(1.0)
     assert document["provenance"]["data_sha256"] == read_campaign(campaign).content_hash()
     keys = {"name", "meaning", "value", "std", "low", "high", "fit_std", "unit", "flags", "helps"}

@@ -28,18 +28,14 @@ def told(name: str, members: int = MEMBERS) -> dict:
         return judge(case(name), members)
 
 
-def test_where_nothing_is_hidden_only_the_shear_of_a_flexible_belt_is_named() -> None:
+def test_where_nothing_is_hidden_nothing_is_named() -> None:
     found = told("1001-none")
-    assert (found["outcome"], found["verdict"], found["named"]) == (
-        "quiet",
-        "named",
-        ["belt_shear"],
-    )
+    assert (found["outcome"], found["verdict"], found["named"]) == ("quiet", "none", [])
 
 
 def test_a_warm_up_with_another_law_is_named_and_its_addition_takes_the_error_away() -> None:
     found = told("1000-temperature-1.20")
-    assert found["named"] == ["temperature", "belt_shear"], "the belt shears as well"
+    assert found["named"] == ["temperature"], "that the belt shears is in the base"
     assert found["outcome"] == "right"
     error = found["error"]
     assert error["before"] / error["floor"] == pytest.approx(case("1000-temperature-1.20").ratio,
@@ -57,23 +53,21 @@ def test_an_oval_tire_which_no_effect_tells_is_unknown() -> None:
     assert (found["outcome"], found["verdict"], found["named"]) == ("flagged", "unknown", [])
 
 
-def test_a_gain_that_no_catalogue_holds_is_unknown_though_the_belt_shears_as_well() -> None:
-    found = told("1750-pressure_sensitive_gage-1.50", 100)  # with fewer the shear is not named
+def test_a_gain_that_no_catalogue_holds_is_unknown() -> None:
+    found = told("1750-pressure_sensitive_gage-1.50")
     assert (found["outcome"], found["verdict"], found["named"]) == ("flagged", "unknown", [])
     # nothing is named, so that nobody is an alarm by an exact fit
     assert all(each["ratio"] >= ALARM for each in found["leaders"] if each["level"] == "alarm")
 
 
-def test_shear_is_named_and_its_addition_takes_the_error() -> None:
+def test_a_belt_that_shears_much_is_no_effect_beside_the_plain_tire() -> None:
     found = told("1700-belt_shear-1.50")
-    assert found["named"] == ["belt_shear"]
-    assert found["outcome"] == "right"
-    assert found["error"]["after"] <= 1.05 * found["error"]["floor"]
+    assert (found["verdict"], found["named"]) == ("none", [])
 
 
 def test_a_tread_that_hardens_with_load_is_named_though_the_joint_fit_gives_it_to_others() -> None:
     found = told("1721-tread_load-1.20")
-    assert found["named"] == ["tread_load", "belt_shear"]
+    assert found["named"] == ["tread_load"]
     assert found["outcome"] == "right"
     assert found["leaders"][0]["ratio"] < ALARM  # by the joint fit it would not have been
     assert found["error"]["after"] <= 1.05 * found["error"]["floor"]
@@ -81,7 +75,7 @@ def test_a_tread_that_hardens_with_load_is_named_though_the_joint_fit_gives_it_t
 
 def test_a_faint_angle_that_nothing_imitates_is_named_for_its_share() -> None:
     found = told("1742-angle_zero-1.05", 32)  # fewer make it an alarm
-    assert found["named"] == ["angle_zero", "belt_shear"]
+    assert found["named"] == ["angle_zero"]
     assert found["outcome"] == "right"
     assert 1.0 <= found["leaders"][0]["ratio"] < ALARM
 

@@ -13,9 +13,9 @@ import pytest
 from tests.unit.identify.model_waves import TIRE, made_waves
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.identify.discrepancy import Discrepancy
-from tirelib.identify.identify import FITTED, estimated
+from tirelib.identify.identify import estimated
 from tirelib.identify.waveform_fit import Prior, fit_waveforms
-from tirelib.model.base import FREE, large_displacements, values_of
+from tirelib.model.base import BARE, FREE, large_displacements, values_of
 
 pytestmark = pytest.mark.speed
 GOALS = {19: 3.0, 60: 10.0}
@@ -54,7 +54,7 @@ def test_identification_time_and_its_growth_with_runs(capsys: pytest.CaptureFixt
 def test_growth_with_free_parameters(capsys: pytest.CaptureFixture[str]) -> None:
     runs = campaign(19)
     times = {}
-    for free in (FREE[:1], FREE[:4], FITTED):
+    for free in (FREE[:1], FREE[:4], BARE):
         prior = Prior(np.full(len(free), 0.5))
         data = runs.data()
 

@@ -15,6 +15,7 @@ from tirelib.cli.common import CAMPAIGN, NEW_FILE, output, progress_bar, write_j
 if TYPE_CHECKING:
     from tirelib.identify.whole import Whole
 
+BASES = ("plain", "dissertation")
 MOST_ROWS = 12
 """Rows of the table of contact angles on the screen."""
 
@@ -36,6 +37,9 @@ nothing could be identified, or no ring although the plan holds straight runs fo
 @click.argument("folder", metavar="DIR", type=CAMPAIGN)
 @click.option("--tire", "tire_file", metavar="T.toml|NAME",
               help="Start and priors (default: the campaign's geometry, literature).")  # fmt: skip
+@click.option("--base", type=click.Choice(BASES), default="plain", show_default=True,
+              help="The plain tire: belt shear, section inertia, a tread that sticks and hardens; "
+              "or the dissertation's ring, in which these are effects to be found.")  # fmt: skip
 @click.option("--out", "out", metavar="M.toml", type=NEW_FILE, required=True,
               help="The identified model; the other verbs read it.")  # fmt: skip
 @click.option(
@@ -46,6 +50,7 @@ def identify(
     context: click.Context,
     folder: Path,
     tire_file: str | None,
+    base: str,
     out: Path,
     json_file: Path | None,
 ) -> None:
@@ -57,7 +62,7 @@ def identify(
     start = read_tire(tire_file) if tire_file is not None else None
     campaign = read_campaign(folder)
     with progress_bar("identifying") as progress:
-        whole = identify_whole(campaign, start, progress=progress)
+        whole = identify_whole(campaign, start, base=base, progress=progress)
     document = whole_document(campaign, whole) | _errors(campaign, whole)
     write_tire(whole.file, out, "tirelib-model/1")
     console = output()

@@ -114,6 +114,7 @@ def next_test(
     """Tell which further run would separate the suspects of CAMPAIGN best."""
     from tirelib.compare.error import error_of
     from tirelib.compare.model import model_of
+    from tirelib.diagnose.candidates import in_base
     from tirelib.diagnose.diagnose import diagnose
     from tirelib.diagnose.document import assess, diagnosis_document
     from tirelib.diagnose.refit import refit
@@ -152,8 +153,9 @@ def next_test(
     suspects = None
     if names is not None:
         suspects = given_suspects(
-            [name.strip() for name in names.split(",")], [e.name for e in effects], catalogue
-        )
+            [name.strip() for name in names.split(",")], [e.name for e in effects], catalogue,
+            in_base=in_base(model.values),
+        )  # fmt: skip
     elif told is not None:
         _belongs(told, campaign, [e.name for e in effects], diagnosis_file)
         suspects = suspects_of(told, catalogue)

@@ -139,7 +139,7 @@ def _track(track: Track, found: Comparison) -> dict[str, Any]:
         "unit": track.unit,
         "noise": track.scale * track.noise,
         "rms": track.scale * fit.rms,
-        "rms_noise": fit.rms / track.noise,
+        "rms_noise": track.in_noise(fit.rms),
         "mean": track.scale * fit.mean,
         "mean_std": track.scale * fit.std,
         "rms_beside_mean": track.scale * fit.rms_beside,

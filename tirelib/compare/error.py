@@ -23,12 +23,12 @@ from tirelib.arrays import BoolArray, FloatArray
 from tirelib.compare.lag import fitted_delay, late_prediction
 from tirelib.compare.model import Model, Prediction, predict_runs
 from tirelib.compare.set_points import predict_set_points, tangents
-from tirelib.contact.exact import ExactContact
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.noise import LEAST_NOISE
 from tirelib.identify.random_effects import Whitening, scales, whitening_of
 from tirelib.model.base import operating_points
 from tirelib.model.state import Operating
+from tirelib.rolling.solve import Start
 from tirelib.signal import LowPass
 
 NOISE, MICROSTRAIN = "noise", "ustrain"
@@ -136,7 +136,7 @@ class Yardstick:
         return NOISE if np.isfinite(self.noise) else MICROSTRAIN
 
     def error(
-        self, model: Model, delay: float | None = None, *, start: ExactContact | None = None
+        self, model: Model, delay: float | None = None, *, start: Start | None = None
     ) -> ModelError:
         """Return the error of a model.
 
@@ -146,7 +146,7 @@ class Yardstick:
         delay : float, optional, [s]
             That of the runs to which the model was fitted, where these are others; it is fitted
             here by default.
-        start : ExactContact, optional
+        start : Rolling or Unknowns, optional
             Of these runs and a model nearby; saves time, the result is the same.
 
         Raises

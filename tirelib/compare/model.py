@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.contact.exact import ExactContact
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.errors import CalibrationError, FormatError, ParameterError, TirelibError
 from tirelib.model.base import Correction, large_displacements, predict, values_of
 from tirelib.model.chain import Changes
 from tirelib.model.state import Operating, State
 from tirelib.parameters import TireFile
+from tirelib.rolling.solve import Start
 from tirelib.signal import LowPass
 from tirelib.waveforms import N_PHI
 
@@ -173,7 +173,7 @@ def predict_runs(
     lateral: Sequence[float],
     low_pass: LowPass,
     *,
-    start: ExactContact | None = None,
+    start: Start | None = None,
 ) -> Prediction:
     """Return what the model says at operating points, with slopes by load and pressure.
 
@@ -185,7 +185,7 @@ def predict_runs(
         Positions of the gages that are averaged (left positive).
     low_pass : LowPass
         Of the measured waveforms.
-    start : ExactContact, optional
+    start : Rolling or Unknowns, optional
         Of the same points and a model nearby; saves time, the result is the same.
 
     Raises
@@ -208,7 +208,7 @@ def _predict_runs(
     points: Operating,
     lateral: FloatArray,
     low_pass: LowPass,
-    start: ExactContact | None,
+    start: Start | None,
 ) -> Prediction:
     n = len(points)
     places = lateral if model.across else np.zeros(1)

@@ -47,6 +47,10 @@ class Track:
     freedom: int
     constant: bool = False
 
+    def in_noise(self, rms: float) -> float:
+        """Return an rms in units of the noise; NaN where repeats are the same to the last digit."""
+        return rms / self.noise if self.noise > 0.0 else float("nan")
+
     @property
     def difference(self) -> FloatArray:
         """Model less measured, SI."""

@@ -3,7 +3,7 @@
 All of this follows from the plan and the model, before any residual is looked at.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,12 +16,16 @@ from tirelib.effects.effect import Strength
 from tirelib.errors import ParameterError
 from tirelib.identify.span import span
 from tirelib.identify.waveform_fit import Data
-from tirelib.model.base import predict
+from tirelib.model.base import coordinates, predict
 
 TWIN_ANGLE = np.deg2rad(30.0)
 """Signatures closer than this are called twins."""
-IN_BASE = {"belt_extension"}
-"""Effects that the base model has as a fitted parameter."""
+_AS_NUMBER = {
+    "belt_extension": "extension_stiffness",
+    "belt_shear": "shear_stiffness",
+    "rotary_inertia": "rotary_inertia",
+}
+"""Effects that a base model may have as a fitted parameter."""
 LEAST_SIGNAL = 3.0
 """An effect at the end of its range that changes whitened waveforms by less is dead."""
 
@@ -92,18 +96,24 @@ class Candidates:
         return sorted(found, key=lambda pair: pair[1])
 
 
+def in_base(values: Mapping[str, float | FloatArray]) -> set[str]:
+    """Return the effects that a tire's base model fits as numbers."""
+    free = {coordinate.name for coordinate in coordinates(values)}
+    return {effect for effect, number in _AS_NUMBER.items() if number in free}
+
+
 def candidates(data: Data, model: Refit, catalogue: Sequence[Effect]) -> Candidates:
     """Return what every effect of a catalogue would change, at the fitted model.
 
     Effects that the model has, and those of the brush, are left out.
     """
-    has = {effect.name for effect in model.effects}
+    has, numbers = {effect.name for effect in model.effects}, in_base(model.values)
     nuisance = model.whiten(model.own_slopes).reshape(len(model.own_slopes), -1)
     basis = span(nuisance.T)
     living: list[Candidate] = []
     dead: dict[str, str] = {}
     for effect in catalogue:
-        if effect.name in has | IN_BASE or effect.hook == "brush":
+        if effect.name in has | numbers or effect.hook == "brush":
             continue
         if effect.untestable:
             dead[effect.name] = effect.untestable

@@ -30,11 +30,10 @@ from tirelib.effects.patch import along, balanced, beam_strain, held_shear
 from tirelib.errors import ParameterError, TirelibError
 from tirelib.identify.delay import STD, UNIT, by_delay
 from tirelib.identify.discrepancy import Discrepancy
-from tirelib.identify.identify import FITTED
 from tirelib.identify.random_effects import random_tangents, scales
 from tirelib.identify.span import span
 from tirelib.identify.waveform_fit import Data
-from tirelib.model.base import move, predict
+from tirelib.model.base import coordinates, move, predict
 from tirelib.waveforms import GRID
 
 MEMBERS = 100
@@ -127,8 +126,9 @@ def variants(
         If none has a solution.
     """
     random = np.random.default_rng(seed)
-    rows = model.whiten(model.slopes[: len(FITTED)]).reshape(len(FITTED), -1)
-    normal = rows @ rows.T + 1e-6 * np.eye(len(FITTED))
+    k = len(coordinates(model.values))
+    rows = model.whiten(model.slopes[:k]).reshape(k, -1)
+    normal = rows @ rows.T + 1e-6 * np.eye(k)
     inverse = np.asarray(np.linalg.inv(normal), dtype=np.float64)
     rests: list[FloatArray] = []
     attempts = 0
@@ -196,7 +196,8 @@ def measured(
         `run_part`.
     """
     random = np.random.default_rng(len(found.rests))
-    free = model.whiten(model.slopes[: len(FITTED)]).reshape(len(FITTED), -1)
+    k = len(coordinates(model.values))
+    free = model.whiten(model.slopes[:k]).reshape(k, -1)
     basis = span(free.T)
     rests = []
     for rest in found.rests:
@@ -257,13 +258,14 @@ def _refitted(
     data: Data, model: Refit, wave: FloatArray, rows: FloatArray, inverse: FloatArray
 ) -> FloatArray:
     """Return the base model brought near a waveform by a few chord steps."""
-    z = np.zeros(len(FITTED))
+    free = coordinates(model.values)
+    z = np.zeros(len(free))
     fitted = model.waveform
     for _ in range(BACK_STEPS):
         step = inverse @ (rows @ model.whiten(wave - fitted).ravel())
         z = z + np.clip(step, -0.4, 0.4)
         state = predict(
-            move(model.values, z, FITTED), data.points, model.changes, low_pass=data.low_pass,
+            move(model.values, z, free), data.points, model.changes, low_pass=data.low_pass,
             correction=model.correction.moved(z),
         )  # fmt: skip
         fitted = state.wave

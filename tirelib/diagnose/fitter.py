@@ -3,7 +3,7 @@
 An effect of one sign whose law ends at zero is held there.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,11 +12,12 @@ from tirelib.arrays import BoolArray, FloatArray
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
 from tirelib.identify.delay import STD, UNIT, by_delay, late
-from tirelib.identify.identify import FITTED
 from tirelib.identify.random_effects import whitening
 from tirelib.identify.waveform_fit import Data
 from tirelib.model.base import (
+    Coordinate,
     Correction,
+    coordinates,
     large_displacements,
     linearised,
     move,
@@ -26,10 +27,21 @@ from tirelib.model.chain import Changes
 from tirelib.model.state import State
 from tirelib.model.whole import with_slopes
 
-WIDTH = np.array([0.7, 0.7, 1.5, 1.0, 1.5, 0.9, 0.15, 0.7])
+WIDTH = {
+    "bending_stiffness": 0.7,
+    "radial_stiffness": 0.7,
+    "radial_pressure_slope": 1.5,
+    "tangential_stiffness": 1.0,
+    "tangential_pressure_slope": 1.5,
+    "tread_stiffness": 0.9,
+    "innerliner_offset": 0.15,
+    "extension_stiffness": 0.7,
+    "shear_stiffness": 0.7,
+    "rotary_inertia": 1.0,
+    "tread_shear_stiffness": 1.0,
+    "tread_hardening": 0.7,
+}
 """Prior standard deviation of the free coordinates: wide, since the campaign has informed them."""
-BASE = len(FITTED) + 1
-"""Coordinates before the strengths: those of the tire, then the delay."""
 STRENGTH_WIDTH = 1.0
 """Prior standard deviation of a strength, relative to its range."""
 LONGEST = 0.4
@@ -41,6 +53,16 @@ MOST = 1e8
 """Damping at which there is no way down."""
 FLAT = 1e-5
 """Gain of a step, over the cost, of one at the bottom."""
+
+
+def widths(free: Sequence[Coordinate]) -> FloatArray:
+    """Return the prior standard deviations of coordinates of the tire."""
+    return np.array([WIDTH[coordinate.name] for coordinate in free])
+
+
+def before_strengths(values: Mapping[str, float | FloatArray]) -> int:
+    """Return how many coordinates stand before the strengths: the tire's, then the delay."""
+    return len(coordinates(values)) + 1
 
 
 def changes_of(effects: Sequence[Effect], strengths: Sequence[FloatArray]) -> Changes:
@@ -67,34 +89,36 @@ class Fitter:
         near: Correction | None = None,
     ) -> None:
         self.data, self.start, self.effects = data, values, effects
+        self.free = coordinates(values)
+        self.base = before_strengths(values)
         scales = [np.full(e.components, e.scale) for e in effects]
-        self.scale = np.concatenate([np.ones(len(FITTED)), [UNIT], *scales])
-        self.z = np.concatenate([np.zeros(len(FITTED)), [delay], *strengths]) / self.scale
-        more = np.full(self.z.size - BASE, STRENGTH_WIDTH)
-        self.width = np.concatenate([WIDTH, [STD / UNIT], more])
+        self.scale = np.concatenate([np.ones(len(self.free)), [UNIT], *scales])
+        self.z = np.concatenate([np.zeros(len(self.free)), [delay], *strengths]) / self.scale
+        more = np.full(self.z.size - self.base, STRENGTH_WIDTH)
+        self.width = np.concatenate([widths(self.free), [STD / UNIT], more])
         self.damping, self.cost = 1e-3, np.inf
         self.fresh = self.follows = False
         self.about, self.near = self.z, near
         self.correction: Correction
         one_sign = [np.full(e.components, (e.low >= 0.0) - (e.high <= 0.0)) for e in effects]
-        self.sign = np.concatenate([np.zeros(BASE), *one_sign])
+        self.sign = np.concatenate([np.zeros(self.base), *one_sign])
         self.signed: BoolArray = self.sign != 0.0
         self.slopes: FloatArray = np.zeros((0, *data.strain.shape))
 
     @property
     def values(self) -> dict[str, float | FloatArray]:
         """Of the tire, at the coordinates."""
-        return move(self.start, self.z[: len(FITTED)], FITTED)
+        return move(self.start, self.z[: len(self.free)], self.free)
 
     def strengths(self, z: FloatArray) -> tuple[FloatArray, ...]:
         """Return the strengths in their units."""
-        flat = (z * self.scale)[BASE:]
+        flat = (z * self.scale)[self.base :]
         cuts = np.cumsum([e.components for e in self.effects])[:-1]
         return tuple(np.split(flat, cuts)) if self.effects else ()
 
     def delay(self, z: FloatArray) -> float:
         """Return the delay [s]."""
-        return float((z * self.scale)[BASE - 1])
+        return float((z * self.scale)[self.base - 1])
 
     def changes(self, z: FloatArray) -> Changes:
         """Return effects and delay for the chain."""
@@ -109,7 +133,7 @@ class Fitter:
             large_displacements(
                 self.values, data.points, low_pass=data.low_pass, start=start
             ),
-            self.values, data.points, FITTED, low_pass=data.low_pass,
+            self.values, data.points, self.free, low_pass=data.low_pass,
         )  # fmt: skip
         if self.follows and before is not None:
             self._follow(before)
@@ -126,7 +150,7 @@ class Fitter:
 
     def _follow(self, before: Correction) -> None:
         """Bring what large displacements have in the slopes up to date."""
-        by_base, others = np.split(self.slopes, [len(FITTED)])
+        by_base, others = np.split(self.slopes, [len(self.free)])
         by_base = by_base + self.correction.by_waveform - before.by_waveform
         self.slopes = np.concatenate([by_base, others])
 
@@ -141,7 +165,7 @@ class Fitter:
 
     def _away(self, z: FloatArray) -> FloatArray:
         """Return how far base coordinates are from where large displacements were computed."""
-        away: FloatArray = (z - self.about)[: len(FITTED)]
+        away: FloatArray = (z - self.about)[: len(self.free)]
         return away
 
     def _take(self, state: State, z: FloatArray) -> None:
@@ -155,13 +179,13 @@ class Fitter:
         self.correction = replace(self.correction, depth=depth)
 
     def _linearise(self, z: FloatArray) -> None:
-        values = move(self.start, z[: len(FITTED)], FITTED)
+        values = move(self.start, z[: len(self.free)], self.free)
         base = linearised(
-            values, self.data.points, FITTED, self.changes(z), low_pass=self.data.low_pass,
+            values, self.data.points, self.free, self.changes(z), low_pass=self.data.low_pass,
             correction=self.large(z),
         )  # fmt: skip
         rows = [base.waveform_slopes, by_delay(base.waveform, self.data.points.omega)[None]]
-        for k in range(BASE, z.size):
+        for k in range(self.base, z.size):
             moved, side = z.copy(), -1.0 if self.sign[k] < 0.0 else 1.0
             moved[k] += 1e-3 * side * (1.0 if side * z[k] <= 0.5 else -1.0)
             wave = self._predict(moved).wave
@@ -173,7 +197,7 @@ class Fitter:
 
     def _predict(self, z: FloatArray) -> State:
         return predict(
-            move(self.start, z[: len(FITTED)], FITTED), self.data.points, self.changes(z),
+            move(self.start, z[: len(self.free)], self.free), self.data.points, self.changes(z),
             low_pass=self.data.low_pass, correction=self.large(z),
         )  # fmt: skip
 

@@ -1,7 +1,7 @@
 """Errors on runs that took no part in a fit: the highest load, and one pressure."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -117,14 +117,7 @@ def _near(correction: Correction, chosen: BoolArray) -> Correction | None:
     contact, rows = correction.contact, np.flatnonzero(chosen)
     if contact is None or len(contact) != chosen.size:
         return None
-    old = contact.constants
-    constants = replace(old, **{f.name: getattr(old, f.name)[rows] for f in fields(old)})
-    per_point = ("radius", "even", "odd", "deflection", "half_angle", "load")
-    part = replace(
-        contact, **{name: getattr(contact, name)[rows] for name in per_point},
-        tread=contact.tread.take(rows), constants=constants,
-    )  # fmt: skip
-    return Correction(correction.waveform[rows], correction.deflection[rows], part)
+    return Correction(correction.waveform[rows], correction.deflection[rows], contact.take(rows))
 
 
 def fold_entry(fold: Fold, before: float, after: float) -> dict[str, Any]:

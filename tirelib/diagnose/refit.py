@@ -10,7 +10,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.compare.model import Model
-from tirelib.diagnose.fitter import BASE, Fitter, changes_of
+from tirelib.diagnose.fitter import Fitter, before_strengths, changes_of
 from tirelib.effects import Effect
 from tirelib.errors import ConvergenceError, ParameterError, TirelibError
 from tirelib.identify.delay import earlier, late
@@ -88,11 +88,11 @@ class Refit:
     @property
     def own_slopes(self) -> FloatArray:
         """Slopes by what belongs to the tire and its effects, shape (n_free - 1, ...)."""
-        return np.delete(self.slopes, BASE - 1, axis=0)
+        return np.delete(self.slopes, before_strengths(self.values) - 1, axis=0)
 
     def beside_delay(self, white: FloatArray) -> FloatArray:
         """Return whitened waveforms (..., n_runs, n_phi) without what a delay could take."""
-        late = self.whiten(self.slopes[BASE - 1])
+        late = self.whiten(self.slopes[before_strengths(self.values) - 1])
         size = float(np.sum(late**2))
         if size == 0.0:
             return white
@@ -106,7 +106,9 @@ class Refit:
 
     def strength_std(self, index: int) -> FloatArray:
         """Return standard deviations of an effect's strength, in its unit."""
-        first = BASE + sum(effect.components for effect in self.effects[:index])
+        first = before_strengths(self.values) + sum(
+            effect.components for effect in self.effects[:index]
+        )
         effect = self.effects[index]
         rows = slice(first, first + effect.components)
         deviation: FloatArray = effect.scale * np.sqrt(np.diag(self.covariance)[rows])

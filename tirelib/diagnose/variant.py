@@ -15,20 +15,23 @@ from tirelib.contact.radial import press
 from tirelib.diagnose.refit import Refit
 from tirelib.effects.effect import State
 from tirelib.errors import ConvergenceError
-from tirelib.identify.identify import FITTED
 from tirelib.identify.waveform_fit import Data
-from tirelib.model.base import Correction, predict
+from tirelib.model.base import Correction, coordinates, predict
 from tirelib.model.chain import Change
-from tirelib.model.state import Operating
 
 REFERENCE_LOAD = 4000.0
 STIFFNESSES = (
     "bending_stiffness", "radial_stiffness", "tangential_stiffness", "extension_stiffness",
 )  # fmt: skip
+TREAD_AND_SECTIONS = (
+    "shear_stiffness", "rotary_inertia", "tread_shear_stiffness", "tread_hardening",
+)  # fmt: skip
 SPREAD = 0.1
 """Relative standard deviation of them."""
 LARGE = 0.3
 """Relative standard deviation of the part that large displacements add."""
+FOLLOWED = 0.1
+"""The same where the model has the belt's shear and a tread that sticks."""
 SECTIONS = 8e-5
 """Largest inertia of the belt's sections, [kg m]: twice that of 12.5 mm of belt and tread."""
 MASS = 0.15
@@ -55,13 +58,18 @@ def variant(data: Data, model: Refit, random: np.random.Generator) -> FloatArray
     for name in STIFFNESSES:
         values[name] = values[name] * float(np.exp(SPREAD * random.standard_normal()))
     values["mass"] = values["mass"] * float(np.exp(MASS * random.standard_normal()))
-    values["shear_stiffness"] = 1e3 / random.uniform(0.001, 0.03) - _tension(values, points)
-    values["tread_hardening"] = random.uniform(0.0, 3.0)
-    values["rotary_inertia"] = random.uniform(0.0, SECTIONS)
+    plain = bool(np.isfinite(values["shear_stiffness"]).all())
+    if plain:
+        for name in TREAD_AND_SECTIONS:
+            values[name] = values[name] * float(np.exp(SPREAD * random.standard_normal()))
+    else:
+        values["shear_stiffness"] = 1e3 / random.uniform(0.001, 0.03)
+        values["tread_hardening"] = random.uniform(0.0, 3.0)
+        values["rotary_inertia"] = random.uniform(0.0, SECTIONS)
     values["tread_stiffness"] = values["tread_stiffness"] * (
         points.load / REFERENCE_LOAD
     ) ** random.uniform(-0.1, 0.2)
-    large = 1.0 + LARGE * float(random.standard_normal())
+    large = 1.0 + (FOLLOWED if plain else LARGE) * float(random.standard_normal())
     follows = model.correction.moved(_moves(model.values, values, len(points)))
     correction = Correction(
         large * follows.waveform, large * follows.deflection, start=follows.start
@@ -77,8 +85,9 @@ def _moves(
     values: Mapping[str, float | FloatArray], others: Mapping[str, float | FloatArray], n: int
 ) -> FloatArray:
     """Return moves of the fitted coordinates from values to others, (n_free, n)."""
-    moves = np.zeros((len(FITTED), n))
-    for row, each in zip(moves, FITTED, strict=True):
+    free = coordinates(values)
+    moves = np.zeros((len(free), n))
+    for row, each in zip(moves, free, strict=True):
         value, other = values[each.name], others[each.name]
         if np.isfinite(value).all():  # a belt that does not stretch has nowhere to go
             row[:] = each.distance(value, other)
@@ -135,10 +144,3 @@ def crowned(curvature: float) -> Change:
         return state.but(belt=np.tensordot(SHARES, belt, axes=1), deflection=depth)
 
     return change
-
-
-def _tension(values: Mapping[str, float | FloatArray], points: Operating) -> FloatArray:
-    """Return the belt's tension, which a sheared section loses of its stiffness (Haringx), [N]."""
-    radius = values["ring_radius"]
-    spin = values["mass"] * (radius * np.asarray(points.omega)) ** 2
-    return np.asarray(points.pressure * values["belt_width"] * radius + spin)

@@ -9,7 +9,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.compare.error import ModelError, Yardstick
 from tirelib.compare.model import Model
-from tirelib.diagnose.candidates import IN_BASE, candidates
+from tirelib.diagnose.candidates import candidates, in_base
 from tirelib.diagnose.floor import FLOOR_MEMBERS, structural_floor
 from tirelib.diagnose.held_out import Fold, folds, held_out
 from tirelib.diagnose.refit import Refit, refit
@@ -144,7 +144,7 @@ class _Strain:
 
     def refuse(self, effect: Effect) -> None:
         """Raise ParameterError if the base fits an effect, or it is one of the brush."""
-        if effect.name in IN_BASE:
+        if effect.name in in_base(self.model.values):
             raise ParameterError(
                 f"effect {effect.name!r}: the base model has it as a fitted number; choose another "
                 "one"

@@ -10,7 +10,7 @@ from tirelib import __version__
 from tirelib.diagnose.held_out import pooled
 from tirelib.errors import FormatError
 from tirelib.extend.extension import Extension
-from tirelib.identify.identify import FITTED
+from tirelib.model.base import BARE, coordinates
 from tirelib.parameters import NUMBERS, Number, TireFile
 from tirelib.parameters.tire import range_fault
 
@@ -26,7 +26,7 @@ def extended_file(file: TireFile, done: Extension, data_hash: str) -> TireFile:
     name = done.runs.waves.header.name
     numbers = dict(file.numbers)
     faults = []
-    for index, coordinate in enumerate(FITTED):
+    for index, coordinate in enumerate(coordinates(done.after.values)):
         value = float(done.after.values[coordinate.name])
         fit_std = coordinate.spread(value, float(np.sqrt(done.after.covariance[index, index])))
         if (fault := range_fault(coordinate.name, value)) is not None:
@@ -71,7 +71,7 @@ def undone_file(file: TireFile) -> tuple[TireFile, Mapping[str, Any]]:
             "kind and source for each is needed"
         ) from error
     # an entry says which numbers its step wrote; those of strain without it wrote the ring's
-    fitted = set(before.get("written", [coordinate.name for coordinate in FITTED]))
+    fitted = set(before.get("written", [coordinate.name for coordinate in BARE]))
     numbers = {name: number for name, number in file.numbers.items() if name not in fitted} | old
     extra = {**file.extra, "effects": before["effects"], "history": history}
     return replace(file, numbers=numbers, extra=extra), last
@@ -135,7 +135,7 @@ def _entry(file: TireFile, done: Extension, data_hash: str) -> dict[str, Any]:
             "effects": list(file.extra.get("effects", [])),
             "numbers": {
                 coordinate.name: written(file.numbers[coordinate.name])
-                for coordinate in FITTED
+                for coordinate in coordinates(done.after.values)
                 if coordinate.name in file.numbers
             },
         },

@@ -39,8 +39,8 @@ class Discrepancy:
         are no columns for it.
     """
 
-    inside: float = 0.08
-    outside: float = 0.01
+    inside: float = 0.04
+    outside: float = 0.006
     knots: int = 24
     reach: float = 5.0
     by_load: float = 0.5
@@ -76,6 +76,10 @@ class Discrepancy:
             square = (points.omega / REFERENCE_OMEGA)[None, :, None] ** 2
             parts.append(self.by_speed * base * square)
         return np.concatenate(parts)
+
+
+COARSE = Discrepancy(inside=0.08, outside=0.01)
+"""Of the dissertation's ring, whose belt does not shear."""
 
 
 def _bumps(scaled: FloatArray, knots: int, reach: float) -> FloatArray:

@@ -9,14 +9,14 @@ import numpy as np
 from tirelib import __version__
 from tirelib.arrays import FloatArray
 from tirelib.campaign import Campaign, CampaignHeader
-from tirelib.errors import TirelibError
+from tirelib.errors import ParameterError, TirelibError
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
-from tirelib.identify.discrepancy import Discrepancy
+from tirelib.identify.discrepancy import COARSE, Discrepancy
 from tirelib.identify.next_run import NextRun, next_run
 from tirelib.identify.strain_notes import gage_notes, run_notes
-from tirelib.identify.structure import STRUCTURE_STD
+from tirelib.identify.structure import STRUCTURE_STD, WITHOUT_SHEAR
 from tirelib.identify.waveform_fit import Prior, WaveformFit, fit_waveforms
-from tirelib.model.base import FREE, Coordinate, values_of
+from tirelib.model.base import Coordinate, coordinates, values_of
 from tirelib.parameters import FIELDS, Number, Tire, TireFile
 from tirelib.threads import one_thread
 from tirelib.units import from_si
@@ -33,9 +33,17 @@ _LITERATURE: Mapping[str, tuple[float, float, str]] = {
     "mass": (3.3, 0.15, "literature, Tables 6-1, 6-2: 3.15 kg/m"),
     "extension_stiffness": (3.2e6, 0.6, "assumed: steel belts, 1 to 10 MN"),
 }
+_PLAIN: Mapping[str, tuple[float, float, str]] = {
+    "shear_stiffness": (6e4, 0.7, "assumed: 25 kN and more, of which the belt's tension takes 20"),
+    "rotary_inertia": (
+        5e-5, 1.0, "rho A h^2 / 12 of 12.5 mm of belt and tread, and room for blocks"
+    ),
+    "tread_shear_stiffness": (2.5e7, 1.0, "k_t / 3, for rubber keeps its volume"),
+    "tread_hardening": (1.0, 0.7, "assumed: blocks bulge into their grooves"),
+}  # fmt: skip
 """Value, relative standard deviation and source of what no campaign header holds."""
-FITTED: tuple[Coordinate, ...] = (*FREE, Coordinate("extension_stiffness"))
-"""What is fitted: an inextensible ring would put the belt's stretch into all other numbers."""
+BASES = ("plain", "dissertation")
+"""The plain tire, and the ring whose belt does not shear on a road without friction."""
 _RADIAL = (1.0, 2.4e5)
 _TANGENTIAL = (0.35, 1.1e5)
 """Slope by pressure [m] and offset [N/m^2] of sidewall stiffnesses, about those of Table 6-3."""
@@ -101,6 +109,7 @@ def identify(
     campaign: Campaign,
     tire: TireFile | None = None,
     *,
+    base: str = "plain",
     waves: Waveforms | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Identification:
@@ -111,6 +120,8 @@ def identify(
     campaign : Campaign
     tire : TireFile, optional
         Start and priors; the campaign's geometry and literature values where it is absent.
+    base : str
+        One of `BASES`.
     waves : Waveforms, optional
         Of the campaign, when they have been read already.
     progress : callable, optional
@@ -126,7 +137,7 @@ def identify(
     waves = waves or measure_waveforms(campaign, progress=progress)
     runs = straight_runs(waves)
     try:
-        start, fit, estimates = estimated(runs, tire, progress=progress)
+        start, fit, estimates = estimated(runs, tire, base=base, progress=progress)
     except TirelibError as error:
         error.args = (_with_run(str(error), runs),)
         raise
@@ -174,19 +185,22 @@ def estimated(
     runs: StraightRuns,
     tire: TireFile | None = None,
     *,
+    base: str = "plain",
     progress: Callable[[str], None] | None = None,
 ) -> tuple[TireFile, WaveformFit, tuple[Estimate, ...]]:
     """Return start and priors, the fit, and what it tells of every number.
 
     Parameters and errors as in `identify`, for runs that have been read already.
     """
-    start = start_file(runs.waves.header, runs, tire)
-    discrepancy = Discrepancy()
+    start = start_file(runs.waves.header, runs, tire, base)
+    values = values_of(start.tire)
+    free = coordinates(values)
+    discrepancy = Discrepancy() if base == "plain" else COARSE
     fit = fit_waveforms(
         runs.data(),
-        values_of(start.tire),
-        Prior(np.array([_prior_std(start, coordinate) for coordinate in FITTED])),
-        free=FITTED,
+        values,
+        Prior(np.array([_prior_std(start, coordinate) for coordinate in free])),
+        free=free,
         discrepancy=discrepancy,
         progress=progress,
     )
@@ -200,16 +214,27 @@ def estimated(
     return start, fit, tuple(estimates)
 
 
-def start_file(header: CampaignHeader, runs: StraightRuns, tire: TireFile | None) -> TireFile:
+def start_file(
+    header: CampaignHeader, runs: StraightRuns, tire: TireFile | None, base: str = "plain"
+) -> TireFile:
     """Return start and priors: the campaign's geometry, then the given tire, then literature.
 
-    The reference pressure is the mean of the campaign. Damping, shear of the belt and hardening are
-    no part of the base model and start at their plain values; an infinite extension stiffness of
-    the given tire is no start for a fit and gives way to the assumed one.
+    The reference pressure is the mean of the campaign. What is no part of the base model starts at
+    zero or infinity: damping, and of the dissertation's ring whatever the plain tire has beyond
+    it. An infinite stiffness or a zero of the given tire is no start for a fit and gives way to the
+    assumed one.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such base.
     """
+    if base not in BASES:
+        raise ParameterError(f"base model {base!r}; allowed are {' and '.join(BASES)}")
     numbers: dict[str, Number] = {}
     pressure = float(np.mean(runs.waves.conditions["pressure"]))
-    for name, (value, share, source) in _LITERATURE.items():
+    literature = {**_LITERATURE, **(_PLAIN if base == "plain" else {})}
+    for name, (value, share, source) in literature.items():
         numbers[name] = Number(value, share * value, "literature", source)
     for prefix, (slope, offset) in (("radial", _RADIAL), ("tangential", _TANGENTIAL)):
         value = slope * pressure + offset
@@ -221,7 +246,8 @@ def start_file(header: CampaignHeader, runs: StraightRuns, tire: TireFile | None
         numbers |= {
             name: number
             for name, number in tire.numbers.items()
-            if name not in {"damping", "shear_stiffness", "tread_hardening"}
+            if name != "damping"
+            and (name not in _PLAIN or (base == "plain" and number.value > 0.0))
             and np.isfinite(number.value)
         }
     geometry = header.tire
@@ -260,9 +286,10 @@ def _prior_std(start: TireFile, coordinate: Coordinate) -> float:
 
 def _structure(start: TireFile, fit: WaveformFit) -> FloatArray:
     """Return the structural standard deviation of every coordinate."""
+    known = WITHOUT_SHEAR if len(fit.free) == len(WITHOUT_SHEAR) else STRUCTURE_STD
     return np.array(
         [
-            STRUCTURE_STD[c.name] * (abs(start.numbers[c.name].value) / c.unit if c.unit else 1.0)
+            known[c.name] * (abs(start.numbers[c.name].value) / c.unit if c.unit else 1.0)
             for c in fit.free
         ]
     )

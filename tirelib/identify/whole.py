@@ -51,6 +51,7 @@ def identify_whole(
     campaign: Campaign,
     start: TireFile | None = None,
     *,
+    base: str = "plain",
     progress: Callable[[str], None] | None = None,
 ) -> Whole:
     """Fit the ring to straight runs with strain, then the brush to runs with slip.
@@ -61,6 +62,8 @@ def identify_whole(
     start : TireFile, optional
         Start and priors of the ring; where the campaign tells no ring, this one gives the contact
         length to the brush.
+    base : str
+        Of the ring: the plain tire, or the dissertation's (`tirelib.identify.identify.BASES`).
     progress : callable, optional
         Called with a label at each step.
 
@@ -76,8 +79,8 @@ def identify_whole(
     ring, routes, failed = None, None, ""
     if campaign.header.gage_lateral:
         try:
-            ring = identify(campaign, known, progress=progress)
-            first = start_file(campaign.header, ring.runs, known)
+            ring = identify(campaign, known, base=base, progress=progress)
+            first = start_file(campaign.header, ring.runs, known, "dissertation")
             routes = follow_routes(ring.runs, first, progress=progress)
             reasons += ring.notes
         except TirelibError as error:

@@ -6,12 +6,13 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.contact.exact import ExactContact, load_exact
-from tirelib.contact.exact_slopes import ExactSlopes
-from tirelib.contact.free_boundary import Start
+from tirelib.contact import free_boundary
 from tirelib.model.chain import Changes, waveform
+from tirelib.model.rolled import RolledSlopes, made_of
 from tirelib.model.state import Operating, State
 from tirelib.parameters import Tire
+from tirelib.rolling.assemble import Unknowns
+from tirelib.rolling.solve import Rolling, Start, solve
 from tirelib.signal import LowPass
 from tirelib.waveforms import GRID, Waveforms
 
@@ -53,7 +54,24 @@ FREE: tuple[Coordinate, ...] = (
     Coordinate("tread_stiffness"),
     Coordinate("innerliner_offset"),
 )
-"""Parameters of the base model that strain waveforms of a campaign may inform."""
+"""Parameters of the linear ring that strain waveforms of a campaign may inform."""
+BARE: tuple[Coordinate, ...] = (*FREE, Coordinate("extension_stiffness"))
+"""Those of the dissertation's ring, whose belt does not shear: an inextensible one would put the
+belt's stretch into all other numbers."""
+PLAIN: tuple[Coordinate, ...] = (
+    *BARE,
+    Coordinate("shear_stiffness"),
+    Coordinate("rotary_inertia"),
+    Coordinate("tread_shear_stiffness"),
+    Coordinate("tread_hardening"),
+)
+"""Those of the plain tire: every belt shears and has section inertia, every tread sticks to the
+road and hardens when it is pressed."""
+
+
+def coordinates(values: Mapping[str, float | FloatArray]) -> tuple[Coordinate, ...]:
+    """Return what a fit to strain moves: of the plain tire, or of a belt that does not shear."""
+    return PLAIN if bool(np.isfinite(values["shear_stiffness"]).all()) else BARE
 
 
 def values_of(tire: Tire) -> dict[str, float | FloatArray]:
@@ -120,24 +138,24 @@ class CorrectionSlopes:
     ----------
     waveform : shape (n_free, n_points, n_phi), [-]
     deflection : shape (n_free, n_points), [m]
-    contact : ExactSlopes
-        Of the exact ring; its last two directions are load and pressure.
+    contact : RolledSlopes
+        Of the rolling ring; its last two directions are load and pressure.
     """
 
     waveform: FloatArray
     deflection: FloatArray
-    contact: ExactSlopes
+    contact: RolledSlopes
 
 
 @dataclass(frozen=True, slots=True)
 class Correction:
-    """What large displacements add to the linear ring, at fixed parameters.
+    """What the rolling ring has and the linear one has not, at fixed parameters.
 
     Attributes
     ----------
     waveform : shape (n_points, n_phi), [-]
     deflection : shape (n_points,), [m]
-    contact : ExactContact or None
+    contact : Rolling or None
         The solution behind it: a start for one nearby, and for slopes.
     start : Start or None
         Of the linear ring's contact.
@@ -149,8 +167,8 @@ class Correction:
 
     waveform: FloatArray
     deflection: FloatArray
-    contact: ExactContact | None = None
-    start: Start | None = None
+    contact: Rolling | None = None
+    start: free_boundary.Start | None = None
     depth: FloatArray | None = None
     slopes: CorrectionSlopes | None = None
 
@@ -186,11 +204,13 @@ class Correction:
             deflection=self.deflection + np.sum(each * deeper, axis=0),
         )
 
-    def guess(self, dz: FloatArray) -> ExactContact | None:
+    def guess(self, dz: FloatArray) -> Unknowns | None:
         """Return a start for the contact after a move (n_free,)."""
-        if self.slopes is None or self.contact is None:
-            return self.contact
-        return self.slopes.contact.moved(self.contact, np.append(dz, [0.0, 0.0]))
+        if self.contact is None:
+            return None
+        return (
+            self.contact.x if self.slopes is None else self.slopes.contact.start(self.contact, dz)
+        )
 
 
 def large_displacements(
@@ -199,22 +219,21 @@ def large_displacements(
     *,
     low_pass: LowPass | None = None,
     phi: FloatArray = GRID,
-    start: ExactContact | None = None,
+    start: Start | None = None,
 ) -> Correction:
-    """Return the exact ring less the linear one, both static and undamped, at a tire's values.
+    """Return the rolling ring less the linear one at a tire's values, both undamped.
 
     It changes slowly with the parameters, so a fit brings it up to date a few times only; a
-    contact nearby for the same points as `start` saves most of the time and changes nothing else.
+    solution nearby for the same points as `start` saves most of the time and changes nothing else.
     """
-    still = dict(values)
-    still["damping"] = 0.0
+    low_pass = low_pass or LowPass()
+    still = {**values, "damping": 0.0}
     state = waveform(State.of(still, points, phi), low_pass=low_pass)
-    exact = load_exact(
-        replace(state.ring, shear_stiffness=np.inf), state.tread, points.load, start=start
-    )
-    strain = smoothed(exact.strain(state.offset, phi), points, low_pass or LowPass())
+    made = made_of(values, points)
+    solved = solve(made.constants, start=start)
+    strain = smoothed(solved.strain(made.offset, phi.size), points, low_pass)
     return Correction(
-        strain - state.wave, exact.deflection - state.deflection, exact,
+        strain - state.wave, solved.deflection - state.deflection, solved,
         state.contact.start if state.contact else None,
     )  # fmt: skip
 

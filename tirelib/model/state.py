@@ -68,7 +68,8 @@ class State:
         Ring radius R, free radius R0, belt width b, tread thickness h0, gage offset y < 0.
     EI, mass, tension_pressure, k_u, k_v, damping, EA, GA, rotary_inertia, inertia_share, tension,
     dashpots
-        Of the ring (`tirelib.ring.ring.Ring`); tension_pressure is p of the tension p b R.
+        Of the ring (`tirelib.ring.ring.Ring`); tension_pressure is p of the tension p b R, and GA
+        is the tire's less that tension.
     k_t, hardening
         Of the tread (`tirelib.contact.tread.Tread`).
     lateral : float, [m]
@@ -128,7 +129,7 @@ class State:
             return np.broadcast_to(np.asarray(values[name], dtype=float), (n,))
 
         above = conditions.pressure - column("pressure")
-        return cls(
+        state = cls(
             conditions=conditions,
             radius=column("ring_radius"),
             free_radius=column("free_radius"),
@@ -152,6 +153,8 @@ class State:
             phi=phi,
             deflection=np.full(n, np.nan),
         )
+        # the tension acts along the sections' normal and takes its own size from their stiffness
+        return state.but(GA=state.GA - state.belt_tension)
 
     def but(self, **changes: Any) -> "State":
         """Return the state with some fields replaced."""

@@ -1,11 +1,12 @@
-"""The model with large displacements, solved at operating points, and its slopes.
+"""The model of a tire, solved at operating points, and its slopes.
 
-The waveform is that of the exact ring, plus what damping and effects change in the linear one:
+The waveform is that of the rolling ring (`tirelib.rolling`), plus what damping and effects change
+in the linear one:
 
-    m = m_exact + m_linear(damping, effects) - m_linear(neither).
+    m = m_rolling + m_linear(damping, effects) - m_linear(neither).
 
-Without either the linear ring is not computed at all. The slopes of the exact part come from its
-own equations (`tirelib.contact.exact_slopes`), those of the rest from differences.
+Without either the linear ring is not computed at all. The slopes of the rolling ring come from its
+own equations, those of the rest from differences.
 """
 
 from collections.abc import Mapping
@@ -14,22 +15,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.contact.exact import ExactContact, load_exact
-from tirelib.contact.exact_slopes import ExactSlopes, exact_slopes
 from tirelib.errors import ParameterError
 from tirelib.model.base import Coordinate, Correction, CorrectionSlopes, predict, smoothed
 from tirelib.model.chain import Changes
-from tirelib.model.state import Operating, State
+from tirelib.model.rolled import STEP, Made, RolledSlopes, made_of, rolled_slopes
+from tirelib.model.state import Operating
+from tirelib.rolling.assemble import Unknowns
+from tirelib.rolling.solve import Rolling, Start, solve
 from tirelib.signal import LowPass
 from tirelib.waveforms import GRID
 
 Values = Mapping[str, float | FloatArray]
-STEP = 1e-4
+LINEAR_STEP = 1e-4
 """Of differences of the linear ring."""
-FINE = 1e-6
-"""Of differences of the constants, which are smooth in everything."""
-HELD = ("radius", "free_radius", "thickness", "hardening")
-"""Constants that the slopes of the exact ring take as given."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,13 +38,13 @@ class Whole:
     ----------
     waveform : shape (n_points, n_phi), [-]
     deflection : shape (n_points,), [m]
-    contact : ExactContact or None
+    contact : Rolling or None
         None for the linear ring alone.
     """
 
     waveform: FloatArray
     deflection: FloatArray
-    contact: ExactContact | None
+    contact: Rolling | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,18 +55,18 @@ class WholeSlopes:
     ----------
     waveform : shape (n_free + 2, n_points, n_phi)
     deflection : shape (n_free + 2, n_points)
-    contact : ExactSlopes or None
+    contact : RolledSlopes or None
     """
 
     waveform: FloatArray
     deflection: FloatArray
-    contact: ExactSlopes | None
+    contact: RolledSlopes | None
 
-    def start(self, found: Whole, dz: FloatArray) -> ExactContact | None:
+    def start(self, found: Whole, dz: FloatArray) -> Unknowns | None:
         """Return a first guess of the contact after a move (n_free,) of the free coordinates."""
         if found.contact is None or self.contact is None:
             return None
-        return self.contact.moved(found.contact, np.append(dz, [0.0, 0.0]))
+        return self.contact.start(found.contact, dz)
 
 
 def solve_whole(
@@ -77,7 +75,7 @@ def solve_whole(
     changes: Changes = (),
     *,
     low_pass: LowPass | None = None,
-    start: ExactContact | None = None,
+    start: Start | None = None,
     exact: bool = True,
 ) -> Whole:
     """Return the solved model at operating points.
@@ -90,10 +88,10 @@ def solve_whole(
     changes : sequence of (stage, change)
         Effects.
     low_pass : LowPass
-    start : ExactContact, optional
+    start : Rolling or Unknowns, optional
         A solution nearby.
     exact : bool
-        False leaves large displacements out.
+        False takes the linear ring alone.
 
     Raises
     ------
@@ -104,14 +102,15 @@ def solve_whole(
     if not exact:
         state = predict(values, points, changes, low_pass=low_pass)
         return Whole(state.wave, state.deflection, None)
-    state = State.of(values, points, GRID)
-    ring = replace(state.ring, shear_stiffness=np.inf)
-    solved = load_exact(ring, state.tread, points.load, start=start)
-    wave = smoothed(solved.strain(state.offset, GRID), points, low_pass)
+    made = made_of(values, points)
+    solved = solve(made.constants, start=start)
+    wave = smoothed(solved.strain(made.offset, GRID.size), points, low_pass)
     depth = solved.deflection
     if _lively(values, changes):
-        more, deeper = _beside(values, points, changes, low_pass)
-        wave, depth = wave + more, depth + deeper
+        full = predict(values, points, changes, low_pass=low_pass)
+        plain = predict(_still(values), points, low_pass=low_pass)
+        wave = wave + full.wave - plain.wave
+        depth = depth + full.deflection - plain.deflection
     return Whole(wave, depth, solved)
 
 
@@ -131,23 +130,18 @@ def whole_slopes(
     found : Whole
         `solve_whole` of the same values, points and changes.
     free : tuple of Coordinate
-
-    Raises
-    ------
-    ParameterError
-        If a coordinate moves what the slopes of the exact ring take as given (`HELD`).
     """
     low_pass = low_pass or LowPass()
     if found.contact is None:
         return _differences(values, points, free, changes, low_pass)
-    slopes = _exact(found.contact, values, points, free, low_pass)
+    slopes = _rolling(found.contact, values, points, free, low_pass)
     if not _lively(values, changes):
         return slopes
     full = _differences(values, points, free, changes, low_pass)
-    still = _differences(_still(values), points, free, (), low_pass)
+    plain = _differences(_still(values), points, free, (), low_pass)
     return WholeSlopes(
-        slopes.waveform + full.waveform - still.waveform,
-        slopes.deflection + full.deflection - still.deflection,
+        slopes.waveform + full.waveform - plain.waveform,
+        slopes.deflection + full.deflection - plain.deflection,
         slopes.contact,
     )
 
@@ -160,7 +154,7 @@ def with_slopes(
     *,
     low_pass: LowPass | None = None,
 ) -> Correction:
-    """Return what large displacements add with its slopes by the free coordinates.
+    """Return a correction of the linear ring with its slopes by the free coordinates.
 
     Parameters
     ----------
@@ -171,49 +165,24 @@ def with_slopes(
     Raises
     ------
     ParameterError
-        If a coordinate moves what the slopes of the exact ring take as given (`HELD`), or the
-        correction is without its contact.
+        If the correction is without its contact.
     """
     if found.contact is None:
         raise ParameterError("model: a correction without its contact has no slopes; compute it")
     low_pass, k = low_pass or LowPass(), len(free)
-    exact = _exact(found.contact, values, points, free, low_pass)
-    still = _differences(_still(values), points, free, (), low_pass)
-    assert exact.contact is not None  # noqa: S101 - of the exact ring
+    whole = _rolling(found.contact, values, points, free, low_pass)
+    plain = _differences(_still(values), points, free, (), low_pass)
+    assert whole.contact is not None  # noqa: S101 - of the rolling ring
     slopes = CorrectionSlopes(
-        exact.waveform[:k] - still.waveform[:k],
-        exact.deflection[:k] - still.deflection[:k],
-        exact.contact,
+        whole.waveform[:k] - plain.waveform[:k],
+        whole.deflection[:k] - plain.deflection[:k],
+        whole.contact,
     )
     return replace(found, slopes=slopes)
 
 
-def _exact(
-    solved: ExactContact,
-    values: Values,
-    points: Operating,
-    free: tuple[Coordinate, ...],
-    low_pass: LowPass,
-) -> WholeSlopes:
-    """Return the slopes of the static exact ring, from its own equations."""
-    n, k = len(points), len(free) + 2
-    columns, several = _shifted(values, points, free, FINE)
-    state = State.of(columns, several, GRID)
-    _check_held(state, free, k, n)
-    constants = [
-        state.EA, state.EI, state.tension_pressure * state.width, state.k_u, state.k_v, state.k_t,
-        several.load, state.offset,
-    ]  # fmt: skip
-    rows = np.stack([np.asarray(c).reshape(k + 1, n) for c in constants], axis=2)
-    finite = np.where(np.isinf(rows), 0.0, rows)  # an infinite EA does not move
-    moves = (finite[1:] - finite[0]) / FINE
-    by = exact_slopes(solved, moves[..., :-1])
-    wave = smoothed(by.strain(solved, rows[0, :, -1], moves[..., -1], GRID), points, low_pass)
-    return WholeSlopes(wave, by.deflection, by)
-
-
 def _lively(values: Values, changes: Changes) -> bool:
-    """Return whether damping or effects make the model differ from the static exact ring."""
+    """Return whether damping or effects make the model differ from the rolling ring."""
     return bool(changes) or bool(np.any(values["damping"]))
 
 
@@ -221,20 +190,46 @@ def _still(values: Values) -> dict[str, float | FloatArray]:
     return {**values, "damping": 0.0}
 
 
-def _beside(
-    values: Values, points: Operating, changes: Changes, low_pass: LowPass
-) -> tuple[FloatArray, FloatArray]:
-    """Return what damping and effects change in waveform and deflection of the linear ring."""
-    full = predict(values, points, changes, low_pass=low_pass)
-    still = predict(_still(values), points, low_pass=low_pass)
-    return full.wave - still.wave, full.deflection - still.deflection
+def _rolling(
+    solved: Rolling,
+    values: Values,
+    points: Operating,
+    free: tuple[Coordinate, ...],
+    low_pass: LowPass,
+) -> WholeSlopes:
+    """Return the slopes of the rolling ring, from its own equations."""
+    there: list[Made] = []
+    for coordinate in free:
+        moved = coordinate.moved(np.asarray(values[coordinate.name], dtype=float), STEP)
+        there.append(made_of({**values, coordinate.name: moved}, points))
+    there.append(made_of(values, replace(points, load=points.load * (1.0 + STEP))))
+    there.append(made_of(values, replace(points, pressure=points.pressure * (1.0 + STEP))))
+    by = rolled_slopes(solved, made_of(values, points), there, STEP, GRID.size)
+    return WholeSlopes(smoothed(by.strain, points, low_pass), by.deflection, by)
+
+
+def _differences(
+    values: Values,
+    points: Operating,
+    free: tuple[Coordinate, ...],
+    changes: Changes,
+    low_pass: LowPass,
+) -> WholeSlopes:
+    """Return slopes of the linear ring: shifted copies, all in one batch."""
+    columns, several = _shifted(values, points, free)
+    state = predict(columns, several, changes, low_pass=low_pass)
+    rows = len(free) + 3
+    waves, depth = state.wave.reshape(rows, len(points), -1), state.deflection.reshape(rows, -1)
+    return WholeSlopes(
+        (waves[1:] - waves[0]) / LINEAR_STEP, (depth[1:] - depth[0]) / LINEAR_STEP, None
+    )
 
 
 def _shifted(
-    values: Values, points: Operating, free: tuple[Coordinate, ...], step: float
+    values: Values, points: Operating, free: tuple[Coordinate, ...]
 ) -> tuple[dict[str, float | FloatArray], Operating]:
     """Return values and points of copies: plain, each coordinate moved, load, pressure."""
-    n, k = len(points), len(free) + 2
+    n, k, step = len(points), len(free) + 2, LINEAR_STEP
     columns = dict(values)
     for j, coordinate in enumerate(free):
         z = np.zeros((k + 1, 1))
@@ -247,29 +242,3 @@ def _shifted(
     load[(k - 1) * n : k * n] *= 1.0 + step
     pressure[k * n :] *= 1.0 + step
     return columns, replace(several, load=load, pressure=pressure)
-
-
-def _differences(
-    values: Values,
-    points: Operating,
-    free: tuple[Coordinate, ...],
-    changes: Changes,
-    low_pass: LowPass,
-) -> WholeSlopes:
-    """Return slopes of the linear ring: shifted copies, all in one batch."""
-    columns, several = _shifted(values, points, free, STEP)
-    state = predict(columns, several, changes, low_pass=low_pass)
-    rows = len(free) + 3
-    waves, depth = state.wave.reshape(rows, len(points), -1), state.deflection.reshape(rows, -1)
-    return WholeSlopes((waves[1:] - waves[0]) / STEP, (depth[1:] - depth[0]) / STEP, None)
-
-
-def _check_held(state: State, free: tuple[Coordinate, ...], k: int, n: int) -> None:
-    for name in HELD:
-        rows = np.asarray(getattr(state, name)).reshape(k + 1, n)
-        moved = np.flatnonzero((rows != rows[0]).any(axis=1))
-        if moved.size:
-            raise ParameterError(
-                f"model: {free[moved[0] - 1].name} moves the ring's {name}, by which the exact "
-                "ring has no slopes; fit belt, sidewall, tread stiffness and offset only"
-            )

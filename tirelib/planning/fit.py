@@ -6,14 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
-from tirelib.diagnose.fitter import STRENGTH_WIDTH, WIDTH, changes_of
+from tirelib.diagnose.fitter import STRENGTH_WIDTH, changes_of, widths
 from tirelib.diagnose.structure import FORM
 from tirelib.effects import Effect
 from tirelib.errors import ConvergenceError, TirelibError
-from tirelib.identify.identify import FITTED
 from tirelib.identify.random_effects import Whitening
 from tirelib.identify.waveform_fit import Data
-from tirelib.model.base import move, predict
+from tirelib.model.base import Coordinate, coordinates, move, predict
 from tirelib.model.chain import Changes
 from tirelib.model.state import Operating
 from tirelib.model.whole import Whole, solve_whole, whole_slopes
@@ -44,7 +43,7 @@ class Guess:
         Values of the tire at z = 0.
     effects : tuple of Effect
     z : shape (n_free + n_strengths,)
-        Moves of `FITTED`, then strengths in units of their range.
+        Moves of the tire's coordinates, then strengths in units of their range.
     """
 
     start: Values
@@ -54,14 +53,19 @@ class Guess:
     @property
     def values(self) -> dict[str, float | FloatArray]:
         """Of the tire."""
-        return move(self.start, self.z[: len(FITTED)], FITTED)
+        return move(self.start, self.z[: len(self.free)], self.free)
 
     @property
     def strengths(self) -> tuple[FloatArray, ...]:
         """In their units, one array per effect."""
         counts = [effect.components for effect in self.effects]
-        parts = np.split(self.z[len(FITTED) :], np.cumsum(counts)[:-1]) if counts else []
+        parts = np.split(self.z[len(self.free) :], np.cumsum(counts)[:-1]) if counts else []
         return tuple(e.scale * part for e, part in zip(self.effects, parts, strict=True))
+
+    @property
+    def free(self) -> tuple[Coordinate, ...]:
+        """What moves of the tire."""
+        return coordinates(self.start)
 
     @property
     def changes(self) -> Changes:
@@ -78,16 +82,18 @@ class Guess:
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             return solve_whole(
                 self.values, points, self.changes, low_pass=data.low_pass,
-                start=near.contact if near is not None else None,
+                start=near.contact.x if near is not None and near.contact else None,
             )  # fmt: skip
 
     def slopes(self, found: Whole, data: Data, points: Operating) -> tuple[FloatArray, FloatArray]:
         """Return slopes by the coordinates, and by relative load and pressure."""
         values, changes = self.values, self.changes
-        by = whole_slopes(found, values, points, FITTED, changes, low_pass=data.low_pass).waveform
+        by = whole_slopes(
+            found, values, points, self.free, changes, low_pass=data.low_pass
+        ).waveform
         plain = predict(values, points, changes, low_pass=data.low_pass).wave
         rows = []
-        for k in range(len(FITTED), self.z.size):
+        for k in range(len(self.free), self.z.size):
             moved = self.z.copy()
             moved[k] += TRIAL if moved[k] <= 0.5 else -TRIAL
             wave = predict(values, points, self.at(moved).changes, low_pass=data.low_pass).wave
@@ -102,7 +108,7 @@ class Guess:
         An end other than zero is as uncertain as the law.
         """
         low, high = np.full(self.z.size, -np.inf), np.full(self.z.size, np.inf)
-        first = len(FITTED)
+        first = len(self.free)
         for effect in self.effects:
             rows = slice(first, first + effect.components)
             low[rows] = effect.low / effect.scale - FORM * (effect.low < 0.0) - self.z[rows]
@@ -119,8 +125,8 @@ class Guess:
     @property
     def width(self) -> FloatArray:
         """Prior standard deviations."""
-        more = self.z.size - len(FITTED)
-        return np.concatenate([WIDTH, np.full(more, STRENGTH_WIDTH)])
+        more = self.z.size - len(self.free)
+        return np.concatenate([widths(self.free), np.full(more, STRENGTH_WIDTH)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -284,4 +290,4 @@ def bounded(
 def started(start: Values, effects: Sequence[Effect], strengths: Sequence[FloatArray]) -> Guess:
     """Return a guess at values and strengths."""
     parts = [np.atleast_1d(s) / e.scale for e, s in zip(effects, strengths, strict=True)]
-    return Guess(start, tuple(effects), np.concatenate([np.zeros(len(FITTED)), *parts]))
+    return Guess(start, tuple(effects), np.concatenate([np.zeros(len(coordinates(start))), *parts]))

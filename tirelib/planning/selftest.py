@@ -19,9 +19,8 @@ from tirelib.diagnose.refit import Refit, refit
 from tirelib.effects import Effect
 from tirelib.errors import CalibrationError, TirelibError
 from tirelib.identify.campaign_data import StraightRuns
-from tirelib.identify.identify import FITTED
 from tirelib.identify.waveform_fit import Data
-from tirelib.model.base import move, predict
+from tirelib.model.base import coordinates, move, predict
 from tirelib.planning.first_round import FirstRound
 from tirelib.planning.rivals import try_suspects
 from tirelib.planning.variants import Track, draw_variants
@@ -215,9 +214,10 @@ class _Judge:
 
     def __init__(self, data: Data, base: Refit, ranking: FirstRound, track: Track) -> None:
         self.data, self.base, self.ranking, self.track = data, base, ranking, track
-        rows = base.whiten(base.slopes[: len(FITTED)]).reshape(len(FITTED), -1)
+        k = len(coordinates(base.values))
+        rows = base.whiten(base.slopes[:k]).reshape(k, -1)
         self.rows = rows
-        normal = rows @ rows.T + 1e-6 * np.eye(len(FITTED))
+        normal = rows @ rows.T + 1e-6 * np.eye(k)
         self.inverse = np.asarray(np.linalg.inv(normal), dtype=np.float64)
 
     def __call__(self, waves: FloatArray) -> tuple[tuple[str, ...], FloatArray]:
@@ -230,7 +230,7 @@ class _Judge:
     def _refitted(self, waves: FloatArray) -> FloatArray:
         """Return the base brought near every tire's waveforms by a few chord steps."""
         base, count = self.base, len(waves)
-        z = np.zeros((count, len(FITTED)))
+        z = np.zeros((count, len(coordinates(base.values))))
         fitted = np.broadcast_to(base.waveform, waves.shape)
         for _ in range(CHORD_STEPS):
             white = base.whiten(waves - fitted).reshape(count, -1)
@@ -250,9 +250,10 @@ class _Judge:
     def _predicted(self, z: FloatArray) -> FloatArray:
         """Return the base's waveforms at every tire's coordinates."""
         base, data, count = self.base, self.data, len(z)
-        each = [move(base.values, row, FITTED) for row in z]
+        free = coordinates(base.values)
+        each = [move(base.values, row, free) for row in z]
         values = dict(base.values)
-        for coordinate in FITTED:
+        for coordinate in free:
             column = [float(np.max(moved[coordinate.name])) for moved in each]
             values[coordinate.name] = np.repeat(column, len(data.points))
         large = [base.correction.moved(row) for row in z]

@@ -19,10 +19,9 @@ from tirelib.diagnose.ensemble import smooth_part, variants
 from tirelib.diagnose.refit import Refit
 from tirelib.diagnose.shape import filled, finer, moved
 from tirelib.diagnose.structure import FORM
-from tirelib.identify.identify import FITTED
 from tirelib.identify.random_effects import Whitening
 from tirelib.identify.waveform_fit import Data
-from tirelib.model.base import large_displacements, linearised, predict
+from tirelib.model.base import coordinates, large_displacements, linearised, predict
 from tirelib.model.state import Operating
 from tirelib.model.whole import with_slopes
 from tirelib.waveforms import GRID
@@ -128,10 +127,15 @@ def _at(base: Refit, data: Data, points: Operating) -> Refit:
     """Return a fitted model at other points, whitened by noise alone; residuals as they are."""
     correction = with_slopes(
         large_displacements(base.values, points, low_pass=data.low_pass),
-        base.values, points, FITTED, low_pass=data.low_pass,
+        base.values, points, coordinates(base.values), low_pass=data.low_pass,
     )  # fmt: skip
     found = linearised(
-        base.values, points, FITTED, base.changes, low_pass=data.low_pass, correction=correction
+        base.values,
+        points,
+        coordinates(base.values),
+        base.changes,
+        low_pass=data.low_pass,
+        correction=correction,
     )
     n = len(points)
     white = Whitening(np.zeros((n, GRID.size, 4)), np.zeros((n, 4, 4)), data.noise)

@@ -1,6 +1,6 @@
 """Who is on trial: the effects of a diagnosis that its campaign does not tell apart."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.diagnose.candidates import IN_BASE
 from tirelib.effects import Effect
 from tirelib.errors import ParameterError
 
@@ -113,6 +112,7 @@ def given_suspects(
     has: Sequence[str],
     catalogue: Mapping[str, Effect],
     quantity: str = "strain",
+    in_base: Collection[str] = (),
 ) -> Suspects:
     """Return suspects by name; one alone stands against nothing.
 
@@ -130,7 +130,7 @@ def given_suspects(
             faults.append(f"{name!r} is not known, {_nearest(name, catalogue)}")
         elif name in has:
             faults.append(f"the model has {name} already")
-        elif name in IN_BASE:
+        elif name in in_base:
             faults.append(f"the base model fits {name} as a number")
         elif catalogue[name].hook == "brush" and quantity == "strain":
             faults.append(f"{name} acts on the brush, which strain does not show")

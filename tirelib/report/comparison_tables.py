@@ -106,7 +106,7 @@ def track_table(found: Comparison) -> Table:
         rows.append([
             f"{track.name} [{track.unit}]", str(fit.runs), number(scale * track.noise, 2),
             number(scale * fit.mean, 3), number(1.96 * scale * fit.std, 2),
-            number(scale * fit.rms, 3), number(fit.rms / track.noise, 3),
+            number(scale * fit.rms, 3), number(track.in_noise(fit.rms), 3),
             number(scale * fit.rms_beside, 3),
         ])  # fmt: skip
     note = (

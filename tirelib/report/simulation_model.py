@@ -1,8 +1,7 @@
 """A model file on the road: the solve that `identify` fits and `compare` uses, effects included.
 
-The exact ring is static and undamped; damping and effects add what they change in the linear ring
-(`tirelib.model.base.predict`). Belt, pressure and strain are put together in the same way. The road
-is without friction there: its force on the belt is vertical.
+Effects add what they change in the linear ring to the rolling one (`tirelib.model.base.predict`).
+Belt, pressure and strain are put together in the same way; the shear is that of the rolling ring.
 """
 
 from collections.abc import Mapping
@@ -219,30 +218,29 @@ def _simulation(
     assert state.strain is not None  # noqa: S101
     u, v, strain = (_on_turn(h) for h in (state.belt[..., 0], state.belt[..., 1], state.strain))
     pressure, edges = state.contact.pressure_at(TURN), state.contact.edges
-    exact = correction.contact if correction is not None else None
-    if exact is not None:
-        still = predict({**values, "damping": 0.0}, points, low_pass=low_pass, phi=TURN)
-        assert still.contact is not None  # noqa: S101
-        assert still.belt is not None  # noqa: S101
-        assert still.strain is not None  # noqa: S101
-        n = np.arange(exact.even.shape[1])
-        u = u - _on_turn(still.belt[..., 0]) + exact.even @ np.cos(n[:, None] * TURN)
-        v = v - _on_turn(still.belt[..., 1]) + exact.odd @ np.sin(n[:, None] * TURN)
-        strain = strain - _on_turn(still.strain) + exact.strain(state.offset, TURN)
-        half = np.stack([-exact.half_angle, exact.half_angle], axis=1)
-        edges = edges - still.contact.edges + half
-        pressure = pressure - still.contact.pressure_at(TURN) + exact.pressure_at(TURN)
+    rolling = correction.contact if correction is not None else None
+    up, along = pressure * np.cos(TURN), -pressure * np.sin(TURN)
+    if rolling is not None:
+        plain = predict({**values, "damping": 0.0}, points, low_pass=low_pass, phi=TURN)
+        assert plain.contact is not None  # noqa: S101
+        assert plain.belt is not None  # noqa: S101
+        assert plain.strain is not None  # noqa: S101
+        turn = rolling.on_turn(TURN.size)
+        u = u - _on_turn(plain.belt[..., 0]) + turn.u
+        v = v - _on_turn(plain.belt[..., 1]) + turn.v
+        strain = strain - _on_turn(plain.strain) + rolling.strain(state.offset, TURN.size)
+        edges = edges - plain.contact.edges + turn.edges
+        pressure = pressure - plain.contact.pressure_at(TURN) + turn.pressure
         pressure = np.where(_inside(edges), np.maximum(pressure, 0.0), 0.0)
+        up, along = pressure, turn.shear
     rate = _slope(strain)
-    curves = (_closed(x) for x in (u, v, pressure, strain, rate, state.wave))
-    u, v, pressure, strain, rate, wave = curves
+    curves = (_closed(x) for x in (u, v, pressure, up, along, strain, rate, state.wave))
+    u, v, pressure, up, along, strain, rate, wave = curves
     phi = np.append(TURN, np.pi)
-    vertical = exact is not None
     return Simulation(
         tire, "radial", points.pressure, points.omega, points.load, state.deflection, edges,
         _at_middle(phi, pressure, edges), _centre(phi, pressure, tire.ring_radius), phi, u, v,
-        pressure, pressure if vertical else pressure * np.cos(phi),
-        np.zeros_like(pressure) if vertical else -pressure * np.sin(phi), strain, rate, gage=wave,
+        pressure, up, along, strain, rate, gage=wave,
     )  # fmt: skip
 
 

@@ -11,14 +11,13 @@ from tirelib.diagnose.refit import Refit, refit
 from tirelib.effects import CATALOGUE
 from tirelib.effects.effect import State, effect
 from tirelib.errors import ParameterError
-from tirelib.identify.identify import FITTED
 from tirelib.identify.waveform_fit import Data
-from tirelib.model.base import large_displacements, move, predict, values_of
+from tirelib.model.base import BARE, large_displacements, move, predict, values_of
 
 
 def cost(data: Data, model: Refit, z: FloatArray) -> float:
     """Return the squared error after a move, large displacements computed there anew."""
-    values = move(model.values, z, FITTED)
+    values = move(model.values, z, BARE)
     large = large_displacements(values, data.points, low_pass=data.low_pass)
     state = predict(values, data.points, model.changes, low_pass=data.low_pass, correction=large)
     return float(np.sum(model.whiten(data.strain - state.wave) ** 2))
@@ -35,20 +34,20 @@ def test_its_error_is_that_of_the_whole_model(lacking: tuple[Data, Refit]) -> No
     data, model = lacking
     nothing = refit(runs().data(with_deflection=False), values_of(TIRE))
     assert model.error > 3.0 * nothing.error, "it lacks the effect"
-    whole = np.sqrt(cost(data, model, np.zeros(len(FITTED))) / data.strain.size)
+    whole = np.sqrt(cost(data, model, np.zeros(len(BARE))) / data.strain.size)
     assert whole == pytest.approx(model.error, rel=1e-3)
 
 
-@pytest.mark.parametrize("k", range(len(FITTED)), ids=[each.name for each in FITTED])
+@pytest.mark.parametrize("k", range(len(BARE)), ids=[each.name for each in BARE])
 def test_no_coordinate_goes_lower(lacking: tuple[Data, Refit], k: int) -> None:
     data, model = lacking
-    here = cost(data, model, np.zeros(len(FITTED)))
+    here = cost(data, model, np.zeros(len(BARE)))
     step = min(0.03, 0.1 * float(WIDTH[k]))
     for side in (-step, step):
-        z = np.zeros(len(FITTED))
+        z = np.zeros(len(BARE))
         z[k] = side
         there = cost(data, model, z)
-        assert there > (1.0 - 2e-3) * here, f"{FITTED[k].name} moved by {side:g}"
+        assert there > (1.0 - 2e-3) * here, f"{BARE[k].name} moved by {side:g}"
 
 
 @pytest.mark.parametrize("name", ["belt_shear", "gage_saturation", "sidewall_pressure"])

@@ -8,20 +8,20 @@ import pytest
 from tests.unit.diagnose.planted import runs
 from tests.unit.identify.model_waves import TIRE
 from tirelib.compare.error import Yardstick
-from tirelib.contact.exact import ExactContact
 from tirelib.diagnose import fitter, held_out, refit
 from tirelib.model.base import Correction, large_displacements, values_of
+from tirelib.rolling.solve import Start
 
 
 def test_a_start_nearby_is_used_and_changes_no_result(monkeypatch: pytest.MonkeyPatch) -> None:
     data = runs().data(with_deflection=False)
-    starts: list[ExactContact | None] = []
+    starts: list[Start | None] = []
 
-    def watched(*given: Any, start: ExactContact | None = None, **named: Any) -> Correction:
+    def watched(*given: Any, start: Start | None = None, **named: Any) -> Correction:
         starts.append(start)
         return large_displacements(*given, start=start, **named)
 
-    def cold(*given: Any, start: ExactContact | None = None, **named: Any) -> Correction:
+    def cold(*given: Any, start: Start | None = None, **named: Any) -> Correction:
         return large_displacements(*given, **named)
 
     found = {}

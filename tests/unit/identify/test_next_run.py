@@ -8,14 +8,13 @@ import pytest
 from tests.unit.identify.model_waves import TIRE, exact_waveform, made_waves, operating
 from tirelib.identify import next_run as module
 from tirelib.identify.campaign_data import straight_runs
-from tirelib.identify.identify import FITTED
 from tirelib.identify.laboratory import SIDEWALL, TREAD, laboratory_tests
 from tirelib.identify.next_run import NextRun, next_run
 from tirelib.identify.waveform_fit import Data, Prior, WaveformFit, fit_waveforms
-from tirelib.model.base import values_of
+from tirelib.model.base import BARE, values_of
 from tirelib.model.state import Operating
 
-NAMES = [c.name for c in FITTED]
+NAMES = [c.name for c in BARE]
 K_V, K_U_SLOPE, K_T, EI = (
     NAMES.index(name)
     for name in ("tangential_stiffness", "radial_pressure_slope", "tread_stiffness",
@@ -33,7 +32,7 @@ def data() -> Data:
 
 
 def fit_of(data: Data) -> WaveformFit:
-    return fit_waveforms(data, values_of(TIRE), PRIOR, free=FITTED)
+    return fit_waveforms(data, values_of(TIRE), PRIOR, free=BARE)
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +99,7 @@ def test_a_test_by_definition_leaves_its_accuracy(fit: WaveformFit, ways: NextRu
 
 
 def test_a_press_test_tells_the_fit_and_not_its_structure(ways: NextRun) -> None:
-    for k in range(len(FITTED)):
+    for k in range(len(BARE)):
         press = next(r for r in ways.tests[k] if r.words.startswith("a press test (vertical"))
         assert 1.96 * STRUCTURE[k] <= press.half_width <= ways.half_width[k] * (1.0 + 1e-9)
 
@@ -122,7 +121,7 @@ def test_a_run_beyond_the_tire_is_left_out(
 def test_laboratory_tests_measure_what_they_say() -> None:
     tests = {
         (t.words.split(" (")[0], len(t.rows)): t
-        for t in laboratory_tests(values_of(TIRE), FITTED, (1e5, 3e5))
+        for t in laboratory_tests(values_of(TIRE), BARE, (1e5, 3e5))
     }
     turn = tests["a torsional sidewall test", 1].rows[0]
     assert turn[K_V] == pytest.approx(1.0)
@@ -148,7 +147,7 @@ def test_no_test_is_proposed_where_the_fitted_sidewall_has_no_stiffness() -> Non
     steep["tangential_pressure_slope"] = 1.01 * TIRE.tangential_stiffness / (TIRE.pressure - 1e5)
 
     def words(given: dict[str, float | np.ndarray]) -> list[str]:
-        return [t.words for t in laboratory_tests(given, FITTED, (1e5, 3e5))]
+        return [t.words for t in laboratory_tests(given, BARE, (1e5, 3e5))]
 
     assert sum(" bar" in text for text in words(values)) == 2
     left = words(steep)

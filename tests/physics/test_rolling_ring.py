@@ -1,0 +1,204 @@
+"""Laws of the rolling ring: balance, symmetry, limits, energy and convergence."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tirelib.arrays import FloatArray
+from tirelib.contact.exact import load_exact
+from tirelib.contact.tread import Tread
+from tirelib.errors import ConvergenceError, ParameterError
+from tirelib.ring.ring import Ring
+from tirelib.rolling.assemble import Unknowns, matrix, residual
+from tirelib.rolling.constants import Constants
+from tirelib.rolling.mesh import mesh
+from tirelib.rolling.solve import Rolling, _column, solve
+
+LOADS = np.array([1500.0, 4000.0, 7000.0])
+OFFSET = np.full(3, -0.003)
+N = 360
+BARE: dict[str, Any] = {
+    "radius": 0.303, "free_radius": 0.316, "EA": 4.6e6, "GA": np.inf, "EI": 2.6, "mass": 3.6,
+    "rotary_inertia": 0.0, "inflation": 2.3e5 * 0.168, "tension": 0.0, "k_u": 4.8e5, "k_v": 1.9e5,
+    "dashpots": 0.0, "k_t": 5.4e7, "hardening": 0.0, "thickness": 0.0125, "crown": 0.0,
+    "half_width": 0.084, "k_s": 0.0, "friction": 0.0, "omega": 1.0, "load": LOADS, "torque": 0.0,
+}  # fmt: skip
+WHOLE = {
+    **BARE, "GA": 5e4, "rotary_inertia": 6e-5, "k_s": 1.8e7, "friction": 0.9, "hardening": 1.0,
+    "dashpots": 0.05, "omega": 70.0, "crown": 0.5,
+}  # fmt: skip
+
+
+def ring(base: dict[str, Any] = BARE, **values: Any) -> Constants:
+    return Constants.of(**{**base, **values})
+
+
+def strain(found: Rolling, n: int = N) -> FloatArray:
+    return smooth(found.strain(OFFSET, n))
+
+
+def smooth(values: FloatArray) -> FloatArray:
+    """Return curves up to the 40th harmonic, mean off."""
+    terms = np.fft.rfft(values)
+    terms[:, 0] = terms[:, 41:] = 0.0
+    return np.asarray(np.fft.irfft(terms, n=values.shape[1]))
+
+
+def rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def test_the_matrix_is_the_derivative_of_the_residual() -> None:
+    k, grid = ring(WHOLE), mesh()
+    found, random = solve(k), np.random.default_rng(1)
+    x = found.x
+    step = Unknowns(
+        1e-4 * random.standard_normal(x.node.shape), 1e-4 * np.ones(3), 1e-4 * np.ones(3)
+    )
+    h = 1e-3
+    ends = [_column(residual(x.plus(step, np.full(3, s * h)), k, grid)[0]) for s in (1.0, -1.0)]
+    differences = (ends[0] - ends[1])[..., 0] / (2.0 * h)
+    m = matrix(x, found.z, found.contact, k, grid)
+    inner = m.band.shape[1]
+    flat = _column(step)[..., 0]
+    product = np.einsum("nbi,ni->nb", m.lower, flat[:, :inner])
+    product += np.einsum("nbc,nc->nb", m.corner, flat[:, inner:])
+    np.testing.assert_allclose(
+        product, differences[:, inner:], atol=1e-5 * np.abs(differences[:, inner:]).max()
+    )
+    rows = np.arange(inner)
+    above = np.einsum("nic,nc->ni", m.right, flat[:, inner:])
+    for offset in range(-15, 16):
+        column = rows + offset
+        ok = (column >= 0) & (column < inner)
+        above[:, rows[ok]] += m.band[:, column[ok], 30 - offset] * flat[:, column[ok]]
+    np.testing.assert_allclose(
+        above, differences[:, :inner], atol=1e-5 * np.abs(differences[:, :inner]).max()
+    )
+
+
+def test_without_shear_and_friction_it_is_the_exact_ring_of_harmonics() -> None:
+    one = np.ones(3)
+    exact = load_exact(
+        Ring(0.303 * one, 2.6 * one, 3.6 * one, 2.3e5 * 0.168 * one, 4.8e5 * one, 1.9e5 * one,
+             extension_stiffness=4.6e6 * one),
+        Tread(0.316 * one, 5.4e7 * one, 0.0125 * one, 0.0 * one), LOADS,
+    )  # fmt: skip
+    found = solve(ring())
+    np.testing.assert_allclose(found.deflection, exact.deflection, rtol=5e-4)
+    phi = found.on_turn(N).phi
+    # its fibres have the length R + y, those of the other ring R
+    other = smooth(exact.strain(-0.003, phi) * 0.303 / 0.300)
+    assert rms(strain(found) - other) < 3e-3 * rms(other)
+
+
+def test_the_road_carries_the_load_and_no_torque() -> None:
+    found = solve(ring(WHOLE))
+    turn = found.on_turn(20_000)
+    step = 2.0 * np.pi / 20_000 * 0.303
+    np.testing.assert_allclose(turn.pressure.sum(axis=1) * step, LOADS, rtol=1e-4)
+    assert (found.drag > 0.0).all(), "the road drags a tire that loses power"
+    driven = solve(ring(WHOLE, torque=150.0))
+    loaded = 0.316 - driven.deflection
+    # a torque that drives pushes the tire against the road's motion; the pressure's centre, which
+    # it moves, bears the rest
+    np.testing.assert_allclose((found.drag - driven.drag) * loaded, 150.0, rtol=0.1)
+
+
+def test_what_the_road_puts_in_is_what_dashpots_and_sliding_take() -> None:
+    for grip in ({}, {"friction": 0.3}, {"dashpots": 0.0}):
+        found = solve(ring({**WHOLE, **grip}))
+        speed = found.rolling_radius * found.constants.omega
+        np.testing.assert_allclose(found.drag * speed, found.dissipated, rtol=0.02, atol=1e-6)
+
+
+def test_without_losses_the_shape_is_symmetric_and_with_them_it_follows_the_motion() -> None:
+    still = strain(solve(ring(GA=5e4)))
+    mirrored = np.roll(still[:, ::-1], 1, axis=1)
+    assert rms(still - mirrored) < 1e-9
+    forward = strain(solve(ring(WHOLE, k_s=0.0)))
+    backward = strain(solve(ring(WHOLE, k_s=0.0, omega=-70.0)))
+    assert rms(forward - np.roll(backward[:, ::-1], 1, axis=1)) < 1e-9
+    assert rms(forward - backward) > 1e-5
+
+
+def test_an_inextensible_belt_without_section_inertia_keeps_its_shape_at_every_speed() -> None:
+    slow, fast = (strain(solve(ring(EA=np.inf, omega=w))) for w in (1.0, 110.0))
+    assert rms(slow - fast) < 2e-3 * rms(slow)
+    heavy = strain(solve(ring(EA=np.inf, omega=110.0, rotary_inertia=1e-4)))
+    assert rms(heavy - fast) > 0.003 * rms(slow), "section inertia softens the bending"
+
+
+def test_a_belt_grows_with_speed_squared() -> None:
+    u = [solve(ring(omega=w)).on_turn(N).u[:, 0] for w in (1.0, 50.0, 100.0)]
+    np.testing.assert_allclose((u[2] - u[0]) / (u[1] - u[0]), 4.0, rtol=0.03)
+
+
+def test_every_softness_gives_way() -> None:
+    whole = solve(ring(WHOLE)).deflection
+    for softer in ({"GA": 4e4}, {"EI": 2.0}, {"k_u": 4e5}, {"k_t": 4e7}, {"inflation": 3.2e4}):
+        assert (solve(ring({**WHOLE, **softer})).deflection > whole).all(), softer
+
+
+def test_a_finer_mesh_converges() -> None:
+    fine = solve(ring(WHOLE), fine=120, coarse=24)
+    off = []
+    for n, rest in ((15, 6), (30, 10), (60, 14)):
+        found = solve(ring(WHOLE), fine=n, coarse=rest)
+        off.append(rms(strain(found) - strain(fine)))
+    assert off[0] > 2.0 * off[1] > 4.0 * off[2]
+    assert rms(strain(solve(ring(WHOLE))) - strain(fine)) < 1.5e-3 * rms(strain(fine))
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    st.floats(1000.0, 7000.0), st.floats(2.5e4, 5e5), st.floats(1e6, 6e7), st.floats(0.05, 1.5),
+    st.floats(0.0, 0.1), st.floats(1.0, 110.0),
+)  # fmt: skip
+def test_it_is_solved_for_every_tire(
+    load: float, shear: float, grip: float, friction: float, damping: float, omega: float
+) -> None:
+    k = ring(WHOLE, GA=shear, k_s=grip, friction=friction, dashpots=damping, omega=omega,
+             load=np.array([load]))  # fmt: skip
+    found = solve(k)
+    turn = found.on_turn(2000)
+    assert 0.002 < found.deflection[0] < 0.06
+    assert (np.abs(turn.shear) <= 1.3 * friction * turn.pressure.max()).all()
+    assert 0.26 < found.rolling_radius[0] < 0.33
+
+
+def test_one_point_does_not_depend_on_those_solved_beside_it() -> None:
+    together = solve(ring(WHOLE)).strain(OFFSET, N)
+    for k, load in enumerate(LOADS):
+        alone = solve(ring(WHOLE, load=np.array([load]))).strain(OFFSET[:1], N)
+        np.testing.assert_allclose(alone[0], together[k], atol=1e-9)
+
+
+def test_a_start_nearby_gives_the_same() -> None:
+    near = solve(ring(WHOLE, EI=2.4))
+    np.testing.assert_allclose(
+        solve(ring(WHOLE), start=near).deflection, solve(ring(WHOLE)).deflection, rtol=1e-9
+    )
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"k_t": -1.0}, "k_t = -1 at point 0; a finite number > 0"),
+        ({"friction": np.nan}, "friction = nan at point 0; a finite number >= 0"),
+        ({"free_radius": 0.30}, "the tread must stand outside the belt"),
+        ({"thickness": 1e-3}, "tread pressed by"),
+        ({"load": np.array([3.0])}, "touches the road over a half angle"),
+    ],
+)
+def test_what_is_no_tire_is_refused(values: dict[str, Any], said: str) -> None:
+    with pytest.raises(ParameterError, match=said):
+        solve(ring(**values))
+
+
+def test_a_load_that_it_does_not_carry_is_refused() -> None:
+    with pytest.raises(ConvergenceError, match="use a smaller load"):
+        solve(ring(load=np.array([60_000.0]), thickness=0.1))

@@ -1,0 +1,111 @@
+"""The rolling ring of a tire at operating points, and how it moves with anything it is made of."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.model.state import Operating
+from tirelib.rolling import belt
+from tirelib.rolling.assemble import Unknowns, by_element, fields, residual
+from tirelib.rolling.constants import Constants
+from tirelib.rolling.mesh import to_grid
+from tirelib.rolling.solve import Rolling, slopes
+
+STEP = 1e-6
+"""Relative change of what the ring is made of, of which the residual's slope is taken."""
+FRICTION = 1.0
+"""Of tread and road. A wheel that rolls freely slides only where its contact ends."""
+ALONG = 1e-3
+"""Share of a slope of the solution, of which the strain's slope is taken."""
+
+Values = Mapping[str, float | FloatArray]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Made:
+    """What a waveform is made of: the ring's constants, and the gage's place.
+
+    Attributes
+    ----------
+    constants : Constants
+    offset : shape (n_points,), [m]
+        y < 0 of the gage from the neutral line.
+    """
+
+    constants: Constants
+    offset: FloatArray
+
+
+def made_of(values: Values, points: Operating) -> Made:
+    """Return the constants of a tire's values (names of `Tire`; arrays allowed) at points.
+
+    A tire's damping is that of every mode, Eq. (107); the linear ring adds what it changes. The
+    crown's curvature changes which strips touch first; a ring in one plane cannot tell it from
+    a softer tread, so that it has none here.
+    """
+    v, width = values, np.asarray(values["belt_width"])
+    above = points.pressure - v["pressure"]
+    constants = Constants.of(
+        radius=v["ring_radius"], free_radius=v["free_radius"], EA=v["extension_stiffness"],
+        GA=v["shear_stiffness"], EI=v["bending_stiffness"], mass=v["mass"],
+        rotary_inertia=v["rotary_inertia"], inflation=points.pressure * width, tension=0.0,
+        k_u=v["radial_stiffness"] + v["radial_pressure_slope"] * above,
+        k_v=v["tangential_stiffness"] + v["tangential_pressure_slope"] * above,
+        dashpots=0.0, k_t=v["tread_stiffness"], hardening=v["tread_hardening"],
+        thickness=v["tread_thickness"], crown=0.0, half_width=0.5 * width,
+        k_s=v["tread_shear_stiffness"], friction=FRICTION, omega=points.omega,
+        load=points.load, torque=0.0,
+    )  # fmt: skip
+    offset = np.broadcast_to(np.asarray(v["innerliner_offset"], dtype=float), (len(points),))
+    return Made(constants, offset)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RolledSlopes:
+    """Slopes of a solution by some directions.
+
+    Attributes
+    ----------
+    strain : shape (n_directions, n_points, n_phi)
+        Before any filter.
+    deflection : shape (n_directions, n_points), [m]
+    unknowns : sequence of Unknowns
+    """
+
+    strain: FloatArray
+    deflection: FloatArray
+    unknowns: Sequence[Unknowns]
+
+    def start(self, found: Rolling, dz: FloatArray) -> Unknowns:
+        """Return a first guess after moves dz along the first directions, (n,) or (n, n_points)."""
+        x = found.x
+        for step, by in zip(dz, self.unknowns, strict=False):
+            x = x.plus(by, np.broadcast_to(step, x.depth.shape))
+        return x
+
+
+def rolled_slopes(
+    found: Rolling, here: Made, there: Sequence[Made], step: float, n_phi: int
+) -> RolledSlopes:
+    """Return slopes towards what a waveform is made of `step` away, for each of `there`.
+
+    By the implicit function theorem: the solution moves by -J^-1 dF, whatever changes F.
+    """
+    at = residual(found.x, here.constants, found.mesh)[0]
+    off = [residual(found.x, each.constants, found.mesh)[0] for each in there]
+    moved = slopes(found, [each.less(at, step) for each in off])
+    base = belt.strain(found.z, here.constants, here.offset)
+    rows = []
+    for each, by in zip(there, moved, strict=True):
+        dz = fields(by_element(by.node), found.mesh.belt)
+        ends = [
+            belt.strain(found.z + side * ALONG * dz, here.constants, here.offset)
+            for side in (1.0, -1.0)
+        ]
+        own = belt.strain(found.z, each.constants, each.offset) - base
+        rows.append((ends[0] - ends[1]) / (2.0 * ALONG) + own / step)
+    grid = to_grid(*found.size, n_phi)
+    strain = np.stack(rows).reshape(len(there), len(base), -1) @ grid.T
+    return RolledSlopes(strain, np.stack([by.depth for by in moved]), moved)

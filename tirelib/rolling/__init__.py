@@ -1,0 +1,1 @@
+"""The rolling ring: one model of belt, sidewall, tread and road with large displacements."""

@@ -1,0 +1,304 @@
+"""Residual and matrix of the rolling ring, element by element, for all operating points at once.
+
+A node has four unknowns: u, v, psi and the shear q of the tread's bristle there. The first node and
+two numbers of the whole tire, the deflection d and the rolling radius rho, stand at the border of a
+band matrix. The equations are the virtual work of u, v and psi, the bristles' law, the vertical
+load and the wheel's torque.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.rolling import belt, road
+from tirelib.rolling.constants import Constants
+from tirelib.rolling.mesh import Mesh, Points
+
+WIDTH = 4
+"""Unknowns of a node."""
+LOCAL = 16
+"""Unknowns of an element."""
+BORDER = WIDTH + 2
+BAND = LOCAL - 1
+"""Diagonals on either side."""
+Q = 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Unknowns:
+    """A solution or a step: nodes (n_points, n_nodes, 4), deflection and rolling radius."""
+
+    node: FloatArray
+    depth: FloatArray
+    rolling: FloatArray
+
+    def plus(self, other: "Unknowns", share: FloatArray) -> "Unknowns":
+        """Return the sum with a share (n_points,) of the other."""
+        return Unknowns(
+            self.node + share[:, None, None] * other.node,
+            self.depth + share * other.depth,
+            self.rolling + share * other.rolling,
+        )
+
+    def less(self, other: "Unknowns", step: float) -> "Unknowns":
+        """Return the difference to the other, per step."""
+        return Unknowns(
+            (self.node - other.node) / step,
+            (self.depth - other.depth) / step,
+            (self.rolling - other.rolling) / step,
+        )
+
+    def take(self, index: Any) -> "Unknowns":
+        """Return some points."""
+        return Unknowns(self.node[index], self.depth[index], self.rolling[index])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contact:
+    """What the road does at its integration points (n_points, n_fine, n_road), and at the nodes.
+
+    Attributes
+    ----------
+    tip : Tip
+    delta, pressure, slope : [m], [N/m], [N/m^2]
+    shear : [N/m]
+        k_s q on the tread along X.
+    node : Tip
+        At the fine elements' four nodes, (n_points, n_fine, 4).
+    q, sticks, side : shape (n_points, n_fine, 3)
+        Law of the bristles at each element's second to fourth node.
+    limit_slope : shape (n_points, n_fine, 3)
+        Of the most shear mu P / k_s by the overlap.
+    entered : shape (n_points, n_fine, 3)
+        Share of the way from the node before on which the bristle touches the road.
+    entered_slope : shape (2, n_points, n_fine, 3), [-]
+        Of the shear through it, by the overlaps at the node before and at the node.
+    """
+
+    tip: road.Tip
+    delta: FloatArray
+    pressure: FloatArray
+    slope: FloatArray
+    shear: FloatArray
+    node: road.Tip
+    q: FloatArray
+    sticks: FloatArray
+    side: FloatArray
+    limit_slope: FloatArray
+    entered: FloatArray
+    entered_slope: FloatArray
+
+
+def by_element(node: FloatArray) -> FloatArray:
+    """Return nodal values (n_points, n_nodes, ...) as (n_points, n_elements, 4, ...)."""
+    n_elements = node.shape[1] // 3
+    closed = np.concatenate([node, node[:, :1]], axis=1)
+    return closed[:, 3 * np.arange(n_elements)[:, None] + np.arange(4)]
+
+
+def fields(local: FloatArray, points: Points) -> FloatArray:
+    """Return (u, v, psi, u', v', psi') at points, (6, n_points, n_elements, n)."""
+    value = np.moveaxis(points.value @ local[..., :3], -1, 0)
+    slope = np.moveaxis(points.slope @ local[..., :3], -1, 0)
+    return np.concatenate([value, slope])
+
+
+def contact(x: Unknowns, local: FloatArray, k: Constants, mesh: Mesh) -> Contact:
+    """Return the state of the contact."""
+    fine = local[:, mesh.fine]
+    u, v, psi = np.moveaxis(mesh.road.value @ fine[..., :3], -1, 0)
+    at = road.tip(u, v, psi, mesh.road.phi, k)
+    height = (k.free_radius - x.depth)[:, None, None]
+    delta = at.down - height
+    push, slope = road.pressure(delta, k)
+    shear = k.k_s[:, None, None] * (mesh.road.linear @ fine[..., Q, None])[..., 0]
+    angle = mesh.node_angles
+    tips = road.tip(fine[..., 0], fine[..., 1], fine[..., 2], angle, k)
+    over = tips.down - height
+    most, by_overlap = road.pressure(over[..., 1:], k)
+    entered, by_before, by_after = road.entered(over[..., :-1], over[..., 1:])
+    share = np.divide(k.friction, k.k_s, out=np.zeros(len(k)), where=k.grips)[:, None, None]
+    step = x.rolling[:, None, None] * np.diff(angle) - np.diff(tips.along, axis=-1)
+    q, sticks, side = road.bristles(entered * step, fine[..., :-1, Q], share * most)
+    by = np.stack([by_before * step, by_after * step])
+    return Contact(
+        at, delta, push, slope, shear, tips, q, sticks, side, share * by_overlap, entered, by
+    )
+
+
+def residual(x: Unknowns, k: Constants, mesh: Mesh) -> tuple[Unknowns, FloatArray, Contact]:
+    """Return the equations' residual, the element fields and the contact."""
+    local = by_element(x.node)
+    z = fields(local, mesh.belt)
+    work = belt.forces(z, k) * mesh.belt.weight
+    out = np.zeros(local.shape)
+    for f in range(3):
+        out[..., f] = (
+            work[f] @ mesh.belt.value + (work[3 + f][:, :, None] @ mesh.belt.slope)[:, :, 0]
+        )
+    c = contact(x, local, k, mesh)
+    area = k.radius[:, None, None] * mesh.road.weight
+    for f in range(3):
+        pull = area * (c.pressure * c.tip.by_down[f] - c.shear * c.tip.by_along[f])
+        out[:, mesh.fine, :, f] += pull @ mesh.road.value
+    law = local[..., 1:, Q].copy()
+    law[:, mesh.fine] -= c.q
+    out[..., 1:, Q] = law
+    load = (area * c.pressure).sum(axis=(1, 2)) - k.load
+    grip = (area * (c.pressure * c.tip.along + c.shear * c.tip.down)).sum(axis=(1, 2))
+    torque = np.where(k.grips, grip + k.torque, x.rolling - k.free_radius)
+    return Unknowns(gathered(out), load, torque), z, c
+
+
+def gathered(local: FloatArray) -> FloatArray:
+    """Return nodal sums (n_points, n_nodes, ...) of values (n_points, n_elements, 4, ...)."""
+    n_points, n_elements = local.shape[:2]
+    out = local[:, :, :3].copy()
+    out[:, :, 0] += np.roll(local[:, :, 3], 1, axis=1)
+    return out.reshape(n_points, 3 * n_elements, *local.shape[3:])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Matrix:
+    """The derivative of the residual: a band with a border.
+
+    Attributes
+    ----------
+    band : shape (n_points, n_inner, 3 BAND + 1)
+        LAPACK's band storage, transposed; unknowns of all nodes but the first.
+    right, lower : shape (n_points, n_inner, BORDER), (n_points, BORDER, n_inner)
+    corner : shape (n_points, BORDER, BORDER)
+    """
+
+    band: FloatArray
+    right: FloatArray
+    lower: FloatArray
+    corner: FloatArray
+
+
+def matrix(x: Unknowns, z: FloatArray, c: Contact, k: Constants, mesh: Mesh) -> Matrix:
+    """Return the derivative of `residual` at its fields and contact."""
+    n, n_elements = len(k), mesh.n_elements
+    element = np.zeros((n, n_elements, 4, WIDTH, 4, WIDTH))
+    element[:, :, :, :3, :, :3] = _belt_blocks(z, k, mesh)
+    area = k.radius[:, None, None] * mesh.road.weight
+    value, linear = mesh.road.value, mesh.road.linear
+    pairs = np.einsum("gi,gj->gij", value, value).reshape(len(value), 16)
+    with_q = np.einsum("gi,gj->gij", value, linear).reshape(len(value), 16)
+    sides = np.zeros((n, n_elements, 4, WIDTH, 2))
+    rows = np.zeros((n, 2, n_elements, 4, WIDTH))
+    n_fine = area.shape[1]
+    fine = mesh.fine
+    for i in range(3):
+        for j in range(3):
+            each = c.slope * c.tip.by_down[i] * c.tip.by_down[j]
+            each = each + _second(c, i, j)
+            block = ((area * each) @ pairs).reshape(n, n_fine, 4, 4)
+            element[:, fine, :, i, :, j] += block
+        held = (area * -c.tip.by_along[i]) @ with_q
+        stiff = k.k_s[:, None, None, None]
+        element[:, fine, :, i, :, Q] += stiff * held.reshape(n, n_fine, 4, 4)
+        sides[:, fine, :, i, 0] += (area * c.slope * c.tip.by_down[i]) @ value
+        rows[:, 0, fine, :, i] += (area * c.slope * c.tip.by_down[i]) @ value
+        turned = c.slope * c.tip.by_down[i] * c.tip.along + c.pressure * c.tip.by_along[i]
+        turned = turned + c.shear * c.tip.by_down[i]
+        rows[:, 1, fine, :, i] += (area * turned) @ value
+    rows[:, 1, fine, :, Q] += k.k_s[:, None, None] * ((area * c.tip.down) @ linear)
+    _bristle_rows(element, sides, c, mesh)
+    corner = np.zeros((n, BORDER, BORDER))
+    corner[:, 4, 4] = (area * c.slope).sum(axis=(1, 2))
+    corner[:, 5, 4] = (area * c.slope * c.tip.along).sum(axis=(1, 2))
+    rows[:, 1] *= k.grips[:, None, None, None]
+    corner[:, 5, 4] *= k.grips
+    corner[:, 5, 5] = ~k.grips
+    return _banded(element, sides, rows, corner)
+
+
+def _second(c: Contact, i: int, j: int) -> FloatArray | float:
+    if i == j == 2:
+        out: FloatArray = -c.pressure * c.tip.lever_down + c.shear * c.tip.lever_along
+        return out
+    return 0.0
+
+
+def _bristle_rows(element: FloatArray, sides: FloatArray, c: Contact, mesh: Mesh) -> None:
+    """Add the derivatives of the bristles' law at each element's second to fourth node."""
+    element[:, :, [1, 2, 3], Q, [1, 2, 3], Q] = 1.0
+    angle = np.diff(mesh.node_angles)
+    for m in range(3):
+        after, sticks, side = m + 1, c.sticks[..., m], c.side[..., m]
+        rows = element[:, mesh.fine]
+        rows[:, :, after, Q, m, Q] -= sticks
+        on = sticks * c.entered[..., m]
+        by_before = sticks * c.entered_slope[0, ..., m]
+        by_after = sticks * c.entered_slope[1, ..., m] + side * c.limit_slope[..., m]
+        for f in range(3):
+            down, along = c.node.by_down[f], c.node.by_along[f]
+            rows[:, :, after, Q, m, f] -= on * along[..., m] + by_before * down[..., m]
+            rows[:, :, after, Q, after, f] += on * along[..., after] - by_after * down[..., after]
+        sides[:, mesh.fine, after, Q, 0] -= by_before + by_after
+        sides[:, mesh.fine, after, Q, 1] -= on * angle[:, m]
+
+
+def _belt_blocks(z: FloatArray, k: Constants, mesh: Mesh) -> FloatArray:
+    """Return the belt's element matrices, (n_points, n_elements, 4, 3, 4, 3)."""
+    h = belt.stiffness(z, k) * mesh.belt.weight
+    n, n_elements = z.shape[1:3]
+    value = np.broadcast_to(mesh.belt.value, mesh.belt.slope.shape)
+    both = np.stack([value, mesh.belt.slope], axis=1)  # (n_elements, value or slope, n_gauss, 4)
+    products = np.einsum("eagi,ebgj->eabgij", both, both).reshape(n_elements, -1, 16)
+    # (6, 6) = (value/slope, 3) x (value/slope, 3)
+    split = h.reshape(2, 3, 2, 3, n, n_elements, -1)
+    ordered = np.ascontiguousarray(split.transpose(5, 4, 1, 3, 0, 2, 6))
+    blocks = ordered.reshape(n_elements, n * 9, -1) @ products
+    out: FloatArray = blocks.reshape(n_elements, n, 3, 3, 4, 4).transpose(1, 0, 4, 2, 5, 3)
+    return out
+
+
+@cache
+def _places(n_elements: int) -> tuple[Any, ...]:
+    """Return where element entries go: (chosen, target) of band, right side and lower side."""
+    node = (3 * np.arange(n_elements)[:, None] + np.arange(4)) % (3 * n_elements)
+    unknown = (WIDTH * (node[..., None] - 1) + np.arange(WIDTH)).reshape(n_elements, LOCAL)
+    row, column = np.broadcast_arrays(unknown[:, :, None], unknown[:, None, :])
+    # the last node's own block is added to the next element's first beforehand
+    last = np.arange(LOCAL) >= LOCAL - WIDTH
+    own = np.broadcast_to(last[:, None] & last[None, :], row.shape)
+    inner = (row >= 0) & (column >= 0) & ~own
+    band = column * (3 * BAND + 1) + 2 * BAND + row - column
+    right = (row >= 0) & (column < 0) & ~own
+    lower = (row < 0) & (column >= 0) & ~own
+    n_inner = WIDTH * (3 * n_elements - 1)
+    return (
+        np.flatnonzero(inner), band[inner],
+        np.flatnonzero(right), (row * BORDER + column + WIDTH)[right],
+        np.flatnonzero(lower), ((row + WIDTH) * n_inner + column)[lower],
+        n_inner,
+    )  # fmt: skip
+
+
+def _banded(element: FloatArray, sides: FloatArray, rows: FloatArray, corner: FloatArray) -> Matrix:
+    n, n_elements = element.shape[:2]
+    own = element[:, :, 3, :, 3, :].copy()
+    element[:, :, 0, :, 0, :] += np.roll(own, 1, axis=1)
+    flat = element.reshape(n, -1)
+    chosen, to_band, from_right, to_right, from_lower, to_lower, n_inner = _places(n_elements)
+    band = np.zeros((n, n_inner * (3 * BAND + 1)))
+    band[:, to_band] = flat[:, chosen]
+    right = np.zeros((n, n_inner * BORDER))
+    right[:, to_right] = flat[:, from_right]
+    lower = np.zeros((n, BORDER * n_inner))
+    lower[:, to_lower] = flat[:, from_lower]
+    corner[:, :WIDTH, :WIDTH] = element[:, 0, 0, :, 0, :]
+    right = right.reshape(n, n_inner, BORDER)
+    lower = lower.reshape(n, BORDER, n_inner)
+    column = gathered(sides)  # (n, n_nodes, WIDTH, 2)
+    right[:, :, WIDTH:] = column[:, 1:].reshape(n, n_inner, 2)
+    corner[:, :WIDTH, WIDTH:] = column[:, 0]
+    line = gathered(np.moveaxis(rows, 1, -1))
+    lower[:, WIDTH:] = np.moveaxis(line[:, 1:].reshape(n, n_inner, 2), 1, 2)
+    corner[:, WIDTH:, :WIDTH] = np.moveaxis(line[:, 0], 1, 2)
+    return Matrix(band.reshape(n, n_inner, 3 * BAND + 1), right, lower, corner)
