@@ -1,5 +1,6 @@
 """Shared by the tests of the bench: a tiny campaign, toy FMUs, programs in their own process."""
 
+import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,6 +21,16 @@ from tirelib.observations import observe
 TOY = Path(__file__).with_name("toy_slave.py")
 BUILD = Path(__file__).parents[2] / "build"
 Spawn = Callable[..., Program]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def terminal_that_hangs_up() -> Iterator[None]:
+    """Let SIGHUP end what tests start, also when they run under nohup, which ignores it."""
+    hang_up = getattr(signal, "SIGHUP", None)
+    before = signal.signal(hang_up, signal.SIG_DFL) if hang_up is not None else None
+    yield
+    if hang_up is not None:
+        signal.signal(hang_up, before)
 
 
 @pytest.fixture(scope="module")

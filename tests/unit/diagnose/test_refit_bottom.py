@@ -42,7 +42,7 @@ def test_its_error_is_that_of_the_whole_model(lacking: tuple[Data, Refit]) -> No
 def test_no_coordinate_goes_lower(lacking: tuple[Data, Refit], k: int) -> None:
     data, model = lacking
     here = cost(data, model, np.zeros(len(BARE)))
-    step = min(0.03, 0.1 * float(WIDTH[k]))
+    step = min(0.03, 0.1 * float(WIDTH[BARE[k].name]))
     for side in (-step, step):
         z = np.zeros(len(BARE))
         z[k] = side
