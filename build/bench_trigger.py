@@ -27,6 +27,7 @@ from bench.live.recording_state import Order, RecorderState, RecordingRule
 from bench.recorder import alarm_event
 from bench.recording_header import RecordingHeader
 from bench.wheels import Line, Wheels
+from tirelib.threads import one_thread
 
 WHEELS, FRAMES, PERIOD_US, SAMPLES = 4, 5, 1600, 16
 READ = 1e-6 * FRAMES * PERIOD_US
@@ -144,4 +145,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

@@ -18,6 +18,7 @@ from tirelib.campaign import read_campaign
 from tirelib.compare import force_noise
 from tirelib.compare.force_points import ForcePoints, force_points
 from tirelib.identify.force_data import FORCES, force_data
+from tirelib.threads import one_thread
 
 CONSTANTS = ("LEAST", "MOST", "REACH", "STEEPEST")
 
@@ -58,4 +59,5 @@ def _say(line: str) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()
