@@ -300,6 +300,8 @@ class Chain:
         if not {"Fz", "contact_angle"} <= set(ends) or not self.laws.radius > 0.0:
             return 0.0
         load, angle = ends["Fz"], ends["contact_angle"]
+        if not angle.high > angle.low:  # one contact length tells no slope
+            return 0.0
         per_angle = (load.high - load.low) / (angle.high - angle.low)
         return per_angle * EDGE / self.laws.radius
 
