@@ -29,8 +29,13 @@ SLOW_BITS = 30
 """Bits of a CAN FD frame at the slow rate, without stuffing."""
 UART_BITS = 10
 """8N1."""
-BUSES = ((1_000_000, None), (500_000, 2_000_000), (500_000, 5_000_000), (1_000_000, 5_000_000),
-         (1_000_000, 8_000_000))  # fmt: skip
+BUSES = (
+    (1_000_000, None),
+    (500_000, 2_000_000),
+    (500_000, 5_000_000),
+    (1_000_000, 5_000_000),
+    (1_000_000, 8_000_000),
+)
 """Bit rates that are suggested where a plan does not fit."""
 
 
@@ -282,5 +287,7 @@ def _check(plan: LoadPlan) -> None:
     fd = LAYOUTS[plan.kind].fd
     if fd != (plan.data_bitrate is not None):
         needs = "CAN FD, with a data bit rate" if fd else "classic CAN, without a data bit rate"
-        raise DeviceError(f"format {plan.kind}: the bus is of the other kind; {needs} is needed; "
-                          "change one of them")  # fmt: skip
+        raise DeviceError(
+            f"format {plan.kind}: the bus is of the other kind; {needs} is needed; "
+            "change one of them"
+        )

@@ -92,9 +92,14 @@ def joined(batches: list[CanBatch]) -> CanBatch:
 
 def _record(width: int) -> np.dtype[np.void]:
     return np.dtype(
-        [("identifier", "<u4"), ("length", "u1"), ("flags", "u1"), ("pad", "<u2"),
-         ("data", "u1", (width,))]
-    )  # fmt: skip
+        [
+            ("identifier", "<u4"),
+            ("length", "u1"),
+            ("flags", "u1"),
+            ("pad", "<u2"),
+            ("data", "u1", (width,)),
+        ]
+    )
 
 
 _RECORDS = {CLASSIC_SIZE: _record(8), FD_SIZE: _record(64)}

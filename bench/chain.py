@@ -230,9 +230,14 @@ class Chain:
             mark, start = known
             run, origin = mark.run, mark.start_time + 1e-6 * (block.t_us - start)
         self._segment = _Segment(
-            block.segment, block.t_us, block.period, run, origin, device_origin,
+            block.segment,
+            block.t_us,
+            block.period,
+            run,
+            origin,
+            device_origin,
             block.strain.shape[1],
-        )  # fmt: skip
+        )
 
     def _take(self, block: Samples) -> list[Turn]:
         """Store samples and take as many steps as they fill."""

@@ -22,17 +22,29 @@ from tirelib.units import from_si, to_si
 FORMAT = "tirebench-conditions/3"
 EARLIER_FORMATS = ("tirebench-conditions/1", "tirebench-conditions/2")
 """Which knew fewer conditions: speed, pressure and camber, later the turn rate."""
-UNITS = {"speed": ("km/h", "speed"), "pressure": ("bar", "pressure"), "camber": ("deg", "angle"),
-         "omega": ("rad/s", "angular_speed"), "friction": ("1", "ratio"),
-         "tread_depth": ("mm", "length"), "tread_temperature": ("degC", "temperature")}  # fmt: skip
+UNITS = {
+    "speed": ("km/h", "speed"),
+    "pressure": ("bar", "pressure"),
+    "camber": ("deg", "angle"),
+    "omega": ("rad/s", "angular_speed"),
+    "friction": ("1", "ratio"),
+    "tread_depth": ("mm", "length"),
+    "tread_temperature": ("degC", "temperature"),
+}
 QUANTITIES = {name: UNITS[name] for name in HELD}
 """Unit in files and dimension of each condition, in the order of `tirelib.held.HELD`."""
-TELLABLE = {**{name: (name, dimension) for name, (_, dimension) in QUANTITIES.items()},
-            "temperature": ("tread_temperature", "temperature")}  # fmt: skip
+TELLABLE = {
+    **{name: (name, dimension) for name, (_, dimension) in QUANTITIES.items()},
+    "temperature": ("tread_temperature", "temperature"),
+}
 """What a bus may tell, by its name in a map: the condition, and its dimension. What is no condition
 of the estimator is left alone."""
-TRUTH = {"Fz": ("N", "force"), "alpha": ("deg", "angle"), "kappa": ("1", "ratio"),
-         "Fy": ("N", "force")}  # fmt: skip
+TRUTH = {
+    "Fz": ("N", "force"),
+    "alpha": ("deg", "angle"),
+    "kappa": ("1", "ratio"),
+    "Fy": ("N", "force"),
+}
 ROUNDING = 0.6
 """Device time is a whole number of microseconds; a condition this close has begun, [us]."""
 LONGEST_MEMORY = 256

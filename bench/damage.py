@@ -311,9 +311,12 @@ def _randomise(stream: bytes, place: int, rng: np.random.Generator) -> tuple[byt
 
 
 _DAMAGE: dict[str, Callable[[bytes, int, np.random.Generator], tuple[bytes, int]]] = {
-    "flip": _flip, "cut": _cut, "insertion": _insert, "splice": _splice,
+    "flip": _flip,
+    "cut": _cut,
+    "insertion": _insert,
+    "splice": _splice,
     "random bytes": _randomise,
-}  # fmt: skip
+}
 
 
 def _largest_memory() -> int:
@@ -357,6 +360,10 @@ def _bus_keys(batch: CanBatch, kind: str) -> list[Hashable]:
 def _key(frames: Frames, row: int) -> tuple[int, int, int, int, int, bytes]:
     """Everything that a frame says."""
     return (
-        int(frames.seq[row]), int(frames.t_us[row]), int(frames.wheel[row]),
-        int(frames.period[row]), int(frames.flags[row]), frames.counts[row].tobytes(),
-    )  # fmt: skip
+        int(frames.seq[row]),
+        int(frames.t_us[row]),
+        int(frames.wheel[row]),
+        int(frames.period[row]),
+        int(frames.flags[row]),
+        frames.counts[row].tobytes(),
+    )

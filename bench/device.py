@@ -194,8 +194,10 @@ def parse_device(text: str, where: str) -> Device:
     gain = _numbers(gages, "gain", where, faults, *GAIN_RANGE)
     for key, given in (("zero_counts", zero), ("gain", gain)):
         if given and lateral and len(given) != len(lateral):
-            faults.append(f"{where}: gages.{key} has {len(given)} numbers, lateral_m "
-                          f"{len(lateral)}; one a gage is needed; correct them")  # fmt: skip
+            faults.append(
+                f"{where}: gages.{key} has {len(given)} numbers, lateral_m "
+                f"{len(lateral)}; one a gage is needed; correct them"
+            )
     if faults:
         raise DeviceError(faults)
     name = str(document.get("name", Path(where).stem))
@@ -208,8 +210,9 @@ def _unknown_keys(document: dict[str, Any], where: str) -> list[str]:
     for table, known in _KNOWN.items():
         content = document.get(table, {}) if table else document
         if not isinstance(content, dict):
-            faults.append(f"{where}: {table} = {content!r}; a table [{table}] is needed; "
-                          "write it as one")  # fmt: skip
+            faults.append(
+                f"{where}: {table} = {content!r}; a table [{table}] is needed; write it as one"
+            )
             continue
         for key in sorted(set(content) - known):
             faults.append(
@@ -251,8 +254,10 @@ def _number(
         faults.append(f"{where}: {key} {given}; a number is needed; write it")
         return math.nan
     if not low <= abs(value) <= high:
-        faults.append(f"{where}: {key} = {value:g}; {low:g} .. {high:g} is allowed, of either "
-                      "sign; check the unit of the source")  # fmt: skip
+        faults.append(
+            f"{where}: {key} = {value:g}; {low:g} .. {high:g} is allowed, of either "
+            "sign; check the unit of the source"
+        )
     return float(value)
 
 
@@ -265,13 +270,17 @@ def _numbers(
     good = isinstance(value, list) and 1 <= len(value) <= MOST_GAGES
     good = good and all(isinstance(x, int | float) and not isinstance(x, bool) for x in value)
     if not good:
-        faults.append(f"{where}: gages.{key} = {value!r}; 1 to {MOST_GAGES} numbers are needed, "
-                      "one a gage; correct the list")  # fmt: skip
+        faults.append(
+            f"{where}: gages.{key} = {value!r}; 1 to {MOST_GAGES} numbers are needed, "
+            "one a gage; correct the list"
+        )
         return None
     for number, x in enumerate(value, start=1):
         if not low <= x <= high:
-            faults.append(f"{where}: gages.{key} of gage {number} = {x:g}; {low:g} .. {high:g} is "
-                          "allowed; check the unit of the source")  # fmt: skip
+            faults.append(
+                f"{where}: gages.{key} of gage {number} = {x:g}; {low:g} .. {high:g} is "
+                "allowed; check the unit of the source"
+            )
     return tuple(float(x) for x in value)
 
 

@@ -128,8 +128,15 @@ def flags(turn: Turn) -> list[str]:
 
 def empty_summary(name: str) -> dict[str, Any]:
     """Return the summary of a quantity that was not measured."""
-    return {"rmse": None, "unit": QUANTITIES[name][0], "r2": None, "n": 0,
-            "rmse_percent_of_range": None, "coverage_95": None, "bias": None}  # fmt: skip
+    return {
+        "rmse": None,
+        "unit": QUANTITIES[name][0],
+        "r2": None,
+        "n": 0,
+        "rmse_percent_of_range": None,
+        "coverage_95": None,
+        "bias": None,
+    }
 
 
 def _summary(

@@ -265,8 +265,9 @@ def _period(run: Run) -> int:
     where = f"run {run.plan.run}"
     if run.strain is None or run.strain.shape[0] != GAGES:
         given = "no strain" if run.strain is None else f"{run.strain.shape[0]} gages"
-        raise DeviceError(f"{where}: it has {given}; the transmitter sends {GAGES} gages; "
-                          "choose another run")  # fmt: skip
+        raise DeviceError(
+            f"{where}: it has {given}; the transmitter sends {GAGES} gages; choose another run"
+        )
     period = round(1.0 / (run.rate * TICK))
     if not 1 <= period < 2**16 or abs(period * TICK * run.rate - 1.0) > 1e-6:
         raise DeviceError(
@@ -298,5 +299,14 @@ def _truth(run: Run) -> dict[str, float]:
     return {name: value for name, value in means.items() if value is not None}
 
 
-__all__ = ["ANNOUNCED", "Player", "Script", "Sink", "Tally", "Tape", "play", "record_tape",
-           "write_script"]  # fmt: skip
+__all__ = [
+    "ANNOUNCED",
+    "Player",
+    "Script",
+    "Sink",
+    "Tally",
+    "Tape",
+    "play",
+    "record_tape",
+    "write_script",
+]

@@ -47,8 +47,9 @@ class News:
     latency: list[float] = field(default_factory=list)
 
     def __bool__(self) -> bool:
-        return bool(self.turns or self.laps or self.messages or self.alarms or self.jumps
-                    or self.left_out)  # fmt: skip
+        return bool(
+            self.turns or self.laps or self.messages or self.alarms or self.jumps or self.left_out
+        )
 
     def add(self, other: "News") -> None:
         """Add what came later."""

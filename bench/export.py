@@ -175,8 +175,11 @@ def write_can_log(recording: Recording, path: Path) -> int:
 
     from bench.links.can_bus import message_of
 
-    kinds: dict[str, Any] = {".blf": can.BLFWriter, ".asc": can.ASCWriter,
-                             ".log": can.CanutilsLogWriter}  # fmt: skip
+    kinds: dict[str, Any] = {
+        ".blf": can.BLFWriter,
+        ".asc": can.ASCWriter,
+        ".log": can.CanutilsLogWriter,
+    }
     header = recording.header
     offset = header.wall_ns - header.monotonic_ns
     count = 0

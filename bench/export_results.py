@@ -19,9 +19,16 @@ from bench.segments import Segment
 from tirelib.units import from_si
 
 Rows = dict[str, list[Any]]
-_ESTIMATED = ("run", "segment", "t", "ready", "device_time",
-              *(f"{name}{end}" for name in QUANTITIES for end in ("", "_std", "_valid")),
-              "omega_rad_s", "valid")  # fmt: skip
+_ESTIMATED = (
+    "run",
+    "segment",
+    "t",
+    "ready",
+    "device_time",
+    *(f"{name}{end}" for name in QUANTITIES for end in ("", "_std", "_valid")),
+    "omega_rad_s",
+    "valid",
+)
 _TEXTS = ("event", "text")
 _LARGEST = 2.0**63
 """Numbers are below this, so that tables can hold them; NaN and infinity are written as null."""
@@ -33,8 +40,13 @@ def results(path: Path, wheel: int | None = None) -> tuple[Rows, Rows]:
 
     Times: ``utc_s`` on the wall clock when the bytes came, and ``t_s`` since the recording began.
     """
-    estimates: Rows = {"utc_s": [], "t_s": [], "wheel": [], **{name: [] for name in _ESTIMATED},
-                       "flags": []}  # fmt: skip
+    estimates: Rows = {
+        "utc_s": [],
+        "t_s": [],
+        "wheel": [],
+        **{name: [] for name in _ESTIMATED},
+        "flags": [],
+    }
     events: Rows = {"utc_s": [], "t_s": [], "event": [], "text": [], "wheel": []}
     recording = Recording(path)
     try:
@@ -50,8 +62,11 @@ def results(path: Path, wheel: int | None = None) -> tuple[Rows, Rows]:
                     f"{recording.path}: {channel.topic} at {moment} ns: {wrong}; the samples are "
                     "exported, estimates and events are not; take another recording"
                 )
-            row = {**content, "utc_s": 1e-9 * (moment + header.clock),
-                   "t_s": 1e-9 * (moment - header.monotonic_ns)}  # fmt: skip
+            row = {
+                **content,
+                "utc_s": 1e-9 * (moment + header.clock),
+                "t_s": 1e-9 * (moment - header.monotonic_ns),
+            }
             if not is_event:
                 row |= {"wheel": number, "flags": " ".join(map(str, content.get("flags", [])))}
             for name, column in (events if is_event else estimates).items():
@@ -107,17 +122,26 @@ def write_mdf(path: Path, found: Sequence[Segment], known: Any, out: Path) -> in
             title = f"wheel {segment.wheel} segment {segment.number}"
             times = 1e-6 * segment.t_us + segment.period * np.arange(len(strain))
             mdf.append(
-                [Signal(strain[:, gage], times, "ustrain", f"{mine}strain_{gage + 1}")
-                 for gage in range(strain.shape[1])], comment=title,
-            )  # fmt: skip
+                [
+                    Signal(strain[:, gage], times, "ustrain", f"{mine}strain_{gage + 1}")
+                    for gage in range(strain.shape[1])
+                ],
+                comment=title,
+            )
             told = segment.known(known)
             values = np.array(told.values)
             mdf.append(
-                [Signal(np.asarray(from_si(values[:, column], unit, dimension)),
-                        1e-6 * np.array(told.t_us), unit, f"{mine}{name}")
-                 for column, (name, (unit, dimension)) in enumerate(CONDITIONS.items())],
+                [
+                    Signal(
+                        np.asarray(from_si(values[:, column], unit, dimension)),
+                        1e-6 * np.array(told.t_us),
+                        unit,
+                        f"{mine}{name}",
+                    )
+                    for column, (name, (unit, dimension)) in enumerate(CONDITIONS.items())
+                ],
                 comment=f"{title}: conditions",
-            )  # fmt: skip
+            )
             count += len(strain)
         estimates, events = results(path)
         for wheel in sorted(set(estimates["wheel"])):

@@ -34,10 +34,12 @@ RATES = {"flips": 0.01, "cuts": 0.01, "inserts": 0.01, "lost": 0.01, "dup": 0.01
 """Faults that strike at random, and how often by default."""
 GAGE_FAULTS = ("saturate", "dead")
 """Faults of one gage, given by its number."""
-SIZES = {"fades": (0.2, 0.0, 10.0, "a number of fades a second"),
-         "hum": (20.0, 0.0, 5000.0, "an amplitude in microstrain"),
-         "drift": (50.0, -5000.0, 5000.0, "ppm"),
-         "reset": (5.0, 0.1, 1e6, "a time in seconds")}  # fmt: skip
+SIZES = {
+    "fades": (0.2, 0.0, 10.0, "a number of fades a second"),
+    "hum": (20.0, 0.0, 5000.0, "an amplitude in microstrain"),
+    "drift": (50.0, -5000.0, 5000.0, "ppm"),
+    "reset": (5.0, 0.1, 1e6, "a time in seconds"),
+}
 """Faults with a size: default, lowest, highest, what it is."""
 TEXT_FAULTS = ("flips", "cuts", "inserts")
 """Faults of bytes; a bus with a checksum of its own shows none of them."""
@@ -66,9 +68,11 @@ def parse_faults(texts: Iterable[str]) -> dict[str, float]:
     for text in texts:
         name, _, given = text.partition("=")
         if name not in RATES and name not in GAGE_FAULTS and name not in SIZES:
-            problems.append(f"--fault {text}: {name!r} is not known; allowed are "
-                            f"{', '.join((*RATES, *GAGE_FAULTS, *SIZES))}; name one of "
-                            "them")  # fmt: skip
+            problems.append(
+                f"--fault {text}: {name!r} is not known; allowed are "
+                f"{', '.join((*RATES, *GAGE_FAULTS, *SIZES))}; name one of "
+                "them"
+            )
             continue
         usual, low, high, what = _range(name)
         try:
@@ -76,8 +80,10 @@ def parse_faults(texts: Iterable[str]) -> dict[str, float]:
         except ValueError:
             value = float("nan")
         if not low <= value <= high or (name in GAGE_FAULTS and value != int(value)):
-            problems.append(f"--fault {text}: {given!r} is not {what}; {low:g} .. {high:g} is "
-                            "allowed; correct it")  # fmt: skip
+            problems.append(
+                f"--fault {text}: {given!r} is not {what}; {low:g} .. {high:g} is "
+                "allowed; correct it"
+            )
             continue
         faults[name] = value
     if problems:

@@ -157,8 +157,10 @@ def strain_names(samples: int, gages: int) -> list[str]:
 def _frame(path: Path, description: Any) -> tuple[int, int]:
     """Return samples a step and gages; refuse an FMU that is no strain estimator."""
     if description.coSimulation is None:
-        raise FmuError(f"{path}: it is no FMU for co-simulation; FMI 2.0 co-simulation "
-                       "is needed; build it with `tirelib fmu build`")  # fmt: skip
+        raise FmuError(
+            f"{path}: it is no FMU for co-simulation; FMI 2.0 co-simulation "
+            "is needed; build it with `tirelib fmu build`"
+        )
     names = {variable.name for variable in description.modelVariables}
     found = [m for name in names if (m := _STRAIN.fullmatch(name))]
     gages = max((int(m[2]) for m in found), default=GAGES)

@@ -37,9 +37,18 @@ STRAIN = 1
 HIGHEST, LOWEST = 32767, -32768
 """Counts that mean: the gage is at an end of its range."""
 HEADER = np.dtype(
-    [("type", "u1"), ("wheel", "u1"), ("seq", "<u2"), ("t_us", "<u4"), ("period", "<u2"),
-     ("n", "u1"), ("flags", "u1"), ("rssi", "i1"), ("temperature", "i1")]
-)  # fmt: skip
+    [
+        ("type", "u1"),
+        ("wheel", "u1"),
+        ("seq", "<u2"),
+        ("t_us", "<u4"),
+        ("period", "<u2"),
+        ("n", "u1"),
+        ("flags", "u1"),
+        ("rssi", "i1"),
+        ("temperature", "i1"),
+    ]
+)
 TICK = 1e-7
 """Unit of a frame's sample period, [s]."""
 LONGEST = HEADER.itemsize + 255 * GAGES * 2 + 4

@@ -105,20 +105,22 @@ def shunted(
 def device_text(device: Device, said: str = "") -> str:
     """Return the device file of a device; `said` is a comment that tells where it comes from."""
     lateral = [] if device.lateral is None else [f"lateral_m   = {list(device.lateral)}"]
-    return "\n".join([
-        *([f"# {said}"] if said else []),
-        f'format = "{FORMAT}"',
-        f"name   = {_quoted(device.name)}",
-        "",
-        "[gages]",
-        *lateral,
-        f"zero_counts = {list(device.zero)}",
-        f"gain        = {list(device.gain)}",
-        "",
-        "[scale]",
-        f"strain_per_count = {device.scale!r}",
-        "",
-    ])  # fmt: skip
+    return "\n".join(
+        [
+            *([f"# {said}"] if said else []),
+            f'format = "{FORMAT}"',
+            f"name   = {_quoted(device.name)}",
+            "",
+            "[gages]",
+            *lateral,
+            f"zero_counts = {list(device.zero)}",
+            f"gain        = {list(device.gain)}",
+            "",
+            "[scale]",
+            f"strain_per_count = {device.scale!r}",
+            "",
+        ]
+    )
 
 
 def write_device(path: Path, device: Device, said: str = "") -> None:

@@ -144,11 +144,17 @@ def _points(rows: Sequence[Any], where: str) -> dict[int | None, tuple[Point, ..
             faults.append(f"{here}: {row!r}; a table is needed; begin each with [[point]]")
             continue
         given = {str(k): v for k, v in row.items() if v not in (None, "")}
-        said = [_unknown(key, here) for key in given if key not in (*COLUMNS, "t_s", "wheel")
-                and key not in unknown]  # fmt: skip
+        said = [
+            _unknown(key, here)
+            for key in given
+            if key not in (*COLUMNS, "t_s", "wheel") and key not in unknown
+        ]
         unknown |= set(given)
-        said += [f"{here}: {key} is missing; a number is needed; write it"
-                 for key in REQUIRED if key not in given]  # fmt: skip
+        said += [
+            f"{here}: {key} is missing; a number is needed; write it"
+            for key in REQUIRED
+            if key not in given
+        ]
         wheel, point = _point(given, here, said)
         faults += said
         if point is not None and not said:
@@ -181,8 +187,10 @@ def _point(
         if low <= value <= high:
             si[name] = float(to_si(value, unit, dimension))
         else:
-            faults.append(f"{here}: {key} = {given[key]}; a number from {low:g} to {high:g} is "
-                          "needed; correct it")  # fmt: skip
+            faults.append(
+                f"{here}: {key} = {given[key]}; a number from {low:g} to {high:g} is "
+                "needed; correct it"
+            )
     wheel, time = _number(given.get("wheel", -1.0)), _number(given.get("t_s", 0.0))
     if not math.isfinite(time):
         faults.append(f"{here}: t_s = {given['t_s']}; seconds are needed; correct it")
@@ -206,8 +214,9 @@ def _order(wheel: int | None, points: Sequence[Point], where: str) -> Iterator[s
     of = "" if wheel is None else f" of wheel {wheel}"
     times = [point.time for point in points]
     if len(points) < 2 or times[0] != 0.0 or any(b <= a for a, b in pairwise(times)):
-        yield (f"{where}: times {times[:5]}{of}; at least two are needed, growing from 0; "
-               "correct them")  # fmt: skip
+        yield (
+            f"{where}: times {times[:5]}{of}; at least two are needed, growing from 0; correct them"
+        )
     if len({point.condition.slip_ratio is None for point in points}) > 1:
         yield f"{where}: slip_ratio{of} is given at some points only; all or none; complete it"
 
@@ -255,8 +264,13 @@ class Rig:
             self._last = state
             force = forces(state)
             kappa = state.omega * state.free_radius / condition.speed - 1.0
-            truth = {"Fz": force.fz, "alpha": condition.slip_angle, "kappa": kappa,
-                     "Fy": force.fy, "Fx": force.fx}  # fmt: skip
+            truth = {
+                "Fz": force.fz,
+                "alpha": condition.slip_angle,
+                "kappa": kappa,
+                "Fy": force.fy,
+                "Fx": force.fx,
+            }
             strain = np.asarray(trace(state, self._points).strain)
             self._known[condition] = (strain, state.omega, truth)
         return self._known[condition]

@@ -93,9 +93,12 @@ class McapLog:
         return self._pending.count + len(self._chunk)
 
     def channel(
-        self, topic: str, encoding: str, schema: tuple[str, bytes] | None = None,
+        self,
+        topic: str,
+        encoding: str,
+        schema: tuple[str, bytes] | None = None,
         metadata: Mapping[str, str] | None = None,
-    ) -> int:  # fmt: skip
+    ) -> int:
         """Return the channel of a topic; a new one the first time.
 
         Parameters
@@ -130,8 +133,9 @@ class McapLog:
         place = self.length + self._pending.count
         before = self._pending.count
         Metadata(metadata=dict(entries), name=name).write(self._pending)
-        self._noted.append(MetadataIndex(length=self._pending.count - before, name=name,
-                                         offset=place))  # fmt: skip
+        self._noted.append(
+            MetadataIndex(length=self._pending.count - before, name=name, offset=place)
+        )
 
     def flush(self) -> None:
         """Close the chunk and write everything; on an error nothing of it is in the file.
@@ -225,10 +229,13 @@ class McapLog:
         packed = zstandard.compress(content, LEVEL)
         times = [time for offsets in self._offsets.values() for time, _ in offsets]
         chunk = Chunk(
-            compression="zstd", data=packed, message_start_time=min(times),
-            message_end_time=max(times), uncompressed_crc=zlib.crc32(content),
+            compression="zstd",
+            data=packed,
+            message_start_time=min(times),
+            message_end_time=max(times),
+            uncompressed_crc=zlib.crc32(content),
             uncompressed_size=len(content),
-        )  # fmt: skip
+        )
         builder = RecordBuilder()
         chunk.write(builder)
         length = builder.count
@@ -288,8 +295,9 @@ class McapLog:
                 record.write(builder)
             if records:
                 size = self.length + builder.count - place
-                offsets.append(SummaryOffset(group_opcode=code, group_start=place,
-                                             group_length=size))  # fmt: skip
+                offsets.append(
+                    SummaryOffset(group_opcode=code, group_start=place, group_length=size)
+                )
         offset_start = self.length + builder.count
         for offset in offsets:
             offset.write(builder)
@@ -326,8 +334,14 @@ def _index_at(file: BinaryIO, stream: ReadDataStream, place: int, length: int) -
     first, last, size = stream.read8(), stream.read8(), stream.read8()
     crc, compression, packed = stream.read4(), stream.read_prefixed_string(), stream.read8()
     file.seek(packed, SEEK_CUR)
-    chunk = Chunk(compression=compression, data=b"", message_start_time=first,
-                  message_end_time=last, uncompressed_crc=crc, uncompressed_size=size)  # fmt: skip
+    chunk = Chunk(
+        compression=compression,
+        data=b"",
+        message_start_time=first,
+        message_end_time=last,
+        uncompressed_crc=crc,
+        uncompressed_size=size,
+    )
     entry = _index_of(chunk, place, length, {}, 0)
     entry.compressed_size = packed
     return entry

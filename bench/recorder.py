@@ -89,10 +89,13 @@ class Recorder:
         if length is None:
             log.metadata("tirebench", header.as_text())
         self._raw = [
-            log.channel(RAW.format(number), encoding_of(source),
-                        metadata={"source": str(number), "name": str(source.get("name", ""))})
+            log.channel(
+                RAW.format(number),
+                encoding_of(source),
+                metadata={"source": str(number), "name": str(source.get("name", ""))},
+            )
             for number, source in enumerate(header.sources)
-        ]  # fmt: skip
+        ]
         self._events = log.channel(EVENTS, "json", EVENT_SCHEMA)
         channel = log.channel(CONDITIONS, "json", CONDITIONS_SCHEMA)
         if length is None:
@@ -211,8 +214,14 @@ class Recorder:
 
 def alarm_event(name: str, text: str, *, on: bool) -> dict[str, Any]:
     """Return an alarm of the run that begins or ends, as an event of a recording."""
-    return {"event": "alarm", "state": "on" if on else "off", "name": name, "wheel": None,
-            "value": None, "text": text}  # fmt: skip
+    return {
+        "event": "alarm",
+        "state": "on" if on else "off",
+        "name": name,
+        "wheel": None,
+        "value": None,
+        "text": text,
+    }
 
 
 def jump_event(jump: Jump, *, whole: bool = True) -> dict[str, Any]:

@@ -220,8 +220,14 @@ def _jump(event: Mapping[str, Any]) -> Jump | None:
         return None
     try:
         start, end = (Place(*map(int, event[key])) for key in ("from", "to"))
-        return Jump(int(event["wheel"]), start, end, str(event["why"]),
-                    int(event["samples"]), int(event["turns"]))  # fmt: skip
+        return Jump(
+            int(event["wheel"]),
+            start,
+            end,
+            str(event["why"]),
+            int(event["samples"]),
+            int(event["turns"]),
+        )
     except (KeyError, OverflowError, TypeError, ValueError):
         return None
 

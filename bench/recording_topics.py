@@ -21,8 +21,11 @@ from tirelib.units import from_si
 
 RAW, EVENTS, CONDITIONS, LINE = "/raw/{}", "/events", "/conditions", "/line"
 STRAIN, ESTIMATE, LINK, TOLD = (
-    "/wheel/{}/strain", "/wheel/{}/estimate", "/wheel/{}/link", "/wheel/{}/conditions",
-)  # fmt: skip
+    "/wheel/{}/strain",
+    "/wheel/{}/estimate",
+    "/wheel/{}/link",
+    "/wheel/{}/conditions",
+)
 SAMPLES = 16
 """Samples of a message of strain: one of SERIAL v1. The first of each alone is a wave of 625 Hz."""
 _ARRAYS = orjson.OPT_SERIALIZE_NUMPY  # which writes NaN as null
@@ -47,21 +50,27 @@ def field_of(name: str) -> str:
 
 _TEXT = {"type": "string"}
 _COUNT = {"type": "integer"}
-EVENT_SCHEMA = _schema("tirebench.Event", "What happened, and markers of the user.",
-                       {"event": _TEXT, "text": _TEXT, "wheel": _COUNT})  # fmt: skip
-CONDITIONS_SCHEMA = _schema("tirebench.Conditions", "Speed, pressure and camber over device time.",
-                            {"format": _TEXT})  # fmt: skip
+EVENT_SCHEMA = _schema(
+    "tirebench.Event",
+    "What happened, and markers of the user.",
+    {"event": _TEXT, "text": _TEXT, "wheel": _COUNT},
+)
+CONDITIONS_SCHEMA = _schema(
+    "tirebench.Conditions", "Speed, pressure and camber over device time.", {"format": _TEXT}
+)
 STRAIN_SCHEMA = _schema(
-    "tirebench.Strain", "Samples that follow each other; the message's time is that of the first.",
+    "tirebench.Strain",
+    "Samples that follow each other; the message's time is that of the first.",
     {
         "segment": _COUNT,
         "t_us": {"type": "integer", "description": "Device time of the first sample, us."},
         "period_us": _number("Time between two samples, us."),
         **{name: {"type": "array", "items": _number("microstrain")} for name in _GAGES},
     },
-)  # fmt: skip
+)
 ESTIMATE_SCHEMA = _schema(
-    "tirebench.Estimate", "One turn, ISO 8855 axes, as in the run's JSON.",
+    "tirebench.Estimate",
+    "One turn, ISO 8855 axes, as in the run's JSON.",
     {
         **{
             f"{name}{end}": _number(f"{unit}{said}")
@@ -72,10 +81,12 @@ ESTIMATE_SCHEMA = _schema(
         "omega_rad_s": _number("rad/s"),
         "flags": {"type": "array", "items": _TEXT},
     },
-)  # fmt: skip
-LINK_SCHEMA = _schema("tirebench.Link", "Good frames and every loss by its kind, counted.",
-                      {"frames": _COUNT, "lost_frames": _COUNT, "crc_bad": _COUNT,
-                       "clock_drift_ppm": _number("ppm")})  # fmt: skip
+)
+LINK_SCHEMA = _schema(
+    "tirebench.Link",
+    "Good frames and every loss by its kind, counted.",
+    {"frames": _COUNT, "lost_frames": _COUNT, "crc_bad": _COUNT, "clock_drift_ppm": _number("ppm")},
+)
 TOLD_SCHEMA = _schema(
     "tirebench.Told",
     "What a bus told of the conditions, when it changed.",

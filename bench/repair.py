@@ -86,8 +86,13 @@ def _copied(found: Iterator[McapRecord], writer: Writer) -> Repaired:
                 )
             elif isinstance(record, Message):
                 count += 1
-                writer.add_message(channels[record.channel_id], record.log_time, record.data,
-                                   record.publish_time, record.sequence)  # fmt: skip
+                writer.add_message(
+                    channels[record.channel_id],
+                    record.log_time,
+                    record.data,
+                    record.publish_time,
+                    record.sequence,
+                )
             elif isinstance(record, Metadata):
                 writer.add_metadata(record.name, record.metadata)
     except OSError:

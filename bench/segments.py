@@ -106,8 +106,14 @@ def segments(
                 if number in current:
                     yield current[number]
                 before = [(content.t_us, *entry) for entry in told.get(number, {}).items()]
-                current[number] = Segment(number, content.segment, block.first_us, content.t_us,
-                                          content.period, told=before)  # fmt: skip
+                current[number] = Segment(
+                    number,
+                    content.segment,
+                    block.first_us,
+                    content.t_us,
+                    content.period,
+                    told=before,
+                )
             current[number].blocks.append(content)
     yield from current.values()
     for said in wheels.contradicted.values():

@@ -33,9 +33,16 @@ from bench.source_plan import SourcePlan, protocol_of
 
 FORMAT = "tirebench-setup/1"
 _KEYS: dict[str, type | tuple[type, ...]] = {
-         "port": str, "baud": int, "bitrate": int, "data_bitrate": int, "bus_options": list,
-         "rate_hz": (int, float), "map": str, "device": str, "wheel": int,
-}  # fmt: skip
+    "port": str,
+    "baud": int,
+    "bitrate": int,
+    "data_bitrate": int,
+    "bus_options": list,
+    "rate_hz": (int, float),
+    "map": str,
+    "device": str,
+    "wheel": int,
+}
 
 
 def read_setup(path: Path, usual: SourcePlan) -> tuple[SourcePlan, ...]:
@@ -99,8 +106,9 @@ def _faults(table: dict[str, Any], where: str) -> list[str]:
         value = table.get(key)
         if value is not None and (not isinstance(value, kind) or isinstance(value, bool)):
             wanted = kind.__name__ if isinstance(kind, type) else "number"
-            faults.append(f"{where}: {key} = {value!r}; a TOML value of type {wanted} is needed; "
-                          "correct it")  # fmt: skip
+            faults.append(
+                f"{where}: {key} = {value!r}; a TOML value of type {wanted} is needed; correct it"
+            )
     wheel = table.get("wheel", 0)
     if isinstance(wheel, int) and not 0 <= wheel <= 255:
         faults.append(f"{where}: wheel = {wheel}; 0 .. 255 is allowed; correct it")
@@ -136,25 +144,32 @@ def check_sources(sources: Sequence[SourcePlan], conditions: Conditions | None) 
     faults = []
     ports = [source.port.port for source in sources]
     for port in sorted({port for port in ports if ports.count(port) > 1}):
-        faults.append(f"--port {port}: it comes twice; each source needs a port of its own; leave "
-                      "one out")  # fmt: skip
+        faults.append(
+            f"--port {port}: it comes twice; each source needs a port of its own; leave one out"
+        )
     wheels = [(wheel, source.port.port) for source in sources for wheel in source.known_wheels]
     for wheel in sorted({w for w, _ in wheels}):
         named = [port for w, port in wheels if w == wheel]
         if len(named) > 1:
-            faults.append(f"wheel {wheel} comes from {' and '.join(named)}; each wheel may come "
-                          "from one source; number them: `wheel = N` or --port N=PORT")  # fmt: skip
+            faults.append(
+                f"wheel {wheel} comes from {' and '.join(named)}; each wheel may come "
+                "from one source; number them: `wheel = N` or --port N=PORT"
+            )
     told = [(place, source.port.port) for source in sources for place in source.told]
     places = [place for place, _ in told]
     if clash := [(place, port) for place, port in told if clashes(place, places)]:
         names = ", ".join(f"{_words(place)} from {port}" for place, port in clash)
-        faults.append(f"a condition is told twice: {names}; each may come from one source, for a "
-                      "wheel or for all; leave one out of its map")  # fmt: skip
+        faults.append(
+            f"a condition is told twice: {names}; each may come from one source, for a "
+            "wheel or for all; leave one out of its map"
+        )
     known = () if conditions is None else conditions.known
     for place, port in told:
         if (name := place[0]) in known:
-            faults.append(f"{_words(place)} comes from {port}, and from --{name} or "
-                          "--conditions; one of them may say it; leave one out")  # fmt: skip
+            faults.append(
+                f"{_words(place)} comes from {port}, and from --{name} or "
+                "--conditions; one of them may say it; leave one out"
+            )
     if faults:
         raise DeviceError(faults)
 

@@ -64,8 +64,15 @@ class SourcePlan:
         user, known = self.protocol.user_map, len(self.known_wheels)
         expected = max(known, 1) if user is None else known
         said_by = self.protocol.rate_said_by
-        return Line(self.protocol.decoder(), devices, self.wheel, self.port.port, said_by, expected,
-                    tuple(self.known_wheels))  # fmt: skip
+        return Line(
+            self.protocol.decoder(),
+            devices,
+            self.wheel,
+            self.port.port,
+            said_by,
+            expected,
+            tuple(self.known_wheels),
+        )
 
     def as_header(self) -> dict[str, Any]:
         """Return the plan as the header of a recording holds it."""
@@ -94,8 +101,11 @@ def protocol_of(port: PortPlan, rate: float, map_file: Path | None) -> ProtocolP
     if user is None:
         return ProtocolPlan(port.encoding, rate)
     if user.of_line != (port.encoding == SERIAL):
-        mine, other = ("a serial line", "PORT, tcp:// or udp://") if user.of_line else (
-            "CAN frames", "slcan:... or can:...")  # fmt: skip
+        mine, other = (
+            ("a serial line", "PORT, tcp:// or udp://")
+            if user.of_line
+            else ("CAN frames", "slcan:... or can:...")
+        )
         raise DeviceError(
             f"--map {map_file} with --port {port.port}: this map is for {mine}; {other} is needed; "
             "name such a port, or another map"

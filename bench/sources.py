@@ -100,12 +100,17 @@ def truth_rows(motions: Mapping[int, Motion]) -> Iterator[dict[str, float]]:
             truth = {name: float(values[row]) for name, values in motion.truth.items()}
             condition = motion.conditions[row]
             yield {
-                "wheel": wheel, "t_s": moment, "Fz_N": truth["Fz"], "Fy_N": truth["Fy"],
-                "Fx_N": truth["Fx"], "alpha_deg": truth["alpha"] * degrees,
-                "kappa": truth["kappa"], "speed_kmh": 3.6 * condition.speed,
+                "wheel": wheel,
+                "t_s": moment,
+                "Fz_N": truth["Fz"],
+                "Fy_N": truth["Fy"],
+                "Fx_N": truth["Fx"],
+                "alpha_deg": truth["alpha"] * degrees,
+                "kappa": truth["kappa"],
+                "speed_kmh": 3.6 * condition.speed,
                 "pressure_bar": 1e-5 * condition.pressure,
                 "omega_rad_s": float(motion.omega[row]),
-            }  # fmt: skip
+            }
 
 
 def chosen_source(recording: Recording, source: int | None) -> int:

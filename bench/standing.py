@@ -93,8 +93,10 @@ def standing_mean(levels: Sequence[Level], still: float = STILL) -> FloatArray:
     faults = []
     for gage in np.flatnonzero(there).tolist():
         if missing[gage] > 0.01:
-            faults.append(f"gage {gage + 1}: {100.0 * missing[gage]:.0f} % of its samples are lost "
-                          "or saturated; all are needed; mend the line or the bridge")  # fmt: skip
+            faults.append(
+                f"gage {gage + 1}: {100.0 * missing[gage]:.0f} % of its samples are lost "
+                "or saturated; all are needed; mend the line or the bridge"
+            )
         elif spread[gage] > still or drift[gage] > CREEP * still:
             faults.append(
                 f"gage {gage + 1}: its strain moves by {1e6 * spread[gage]:.0f} microstrain and "

@@ -287,8 +287,9 @@ class Timeline:
     def _samples_of(
         self, strain: FloatArray, lost: BoolArray, saturated: BoolArray, time: int, why: str
     ) -> Samples:
-        block = Samples(self._segment, why, self._start, time, self._period * TICK,
-                        strain, lost, saturated)  # fmt: skip
+        block = Samples(
+            self._segment, why, self._start, time, self._period * TICK, strain, lost, saturated
+        )
         self._start += len(strain)
         return block
 

@@ -132,9 +132,13 @@ class SerialTransmitter:
             flags = np.bitwise_or.reduce(bits[part].reshape(-1, samples), axis=1).astype(np.int64)
             flags |= self._clock.announcements(first + part.start, len(flags))
             frames = strain_frames(
-                counts[part], period=record.period, wheel=record.wheel, seq=self._seq,
-                t_us=(begin - self._clock.offset) % 2**32, flags=flags.tolist(),
-            )  # fmt: skip
+                counts[part],
+                period=record.period,
+                wheel=record.wheel,
+                seq=self._seq,
+                t_us=(begin - self._clock.offset) % 2**32,
+                flags=flags.tolist(),
+            )
             self._seq += len(frames)
             wire += encode(frames)
         ends = np.minimum(SAMPLES * (1 + np.arange(len(wire))), len(counts)) + first
@@ -216,10 +220,13 @@ class CanTransmitter:
             if announced or times[row] >= self._next_health:
                 self._next_health = int(times[row]) + (0 if announced else HEALTH_PERIOD)
                 health = Health(
-                    self._health.radio_lost, self._health.rssi, self._health.temperature,
-                    self._health.battery, self._health.pressure,
+                    self._health.radio_lost,
+                    self._health.rssi,
+                    self._health.temperature,
+                    self._health.battery,
+                    self._health.pressure,
                     self._health.flags | int(flags[row]),
-                )  # fmt: skip
+                )
                 batch = same_kind(identifier, encode_health(health), fd=False)
                 # just before the frame that it speaks of
                 parts.append((np.array([1e-6 * (times[row] + 0.5 * period)]), batch))

@@ -112,9 +112,10 @@ def _rebuilt(archive: FmuArchive) -> bytes | None:
 
     known = {p.name for p in signature(build_fmu).parameters.values() if p.default is not p.empty}
     options: dict[str, Any] = {
-        name: value for name, value in said.items()
+        name: value
+        for name, value in said.items()
         if name in known and isinstance(value, bool | int | float)
-    }  # fmt: skip
+    }
     with tempfile.TemporaryDirectory(prefix=prefix()) as name:
         folder = Path(name)
         (folder / "calibration.toml").write_bytes(calibration)

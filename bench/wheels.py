@@ -310,8 +310,11 @@ class Wheels:
         """Return what to look at on each line from which no good frame came, by its source."""
         said = {source: line.decoder.counts.hint for source, line in enumerate(self.lines)}
         many = len(self.lines) > 1
-        return {source: f"{self.lines[source].name}: {hint}" if many else hint
-                for source, hint in said.items() if hint}  # fmt: skip
+        return {
+            source: f"{self.lines[source].name}: {hint}" if many else hint
+            for source, hint in said.items()
+            if hint
+        }
 
     @property
     def missing(self) -> list[int]:

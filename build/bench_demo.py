@@ -62,8 +62,9 @@ def plan(name: str) -> "Plan":
         return Plan("bench-demo", "5 loads x 5 slip angles, 4 slip ratios", (*grid, *slips), 4)
     straight = [at(p) for p in (70, 100, 130)]
     others = [at(100, -3.0), at(130, 1.5), at(100, 3.0), at(100, 0.0, -0.01)]
-    return Plan("bench-demo-live", "3 loads twice, 3 slip angles, braking",
-                (*straight, *others, *straight))  # fmt: skip
+    return Plan(
+        "bench-demo-live", "3 loads twice, 3 slip angles, braking", (*straight, *others, *straight)
+    )
 
 
 def measure(name: str, target: Path) -> None:
@@ -75,11 +76,18 @@ def measure(name: str, target: Path) -> None:
     (seed, turns), day, console = DAYS[name], plan(name), Console()
     with console.status("solving the rig") as status:
         truths = run_plan(
-            day, tire("reference"), target, seed=seed, jobs=2, chain=Chain(turns=turns),
-            overwrite=True, progress=lambda done, all_: status.update(f"run {done} of {all_}"),
-        )  # fmt: skip
-    console.print(f"{len(truths)} runs in {name}: {day.about} (axes iso, day {seed})",
-                  highlight=False)  # fmt: skip
+            day,
+            tire("reference"),
+            target,
+            seed=seed,
+            jobs=2,
+            chain=Chain(turns=turns),
+            overwrite=True,
+            progress=lambda done, all_: status.update(f"run {done} of {all_}"),
+        )
+    console.print(
+        f"{len(truths)} runs in {name}: {day.about} (axes iso, day {seed})", highlight=False
+    )
 
 
 def campaigns(steps: Steps, out: Path, data: Path | None, fresh: bool) -> dict[str, Path]:
@@ -88,12 +96,19 @@ def campaigns(steps: Steps, out: Path, data: Path | None, fresh: bool) -> dict[s
     for name, folder in found.items():
         if data is not None:
             if not (folder / "campaign.toml").exists():
-                sys.exit(f"Error: {data}: no campaign {name}; {', '.join(DAYS)} are needed; put "
-                         "the folders there")  # fmt: skip
+                sys.exit(
+                    f"Error: {data}: no campaign {name}; {', '.join(DAYS)} are needed; put "
+                    "the folders there"
+                )
         elif fresh or not (folder / "truth.csv").exists():  # the rig writes it last
-            steps.run(f"Measure the day '{name}' on the numerical rig",
-                      ROOT / "build/bench_demo.py", "--measure", name, folder,
-                      program="python")  # fmt: skip
+            steps.run(
+                f"Measure the day '{name}' on the numerical rig",
+                ROOT / "build/bench_demo.py",
+                "--measure",
+                name,
+                folder,
+                program="python",
+            )
         else:
             steps.console.print(f"{name}: measured before, used again (--fresh measures anew)")
     return found
@@ -103,12 +118,20 @@ def prepare(steps: Steps, out: Path, day: Path, model: str | None) -> tuple[Path
     """Calibrate, build the FMU, identify a model; return the FMU and the model."""
     calibration, fmu = out / "calibration.toml", out / "StrainTire.fmu"
     steps.run("Calibrate", "calibrate", day, "--quick", "--out", calibration)
-    steps.run("Build the FMU", "fmu", "build", "--calibration", calibration, "--out", fmu,
-              "--samples-per-step", "16")  # fmt: skip
+    steps.run(
+        "Build the FMU",
+        "fmu",
+        "build",
+        "--calibration",
+        calibration,
+        "--out",
+        fmu,
+        "--samples-per-step",
+        "16",
+    )
     if model is not None:
         return fmu, model
-    steps.run("Identify a model from the same day", "identify", day, "--out",
-              out / "model.toml")  # fmt: skip
+    steps.run("Identify a model from the same day", "identify", day, "--out", out / "model.toml")
     return fmu, out / "model.toml"
 
 
@@ -121,10 +144,18 @@ def ready_fmu(steps: Steps, out: Path, samples: int = 16) -> tuple[Path, Path]:
     days = campaigns(steps, demo, None, fresh=False)
     calibration, fmu = out / "calibration.toml", out / "StrainTire.fmu"
     if not calibration.exists():
-        steps.run("Calibrate", "calibrate", days["calibrated"], "--quick", "--out",
-                  calibration)  # fmt: skip
-    steps.run("Build the FMU", "fmu", "build", "--calibration", calibration, "--out", fmu,
-              "--samples-per-step", str(samples))  # fmt: skip
+        steps.run("Calibrate", "calibrate", days["calibrated"], "--quick", "--out", calibration)
+    steps.run(
+        "Build the FMU",
+        "fmu",
+        "build",
+        "--calibration",
+        calibration,
+        "--out",
+        fmu,
+        "--samples-per-step",
+        str(samples),
+    )
     return fmu, days["played"]
 
 
@@ -147,15 +178,22 @@ def play(
         "Play the day as a wheel on a serial port, in the background",
         *("emulate", "--campaign", day, "--all", "--device", files.device),
         *("--port-file", port_file, "--conditions", files.conditions, "--speedup", f"{pace:g}"),
-        *("--after", go, "--wait", f"{PATIENCE:.0f}"), program="tirebench", log=sent,
-    ) as wheel:  # fmt: skip
+        *("--after", go, "--wait", f"{PATIENCE:.0f}"),
+        program="tirebench",
+        log=sent,
+    ) as wheel:
         port = wait_for_port(port_file, wheel, sent)
-        with steps.beside(
-            "Read the port, step the FMU, record, show the live page",
-            *("run", "--port", port, "--fmu", fmu, "--conditions", files.conditions),
-            *("--device", files.device, "--record", out / "live.mcap", "--json", files.live),
-            "--every-turn", program="tirebench", log=said,
-        ) as run, steps.console.status("starting") as status:  # fmt: skip
+        with (
+            steps.beside(
+                "Read the port, step the FMU, record, show the live page",
+                *("run", "--port", port, "--fmu", fmu, "--conditions", files.conditions),
+                *("--device", files.device, "--record", out / "live.mcap", "--json", files.live),
+                "--every-turn",
+                program="tirebench",
+                log=said,
+            ) as run,
+            steps.console.status("starting") as status,
+        ):
             url = address_of(said, run)
             seen = look(url, LOOKED * turns_of(day), status.update, go.touch)
             end_when_played(run, said, wheel, sent, status.update)
@@ -176,16 +214,39 @@ def use(steps: Steps, out: Path, fmu: Path, files: "LiveFiles", model: Path | st
     """Replay and export the recording, and do with the campaign what one does with campaigns."""
     record, exported = out / "live.mcap", out / "exported"
     calibration = out / "calibration.toml"
-    steps.run("Replay the recording", "replay", record, "--fmu", fmu, "--json", files.replay,
-              program="tirebench")  # fmt: skip
-    steps.run("Export it as a campaign (MDF4)", "export", record, "--out", exported,
-              program="tirebench")  # fmt: skip
+    steps.run(
+        "Replay the recording",
+        "replay",
+        record,
+        "--fmu",
+        fmu,
+        "--json",
+        files.replay,
+        program="tirebench",
+    )
+    steps.run(
+        "Export it as a campaign (MDF4)", "export", record, "--out", exported, program="tirebench"
+    )
     steps.run("Check the campaign", "campaign", "check", exported)
-    steps.run("Estimate it with the library", "estimate", exported, "--calibration", calibration,
-              "--json", files.direct)  # fmt: skip
+    steps.run(
+        "Estimate it with the library",
+        "estimate",
+        exported,
+        "--calibration",
+        calibration,
+        "--json",
+        files.direct,
+    )
     steps.run("Estimate it with the FMU", "fmu", "run", fmu, exported, "--json", files.fmu)
-    steps.run("Where does the model fail?", "compare", exported, "--model", model, "--out",
-              out / "compared")  # fmt: skip
+    steps.run(
+        "Where does the model fail?",
+        "compare",
+        exported,
+        "--model",
+        model,
+        "--out",
+        out / "compared",
+    )
 
 
 def draw(steps: Steps, out: Path, day: Path, files: "LiveFiles", seen: Seen) -> Path:
@@ -200,23 +261,37 @@ def draw(steps: Steps, out: Path, day: Path, files: "LiveFiles", seen: Seen) -> 
     line = read_line(files, campaign)
     drawing = live_drawing(files, campaign, LowPass(calibration.order, calibration.cut_off))
     sections = [
-        Section("Line", "live", live_text(line), [live_table(files, line)],
-                draw_all(out, [drawing])),
-        Section("Live page", "page", seen.words, pictures=[
-            Picture("page", "The live page while the wheel sent", "As a browser showed it.",
-                    file=seen.picture, vector=seen.picture,
-                    reason="" if seen.picture else "no browser was there"),
-        ]),
-    ]  # fmt: skip
+        Section(
+            "Line", "live", live_text(line), [live_table(files, line)], draw_all(out, [drawing])
+        ),
+        Section(
+            "Live page",
+            "page",
+            seen.words,
+            pictures=[
+                Picture(
+                    "page",
+                    "The live page while the wheel sent",
+                    "As a browser showed it.",
+                    file=seen.picture,
+                    vector=seen.picture,
+                    reason="" if seen.picture else "no browser was there",
+                ),
+            ],
+        ),
+    ]
     reports = [("where the model fails", "compared/index.html")]
     return write_page(
-        out, "demo.html", title="From a wheel transmitter to a model",
+        out,
+        "demo.html",
+        title="From a wheel transmitter to a model",
         lead=f"{len(campaign.plans)} runs of a tire ({calibration.tire}) went over a serial line "
         "to the bench, live, and came back as a campaign.",
-        headline=[], sections=sections,
+        headline=[],
+        sections=sections,
         commands=[{"what": what, "command": command} for what, command in steps.commands],
         reports=[{"title": title, "file": file} for title, file in reports],
-    )  # fmt: skip
+    )
 
 
 def clear(out: Path) -> None:
@@ -233,8 +308,12 @@ def main(arguments: Sequence[str] | None = None, steps: Steps | None = None) -> 
     parser = argparse.ArgumentParser(description="The bench from end to end.")
     parser.add_argument("--fresh", action="store_true", help="measure again what is there")
     parser.add_argument("--out", type=Path, default=ROOT / "build/out/bench-demo", metavar="DIR")
-    parser.add_argument("--data", type=Path, metavar="DIR",
-                        help=f"ready campaigns in folders named {', '.join(DAYS)}")  # fmt: skip
+    parser.add_argument(
+        "--data",
+        type=Path,
+        metavar="DIR",
+        help=f"ready campaigns in folders named {', '.join(DAYS)}",
+    )
     parser.add_argument("--model", metavar="M.toml|NAME", help="compare with it, identify none")
     parser.add_argument("--pace", type=float, default=1.0, metavar="X", help="times real time")
     parser.add_argument("--no-browser", action="store_true", help="fetch the page, look not at it")
@@ -258,9 +337,11 @@ def main(arguments: Sequence[str] | None = None, steps: Steps | None = None) -> 
     steps.console.print(Rule(said, style="green"))
     judge(steps.console, files, days["played"])
     for what, file in (
-        ("everything", page), ("where the model fails", out / "compared/index.html"),
-        ("recording", out / "live.mcap"), ("campaign of the recording", out / "exported"),
-    ):  # fmt: skip
+        ("everything", page),
+        ("where the model fails", out / "compared/index.html"),
+        ("recording", out / "live.mcap"),
+        ("campaign of the recording", out / "exported"),
+    ):
         shown = os.path.relpath(file)
         steps.console.print(f"open  {shown}   ({what})", highlight=False, soft_wrap=True)
 

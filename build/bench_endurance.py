@@ -69,28 +69,54 @@ class Bench:
         before = CHRT if self.realtime and arguments[0] == "emulate" else ()
         with (self.out / log).open("wb") as file:
             process = subprocess.Popen(
-                [*before, str(PROGRAMS / "tirebench"), *map(str, arguments)], cwd=ROOT,
-                stdin=subprocess.DEVNULL, stdout=file, stderr=subprocess.STDOUT,
+                [*before, str(PROGRAMS / "tirebench"), *map(str, arguments)],
+                cwd=ROOT,
+                stdin=subprocess.DEVNULL,
+                stdout=file,
+                stderr=subprocess.STDOUT,
                 env={**os.environ, "PYTHONUNBUFFERED": "1"},
-            )  # fmt: skip
+            )
         self.started.append(process)
         return process
 
     def run(self, log: str, port: object, record: Path, *more: object) -> Any:
         """Start ``tirebench run`` on a port."""
         return self.start(
-            log, "run", "--port", port, "--fmu", self.fmu, "--trust", "--speed", 65,
-            "--pressure", 2.3, "--camber", 0, "--record", record,
-            *(("--realtime",) if self.realtime else ()), *more,
-        )  # fmt: skip
+            log,
+            "run",
+            "--port",
+            port,
+            "--fmu",
+            self.fmu,
+            "--trust",
+            "--speed",
+            65,
+            "--pressure",
+            2.3,
+            "--camber",
+            0,
+            "--record",
+            record,
+            *(("--realtime",) if self.realtime else ()),
+            *more,
+        )
 
     def emulate(self, port_file: str, seconds: float, *more: object) -> tuple[Any, str]:
         """Start a wheel that rolls straight ahead; return it and its port."""
         file, manoeuvre = self.out / port_file, self.out / "straight.toml"
         file.unlink(missing_ok=True)
         manoeuvre.write_text(MANOEUVRE.format(seconds=seconds), encoding="utf-8")
-        wheel = self.start("emulate.log", "emulate", "--manoeuvre", manoeuvre, "--port-file", file,
-                           "--wait", 600, *more)  # fmt: skip
+        wheel = self.start(
+            "emulate.log",
+            "emulate",
+            "--manoeuvre",
+            manoeuvre,
+            "--port-file",
+            file,
+            "--wait",
+            600,
+            *more,
+        )
         wait(
             file.exists, f"the port of {file}", wheel, PATIENCE + seconds
         )  # the tape is made first
@@ -112,8 +138,10 @@ def wait(
     while not true():
         gone = process is not None and process.poll() is not None
         if gone or time.monotonic() - start > patience:
-            sys.exit(f"Error: endurance: {what}: waited {patience:.0f} s or the program ended; "
-                     "it should come; see the logs")  # fmt: skip
+            sys.exit(
+                f"Error: endurance: {what}: waited {patience:.0f} s or the program ended; "
+                "it should come; see the logs"
+            )
         time.sleep(0.005)
     return time.monotonic() - start
 
@@ -141,13 +169,25 @@ def hold(bench: Bench, name: str, minutes: float) -> dict[str, Any]:
     record.unlink(missing_ok=True)
     numbers = [word for wheel in range(wheels) for word in ("--wheel", wheel)]
     sent = bench.out / "sent.json"
-    emulator, port = bench.emulate("port", 60.0 * minutes, "--format", kind, *numbers,
-                                   "--json", sent)  # fmt: skip
+    emulator, port = bench.emulate(
+        "port", 60.0 * minutes, "--format", kind, *numbers, "--json", sent
+    )
     port = port if kind == "serial" else f"slcan:{port}"
     rates = () if kind == "serial" else ("--data-bitrate", 5_000_000)
     listener = Listener()
-    run = bench.run(f"{stem}.log", port, record, *rates, *numbers, "--json", document, "--silence",
-                    3, "--plotjuggler", listener.port)  # fmt: skip
+    run = bench.run(
+        f"{stem}.log",
+        port,
+        record,
+        *rates,
+        *numbers,
+        "--json",
+        document,
+        "--silence",
+        3,
+        "--plotjuggler",
+        listener.port,
+    )
     log = bench.out / f"{stem}.log"
     url = address_of(log, run)
     listener.wait_after(0.0, PATIENCE)
@@ -169,19 +209,28 @@ def hold(bench: Bench, name: str, minutes: float) -> dict[str, Any]:
     above = 1e3 * (np.array(ages) - min(ages)) if ages else np.array([np.nan])
     tenth = max(1, len(meter.memory) // 10)
     return {
-        "line": name, "minutes": minutes, "browser": browser,
-        "frames_sent": told["frames"], "unheard": told["unheard"],
-        "emulator_late_ms": 1e3 * told["late_s"], "frames": seen["line"]["frames"],
+        "line": name,
+        "minutes": minutes,
+        "browser": browser,
+        "frames_sent": told["frames"],
+        "unheard": told["unheard"],
+        "emulator_late_ms": 1e3 * told["late_s"],
+        "frames": seen["line"]["frames"],
         "lost": {key: seen["line"][key] for key in LOST},
         "skipped": re.findall(r".*(?:skipped|started again).*", said)[-3:],
-        "turns": len(seen["turns"]), "valid": sum(turn["valid"] for turn in seen["turns"]),
-        "p50_ms": float(found[1]) if found else None, "p99_ms": float(found[2]) if found else None,
-        "spread_p50_ms": float(np.median(above)), "spread_p99_ms": float(np.percentile(above, 99)),
+        "turns": len(seen["turns"]),
+        "valid": sum(turn["valid"] for turn in seen["turns"]),
+        "p50_ms": float(found[1]) if found else None,
+        "p99_ms": float(found[2]) if found else None,
+        "spread_p50_ms": float(np.median(above)),
+        "spread_p99_ms": float(np.percentile(above, 99)),
         "cpu_per_second": cpu / lasted,
-        "memory_MB": [float(np.median(part)) / 2**20
-                      for part in (meter.memory[tenth : 2 * tenth + 1], meter.memory[-tenth:])],
+        "memory_MB": [
+            float(np.median(part)) / 2**20
+            for part in (meter.memory[tenth : 2 * tenth + 1], meter.memory[-tenth:])
+        ],
         "load_average": float(np.mean(meter.loads)),
-    }  # fmt: skip
+    }
 
 
 def plug(bench: Bench, cycles: int) -> dict[str, Any]:
@@ -193,8 +242,9 @@ def plug(bench: Bench, cycles: int) -> dict[str, Any]:
         record, link = bench.out / f"plug-{away:g}.mcap", bench.out / "cable"
         for old in (record, link):
             old.unlink(missing_ok=True)
-        emulator, _ = bench.emulate("port", 20.0, "--loop", "--link", link, "--unplug", PLUGGED,
-                                    "--replug", away)  # fmt: skip
+        emulator, _ = bench.emulate(
+            "port", 20.0, "--loop", "--link", link, "--unplug", PLUGGED, "--replug", away
+        )
         run = bench.run("plug.log", link, record, "--no-page", "--json", bench.out / "plug.json")
         wait(lambda r=record: r.exists() and r.stat().st_size > 50_000, "first bytes", run)
         plugged, there = [], True
@@ -215,9 +265,12 @@ def plug(bench: Bench, cycles: int) -> dict[str, Any]:
         events["reconnects"] += line["reconnects"]
         events["cycles"] += len(plugged)
     return {
-        **events, "back_p50_s": float(np.median(back)), "back_max_s": float(max(back)),
-        "not_back": sum(not np.isfinite(x) for x in back), "load_average": os.getloadavg()[0],
-    }  # fmt: skip
+        **events,
+        "back_p50_s": float(np.median(back)),
+        "back_max_s": float(max(back)),
+        "not_back": sum(not np.isfinite(x) for x in back),
+        "load_average": os.getloadavg()[0],
+    }
 
 
 def raw_arrivals(files: list[Path]) -> np.ndarray:
@@ -259,12 +312,14 @@ def kill(bench: Bench, kills: int) -> dict[str, Any]:
     listener.close()
     lost = after(bench, done)
     return {
-        "kills": done, "processes": sorted({one["role"] for one in done}),
-        "readable": lost["readable"], "lost_max_s": max(one["lost_s"] for one in done),
+        "kills": done,
+        "processes": sorted({one["role"] for one in done}),
+        "readable": lost["readable"],
+        "lost_max_s": max(one["lost_s"] for one in done),
         "back_max_s": max(one["back_s"] or 0.0 for one in done),
         "not_back": sum(one["back_s"] is None for one in done[:-1]),
         "load_average": os.getloadavg()[0],
-    }  # fmt: skip
+    }
 
 
 def strike(
@@ -319,8 +374,9 @@ def after(bench: Bench, done: list[dict[str, Any]]) -> dict[str, Any]:
         recording.close()
     ends = [one["moment"] for one in done[1:]] + [np.inf]
     for one, following in zip(done, ends, strict=True):
-        arrivals = raw_arrivals([file for file in files if file.stem.startswith(
-            Path(one["file"]).stem)])  # fmt: skip
+        arrivals = raw_arrivals(
+            [file for file in files if file.stem.startswith(Path(one["file"]).stem)]
+        )
         if one["role"] == "run":  # nothing comes after it: what is missing before
             before = arrivals[arrivals <= one["moment"] + 1.0]
             one["lost_s"] = max(0.0, one["moment"] - float(before[-1]))
@@ -341,8 +397,9 @@ def main() -> None:
     parser.add_argument("--cycles", type=int, default=100)
     parser.add_argument("--kills", type=int, default=20)
     parser.add_argument("--line", action="append", choices=tuple(LINES))
-    parser.add_argument("--realtime", action="store_true",
-                        help="at real-time priority, on a busy machine")  # fmt: skip
+    parser.add_argument(
+        "--realtime", action="store_true", help="at real-time priority, on a busy machine"
+    )
     parser.add_argument("--out", type=Path, default=OUT, metavar="DIR")
     given = parser.parse_args()
     out, console = given.out.resolve(), Console()

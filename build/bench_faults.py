@@ -65,13 +65,18 @@ def judged(name: str, outcome: Outcome, used: float) -> dict[str, Any]:
     wrong = MOST_WRONG_TEXT * outcome.damaged if "slcan" in name else 0.0
     good = outcome.lost_per_damage <= most and outcome.growth <= MOST_GROWTH
     return {
-        "damages": outcome.damaged, "frames": outcome.sent, "kinds": dict(outcome.kinds),
-        "accepted_wrong": outcome.wrong, "wrong_judged": lengths,
+        "damages": outcome.damaged,
+        "frames": outcome.sent,
+        "kinds": dict(outcome.kinds),
+        "accepted_wrong": outcome.wrong,
+        "wrong_judged": lengths,
         "good_lost_per_damage": outcome.lost_per_damage,
-        "crc_bad": outcome.counts.crc, "framing_bad": outcome.counts.framing,
-        "memory_growth_bytes": outcome.growth, "cpu_s": used,
+        "crc_bad": outcome.counts.crc,
+        "framing_bad": outcome.counts.framing,
+        "memory_growth_bytes": outcome.growth,
+        "cpu_s": used,
         "good": good and (outcome.wrong <= wrong or not lengths),
-    }  # fmt: skip
+    }
 
 
 def show(lines: dict[str, dict[str, Any]], console: Console) -> None:
@@ -80,10 +85,14 @@ def show(lines: dict[str, dict[str, Any]], console: Console) -> None:
     for name, one in lines.items():
         wrong = f"{one['accepted_wrong']}{'' if one['wrong_judged'] else ' (no checksum)'}"
         table.add_row(
-            name, str(one["damages"]), wrong, f"{one['good_lost_per_damage']:.3f}",
-            f"{one['memory_growth_bytes'] / 2**20:+.1f} MB", f"{one['cpu_s']:.0f} s",
+            name,
+            str(one["damages"]),
+            wrong,
+            f"{one['good_lost_per_damage']:.3f}",
+            f"{one['memory_growth_bytes'] / 2**20:+.1f} MB",
+            f"{one['cpu_s']:.0f} s",
             "good" if one["good"] else "BAD",
-        )  # fmt: skip
+        )
     console.print(table)
 
 

@@ -89,8 +89,10 @@ def main() -> None:
     hogs = [context.Process(target=hog, daemon=True) for _ in range(given.hogs)]
     sender = context.Process(target=send, args=(master, reads, seconds, results))
     said = realtime(given.realtime)
-    source = SourcePlan(PortPlan(f"slcan:{os.ttyname(slave)}", bitrate=1_000_000,
-                                 data_bitrate=5_000_000), ProtocolPlan(SLCAN, 1e4))  # fmt: skip
+    source = SourcePlan(
+        PortPlan(f"slcan:{os.ttyname(slave)}", bitrate=1_000_000, data_bitrate=5_000_000),
+        ProtocolPlan(SLCAN, 1e4),
+    )
     apart = not (given.realtime or given.together)
     reader = ReaderPlan((source,), 5.0, apart=apart)
     plan = LivePlan(reader, None, Conditions.constant(), RecordingHeader({}), given.out)
@@ -105,11 +107,13 @@ def main() -> None:
         chain.finish("stopped")
         counts = chain.counts()
         timeline = chain.wheels.counts[1]
-    write(f"{said}; load {os.getloadavg()[0]:.0f}; {given.hogs} hogs, {given.wheels} wheels: "
-          f"{100 * lost / sent:.1f} % of {sent / 1e6:.1f} MB lost in the adapter's buffer, "
-          f"{counts['raw']['lost_bytes']} bytes for want of a recorder; "
-          f"{timeline.lost_samples} samples lost, "
-          f"{counts['raw']['not_decoded_bytes']} bytes not decoded; {counts['cpu_s']}")  # fmt: skip
+    write(
+        f"{said}; load {os.getloadavg()[0]:.0f}; {given.hogs} hogs, {given.wheels} wheels: "
+        f"{100 * lost / sent:.1f} % of {sent / 1e6:.1f} MB lost in the adapter's buffer, "
+        f"{counts['raw']['lost_bytes']} bytes for want of a recorder; "
+        f"{timeline.lost_samples} samples lost, "
+        f"{counts['raw']['not_decoded_bytes']} bytes not decoded; {counts['cpu_s']}"
+    )
 
 
 if __name__ == "__main__":

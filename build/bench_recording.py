@@ -49,11 +49,15 @@ def pieces(
     if run.strain is None:
         raise SystemExit(f"{campaign}: its first run has no strain; name a campaign that has")
     times = math.ceil(seconds * run.rate / run.strain.shape[1])
-    runs = [replace(run, strain=np.tile(run.strain, (1, times)), trigger=None, rig={},
-                    rig_time=None)]  # fmt: skip
+    runs = [
+        replace(run, strain=np.tile(run.strain, (1, times)), trigger=None, rig={}, rig_time=None)
+    ]
     tape = record_tape(runs, Device(), Faults({}), wheels, source.header)
-    frames = [(due, frame) for piece in Player(transmitter(kind), line, Faults({})).pieces(tape)
-              for due, frame in zip(piece.due, piece.frames, strict=True)]  # fmt: skip
+    frames = [
+        (due, frame)
+        for piece in Player(transmitter(kind), line, Faults({})).pieces(tape)
+        for due, frame in zip(piece.due, piece.frames, strict=True)
+    ]
     found: dict[int, list[bytes]] = {}
     for due, frame in frames:
         found.setdefault(int(due / READ), []).append(frame)
@@ -101,9 +105,9 @@ OUTPUTS = {
         ("Fz", "alpha", "kappa", "Fy", "Fz_std", "alpha_std", "kappa_std", "Fy_std", "turn_rate")
     )
 }
-ESTIMATE = json.dumps(turn_document(
-    Turn(1, 0, 12.345678, 12.4, 12.4, {**OUTPUTS, "valid": 1.0}, {}, 0, (0,) * 5)
-)).encode()  # fmt: skip
+ESTIMATE = json.dumps(
+    turn_document(Turn(1, 0, 12.345678, 12.4, 12.4, {**OUTPUTS, "valid": 1.0}, {}, 0, (0,) * 5))
+).encode()
 
 
 def main() -> None:

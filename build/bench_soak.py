@@ -277,8 +277,10 @@ def draw(samples: list[Sample], file: Path) -> None:
         axes[2].set(title=f"Clock fit: error of the drift, which is {FAST:g} ppm [ppm]")
         first = samples[0].Fz_N
         axes[3].plot(hours, [s.Fz_N - first for s in samples], ".-")
-        axes[3].set(title=f"Fz of unflagged turns: median of ten minutes less {first:.3f} N [N]",
-                    xlabel="simulated time [h]")  # fmt: skip
+        axes[3].set(
+            title=f"Fz of unflagged turns: median of ten minutes less {first:.3f} N [N]",
+            xlabel="simulated time [h]",
+        )
         figure.savefig(file, dpi=110)
 
 
@@ -310,11 +312,15 @@ def run(
                 due += every
         recorder.close()
         return {
-            "hours": hours, "rate_Hz": 1.0 / (PERIOD * TICK), "faults_a_frame": RATES,
-            "recorded_bytes": recorder.bytes, "last_recording_whole": recorder.readable(),
-            "load_average": os.getloadavg(), "good": judge(notes.samples),
+            "hours": hours,
+            "rate_Hz": 1.0 / (PERIOD * TICK),
+            "faults_a_frame": RATES,
+            "recorded_bytes": recorder.bytes,
+            "last_recording_whole": recorder.readable(),
+            "load_average": os.getloadavg(),
+            "good": judge(notes.samples),
             "samples": [asdict(s) for s in notes.samples],
-        }  # fmt: skip
+        }
 
 
 def store(result: dict[str, Any], out: Path) -> None:

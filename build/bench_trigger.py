@@ -44,8 +44,12 @@ def reads() -> Iterator[list[bytes]]:
     number = 0
     while True:
         rows = (number * FRAMES * SAMPLES + np.arange(FRAMES * SAMPLES)) % len(counts)
-        frames = strain_frames(counts[rows], period=1000, seq=number * FRAMES % 2**16,
-                               t_us=number * FRAMES * PERIOD_US % 2**32)  # fmt: skip
+        frames = strain_frames(
+            counts[rows],
+            period=1000,
+            seq=number * FRAMES % 2**16,
+            t_us=number * FRAMES * PERIOD_US % 2**32,
+        )
         yield [b"".join(encode(frames))] * WHEELS
         number += 1
 
@@ -64,8 +68,9 @@ class Bench:
         self._order("start", str(file))
         rule = RecordingRule(around=(before, 1.0))
         header = RecordingHeader({}, more=({},) * (WHEELS - 1))
-        self.recorder = Kept(record, lambda _: (header, Conditions.constant(), rule,
-                                                exchange.address))  # fmt: skip
+        self.recorder = Kept(
+            record, lambda _: (header, Conditions.constant(), rule, exchange.address)
+        )
         self._wheels = Wheels([Line(SerialDecoder(), {}, wheel=n) for n in range(WHEELS)])
         self._reads = reads()
 

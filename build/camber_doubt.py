@@ -43,8 +43,10 @@ def tilted() -> Plan:
     """Return runs at every camber, load and slip angle."""
     runs = tuple(
         Condition(load, 2.3e5, 65.0 / 3.6, np.deg2rad(angle), np.deg2rad(camber))
-        for camber in CAMBERS for load in LOADS for angle in ANGLES
-    )  # fmt: skip
+        for camber in CAMBERS
+        for load in LOADS
+        for angle in ANGLES
+    )
     return Plan("tilted", "4 loads x 3 slip angles x 7 cambers", runs)
 
 
@@ -53,9 +55,11 @@ def per_degree(calibration: Calibration, seen: Observations) -> list[str]:
     chain = calibration.chains[-1]
     values = regressors_of(seen, np.zeros(len(seen)))
     found, _ = chain.predict(values)
-    rest = {} if chain.likeness is None else dict(
-        zip(chain.likeness.names, chain.likeness.rest(values).T, strict=True)
-    )  # fmt: skip
+    rest = (
+        {}
+        if chain.likeness is None
+        else dict(zip(chain.likeness.names, chain.likeness.rest(values).T, strict=True))
+    )
     error = {
         "Fy [N]": found["Fy"].value - seen.truth["Fy"],
         "alpha [deg]": np.rad2deg(found["alpha"].value - seen.truth["slip_angle"]),

@@ -22,10 +22,18 @@ from tirelib.ring.ring import Ring
 from tirelib.threads import one_thread
 
 BICYCLE = {
-    "ring_radius": 0.330, "free_radius": 0.3335, "belt_width": 0.04065, "tread_thickness": 0.0035,
-    "innerliner_offset": -0.001, "bending_stiffness": 0.009382, "mass": 0.25, "pressure": 2.946e5,
-    "radial_stiffness": 1.73e5, "tangential_stiffness": 4e4, "tread_stiffness": 1.191e8,
-}  # fmt: skip
+    "ring_radius": 0.330,
+    "free_radius": 0.3335,
+    "belt_width": 0.04065,
+    "tread_thickness": 0.0035,
+    "innerliner_offset": -0.001,
+    "bending_stiffness": 0.009382,
+    "mass": 0.25,
+    "pressure": 2.946e5,
+    "radial_stiffness": 1.73e5,
+    "tangential_stiffness": 4e4,
+    "tread_stiffness": 1.191e8,
+}
 WHEELS: dict[str, tuple[dict[str, float], tuple[float, ...]]] = {
     "car": ({}, (500.0, 4000.0, 8000.0)),
     "kart": ({"ring_radius": 0.125, "free_radius": 0.1375}, (100.0, 600.0)),
@@ -62,10 +70,17 @@ def main() -> None:
     for factor in TRIED:
         refused = sum(pull > factor * checks.LARGEST_PULL for _, pull in found)
         click.echo(f"LARGEST_PULL x {factor:g}: {refused} of {len(found)} refused")
-    thin = read_tire("table-6-1").tire.changed(**BICYCLE).changed(
-        belt_width=0.026, bending_stiffness=0.0207, pressure=5.664e5, radial_stiffness=2.6e4,
-        tread_stiffness=2.79e9,
-    )  # fmt: skip
+    thin = (
+        read_tire("table-6-1")
+        .tire.changed(**BICYCLE)
+        .changed(
+            belt_width=0.026,
+            bending_stiffness=0.0207,
+            pressure=5.664e5,
+            radial_stiffness=2.6e4,
+            tread_stiffness=2.79e9,
+        )
+    )
     for modes in (1, 2, 4, 8):
         count = modes * energy.N_MODES
         cells = []

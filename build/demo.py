@@ -43,8 +43,16 @@ if TYPE_CHECKING:
     from bench.rig.plans import Plan
     from tirelib.report.live import LiveFiles
 
-__all__ = ["PATIENCE", "ROOT", "Steps", "end_when_played", "judge", "require_terminal",
-           "wait_for_port", "write_device"]  # fmt: skip
+__all__ = [
+    "PATIENCE",
+    "ROOT",
+    "Steps",
+    "end_when_played",
+    "judge",
+    "require_terminal",
+    "wait_for_port",
+    "write_device",
+]
 
 ROOT = Path(__file__).resolve().parent.parent
 PROGRAMS = Path(sys.executable).parent
@@ -130,9 +138,12 @@ class Steps:
         self._announce(what, f"{_shown(program, arguments)} &")
         with log.open("wb") as file:
             process = subprocess.Popen(
-                _command(program, arguments), cwd=ROOT, stdin=subprocess.DEVNULL, stdout=file,
+                _command(program, arguments),
+                cwd=ROOT,
+                stdin=subprocess.DEVNULL,
+                stdout=file,
                 stderr=subprocess.STDOUT,
-            )  # fmt: skip
+            )
             try:
                 yield process
                 try:
@@ -163,9 +174,13 @@ def _watched(bar: Progress, job: Job, log: Path) -> int:
     task, started = bar.add_task(job.what, total=job.total), time.time()
     with log.open("wb") as file:
         process = subprocess.Popen(
-            _command(job.program, job.words), cwd=ROOT, stdin=subprocess.DEVNULL, stdout=file,
-            stderr=subprocess.STDOUT, env=ALONE | {"COLUMNS": str(bar.console.width)},
-        )  # fmt: skip
+            _command(job.program, job.words),
+            cwd=ROOT,
+            stdin=subprocess.DEVNULL,
+            stdout=file,
+            stderr=subprocess.STDOUT,
+            env=ALONE | {"COLUMNS": str(bar.console.width)},
+        )
         try:
             while process.poll() is None:
                 time.sleep(0.1)
@@ -215,9 +230,19 @@ def measure(steps: Steps, folder: Path, fresh: bool) -> dict[str, Path]:
         target = folder / name
         what = f"Measure {name} on the numerical rig"
         words: tuple[str | Path, ...] = (
-            "rig", "--plan", plan, "--seed", str(seed), "--repeats", str(repeats),
-            "--jobs", "1", "--out", target, "--force",
-        )  # fmt: skip
+            "rig",
+            "--plan",
+            plan,
+            "--seed",
+            str(seed),
+            "--repeats",
+            str(repeats),
+            "--jobs",
+            "1",
+            "--out",
+            target,
+            "--force",
+        )
         program = "tirelib"
         if plan in SHORTENED:
             what += ", some of its slip angles"
@@ -251,8 +276,9 @@ def measure_shortened(name: str, target: Path) -> None:
     from bench.rig.tire import tire
 
     plan, seed, repeats = PLANS[name]
-    truths = run_plan(planned(plan), tire("reference"), target, seed=seed, repeats=repeats,
-                      jobs=1, overwrite=True)  # fmt: skip
+    truths = run_plan(
+        planned(plan), tire("reference"), target, seed=seed, repeats=repeats, jobs=1, overwrite=True
+    )
     said = f"{len(truths)} runs of {plan} in {_short(target)} (axes iso, seed {seed})"
     Console().print(said, highlight=False, soft_wrap=True)
 
@@ -275,14 +301,18 @@ def main() -> None:
     parser.add_argument("--fresh", action="store_true", help="measure again what is there")
     parser.add_argument("--out", type=Path, default=ROOT / "build/out/demo", metavar="DIR")
     parser.add_argument(
-        "--data", type=Path, metavar="DIR",
+        "--data",
+        type=Path,
+        metavar="DIR",
         help=f"use ready campaigns in folders named {', '.join(PLANS)} instead of the rig",
-    )  # fmt: skip
+    )
     parser.add_argument("--no-live", action="store_true", help="leave out FMU and serial line")
     parser.add_argument(
-        "--measure", nargs=2, metavar=("NAME", "DIR"),
+        "--measure",
+        nargs=2,
+        metavar=("NAME", "DIR"),
         help=f"only measure a shortened plan ({', '.join(SHORTENED)}) into a folder",
-    )  # fmt: skip
+    )
     given = parser.parse_args()
     if given.measure:
         measure_shortened(given.measure[0], Path(given.measure[1]).resolve())
@@ -294,35 +324,75 @@ def main() -> None:
     data = ready(given.data.resolve()) if given.data else measure(steps, out / "data", given.fresh)
     calibration, fmu = out / "calibration.toml", out / "StrainTire.fmu"
     seen = [data[name] for name in CALIBRATED if name in data]
-    steps.together([
-        Job("Calibrate", ("calibrate", *seen, "--out", calibration, "--report",
-                          out / "calibration")),
-        *(Job(f"Check {name}", ("campaign", "check", folder)) for name, folder in data.items()),
-        Job("Read the features of every turn", ("features", data["set1"], "--out",
-                                                out / "features.parquet")),
-    ])  # fmt: skip
+    steps.together(
+        [
+            Job(
+                "Calibrate",
+                ("calibrate", *seen, "--out", calibration, "--report", out / "calibration"),
+            ),
+            *(Job(f"Check {name}", ("campaign", "check", folder)) for name, folder in data.items()),
+            Job(
+                "Read the features of every turn",
+                ("features", data["set1"], "--out", out / "features.parquet"),
+            ),
+        ]
+    )
     unseen = [name for name in data if name.endswith("-unseen")]
     jobs = [
-        Job(f"Estimate {name}", ("estimate", data[name], "--calibration", calibration,
-                                 "--json", out / f"{name}.json", "--report", out / name))
+        Job(
+            f"Estimate {name}",
+            (
+                "estimate",
+                data[name],
+                "--calibration",
+                calibration,
+                "--json",
+                out / f"{name}.json",
+                "--report",
+                out / name,
+            ),
+        )
         for name in unseen
-    ]  # fmt: skip
+    ]
     if not given.no_live:
-        jobs.append(Job("Build the FMU", ("fmu", "build", "--calibration", calibration,
-                                          "--out", fmu, "--samples-per-step", "16")))  # fmt: skip
+        jobs.append(
+            Job(
+                "Build the FMU",
+                (
+                    "fmu",
+                    "build",
+                    "--calibration",
+                    calibration,
+                    "--out",
+                    fmu,
+                    "--samples-per-step",
+                    "16",
+                ),
+            )
+        )
     steps.together(jobs)
-    reports = [("calibration", "calibration/index.html"),
-               *((f"estimates of {name}", f"{name}/index.html") for name in unseen)]  # fmt: skip
+    reports = [
+        ("calibration", "calibration/index.html"),
+        *((f"estimates of {name}", f"{name}/index.html") for name in unseen),
+    ]
     live = None
     if not given.no_live:
         day = data["set1-unseen"]
         live = go_live(steps, out, day, fmu, out / "set1-unseen.json")
         record = live.live.with_name(RECORDING)
-        steps.together([
-            Job("Estimate set1-unseen with the FMU", ("fmu", "run", fmu, day, "--json", live.fmu)),
-            Job("Replay the recording", ("run", "--replay", record, "--fmu", fmu, "--json",
-                                         live.replay, "--no-page"), "tirebench"),
-        ])  # fmt: skip
+        steps.together(
+            [
+                Job(
+                    "Estimate set1-unseen with the FMU",
+                    ("fmu", "run", fmu, day, "--json", live.fmu),
+                ),
+                Job(
+                    "Replay the recording",
+                    ("run", "--replay", record, "--fmu", fmu, "--json", live.replay, "--no-page"),
+                    "tirebench",
+                ),
+            ]
+        )
     page = draw(console, out, data, calibration, live, steps, reports)
     console.print(Rule(f"done in {time.monotonic() - started:.0f} s", style="green"))
     for title, file in [("everything", page), *((t, out / f) for t, f in reports)]:

@@ -59,8 +59,14 @@ def go_live(steps: "Steps", out: Path, data: Path, fmu: Path, library: Path) -> 
 
     folder = out / "live"
     folder.mkdir(parents=True, exist_ok=True)
-    files = LiveFiles(library, out / "fmu.json", folder / "live.json", folder / "replay.json",
-                      folder / "conditions.json", folder / "device.toml")  # fmt: skip
+    files = LiveFiles(
+        library,
+        out / "fmu.json",
+        folder / "live.json",
+        folder / "replay.json",
+        folder / "conditions.json",
+        folder / "device.toml",
+    )
     port_file, go, record = folder / "port", folder / "go", folder / RECORDING
     said, sent = folder / "run.log", folder / "emulate.log"
     for old in (port_file, go, record, files.fmu, files.live, files.replay, files.conditions):
@@ -72,15 +78,22 @@ def go_live(steps: "Steps", out: Path, data: Path, fmu: Path, library: Path) -> 
         "Play runs of it as a wheel on a serial port, in the background",
         *("emulate", "--campaign", data, *runs, "--device", files.device),
         *("--port-file", port_file, "--conditions", files.conditions, "--after", go),
-        *("--wait", f"{PATIENCE:.0f}"), program="tirebench", log=sent,
-    ) as wheel:  # fmt: skip
+        *("--wait", f"{PATIENCE:.0f}"),
+        program="tirebench",
+        log=sent,
+    ) as wheel:
         port = wait_for_port(port_file, wheel, sent)
-        with steps.beside(
-            "Read the port, step the FMU, record",
-            *("run", "--port", port, "--fmu", fmu, "--conditions", files.conditions),
-            *("--device", files.device, "--record", record, "--json", files.live),
-            *("--every-turn", "--no-page"), program="tirebench", log=said,
-        ) as run, steps.console.status("starting") as status:  # fmt: skip
+        with (
+            steps.beside(
+                "Read the port, step the FMU, record",
+                *("run", "--port", port, "--fmu", fmu, "--conditions", files.conditions),
+                *("--device", files.device, "--record", record, "--json", files.live),
+                *("--every-turn", "--no-page"),
+                program="tirebench",
+                log=said,
+            ) as run,
+            steps.console.status("starting") as status,
+        ):
             go.touch()
             end_when_played(run, said, wheel, sent, status.update)
     return files

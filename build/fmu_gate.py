@@ -13,15 +13,37 @@ import sys
 from pathlib import Path
 
 FOLDER = Path(__file__).parents[1] / "fmu_src" / "gate"
-FLAGS = ("-target", "x86_64-linux-gnu.2.17", "-shared", "-fPIC", "-Os", "-s", "-std=c11", "-Wall",
-         "-Wextra", "-Werror", "-fvisibility=default", "-Wl,--build-id=none")  # fmt: skip
+FLAGS = (
+    "-target",
+    "x86_64-linux-gnu.2.17",
+    "-shared",
+    "-fPIC",
+    "-Os",
+    "-s",
+    "-std=c11",
+    "-Wall",
+    "-Wextra",
+    "-Werror",
+    "-fvisibility=default",
+    "-Wl,--build-id=none",
+)
 
 
 def compiled(source: Path, target: Path) -> None:
     """Compile a gate; its source's hash becomes part of it."""
     digest = hashlib.sha256(source.read_bytes()).hexdigest()
-    command = (sys.executable, "-m", "ziglang", "cc", *FLAGS, f'-DSOURCE="{digest}"', str(source),
-               "-ldl", "-o", str(target))  # fmt: skip
+    command = (
+        sys.executable,
+        "-m",
+        "ziglang",
+        "cc",
+        *FLAGS,
+        f'-DSOURCE="{digest}"',
+        str(source),
+        "-ldl",
+        "-o",
+        str(target),
+    )
     subprocess.run(command, check=True)
 
 

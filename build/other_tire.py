@@ -45,8 +45,10 @@ def drifting() -> Plan:
     away += [(PRESSURE, v / 3.6) for v in (20.0, 100.0, 140.0)]
     runs = tuple(
         Condition(load, pressure, speed, np.deg2rad(angle))
-        for load in (2500.0, 4500.0, 6500.0) for pressure, speed in away for angle in (0.0, 3.0)
-    )  # fmt: skip
+        for load in (2500.0, 4500.0, 6500.0)
+        for pressure, speed in away
+        for angle in (0.0, 3.0)
+    )
     return Plan("drift", "3 loads x 4 pressures and 3 speeds x 2 slip angles", runs)
 
 
@@ -93,8 +95,10 @@ def halves(
     calibrations: Mapping[str, Calibration], days: Mapping[str, Mapping[str, Observations]]
 ) -> list[str]:
     """Return for half and double of each constant the flagged turns of own and of other tires."""
-    lines = ["| constant | factor | own tire | other tires, set1 | set3 | drift |",
-             "|---|---|---|---|---|---|"]  # fmt: skip
+    lines = [
+        "| constant | factor | own tire | other tires, set1 | set3 | drift |",
+        "|---|---|---|---|---|---|",
+    ]
 
     def judge(label: str, factor: float, *, unsaid: bool = False) -> None:
         count = dict.fromkeys(("own", "set1", "set3", "drift"), (0, 0))

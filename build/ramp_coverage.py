@@ -34,18 +34,28 @@ STRAIGHT = Plan(
     "3 loads x 5 speeds, and 3 loads x 7 slip ratios at 65 km/h, 2.3 bar",
     (
         *(Condition(load, 2.3e5, kmh * KMH) for load in LOADS for kmh in (20, 40, 65, 90, 110)),
-        *(Condition(load, 2.3e5, 65.0 * KMH, slip_ratio=slip)
-          for load in LOADS for slip in (-0.08, -0.05, -0.03, -0.015, 0.015, 0.03, 0.05)),
+        *(
+            Condition(load, 2.3e5, 65.0 * KMH, slip_ratio=slip)
+            for load in LOADS
+            for slip in (-0.08, -0.05, -0.03, -0.015, 0.015, 0.03, 0.05)
+        ),
     ),
-)  # fmt: skip
+)
 STEADY = {plan("set1"): 1, STRAIGHT: 2}
 RAMPS = {plan("ramps"): 4}
 """Plans, and the day that each is measured on."""
 OMEGA, SPEED, DENSE = "omega", "speed", "1 kHz"
 """What tells the wheel's own motion: the rig's turn rate and speed, its speed alone, or both with
 the values between those of the rig, which are otherwise held from one to the next."""
-COLUMNS = (("Fz", OMEGA), ("Fz", SPEED), ("alpha", OMEGA), ("Fy", OMEGA), ("kappa", OMEGA),
-           ("kappa", SPEED), ("kappa", DENSE))  # fmt: skip
+COLUMNS = (
+    ("Fz", OMEGA),
+    ("Fz", SPEED),
+    ("alpha", OMEGA),
+    ("Fy", OMEGA),
+    ("kappa", OMEGA),
+    ("kappa", SPEED),
+    ("kappa", DENSE),
+)
 
 Judged = dict[tuple[str, str], list[tuple[float, float]]]
 """By quantity and source: error and standard deviation of each valid turn."""

@@ -30,8 +30,14 @@ ROOT = Path(__file__).parents[1]
 RATE, SAMPLES = 1e4, 20
 CALIBRATION = read_calibration(ROOT / "build/cosim/calibration.toml")
 SURFACE = read_surface(default_surface())
-RESTING = {"Fz": 4000.0, "alpha": 0.0, "kappa": 0.0, "camber": 0.0, "speed": 20.0,
-           "pressure": 2.3e5}  # fmt: skip
+RESTING = {
+    "Fz": 4000.0,
+    "alpha": 0.0,
+    "kappa": 0.0,
+    "camber": 0.0,
+    "speed": 20.0,
+    "pressure": 2.3e5,
+}
 STEADY = 0.5
 """Time before the speed begins to change, [s]."""
 
@@ -88,19 +94,28 @@ def draw() -> None:
             ):
                 shape = "+" if color == "tab:blue" else mark
                 late = (features.time > STEADY + 0.1) & told.turn_valid
-                speed = np.interp(features.time * RATE, np.arange(made["speed"].size),
-                                  made["speed"])  # fmt: skip
+                speed = np.interp(
+                    features.time * RATE, np.arange(made["speed"].size), made["speed"]
+                )
                 x = 50.0 * acceleration * features.period / speed
                 error = 100.0 * (told.value["Fz"] / load - 1.0)
                 axes.plot(x[late], error[late], shape, color=color, markersize=3, alpha=0.6)
     left.set(title="even turn", ylabel="error of Fz [%]", xlabel="a T / (2 v) [%]")
-    right.set(title="wheel's own rate: + omega, o speed", xlabel="a T / (2 v) [%]",
-              ylim=(-5.0, 5.0))  # fmt: skip
+    right.set(
+        title="wheel's own rate: + omega, o speed", xlabel="a T / (2 v) [%]", ylim=(-5.0, 5.0)
+    )
     for axes in (left, right):
         axes.grid(alpha=0.3)
         axes.axhspan(-3.0, 3.0, color="0.9", zorder=0)
-    left.text(0.98, 0.97, "circles 2 kN, squares 4 kN; grey: 3 %", transform=left.transAxes,
-              ha="right", va="top", fontsize=8)  # fmt: skip
+    left.text(
+        0.98,
+        0.97,
+        "circles 2 kN, squares 4 kN; grey: 3 %",
+        transform=left.transAxes,
+        ha="right",
+        va="top",
+        fontsize=8,
+    )
     figure.savefig(ROOT / "docs/ramp_error.png", dpi=110)
 
 
@@ -122,8 +137,11 @@ def steps() -> None:
                 for turn in range(4):
                     row = first + turn
                     here = min(int(features.time[row] * RATE), made["Fz"].size - 1)
-                    truth = {"Fz": made["Fz"][here], "alpha": made["alpha"][here],
-                             "kappa": made["kappa"][here]}  # fmt: skip
+                    truth = {
+                        "Fz": made["Fz"][here],
+                        "alpha": made["alpha"][here],
+                        "kappa": made["kappa"][here],
+                    }
                     rows.setdefault(turn, []).append(
                         (*(found.value[q][row] - truth[q] for q in truth), found.turn_valid[row])
                     )
@@ -175,8 +193,12 @@ def slips() -> None:
                     rows.append((stiffness, error.max(), over.max()))
             table = np.array(rows)
             half, one, double = (table[table[:, 0] == x] for x in (0.5, 1.0, 2.0))
-            cells = (law.__name__, ", ".join(told), f"{one[:, 1].max():.4f}",
-                     *(f"{x[:, 2].max():.1f}" for x in (half, one, double)))  # fmt: skip
+            cells = (
+                law.__name__,
+                ", ".join(told),
+                f"{one[:, 1].max():.4f}",
+                *(f"{x[:, 2].max():.1f}" for x in (half, one, double)),
+            )
             sys.stdout.write(f"| {' | '.join(cells)} |\n")
 
 

@@ -31,13 +31,22 @@ from tirelib.observations import Observations, mean_by, observe
 from tirelib.threads import one_thread
 
 TRIED: tuple[tuple[ModuleType, str, str], ...] = (
-    (chain, "EDGE", "Fz"), (unknowns, "UNDER_GROOVES", "Fz"), (unknowns, "SOFTENING", "Fz"),
-    (unknowns, "TEMPERATURE", "Fz"), (chain, "BENT", "kappa"), (chain, "CORNERING", "alpha"),
-    (chain, "MOMENT_DOUBT", "alpha"), (any_road, "HIDDEN", "alpha"),
-    (any_road, "HIDDEN_DOUBT", "alpha"), (any_road, "CURVE_DOUBT", "alpha"),
-    (sliding, "CURVE_DOUBT", "alpha"), (chain, "LOAD_DOUBT", "Fz"),
-    (chain, "FORCE_DOUBT", "Fy"), (chain, "FORCE", "Fy"), (chain, "LAW_DOUBT", "kappa"),
-)  # fmt: skip
+    (chain, "EDGE", "Fz"),
+    (unknowns, "UNDER_GROOVES", "Fz"),
+    (unknowns, "SOFTENING", "Fz"),
+    (unknowns, "TEMPERATURE", "Fz"),
+    (chain, "BENT", "kappa"),
+    (chain, "CORNERING", "alpha"),
+    (chain, "MOMENT_DOUBT", "alpha"),
+    (any_road, "HIDDEN", "alpha"),
+    (any_road, "HIDDEN_DOUBT", "alpha"),
+    (any_road, "CURVE_DOUBT", "alpha"),
+    (sliding, "CURVE_DOUBT", "alpha"),
+    (chain, "LOAD_DOUBT", "Fz"),
+    (chain, "FORCE_DOUBT", "Fy"),
+    (chain, "FORCE", "Fy"),
+    (chain, "LAW_DOUBT", "kappa"),
+)
 """Module that uses a constant, its name, and the quantity on which it acts most."""
 DEPTHS = (0.008, 0.006, 0.004)
 LOADS = (2000.0, 4000.0, 6000.0)
@@ -94,8 +103,10 @@ def measure(name: str, seed: int, out: Path, jobs: int) -> list[str]:
     own = tire_of(name, seed)
     runs = tuple(
         Condition(load, 2.3e5, 65.0 / 3.6, angle, friction=own.friction, tread_depth=depth)
-        for depth in DEPTHS for angle in (0.0, np.deg2rad(1.0)) for load in LOADS
-    )  # fmt: skip
+        for depth in DEPTHS
+        for angle in (0.0, np.deg2rad(1.0))
+        for load in LOADS
+    )
     seen = measured(out / f"worn-{name}-{seed}", Plan("worn", "worn treads", runs), own, seed, jobs)
     regressors = compute_regressors(seen.features, range(5))
 
@@ -134,8 +145,10 @@ def shifts(name: str, seed: int, out: Path, jobs: int) -> np.ndarray:
     own = tire_of(name, seed)
     runs = tuple(
         Condition(load, 2.3e5, 65.0 / 3.6, np.deg2rad(angle), friction=friction)
-        for friction in (0.4, 0.6) for angle in (-3.0, 1.5, 4.0) for load in LOADS
-    )  # fmt: skip
+        for friction in (0.4, 0.6)
+        for angle in (-3.0, 1.5, 4.0)
+        for load in LOADS
+    )
     slid = measured(
         out / f"slid-{name}-{seed}", Plan("slid", "slippery roads", runs), own, seed, jobs
     )
@@ -187,9 +200,12 @@ def doubts(name: str, seed: int, out: Path) -> list[str]:
 
     slip = found["kappa"].value
     at = {
-        **values, "speed_squared": values["speed"] ** 2, "load": found["Fz"].value,
-        "slip_ratio": slip, "slip_size": np.abs(slip),
-    }  # fmt: skip
+        **values,
+        "speed_squared": values["speed"] ** 2,
+        "load": found["Fz"].value,
+        "slip_ratio": slip,
+        "slip_size": np.abs(slip),
+    }
     read = side * full.moment.predict(at)[0]
     moment = side * truth["Mz"] / (load * curve.longest(load))
     dry = used * (1.0 - curve.share(used, curve.friction, load)) ** curve.fading

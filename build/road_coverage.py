@@ -43,12 +43,15 @@ def drawn(runs: int, seed: int) -> Plan:
     rng = np.random.default_rng(seed)
     conditions = tuple(
         Condition(
-            rng.uniform(1500.0, 8000.0), 2.3e5, 65.0 / 3.6, np.deg2rad(rng.uniform(-5.0, 5.0)),
+            rng.uniform(1500.0, 8000.0),
+            2.3e5,
+            65.0 / 3.6,
+            np.deg2rad(rng.uniform(-5.0, 5.0)),
             friction=rng.uniform(*FRICTION),
             tread_depth=NEW_DEPTH - rng.uniform(0.0, DEPTH[1] - DEPTH[0]),
         )
         for _ in range(runs)
-    )  # fmt: skip
+    )
     return Plan("drawn", "load, slip angle, friction and tread depth drawn", conditions)
 
 
@@ -83,10 +86,12 @@ def rows_of(
     if not use.any():
         return int(rows.sum()), 0.0, np.nan, np.nan, np.nan
     return (
-        int(rows.sum()), float(use.sum() / rows.sum()),
+        int(rows.sum()),
+        float(use.sum() / rows.sum()),
         float(np.mean(np.abs(error) <= TWO_SIGMA * std)),
-        float(np.sqrt(np.mean(error**2))), float(np.sqrt(np.mean(std**2))),
-    )  # fmt: skip
+        float(np.sqrt(np.mean(error**2))),
+        float(np.sqrt(np.mean(std**2))),
+    )
 
 
 def table(calibration: Calibration, dry: Observations, seen: Observations) -> list[str]:
@@ -95,8 +100,10 @@ def table(calibration: Calibration, dry: Observations, seen: Observations) -> li
         "friction": seen.features.friction,
         "wear [mm]": 1e3 * (NEW_DEPTH - seen.features.tread_depth),
     }
-    lines = ["| what is said | part | quantity | valid | in the 95 % interval | rms error | std |",
-             "|---|---|---|---|---|---|---|"]  # fmt: skip
+    lines = [
+        "| what is said | part | quantity | valid | in the 95 % interval | rms error | std |",
+        "|---|---|---|---|---|---|---|",
+    ]
     for label, given in (("nothing", silent(seen)), ("friction and tread", seen)):
         estimates = calibration.estimate(given.features)
         parts = {"all": seen.usable} | {
@@ -111,8 +118,11 @@ def table(calibration: Calibration, dry: Observations, seen: Observations) -> li
                     f"| {label} | {part} | {quantity} | {100 * valid:.0f} % | {100 * held:.0f} % | "
                     f"{rms:.3g} {unit} | {std:.3g} |"
                 )
-    lines += ["", "| quantity | growth of the std, dry and new | lost on the drawn roads | ratio |",
-              "|---|---|---|---|"]  # fmt: skip
+    lines += [
+        "",
+        "| quantity | growth of the std, dry and new | lost on the drawn roads | ratio |",
+        "|---|---|---|---|",
+    ]
     known, unknown = calibration.estimate(dry.features), calibration.estimate(silent(dry).features)
     estimates = calibration.estimate(silent(seen).features)
     for quantity, (unit, factor) in EDGE_UNIT.items():
@@ -140,8 +150,16 @@ def draw(calibration: Calibration, seen: Observations, folder: Path) -> None:
         reach = TWO_SIGMA * factor * estimates.std[quantity][good]
         for column, (label, x) in enumerate(across):
             axis = axes[row, column]
-            axis.errorbar(x[good], np.zeros(good.sum()), yerr=reach, fmt="none", ecolor=ORANGE,
-                          elinewidth=2.0, alpha=0.35, label="95 % interval")  # fmt: skip
+            axis.errorbar(
+                x[good],
+                np.zeros(good.sum()),
+                yerr=reach,
+                fmt="none",
+                ecolor=ORANGE,
+                elinewidth=2.0,
+                alpha=0.35,
+                label="95 % interval",
+            )
             axis.plot(x[good], error, "o", color=BLUE, label="estimate less truth")
             axis.set_ylabel(f"{quantity} [{unit}]")
             if row == 3:

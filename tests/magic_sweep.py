@@ -62,9 +62,20 @@ def magic_sweep(seed: int, planted: dict[str, float], plan: Sweep = Sweep()) -> 
     side = side + plan.noise * rng.standard_normal(n)
     nothing = np.full(n, np.nan)
     return ForceData(
-        load, pressure, alpha, np.zeros(n), camber, nothing, nothing, side, nothing,
-        np.floor(time / 11.0).astype(np.int64), np.full(n, SPEED), temperature, time,
-    )  # fmt: skip
+        load,
+        pressure,
+        alpha,
+        np.zeros(n),
+        camber,
+        nothing,
+        nothing,
+        side,
+        nothing,
+        np.floor(time / 11.0).astype(np.int64),
+        np.full(n, SPEED),
+        temperature,
+        time,
+    )
 
 
 def _force(

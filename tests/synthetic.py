@@ -70,10 +70,15 @@ def record(
     rng = np.random.default_rng(seed)
     side = np.array(LATERAL[:gages]) / 0.06
     rows = [
-        waveform(phi, half=half * (1 + tilt * s), tension=tension * (1 + 0.3 * tilt * s),
-                 dip=dip * (1 + 2 * tilt * s), imbalance=imbalance)
+        waveform(
+            phi,
+            half=half * (1 + tilt * s),
+            tension=tension * (1 + 0.3 * tilt * s),
+            dip=dip * (1 + 2 * tilt * s),
+            imbalance=imbalance,
+        )
         for s in side
-    ]  # fmt: skip
+    ]
     strain = np.stack(rows) + offset + noise * rng.standard_normal((gages, n))
     top = np.floor((phi - np.pi) / (2.0 * np.pi))
     trigger = np.concatenate(([False], np.diff(top) > 0.5))
@@ -129,9 +134,21 @@ def synthetic_run(
         return value + scatter * rng.standard_normal(n)
 
     return Run(
-        plan=RunPlan(run, f"runs/{run:03d}.mf4", kind, load, pressure, speed, slip_angle, camber,
-                     slip_ratio, start=12.0 * run, friction=0.9, tread_depth=0.008,
-                     tread_temperature=313.15),
+        plan=RunPlan(
+            run,
+            f"runs/{run:03d}.mf4",
+            kind,
+            load,
+            pressure,
+            speed,
+            slip_angle,
+            camber,
+            slip_ratio,
+            start=12.0 * run,
+            friction=0.9,
+            tread_depth=0.008,
+            tread_temperature=313.15,
+        ),
         strain=strain,
         rate=RATE,
         trigger=trigger,
@@ -147,7 +164,7 @@ def synthetic_run(
             "pressure": measured(pressure, 300.0),
         },
         rig_time=np.arange(n) / 100.0,
-    )  # fmt: skip
+    )
 
 
 def header(

@@ -22,14 +22,27 @@ GRID = np.linspace(-np.pi, np.pi, N_PHI, endpoint=False)
 """Wheel angles of a waveform, [rad]; zero is the road's normal through the axle."""
 
 CONDITIONS = (
-    "Fz", "Fx", "Fy", "Mz", "pressure", "omega", "speed", "slip_angle", "camber", "slip_ratio",
+    "Fz",
+    "Fx",
+    "Fy",
+    "Mz",
+    "pressure",
+    "omega",
+    "speed",
+    "slip_angle",
+    "camber",
+    "slip_ratio",
     "loaded_radius",
-)  # fmt: skip
+)
 """Rig quantities of a run; the set point stands in where one was not recorded and has one."""
 _SET_POINT = {
-    "Fz": "load", "pressure": "pressure", "speed": "speed", "slip_angle": "slip_angle",
-    "camber": "camber", "slip_ratio": "slip_ratio",
-}  # fmt: skip
+    "Fz": "load",
+    "pressure": "pressure",
+    "speed": "speed",
+    "slip_angle": "slip_angle",
+    "camber": "camber",
+    "slip_ratio": "slip_ratio",
+}
 
 
 @dataclass(frozen=True, slots=True)

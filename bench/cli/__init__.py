@@ -11,8 +11,7 @@ from tirelib import __version__
 from tirelib.errors import TirelibError
 from tirelib.threads import bound_process
 
-VERBS = ("ports", "load", "emulate", "run", "record", "zero", "shunt", "replay", "export",
-         "repair")  # fmt: skip
+VERBS = ("ports", "load", "emulate", "run", "record", "zero", "shunt", "replay", "export", "repair")
 """Verbs; each is the command of that name in the module of that name."""
 
 _EXAMPLE = """\b

@@ -12,11 +12,19 @@ from bench.links.opening import PortPlan
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 _OPTIONS = (
-    click.option("--estimates-out", metavar="PORT",
-                 help="Send estimates on this CAN bus (can:... or slcan:...), see tirelib.dbc."),
-    click.option("--plotjuggler", metavar="[HOST:]PORT", is_flag=False, flag_value="9870",
-                 help="Send estimates as JSON over UDP.  [HOST: 127.0.0.1]"),
-)  # fmt: skip
+    click.option(
+        "--estimates-out",
+        metavar="PORT",
+        help="Send estimates on this CAN bus (can:... or slcan:...), see tirelib.dbc.",
+    ),
+    click.option(
+        "--plotjuggler",
+        metavar="[HOST:]PORT",
+        is_flag=False,
+        flag_value="9870",
+        help="Send estimates as JSON over UDP.  [HOST: 127.0.0.1]",
+    ),
+)
 
 
 def bridge_options(command: Command) -> Command:

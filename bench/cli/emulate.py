@@ -52,48 +52,113 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
 
 
 @click.command(epilog=_EXAMPLE)
-@click.option("--campaign", "folder", metavar="DIR", type=click.Path(path_type=Path),
-              help="Play runs of a campaign with strain.")  # fmt: skip
-@click.option("--run", "numbers", metavar="N", type=int, multiple=True,
-              help="Run to play, several in the order given.  [default: the first]")  # fmt: skip
+@click.option(
+    "--campaign",
+    "folder",
+    metavar="DIR",
+    type=click.Path(path_type=Path),
+    help="Play runs of a campaign with strain.",
+)
+@click.option(
+    "--run",
+    "numbers",
+    metavar="N",
+    type=int,
+    multiple=True,
+    help="Run to play, several in the order given.  [default: the first]",
+)
 @click.option("--all", "everything", is_flag=True, help="Play all runs.")
-@click.option("--manoeuvre", "manoeuvre_file", metavar="M", type=FILE,
-              help="Play a manoeuvre on the numerical rig (TOML or CSV).")  # fmt: skip
+@click.option(
+    "--manoeuvre",
+    "manoeuvre_file",
+    metavar="M",
+    type=FILE,
+    help="Play a manoeuvre on the numerical rig (TOML or CSV).",
+)
 @click.option("--recording", metavar="R.mcap", type=FILE, help="Play a recording.")
-@click.option("--source", "number", metavar="N", type=click.IntRange(min=0),
-              help="Which source of a recording that has several.")  # fmt: skip
-@click.option("--rate", default=10_000.0, show_default=True, metavar="HZ",
-              type=click.FloatRange(153.0, 50_000.0),
-              help="Of the gages in a manoeuvre.")  # fmt: skip
-@click.option("--truth", "truth_file", metavar="T.csv", type=NEW_FILE,
-              help="Write the rig's forces along a manoeuvre.")  # fmt: skip
-@click.option("--format", "kind", default="serial", show_default=True,
-              type=click.Choice(FORMATS), help="What the wheel sends.")  # fmt: skip
+@click.option(
+    "--source",
+    "number",
+    metavar="N",
+    type=click.IntRange(min=0),
+    help="Which source of a recording that has several.",
+)
+@click.option(
+    "--rate",
+    default=10_000.0,
+    show_default=True,
+    metavar="HZ",
+    type=click.FloatRange(153.0, 50_000.0),
+    help="Of the gages in a manoeuvre.",
+)
+@click.option(
+    "--truth",
+    "truth_file",
+    metavar="T.csv",
+    type=NEW_FILE,
+    help="Write the rig's forces along a manoeuvre.",
+)
+@click.option(
+    "--format",
+    "kind",
+    default="serial",
+    show_default=True,
+    type=click.Choice(FORMATS),
+    help="What the wheel sends.",
+)
 @click.option("--bus", metavar="can:IF:CHANNEL", help="Send on a bus of python-can.")
-@click.option("--link", metavar="PATH", type=FILE,
-              help="Name for the port that stays when it is plugged in again.")  # fmt: skip
+@click.option(
+    "--link",
+    metavar="PATH",
+    type=FILE,
+    help="Name for the port that stays when it is plugged in again.",
+)
 @click.option("--device", "device_file", metavar="D.toml", type=FILE, help="Scale and zero.")
-@click.option("--wheel", "wheels", multiple=True, default=(0,), show_default=True,
-              type=click.IntRange(0, 255), help="Number of a wheel, up to four.")  # fmt: skip
+@click.option(
+    "--wheel",
+    "wheels",
+    multiple=True,
+    default=(0,),
+    show_default=True,
+    type=click.IntRange(0, 255),
+    help="Number of a wheel, up to four.",
+)
 @click.option(
     "--port-file", metavar="F", type=NEW_FILE, help="Write the port's path into this file."
 )
-@click.option("--conditions", "sidecar", metavar="F.json", type=NEW_FILE,
-              help="Write the conditions over time and the rig's truth.")  # fmt: skip
+@click.option(
+    "--conditions",
+    "sidecar",
+    metavar="F.json",
+    type=NEW_FILE,
+    help="Write the conditions over time and the rig's truth.",
+)
 @click.option("--loop", is_flag=True, help="Begin again at the end, until Ctrl-C.")
-@click.option("--speedup", default=1.0, show_default=True, type=click.FloatRange(0.01, 1000.0),
-              help="Faster than real time.")  # fmt: skip
-@click.option("--fault", "fault_texts", metavar="NAME[=VALUE]", multiple=True,
-              help="See below.")  # fmt: skip
+@click.option(
+    "--speedup",
+    default=1.0,
+    show_default=True,
+    type=click.FloatRange(0.01, 1000.0),
+    help="Faster than real time.",
+)
+@click.option("--fault", "fault_texts", metavar="NAME[=VALUE]", multiple=True, help="See below.")
 @click.option("--seed", default=0, show_default=True, help="Of the faults.")
-@click.option("--wait", "patience", default=60.0, show_default=True, metavar="S",
-              help="How long to wait for a reader.")  # fmt: skip
-@click.option("--after", metavar="F", type=FILE,
-              help="Send nothing before this file is there.")  # fmt: skip
-@click.option("--unplug", metavar="S", type=float,
-              help="Pull the cable after this time.")  # fmt: skip
-@click.option("--replug", metavar="S", type=click.FloatRange(min=0.0),
-              help="Plug it in again after so long, and so on; with --link.")  # fmt: skip
+@click.option(
+    "--wait",
+    "patience",
+    default=60.0,
+    show_default=True,
+    metavar="S",
+    help="How long to wait for a reader.",
+)
+@click.option("--after", metavar="F", type=FILE, help="Send nothing before this file is there.")
+@click.option("--unplug", metavar="S", type=float, help="Pull the cable after this time.")
+@click.option(
+    "--replug",
+    metavar="S",
+    type=click.FloatRange(min=0.0),
+    help="Plug it in again after so long, and so on; with --link.",
+)
 @click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write what was sent.")
 @click.pass_context
 def emulate(
@@ -181,11 +246,18 @@ def emulate(
             click.echo(str(error) or "stopped", err=True)
     _summary(tally, len(runs), faults, sink)
     if json_file is not None:
-        write_json(json_file, {
-            "format": "tirebench-emulation/1", "runs": runs,
-            "frames": tally.sent, "unheard": tally.unheard, "late_s": tally.late,
-            "faults": dict(faults.done), "unplugged": getattr(sink, "unplugged", 0),
-        })  # fmt: skip
+        write_json(
+            json_file,
+            {
+                "format": "tirebench-emulation/1",
+                "runs": runs,
+                "frames": tally.sent,
+                "unheard": tally.unheard,
+                "late_s": tally.late,
+                "faults": dict(faults.done),
+                "unplugged": getattr(sink, "unplugged", 0),
+            },
+        )
     context.exit(1 if tally.unheard and replug is None else 0)
 
 
@@ -253,8 +325,10 @@ def _recorded(recording: Path | None, source: int | None) -> Iterator[Script]:
 
 
 def _summary(tally: Tally, runs: int, faults: Faults, sink: TerminalSink | BusSink) -> None:
-    click.echo(f"{tally.sent} frames in {runs} runs, {tally.unheard} of them unheard, "
-               f"at most {1e3 * tally.late:.1f} ms late")  # fmt: skip
+    click.echo(
+        f"{tally.sent} frames in {runs} runs, {tally.unheard} of them unheard, "
+        f"at most {1e3 * tally.late:.1f} ms late"
+    )
     for name, count in faults.done.items():
         click.echo(f"  {count:6d} {name}")
     if isinstance(sink, TerminalSink) and sink.unplugged:

@@ -47,13 +47,27 @@ input.
 
 @click.command(epilog=_EXAMPLE)
 @click.argument("recording", metavar="RECORDING", type=FILE)
-@click.option("--out", metavar="DIR|FILE", required=True, type=NewPath(path_type=Path),
-              help="A new folder for a campaign; a file by its ending.")  # fmt: skip
-@click.option("--like", metavar="DIR", type=click.Path(path_type=Path),
-              help="Campaign whose tire and gages hold here.")  # fmt: skip
+@click.option(
+    "--out",
+    metavar="DIR|FILE",
+    required=True,
+    type=NewPath(path_type=Path),
+    help="A new folder for a campaign; a file by its ending.",
+)
+@click.option(
+    "--like",
+    metavar="DIR",
+    type=click.Path(path_type=Path),
+    help="Campaign whose tire and gages hold here.",
+)
 @click.option("--wheel", type=click.IntRange(0, 255), help="[default: the first that was heard]")
-@click.option("--device", "device_texts", metavar="[WHEEL=]D.toml", multiple=True,
-              help="Instead of the recording's device file.")  # fmt: skip
+@click.option(
+    "--device",
+    "device_texts",
+    metavar="[WHEEL=]D.toml",
+    multiple=True,
+    help="Instead of the recording's device file.",
+)
 @click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write what was written.")
 @click.pass_context
 def export(
@@ -107,8 +121,10 @@ def export(
     if damage:
         click.echo(f"note: the recording breaks off ({damage})")
     if json_file is not None:
-        write_json(json_file, {"format": "tirebench-export/1", "out": str(out), what: count,
-                               "complete": not damage})  # fmt: skip
+        write_json(
+            json_file,
+            {"format": "tirebench-export/1", "out": str(out), what: count, "complete": not damage},
+        )
     context.exit(0 if count and not damage else 1)
 
 

@@ -30,18 +30,43 @@ NOBODY = 30.0
 
 _OPTIONS = (
     click.option("--port", metavar="PORT", help="Port to read; see below."),
-    click.option("--device", "device_texts", metavar="D.toml", multiple=True,
-                 help="Device file that is to be made better.  [default: the usual scale]"),
-    click.option("--wheel", "number", type=click.IntRange(0, 255), metavar="N",
-                 help="Which wheel, where several send."),
-    click.option("--seconds", default=3.0, show_default=True, type=click.FloatRange(1.0, 600.0),
-                 help="How long the mean is taken."),
-    click.option("--still", default=1e6 * STILL, show_default=True, metavar="MICROSTRAIN",
-                 type=click.FloatRange(min=0.0, min_open=True),
-                 help="A wheel whose strain moves by more turns."),
-    click.option("--out", required=True, type=NEW_FILE, metavar="NEW.toml",
-                 help="Device file to write; a new one."),
-)  # fmt: skip
+    click.option(
+        "--device",
+        "device_texts",
+        metavar="D.toml",
+        multiple=True,
+        help="Device file that is to be made better.  [default: the usual scale]",
+    ),
+    click.option(
+        "--wheel",
+        "number",
+        type=click.IntRange(0, 255),
+        metavar="N",
+        help="Which wheel, where several send.",
+    ),
+    click.option(
+        "--seconds",
+        default=3.0,
+        show_default=True,
+        type=click.FloatRange(1.0, 600.0),
+        help="How long the mean is taken.",
+    ),
+    click.option(
+        "--still",
+        default=1e6 * STILL,
+        show_default=True,
+        metavar="MICROSTRAIN",
+        type=click.FloatRange(min=0.0, min_open=True),
+        help="A wheel whose strain moves by more turns.",
+    ),
+    click.option(
+        "--out",
+        required=True,
+        type=NEW_FILE,
+        metavar="NEW.toml",
+        help="Device file to write; a new one.",
+    ),
+)
 
 
 def gathering_options(command: Command) -> Command:
@@ -91,15 +116,25 @@ class Asked:
             )
         ((number, levels),) = found.items()
         if number in wheels.contradicted:
-            click.secho(f"WARNING: {wheels.contradicted[number]}; a standing wheel's mean strain "
-                        "does not depend on it, estimates do", fg="red", err=True)  # fmt: skip
+            click.secho(
+                f"WARNING: {wheels.contradicted[number]}; a standing wheel's mean strain "
+                "does not depend on it, estimates do",
+                fg="red",
+                err=True,
+            )
         return wheels.heard[number].timeline.device, standing_mean(levels, self.still)
 
 
 def asked(
-    port: str | None, device_texts: tuple[str, ...], number: int | None, seconds: float,
-    still: float, plan: PortPlan, rate: float, map_file: Path | None,
-) -> Asked:  # fmt: skip
+    port: str | None,
+    device_texts: tuple[str, ...],
+    number: int | None,
+    seconds: float,
+    still: float,
+    plan: PortPlan,
+    rate: float,
+    map_file: Path | None,
+) -> Asked:
     """Return what the options ask for."""
     devices, text = devices_of(device_texts)
     usual = SourcePlan(plan, ProtocolPlan(rate=rate), devices, None, text)

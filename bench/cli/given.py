@@ -25,10 +25,12 @@ from tirelib.units import to_si
 LOOK = 0.05
 """Time between two looks for a file that is waited for, [s]."""
 _OPTIONS = {"speed": "--speed KMH, ", "pressure": "--pressure BAR, ", "camber": "--camber DEG, "}
-_WITHOUT = {"speed": "there will be no slip ratio",
-            "pressure": "standard deviations are wider by what pressure does",
-            "camber": "standard deviations of Fy and alpha are wider by what camber does, and "
-                      "turns that owe most of theirs to it say camber_unknown"}  # fmt: skip
+_WITHOUT = {
+    "speed": "there will be no slip ratio",
+    "pressure": "standard deviations are wider by what pressure does",
+    "camber": "standard deviations of Fy and alpha are wider by what camber does, and "
+    "turns that owe most of theirs to it say camber_unknown",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,16 +251,22 @@ def say_missing(given: Given, calibration: Calibration, console: Console) -> Non
     for name, words in needed.items():
         console.print(
             f"WARNING: no {words}: this calibration needs it, and NO TURN WILL BE VALID; give "
-            f"{_option(name)}--conditions FILE, or a map with [{name}]", style="bold red",
-            soft_wrap=True, markup=False,
-        )  # fmt: skip
+            f"{_option(name)}--conditions FILE, or a map with [{name}]",
+            style="bold red",
+            soft_wrap=True,
+            markup=False,
+        )
     for name, words in useful.items():
         console.print(
             f"note: no {words}: {_WITHOUT[name]}; give {_option(name)}"
-            f"--conditions FILE, or a map with [{name}]", soft_wrap=True, markup=False,
-        )  # fmt: skip
+            f"--conditions FILE, or a map with [{name}]",
+            soft_wrap=True,
+            markup=False,
+        )
     if not calibration.knows_tire:
         console.print(
             "note: this calibration cannot notice another tire on the wheel (fewer than 17 "
-            "conditions, or an earlier version); calibrate on more", soft_wrap=True, markup=False,
-        )  # fmt: skip
+            "conditions, or an earlier version); calibrate on more",
+            soft_wrap=True,
+            markup=False,
+        )

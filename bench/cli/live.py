@@ -25,8 +25,19 @@ REFRESH = 0.25
 FORMATS = {"Fz": (".0f", "N"), "alpha": (".2f", "deg"), "kappa": (".4f", ""), "Fy": (".0f", "N")}
 UNITS = [f"{name} [{unit}]" if unit else name for name, (_, unit) in FORMATS.items()]
 HEADINGS = ("wheel", "run", "t [s]", *UNITS, "valid", "flags")
-LOSSES = ("crc_bad", "framing_bad", "lost_frames", "duplicates", "out_of_order", "resets",
-          "unknown_type", "other_wheel", "unplaced_samples", "overruns", "reconnects")  # fmt: skip
+LOSSES = (
+    "crc_bad",
+    "framing_bad",
+    "lost_frames",
+    "duplicates",
+    "out_of_order",
+    "resets",
+    "unknown_type",
+    "other_wheel",
+    "unplaced_samples",
+    "overruns",
+    "reconnects",
+)
 
 
 class Screen:

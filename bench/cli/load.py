@@ -26,14 +26,27 @@ Exit code: 0 it fits, 1 it does not (and what would is said), 2 bad input.
 @click.command(epilog=_EXAMPLE)
 @click.option("--bus", required=True, type=click.Choice(["classic", "fd", "serial"]))
 @click.option("--bitrate", default=500_000, show_default=True, type=click.IntRange(min=1000))
-@click.option("--data-bitrate", type=click.IntRange(min=1000),
-              help="Of the data in CAN FD.  [default: 2000000]")  # fmt: skip
+@click.option(
+    "--data-bitrate",
+    type=click.IntRange(min=1000),
+    help="Of the data in CAN FD.  [default: 2000000]",
+)
 @click.option("--baud", default=2_000_000, show_default=True, type=click.IntRange(min=1200))
-@click.option("--format", "kind", type=click.Choice([RAW16, RAW12, RAW12C]),
-              help="[default: RAW16 on fd, RAW12C on classic]")  # fmt: skip
+@click.option(
+    "--format",
+    "kind",
+    type=click.Choice([RAW16, RAW12, RAW12C]),
+    help="[default: RAW16 on fd, RAW12C on classic]",
+)
 @click.option("--wheels", default=1, show_default=True, type=click.IntRange(1, 8))
-@click.option("--rate", default=10_000.0, show_default=True, metavar="HZ",
-              type=click.FloatRange(153.0, 200_000.0), help="Of the gages.")  # fmt: skip
+@click.option(
+    "--rate",
+    default=10_000.0,
+    show_default=True,
+    metavar="HZ",
+    type=click.FloatRange(153.0, 200_000.0),
+    help="Of the gages.",
+)
 @click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers.")
 @click.pass_context
 def load(
@@ -58,8 +71,10 @@ def load(
     else:
         bits = f"{slow:.1f} bits (worst {worst_slow:.0f})"
     click.echo(f"  {found.frames:.0f} frames/s of {bits}")
-    click.echo(f"  load {found.mean:.0%} mean, {found.worst:.0%} worst; HEALTH and SYNC "
-               f"{found.service:.1%}")  # fmt: skip
+    click.echo(
+        f"  load {found.mean:.0%} mean, {found.worst:.0%} worst; HEALTH and SYNC "
+        f"{found.service:.1%}"
+    )
     if found.usb:
         click.echo(f"  as slcan: {found.usb / 1e3:.0f} kB/s to the host")
     others = [] if found.fits else suggestions(plan)
@@ -75,13 +90,23 @@ def load(
         if not others:
             click.echo("  nothing on one line; take several")
     if json_file is not None:
-        write_json(json_file, {
-            "format": "tirebench-load/1", "plan": plan.text, "fits": found.fits,
-            "mean": found.mean, "worst": found.worst, "service": found.service,
-            "frames_per_s": found.frames, "bits": list(found.bits),
-            "worst_bits": list(found.worst_bits), "slcan_bytes_per_s": found.usb,
-            "highest_rate_hz": highest, "would_fit": others,
-        })  # fmt: skip
+        write_json(
+            json_file,
+            {
+                "format": "tirebench-load/1",
+                "plan": plan.text,
+                "fits": found.fits,
+                "mean": found.mean,
+                "worst": found.worst,
+                "service": found.service,
+                "frames_per_s": found.frames,
+                "bits": list(found.bits),
+                "worst_bits": list(found.worst_bits),
+                "slcan_bytes_per_s": found.usb,
+                "highest_rate_hz": highest,
+                "would_fit": others,
+            },
+        )
     context.exit(0 if found.fits else 1)
 
 

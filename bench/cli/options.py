@@ -22,23 +22,56 @@ as a map says), slcan:/dev/ttyACM0 (CAN adapter with slcan, read in bulk), can:I
 """
 
 _PORT_OPTIONS = (
-    click.option("--baud", default=2_000_000, show_default=True, type=click.IntRange(min=1200),
-                 help="Of a serial port."),
-    click.option("--bitrate", default=BITRATE, show_default=True, type=click.IntRange(min=1000),
-                 help="Of a CAN bus."),
-    click.option("--data-bitrate", type=click.IntRange(min=1000),
-                 help="Of the data in CAN FD.  [default: classic CAN]"),
-    click.option("--bus-option", "bus_options", metavar="KEY=VALUE", multiple=True,
-                 help="More for python-can."),
-    click.option("--rate", default=RATE, show_default=True, metavar="HZ",
-                 type=click.FloatRange(153.0, 200_000.0),
-                 help="Sample rate of the gages on CAN; SERIAL v1 says its own."),
-    click.option("--map", "map_file", metavar="M.toml", type=FILE,
-                 help="Another make's transmitter, on CAN or a serial line."),
-    click.option("--reconnect", default=60.0, show_default=True, metavar="S",
-                 type=click.FloatRange(min=0.0),
-                 help="How long a port may be away before the run ends."),
-)  # fmt: skip
+    click.option(
+        "--baud",
+        default=2_000_000,
+        show_default=True,
+        type=click.IntRange(min=1200),
+        help="Of a serial port.",
+    ),
+    click.option(
+        "--bitrate",
+        default=BITRATE,
+        show_default=True,
+        type=click.IntRange(min=1000),
+        help="Of a CAN bus.",
+    ),
+    click.option(
+        "--data-bitrate",
+        type=click.IntRange(min=1000),
+        help="Of the data in CAN FD.  [default: classic CAN]",
+    ),
+    click.option(
+        "--bus-option",
+        "bus_options",
+        metavar="KEY=VALUE",
+        multiple=True,
+        help="More for python-can.",
+    ),
+    click.option(
+        "--rate",
+        default=RATE,
+        show_default=True,
+        metavar="HZ",
+        type=click.FloatRange(153.0, 200_000.0),
+        help="Sample rate of the gages on CAN; SERIAL v1 says its own.",
+    ),
+    click.option(
+        "--map",
+        "map_file",
+        metavar="M.toml",
+        type=FILE,
+        help="Another make's transmitter, on CAN or a serial line.",
+    ),
+    click.option(
+        "--reconnect",
+        default=60.0,
+        show_default=True,
+        metavar="S",
+        type=click.FloatRange(min=0.0),
+        help="How long a port may be away before the run ends.",
+    ),
+)
 
 
 def port_options(command: Command) -> Command:

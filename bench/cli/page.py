@@ -26,18 +26,35 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 NEEDED = ("starlette", "uvicorn", "websockets")
 
 _OPTIONS = (
-    click.option("--page/--no-page", default=None,
-                 help="Live page in the browser.  [default: yes, but for a replay without --pace]"),
-    click.option("--host", default=LOOPBACK, show_default=True, metavar="ADDRESS",
-                 help="Address of the page."),
-    click.option("--network", is_flag=True,
-                 help="Allow a --host that other machines can reach; not encrypted."),
-    click.option("--page-port", default=0, type=click.IntRange(0, 65535), metavar="N",
-                 help="Port of the page.  [default: a free one]"),
+    click.option(
+        "--page/--no-page",
+        default=None,
+        help="Live page in the browser.  [default: yes, but for a replay without --pace]",
+    ),
+    click.option(
+        "--host",
+        default=LOOPBACK,
+        show_default=True,
+        metavar="ADDRESS",
+        help="Address of the page.",
+    ),
+    click.option(
+        "--network",
+        is_flag=True,
+        help="Allow a --host that other machines can reach; not encrypted.",
+    ),
+    click.option(
+        "--page-port",
+        default=0,
+        type=click.IntRange(0, 65535),
+        metavar="N",
+        help="Port of the page.  [default: a free one]",
+    ),
     click.option("--tui", is_flag=True, help="The same in this terminal."),
-    click.option("--alarms", "alarms", metavar="A.toml", type=FILE,
-                 help="Limits of the page's alarms."),
-)  # fmt: skip
+    click.option(
+        "--alarms", "alarms", metavar="A.toml", type=FILE, help="Limits of the page's alarms."
+    ),
+)
 
 
 def page_options(command: Command) -> Command:
@@ -118,9 +135,10 @@ class Shown:
         if choice.open_to_others:
             console.print(
                 f"warning: the page is open to the network at {choice.host}, not encrypted; "
-                "whoever has its address can record and set markers", style="bold red",
+                "whoever has its address can record and set markers",
+                style="bold red",
                 soft_wrap=True,
-            )  # fmt: skip
+            )
         if page.url:
             console.print(f"live page: {page.url}", soft_wrap=True, markup=False, highlight=False)
 

@@ -16,8 +16,7 @@ Exit code: 0 at least one, 1 none.
 
 
 @click.command(epilog=_EXAMPLE)
-@click.option("--json", "json_file", metavar="FILE",
-              type=NEW_FILE, help="Write the list.")  # fmt: skip
+@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the list.")
 @click.pass_context
 def ports(context: click.Context, json_file: Path | None) -> None:
     """List serial ports: device, description, identity."""

@@ -38,20 +38,43 @@ Exit code: 0 done, 1 the port went away or not one good frame came, 2 bad input.
 
 
 @click.command(epilog=_EXAMPLE)
-@click.option("--port", "ports", metavar="[WHEEL=]PORT", multiple=True,
-              help="Port to read, several allowed; see below.")  # fmt: skip
-@click.option("--setup", metavar="S.toml", type=FILE,
-              help="Several sources, each with its protocol, wheel and device file.")  # fmt: skip
+@click.option(
+    "--port",
+    "ports",
+    metavar="[WHEEL=]PORT",
+    multiple=True,
+    help="Port to read, several allowed; see below.",
+)
+@click.option(
+    "--setup",
+    metavar="S.toml",
+    type=FILE,
+    help="Several sources, each with its protocol, wheel and device file.",
+)
 @click.option("--out", metavar="FILE.mcap", type=NEW_FILE, required=True, help="A new file.")
 @recording_options
-@click.option("--conditions", "sidecar", metavar="F.json", type=FILE,
-              help="Conditions over time, as `emulate --conditions` writes them.")  # fmt: skip
-@click.option("--device", "device_texts", metavar="[WHEEL=]D.toml", multiple=True,
-              help="Scale and zero of the gages, kept in the recording.")  # fmt: skip
+@click.option(
+    "--conditions",
+    "sidecar",
+    metavar="F.json",
+    type=FILE,
+    help="Conditions over time, as `emulate --conditions` writes them.",
+)
+@click.option(
+    "--device",
+    "device_texts",
+    metavar="[WHEEL=]D.toml",
+    multiple=True,
+    help="Scale and zero of the gages, kept in the recording.",
+)
 @port_options
 @click.option("--duration", metavar="S", type=click.FloatRange(min=0.0), help="End after this.")
-@click.option("--silence", metavar="S", type=click.FloatRange(min=0.0),
-              help="End when nothing came for so long.")  # fmt: skip
+@click.option(
+    "--silence",
+    metavar="S",
+    type=click.FloatRange(min=0.0),
+    help="End when nothing came for so long.",
+)
 @click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the counters.")
 @click.pass_context
 def record(
@@ -82,14 +105,18 @@ def record(
     usual = SourcePlan(plan, ProtocolPlan(rate=rate), devices, None, text)
     given = None if sidecar is None else read_conditions(sidecar)
     known = given_live(live_sources(ports, setup, map_file, usual), given, ())
-    settings: dict[str, Any] = {"ports": [source.port.port for source in known.sources],
-                                "baud": baud, "bitrate": bitrate,
-                                "data_bitrate": data_bitrate}  # fmt: skip
+    settings: dict[str, Any] = {
+        "ports": [source.port.port for source in known.sources],
+        "baud": baud,
+        "bitrate": bitrate,
+        "data_bitrate": data_bitrate,
+    }
     first, *more = (source.as_header() for source in known.sources)
     header = RecordingHeader(settings, text, "", first, tuple(more))
     priority = realtime(None)
-    reader = ReaderPlan(known.sources, reconnect, strain=rule.strain, apart=ordinary(priority),
-                        estimated=False)  # fmt: skip
+    reader = ReaderPlan(
+        known.sources, reconnect, strain=rule.strain, apart=ordinary(priority), estimated=False
+    )
     live = LivePlan(reader, None, known.conditions, header, out, rule=rule)
     with start_in_order() as stop, LiveChain(live, click.echo) as chain:
         session = Session(chain, limits=Limits(duration, silence), watch=_alarm)
@@ -103,11 +130,17 @@ def record(
         click.echo(f"unplugged: {outcome.message}")
     click.echo(f"ended: {outcome.reason}; {recorded} bytes; {counters(wheels)}")
     if json_file is not None:
-        write_json(json_file, {
-            "format": "tirebench-record/1", "ended": outcome.reason, "bytes": recorded,
-            "line": line_document(*wheels.counts), "chain": counts,
-            "wheels": {n: wheel_document(wheels, n) for n in wheels.heard},
-        })  # fmt: skip
+        write_json(
+            json_file,
+            {
+                "format": "tirebench-record/1",
+                "ended": outcome.reason,
+                "bytes": recorded,
+                "line": line_document(*wheels.counts),
+                "chain": counts,
+                "wheels": {n: wheel_document(wheels, n) for n in wheels.heard},
+            },
+        )
     failed = counts["recording"]["error"]
     if failed:
         click.secho(f"not everything is recorded: {failed}", fg="red")

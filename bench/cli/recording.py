@@ -24,17 +24,32 @@ LITTLE = 1e9
 """Room below which there is a warning, [bytes]: about an hour of one wheel."""
 
 _OPTIONS = (
-    click.option("--split-minutes", metavar="MIN", type=click.FloatRange(min=0.01),
-                 help="Begin a new part of the recording after so long."),
-    click.option("--split-mb", metavar="MB", type=click.FloatRange(min=0.1),
-                 help="Begin a new part of the recording when one is so long."),
-    click.option("--strain/--no-strain", default=True,
-                 help="Record decoded strain beside the raw bytes, for other programs."),
-    click.option("--trigger", metavar="BEFORE,AFTER", callback=lambda _c, _p, text: _around(text),
-                 help="Record only around a lost port and, with the page or --tui of `run`, around "
-                      "markers and alarms that begin: so many seconds before and after, a file for "
-                      "each."),
-)  # fmt: skip
+    click.option(
+        "--split-minutes",
+        metavar="MIN",
+        type=click.FloatRange(min=0.01),
+        help="Begin a new part of the recording after so long.",
+    ),
+    click.option(
+        "--split-mb",
+        metavar="MB",
+        type=click.FloatRange(min=0.1),
+        help="Begin a new part of the recording when one is so long.",
+    ),
+    click.option(
+        "--strain/--no-strain",
+        default=True,
+        help="Record decoded strain beside the raw bytes, for other programs.",
+    ),
+    click.option(
+        "--trigger",
+        metavar="BEFORE,AFTER",
+        callback=lambda _c, _p, text: _around(text),
+        help="Record only around a lost port and, with the page or --tui of `run`, around "
+        "markers and alarms that begin: so many seconds before and after, a file for "
+        "each.",
+    ),
+)
 
 
 def recording_options(command: Command) -> Command:
@@ -42,9 +57,13 @@ def recording_options(command: Command) -> Command:
 
     @wraps(command)
     def with_rule(
-        *given: Any, split_minutes: float | None, split_mb: float | None, strain: bool,
-        trigger: tuple[float, float] | None, **named: Any,
-    ) -> Any:  # fmt: skip
+        *given: Any,
+        split_minutes: float | None,
+        split_mb: float | None,
+        strain: bool,
+        trigger: tuple[float, float] | None,
+        **named: Any,
+    ) -> Any:
         minutes = inf if split_minutes is None else split_minutes
         size = inf if split_mb is None else split_mb
         rule = RecordingRule(strain, 60.0 * minutes, 1e6 * size, trigger)

@@ -21,13 +21,28 @@ Exit code: as of `tirebench run`.
 
 @click.command(epilog=_EXAMPLE)
 @click.argument("recording", metavar="RECORDING", type=FILE)
-@click.option("--fmu", "fmu_file", metavar="X.fmu", type=FILE, required=True,
-              help="Made by `tirelib fmu build`.")  # fmt: skip
+@click.option(
+    "--fmu",
+    "fmu_file",
+    metavar="X.fmu",
+    type=FILE,
+    required=True,
+    help="Made by `tirelib fmu build`.",
+)
 @click.option("--trust", is_flag=True, help="Run this FMU although it is unknown; remember it.")
-@click.option("--pace", metavar="X", type=click.FloatRange(0.001, 1000.0),
-              help="Times real time.  [default: as fast as possible]")  # fmt: skip
-@click.option("--wheel", "numbers", multiple=True, type=click.IntRange(0, 255),
-              help="Wheels to look at.  [default: as in the run]")  # fmt: skip
+@click.option(
+    "--pace",
+    metavar="X",
+    type=click.FloatRange(0.001, 1000.0),
+    help="Times real time.  [default: as fast as possible]",
+)
+@click.option(
+    "--wheel",
+    "numbers",
+    multiple=True,
+    type=click.IntRange(0, 255),
+    help="Wheels to look at.  [default: as in the run]",
+)
 @click.option(
     "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write every turn as JSON."
 )
@@ -42,5 +57,13 @@ def replay(
     json_file: Path | None,
 ) -> None:
     """Estimate from a recording what the run estimated."""
-    context.invoke(run, replay=recording, fmu_file=fmu_file, trust=trust, pace=pace,
-                   numbers=numbers, json_file=json_file, page=False)  # fmt: skip
+    context.invoke(
+        run,
+        replay=recording,
+        fmu_file=fmu_file,
+        trust=trust,
+        pace=pace,
+        numbers=numbers,
+        json_file=json_file,
+        page=False,
+    )

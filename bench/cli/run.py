@@ -65,46 +65,115 @@ Exit code: 0 done, 1 unplugged or not one valid turn, 2 bad input. Ctrl-C ends i
 
 
 @click.command(epilog=_EXAMPLE)
-@click.option("--port", "ports", metavar="[WHEEL=]PORT", multiple=True,
-              help="Port to read, several allowed; see below and `tirebench ports`.")  # fmt: skip
-@click.option("--setup", metavar="S.toml", type=FILE,
-              help="Several sources, each with its protocol, wheel and device file.")  # fmt: skip
-@click.option("--port-file", metavar="FILE", type=FILE,
-              help="File that holds the port's name (`emulate --port-file`).")  # fmt: skip
-@click.option("--wait", metavar="[S]", type=click.FloatRange(min=0.0), default=0.0,
-              is_flag=False, flag_value=60.0,
-              help="Wait for ports that are not there yet, 60 s unless said.")  # fmt: skip
+@click.option(
+    "--port",
+    "ports",
+    metavar="[WHEEL=]PORT",
+    multiple=True,
+    help="Port to read, several allowed; see below and `tirebench ports`.",
+)
+@click.option(
+    "--setup",
+    metavar="S.toml",
+    type=FILE,
+    help="Several sources, each with its protocol, wheel and device file.",
+)
+@click.option(
+    "--port-file",
+    metavar="FILE",
+    type=FILE,
+    help="File that holds the port's name (`emulate --port-file`).",
+)
+@click.option(
+    "--wait",
+    metavar="[S]",
+    type=click.FloatRange(min=0.0),
+    default=0.0,
+    is_flag=False,
+    flag_value=60.0,
+    help="Wait for ports that are not there yet, 60 s unless said.",
+)
 @click.option("--replay", metavar="FILE", type=FILE, help="Recording to read instead.")
-@click.option("--pace", metavar="X", type=click.FloatRange(0.001, 1000.0),
-              help="Replay at X times real time.  [default: as fast as possible]")  # fmt: skip
-@click.option("--fmu", "fmu_file", metavar="X.fmu", type=FILE, required=True,
-              help="Made by `tirelib fmu build`; one instance for each wheel.")  # fmt: skip
+@click.option(
+    "--pace",
+    metavar="X",
+    type=click.FloatRange(0.001, 1000.0),
+    help="Replay at X times real time.  [default: as fast as possible]",
+)
+@click.option(
+    "--fmu",
+    "fmu_file",
+    metavar="X.fmu",
+    type=FILE,
+    required=True,
+    help="Made by `tirelib fmu build`; one instance for each wheel.",
+)
 @click.option("--trust", is_flag=True, help="Run this FMU although it is unknown; remember it.")
 @click.option("--speed", metavar="KMH", type=float, help="Travel speed.")
 @click.option("--pressure", metavar="BAR", type=click.FloatRange(min=0.0), help="Gauge pressure.")
 @click.option("--camber", metavar="DEG", type=float, help="ISO 8855.")
-@click.option("--condition", "named", metavar="NAME=VALUE", multiple=True,
-              help="Any condition by its name: friction=0.8, tread_depth=5 (mm).")  # fmt: skip
-@click.option("--conditions", "sidecar", metavar="F.json", type=FILE,
-              help="Conditions over time, as `emulate --conditions` writes them.")  # fmt: skip
-@click.option("--device", "device_texts", metavar="[WHEEL=]D.toml", multiple=True,
-              help="Scale and zero of the gages; one for all wheels, or for each.")  # fmt: skip
-@click.option("--wheel", "numbers", multiple=True, type=click.IntRange(0, 255),
-              help="Wheels to look at.  [default: the first four that are heard]")  # fmt: skip
+@click.option(
+    "--condition",
+    "named",
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="Any condition by its name: friction=0.8, tread_depth=5 (mm).",
+)
+@click.option(
+    "--conditions",
+    "sidecar",
+    metavar="F.json",
+    type=FILE,
+    help="Conditions over time, as `emulate --conditions` writes them.",
+)
+@click.option(
+    "--device",
+    "device_texts",
+    metavar="[WHEEL=]D.toml",
+    multiple=True,
+    help="Scale and zero of the gages; one for all wheels, or for each.",
+)
+@click.option(
+    "--wheel",
+    "numbers",
+    multiple=True,
+    type=click.IntRange(0, 255),
+    help="Wheels to look at.  [default: the first four that are heard]",
+)
 @port_options
-@click.option("--record", metavar="FILE.mcap", type=NEW_FILE,
-              help="Record raw bytes, strain, estimates and counters.")  # fmt: skip
+@click.option(
+    "--record",
+    metavar="FILE.mcap",
+    type=NEW_FILE,
+    help="Record raw bytes, strain, estimates and counters.",
+)
 @recording_options
-@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE,
-              help="Write every turn as JSON, as it comes.")  # fmt: skip
+@click.option(
+    "--json",
+    "json_file",
+    metavar="FILE",
+    type=NEW_FILE,
+    help="Write every turn as JSON, as it comes.",
+)
 @click.option("--duration", metavar="S", type=click.FloatRange(min=0.0), help="End after this.")
-@click.option("--silence", metavar="S", type=click.FloatRange(min=0.0),
-              help="End when nothing came for so long.")  # fmt: skip
+@click.option(
+    "--silence",
+    metavar="S",
+    type=click.FloatRange(min=0.0),
+    help="End when nothing came for so long.",
+)
 @click.option("--turns", metavar="N", type=click.IntRange(min=1), help="End after so many turns.")
-@click.option("--every-turn", is_flag=True,
-              help="Skip none: the port waits.  [default: skip what is 3 s late]")  # fmt: skip
-@click.option("--realtime/--no-realtime", "asked", default=None,
-              help="Go before all other programs.  [default: where this user may]")  # fmt: skip
+@click.option(
+    "--every-turn",
+    is_flag=True,
+    help="Skip none: the port waits.  [default: skip what is 3 s late]",
+)
+@click.option(
+    "--realtime/--no-realtime",
+    "asked",
+    default=None,
+    help="Go before all other programs.  [default: where this user may]",
+)
 @bridge_options
 @page_options
 @click.pass_context
@@ -192,19 +261,36 @@ def run(
         switch: RecordingSwitch | None = None
         source: Source
         if link is None:
-            settings = {"ports": [source.port.port for source in known.sources], "baud": baud,
-                        "bitrate": bitrate, "data_bitrate": data_bitrate, "wheels": list(numbers),
-                        "fmu": str(fmu_file), "speed_kmh": speed, "pressure_bar": pressure,
-                        "camber_deg": camber}  # fmt: skip
+            settings = {
+                "ports": [source.port.port for source in known.sources],
+                "baud": baud,
+                "bitrate": bitrate,
+                "data_bitrate": data_bitrate,
+                "wheels": list(numbers),
+                "fmu": str(fmu_file),
+                "speed_kmh": speed,
+                "pressure_bar": pressure,
+                "camber_deg": camber,
+            }
             first, *more = (source.as_header() for source in known.sources)
             header = RecordingHeader(settings, device_text, archive.sha256, first, tuple(more))
             recorded = record is not None or shown.anything
-            reader = ReaderPlan(known.sources, reconnect, numbers, recorded, every_turn,
-                                rule.strain, wait, ordinary(priority))  # fmt: skip
-            chain = stack.enter_context(LiveChain(
-                LivePlan(reader, file, known.conditions, header, record, shown.anything, rule),
-                lambda text: console.print(text, soft_wrap=True, markup=False),
-            ))  # fmt: skip
+            reader = ReaderPlan(
+                known.sources,
+                reconnect,
+                numbers,
+                recorded,
+                every_turn,
+                rule.strain,
+                wait,
+                ordinary(priority),
+            )
+            chain = stack.enter_context(
+                LiveChain(
+                    LivePlan(reader, file, known.conditions, header, record, shown.anything, rule),
+                    lambda text: console.print(text, soft_wrap=True, markup=False),
+                )
+            )
             file_name = record or Path(time.strftime("tirebench-%Y%m%d-%H%M%S.mcap"))
             switch = RecordingSwitch(chain, file_name, started=record is not None)
             source = chain
@@ -212,15 +298,24 @@ def run(
             source = _in_process(link, file, known, stack, laps=shown.anything)
         console.print(f"{source.name} -> {file.name}, {file.samples} samples a step")
         if record is not None:
-            console.print(at_start(record, reader, rule, watched=shown.anything),
-                          soft_wrap=True, markup=False)  # fmt: skip
+            console.print(
+                at_start(record, reader, rule, watched=shown.anything), soft_wrap=True, markup=False
+            )
         if priority:
             console.print(f"priority: {priority}", soft_wrap=True, markup=False)
         stack.enter_context(shown)
         of_recording = link is not None and conditions is None
         said_by = "recording" if of_recording else sidecar.name if sidecar else "option"
-        shown.open(source, switch, fmu_file, calibration, known.devices, known.conditions, said_by,
-                   Path() if record is None else record.parent)  # fmt: skip
+        shown.open(
+            source,
+            switch,
+            fmu_file,
+            calibration,
+            known.devices,
+            known.conditions,
+            said_by,
+            Path() if record is None else record.parent,
+        )
         journal = None if json_file is None else Journal(json_file)
         if journal is not None:
             stack.callback(journal.close)
@@ -230,11 +325,16 @@ def run(
         outcome, used = _session(session, source, console, bridges, shown, journal, switch)
         _summary(console, outcome, source, used, link, switch)
         if journal is not None:
-            origin = {"link": source.name, "fmu_sha256": archive.sha256, "ended": outcome.reason,
-                      "cpu_share": used if source.live else None,
-                      "chain": source.counts()}  # fmt: skip
-            journal.finish(document(outcome.turns, known.conditions.runs, source.wheels,
-                                    origin, calibration))  # fmt: skip
+            origin = {
+                "link": source.name,
+                "fmu_sha256": archive.sha256,
+                "ended": outcome.reason,
+                "cpu_share": used if source.live else None,
+                "chain": source.counts(),
+            }
+            journal.finish(
+                document(outcome.turns, known.conditions.runs, source.wheels, origin, calibration)
+            )
             console.print(f"written: {json_file}", soft_wrap=True)
     if outcome.error is not None:
         raise outcome.error
@@ -328,8 +428,10 @@ def _summary(
         console.print(f"note: {counts['raw']['lost_bytes']} raw bytes were not recorded")
     if source.live and outcome.latency:
         middle, high = np.percentile(np.array(outcome.latency) * 1e3, (50, 99))
-        console.print(f"byte in to estimate out: median {middle:.1f} ms, 99 % {high:.1f} ms; "
-                      f"{100 * used:.0f} % of a core")  # fmt: skip
+        console.print(
+            f"byte in to estimate out: median {middle:.1f} ms, 99 % {high:.1f} ms; "
+            f"{100 * used:.0f} % of a core"
+        )
     triggered = counts.get("recording", {}).get("recordings", 0)
     if triggered > 1:
         console.print(f"{triggered} recordings, numbered from the first")

@@ -29,24 +29,67 @@ Exit code: 0 done, 2 bad input, no such step included.
 
 @click.command(epilog=_EXAMPLE)
 @gathering_options
-@click.option("--replay", nargs=2, metavar="OFF.mcap ON.mcap", type=FILE,
-              help="Recordings without and with the shunt instead.")  # fmt: skip
-@click.option("--gage-resistance", "gage_ohm", required=True, metavar="OHM",
-              type=click.FloatRange(1.0, 1e5), help="Rg, 350 say.")  # fmt: skip
-@click.option("--shunt", "shunt_ohm", required=True, metavar="OHM",
-              type=click.FloatRange(10.0, 1e8), help="Rs, 100000 say.")  # fmt: skip
-@click.option("--gage-factor", "factor", required=True, metavar="KS",
-              type=click.FloatRange(0.1, 300.0), help="Ks of the gage.")  # fmt: skip
-@click.option("--gage", "gages", type=click.IntRange(1), multiple=True, metavar="N",
-              help="Gage that is shunted, several allowed.  [default: all]")  # fmt: skip
+@click.option(
+    "--replay",
+    nargs=2,
+    metavar="OFF.mcap ON.mcap",
+    type=FILE,
+    help="Recordings without and with the shunt instead.",
+)
+@click.option(
+    "--gage-resistance",
+    "gage_ohm",
+    required=True,
+    metavar="OHM",
+    type=click.FloatRange(1.0, 1e5),
+    help="Rg, 350 say.",
+)
+@click.option(
+    "--shunt",
+    "shunt_ohm",
+    required=True,
+    metavar="OHM",
+    type=click.FloatRange(10.0, 1e8),
+    help="Rs, 100000 say.",
+)
+@click.option(
+    "--gage-factor",
+    "factor",
+    required=True,
+    metavar="KS",
+    type=click.FloatRange(0.1, 300.0),
+    help="Ks of the gage.",
+)
+@click.option(
+    "--gage",
+    "gages",
+    type=click.IntRange(1),
+    multiple=True,
+    metavar="N",
+    help="Gage that is shunted, several allowed.  [default: all]",
+)
 @click.option("--positive", is_flag=True, help="The shunt looks like tension.")
 def shunt(
-    port: str | None, device_texts: tuple[str, ...], number: int | None, seconds: float,
-    still: float, out: Path, baud: int, bitrate: int, data_bitrate: int | None,
-    bus_options: tuple[str, ...], rate: float, map_file: Path | None, reconnect: float,
-    replay: tuple[Path, Path] | None, gage_ohm: float, shunt_ohm: float, factor: float,
-    gages: tuple[int, ...], positive: bool,
-) -> None:  # fmt: skip
+    port: str | None,
+    device_texts: tuple[str, ...],
+    number: int | None,
+    seconds: float,
+    still: float,
+    out: Path,
+    baud: int,
+    bitrate: int,
+    data_bitrate: int | None,
+    bus_options: tuple[str, ...],
+    rate: float,
+    map_file: Path | None,
+    reconnect: float,
+    replay: tuple[Path, Path] | None,
+    gage_ohm: float,
+    shunt_ohm: float,
+    factor: float,
+    gages: tuple[int, ...],
+    positive: bool,
+) -> None:
     """Find the gain of each gage with a shunt, on a standing wheel."""
     if (port is None) == (replay is None):
         raise click.UsageError("just one of --port and --replay is needed")

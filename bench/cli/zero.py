@@ -28,11 +28,21 @@ Exit code: 0 done, 2 bad input, a wheel that turns included.
 @gathering_options
 @click.option("--replay", metavar="FILE.mcap", type=FILE, help="Recording to read instead.")
 def zero(
-    port: str | None, device_texts: tuple[str, ...], number: int | None, seconds: float,
-    still: float, out: Path, baud: int, bitrate: int, data_bitrate: int | None,
-    bus_options: tuple[str, ...], rate: float, map_file: Path | None, reconnect: float,
+    port: str | None,
+    device_texts: tuple[str, ...],
+    number: int | None,
+    seconds: float,
+    still: float,
+    out: Path,
+    baud: int,
+    bitrate: int,
+    data_bitrate: int | None,
+    bus_options: tuple[str, ...],
+    rate: float,
+    map_file: Path | None,
+    reconnect: float,
     replay: Path | None,
-) -> None:  # fmt: skip
+) -> None:
     """Take the mean strain of a standing, unloaded wheel as the zero of its gages."""
     if (port is None) == (replay is None):
         raise click.UsageError("just one of --port and --replay is needed")

@@ -117,9 +117,13 @@ class PortPlan:
 
             interface, _, channel = rest.partition(":")
             return CanLink(
-                interface, channel, self.bitrate, self.data_bitrate, bus_options(self.options),
+                interface,
+                channel,
+                self.bitrate,
+                self.data_bitrate,
+                bus_options(self.options),
                 transmit=transmit,
-            )  # fmt: skip
+            )
         if self.port.startswith(SOCKETS):
             from bench.links.socket_port import SocketLink
 

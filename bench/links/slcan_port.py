@@ -11,8 +11,17 @@ from bench.links.serial_port import SerialLink
 from bench.links.socket_port import SocketLink
 from bench.protocols import SLCAN
 
-BITRATES = {10_000: "S0", 20_000: "S1", 50_000: "S2", 100_000: "S3", 125_000: "S4",
-            250_000: "S5", 500_000: "S6", 750_000: "S7", 1_000_000: "S8"}  # fmt: skip
+BITRATES = {
+    10_000: "S0",
+    20_000: "S1",
+    50_000: "S2",
+    100_000: "S3",
+    125_000: "S4",
+    250_000: "S5",
+    500_000: "S6",
+    750_000: "S7",
+    1_000_000: "S8",
+}
 DATA_BITRATES = {2_000_000: "Y2", 5_000_000: "Y5"}
 
 

@@ -108,9 +108,13 @@ class LiveChain:
         self._reader: Kept | None = None
         self._recorder: Kept | None = None
         self._estimators = Estimators(
-            plan.file, plan.conditions, self._exchange, self._jumped, laps=plan.laps,
+            plan.file,
+            plan.conditions,
+            self._exchange,
+            self._jumped,
+            laps=plan.laps,
             every=plan.reader.every_turn,
-        )  # fmt: skip
+        )
         self._finished = False
         self._judged = JudgedTurns()
         self._alarms = RunAlarms(
@@ -132,8 +136,10 @@ class LiveChain:
                 known = self._plan.reader.expected
                 self._estimators.start(known)  # those of other wheels start when they are heard
                 self._wait(lambda: len(self._estimators.ready) >= known, self._estimators.awaited)
-            self._wait(lambda: self.obeyed(Deadline.after(0.0)),
-                       lambda: f"the recorder to begin {self._plan.record}")  # fmt: skip
+            self._wait(
+                lambda: self.obeyed(Deadline.after(0.0)),
+                lambda: f"the recorder to begin {self._plan.record}",
+            )
             # ports are opened last: from then on bytes come
             for number in range(self._plan.reader.ports):
                 self._start_port(number)
@@ -197,17 +203,24 @@ class LiveChain:
         refused, refused_bytes = exchange.raw.refused
         return {
             "processes": self.process_ids,
-            "cpu_s": {"reader": self._state.cpu, "recorder": self._recorded.cpu, **self._port_cpu(),
-                      **{f"estimator {slot}": cpu for slot, cpu in self._estimators.cpu.items()}},
+            "cpu_s": {
+                "reader": self._state.cpu,
+                "recorder": self._recorded.cpu,
+                **self._port_cpu(),
+                **{f"estimator {slot}": cpu for slot, cpu in self._estimators.cpu.items()},
+            },
             "restarts": {name: kept.starts - 1 for name, kept in self._processes().items()},
-            "raw": {"lost_reads": refused, "lost_bytes": refused_bytes,
-                    "most_waiting_bytes": exchange.raw.high,
-                    "not_decoded_bytes": self._state.passed,
-                    "alarm": TOO_BUSY if self._state.passing else ""},
+            "raw": {
+                "lost_reads": refused,
+                "lost_bytes": refused_bytes,
+                "most_waiting_bytes": exchange.raw.high,
+                "not_decoded_bytes": self._state.passed,
+                "alarm": TOO_BUSY if self._state.passing else "",
+            },
             "recording": self._recorded.as_document(refused_bytes),
             "given_up": dict(self._alarms.given_up),
             "wheels": {wheel: self.wheel_counts(wheel) for wheel in self.wheels.heard},
-        }  # fmt: skip
+        }
 
     def _port_cpu(self) -> dict[str, float]:
         return {f"port {n}": state.cpu for n, state in enumerate(self._port_states()) if state}
@@ -228,7 +241,7 @@ class LiveChain:
             **skipped(self.jumps, wheel),
             "queue_overruns": self._exchange.samples[slot].refused[0],
             "most_waiting_bytes": self._exchange.samples[slot].high,
-        }  # fmt: skip
+        }
 
     def poll(self, deadline: Deadline) -> News:
         """Return what has come by the deadline, at once when there is something.
@@ -309,8 +322,13 @@ class LiveChain:
 
     def _start_port(self, number: int) -> None:
         reader = self._plan.reader
-        plan = (number, reader.sources[number].port, reader.patience, reader.wait,
-                self._exchange.address)  # fmt: skip
+        plan = (
+            number,
+            reader.sources[number].port,
+            reader.patience,
+            reader.wait,
+            self._exchange.address,
+        )
         self._ports.append(Kept(read_source, lambda _: plan))
 
     def _opening(self) -> str:

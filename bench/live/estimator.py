@@ -174,8 +174,16 @@ class _Estimator:
         """Note that samples are left out up to these, and about how many."""
         samples = max(0, round(1e-6 * (content.t_us - start_us) / content.period))
         turns = samples * content.period / self._turn_length
-        self._jump(Jump(wheel, start, Place(content.segment, content.start), SKIPPED, samples,
-                        max(1, round(turns)) if turns == turns else 0))  # fmt: skip
+        self._jump(
+            Jump(
+                wheel,
+                start,
+                Place(content.segment, content.start),
+                SKIPPED,
+                samples,
+                max(1, round(turns)) if turns == turns else 0,
+            )
+        )
 
     def _jump(self, jump: Jump) -> None:
         self._estimation.jump(jump.why)

@@ -116,8 +116,16 @@ class Estimators:
     def _given(self, file: FmuFile, slot: int, starts: int) -> tuple[Any, ...]:
         """Return what a process is given at its start: it goes on behind what was reported."""
         self._drain(slot, self._pending)
-        plan = EstimatorPlan(file, self._conditions, slot, self._laps, self._turns[slot],
-                             self._cursors[slot], starts > 1, self._every)  # fmt: skip
+        plan = EstimatorPlan(
+            file,
+            self._conditions,
+            slot,
+            self._laps,
+            self._turns[slot],
+            self._cursors[slot],
+            starts > 1,
+            self._every,
+        )
         return plan, self._exchange.address
 
     def _drain(self, slot: int, news: News) -> None:

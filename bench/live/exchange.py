@@ -143,8 +143,9 @@ class Exchange:
         samples = int(min(SAMPLES, room)) // 64 * 64
         shared = memory(fixed + slots * samples)
         fresh = tuple(context.Semaphore(0) for _ in range(slots))
-        address = Address(shared.name, slots, fresh, context.Semaphore(0), samples, ports,
-                          context.Semaphore(0))  # fmt: skip
+        address = Address(
+            shared.name, slots, fresh, context.Semaphore(0), samples, ports, context.Semaphore(0)
+        )
         return cls(address, shared)
 
     def is_set(self, flag: int) -> bool:
@@ -157,8 +158,15 @@ class Exchange:
 
     def close(self) -> None:
         """Let go of the memory; its maker removes it. Calling twice does no harm."""
-        for queue in (self.raw, self.orders, self.strain, self.results, *self.samples, *self.news,
-                      *self.reads):  # fmt: skip
+        for queue in (
+            self.raw,
+            self.orders,
+            self.strain,
+            self.results,
+            *self.samples,
+            *self.news,
+            *self.reads,
+        ):
             queue.close()
         for cell in (self.line, self.recorded, *self.ports):
             cell.close()

@@ -63,8 +63,13 @@ def read_source(
     state.ended = False
     sender = _Sender(number, exchange, state)
     try:
-        link = ReconnectingLink(port.open, patience, state.name or (port.port if wait else ""),
-                                wait=0.0 if again else wait, forever=address.ports > 1)  # fmt: skip
+        link = ReconnectingLink(
+            port.open,
+            patience,
+            state.name or (port.port if wait else ""),
+            wait=0.0 if again else wait,
+            forever=address.ports > 1,
+        )
         state.name = link.name
         if again:
             sender.send(Read(time.monotonic_ns(), b"", RESUMED, number))

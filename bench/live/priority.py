@@ -83,9 +83,7 @@ def own_share() -> None:
 
 
 def _set() -> None:
-    os.sched_setscheduler(
-        0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(PRIORITY)
-    )  # fmt: skip
+    os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(PRIORITY))
 
 
 def below() -> None:

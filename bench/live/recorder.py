@@ -54,9 +54,13 @@ def record(
 
 class _Recorder:
     def __init__(
-        self, header: RecordingHeader, conditions: Conditions, rule: RecordingRule,
-        exchange: Exchange, state: RecorderState,
-    ) -> None:  # fmt: skip
+        self,
+        header: RecordingHeader,
+        conditions: Conditions,
+        rule: RecordingRule,
+        exchange: Exchange,
+        state: RecorderState,
+    ) -> None:
         self._header = header
         self._conditions = conditions
         self._rule = rule
@@ -246,8 +250,9 @@ class _Recorder:
         """Begin a file, or go on in it; return why that is not possible, or nothing."""
         state = self._state
         recording, wall, monotonic = state.began
-        header = replace(self._header, recording=recording, part=state.part, wall_ns=wall,
-                         monotonic_ns=monotonic)  # fmt: skip
+        header = replace(
+            self._header, recording=recording, part=state.part, wall_ns=wall, monotonic_ns=monotonic
+        )
         self._part_began = time.monotonic()
         try:
             self._recorder = Recorder(path, header, self._conditions, length)
@@ -295,9 +300,11 @@ class _Recorder:
         """Begin a new part where the rule wants one."""
         rule, state, recorder = self._rule, self._state, self._recorder
         age = time.monotonic() - self._part_began
-        if recorder is None or state.path is None or (
-            age < rule.split_time and recorder.length < rule.split_size
-        ):  # fmt: skip
+        if (
+            recorder is None
+            or state.path is None
+            or (age < rule.split_time and recorder.length < rule.split_size)
+        ):
             return
         path = state.path
         recorder.close("the next part follows")
@@ -342,8 +349,11 @@ class _Recorder:
         if self._kept is not None:
             self._kept.write_again()
         state, exchange = self._state, self._exchange
-        for queue, cursor in ((exchange.raw, state.raw), (exchange.strain, state.strain),
-                              (exchange.results, state.results)):  # fmt: skip
+        for queue, cursor in (
+            (exchange.raw, state.raw),
+            (exchange.strain, state.strain),
+            (exchange.results, state.results),
+        ):
             queue.go_to(cursor)
 
     def _flush(self) -> None:

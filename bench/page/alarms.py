@@ -105,8 +105,10 @@ def read_alarms(path: Path) -> dict[str, Rule]:
     rules, faults = dict(RULES), []
     for name, table in document.items():
         if name not in RULES:
-            faults.append(f"--alarms {path}: [{name}] is not known; allowed are "
-                          f"{', '.join(RULES)}; correct the spelling")  # fmt: skip
+            faults.append(
+                f"--alarms {path}: [{name}] is not known; allowed are "
+                f"{', '.join(RULES)}; correct the spelling"
+            )
             continue
         fault = _fault(name, table)
         if fault:
@@ -243,6 +245,11 @@ def _text(rule: Rule, value: float, wheel: int | None) -> str:
 
 def event_of(alarm: Alarm) -> dict[str, Any]:
     """Return an alarm as an event of the recording."""
-    return {"event": "alarm", "state": "on" if alarm.until is None else "off",
-            "name": alarm.name, "wheel": alarm.wheel, "value": alarm.value,
-            "text": alarm.text}  # fmt: skip
+    return {
+        "event": "alarm",
+        "state": "on" if alarm.until is None else "off",
+        "name": alarm.name,
+        "wheel": alarm.wheel,
+        "value": alarm.value,
+        "text": alarm.text,
+    }

@@ -207,8 +207,10 @@ class Feed:
         self._alarms.tell("json", self._unwritten, now)
         recorded = chain.get("recording", {})
         free = recorded.get("free_bytes")
-        room = {"minutes_left": recorded.get("minutes_left"),
-                "disk": None if free is None else 1e-9 * free}  # fmt: skip
+        room = {
+            "minutes_left": recorded.get("minutes_left"),
+            "disk": None if free is None else 1e-9 * free,
+        }
         changed += self._alarms.look(room, None, now)
         if self._note is not None:
             for alarm in changed:
@@ -229,9 +231,11 @@ class Feed:
         """Return the values of a wheel that have limits."""
         age, heard = entry["newest_sample_age_ms"], self._source.heard
         last = self._last.get(number, {})
-        silence = None if age is None and heard is None else max(
-            0.0 if age is None else 1e-3 * age, 0.0 if heard is None else now - heard
-        )  # fmt: skip
+        silence = (
+            None
+            if age is None and heard is None
+            else max(0.0 if age is None else 1e-3 * age, 0.0 if heard is None else now - heard)
+        )
         return {
             "silence": silence,
             "rate": entry.get("rate_percent"),

@@ -116,8 +116,10 @@ class GageSetup:
     def _written(self, wheel: int, device: Device, what: str) -> str:
         path = self._folder / f"wheel-{wheel}-{what}-{time.strftime('%Y%m%d-%H%M%S')}.toml"
         write_device(path, device, f"{what} of wheel {wheel}, from the live page")
-        return f"wheel {wheel}: {what} written to {path.name}; for the next run: --device " \
-               f"{wheel}={path.name}"  # fmt: skip
+        return (
+            f"wheel {wheel}: {what} written to {path.name}; for the next run: --device "
+            f"{wheel}={path.name}"
+        )
 
 
 def _microstrain(value: float) -> float | None:

@@ -185,8 +185,13 @@ class Viewer:
         if self._lap == (number, wheel.lap_count) and self._band == (number, wheel.band_count):
             return None
         lap = wheel.lap
-        entry = {"wheel": number, "turn": lap.turn, "valid": lap.valid, "laps": len(wheel.laps),
-                 "trace": len(arrays)}  # fmt: skip
+        entry = {
+            "wheel": number,
+            "turn": lap.turn,
+            "valid": lap.valid,
+            "laps": len(wheel.laps),
+            "trace": len(arrays),
+        }
         arrays.append(1e6 * wheel.laps[-1])
         self._lap = (number, wheel.lap_count)
         if made is not None and self._band != (number, wheel.band_count):

@@ -55,8 +55,9 @@ class Lap:
 
     def pack(self) -> bytes:
         """Return the lap as bytes."""
-        head = _HEAD.pack(self.wheel, len(self.strain), self.turn, self.segment, self.valid,
-                          self.first, self.step)  # fmt: skip
+        head = _HEAD.pack(
+            self.wheel, len(self.strain), self.turn, self.segment, self.valid, self.first, self.step
+        )
         return head + self.strain.tobytes()
 
     @classmethod
@@ -158,8 +159,15 @@ class Laps:
         every = math.ceil((last - first) / MOST_SAMPLES)
         rows = self._rows[first - self._start : last - self._start + 1 : every]
         degrees = 180.0 / pending.half
-        return Lap(self.wheel, pending.turn, pending.segment, pending.valid,
-                   degrees * (first - pending.middle), degrees * every, rows.copy())  # fmt: skip
+        return Lap(
+            self.wheel,
+            pending.turn,
+            pending.segment,
+            pending.valid,
+            degrees * (first - pending.middle),
+            degrees * every,
+            rows.copy(),
+        )
 
 
 def band(traces: list[Float32Array]) -> Float32Array:

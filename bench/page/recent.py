@@ -44,15 +44,26 @@ class Recent:
         counts = wheel.timeline.counts
         now = time.monotonic() if now is None else now
         seen = self._seen
-        seen.append(_Seen(now, wheel.timeline.received, counts.lost_samples,
-                          sum(counts.saturated), turns, invalid, counts.low_battery))  # fmt: skip
+        seen.append(
+            _Seen(
+                now,
+                wheel.timeline.received,
+                counts.lost_samples,
+                sum(counts.saturated),
+                turns,
+                invalid,
+                counts.low_battery,
+            )
+        )
         while len(seen) > 2 and now - seen[1].moment >= SPAN:
             seen.popleft()
         first, last = seen[0], seen[-1]
         elapsed, expected = last.moment - first.moment, wheel.timeline.rate
         came, lost, all_turns = (
-            last.received - first.received, last.lost - first.lost, last.turns - first.turns,
-        )  # fmt: skip
+            last.received - first.received,
+            last.lost - first.lost,
+            last.turns - first.turns,
+        )
         known = elapsed >= SHORTEST
         return {
             "rate_hz": came / elapsed if known else None,
@@ -60,8 +71,10 @@ class Recent:
             "rate_percent": 100.0 * came / elapsed / expected if known and expected else None,
             "loss_percent": 100.0 * lost / (came + lost) if known and came + lost else None,
             "saturated_percent": 20.0 * (last.saturated - first.saturated) / came
-            if known and came else None,
+            if known and came
+            else None,
             "invalid_percent": 100.0 * (last.invalid - first.invalid) / all_turns
-            if known and all_turns else None,
+            if known and all_turns
+            else None,
             "battery_is_low": last.low_battery > first.low_battery,
-        }  # fmt: skip
+        }

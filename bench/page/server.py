@@ -177,8 +177,12 @@ class Page:
 
     def _about(self) -> dict[str, Any]:
         skipped = self._skipped + sum(viewer.skipped for viewer in self._viewers)
-        return {"starts": self._plan.starts, "viewers": len(self._viewers),
-                "missed": self._history.missed, "skipped_all": skipped}  # fmt: skip
+        return {
+            "starts": self._plan.starts,
+            "viewers": len(self._viewers),
+            "missed": self._history.missed,
+            "skipped_all": skipped,
+        }
 
 
 class _Server(uvicorn.Server):
@@ -200,11 +204,19 @@ def serve(plan: PagePlan, listener: socket.socket, pipe: Connection) -> None:
         os.set_blocking(pipe.fileno(), False)  # a run that does not ask may not stop the page
     app = Page(plan, board, pipe).app()
     config = uvicorn.Config(
-        app, log_config=None, access_log=False, server_header=False, http=HttpConnection,
+        app,
+        log_config=None,
+        access_log=False,
+        server_header=False,
+        http=HttpConnection,
         ws="websockets-sansio",
-        ws_max_size=256, ws_per_message_deflate=False, proxy_headers=False, lifespan="on",
-        limit_concurrency=128, timeout_keep_alive=5,
-    )  # fmt: skip
+        ws_max_size=256,
+        ws_per_message_deflate=False,
+        proxy_headers=False,
+        lifespan="on",
+        limit_concurrency=128,
+        timeout_keep_alive=5,
+    )
     asyncio.run(_Server(config).serve([listener]))
 
 

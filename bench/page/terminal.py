@@ -33,9 +33,22 @@ NOW = (
     ("tire_pressure_bar", "bar", 2),
 )
 """Of the last seconds and what the wheel says of itself: key, heading, digits."""
-LOSSES = ("crc_bad", "framing_bad", "lost_frames", "lost_samples", "duplicates", "out_of_order",
-          "resets", "overruns", "reconnects", "queue_overruns", "skipped_turns",
-          "estimator_restarts", "radio_loss", "low_battery")  # fmt: skip
+LOSSES = (
+    "crc_bad",
+    "framing_bad",
+    "lost_frames",
+    "lost_samples",
+    "duplicates",
+    "out_of_order",
+    "resets",
+    "overruns",
+    "reconnects",
+    "queue_overruns",
+    "skipped_turns",
+    "estimator_restarts",
+    "radio_loss",
+    "low_battery",
+)
 
 
 def show(board_name: str, starts: int) -> None:
@@ -138,8 +151,9 @@ def _heading(state: dict[str, Any]) -> RenderableType:
     recording = state.get("recording", {})
     rec = f"  REC {recording.get('name', '')} {recording.get('bytes', 0) / 1e6:.1f} MB"
     rec = rec if recording.get("on") else ""
-    return Text.assemble((f" {said} ", style), f"  {state.get('link', '')}  ISO 8855",
-                         (rec, "bold red"))  # fmt: skip
+    return Text.assemble(
+        (f" {said} ", style), f"  {state.get('link', '')}  ISO 8855", (rec, "bold red")
+    )
 
 
 def _wheel(
@@ -164,17 +178,31 @@ def _wheel(
 
 def _health(state: dict[str, Any], history: History, starts: int) -> RenderableType:
     table = Table(box=SIMPLE_HEAD)
-    for name in ("wheel", "frames", "turns", "invalid", "lost", "saturated", "ppm", "age [ms]",
-                 *(heading for _, heading, _ in NOW)):  # fmt: skip
+    for name in (
+        "wheel",
+        "frames",
+        "turns",
+        "invalid",
+        "lost",
+        "saturated",
+        "ppm",
+        "age [ms]",
+        *(heading for _, heading, _ in NOW),
+    ):
         table.add_column(Text(name), justify="right")
     for number, counts in state.get("wheels", {}).items():
         lost = " ".join(f"{name} {counts[name]}" for name in LOSSES if counts[name]) or "nothing"
-        table.add_row(number, str(counts["frames"]), str(counts["turns"]),
-                      str(counts["invalid_turns"]), lost,
-                      " ".join(map(str, counts["saturated_samples"])),
-                      _or_dash(counts["clock_drift_ppm"]),
-                      _or_dash(counts["newest_sample_age_ms"]),
-                      *(_or_dash(counts.get(key), digits) for key, _, digits in NOW))  # fmt: skip
+        table.add_row(
+            number,
+            str(counts["frames"]),
+            str(counts["turns"]),
+            str(counts["invalid_turns"]),
+            lost,
+            " ".join(map(str, counts["saturated_samples"])),
+            _or_dash(counts["clock_drift_ppm"]),
+            _or_dash(counts["newest_sample_age_ms"]),
+            *(_or_dash(counts.get(key), digits) for key, _, digits in NOW),
+        )
     starts += sum(state.get("chain", {}).get("restarts", {}).values())
     dropped = history.missed + state.get("left_out", 0)
     said = "".join(f"\nFMU: {message}" for message in state.get("messages", []))
@@ -188,10 +216,11 @@ def _clock(moment: float) -> str:
 def in_use_line(conditions: dict[str, dict[str, Any]]) -> str:
     """Return which conditions are in use and where each comes from, in one line."""
     return ", ".join(
-        f"{name} not known" if one["value"] is None
+        f"{name} not known"
+        if one["value"] is None
         else f"{name} {one['value']:.2f} {one['unit']} ({one['source']})"
         for name, one in conditions.items()
-    )  # fmt: skip
+    )
 
 
 def _room(state: dict[str, Any]) -> str:

@@ -24,8 +24,10 @@ from bench.protocols.signals import Signal
 
 PUBLISHED_WHEELS = 4
 FOLDER = Path(__file__).parent.parent
-FILES = {FOLDER / "tirelib.dbc": (RAW16, RAW12, HEALTH),
-         FOLDER / "tirelib_classic.dbc": (RAW12C, SYNC, HEALTH)}  # fmt: skip
+FILES = {
+    FOLDER / "tirelib.dbc": (RAW16, RAW12, HEALTH),
+    FOLDER / "tirelib_classic.dbc": (RAW12C, SYNC, HEALTH),
+}
 """Each file and the kinds of frame in it; estimates are in both."""
 _FRAME_FORMAT = {False: 0, True: 14}  # VFrameFormat: StandardCAN, StandardCAN_FD
 
@@ -72,8 +74,9 @@ def database(kinds: tuple[str, ...]) -> str:
     for wheel in range(PUBLISHED_WHEELS):
         for kind in kinds:
             layout = LAYOUTS[kind]
-            frames.append((layout.base + wheel, f"{kind}_{wheel}", layout.length, layout.fd,
-                           signals(kind)))  # fmt: skip
+            frames.append(
+                (layout.base + wheel, f"{kind}_{wheel}", layout.length, layout.fd, signals(kind))
+            )
         for kind, base in ESTIMATE_BASES.items():
             frames.append((base + wheel, f"{kind}_{wheel}", 8, False, estimate_signals(kind)))
     return "\n".join(_lines(sorted(frames))) + "\n"
@@ -100,8 +103,13 @@ def _lines(frames: list[tuple[int, str, int, bool, tuple[Signal, ...]]]) -> Iter
         for signal in content:
             if signal.comment:
                 yield f'CM_ SG_ {identifier} {signal.name} "{signal.comment}";'
-    kinds = ["StandardCAN", "ExtendedCAN", *(f"reserved{n}" for n in range(2, 14)),
-             "StandardCAN_FD", "ExtendedCAN_FD"]  # fmt: skip
+    kinds = [
+        "StandardCAN",
+        "ExtendedCAN",
+        *(f"reserved{n}" for n in range(2, 14)),
+        "StandardCAN_FD",
+        "ExtendedCAN_FD",
+    ]
     yield f'BA_DEF_ BO_ "VFrameFormat" ENUM {",".join(f"{chr(34)}{k}{chr(34)}" for k in kinds)};'
     yield 'BA_DEF_ BO_ "CANFD_BRS" ENUM "0","1";'
     yield 'BA_DEF_ "BusType" STRING ;'

@@ -25,8 +25,12 @@ from bench.protocols.signals import Signal
 
 ESTIMATE, ESTIMATE_STD, ESTIMATE_STATE = "ESTIMATE", "ESTIMATE_STD", "ESTIMATE_STATE"
 ESTIMATE_BASES: Mapping[str, int] = {ESTIMATE: 0x140, ESTIMATE_STD: 0x148, ESTIMATE_STATE: 0x150}
-STEPS = {"Fz": (0.5, 1.0, "N"), "Fy": (0.5, 1.0, "N"),
-         "alpha": (0.001, 180.0 / math.pi, "deg"), "kappa": (1e-4, 1.0, "")}  # fmt: skip
+STEPS = {
+    "Fz": (0.5, 1.0, "N"),
+    "Fy": (0.5, 1.0, "N"),
+    "alpha": (0.001, 180.0 / math.pi, "deg"),
+    "kappa": (1e-4, 1.0, ""),
+}
 """Step on the bus in the unit of the bus, that unit in SI, its name."""
 AGE_STEP = 1e-4
 UNKNOWN_SIGNED, UNKNOWN = -(2**15), 2**16 - 1

@@ -70,9 +70,15 @@ _RAW16 = np.dtype([("counts", "<i2", (6, GAGES)), *_TAIL])
 _RAW12 = np.dtype([("packed", "u1", (20, 3)), *_TAIL])
 _SYNC = np.dtype([("index", "<u4"), ("t_us", "<u4")])
 _HEALTH = np.dtype(
-    [("lost", "<u2"), ("rssi", "i1"), ("temperature", "i1"), ("battery", "u1"),
-     ("pressure", "u1"), ("flags", "<u2")]
-)  # fmt: skip
+    [
+        ("lost", "<u2"),
+        ("rssi", "i1"),
+        ("temperature", "i1"),
+        ("battery", "u1"),
+        ("pressure", "u1"),
+        ("flags", "<u2"),
+    ]
+)
 _PLACES = np.arange(48, -1, -12).astype(np.uint64)
 
 
@@ -200,10 +206,13 @@ def decode_health(data: ByteArray) -> Health:
     """Return what one frame of shape (8,) or longer says."""
     record = _records(data[None, :], _HEALTH)[0]
     return Health(
-        int(record["lost"]), int(record["rssi"]), int(record["temperature"]),
-        int(record["battery"]) * BATTERY_STEP, int(record["pressure"]) * PRESSURE_STEP,
+        int(record["lost"]),
+        int(record["rssi"]),
+        int(record["temperature"]),
+        int(record["battery"]) * BATTERY_STEP,
+        int(record["pressure"]) * PRESSURE_STEP,
         int(record["flags"]),
-    )  # fmt: skip
+    )
 
 
 def to_twelve(counts: Int16Array) -> Int16Array:

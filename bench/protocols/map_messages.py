@@ -135,18 +135,26 @@ def of_dbc(database: Any) -> dict[str, Message]:
     for m in database.messages:
         signals = {
             s.name: Signal(
-                s.name, s.start, s.length, s.is_signed, float(s.scale), s.unit or "",
-                s.byte_order == "big_endian", float(s.offset), real=s.is_float,
+                s.name,
+                s.start,
+                s.length,
+                s.is_signed,
+                float(s.scale),
+                s.unit or "",
+                s.byte_order == "big_endian",
+                float(s.offset),
+                real=s.is_float,
             )
             for s in m.signals
-        }  # fmt: skip
+        }
         ways = {
             s.name: (s.multiplexer_signal, tuple(s.multiplexer_ids))
             for s in m.signals
             if s.multiplexer_ids and s.multiplexer_signal
         }
-        messages[m.name] = Message(m.name, m.frame_id, m.is_extended_frame, m.length,
-                                   _multiplexed(signals, ways))  # fmt: skip
+        messages[m.name] = Message(
+            m.name, m.frame_id, m.is_extended_frame, m.length, _multiplexed(signals, ways)
+        )
     return messages
 
 
@@ -158,9 +166,12 @@ def _can(table: Mapping[str, Any]) -> Message:
         if "multiplexer" in s
     }
     return Message(
-        str(table["name"]), int(table["id"]), bool(table.get("extended", False)),
-        int(table["length"]), _multiplexed(signals, ways),
-    )  # fmt: skip
+        str(table["name"]),
+        int(table["id"]),
+        bool(table.get("extended", False)),
+        int(table["length"]),
+        _multiplexed(signals, ways),
+    )
 
 
 def _binary(table: Mapping[str, Any], number: int) -> Message:
@@ -178,19 +189,32 @@ def _binary(table: Mapping[str, Any], number: int) -> Message:
         if item != "x":
             start = 8 * place + (7 if big else 0)
             given = _named(fields.pop(0))
-            signals.append(Signal(
-                str(given["name"]), start, 8 * width, item.islower(),
-                float(given.get("factor", 1.0)), "", big, float(given.get("offset", 0.0)),
-                real=item in "fd",
-            ))  # fmt: skip
+            signals.append(
+                Signal(
+                    str(given["name"]),
+                    start,
+                    8 * width,
+                    item.islower(),
+                    float(given.get("factor", 1.0)),
+                    "",
+                    big,
+                    float(given.get("offset", 0.0)),
+                    real=item in "fd",
+                )
+            )
         place += width
     if fields:
         raise ValueError(f"struct has {len(signals)} values, fields has more names")
     start, order = table.get("checksum_from", "sync"), table.get("checksum_order")
     if start not in ("sync", "fields") or order not in (None, "little", "big"):
         raise ValueError("checksum_from is sync or fields, checksum_order little or big")
-    cut = BinaryCut(sync, size, _checksum(table), start == "sync", (order or "") == "big" or
-                    (order is None and big))  # fmt: skip
+    cut = BinaryCut(
+        sync,
+        size,
+        _checksum(table),
+        start == "sync",
+        (order or "") == "big" or (order is None and big),
+    )
     named = {signal.name: signal for signal in signals}
     return Message(str(table["name"]), number, False, size, named, cut)
 
@@ -202,11 +226,19 @@ def _text(table: Mapping[str, Any], number: int) -> Message:
         bits = int(given.get("bits", 0))
         if not 0 <= bits <= 32:
             raise ValueError("bits is 1 .. 32")
-        signals.append(Signal(
-            str(given["name"]), place, bits or 64, bool(given.get("signed", False)),
-            float(given.get("factor", 1.0)), "", False, float(given.get("offset", 0.0)),
-            real=not bits,
-        ))  # fmt: skip
+        signals.append(
+            Signal(
+                str(given["name"]),
+                place,
+                bits or 64,
+                bool(given.get("signed", False)),
+                float(given.get("factor", 1.0)),
+                "",
+                False,
+                float(given.get("offset", 0.0)),
+                real=not bits,
+            )
+        )
         place += 64
     separator, starts = str(table.get("separator", ",")), str(table.get("starts", ""))
     if len(separator) != 1 or not separator.isascii() or not starts.isascii() or not signals:
@@ -220,9 +252,11 @@ def _checksum(table: Mapping[str, Any]) -> str:
     given = str(table.get("checksum", ""))
     name = key(given)
     if given and name not in CHECKSUMS:
-        raise ValueError(f"checksum = {given!r} is not known; SUM-8, SUM-16, XOR-8 are, and CRCs "
-                         "by their name in the catalogue of G. Cook, such as CRC-32, "
-                         "CRC-16/MODBUS")  # fmt: skip
+        raise ValueError(
+            f"checksum = {given!r} is not known; SUM-8, SUM-16, XOR-8 are, and CRCs "
+            "by their name in the catalogue of G. Cook, such as CRC-32, "
+            "CRC-16/MODBUS"
+        )
     return name
 
 
@@ -254,7 +288,13 @@ def _signal(table: Mapping[str, Any]) -> Signal:
     if order not in ("little", "big"):
         raise ValueError(f"order = {order!r}; little or big")
     return Signal(
-        str(table["name"]), int(table["start"]), int(table["length"]),
-        bool(table.get("signed", False)), float(table.get("factor", 1.0)), "", order == "big",
-        float(table.get("offset", 0.0)), real=bool(table.get("float", False)),
-    )  # fmt: skip
+        str(table["name"]),
+        int(table["start"]),
+        int(table["length"]),
+        bool(table.get("signed", False)),
+        float(table.get("factor", 1.0)),
+        "",
+        order == "big",
+        float(table.get("offset", 0.0)),
+        real=bool(table.get("float", False)),
+    )

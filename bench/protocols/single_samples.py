@@ -89,9 +89,13 @@ class SingleSamples:
         return [self._frames(counts[new], state[new], anchor, place, elapsed / span)]
 
     def _frames(
-        self, counts: Int16Array, state: IntArray, anchor: tuple[int, int], place: IntArray,
+        self,
+        counts: Int16Array,
+        state: IntArray,
+        anchor: tuple[int, int],
+        place: IntArray,
         step: float,
-    ) -> Frames:  # fmt: skip
+    ) -> Frames:
         m = len(place)
         return Frames(
             wheel=np.full(m, self._wheel),

@@ -22,8 +22,14 @@ from bench.protocols.layouts import Health
 
 LONGEST = 1 + 8 + 1 + 128 + 4
 """Characters of the longest line."""
-_LETTERS = {b"t": (3, False), b"T": (8, False), b"d": (3, True), b"D": (8, True),
-            b"b": (3, True), b"B": (8, True)}  # fmt: skip
+_LETTERS = {
+    b"t": (3, False),
+    b"T": (8, False),
+    b"d": (3, True),
+    b"D": (8, True),
+    b"b": (3, True),
+    b"B": (8, True),
+}
 """Digits of the identifier, and whether it is CAN FD."""
 _REPLIES = frozenset(b"zZVvNFrR")
 """First letters of lines that are no data frame and no damage: replies, remote frames."""

@@ -32,8 +32,9 @@ class UserCan:
     def push(self, batch: CanBatch, arrival: int) -> list[Frames | Measured]:
         """Return strain frames, and between them what the bus tells, before its own frame."""
         told = self._told(batch)
-        wheels = [(wheel, _rows(batch, wheel.map.message, wheel.map.strain[0]))
-                  for wheel in self._wheels]  # fmt: skip
+        wheels = [
+            (wheel, _rows(batch, wheel.map.message, wheel.map.strain[0])) for wheel in self._wheels
+        ]
         known = np.zeros(len(batch), np.bool_)
         known[[row for row, _ in told]] = True
         for _, rows in wheels:
@@ -64,9 +65,12 @@ class UserCan:
 
     @staticmethod
     def _strain(
-        batch: CanBatch, wheels: "list[tuple[_Wheel, BoolArray]]", first: int, end: int,
+        batch: CanBatch,
+        wheels: "list[tuple[_Wheel, BoolArray]]",
+        first: int,
+        end: int,
         arrival: int,
-    ) -> list[Frames | Measured]:  # fmt: skip
+    ) -> list[Frames | Measured]:
         """Return the strain of some rows."""
         return [
             wheel.frames(batch.take(np.flatnonzero(rows[first:end]) + first), arrival)

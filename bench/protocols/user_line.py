@@ -59,13 +59,16 @@ class UserLine:
         if not found:
             return []
         m, packed = len(found), b"".join(body.ljust(self._width, b"\0") for _, body in found)
-        return self._frames.push(CanBatch(
-            identifier=np.array([number for number, _ in found], np.int64),
-            extended=np.zeros(m, np.bool_),
-            fd=np.zeros(m, np.bool_),
-            length=np.full(m, self._width, np.int64),
-            data=np.frombuffer(packed, np.uint8).reshape(m, self._width),
-        ), arrival)  # fmt: skip
+        return self._frames.push(
+            CanBatch(
+                identifier=np.array([number for number, _ in found], np.int64),
+                extended=np.zeros(m, np.bool_),
+                fd=np.zeros(m, np.bool_),
+                length=np.full(m, self._width, np.int64),
+                data=np.frombuffer(packed, np.uint8).reshape(m, self._width),
+            ),
+            arrival,
+        )
 
     def interrupt(self) -> None:
         """Forget a half frame."""
@@ -77,8 +80,11 @@ class Binary:
     """Frames that begin with a sync word; see `Cutter`."""
 
     def __init__(self, messages: Sequence[Message], counts: LineCounts) -> None:
-        self._cuts = [(message.identifier, message.cut) for message in messages
-                      if isinstance(message.cut, BinaryCut)]  # fmt: skip
+        self._cuts = [
+            (message.identifier, message.cut)
+            for message in messages
+            if isinstance(message.cut, BinaryCut)
+        ]
         self._syncs = tuple(cut.sync for _, cut in self._cuts)
         self._longest = max(map(len, self._syncs))
         self._counts = counts
@@ -149,8 +155,11 @@ class Text:
     """Lines of columns; see `Cutter`."""
 
     def __init__(self, messages: Sequence[Message], counts: LineCounts) -> None:
-        self._cuts = [(message.identifier, message.cut) for message in messages
-                      if isinstance(message.cut, TextCut)]  # fmt: skip
+        self._cuts = [
+            (message.identifier, message.cut)
+            for message in messages
+            if isinstance(message.cut, TextCut)
+        ]
         self._counts = counts
         self._tail = b""
         self._too_long = False

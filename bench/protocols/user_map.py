@@ -66,8 +66,7 @@ FORMAT = "tirebench-map/1"
 LONGEST_SIGNAL = 32
 SHORTEST_WRAP = 0.1
 """A counter that wraps sooner needs a time beside it, or a gap could not be seen, [s]."""
-_WANTED = ("name, id, length and signals of CAN; name, sync, struct and fields; or name and "
-           "columns")  # fmt: skip
+_WANTED = "name, id, length and signals of CAN; name, sync, struct and fields; or name and columns"
 _KEYS = {"format", "dbc", "rate_hz", "strain_unit", "wheel", "message", "name", *TELLABLE}
 
 
@@ -133,20 +132,28 @@ class _Reader:
         wheels = [w for table in tables if (w := self._wheel(table, messages, float(rate)))]
         told = [name for name in TELLABLE if name in self.document]
         if not tables and not told:
-            self.fault("wheel", tables, "a table [[wheel]], or one of a condition such as [speed], "
-                       "is needed", "write it")  # fmt: skip
+            self.fault(
+                "wheel",
+                tables,
+                "a table [[wheel]], or one of a condition such as [speed], is needed",
+                "write it",
+            )
         if len({w.wheel for w in wheels}) < len(wheels):
             self.fault("wheel", [w.wheel for w in wheels], "each number may come once")
         device = self._device(wheels)
         quantities = [q for name in told for q in self._quantities(name, messages)]
         places = [(TELLABLE[q.name][0], q.wheel) for q in quantities]
         if twice := {place for place in places if clashes(place, places)}:
-            self.fault("conditions", sorted(twice, key=str), "each may come once for a wheel, or "
-                       "once for all")  # fmt: skip
+            self.fault(
+                "conditions",
+                sorted(twice, key=str),
+                "each may come once for a wheel, or once for all",
+            )
         if self.faults:
             raise DeviceError(self.faults)
-        return UserMap(float(rate), tuple(wheels), device, tuple(quantities), text,
-                       tuple(messages.values()))  # fmt: skip
+        return UserMap(
+            float(rate), tuple(wheels), device, tuple(quantities), text, tuple(messages.values())
+        )
 
     def _tables(self, key: str) -> list[dict[str, Any]]:
         """Return the tables of that name; whatever else has it is a fault."""
@@ -179,8 +186,12 @@ class _Reader:
                 self.fault("message", message.name, "each name may come once")
             messages[message.name] = message
         if len({kind_of(table) for table in tables}) > 1:
-            self.fault("message", [t.get("name") for t in tables], "all are frames of CAN, or all "
-                       "have a sync, or all are columns: a line has one kind")  # fmt: skip
+            self.fault(
+                "message",
+                [t.get("name") for t in tables],
+                "all are frames of CAN, or all "
+                "have a sync, or all are columns: a line has one kind",
+            )
         return messages
 
     def _wheel(
@@ -196,8 +207,11 @@ class _Reader:
             or not all(isinstance(r, list) and len(r) == len(rows[0]) for r in rows)
             or not 1 <= len(rows[0]) <= MOST_GAGES
         ):
-            self.fault(f"{what}: samples", rows, f"lists of 1 to {MOST_GAGES} signals are needed, "
-                       "a list a sample")  # fmt: skip
+            self.fault(
+                f"{what}: samples",
+                rows,
+                f"lists of 1 to {MOST_GAGES} signals are needed, a list a sample",
+            )
             return None
         if message is None:
             return None
@@ -205,8 +219,11 @@ class _Reader:
         strain = [self._signal(what, name, message) for name in names]
         absent = tuple(name == "" for name in rows[0])
         if any(tuple(name == "" for name in row) != absent for row in rows) or all(absent):
-            self.fault(f"{what}: samples", rows, "each sample needs the same gages, one at least; "
-                       'a gage that is not there is ""')  # fmt: skip
+            self.fault(
+                f"{what}: samples",
+                rows,
+                'each sample needs the same gages, one at least; a gage that is not there is ""',
+            )
         counter = self._optional(what, table, "counter", message)
         time = self._optional(what, table, "time", message)
         tick = 1.0
@@ -214,19 +231,32 @@ class _Reader:
             tick = self._seconds(what, table.get("time_unit"), time)
             self._integer(what, time)
         elif counter is None:
-            self.fault(what, sorted(table), "counter or time is needed: else no loss can be seen",
-                       "name one")  # fmt: skip
+            self.fault(
+                what,
+                sorted(table),
+                "counter or time is needed: else no loss can be seen",
+                "name one",
+            )
         elif (wrap := 2**counter.length * len(rows) / rate) < SHORTEST_WRAP:
-            self.fault(f"{what}: counter", counter.name, f"it wraps after {1e3 * wrap:.0f} ms, "
-                       f"{1e3 * SHORTEST_WRAP:.0f} ms are needed without a time, or a gap could "
-                       "not be seen", "name a time too")  # fmt: skip
+            self.fault(
+                f"{what}: counter",
+                counter.name,
+                f"it wraps after {1e3 * wrap:.0f} ms, "
+                f"{1e3 * SHORTEST_WRAP:.0f} ms are needed without a time, or a gap could "
+                "not be seen",
+                "name a time too",
+            )
         if counter is not None:
             self._integer(what, counter)
         used = [s for s in (*strain, counter, time) if s is not None]
         if len({(s.selector, s.selected) for s in used}) > 1:
-            self.fault(f"{what}: samples", [s.name for s in used], "all signals of a wheel, "
-                       "counter and time included, must stand in the same frames: one "
-                       "multiplexer, one value")  # fmt: skip
+            self.fault(
+                f"{what}: samples",
+                [s.name for s in used],
+                "all signals of a wheel, "
+                "counter and time included, must stand in the same frames: one "
+                "multiplexer, one value",
+            )
         number = table.get("wheel")
         if not _is_wheel(number):
             self.fault("wheel", number, "0 .. 255 is needed")
@@ -244,26 +274,40 @@ class _Reader:
     def _signal(self, what: str, name: Any, message: Message) -> Signal | None:
         signal = message.signals.get(str(name))
         if signal is None:
-            self.fault(f"{what}: signal", name, f"{message.name} has the signals "
-                       f"{', '.join(message.signals) or 'none'}")  # fmt: skip
+            self.fault(
+                f"{what}: signal",
+                name,
+                f"{message.name} has the signals {', '.join(message.signals) or 'none'}",
+            )
             return None
         for part in (signal, signal.selector):
             if part is not None and not _fits(part, message):
-                self.fault(f"{what}: signal", part.name, f"1 to {LONGEST_SIGNAL} bits, 32 or 64 of "
-                           f"a real one, inside the {message.length} bytes of {message.name} are "
-                           "allowed")  # fmt: skip
+                self.fault(
+                    f"{what}: signal",
+                    part.name,
+                    f"1 to {LONGEST_SIGNAL} bits, 32 or 64 of "
+                    f"a real one, inside the {message.length} bytes of {message.name} are "
+                    "allowed",
+                )
                 return None
         if signal.selector is not None and signal.selector.selector is not None:
-            self.fault(f"{what}: signal", name, "a multiplexer that is multiplexed itself is not "
-                       "read", "name another")  # fmt: skip
+            self.fault(
+                f"{what}: signal",
+                name,
+                "a multiplexer that is multiplexed itself is not read",
+                "name another",
+            )
             return None
         return signal
 
     def _integer(self, what: str, signal: Signal) -> None:
         if signal.real:
-            self.fault(f"{what}: signal", signal.name, "counter and time must be integers: a real "
-                       "number does not say where it wraps", "name another, or say the bits of "
-                       "the column")  # fmt: skip
+            self.fault(
+                f"{what}: signal",
+                signal.name,
+                "counter and time must be integers: a real number does not say where it wraps",
+                "name another, or say the bits of the column",
+            )
 
     def _optional(
         self, what: str, table: dict[str, Any], key: str, message: Message

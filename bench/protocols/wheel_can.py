@@ -96,8 +96,10 @@ class WheelCan:
         """Take the frames of one wheel."""
         kinds = _KINDS[(batch.identifier - LAYOUTS[RAW16].base) // WHEELS, batch.length]
         there = set(kinds.tolist())
-        rows = {kind: kinds == code if code in there else _none(kinds)
-                for code, kind in enumerate(LAYOUTS)}  # fmt: skip
+        rows = {
+            kind: kinds == code if code in there else _none(kinds)
+            for code, kind in enumerate(LAYOUTS)
+        }
         strain = [kind for kind in (RAW16, RAW12, RAW12C) if _CODES[kind] in there]
         if strain:
             self._kind.setdefault(wheel, strain[0])  # one kind a wheel, the first that is heard
@@ -131,9 +133,14 @@ class WheelCan:
         return self._single[wheel].push(rows[SYNC][taken], batch.data[taken, :8], state[taken])
 
     def _frames(
-        self, wheel: int, kind: str, batch: CanBatch, rows: BoolArray, state: IntArray,
+        self,
+        wheel: int,
+        kind: str,
+        batch: CanBatch,
+        rows: BoolArray,
+        state: IntArray,
         arrival: int,
-    ) -> list[Frames]:  # fmt: skip
+    ) -> list[Frames]:
         if not rows.any():
             return []
         samples = LAYOUTS[kind].samples

@@ -11,8 +11,14 @@ from itertools import pairwise
 from bench.rig.tire import Condition
 from tirelib.errors import ParameterError
 
-STEPS = {"load": 400.0, "slip_angle": 0.01, "slip_ratio": 0.01, "speed": 3.0, "pressure": 2e4,
-         "camber": 0.02}  # fmt: skip
+STEPS = {
+    "load": 400.0,
+    "slip_angle": 0.01,
+    "slip_ratio": 0.01,
+    "speed": 3.0,
+    "pressure": 2e4,
+    "camber": 0.02,
+}
 """Farthest that two solutions lie apart, SI."""
 
 

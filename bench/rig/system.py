@@ -68,8 +68,12 @@ class Balance:
     def matrix(self) -> csc_matrix:
         """Derivative of the residual, without that of laws of the belt that have none."""
         lay, tire, cond, grid, contact = (
-            pattern(self.grid), self.tire, self.cond, self.grid, self.road,
-        )  # fmt: skip
+            pattern(self.grid),
+            self.tire,
+            self.cond,
+            self.grid,
+            self.road,
+        )
         _, tangent = internal(tire, cond, self.omega, self.z)
         add_stiffness(cond, grid, contact, tangent)
         data = [

@@ -91,9 +91,18 @@ def balance(
     )
     force, stiff = zip(*work, strict=True)
     return Balance(
-        tire, law, cond, mesh, u, height, rolling, omega,
-        mesh.add.vector(list(force)), stiff, contact,
-    )  # fmt: skip
+        tire,
+        law,
+        cond,
+        mesh,
+        u,
+        height,
+        rolling,
+        omega,
+        mesh.add.vector(list(force)),
+        stiff,
+        contact,
+    )
 
 
 def sidewall_force(

@@ -36,10 +36,21 @@ def main() -> None:
     parser.add_argument("--seed", type=int, required=True, help="0 or above")
     parser.add_argument("--out", type=Path, required=True, help="folder of the campaign")
     parser.add_argument("--plan", type=int, choices=(66, 15), default=66, help="number of runs")
-    parser.add_argument("--effect", action="append", default=[], choices=sorted(EFFECTS),
-                        metavar="NAME", help="hide this; may be given several times")  # fmt: skip
-    parser.add_argument("--strength", action="append", default=[], type=float,
-                        help="of each effect in turn; default: one that shows clearly")  # fmt: skip
+    parser.add_argument(
+        "--effect",
+        action="append",
+        default=[],
+        choices=sorted(EFFECTS),
+        metavar="NAME",
+        help="hide this; may be given several times",
+    )
+    parser.add_argument(
+        "--strength",
+        action="append",
+        default=[],
+        type=float,
+        help="of each effect in turn; default: one that shows clearly",
+    )
     parser.add_argument("--force", action="store_true", help="replace a campaign that is there")
     given = parser.parse_args()
     if given.strength and len(given.strength) != len(given.effect):

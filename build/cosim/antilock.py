@@ -93,8 +93,10 @@ class Road:
 def _split(side: str, start: str) -> Road:
     low, even = (LOW, 1.0) if side == "left" else (1.0, LOW), (1.0, 1.0)
     first, then = (low, even) if start == "leaving" else (even, low)
-    words = {"entering": "comes under the {} wheels after {} m", "leaving": "under the {} wheels "
-             "ends after {} m"}[start]  # fmt: skip
+    words = {
+        "entering": "comes under the {} wheels after {} m",
+        "leaving": "under the {} wheels ends after {} m",
+    }[start]
     title = f"friction {LOW:g} " + words.format(side, f"{CHANGE:g}")
     return Road(f"split_{side}_{start}", title, ((-math.inf, *first), (CHANGE, *then)))
 
@@ -105,12 +107,20 @@ LOW, CHANGE = 0.4, 12.0
 """Factor of the slippery side of a split road, and where it begins or ends [m]."""
 ROADS = (
     Road("low", "friction 0.4, not known", ((-math.inf, 0.4, 0.4),)),
-    Road("changing", "friction 0.9, from 10 m on 0.4, from 25 m on 0.7",
-         ((-math.inf, 0.9, 0.9), (10.0, 0.4, 0.4), (25.0, 0.7, 0.7))),
-    Road("turn", "turn of 2 m/s\N{SUPERSCRIPT TWO}, friction 0.5, not known",
-         ((-math.inf, 0.5, 0.5),), 0.0135, 1.2),
+    Road(
+        "changing",
+        "friction 0.9, from 10 m on 0.4, from 25 m on 0.7",
+        ((-math.inf, 0.9, 0.9), (10.0, 0.4, 0.4), (25.0, 0.7, 0.7)),
+    ),
+    Road(
+        "turn",
+        "turn of 2 m/s\N{SUPERSCRIPT TWO}, friction 0.5, not known",
+        ((-math.inf, 0.5, 0.5),),
+        0.0135,
+        1.2,
+    ),
     *(_split(side, start) for side in ("left", "right") for start in ("entering", "leaving")),
-)  # fmt: skip
+)
 """Two even roads, a turn; four starts of a split one: either side is the slippery one, and the stop
 begins on even ground and enters the split, or begins on the split and leaves it."""
 STARTS_OF_SPLIT = 4
@@ -354,8 +364,10 @@ def stop(road: Road, brakes: Brakes, *, end_speed: float = END_SPEED) -> StopRun
         if since > LONGEST:
             raise ConvergenceError(
                 f"braking, {road.title}: {speed:.1f} m/s after {LONGEST:g} s; the controller does "
-                "not stop the vehicle; look at what it knows", drive.state, speed - end_speed,
-            )  # fmt: skip
+                "not stop the vehicle; look at what it knows",
+                drive.state,
+                speed - end_speed,
+            )
         sensors = Sensors.of(drive.state, motion)
         told = estimator.step(told, sensors, STEP)
         felt = dataclasses.replace(motion.wheels, alpha=np.arctan(drive.state[SIDE_SLIP]))
@@ -385,12 +397,27 @@ def stop(road: Road, brakes: Brakes, *, end_speed: float = END_SPEED) -> StopRun
             drift = math.atan2(drive.state[11], drive.state[10])
             aside += speed * math.sin(off + drift) * STEP
             w, known = motion.wheels, getattr(brakes, "known", _NOTHING)
-            log.add((since, way, speed, told, off, aside, angle), w.kappa, w.Fz, w.alpha, torque,
-                    factor, known.kappa, known.load, known.alpha)  # fmt: skip
-        motion = drive.step(STEP, Controls(
-            steer=np.array([angle, angle, 0.0, 0.0]), drive=push, brake=torque, friction=factor,
-            road=np.zeros(4),
-        ))  # fmt: skip
+            log.add(
+                (since, way, speed, told, off, aside, angle),
+                w.kappa,
+                w.Fz,
+                w.alpha,
+                torque,
+                factor,
+                known.kappa,
+                known.load,
+                known.alpha,
+            )
+        motion = drive.step(
+            STEP,
+            Controls(
+                steer=np.array([angle, angle, 0.0, 0.0]),
+                drive=push,
+                brake=torque,
+                friction=factor,
+                road=np.zeros(4),
+            ),
+        )
         before, speed = speed, float(np.hypot(*drive.state[10:12]))
         way += 0.5 * (before + speed) * STEP * (since >= 0.0)
         time += STEP
@@ -398,10 +425,12 @@ def stop(road: Road, brakes: Brakes, *, end_speed: float = END_SPEED) -> StopRun
     over = (end_speed - speed) / max(before - speed, 1e-12)  # the end lies within the last step
     source = getattr(brakes, "source", None)
     return StopRun(
-        way - over * before * STEP, *scalars.T, *tables,
+        way - over * before * STEP,
+        *scalars.T,
+        *tables,
         refused=int(getattr(source, "refused", 0)),
         out_of_range=int(getattr(source, "out_of_range", 0)),
-    )  # fmt: skip
+    )
 
 
 _NOTHING = Known(*np.full((3, 4), np.nan))
@@ -426,14 +455,25 @@ class AntiLockStudy:
     def document(self) -> dict[str, Any]:
         """Return the figures as JSON knows them."""
         rows = [
-            {"road": road.name, "title": road.title, "knowledge": kind, **run.figures(),
-             "estimates_refused": run.refused, "out_of_range": run.out_of_range}
+            {
+                "road": road.name,
+                "title": road.title,
+                "knowledge": kind,
+                **run.figures(),
+                "estimates_refused": run.refused,
+                "out_of_range": run.out_of_range,
+            }
             for road in self.roads
             for kind in KINDS
             for run in (self.runs[road.name, kind],)
-        ]  # fmt: skip
-        return {"from_kmh": 3.6 * SPEED, "to_kmh": 3.6 * END_SPEED, "falling": FALLING,
-                "vehicle": "14 degrees of freedom", "rows": rows}  # fmt: skip
+        ]
+        return {
+            "from_kmh": 3.6 * SPEED,
+            "to_kmh": 3.6 * END_SPEED,
+            "falling": FALLING,
+            "vehicle": "14 degrees of freedom",
+            "rows": rows,
+        }
 
 
 def study(

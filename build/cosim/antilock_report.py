@@ -39,9 +39,12 @@ def part(study: AntiLockStudy) -> Part:
     """Return the part of a page."""
     shown = [road for road in study.roads if road.name in SHOWN]
     return Part(
-        "Closed loop: anti-lock braking on roads of unknown friction (14-DOF vehicle)", "antilock",
-        sentence(study), tables=[table(study)], plots=[_plot(study, road) for road in shown],
-    )  # fmt: skip
+        "Closed loop: anti-lock braking on roads of unknown friction (14-DOF vehicle)",
+        "antilock",
+        sentence(study),
+        tables=[table(study)],
+        plots=[_plot(study, road) for road in shown],
+    )
 
 
 def table(study: AntiLockStudy) -> Table:
@@ -51,14 +54,30 @@ def table(study: AntiLockStudy) -> Table:
         for kind in KINDS:
             run = study.runs[road.name, kind]
             found = run.figures()
-            rows.append((
-                road.title, kind, number(found["distance_m"], 4),
-                f"{found['largest_yaw_deg']:.2f}", f"{found['largest_aside_m']:.2f}",
-                f"{100.0 * found['largest_slip']:.0f}", f"{found['largest_steer_deg']:.2f}",
-                f"{found['steering_deg']:.1f}", str(run.refused) if kind == "strain" else "",
-            ))  # fmt: skip
-    head = ("road", "knowledge", "way [m]", "yaw [deg]", "aside [m]", "slip [%]",
-            "wheel angle [deg]", "steering [deg]", "refused")  # fmt: skip
+            rows.append(
+                (
+                    road.title,
+                    kind,
+                    number(found["distance_m"], 4),
+                    f"{found['largest_yaw_deg']:.2f}",
+                    f"{found['largest_aside_m']:.2f}",
+                    f"{100.0 * found['largest_slip']:.0f}",
+                    f"{found['largest_steer_deg']:.2f}",
+                    f"{found['steering_deg']:.1f}",
+                    str(run.refused) if kind == "strain" else "",
+                )
+            )
+    head = (
+        "road",
+        "knowledge",
+        "way [m]",
+        "yaw [deg]",
+        "aside [m]",
+        "slip [%]",
+        "wheel angle [deg]",
+        "steering [deg]",
+        "refused",
+    )
     title = f"Stops from {3.6 * SPEED:.0f} to {3.6 * END_SPEED:.0f} km/h"
     return Table(title, head, rows, texts=2, note=NOTE)
 
@@ -97,9 +116,13 @@ def _compare(study: AntiLockStudy, roads: Sequence[Road]) -> str:
 def _plot(study: AntiLockStudy, road: Road) -> Plot:
     """Draw slip and torque of both front wheels, and the yaw and the steering."""
     figure = make_subplots(
-        3, 2, shared_xaxes=True, vertical_spacing=0.06, horizontal_spacing=0.09,
+        3,
+        2,
+        shared_xaxes=True,
+        vertical_spacing=0.06,
+        horizontal_spacing=0.09,
         column_titles=["front left", "front right"],
-    )  # fmt: skip
+    )
     rows: list[tuple[str | float, ...]] = []
     for kind in KINDS:
         run = study.runs[road.name, kind]
@@ -110,12 +133,24 @@ def _plot(study: AntiLockStudy, road: Road) -> Plot:
             series = (slip, run.torque[:, wheel], last[column - 1])
             for row, values in enumerate(series, start=1):
                 figure.add_scatter(
-                    x=run.time[::EVERY], y=values[::EVERY], name=kind, mode="lines",
-                    line={"color": colour, "dash": dash, "width": 1.6}, legendgroup=kind,
-                    showlegend=(row, column) == (1, 1), row=row, col=column,
-                )  # fmt: skip
-        table = (run.time, 100.0 * run.kappa[:, 0], 100.0 * run.kappa[:, 1], run.torque[:, 0],
-                 run.torque[:, 1], *last)  # fmt: skip
+                    x=run.time[::EVERY],
+                    y=values[::EVERY],
+                    name=kind,
+                    mode="lines",
+                    line={"color": colour, "dash": dash, "width": 1.6},
+                    legendgroup=kind,
+                    showlegend=(row, column) == (1, 1),
+                    row=row,
+                    col=column,
+                )
+        table = (
+            run.time,
+            100.0 * run.kappa[:, 0],
+            100.0 * run.kappa[:, 1],
+            run.torque[:, 0],
+            run.torque[:, 1],
+            *last,
+        )
         rows += [
             (kind, *(round(float(x), 5) for x in values))
             for values in np.stack(table, axis=1)[::EVERY]
@@ -128,9 +163,19 @@ def _plot(study: AntiLockStudy, road: Road) -> Plot:
     figure.update_xaxes(title_text="time since the brakes [s]", row=3)
     styled_figure(figure, 720, legend={"orientation": "h", "y": -0.1})
     return Plot(
-        f"antilock-{road.name}", f"{road.title[0].upper()}{road.title[1:]}",
+        f"antilock-{road.name}",
+        f"{road.title[0].upper()}{road.title[1:]}",
         f"A slip ratio below {100.0 * DEEPEST:.0f} % is drawn there. ISO 8855: left is positive.",
-        figure, ("knowledge", "time [s]", "slip ratio front left [%]", "front right [%]",
-                 "torque front left [N m]", "front right [N m]", "yaw [deg]", "steering [deg]"),
+        figure,
+        (
+            "knowledge",
+            "time [s]",
+            "slip ratio front left [%]",
+            "front right [%]",
+            "torque front left [N m]",
+            "front right [N m]",
+            "yaw [deg]",
+            "steering [deg]",
+        ),
         rows,
-    )  # fmt: skip
+    )

@@ -86,9 +86,8 @@ def straight_ahead() -> FloatArray:
     """Return conditions as `design` does: loads, rolling freely at two speeds, and braking."""
     free = [(load, 0.0, 0.0, 0.0, v) for load, v in itertools.product(LOADS_FREE, (12.0, 22.0))]
     braking = [
-        (load, 0.0, -slip, 0.0, 18.0)
-        for load, slip in itertools.product(LOADS_BRAKING, BRAKING)
-    ]  # fmt: skip
+        (load, 0.0, -slip, 0.0, 18.0) for load, slip in itertools.product(LOADS_BRAKING, BRAKING)
+    ]
     return np.array([*free, *braking])
 
 
@@ -131,9 +130,12 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--out", type=Path, default=CALIBRATION, metavar="CAL.toml")
     parser.add_argument(
-        "--data", type=Path, default=root / "build/out/cosim", metavar="DIR",
+        "--data",
+        type=Path,
+        default=root / "build/out/cosim",
+        metavar="DIR",
         help="where the rig's measurements go",
-    )  # fmt: skip
+    )
     given = parser.parse_args()
     folders = []
     for name, (plan, day) in plans(given.points).items():
@@ -142,9 +144,14 @@ def main() -> None:
             continue
         with progress_bar(f"measuring {name}", len(plan.conditions)) as advance:
             run_plan(
-                plan, tire("reference"), given.data / name, seed=day, jobs=given.jobs,
-                overwrite=True, progress=lambda *_, say=advance: say(""),
-            )  # fmt: skip
+                plan,
+                tire("reference"),
+                given.data / name,
+                seed=day,
+                jobs=given.jobs,
+                overwrite=True,
+                progress=lambda *_, say=advance: say(""),
+            )
     command = [str(Path(sys.executable).with_name("tirelib")), "calibrate", *folders]
     sys.exit(subprocess.run([*command, "--out", str(given.out)], check=False).returncode)
 

@@ -170,8 +170,10 @@ def brake(
         if time > LONGEST:
             raise ConvergenceError(
                 f"braking, {road.title}: {speed:.1f} m/s after {LONGEST:g} s; the controller does "
-                "not stop the vehicle; look at what it knows", drive.state, speed - end_speed,
-            )  # fmt: skip
+                "not stop the vehicle; look at what it knows",
+                drive.state,
+                speed - end_speed,
+            )
         given = dataclasses.replace(given, steer=road.angles(*drive.state[[YAW, YAW_RATE]]))
         if time < road.rolling:
             known = source.step(time, motion.wheels, drive.state[SPIN])
@@ -184,8 +186,17 @@ def brake(
             known = source.step(time, motion.wheels, drive.state[SPIN])
             asked, torque = control.step(asked, known, slowing, speed, since)
             wheels = motion.wheels
-            rows.append((np.array([since, way, speed]), wheels.kappa, wheels.Fz, wheels.alpha,
-                         known.kappa, known.load, torque))  # fmt: skip
+            rows.append(
+                (
+                    np.array([since, way, speed]),
+                    wheels.kappa,
+                    wheels.Fz,
+                    wheels.alpha,
+                    known.kappa,
+                    known.load,
+                    torque,
+                )
+            )
             spin = drive.state[SPIN]
             held = dataclasses.replace(given, brake=torque, friction=road.friction(way))
             motion = drive.step(STEP, held)

@@ -41,11 +41,13 @@ def parts(study: Study) -> list[Part]:
     words = " ".join(sentence(study, road) for road in roads)
     return [
         Part(
-            "Closed loop: slip control (14-DOF vehicle)", "closed_loop", words,
+            "Closed loop: slip control (14-DOF vehicle)",
+            "closed_loop",
+            words,
             tables=[table(study)],
             plots=[_plot(study, road) for road in roads],
         )
-    ]  # fmt: skip
+    ]
 
 
 def table(study: Study) -> Table:
@@ -63,8 +65,16 @@ def table(study: Study) -> Table:
         )
         for o in study.outcomes
     ]
-    head = ("road", "knowledge", "distance [m]", "spread [m]", "longer by [%]",
-            "rms slip error [%]", "rear slip angle [deg]", "refused")  # fmt: skip
+    head = (
+        "road",
+        "knowledge",
+        "distance [m]",
+        "spread [m]",
+        "longer by [%]",
+        "rms slip error [%]",
+        "rear slip angle [deg]",
+        "refused",
+    )
     return Table("Stopping with once-per-turn knowledge", head, rows, texts=2, note=NOTE)
 
 
@@ -87,9 +97,13 @@ def _delay(outcome: Outcome) -> float:
 def _plot(study: Study, road: str) -> Plot:
     """Draw slip, load and brake torque of a front and a rear wheel."""
     figure = make_subplots(
-        3, 2, shared_xaxes=True, vertical_spacing=0.05, horizontal_spacing=0.08,
+        3,
+        2,
+        shared_xaxes=True,
+        vertical_spacing=0.05,
+        horizontal_spacing=0.08,
         column_titles=[f"{name} wheel" for _, name in SHOWN],
-    )  # fmt: skip
+    )
     rows: list[tuple[str | float, ...]] = []
     for outcome in (o for o in study.outcomes if o.road == road):
         run = outcome.runs[0]
@@ -105,24 +119,35 @@ def _plot(study: Study, road: str) -> Plot:
             ]
     strain = study.of(road, "strain").runs[0]
     for column, (wheel, _) in enumerate(SHOWN, start=1):
-        told = {"slip": 100.0 * strain.known_kappa[:, wheel],
-                "load": 1e-3 * strain.known_load[:, wheel]}  # fmt: skip
-        _lines(figure, column, strain.time, told, "estimated from strain",
-               {"color": FAINT, "shape": "hv", "width": 1.2})  # fmt: skip
-        figure.add_hline(100.0 * SlipController().target, row=1, col=column, line_width=0.8,
-                         line_color=FAINT)  # fmt: skip
+        told = {
+            "slip": 100.0 * strain.known_kappa[:, wheel],
+            "load": 1e-3 * strain.known_load[:, wheel],
+        }
+        _lines(
+            figure,
+            column,
+            strain.time,
+            told,
+            "estimated from strain",
+            {"color": FAINT, "shape": "hv", "width": 1.2},
+        )
+        figure.add_hline(
+            100.0 * SlipController().target, row=1, col=column, line_width=0.8, line_color=FAINT
+        )
         figure.update_xaxes(title_text="time since the brakes [s]", row=3, col=column)
     for row, text in enumerate(("slip ratio [%]", "load [kN]", "brake torque [N m]"), start=1):
         figure.update_yaxes(title_text=text, row=row, col=1)
     styled_figure(figure, 680, legend={"orientation": "h", "y": -0.1})
     title = _TITLES[road]
     return Plot(
-        f"closed_loop_{road}", f"{title[0].upper()}{title[1:]}",
+        f"closed_loop_{road}",
+        f"{title[0].upper()}{title[1:]}",
         "One run with each kind of knowledge; the thin line is what the controller is told by the "
         "strain tires. The target is the horizontal line, without a slip angle.",
-        figure, ("knowledge", "wheel", "time [s]", "slip ratio [%]", "load [kN]",
-                 "brake torque [N m]"), rows,
-    )  # fmt: skip
+        figure,
+        ("knowledge", "wheel", "time [s]", "slip ratio [%]", "load [kN]", "brake torque [N m]"),
+        rows,
+    )
 
 
 def _series(run: BrakingRun, wheel: int) -> dict[str, FloatArray]:
@@ -134,14 +159,24 @@ def _series(run: BrakingRun, wheel: int) -> dict[str, FloatArray]:
 
 
 def _lines(
-    figure: go.Figure, column: int, time: FloatArray, series: Mapping[str, FloatArray], name: str,
+    figure: go.Figure,
+    column: int,
+    time: FloatArray,
+    series: Mapping[str, FloatArray],
+    name: str,
     line: Mapping[str, object],
-) -> None:  # fmt: skip
+) -> None:
     for row, values in enumerate(series.values(), start=1):
         figure.add_trace(
             go.Scatter(
-                x=time[::EVERY], y=values[::EVERY], name=name, mode="lines", line=dict(line),
-                legendgroup=name, showlegend=(row, column) == (1, 1),
+                x=time[::EVERY],
+                y=values[::EVERY],
+                name=name,
+                mode="lines",
+                line=dict(line),
+                legendgroup=name,
+                showlegend=(row, column) == (1, 1),
             ),
-            row=row, col=column,
-        )  # fmt: skip
+            row=row,
+            col=column,
+        )

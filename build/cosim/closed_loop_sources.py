@@ -151,6 +151,11 @@ class Strain:
 
 def _states(wheels: Wheels, omega: FloatArray) -> WheelStates:
     return WheelStates(
-        load=wheels.Fz, alpha=wheels.alpha, kappa=wheels.kappa, camber=wheels.camber,
-        speed=wheels.speed, omega=omega, friction=OWN_FRICTION * wheels.friction,
-    )  # fmt: skip
+        load=wheels.Fz,
+        alpha=wheels.alpha,
+        kappa=wheels.kappa,
+        camber=wheels.camber,
+        speed=wheels.speed,
+        omega=omega,
+        friction=OWN_FRICTION * wheels.friction,
+    )

@@ -109,8 +109,9 @@ class StabilityController:
         load, slip = float(known.load[outside]), float(known.kappa[outside])
         if math.isfinite(load) and math.isfinite(slip):
             force = min(self.gain * abs(excess) / self.half_track, self.most * load)
-            found[outside] = self.radius * force * float(np.clip(2.0 - 2.0 * slip / self.deepest,
-                                                                 0.0, 1.0))  # fmt: skip
+            found[outside] = (
+                self.radius * force * float(np.clip(2.0 - 2.0 * slip / self.deepest, 0.0, 1.0))
+            )
         return found
 
 
@@ -174,17 +175,26 @@ def swerve(
         known = source.step(time, wheels, drive.state[SPIN]) if source is not None else unknown
         torque, angle = control.torque(known), road.steer(time)
         x = drive.state
-        scalars = (time, angle, x[YAW_RATE], math.atan2(x[SIDE], x[FORWARD]),
-                   math.hypot(x[FORWARD], x[SIDE]))  # fmt: skip
+        scalars = (
+            time,
+            angle,
+            x[YAW_RATE],
+            math.atan2(x[SIDE], x[FORWARD]),
+            math.hypot(x[FORWARD], x[SIDE]),
+        )
         rows.append((np.array(scalars), wheels.alpha, wheels.kappa, known.alpha, torque))
         steer = np.array([angle, angle, 0.0, 0.0])
         motion = drive.step(STEP, dataclasses.replace(given, steer=steer, brake=torque))
     table, alpha, kappa, told, torques = (np.array(x) for x in zip(*rows, strict=True))
     return SwerveRun(
-        *table.T, alpha, kappa, told, torques,
+        *table.T,
+        alpha,
+        kappa,
+        told,
+        torques,
         out_of_range=int(getattr(source, "out_of_range", 0)),
         refused=int(getattr(source, "refused", 0)),
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True)

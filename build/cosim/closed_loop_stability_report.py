@@ -27,9 +27,12 @@ NOTE = (
 def part(outcomes: Sequence[StabilityOutcome]) -> Part:
     """Return the part of a page."""
     return Part(
-        "Closed loop: stability control (14-DOF vehicle)", "stability", sentence(outcomes),
-        tables=[table(outcomes)], plots=[_plot(outcomes)],
-    )  # fmt: skip
+        "Closed loop: stability control (14-DOF vehicle)",
+        "stability",
+        sentence(outcomes),
+        tables=[table(outcomes)],
+        plots=[_plot(outcomes)],
+    )
 
 
 def table(outcomes: Sequence[StabilityOutcome]) -> Table:
@@ -45,8 +48,14 @@ def table(outcomes: Sequence[StabilityOutcome]) -> Table:
         )
         for o in outcomes
     ]
-    head = ("knowledge", "rear slip angle [deg]", "side slip [deg]", "speed lost [km/h]",
-            "largest torque [N m]", "refused")  # fmt: skip
+    head = (
+        "knowledge",
+        "rear slip angle [deg]",
+        "side slip [deg]",
+        "speed lost [km/h]",
+        "largest torque [N m]",
+        "refused",
+    )
     return Table("Sine with dwell, the rear wheels on a slippery road", head, rows, note=NOTE)
 
 
@@ -73,25 +82,38 @@ def _plot(outcomes: Sequence[StabilityOutcome]) -> Plot:
         series = (rear, np.degrees(run.side_slip), run.torque[:, :2] @ np.array([1.0, -1.0]))
         for row, values in enumerate(series, start=1):
             figure.add_scatter(
-                x=run.time[::EVERY], y=values[::EVERY], name=outcome.source, mode="lines",
-                line={"color": colour, "dash": dash}, legendgroup=outcome.source,
-                showlegend=row == 1, row=row, col=1,
-            )  # fmt: skip
+                x=run.time[::EVERY],
+                y=values[::EVERY],
+                name=outcome.source,
+                mode="lines",
+                line={"color": colour, "dash": dash},
+                legendgroup=outcome.source,
+                showlegend=row == 1,
+                row=row,
+                col=1,
+            )
         rows += [
             (outcome.source, *(round(float(x), 5) for x in values))
             for values in np.stack([run.time, *series], axis=1)[::EVERY]
         ]
     strain = next(o for o in outcomes if o.source == "strain").runs[0]
     figure.add_scatter(
-        x=strain.time[::EVERY], y=np.degrees(strain.known_alpha[::EVERY, 2:].mean(axis=1)),
-        name="estimated from strain", mode="lines",
-        line={"color": FAINT, "shape": "hv", "width": 1.2}, row=1, col=1,
-    )  # fmt: skip
+        x=strain.time[::EVERY],
+        y=np.degrees(strain.known_alpha[::EVERY, 2:].mean(axis=1)),
+        name="estimated from strain",
+        mode="lines",
+        line={"color": FAINT, "shape": "hv", "width": 1.2},
+        row=1,
+        col=1,
+    )
     for limit in (-1.0, 1.0):
         figure.add_hline(
-            limit * math.degrees(StabilityController().threshold), row=1, col=1, line_width=0.8,
+            limit * math.degrees(StabilityController().threshold),
+            row=1,
+            col=1,
+            line_width=0.8,
             line_color=FAINT,
-        )  # fmt: skip
+        )
     for row, text in enumerate(
         ("rear slip angle [deg]", "side slip [deg]", "front brakes, left less right [N m]"), start=1
     ):
@@ -101,8 +123,16 @@ def _plot(outcomes: Sequence[StabilityOutcome]) -> Plot:
     figure.update_xaxes(title_text="time [s]", row=3, col=1)
     styled_figure(figure, 680, legend={"orientation": "h", "y": -0.1})
     return Plot(
-        "closed_loop_stability", "Sine with dwell",
+        "closed_loop_stability",
+        "Sine with dwell",
         "One run with each kind of knowledge; beyond the horizontal lines the controller brakes.",
-        figure, ("knowledge", "time [s]", "rear slip angle [deg]", "side slip [deg]",
-                 "brake torque left less right [N m]"), rows,
-    )  # fmt: skip
+        figure,
+        (
+            "knowledge",
+            "time [s]",
+            "rear slip angle [deg]",
+            "side slip [deg]",
+            "brake torque left less right [N m]",
+        ),
+        rows,
+    )

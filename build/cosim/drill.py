@@ -38,9 +38,9 @@ def drill(wheels: FourWheels) -> list[dict[str, Any]]:
     found = []
     for first in range(0, len(CASES), len(WHEELS)):
         cases = CASES[first : first + len(WHEELS)]
-        steady = WheelStates(**{
-            name: np.full(len(WHEELS), value) for name, value in _START.items()
-        })  # fmt: skip
+        steady = WheelStates(
+            **{name: np.full(len(WHEELS), value) for name, value in _START.items()}
+        )
         out = steady
         for at, (_, name, value) in enumerate(cases):
             changed = getattr(out, name).copy()
@@ -53,11 +53,13 @@ def drill(wheels: FourWheels) -> list[dict[str, Any]]:
             dropped = np.flatnonzero(~valid[before:])
             omega = told["tire_omega"][before - 1, at]
             turns = dropped[0] * STEP * omega / (2.0 * np.pi) if dropped.size else np.nan
-            found.append({
-                "case": words,
-                "valid_before": bool(valid[before - 1]),
-                "turns": float(turns),
-                "stays": bool(dropped.size and not valid[before + dropped[0] :].any()),
-                "passed": bool(valid[before - 1] and dropped.size and turns <= TURNS),
-            })  # fmt: skip
+            found.append(
+                {
+                    "case": words,
+                    "valid_before": bool(valid[before - 1]),
+                    "turns": float(turns),
+                    "stays": bool(dropped.size and not valid[before + dropped[0] :].any()),
+                    "passed": bool(valid[before - 1] and dropped.size and turns <= TURNS),
+                }
+            )
     return found

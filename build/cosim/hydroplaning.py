@@ -154,10 +154,15 @@ def approach(kind: str, four: FourWheels | None = None) -> Approach:
         asked += (GENTLE * brakes - asked) * min(STEP / 0.1, 1.0)
         force = p.mass * asked * 0.31
         hold = p.drag * speed**2 * 0.31 * (not brakes)
-        motion = drive.step(STEP, dataclasses.replace(
-            Controls.none(), friction=factor, drive=np.array([0.5, 0.5, 0.0, 0.0]) * hold,
-            brake=force * np.array([0.35, 0.35, 0.15, 0.15]),
-        ))  # fmt: skip
+        motion = drive.step(
+            STEP,
+            dataclasses.replace(
+                Controls.none(),
+                friction=factor,
+                drive=np.array([0.5, 0.5, 0.0, 0.0]) * hold,
+                brake=force * np.array([0.35, 0.35, 0.15, 0.15]),
+            ),
+        )
         before, speed = speed, float(np.hypot(*drive.state[10:12]))
         way += 0.5 * (before + speed) * STEP
         time += STEP
@@ -166,9 +171,15 @@ def approach(kind: str, four: FourWheels | None = None) -> Approach:
 
 def _states(wheels: Any, omega: FloatArray, wedge: FloatArray, factor: FloatArray) -> WheelStates:
     return WheelStates(
-        load=wheels.Fz, alpha=wheels.alpha, kappa=wheels.kappa, camber=wheels.camber,
-        speed=wheels.speed, omega=omega, friction=OWN_FRICTION * factor, wedge=wedge,
-    )  # fmt: skip
+        load=wheels.Fz,
+        alpha=wheels.alpha,
+        kappa=wheels.kappa,
+        camber=wheels.camber,
+        speed=wheels.speed,
+        omega=omega,
+        friction=OWN_FRICTION * factor,
+        wedge=wedge,
+    )
 
 
 Drives = dict[str, Approach]
@@ -199,14 +210,18 @@ def missed(drives: Drives) -> list[str]:
 def document(drives: Drives) -> dict[str, Any]:
     """Return the figures as JSON knows them."""
     rows = [
-        {"knowledge": kind} | {
-            name: value if math.isfinite(value) else None
-            for name, value in run.figures().items()
-        }
+        {"knowledge": kind}
+        | {name: value if math.isfinite(value) else None for name, value in run.figures().items()}
         for kind, run in drives.items()
-    ]  # fmt: skip
-    return {"from_kmh": 3.6 * SPEED, "strength": STRENGTH, "water_from_m": BEGINS,
-            "place_m": PLACE, "vehicle": "14 degrees of freedom", "rows": rows}  # fmt: skip
+    ]
+    return {
+        "from_kmh": 3.6 * SPEED,
+        "strength": STRENGTH,
+        "water_from_m": BEGINS,
+        "place_m": PLACE,
+        "vehicle": "14 degrees of freedom",
+        "rows": rows,
+    }
 
 
 def main(arguments: list[str] | None = None) -> int:

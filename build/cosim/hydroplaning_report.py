@@ -21,9 +21,12 @@ NOTE = (
 def part(drives: Drives) -> Part:
     """Return the part of a page."""
     return Part(
-        "Closed loop: hydroplaning (14-DOF vehicle)", "hydroplaning", sentence(drives),
-        tables=[table(drives)], plots=[_plot(drives)],
-    )  # fmt: skip
+        "Closed loop: hydroplaning (14-DOF vehicle)",
+        "hydroplaning",
+        sentence(drives),
+        tables=[table(drives)],
+        plots=[_plot(drives)],
+    )
 
 
 def table(drives: Drives) -> Table:
@@ -31,12 +34,22 @@ def table(drives: Drives) -> Table:
     rows = []
     for kind, run in drives.items():
         found = run.figures()
-        rows.append((
-            kind, number(round(found["noticed_after_m"], 1), 3), number(found["speed_kmh"], 3),
-            number(100.0 * found["share_of_water"], 3), number(found["stopping_way_m"], 3),
-        ))  # fmt: skip
-    head = ("knowledge", "noticed after [m]", "speed [km/h]", "load on the water [%]",
-            "stopping way from there [m]")  # fmt: skip
+        rows.append(
+            (
+                kind,
+                number(round(found["noticed_after_m"], 1), 3),
+                number(found["speed_kmh"], 3),
+                number(100.0 * found["share_of_water"], 3),
+                number(found["stopping_way_m"], 3),
+            )
+        )
+    head = (
+        "knowledge",
+        "noticed after [m]",
+        "speed [km/h]",
+        "load on the water [%]",
+        "stopping way from there [m]",
+    )
     title = f"{PLACE - BEGINS:.0f} m into the water, from {3.6 * SPEED:.0f} km/h"
     return Table(title, head, rows, note=NOTE)
 
@@ -61,9 +74,16 @@ def _plot(drives: Drives) -> Plot:
         line = {"color": colour, "dash": dash, "width": 1.6}
         for row, values in ((1, 3.6 * run.speed), (2, 100.0 * run.share)):
             figure.add_scatter(
-                x=run.way[::EVERY], y=values[::EVERY], name=kind, mode="lines", line=line,
-                legendgroup=kind, showlegend=row == 1, row=row, col=1,
-            )  # fmt: skip
+                x=run.way[::EVERY],
+                y=values[::EVERY],
+                name=kind,
+                mode="lines",
+                line=line,
+                legendgroup=kind,
+                showlegend=row == 1,
+                row=row,
+                col=1,
+            )
         table = (run.way, 3.6 * run.speed, 100.0 * run.share, 100.0 * run.known)
         rows += [
             (kind, *(round(float(x), 4) for x in values))
@@ -71,17 +91,24 @@ def _plot(drives: Drives) -> Plot:
         ]
     strain = drives["strain"]
     figure.add_scatter(
-        x=strain.way[::EVERY], y=100.0 * strain.known[::EVERY], name="told by strain", mode="lines",
-        line={"color": FAINT, "shape": "hv", "width": 1.2}, row=2, col=1,
-    )  # fmt: skip
+        x=strain.way[::EVERY],
+        y=100.0 * strain.known[::EVERY],
+        name="told by strain",
+        mode="lines",
+        line={"color": FAINT, "shape": "hv", "width": 1.2},
+        row=2,
+        col=1,
+    )
     figure.add_hline(100.0 * ALLOWED, row=2, col=1, line_width=0.8, line_color=FAINT)
     figure.update_yaxes(title_text="speed [km/h]", row=1, col=1)
     figure.update_yaxes(title_text="load on the water [%]", row=2, col=1)
     figure.update_xaxes(title_text="way [m]", row=2, col=1)
     styled_figure(figure, 520, legend={"orientation": "h", "y": -0.14})
     return Plot(
-        "hydroplaning", "Into standing water",
+        "hydroplaning",
+        "Into standing water",
         f"The water begins at {BEGINS:.0f} m; above the horizontal line the car brakes gently.",
-        figure, ("knowledge", "way [m]", "speed [km/h]", "load on the water [%]", "known [%]"),
+        figure,
+        ("knowledge", "way [m]", "speed [km/h]", "load on the water [%]", "known [%]"),
         rows,
-    )  # fmt: skip
+    )

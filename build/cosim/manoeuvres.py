@@ -125,9 +125,10 @@ def _split(vehicle: Vehicle) -> Driver:
         slippery = 0.45 if t > 1.0 else 1.0
         angle = -0.4 * motion.heading - 0.15 * motion.yaw_rate
         return Controls(
-            _steer(angle, motion), _torque(vehicle, 4.5 * ramp(t, 1.5, 1.8)),
+            _steer(angle, motion),
+            _torque(vehicle, 4.5 * ramp(t, 1.5, 1.8)),
             friction=(slippery, 1.0, slippery, 1.0),
-        )  # fmt: skip
+        )
 
     return drive
 
@@ -163,23 +164,55 @@ MANOEUVRES: Mapping[str, Manoeuvre] = MappingProxyType(
     {
         m.name: m
         for m in (
-            Manoeuvre("step_steer", "80 km/h, front wheels to 1.75 deg in 0.2 s", 80.0 * KMH, 3.5,
-                      _step_steer),
-            Manoeuvre("double_lane_change", "80 km/h, 3.5 m to the left and back", 80.0 * KMH, 6.0,
-                      _double_lane_change),
-            Manoeuvre("slalom", "70 km/h, 0.5 Hz, front wheels to +-2 deg", 70.0 * KMH, 5.0,
-                      _slalom),
-            Manoeuvre("braking_in_a_turn", "80 km/h, left turn, then 2.5 m/s^2", 80.0 * KMH, 5.0,
-                      _braking_in_a_turn),
-            Manoeuvre("abs_pulses", "100 km/h, brake pulses of 7 m/s^2 at 3 Hz", 100.0 * KMH, 3.5,
-                      _abs_pulses),
-            Manoeuvre("mu_split", "90 km/h, 4.5 m/s^2, left wheels on 45 % friction", 90.0 * KMH,
-                      5.0, _split),
-            Manoeuvre("slippery_turn", "60 km/h, 40 % friction, front wheels to 4.5 deg",
-                      60.0 * KMH, 5.0, _slippery_turn),
-            Manoeuvre("kerb", "60 km/h, right wheels over a ledge of 15 mm", 60.0 * KMH, 3.0,
-                      _kerb),
+            Manoeuvre(
+                "step_steer",
+                "80 km/h, front wheels to 1.75 deg in 0.2 s",
+                80.0 * KMH,
+                3.5,
+                _step_steer,
+            ),
+            Manoeuvre(
+                "double_lane_change",
+                "80 km/h, 3.5 m to the left and back",
+                80.0 * KMH,
+                6.0,
+                _double_lane_change,
+            ),
+            Manoeuvre(
+                "slalom", "70 km/h, 0.5 Hz, front wheels to +-2 deg", 70.0 * KMH, 5.0, _slalom
+            ),
+            Manoeuvre(
+                "braking_in_a_turn",
+                "80 km/h, left turn, then 2.5 m/s^2",
+                80.0 * KMH,
+                5.0,
+                _braking_in_a_turn,
+            ),
+            Manoeuvre(
+                "abs_pulses",
+                "100 km/h, brake pulses of 7 m/s^2 at 3 Hz",
+                100.0 * KMH,
+                3.5,
+                _abs_pulses,
+            ),
+            Manoeuvre(
+                "mu_split",
+                "90 km/h, 4.5 m/s^2, left wheels on 45 % friction",
+                90.0 * KMH,
+                5.0,
+                _split,
+            ),
+            Manoeuvre(
+                "slippery_turn",
+                "60 km/h, 40 % friction, front wheels to 4.5 deg",
+                60.0 * KMH,
+                5.0,
+                _slippery_turn,
+            ),
+            Manoeuvre(
+                "kerb", "60 km/h, right wheels over a ledge of 15 mm", 60.0 * KMH, 3.0, _kerb
+            ),
         )
     }
-)  # fmt: skip
+)
 """All manoeuvres by name, in the order of the page."""

@@ -60,13 +60,15 @@ def build_fmus(folder: Path, calibration: Path, step: float = STEP) -> tuple[Pat
     folder.mkdir(parents=True, exist_ok=True)
     return (
         build_virtual(
-            folder / "VirtualTire.fmu", samples_per_step=samples, sample_rate=RATE,
+            folder / "VirtualTire.fmu",
+            samples_per_step=samples,
+            sample_rate=RATE,
             surface=friction_surface(),
         ),
         build_fmu(
             calibration, folder / "StrainTire.fmu", samples_per_step=samples, sample_rate=RATE
         ),
-    )  # fmt: skip
+    )
 
 
 def drive(manoeuvre: Manoeuvre, number: int = VEHICLE) -> Iterator[Motion]:

@@ -54,8 +54,13 @@ LONG = "closed_loop_split"
 """Half of the work: on a split road the way to a stop is long, and every source goes it."""
 ON_FRICTION = ("alpha",)
 """What the friction of the road changes at the same strain."""
-OTHERS = {DRILL: 4.0, STABILITY: 15.0, WATER: 8.0, **dict.fromkeys(BRAKING, 20.0),
-          **dict.fromkeys(ANTILOCK, 6.0)}  # fmt: skip
+OTHERS = {
+    DRILL: 4.0,
+    STABILITY: 15.0,
+    WATER: 8.0,
+    **dict.fromkeys(BRAKING, 20.0),
+    **dict.fromkeys(ANTILOCK, 6.0),
+}
 """As long as a manoeuvre of so many seconds."""
 EVERY = 10
 """The page shows every so many steps of the truth."""
@@ -157,8 +162,9 @@ def main() -> None:
     """Run the co-simulations and write the page."""
     parser = argparse.ArgumentParser(
         description="Vehicle co-simulations: estimated against true wheel quantities.",
-        epilog=_EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument(
         "manoeuvres",
         nargs="*",
@@ -185,8 +191,11 @@ def main() -> None:
     given.out.mkdir(parents=True, exist_ok=True)
     fmus = build_fmus(given.out, given.calibration)
     parts = dict.fromkeys([*names, DRILL], fmus)
-    loops = [name for name in LOOPS if (every and (given.all or name != LONG))
-             or name in given.manoeuvres]  # fmt: skip
+    loops = [
+        name
+        for name in LOOPS
+        if (every and (given.all or name != LONG)) or name in given.manoeuvres
+    ]
     if loops:
         slow = build_fmus(given.out / "closed_loop", given.calibration, closed_loop.STEP)
         parts |= dict.fromkeys(loops, slow)

@@ -40,10 +40,15 @@ INTERVAL = 1.96
 AFTER = np.radians(20.0)
 FILTER = SUPPORT * HALF_POWER / DEFAULT_ORDER
 """Half-width of the low-pass [rad]."""
-RANGE: Mapping[str, tuple[float, float]] = MappingProxyType({
-    "Fz": LOAD, "alpha": (-ALPHA, ALPHA), "kappa": (-KAPPA, DRIVING), "camber": (-CAMBER, CAMBER),
-    "speed": SPEED,
-})  # fmt: skip
+RANGE: Mapping[str, tuple[float, float]] = MappingProxyType(
+    {
+        "Fz": LOAD,
+        "alpha": (-ALPHA, ALPHA),
+        "kappa": (-KAPPA, DRIVING),
+        "camber": (-CAMBER, CAMBER),
+        "speed": SPEED,
+    }
+)
 """What the calibration has seen."""
 SLACK = 0.1
 """Share of the range beyond it in which neither answer of `valid` is wrong."""
@@ -111,14 +116,16 @@ def turns_of(recording: Recording, wheel: int) -> Turns:
         told={name: told[name][rows] for name in LIMITS},
         std={name: told[f"{name}_std"][rows] for name in LIMITS},
         truth={
-            "Fz": truth["Fz"][at], "alpha": truth["alpha"][at], "kappa": truth["kappa"][at],
+            "Fz": truth["Fz"][at],
+            "alpha": truth["alpha"][at],
+            "kappa": truth["kappa"][at],
             "Fy": told["tire_fy"][at],
         },
         valid={name: told[f"{name}_valid"][rows] > 0.0 for name in LIMITS},
         steady=steady,
         lag=_lag(recording, wheel, at, rows),
         allowed=AFTER + FILTER + told["tire_omega"][rows] * STEP,
-    )  # fmt: skip
+    )
 
 
 def _lag(recording: Recording, wheel: int, at: IntArray, rows: IntArray) -> FloatArray:
@@ -176,9 +183,12 @@ def score(recording: Recording) -> dict[str, Any]:
     whole = _figures(turns, off) | _validity(recording, list(range(len(WHEELS))))
     held = _held(recording, peak)
     return {
-        "name": recording.name, "peak_Fy_N": peak, "least_friction": least_friction(recording),
-        "all": whole | held, "wheels": wheels,
-    }  # fmt: skip
+        "name": recording.name,
+        "peak_Fy_N": peak,
+        "least_friction": least_friction(recording),
+        "all": whole | held,
+        "wheels": wheels,
+    }
 
 
 def least_friction(recording: Recording) -> float:
@@ -279,8 +289,12 @@ STANDS_OUT = 0.8
 
 def _held(recording: Recording, peak: float) -> dict[str, Any]:
     """Return what a controller meets: error of the value held, and the delay that fits best."""
-    scale = {"Fz": 100.0 / recording.static, "alpha": np.degrees(1.0), "kappa": 1.0,
-             "Fy": 100.0 / peak}  # fmt: skip
+    scale = {
+        "Fz": 100.0 / recording.static,
+        "alpha": np.degrees(1.0),
+        "kappa": 1.0,
+        "Fy": 100.0 / peak,
+    }
     truth = recording.truth | {"Fy": recording.told["tire_fy"]}
     found: dict[str, Any] = {"held": {}, "delay_ms": {}}
     for name, factor in scale.items():

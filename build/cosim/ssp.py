@@ -30,8 +30,14 @@ SET = "initialValues"
 """Name of every parameter set: ecos takes the sets of a name, libcosim this one."""
 FMU_TYPE = "application/x-fmu-sharedlibrary"
 START_ANGLES = (-3.1, -1.6, 0.6, 2.2)
-TURN_BRAKING = {"start_speed": 25.0, "steer_front": 0.015, "brake_FL": 500.0, "brake_FR": 500.0,
-                "brake_RL": 200.0, "brake_RR": 200.0}  # fmt: skip
+TURN_BRAKING = {
+    "start_speed": 25.0,
+    "steer_front": 0.015,
+    "brake_FL": 500.0,
+    "brake_FR": 500.0,
+    "brake_RL": 200.0,
+    "brake_RR": 200.0,
+}
 """Parameters and held inputs of the vehicle: a slight turn under slight braking."""
 _STRAIN = re.compile(r"strain_(\d+_)?\d+")
 Value = float | int | bool | str
@@ -75,9 +81,14 @@ class System:
 
 
 def four_wheels(
-    vehicle: Path, virtual: Path, strain: Path, *, stop: float = 1.0,
-    driving: Mapping[str, Value] | None = None, wheels: Sequence[Mapping[str, Value]] | None = None,
-) -> System:  # fmt: skip
+    vehicle: Path,
+    virtual: Path,
+    strain: Path,
+    *,
+    stop: float = 1.0,
+    driving: Mapping[str, Value] | None = None,
+    wheels: Sequence[Mapping[str, Value]] | None = None,
+) -> System:
     """Return the car: wheel quantities to the virtual tires, frames to the strain tires.
 
     Parameters
@@ -152,8 +163,9 @@ def _check(system: System) -> None:
         for where, name in (link.source, link.target)
         if name not in known.get(where, {})
     ]
-    wrong += [f"{c.name}.{n}" for c in system.components for n in c.parameters
-              if n not in known[c.name]]  # fmt: skip
+    wrong += [
+        f"{c.name}.{n}" for c in system.components for n in c.parameters if n not in known[c.name]
+    ]
     if wrong:
         raise ParameterError(
             f"{system.name}: no FMU has {', '.join(wrong)}; name variables of its components"
@@ -162,47 +174,64 @@ def _check(system: System) -> None:
 
 def structure(system: System) -> bytes:
     """Return ``SystemStructure.ssd``."""
-    root = Xml.Element(f"{{{SSD}}}SystemStructureDescription",
-                       {"version": "1.0", "name": system.name})  # fmt: skip
+    root = Xml.Element(
+        f"{{{SSD}}}SystemStructureDescription", {"version": "1.0", "name": system.name}
+    )
     body = Xml.SubElement(root, f"{{{SSD}}}System", {"name": system.name})
     elements = Xml.SubElement(body, f"{{{SSD}}}Elements")
     for component in system.components:
         _component(elements, component, system.links)
     links = Xml.SubElement(body, f"{{{SSD}}}Connections")
     for link in system.links:
-        Xml.SubElement(links, f"{{{SSD}}}Connection", {
-            "startElement": link.source[0], "startConnector": link.source[1],
-            "endElement": link.target[0], "endConnector": link.target[1],
-        })  # fmt: skip
+        Xml.SubElement(
+            links,
+            f"{{{SSD}}}Connection",
+            {
+                "startElement": link.source[0],
+                "startConnector": link.source[1],
+                "endElement": link.target[0],
+                "endConnector": link.target[1],
+            },
+        )
     units = Xml.SubElement(root, f"{{{SSD}}}Units")
     for name, (base, _) in UNITS.items():
         unit = Xml.SubElement(units, f"{{{SSC}}}Unit", {"name": name})
         Xml.SubElement(unit, f"{{{SSC}}}BaseUnit", base)
-    Xml.SubElement(root, f"{{{SSD}}}DefaultExperiment",
-                   {"startTime": "0.0", "stopTime": repr(system.stop)})  # fmt: skip
+    Xml.SubElement(
+        root, f"{{{SSD}}}DefaultExperiment", {"startTime": "0.0", "stopTime": repr(system.stop)}
+    )
     return _text(root)
 
 
 def _component(elements: Xml.Element, component: Component, links: Sequence[Link]) -> None:
     """Describe a component with the connectors that are in use, and with those it may set."""
-    element = Xml.SubElement(elements, f"{{{SSD}}}Component", {
-        "name": component.name, "type": FMU_TYPE, "source": f"resources/{component.fmu.name}",
-        "implementation": "CoSimulation",
-    })  # fmt: skip
-    used = {end[1] for link in links for end in (link.source, link.target)
-            if end[0] == component.name}  # fmt: skip
+    element = Xml.SubElement(
+        elements,
+        f"{{{SSD}}}Component",
+        {
+            "name": component.name,
+            "type": FMU_TYPE,
+            "source": f"resources/{component.fmu.name}",
+            "implementation": "CoSimulation",
+        },
+    )
+    used = {
+        end[1] for link in links for end in (link.source, link.target) if end[0] == component.name
+    }
     connectors = Xml.SubElement(element, f"{{{SSD}}}Connectors")
     for name, variable in _variables(component.fmu).items():
         if name not in used and name not in component.parameters:
             continue
-        entry = Xml.SubElement(connectors, f"{{{SSD}}}Connector",
-                               {"name": name, "kind": variable.causality})  # fmt: skip
+        entry = Xml.SubElement(
+            connectors, f"{{{SSD}}}Connector", {"name": name, "kind": variable.causality}
+        )
         kind = Xml.SubElement(entry, f"{{{SSC}}}{variable.type}")
         if variable.type == "Real" and variable.unit is not None:
             kind.set("unit", variable.unit)
     bindings = Xml.SubElement(element, f"{{{SSD}}}ParameterBindings")
-    Xml.SubElement(bindings, f"{{{SSD}}}ParameterBinding",
-                   {"source": f"resources/{component.name}.ssv"})  # fmt: skip
+    Xml.SubElement(
+        bindings, f"{{{SSD}}}ParameterBinding", {"source": f"resources/{component.name}.ssv"}
+    )
 
 
 def parameter_set(component: Component) -> bytes:

@@ -32,8 +32,12 @@ WATCHED = (
     *(f"vehicle.{q}_{w}" for q in ("Fz", "alpha", "kappa", "Fx", "Fy") for w in WHEELS),
     *(f"tire_{w}.{q}" for q in ("wheel_angle", "Fx_rig", "Fy_rig") for w in WHEELS),
     *(f"strain_{w}.{q}" for q in ("Fz", "alpha", "kappa", "Fy", "Fz_std") for w in WHEELS),
-    "vehicle.x", "vehicle.y", "vehicle.yaw_rate", "vehicle.vx", "vehicle.roll",
-)  # fmt: skip
+    "vehicle.x",
+    "vehicle.y",
+    "vehicle.yaw_rate",
+    "vehicle.vx",
+    "vehicle.roll",
+)
 """Real variables that are recorded."""
 Result = dict[str, FloatArray]
 
@@ -68,9 +72,11 @@ class _Instance:
         description = read_model_description(path)
         self.variables = {v.name: v for v in description.modelVariables}
         self.slave: Any = FMU2Slave(
-            guid=description.guid, unzipDirectory=extract(path, str(folder / component.name)),
-            modelIdentifier=description.coSimulation.modelIdentifier, instanceName=component.name,
-        )  # fmt: skip
+            guid=description.guid,
+            unzipDirectory=extract(path, str(folder / component.name)),
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            instanceName=component.name,
+        )
         self.slave.instantiate()
         self.slave.setupExperiment(startTime=0.0)
         for source in sources:

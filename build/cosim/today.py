@@ -173,9 +173,7 @@ class AntiLock:
     def rates(self) -> Mapping[Phase, float]:
         """Change of the torque in each phase [N m / s]."""
         built = {Phase.FREE: self.build, Phase.REBUILD: self.build, Phase.STEPS: self.steps}
-        return MappingProxyType(
-            dict.fromkeys(Phase, 0.0) | built | {Phase.RELEASE: -self.release}
-        )  # fmt: skip
+        return MappingProxyType(dict.fromkeys(Phase, 0.0) | built | {Phase.RELEASE: -self.release})
 
 
 class TodaysBrakes:

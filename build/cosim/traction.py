@@ -60,9 +60,13 @@ class TractionController:
         return -base * np.sqrt(np.maximum(share, 0.04))
 
     def step(
-        self, believed: FloatArray, known: Known, shown: tuple[FloatArray, FloatArray],
-        speed: float, since: float,
-    ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+        self,
+        believed: FloatArray,
+        known: Known,
+        shown: tuple[FloatArray, FloatArray],
+        speed: float,
+        since: float,
+    ) -> tuple[FloatArray, FloatArray]:
         """Return the traction believed from now on, and brake torques [N m], both of shape (4,).
 
         Parameters

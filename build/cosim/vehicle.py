@@ -187,11 +187,11 @@ class Vehicle:
         """Set the friction under each wheel."""
         self._friction = tuple(controls.friction)
         self.parameters.tires = [
-            SimpleNamespace(**(self._tire | {
-                name: factor * self._tire[name] for name in ("p_dx1", "p_dy1")
-            }))
+            SimpleNamespace(
+                **(self._tire | {name: factor * self._tire[name] for name in ("p_dx1", "p_dy1")})
+            )
             for factor in controls.friction
-        ]  # fmt: skip
+        ]
 
     def static_load(self) -> FloatArray:
         """Return the wheels' loads on a level road at rest, [N]."""
@@ -261,4 +261,4 @@ class Vehicle:
             ),
             fx=fx,
             fy=_LATERAL * fy,
-        )  # fmt: skip
+        )

@@ -40,8 +40,15 @@ PRESSURE = 2.3e5
 """Inflation pressure where a vehicle has none [Pa]."""
 OWN_FRICTION = START[FRICTION]
 """Coefficient of friction of the virtual tire's own road: a vehicle's factor of 1."""
-_SHOWN = ("omega", "wheel_angle", "alpha_relaxed", "kappa_relaxed", "Fx_rig", "Fy_rig",
-          "rolling_radius")  # fmt: skip
+_SHOWN = (
+    "omega",
+    "wheel_angle",
+    "alpha_relaxed",
+    "kappa_relaxed",
+    "Fx_rig",
+    "Fy_rig",
+    "rolling_radius",
+)
 _REALS = (*QUANTITIES, *(f"{q}_std" for q in QUANTITIES), "turn_rate", "contact_time")
 _VALID = ("valid", *(f"{q}_valid" for q in QUANTITIES))
 
@@ -94,9 +101,17 @@ class WheelStates:
     def rows(self) -> FloatArray:
         """Return the inputs of the virtual tires, shape (4, 7): `INPUTS`, then the friction."""
         return np.stack(
-            (self.load, self.alpha, self.kappa, self.camber, self.speed, self.pressure,
-             self.friction), axis=1,
-        )  # fmt: skip
+            (
+                self.load,
+                self.alpha,
+                self.kappa,
+                self.camber,
+                self.speed,
+                self.pressure,
+                self.friction,
+            ),
+            axis=1,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,9 +195,11 @@ class VirtualTire:
         self._n = len(strains)
         self._folder = extract(str(path))
         self.slave: Any = FMU2Slave(
-            guid=description.guid, unzipDirectory=self._folder, instanceName=name,
+            guid=description.guid,
+            unzipDirectory=self._folder,
+            instanceName=name,
             modelIdentifier=description.coSimulation.modelIdentifier,
-        )  # fmt: skip
+        )
         self.slave.instantiate()
         self._wanted = (c_uint32 * len(wanted))(*wanted)
         self._values = (c_double * len(wanted))()
@@ -278,10 +295,15 @@ class FourWheels:
         self.rate, self._water, self._speed_sensors = rate, water, speed_sensors
         self._tread_depth, self._tells_friction = tread_depth, tells_friction
         self._options = [
-            {"sample_rate": rate, "noise_std": noise, "seed": seed + at, "start_angle": angle,
-             **(parameters or {})}
+            {
+                "sample_rate": rate,
+                "noise_std": noise,
+                "seed": seed + at,
+                "start_angle": angle,
+                **(parameters or {}),
+            }
             for at, angle in enumerate(start_angles)
-        ]  # fmt: skip
+        ]
         self.tires = [VirtualTire(virtual, f"tire_{name}") for name in WHEELS]
         self.estimators = [LoadedFmu(strain, name=f"wheel_{name}") for name in WHEELS]
         self.samples = self.estimators[0].samples
@@ -334,9 +356,12 @@ class FourWheels:
             parts["tire_valid"][wheel] = good
             measured = parts["tire_omega"][wheel] if self._speed_sensors else math.nan
             told = told_conditions(
-                truth, wheel, measured, self._tread_depth,
+                truth,
+                wheel,
+                measured,
+                self._tread_depth,
                 truth.friction[wheel] if self._tells_friction else math.nan,
-            )  # fmt: skip
+            )
             self._estimate(wheel, frame[:new], good, told, parts)
         self.told = Estimates(**parts)
         return self.told
@@ -397,5 +422,12 @@ def told_conditions(
     return np.array([known.get(name, np.nan) for name in HELD])
 
 
-_TIRE = ("tire_omega", "tire_angle", "tire_alpha", "tire_kappa", "tire_fx", "tire_fy",
-         "tire_radius")  # fmt: skip
+_TIRE = (
+    "tire_omega",
+    "tire_angle",
+    "tire_alpha",
+    "tire_kappa",
+    "tire_fx",
+    "tire_fy",
+    "tire_radius",
+)

@@ -77,10 +77,16 @@ def tensions(path: Path, found: dict[str, list[State]], ring: Curves) -> None:
         style = {"mu000": "-", "mu050": "--", "mu100": ":"}[name.split("_")[1]]
         color = {"solid": "C0", "blocks": "C1", "stretchy": "C2"}[name.split("_")[0]]
         ax.plot(
-            LOADS, [1e6 * s.beam_strain[0] for s in loaded], style, color=color, marker="o",
-            label=name.replace("_mu", ", friction ").replace("000", "0").replace("050", "0.5")
+            LOADS,
+            [1e6 * s.beam_strain[0] for s in loaded],
+            style,
+            color=color,
+            marker="o",
+            label=name.replace("_mu", ", friction ")
+            .replace("000", "0")
+            .replace("050", "0.5")
             .replace("100", "1"),
-        )  # fmt: skip
+        )
     ax.plot(
         LOADS, 1e6 * ring.strain[:, 0], "k-s", mfc="none", label="ring with tension, friction 0"
     )

@@ -173,10 +173,17 @@ class _Search:
         data, model = fitted_data(waves, self.held_out), None
         model = base_fit(waves, self.held_out, self.plain_fit)
         return Case(
-            self.base.day.seed, self.kind, ratio, waves, self.floor_waves, self.held_out,
-            dict(planted), residual(data, model) / self.floor, model.error / self.plain_fit.error,
+            self.base.day.seed,
+            self.kind,
+            ratio,
+            waves,
+            self.floor_waves,
+            self.held_out,
+            dict(planted),
+            residual(data, model) / self.floor,
+            model.error / self.plain_fit.error,
             self.floor,
-        )  # fmt: skip
+        )
 
     def _waves(self, planted: Planted) -> Waveforms:
         """Return waveforms at strengths; of one effect of the tire, between solved ones."""
@@ -312,9 +319,14 @@ def save_case(case: Case, file: Path) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     w = case.waves
     truth = {
-        "seed": case.seed, "kind": case.kind, "wanted": case.wanted, "ratio": case.ratio,
-        "white_ratio": case.white_ratio, "floor": case.floor, "strength": dict(case.strength),
-    }  # fmt: skip
+        "seed": case.seed,
+        "kind": case.kind,
+        "wanted": case.wanted,
+        "ratio": case.ratio,
+        "white_ratio": case.white_ratio,
+        "floor": case.floor,
+        "strength": dict(case.strength),
+    }
     conditions: dict[str, Any] = {f"c_{k}": v for k, v in w.conditions.items()}
     conditions |= {f"f_{k}": v for k, v in case.floor_waves.conditions.items()}
     part = file.with_suffix(".part.npz")
@@ -343,10 +355,17 @@ def load_case(file: Path) -> Case:
     angle_std = step / np.sqrt(12.0 * (empty.turns + 1))
     waves = replace(empty, strain=strain, conditions=c, angle_std=angle_std)
     return Case(
-        truth["seed"], truth["kind"], truth["wanted"], waves,
-        replace(empty, strain=floor, conditions=f, angle_std=angle_std), held,
-        truth["strength"], truth["ratio"], truth["white_ratio"], truth["floor"],
-    )  # fmt: skip
+        truth["seed"],
+        truth["kind"],
+        truth["wanted"],
+        waves,
+        replace(empty, strain=floor, conditions=f, angle_std=angle_std),
+        held,
+        truth["strength"],
+        truth["ratio"],
+        truth["white_ratio"],
+        truth["floor"],
+    )
 
 
 def kinds(known: bool) -> Sequence[str]:

@@ -42,21 +42,31 @@ def _by_files(case: Case, folder: Path) -> dict[str, Any]:
     fitted = tuple(dict.fromkeys(c for c in today.nominal if c not in HELD_OUT))
     campaign, model, told = folder / "campaign", folder / "M.toml", folder / "D.json"
     run_plan(
-        Plan("hidden", "12 conditions", fitted), today.tire, campaign, seed=case.seed,
-        repeats=REPEATS, jobs=1, chain=today.chain, planted=case.strength,
-    )  # fmt: skip
+        Plan("hidden", "12 conditions", fitted),
+        today.tire,
+        campaign,
+        seed=case.seed,
+        repeats=REPEATS,
+        jobs=1,
+        chain=today.chain,
+        planted=case.strength,
+    )
     _call("identify", campaign, "--out", model)
     _call("diagnose", campaign, "--model", model, "--json", told)
     verdict = json.loads(told.read_text())
     out = {
-        "seed": case.seed, "kind": case.kind, "wanted": case.wanted,
+        "seed": case.seed,
+        "kind": case.kind,
+        "wanted": case.wanted,
         "outcome": outcome(case, verdict["verdict"], verdict["named"]),
-        "verdict": verdict["verdict"], "named": verdict["named"],
-    }  # fmt: skip
+        "verdict": verdict["verdict"],
+        "named": verdict["named"],
+    }
     if case.kind != NONE and case.known and len(case.names) == 1:
         second, added = folder / "M2.toml", folder / "A.json"
-        _call("add", case.kind, "--model", model, "--data", campaign, "--out", second,
-              "--json", added)  # fmt: skip
+        _call(
+            "add", case.kind, "--model", model, "--data", campaign, "--out", second, "--json", added
+        )
         document = json.loads(added.read_text())
         out |= {key: document[key] for key in ("error_before", "error_after", "floor")}
         out |= {key: document[key] for key in ("heldout_error_before", "heldout_error_after")}

@@ -31,13 +31,43 @@ BELT = frozenset({"belt_shear", "belt_extension"})
 """Right additions on a tire whose belt really shears and stretches; they may not hide another."""
 HELD_OUT_BY = ("load", "pressure", "speed")
 _CODE = {
-    "diagnose": ("candidates", "diagnose", "ensemble", "fitter", "noise",
-                 "plain", "ranking", "refit", "rivals", "rounds", "secants", "shape", "shear",
-                 "spread", "stage", "structure", "unlisted", "variant"),
-    "identify": ("campaign_data", "delay", "discrepancy", "identify", "noise", "random_effects",
-                 "span", "structure", "waveform_fit"),
-    "effects": ("*",), "model": ("*",), "contact": ("*",), "ring": ("*",), "strain": ("*",),
-}  # fmt: skip
+    "diagnose": (
+        "candidates",
+        "diagnose",
+        "ensemble",
+        "fitter",
+        "noise",
+        "plain",
+        "ranking",
+        "refit",
+        "rivals",
+        "rounds",
+        "secants",
+        "shape",
+        "shear",
+        "spread",
+        "stage",
+        "structure",
+        "unlisted",
+        "variant",
+    ),
+    "identify": (
+        "campaign_data",
+        "delay",
+        "discrepancy",
+        "identify",
+        "noise",
+        "random_effects",
+        "span",
+        "structure",
+        "waveform_fit",
+    ),
+    "effects": ("*",),
+    "model": ("*",),
+    "contact": ("*",),
+    "ring": ("*",),
+    "strain": ("*",),
+}
 """Modules of the library that a verdict depends on."""
 
 
@@ -70,10 +100,15 @@ def judge(case: Case, members: int = MEMBERS) -> dict[str, Any]:
     except TirelibError as error:
         made = {"outcome": "failed", "error": str(error)}
     made |= {
-        "seed": case.seed, "kind": case.kind, "wanted": case.wanted, "ratio": case.ratio,
-        "white_ratio": case.white_ratio, "strength": dict(case.strength), "known": case.known,
+        "seed": case.seed,
+        "kind": case.kind,
+        "wanted": case.wanted,
+        "ratio": case.ratio,
+        "white_ratio": case.white_ratio,
+        "strength": dict(case.strength),
+        "known": case.known,
         "seconds": time.process_time() - began,
-    }  # fmt: skip
+    }
     keep(file, json.dumps(made, indent=1).encode())
     return made
 
@@ -88,11 +123,17 @@ def _judged(case: Case, members: int) -> dict[str, Any]:
         "named": list(found.named),
         "left_over_floor": found.left / found.floor,
         "leaders": [
-            {"effect": f.effect.name, "level": f.level, "ratio": f.score / f.threshold,
-             "share": f.share, "in_range": f.in_range, "strength": np.ravel(f.strength).tolist()}
+            {
+                "effect": f.effect.name,
+                "level": f.level,
+                "ratio": f.score / f.threshold,
+                "share": f.share,
+                "in_range": f.in_range,
+                "strength": np.ravel(f.strength).tolist(),
+            }
             for f in found.findings[:6]
         ],
-    }  # fmt: skip
+    }
     if case.kind != NONE and case.known:
         out |= _addition(case, found)
     return out
@@ -140,18 +181,21 @@ def _addition(case: Case, found: Diagnosis) -> dict[str, Any]:
         "addition": "done",
         "added_strength": [np.ravel(s).tolist() for s in model.strengths],
         "error": {
-            "before": residual(data, found.base), "after": residual(data, model),
-            "floor": residual(floor_data, plain), "with_shear": residual(data, sheared),
+            "before": residual(data, found.base),
+            "after": residual(data, model),
+            "floor": residual(floor_data, plain),
+            "with_shear": residual(data, sheared),
         },
         "white_error": {
-            "before": found.base.error * data.noise, "after": model.error * data.noise,
+            "before": found.base.error * data.noise,
+            "after": model.error * data.noise,
             "floor": plain.error * floor_data.noise,
         },
         "held_out": {
             name: {"before": held[0][k], "after": held[1][k], "floor": held[2][k]}
             for k, name in enumerate(HELD_OUT_BY)
         },
-    }  # fmt: skip
+    }
 
 
 def _with_shear(data: Data, model: Refit) -> Refit:
@@ -194,8 +238,13 @@ def _held_out(waves: Waveforms, case: Case, model: Refit) -> list[float]:
     strain: FloatArray = waves.strain[case.held_out][:, used.gages].mean(axis=1)
     data = used.data(with_deflection=False)
     whiten = whitening(
-        wave, model.values, out, data.tolerance, waves.angle_std[case.held_out], data.noise,
+        wave,
+        model.values,
+        out,
+        data.tolerance,
+        waves.angle_std[case.held_out],
+        data.noise,
         waves.low_pass,
-    )  # fmt: skip
+    )
     rms = data.noise * np.sqrt(np.mean(whiten(strain - wave) ** 2, axis=1))
     return [float(x) for x in rms[np.argsort(waves.group[case.held_out])]]

@@ -113,10 +113,18 @@ def traces(
         seen = trace(state)
         for name, strength in planted.items():
             seen = HIDDEN[name].trace(
-                Shown(today.tire, today.really[run], state.omega, seen, edges(state)[0],
-                      state.stiffness, float(today.place[run]), today.angle),
+                Shown(
+                    today.tire,
+                    today.really[run],
+                    state.omega,
+                    seen,
+                    edges(state)[0],
+                    state.stiffness,
+                    float(today.place[run]),
+                    today.angle,
+                ),
                 strength,
-            )  # fmt: skip
+            )
         states.append(state)
         shown.append(seen)
         if progress is not None:

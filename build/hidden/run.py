@@ -37,10 +37,15 @@ ROOT = Path(__file__).parents[2]
 GOLDEN = ROOT / "tests" / "golden" / "hidden_effects.json"
 RATIOS = (1.5, 1.2, 1.05)
 PAIRS = (
-    "sidewall_damping+gage_drift", "sidewall_load+nonuniformity", "dynamic_stiffening+angle_zero",
-    "temperature+low_pass", "sidewall_pressure+trailing_sliding", "tread_friction+gage_drift",
-    "hydroplaning+nonuniformity", "sidewall_load+low_pass",
-)  # fmt: skip
+    "sidewall_damping+gage_drift",
+    "sidewall_load+nonuniformity",
+    "dynamic_stiffening+angle_zero",
+    "temperature+low_pass",
+    "sidewall_pressure+trailing_sliding",
+    "tread_friction+gage_drift",
+    "hydroplaning+nonuniformity",
+    "sidewall_load+low_pass",
+)
 FIRST = 5000
 
 Wanted = tuple[int, str, float]

@@ -33,8 +33,9 @@ def figures(rows: Rows) -> dict[str, Any]:
         "single": {f"{x:g}": _single([r for r in single if r["wanted"] == x]) for x in ratios},
         "by_kind": {
             kind: {
-                f"{x:g}": dict(Counter(r["outcome"] for r in single
-                                       if r["kind"] == kind and r["wanted"] == x))
+                f"{x:g}": dict(
+                    Counter(r["outcome"] for r in single if r["kind"] == kind and r["wanted"] == x)
+                )
                 for x in ratios
             }
             for kind in sorted({r["kind"] for r in single})
@@ -56,7 +57,7 @@ def figures(rows: Rows) -> dict[str, Any]:
             "wrong_name": _share(pairs, "wrong"),
         },
         "addition": {f"{x:g}": _addition([r for r in single if r["wanted"] == x]) for x in ratios},
-    }  # fmt: skip
+    }
 
 
 def _single(rows: Rows) -> dict[str, Any]:
@@ -128,25 +129,44 @@ def markdown(told: Mapping[str, Any]) -> str:
         "|---|" + "---|" * len(ratios),
     ]
     for name, words in (
-        ("right", "named right"), ("with_twin", "right, with a twin beside it"),
-        ("wrong", "wrong name"), ("flagged_unknown", "called unknown"), ("missed", "missed"),
-    ):  # fmt: skip
+        ("right", "named right"),
+        ("with_twin", "right, with a twin beside it"),
+        ("wrong", "wrong name"),
+        ("flagged_unknown", "called unknown"),
+        ("missed", "missed"),
+    ):
         lines.append(_row(words, [_percent(f["single"][x][name]) for x in ratios]))
     lines.append(_row("cases", [str(f["single"][x]["cases"]) for x in ratios]))
     added = [f["addition"][x] for x in ratios]
     for key, words in (
-        ("error", "plain residual"), ("white_error", "residual, set points discounted"),
-    ):  # fmt: skip
-        lines.append(_row(f"after adding, {words}: at most {LIMIT} floor",
-                          [_percent(a.get(key, {}).get("at_floor")) for a in added]))  # fmt: skip
-        lines.append(_row(f"after adding, {words}: removable mean square gone, median",
-                          [_percent(a.get(key, {}).get("removed")) for a in added]))  # fmt: skip
-    lines.append(_row(f"after adding the belt's shear too, plain residual: at most {LIMIT} floor",
-                      [_percent(a.get("at_floor_with_shear")) for a in added]))  # fmt: skip
+        ("error", "plain residual"),
+        ("white_error", "residual, set points discounted"),
+    ):
+        lines.append(
+            _row(
+                f"after adding, {words}: at most {LIMIT} floor",
+                [_percent(a.get(key, {}).get("at_floor")) for a in added],
+            )
+        )
+        lines.append(
+            _row(
+                f"after adding, {words}: removable mean square gone, median",
+                [_percent(a.get(key, {}).get("removed")) for a in added],
+            )
+        )
+    lines.append(
+        _row(
+            f"after adding the belt's shear too, plain residual: at most {LIMIT} floor",
+            [_percent(a.get("at_floor_with_shear")) for a in added],
+        )
+    )
     for name in ("load", "pressure", "speed"):
-        lines.append(_row(f"held-out {name}: the same, median",
-                          [_percent(a.get(f"held_out_{name}", {}).get("removed"))
-                           for a in added]))  # fmt: skip
+        lines.append(
+            _row(
+                f"held-out {name}: the same, median",
+                [_percent(a.get(f"held_out_{name}", {}).get("removed")) for a in added],
+            )
+        )
     none, unknown, pairs = f["none"], f["unknown"], f["pairs"]
     lines += [
         "",

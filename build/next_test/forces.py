@@ -48,12 +48,24 @@ LOADS, PRESSURES = (700.0, 1500.0, 2300.0), (0.7e5, 0.83e5, 0.96e5)
 WIDE, SMALL = (-8.0, -5.0, -2.5, 2.5, 5.0, 8.0), (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)
 """Slip angles [deg]."""
 DRIFTS = ("stiffness_drift", "friction_drift")
-PLANTED = ("friction_load", "stiffness_load", "friction_pressure", "stiffness_pressure",
-           "friction_temperature", "stiffness_temperature", *DRIFTS)  # fmt: skip
-ENVELOPE = MappingProxyType({
-    "load": (500.0, 2900.0), "pressure": (0.65e5, 1.0e5), "speed": (SPEED, SPEED),
-    "slip_angle": (np.deg2rad(-9.0), np.deg2rad(9.0)), "temperature": (315.0, 350.0),
-})  # fmt: skip
+PLANTED = (
+    "friction_load",
+    "stiffness_load",
+    "friction_pressure",
+    "stiffness_pressure",
+    "friction_temperature",
+    "stiffness_temperature",
+    *DRIFTS,
+)
+ENVELOPE = MappingProxyType(
+    {
+        "load": (500.0, 2900.0),
+        "pressure": (0.65e5, 1.0e5),
+        "speed": (SPEED, SPEED),
+        "slip_angle": (np.deg2rad(-9.0), np.deg2rad(9.0)),
+        "temperature": (315.0, 350.0),
+    }
+)
 
 
 @dataclass(frozen=True)
@@ -99,10 +111,13 @@ class Plan:
         run = np.arange(n) if self.scattered else np.arange(n) // visits.shape[1]
         pace = 0.0 if self.scattered else PACE
         return {
-            "load": load, "pressure": pressure, "slip_angle": angle,
+            "load": load,
+            "pressure": pressure,
+            "slip_angle": angle,
             "temperature": warm + 1.5 * random.standard_normal(n),
-            "time": (PAUSE - pace) * run + pace * np.arange(n), "run": run,
-        }  # fmt: skip
+            "time": (PAUSE - pace) * run + pace * np.arange(n),
+            "run": run,
+        }
 
 
 SWEEPS: Mapping[str, Plan] = MappingProxyType(
@@ -133,9 +148,15 @@ class Tire:
         planted = {} if self.truth in DRIFTS else {self.truth: self.strength}
         angle = np.arctan(np.tan(at["slip_angle"]) * (1.0 + stiff) / (1.0 - slick))
         out: FloatArray = (1.0 - slick) * _force(
-            np.random.default_rng([self.seed, 22]), planted, at["load"], at["pressure"],
-            np.zeros(angle.size), at["temperature"], angle, at["time"],
-        )  # fmt: skip
+            np.random.default_rng([self.seed, 22]),
+            planted,
+            at["load"],
+            at["pressure"],
+            np.zeros(angle.size),
+            at["temperature"],
+            angle,
+            at["time"],
+        )
         return out
 
     def measured(self, at: Mapping[str, FloatArray], draw: int) -> ForceData:
@@ -148,9 +169,18 @@ class Tire:
         return ForceData(
             at["load"] * (1.0 + LOAD_NOISE * off[0]),
             at["pressure"] * (1.0 + PRESSURE_NOISE * off[1]),
-            at["slip_angle"] + ANGLE_NOISE * off[2], flat, flat, nothing, nothing, side, nothing,
-            run, np.full(n, SPEED), at["temperature"], at["time"],
-        )  # fmt: skip
+            at["slip_angle"] + ANGLE_NOISE * off[2],
+            flat,
+            flat,
+            nothing,
+            nothing,
+            side,
+            nothing,
+            run,
+            np.full(n, SPEED),
+            at["temperature"],
+            at["time"],
+        )
 
 
 def case_of(data: ForceData) -> ForceCase:

@@ -71,9 +71,10 @@ def open_still(gap: float | None) -> bool:
 def foretold(test: NextTest, rank: int) -> dict[str, Any]:
     """Return a run of a rank, and what is foretold of it."""
     return {
-        "at": test.envelope.text(test.points[rank]), "predicted": float(test.score[rank]),
+        "at": test.envelope.text(test.points[rank]),
+        "predicted": float(test.score[rank]),
         "chance": float(test.probability[rank]),
-    }  # fmt: skip
+    }
 
 
 def look_alikes(
@@ -94,8 +95,10 @@ def look_alikes(
         names, angles = signatures(plan)
         order = sorted(
             (float(angles[i, j]), *sorted((names[i], names[j])))
-            for i in range(len(names)) for j in range(i) if angles[i, j] < CONFUSABLE
-        )  # fmt: skip
+            for i in range(len(names))
+            for j in range(i)
+            if angles[i, j] < CONFUSABLE
+        )
         known = {(a, b) for _, a, b in chosen}
         chosen += [(plan, a, b) for _, a, b in order if (a, b) not in known][:A_PLAN]
     return chosen

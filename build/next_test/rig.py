@@ -52,22 +52,52 @@ def _plan(*conditions: tuple[float, float, float]) -> tuple[Condition, ...]:
     return tuple(Condition(load, bar * BAR, kmh * KMH) for load, bar, kmh in conditions)
 
 
-PLANS: Mapping[str, tuple[Condition, ...]] = MappingProxyType({
-    "one_speed": _plan((3000.0, 1.8, 65.0), (4500.0, 1.8, 65.0), (6000.0, 1.8, 65.0),
-                       (3000.0, 2.4, 65.0), (4500.0, 2.4, 65.0), (6000.0, 2.4, 65.0)),
-    "one_pressure": _plan((3000.0, 2.1, 40.0), (6000.0, 2.1, 40.0), (4500.0, 2.1, 60.0),
-                          (4500.0, 2.1, 80.0), (3000.0, 2.1, 100.0), (6000.0, 2.1, 100.0)),
-    "pressure_by_load": _plan((3000.0, 1.8, 40.0), (3000.0, 1.8, 100.0), (4500.0, 2.1, 60.0),
-                              (4500.0, 2.1, 80.0), (6000.0, 2.4, 40.0), (6000.0, 2.4, 100.0)),
-    "ever_faster": _plan((3000.0, 2.4, 40.0), (6000.0, 1.8, 52.0), (4500.0, 2.1, 64.0),
-                         (3000.0, 1.8, 76.0), (6000.0, 2.4, 88.0), (4500.0, 2.1, 100.0)),
-})  # fmt: skip
+PLANS: Mapping[str, tuple[Condition, ...]] = MappingProxyType(
+    {
+        "one_speed": _plan(
+            (3000.0, 1.8, 65.0),
+            (4500.0, 1.8, 65.0),
+            (6000.0, 1.8, 65.0),
+            (3000.0, 2.4, 65.0),
+            (4500.0, 2.4, 65.0),
+            (6000.0, 2.4, 65.0),
+        ),
+        "one_pressure": _plan(
+            (3000.0, 2.1, 40.0),
+            (6000.0, 2.1, 40.0),
+            (4500.0, 2.1, 60.0),
+            (4500.0, 2.1, 80.0),
+            (3000.0, 2.1, 100.0),
+            (6000.0, 2.1, 100.0),
+        ),
+        "pressure_by_load": _plan(
+            (3000.0, 1.8, 40.0),
+            (3000.0, 1.8, 100.0),
+            (4500.0, 2.1, 60.0),
+            (4500.0, 2.1, 80.0),
+            (6000.0, 2.4, 40.0),
+            (6000.0, 2.4, 100.0),
+        ),
+        "ever_faster": _plan(
+            (3000.0, 2.4, 40.0),
+            (6000.0, 1.8, 52.0),
+            (4500.0, 2.1, 64.0),
+            (3000.0, 1.8, 76.0),
+            (6000.0, 2.4, 88.0),
+            (4500.0, 2.1, 100.0),
+        ),
+    }
+)
 """Six conditions each, in the order in which a hurried tester would choose them."""
 IN_ORDER = ("ever_faster",)
 """Plans that are driven in that order; the others in one at random."""
-ENVELOPE = MappingProxyType({
-    "load": (2000.0, 7500.0), "pressure": (1.6 * BAR, 2.7 * BAR), "speed": (20.0 * KMH, 130.0 * KMH)
-})  # fmt: skip
+ENVELOPE = MappingProxyType(
+    {
+        "load": (2000.0, 7500.0),
+        "pressure": (1.6 * BAR, 2.7 * BAR),
+        "speed": (20.0 * KMH, 130.0 * KMH),
+    }
+)
 """What the rig allows, SI."""
 
 
@@ -121,8 +151,13 @@ class Made:
         return waves
 
     def _further(self, point: FloatArray, before: int) -> Waveforms:
-        told = (campaign_day(self.seed, self.plan).key, self.truth, f"{self.strength:.6e}",
-                np.round(point, 2).tolist(), before)  # fmt: skip
+        told = (
+            campaign_day(self.seed, self.plan).key,
+            self.truth,
+            f"{self.strength:.6e}",
+            np.round(point, 2).tolist(),
+            before,
+        )
         file = CACHE / "further" / f"{_digest(told)}.pkl"
 
         def make() -> Waveforms:
@@ -156,12 +191,20 @@ def small_day(
     """Return a day of a seed's tire with other conditions."""
     whole = day(seed)
     return SmallDay(
-        seed, whole.tire, whole.chain, tuple(conditions),
-        tuple(replace(settle(c, whole.chain, seed, first + k), slip_angle=0.0, camber=0.0)
-              for k, c in enumerate(conditions)),
-        np.array(group), np.zeros(len(conditions), dtype=bool), whole.delay, whole.angle,
+        seed,
+        whole.tire,
+        whole.chain,
+        tuple(conditions),
+        tuple(
+            replace(settle(c, whole.chain, seed, first + k), slip_angle=0.0, camber=0.0)
+            for k, c in enumerate(conditions)
+        ),
+        np.array(group),
+        np.zeros(len(conditions), dtype=bool),
+        whole.delay,
+        whole.angle,
         tuple(when),
-    )  # fmt: skip
+    )
 
 
 def traces(
@@ -180,8 +223,16 @@ def traces(
                 state = solve(tire, condition, replace(plain, height=plain.height + lower), _GRID)
         seen = trace(state)
         if strength:
-            there = Shown(today.tire, condition, state.omega, seen, edges(state)[0],
-                          state.stiffness, place, today.angle)  # fmt: skip
+            there = Shown(
+                today.tire,
+                condition,
+                state.omega,
+                seen,
+                edges(state)[0],
+                state.stiffness,
+                place,
+                today.angle,
+            )
             seen = HIDDEN[name].trace(there, strength)
         states.append(state)
         shown.append(seen)
@@ -251,8 +302,15 @@ class Visible:
 
     def __init__(self, none: Bare) -> None:
         data, trial = straight_runs(none.waves).data(with_deflection=False), none.trial
-        white = whitening(none.fit.waveform, none.fit.values, data.points, data.tolerance,
-                          data.angle_std, trial.noise, data.low_pass)  # fmt: skip
+        white = whitening(
+            none.fit.waveform,
+            none.fit.values,
+            data.points,
+            data.tolerance,
+            data.angle_std,
+            trial.noise,
+            data.low_pass,
+        )
         free = none.fit.own_slopes * WIDTH[:, None, None]
         self.whiten = white
         self.rows = white(np.concatenate([trial.shapes.present, free])).reshape(
@@ -303,11 +361,15 @@ def join(one: Waveforms, more: Waveforms) -> Waveforms:
     """Return the runs of a campaign and further ones, which come after."""
     count = len(one) + len(more)
     step = float(one.start[1] - one.start[0])
-    both = {name: np.concatenate([getattr(one, name), getattr(more, name)])
-            for name in ("strain", "turns", "scatter", "angle_std")}  # fmt: skip
+    both = {
+        name: np.concatenate([getattr(one, name), getattr(more, name)])
+        for name in ("strain", "turns", "scatter", "angle_std")
+    }
     return replace(
-        one, run=np.arange(count), start=step * np.arange(count),
+        one,
+        run=np.arange(count),
+        start=step * np.arange(count),
         group=np.concatenate([one.group, one.group.max() + 1 + more.group]),
         conditions={k: np.concatenate([v, more.conditions[k]]) for k, v in one.conditions.items()},
         **both,
-    )  # fmt: skip
+    )

@@ -35,11 +35,24 @@ from tirelib.threads import one_thread
 VISIBLE = {"strain": 15.0, "Fy": 17.0}
 """Chi-square by which the campaign alone shows the effect, against none, in the metric of
 structure: that at which a run at random parts about 45 % of the pairs, on seeds from 1400 on."""
-_PARTS = ("diagnose", "effects", "identify", "model", "planning", "contact", "ring", "strain",
-          "brush", "compare")  # fmt: skip
+_PARTS = (
+    "diagnose",
+    "effects",
+    "identify",
+    "model",
+    "planning",
+    "contact",
+    "ring",
+    "strain",
+    "brush",
+    "compare",
+)
 STAGES = {
-    "before": "before", "random": "random", "chosen": "advised", "second": "advised, one or two",
-}  # fmt: skip
+    "before": "before",
+    "random": "random",
+    "chosen": "advised",
+    "second": "advised, one or two",
+}
 """Of a case, and as the table tells them."""
 Verdict = dict[str, Any]
 
@@ -89,15 +102,21 @@ def table(found: Sequence[Verdict]) -> str:
     """Return the table in Markdown: by pair, all, those open before, and what was foretold."""
     able = [v for v in found if "error" not in v]
     stages = {k: title for k, title in STAGES.items() if any(k in v for v in able)}
-    rows = ["| pair | " + " | ".join(f"{title}: right | wrong" for title in stages.values()) + " |",
-            "|---" * (1 + 2 * len(stages)) + "|"]  # fmt: skip
+    rows = [
+        "| pair | " + " | ".join(f"{title}: right | wrong" for title in stages.values()) + " |",
+        "|---" * (1 + 2 * len(stages)) + "|",
+    ]
     by: dict[str, list[Verdict]] = {}
     for v in able:
         by.setdefault(f"{v['plan']}: {', '.join(sorted((v['truth'], v['rival'])))}", []).append(v)
     still = [v for v in able if state(v, "before") == "open"]
     likely = [v for v in still if v.get("chosen", {}).get("chance", 0.0) >= PROMISING]
-    groups = [*by.items(), ("all", able), ("open before", still),
-              (f"of these, told a chance of {100 * PROMISING:.0f} % or more", likely)]  # fmt: skip
+    groups = [
+        *by.items(),
+        ("all", able),
+        ("open before", still),
+        (f"of these, told a chance of {100 * PROMISING:.0f} % or more", likely),
+    ]
     for name, each in groups:
         rows.append(f"| {name} | " + " | ".join(shares(each, stage) for stage in stages) + " |")
     for v in found:

@@ -53,13 +53,17 @@ def measured(case: PairCase) -> dict[str, Any]:
     runs = straight_runs(made.waves)
     data = runs.data(with_deflection=False)
     noise = repeated_noise(runs, data, base)
-    suspects = [(CATALOGUE[k], np.full(CATALOGUE[k].components, 0.1 * CATALOGUE[k].toward))
-                for k in sorted((case.truth, case.rival))]  # fmt: skip
+    suspects = [
+        (CATALOGUE[k], np.full(CATALOGUE[k].components, 0.1 * CATALOGUE[k].toward))
+        for k in sorted((case.truth, case.rival))
+    ]
     test = _advice(data, base, suspects, noise)
     out: dict[str, Any] = {
-        "strength": made.strength, "reached": made.visible, "ratio": made.ratio,
+        "strength": made.strength,
+        "reached": made.visible,
+        "ratio": made.ratio,
         "before": case.gap(test.trial),
-    }  # fmt: skip
+    }
     if len(test.trial.rivals) < 2:
         return out
     for name, k in (("chosen", 0), ("random", case.any_of(len(test.points)))):

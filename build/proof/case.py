@@ -29,8 +29,16 @@ HELD_OUT_EVERY = 4
 def fingerprint() -> str:
     """Return a hash of the code that a result depends on."""
     root = Path(__file__).parents[2] / "tirelib"
-    names = ("identify", "waveform_fit", "fit_cost", "discrepancy", "structure", "campaign_data",
-             "noise", "random_effects")  # fmt: skip
+    names = (
+        "identify",
+        "waveform_fit",
+        "fit_cost",
+        "discrepancy",
+        "structure",
+        "campaign_data",
+        "noise",
+        "random_effects",
+    )
     files = [root / "identify" / f"{name}.py" for name in names]
     files += [root / "model" / f"{name}.py" for name in ("base", "chain", "state", "whole")]
     files += [root / "model" / "rolled.py", *sorted((root / "rolling").glob("*.py"))]
@@ -57,9 +65,12 @@ def tests_of(seed: int, tire: RigTire, pressure: float) -> dict[str, Any]:
             return stored
     found = laboratory(tire, pressure)
     made = {
-        "fingerprint": mark, "pressure": pressure, "values": found.values, "modal": found.modal,
+        "fingerprint": mark,
+        "pressure": pressure,
+        "values": found.values,
+        "modal": found.modal,
         "press": press(tire, PRESSURE, LOAD),
-    }  # fmt: skip
+    }
     file.write_text(json.dumps(made, indent=1))
     return made
 
@@ -94,8 +105,12 @@ def _make(seed: int) -> dict[str, Any]:
         "rms_share": fit.rms / float(np.sqrt(np.mean(runs.strain**2))),
         "parameters": {
             e.name: {
-                "value": e.value, "low": e.low, "high": e.high, "fit_std": e.fit_std,
-                "flags": list(e.flags), "laboratory": found["values"].get(e.name, own[e.name]),
+                "value": e.value,
+                "low": e.low,
+                "high": e.high,
+                "fit_std": e.fit_std,
+                "flags": list(e.flags),
+                "laboratory": found["values"].get(e.name, own[e.name]),
                 "definition": own[e.name],
             }
             for e in estimates
@@ -103,7 +118,7 @@ def _make(seed: int) -> dict[str, Any]:
         "modal": found["modal"],
         "vertical_stiffness": {"model": model, "laboratory": found["press"]},
         "held_out": held_out(data.waves) if seed % HELD_OUT_EVERY == 0 else None,
-    }  # fmt: skip
+    }
 
 
 def definition(tire: RigTire, pressure: float) -> dict[str, float]:
@@ -129,10 +144,18 @@ def vertical_stiffness(tire: Tire) -> float:
     loads = LOAD * np.array([0.99, 1.01])
     none = np.zeros(2)
     press = Operating(
-        load=loads, pressure=np.full(2, PRESSURE), omega=np.full(2, CREEP / tire.ring_radius),
-        speed=np.full(2, CREEP), camber=none, slip_angle=none, slip_ratio=none, side_force=none,
-        drive_force=none, order=none, temperature=np.full(2, np.nan),
-    )  # fmt: skip
+        load=loads,
+        pressure=np.full(2, PRESSURE),
+        omega=np.full(2, CREEP / tire.ring_radius),
+        speed=np.full(2, CREEP),
+        camber=none,
+        slip_angle=none,
+        slip_ratio=none,
+        side_force=none,
+        drive_force=none,
+        order=none,
+        temperature=np.full(2, np.nan),
+    )
     depth = solve_whole(values_of(tire), press).deflection
     return float(np.diff(loads)[0] / np.diff(depth)[0])
 

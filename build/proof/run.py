@@ -39,12 +39,12 @@ def table(cases: Sequence[dict[str, Any]]) -> dict[str, Any]:
     held = [c["held_out"] for c in cases if c["held_out"] is not None]
     return {
         "parameters": {name: _row(name, cases) for name in STRUCTURE_STD},
-        "coverage_all": float(
-            np.mean([_row(name, cases)["coverage"] for name in STRUCTURE_STD])
-        ),
+        "coverage_all": float(np.mean([_row(name, cases)["coverage"] for name in STRUCTURE_STD])),
         "vertical_stiffness_error": _spread(
-            [c["vertical_stiffness"]["model"] / c["vertical_stiffness"]["laboratory"] - 1.0
-             for c in cases]
+            [
+                c["vertical_stiffness"]["model"] / c["vertical_stiffness"]["laboratory"] - 1.0
+                for c in cases
+            ]
         ),
         "held_out_ratio": {
             name: _spread([row[name] for row in held]) for name in (held[0] if held else {})
@@ -52,7 +52,7 @@ def table(cases: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "held_out_tires": len(held),
         "rms_share": _spread([c["rms_share"] for c in cases]),
         "seconds": _spread([c["seconds"] for c in cases]),
-    }  # fmt: skip
+    }
 
 
 def _row(name: str, cases: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -85,8 +85,12 @@ def _row(name: str, cases: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 def _spread(values: Sequence[float]) -> dict[str, float]:
     x = np.asarray(values, dtype=float)
-    return {"mean": float(x.mean()), "rms": float(np.sqrt(np.mean(x**2))),
-            "median": float(np.median(x)), "largest": float(x[np.argmax(np.abs(x))])}  # fmt: skip
+    return {
+        "mean": float(x.mean()),
+        "rms": float(np.sqrt(np.mean(x**2))),
+        "median": float(np.median(x)),
+        "largest": float(x[np.argmax(np.abs(x))]),
+    }
 
 
 def show(found: dict[str, Any]) -> str:

@@ -94,9 +94,14 @@ def solved(inputs: np.ndarray, start: State | None) -> tuple[State, Point]:
     angle, _ = edges(state)
     camber = float(np.cos(state.condition.camber))
     return state, Point(
-        inputs, trace(state, POINTS).strain, angle, np.array(values), state.omega,
-        state.free_radius, state.height / camber,
-    )  # fmt: skip
+        inputs,
+        trace(state, POINTS).strain,
+        angle,
+        np.array(values),
+        state.omega,
+        state.free_radius,
+        state.height / camber,
+    )
 
 
 def main(points: int, seconds: float, folder: Path, friction: bool) -> None:

@@ -31,7 +31,7 @@ from tirelib.fmu.virtual.surface import (
     mirrored,
     radius_terms,
     write_surface,
-)  # fmt: skip
+)
 from tirelib.threads import one_thread
 
 GRID = 720
@@ -65,9 +65,13 @@ class Solutions:
     def part(self, chosen: np.ndarray) -> "Solutions":
         """Return some of the points."""
         return Solutions(
-            self.inputs[chosen], self.strain[chosen], self.edges[chosen], self.forces[chosen],
-            self.free_radius[chosen], 0,
-        )  # fmt: skip
+            self.inputs[chosen],
+            self.strain[chosen],
+            self.edges[chosen],
+            self.forces[chosen],
+            self.free_radius[chosen],
+            0,
+        )
 
 
 def range_of(dimensions: int) -> tuple[np.ndarray, np.ndarray]:
@@ -97,10 +101,14 @@ def read_solutions(folder: Path, most: int | None = None, more: Path | None = No
     with_friction = [np.load(path) for path in sorted(more.glob("*.npz"))] if more else []
     good = [file for file in (*files, *with_friction) if "strain" in file.files]
     own = [tire("reference").friction] if with_friction else []
-    inputs = np.array([
-        file["inputs"] if file["inputs"].size > RANGE_LOW.size else np.append(file["inputs"], own)
-        for file in good
-    ])  # fmt: skip
+    inputs = np.array(
+        [
+            file["inputs"]
+            if file["inputs"].size > RANGE_LOW.size
+            else np.append(file["inputs"], own)
+            for file in good
+        ]
+    )
     ends = np.array([file["edges"] for file in good])
     edges = np.stack((0.25 * (ends[..., 1] - ends[..., 0]) ** 2, ends.mean(axis=2)), axis=1)
     force = np.array([file["forces"] for file in good])
@@ -156,13 +164,21 @@ def make(solutions: Solutions, waves: np.ndarray, slip: np.ndarray, scales: np.n
     terms = radius_terms(solutions.inputs)
     low, high = range_of(solutions.inputs.shape[1])
     return Surface(
-        lateral=tire("reference").lateral, low=low, high=high, slip=slip, scales=scales,
+        lateral=tire("reference").lateral,
+        low=low,
+        high=high,
+        slip=slip,
+        scales=scales,
         points=solutions.inputs,
         even=(even - mean).reshape(n, -1) @ scores[0].T,
         odd=odd.reshape(n, -1) @ scores[1].T,
-        edges=solutions.edges, forces=solutions.forces, mean=mean, basis=np.concatenate(parts),
-        rolling=np.linalg.lstsq(terms, solutions.free_radius, rcond=None)[0], about={},
-    )  # fmt: skip
+        edges=solutions.edges,
+        forces=solutions.forces,
+        mean=mean,
+        basis=np.concatenate(parts),
+        rolling=np.linalg.lstsq(terms, solutions.free_radius, rcond=None)[0],
+        about={},
+    )
 
 
 def _components(waves: np.ndarray) -> np.ndarray:
@@ -298,13 +314,16 @@ def main(folder: Path, out: Path, most: int | None, more: Path | None) -> None:
         "tire": tire("reference").name,
         "made_by": f"build/virtual_tire of tirelib {__version__}, numerical rig, default mesh",
         "inputs": list(surface.inputs),
-        "solutions": len(waves), "not_solved": solutions.failed,
+        "solutions": len(waves),
+        "not_solved": solutions.failed,
         "design": "scrambled Sobol points, seed 2"
         + (f"; with friction {FRICTION_DESIGN}, seed 3" if more else ""),
-        "design_low": low.tolist(), "design_high": high.tolist(),
+        "design_low": low.tolist(),
+        "design_high": high.tolist(),
         "error": f"{FOLDS}-fold cross-validation, a point and its mirror image left out together",
-        "strain_spread_ustrain": size, "left_out": told,
-    }  # fmt: skip
+        "strain_spread_ustrain": size,
+        "left_out": told,
+    }
     write_surface(replace(surface, about=about), out)
     _tell(json.dumps(about, indent=1))
     _tell(f"components {surface.even.shape[1]} + {surface.odd.shape[1]}")

@@ -64,8 +64,16 @@ class Line:
 
     def __init__(self, spawn: Callable[..., Program], folder: Path, *arguments: object) -> None:
         self._go = folder / "go"
-        self.wheel = spawn("emulate", *arguments, "--port-file", folder / "port",
-                           "--wait", PATIENCE, "--after", self._go)  # fmt: skip
+        self.wheel = spawn(
+            "emulate",
+            *arguments,
+            "--port-file",
+            folder / "port",
+            "--wait",
+            PATIENCE,
+            "--after",
+            self._go,
+        )
         self.port = port_of(folder / "port", self.wheel)
 
     def heard_by(self, run: Program) -> tuple[int, str, str]:

@@ -113,12 +113,14 @@ def test_the_replay_is_the_live_run_to_the_last_bit(out: Path) -> None:
 
 
 def test_the_library_finds_in_the_exported_campaign_what_the_bench_said_live(out: Path) -> None:
-    found = agreement("live - library", read_turns(out / "live.json"),
-                      read_turns(out / "library.json"), 1e-9)  # fmt: skip
+    found = agreement(
+        "live - library", read_turns(out / "live.json"), read_turns(out / "library.json"), 1e-9
+    )
     assert found.faults == []
     assert all(row.turns >= 7 * 3 for row in found.rows if row.title == "vertical load Fz")
-    by_fmu = agreement("library - FMU", read_turns(out / "library.json"),
-                       read_turns(out / "fmu.json"), 1e-9)  # fmt: skip
+    by_fmu = agreement(
+        "library - FMU", read_turns(out / "library.json"), read_turns(out / "fmu.json"), 1e-9
+    )
     assert by_fmu.faults == []
 
 
@@ -152,8 +154,14 @@ def test_a_number_that_differs_ends_the_demonstration(
     changed = document(out / "replay.json")
     next(turn for turn in changed["turns"] if turn["valid"])["Fz"] += 1e-9
     (tmp_path / "replay.json").write_text(json.dumps(changed))
-    names = ("library.json", "fmu.json", "live.json", "replay.json", "conditions.json",
-             "device.toml")  # fmt: skip
+    names = (
+        "library.json",
+        "fmu.json",
+        "live.json",
+        "replay.json",
+        "conditions.json",
+        "device.toml",
+    )
     files = [tmp_path / n if n == "replay.json" else out / n for n in names]
     with pytest.raises(SystemExit):
         demo_module.judge(Console(file=sys.stderr), LiveFiles(*files), out / "exported")
@@ -207,13 +215,29 @@ def test_what_a_soak_has_struck_is_never_ahead_of_what_it_has_sent(demo_module: 
 def sample(hours: float, **changes: Any) -> Any:
     import bench_soak
 
-    line = {"crc_bad": 2, "framing_bad": 1, "lost_frames": 6, "duplicates": 4, "resets": 0,
-            "out_of_order": 0, "unknown_type": 0}  # fmt: skip
+    line = {
+        "crc_bad": 2,
+        "framing_bad": 1,
+        "lost_frames": 6,
+        "duplicates": 4,
+        "resets": 0,
+        "out_of_order": 0,
+        "unknown_type": 0,
+    }
     known = {
-        "hours": hours, "cpu_s": 1.0, "wall_s": 1.0, "rss_bytes": 2**28, "turns": 9,
-        "clean_turns": 8, "drift_ppm": bench_soak.FAST + 0.1, "residual_us": 1.0, "Fz_N": 4800.0,
-        "Fz_spread_N": 0.0, "line": line, "done": {"flips": 3, "lost": 3, "dup": 4},
-    }  # fmt: skip
+        "hours": hours,
+        "cpu_s": 1.0,
+        "wall_s": 1.0,
+        "rss_bytes": 2**28,
+        "turns": 9,
+        "clean_turns": 8,
+        "drift_ppm": bench_soak.FAST + 0.1,
+        "residual_us": 1.0,
+        "Fz_N": 4800.0,
+        "Fz_spread_N": 0.0,
+        "line": line,
+        "done": {"flips": 3, "lost": 3, "dup": 4},
+    }
     line.update({key: value for key, value in changes.items() if key in line})
     known.update({key: value for key, value in changes.items() if key in known})
     return bench_soak.Sample(**known)
@@ -250,8 +274,9 @@ def test_a_meter_counts_the_processes_of_a_run_and_those_that_ended(demo_module:
 
     work = "import time\nwhile time.process_time() < 0.2: pass\n"
     parent = "import subprocess, sys; subprocess.run([sys.executable, '-c', sys.argv[1]])"
-    run = subprocess.Popen([sys.executable, "-c", f"{parent}; input()", work],
-                           stdin=subprocess.PIPE)  # fmt: skip
+    run = subprocess.Popen(
+        [sys.executable, "-c", f"{parent}; input()", work], stdin=subprocess.PIPE
+    )
     meter = bench_processes.Meter(run.pid)
     end = time.monotonic() + PATIENCE
     most = 0

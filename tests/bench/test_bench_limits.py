@@ -15,29 +15,47 @@ def limits(build_programs: None) -> Any:
 
 
 LINE = {
-    "line": "serial, 1 wheel", "minutes": 10.0, "frames_sent": 9, "frames": 9, "unheard": 0,
-    "lost": {"crc_bad": 0, "gaps": 0}, "p50_ms": 6.0, "p99_ms": 9.0, "cpu_per_second": 0.4,
+    "line": "serial, 1 wheel",
+    "minutes": 10.0,
+    "frames_sent": 9,
+    "frames": 9,
+    "unheard": 0,
+    "lost": {"crc_bad": 0, "gaps": 0},
+    "p50_ms": 6.0,
+    "p99_ms": 9.0,
+    "cpu_per_second": 0.4,
     "load_average": 1.0,
-}  # fmt: skip
+}
 PLUG = {"cycles": 100, "back_p50_s": 0.01, "back_max_s": 1.9, "not_back": 0, "load_average": 1.0}
 KILL = {
-    "kills": [{"role": "run", "all_gone_s": 0.5}, {"role": "reader"}], "processes": ["reader"],
-    "readable": {"a.mcap": True}, "lost_max_s": 0.9, "back_max_s": 5.0, "not_back": 0,
+    "kills": [{"role": "run", "all_gone_s": 0.5}, {"role": "reader"}],
+    "processes": ["reader"],
+    "readable": {"a.mcap": True},
+    "lost_max_s": 0.9,
+    "back_max_s": 5.0,
+    "not_back": 0,
     "load_average": 1.0,
-}  # fmt: skip
+}
 SOUND: dict[str, dict[str, Any]] = {"serial, 1 wheel": LINE, "plug": PLUG, "kill": KILL}
 
 
-@pytest.mark.parametrize(("part", "change"), [
-    ("serial, 1 wheel", {"lost": {"crc_bad": 1, "gaps": 0}}),
-    ("serial, 1 wheel", {"frames": 8}), ("serial, 1 wheel", {"unheard": 1}),
-    ("serial, 1 wheel", {"p99_ms": 20.0}), ("serial, 1 wheel", {"p99_ms": None}),
-    ("serial, 1 wheel", {"cpu_per_second": 1.0}),
-    ("plug", {"back_max_s": 2.1}), ("plug", {"not_back": 1}),
-    ("kill", {"lost_max_s": 1.1}), ("kill", {"not_back": 1}),
-    ("kill", {"readable": {"a.mcap": True, "b.mcap": False}}),
-    ("kill", {"kills": [{"role": "run", "all_gone_s": None}]}),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("part", "change"),
+    [
+        ("serial, 1 wheel", {"lost": {"crc_bad": 1, "gaps": 0}}),
+        ("serial, 1 wheel", {"frames": 8}),
+        ("serial, 1 wheel", {"unheard": 1}),
+        ("serial, 1 wheel", {"p99_ms": 20.0}),
+        ("serial, 1 wheel", {"p99_ms": None}),
+        ("serial, 1 wheel", {"cpu_per_second": 1.0}),
+        ("plug", {"back_max_s": 2.1}),
+        ("plug", {"not_back": 1}),
+        ("kill", {"lost_max_s": 1.1}),
+        ("kill", {"not_back": 1}),
+        ("kill", {"readable": {"a.mcap": True, "b.mcap": False}}),
+        ("kill", {"kills": [{"role": "run", "all_gone_s": None}]}),
+    ],
+)
 def test_a_figure_that_is_missed_fails_its_part_alone(
     limits: Any, part: str, change: dict[str, Any]
 ) -> None:

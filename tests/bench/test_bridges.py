@@ -17,10 +17,21 @@ from bench.protocols.dbc import FILES
 from bench.protocols.estimates import estimate_frames
 
 OUTPUTS = {
-    "Fz": 4321.5, "alpha": math.radians(-3.25), "kappa": -0.0123, "Fy": -1502.0, "Fz_std": 40.0,
-    "alpha_std": math.radians(0.05), "kappa_std": 0.0011, "Fy_std": 21.5, "age": 0.0123,
-    "valid": 1.0, "Fz_valid": 1.0, "alpha_valid": 1.0, "kappa_valid": 0.0, "Fy_valid": 1.0,
-}  # fmt: skip
+    "Fz": 4321.5,
+    "alpha": math.radians(-3.25),
+    "kappa": -0.0123,
+    "Fy": -1502.0,
+    "Fz_std": 40.0,
+    "alpha_std": math.radians(0.05),
+    "kappa_std": 0.0011,
+    "Fy_std": 21.5,
+    "age": 0.0123,
+    "valid": 1.0,
+    "Fz_valid": 1.0,
+    "alpha_valid": 1.0,
+    "kappa_valid": 0.0,
+    "Fy_valid": 1.0,
+}
 TURN = Turn(1, 0, 0.5, 0.6, 0.6, OUTPUTS, {}, 8192 | 16, (0, 0, 0, 0, 0), wheel=2)
 
 

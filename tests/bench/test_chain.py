@@ -47,8 +47,15 @@ class StandIn:
         values = {q: turn.value(q) for q in QUANTITIES}
         stds = {f"{q}_std": turn.std(q) for q in QUANTITIES}
         valids = {f"{q}_valid": float(turn.is_valid(q)) for q in QUANTITIES}
-        numbers = {**values, **stds, **valids, "contact_time": turn.time, "age": self._stream.age,
-                "valid": float(turn.valid), "flags": turn.flags}  # fmt: skip
+        numbers = {
+            **values,
+            **stds,
+            **valids,
+            "contact_time": turn.time,
+            "age": self._stream.age,
+            "valid": float(turn.valid),
+            "flags": turn.flags,
+        }
         return numbers, {}
 
 
@@ -89,8 +96,9 @@ def test_the_bench_gives_the_estimates_of_the_library(
 ) -> None:
     turns, chain = estimates(calibration, script.frames, script.conditions, samples)
     observations = observe([read_campaign(campaign)])
-    library = estimate_document(observations, calibration.estimate(observations.features),
-                                calibration)  # fmt: skip
+    library = estimate_document(
+        observations, calibration.estimate(observations.features), calibration
+    )
     bench = document(turns, script.conditions.runs, chain.wheels, {})
     assert len(bench["turns"]) == len(library["turns"]) >= 15
     assert sum(turn["valid"] for turn in bench["turns"]) >= 12

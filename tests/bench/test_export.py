@@ -105,8 +105,9 @@ def test_a_table_has_every_sample_of_every_wheel(bus: Path, tmp_path: Path, endi
             strain = np.asarray(run.strain)[2, : len(mine)] * 1e6
             sound = ~mine.lost.to_numpy()
             assert len(mine) > 0.98 * run.strain.shape[1]
-            np.testing.assert_allclose(mine.strain_3_ustrain.to_numpy()[sound], strain[sound],
-                                       atol=1e-6)  # fmt: skip
+            np.testing.assert_allclose(
+                mine.strain_3_ustrain.to_numpy()[sound], strain[sound], atol=1e-6
+            )
             assert set(mine.run) == {run.plan.run}
     assert 0 < table.lost.sum() < 0.05 * len(table)
 
@@ -162,8 +163,11 @@ def test_a_recording_without_campaign_needs_one_like_it(
     campaign: Path, serial: Path, tmp_path: Path
 ) -> None:
     protocol = ProtocolPlan().as_header()
-    with Recorder(tmp_path / "c.mcap", RecordingHeader({}, protocol=protocol),
-                  Conditions.constant(18.0, 2.3e5, 0.0)) as recorder:  # fmt: skip
+    with Recorder(
+        tmp_path / "c.mcap",
+        RecordingHeader({}, protocol=protocol),
+        Conditions.constant(18.0, 2.3e5, 0.0),
+    ) as recorder:
         for read in reads_of(serial):
             recorder.read(read)
     code, said = invoke("export", tmp_path / "c.mcap", "--out", tmp_path / "c")
@@ -191,4 +195,8 @@ def test_a_lost_port_is_recorded_and_replayed(serial: Path, tmp_path: Path) -> N
             recorder.read(read)
         recorder.event({"event": "marker", "text": "here"})
     assert [(r.data, r.event) for r in reads_of(path)] == [
-        (b"abc", ""), (b"", LOST), (b"", BACK), (b"d", "")]  # fmt: skip
+        (b"abc", ""),
+        (b"", LOST),
+        (b"", BACK),
+        (b"d", ""),
+    ]

@@ -39,8 +39,15 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     speed[:, :2] = np.array([3600, 7200], "<u2").view(np.uint8).reshape(2, 2)
     told = same_kind(700, speed, fd=True)
     rows = np.arange(100)
-    batch = joined([strain.take(rows[:10]), told.take(rows[:1]), strain.take(rows[10:61]),
-                    told.take(rows[1:2]), strain.take(rows[61:])])  # fmt: skip
+    batch = joined(
+        [
+            strain.take(rows[:10]),
+            told.take(rows[:1]),
+            strain.take(rows[10:61]),
+            told.take(rows[1:2]),
+            strain.take(rows[61:]),
+        ]
+    )
     protocol = ProtocolPlan(CAN, 1e3, parse_map(MAP, DBC, "m.toml")).as_header()
     header = RecordingHeader({}, protocol=protocol)
     start = header.monotonic_ns

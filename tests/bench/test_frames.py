@@ -51,9 +51,12 @@ def test_the_layout_is_the_published_one() -> None:
     sent = some_frames(1, 3)
     body = cobs.decode(encode(sent)[0][:-1])
     head = struct.pack(
-        "<BBHIHBBbb", 1, *(int(getattr(sent, n)[0]) for n in ("wheel", "seq", "t_us", "period")),
-        16, *(int(getattr(sent, n)[0]) for n in ("flags", "rssi", "temperature")),
-    )  # fmt: skip
+        "<BBHIHBBbb",
+        1,
+        *(int(getattr(sent, n)[0]) for n in ("wheel", "seq", "t_us", "period")),
+        16,
+        *(int(getattr(sent, n)[0]) for n in ("flags", "rssi", "temperature")),
+    )
     assert body[:14] == head
     assert body[14:-4] == struct.pack("<80h", *sent.counts.ravel().tolist())
     assert body[-4:] == struct.pack("<I", zlib.crc32(body[:-4]))

@@ -119,8 +119,9 @@ def test_zero_warns_of_a_wheel_whose_clock_contradicts_its_rate(
 
 def test_zero_of_a_wheel_that_turns_is_refused(tmp_path: Path) -> None:
     wire = list(write_script(tiny_runs(), WHEEL, Faults({})).frames)
-    outcome = call("zero", "--replay", recorded(tmp_path / "a.mcap", wire), "--out",
-                   tmp_path / "new.toml")  # fmt: skip
+    outcome = call(
+        "zero", "--replay", recorded(tmp_path / "a.mcap", wire), "--out", tmp_path / "new.toml"
+    )
     assert "stop the wheel" in str(outcome.exception)
     assert not (tmp_path / "new.toml").exists()
 
@@ -129,11 +130,17 @@ def test_a_wheel_that_creeps_is_refused_and_so_is_too_little(tmp_path: Path) -> 
     noise = np.random.default_rng(1).normal(0.0, 3.0, (40_000, 5))
     creeping = np.rint(noise + np.linspace(0.0, 60.0, 40_000)[:, None]).astype(np.int16)
     wire = encode(strain_frames(creeping, period=1000))
-    outcome = call("zero", "--replay", recorded(tmp_path / "a.mcap", wire), "--out",
-                   tmp_path / "new.toml")  # fmt: skip
+    outcome = call(
+        "zero", "--replay", recorded(tmp_path / "a.mcap", wire), "--out", tmp_path / "new.toml"
+    )
     assert "drifts by" in str(outcome.exception)
-    outcome = call("zero", "--replay", recorded(tmp_path / "b.mcap", standing()[:300]), "--out",
-                   tmp_path / "new.toml")  # fmt: skip
+    outcome = call(
+        "zero",
+        "--replay",
+        recorded(tmp_path / "b.mcap", standing()[:300]),
+        "--out",
+        tmp_path / "new.toml",
+    )
     assert "1 s at least are needed" in str(outcome.exception)
 
 
@@ -236,8 +243,9 @@ def test_zero_reads_a_port(tmp_path: Path) -> None:
     sender = threading.Thread(target=send)
     sender.start()
     try:
-        outcome = call("zero", "--port", terminal.path, "--seconds", 1, "--out",
-                       tmp_path / "new.toml")  # fmt: skip
+        outcome = call(
+            "zero", "--port", terminal.path, "--seconds", 1, "--out", tmp_path / "new.toml"
+        )
     finally:
         ended.set()
         sender.join()

@@ -28,23 +28,42 @@ from bench.recording_topics import CONDITIONS, ESTIMATE, EVENTS
 NESTED = "[" * 100_000
 MARK = RunMark(1, 0, 0.0, {}, {"kind": "free", "load": 3000.0})
 SOUND = conditions_document(Conditions((0,), (condition(18.0, 2.3e5, 0.0),), (MARK,)))
-JUMP = {"event": "jump", "wheel": 0, "from": [0, 0], "to": [0, 9], "why": "x", "samples": 9,
-        "turns": 0}  # fmt: skip
+JUMP = {
+    "event": "jump",
+    "wheel": 0,
+    "from": [0, 0],
+    "to": [0, 9],
+    "why": "x",
+    "samples": 9,
+    "turns": 0,
+}
 
 
 def made(
-    path: Path, conditions: Any = SOUND, event: Any = JUMP, encoding: str = SERIAL,
-    packed: CompressionType | None = None, times: int = 1, arrivals: tuple[int, ...] = (),
-    estimate: Any = None, **header: Any,
-) -> Path:  # fmt: skip
+    path: Path,
+    conditions: Any = SOUND,
+    event: Any = JUMP,
+    encoding: str = SERIAL,
+    packed: CompressionType | None = None,
+    times: int = 1,
+    arrivals: tuple[int, ...] = (),
+    estimate: Any = None,
+    **header: Any,
+) -> Path:
     """Write a recording as this program would not."""
     with path.open("wb") as file:
-        writer = Writer(file, use_chunking=packed is not None,
-                        compression=packed or CompressionType.NONE)  # fmt: skip
+        writer = Writer(
+            file, use_chunking=packed is not None, compression=packed or CompressionType.NONE
+        )
         writer.start("tirebench", FORMAT)
-        text = {"settings": "{}", "device": "", "fmu_sha256": "", "wall_ns": "2",
-                "protocol": json.dumps(ProtocolPlan(encoding).as_header()),
-                "monotonic_ns": "1"}  # fmt: skip
+        text = {
+            "settings": "{}",
+            "device": "",
+            "fmu_sha256": "",
+            "wall_ns": "2",
+            "protocol": json.dumps(ProtocolPlan(encoding).as_header()),
+            "monotonic_ns": "1",
+        }
         texts = {k: v if isinstance(v, str) else json.dumps(v) for k, v in header.items()}
         writer.add_metadata("tirebench", {"format": FORMAT, **text, **texts})
         parts = {CONDITIONS: conditions, EVENTS: event, ESTIMATE.format(0): estimate}
@@ -72,23 +91,30 @@ def invoke(*words: object) -> tuple[int, str]:
     return outcome.exit_code, outcome.output
 
 
-@pytest.mark.parametrize(("damage", "said"), [
-    ({"conditions": NESTED}, "the conditions are damaged (JSON is nested too deeply)"),
-    ({"settings": NESTED}, "the header is damaged (JSON is nested too deeply)"),
-    ({"settings": {"wheels": 1e308}}, "wheels = 1e+308; a list of 0 .. 255 is allowed"),
-    ({"settings": {"wheels": [2**70]}}, "a list of 0 .. 255 is allowed"),
-    ({"protocol": {"rate_hz": 10**400}}, "rate_hz = 1000000"),
-    ({"protocol": {"rate_hz": float("nan")}}, "rate_hz = nan; 153 .. 200000 Hz is allowed"),
-    ({"protocol": {"rate_hz": 0}}, "rate_hz = 0; 153"),
-    ({"protocol": {"rate_hz": [1e4]}}, "rate_hz = [10000.0]; 153"),
-    ({"protocol": {"map": "no TOML"}}, "the map is no TOML"),
-    ({"wall_ns": str(2**70)}, "the header is damaged (a time of 1180591620717411303424 ns"),
-    ({"device": "# wheel x\n"}, "device file of wheel 'x'; 0 .. 255 is allowed"),
-    ({"device": "# wheel " + "9" * 5000}, "0 .. 255 is allowed"),
-    ({"conditions": SOUND | {"runs": [{"run": 1, "t_us": 0, "start_s": 0.0,
-                                       "plan_si": {"load": "much"}}]}},
-     "the conditions are damaged"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        ({"conditions": NESTED}, "the conditions are damaged (JSON is nested too deeply)"),
+        ({"settings": NESTED}, "the header is damaged (JSON is nested too deeply)"),
+        ({"settings": {"wheels": 1e308}}, "wheels = 1e+308; a list of 0 .. 255 is allowed"),
+        ({"settings": {"wheels": [2**70]}}, "a list of 0 .. 255 is allowed"),
+        ({"protocol": {"rate_hz": 10**400}}, "rate_hz = 1000000"),
+        ({"protocol": {"rate_hz": float("nan")}}, "rate_hz = nan; 153 .. 200000 Hz is allowed"),
+        ({"protocol": {"rate_hz": 0}}, "rate_hz = 0; 153"),
+        ({"protocol": {"rate_hz": [1e4]}}, "rate_hz = [10000.0]; 153"),
+        ({"protocol": {"map": "no TOML"}}, "the map is no TOML"),
+        ({"wall_ns": str(2**70)}, "the header is damaged (a time of 1180591620717411303424 ns"),
+        ({"device": "# wheel x\n"}, "device file of wheel 'x'; 0 .. 255 is allowed"),
+        ({"device": "# wheel " + "9" * 5000}, "0 .. 255 is allowed"),
+        (
+            {
+                "conditions": SOUND
+                | {"runs": [{"run": 1, "t_us": 0, "start_s": 0.0, "plan_si": {"load": "much"}}]}
+            },
+            "the conditions are damaged",
+        ),
+    ],
+)
 @pytest.mark.parametrize("verb", ["export", "replay"])
 def test_damage_of_what_a_recording_says_of_itself_is_named(
     verb: str, damage: dict[str, Any], said: str, tmp_path: Path, toy_fmus: dict[int, Path]
@@ -110,14 +136,17 @@ def test_an_event_that_says_nothing_is_passed_over(event: Any, tmp_path: Path) -
 
 
 @pytest.mark.parametrize("ending", ["csv", "parquet", "mf4"])
-@pytest.mark.parametrize(("parts", "said"), [
-    ({"event": {"event": [1]}}, "event = '[1]'; a text is needed"),
-    ({"event": {"event": "marker", "text": "\ud800"}}, "a text is needed"),
-    ({"event": {"event": "marker", "wheel": {}}}, "wheel = '{}'; a number or null is needed"),
-    ({"estimate": {"Fz": "much"}}, "Fz = 'much'; a number or null is needed"),
-    ({"estimate": {"turn": 1, "segment": 2**70}}, "a number or null is needed"),
-    ({"estimate": {"flags": 5}}, "flags = '5'; a list of texts is needed"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("parts", "said"),
+    [
+        ({"event": {"event": [1]}}, "event = '[1]'; a text is needed"),
+        ({"event": {"event": "marker", "text": "\ud800"}}, "a text is needed"),
+        ({"event": {"event": "marker", "wheel": {}}}, "wheel = '{}'; a number or null is needed"),
+        ({"estimate": {"Fz": "much"}}, "Fz = 'much'; a number or null is needed"),
+        ({"estimate": {"turn": 1, "segment": 2**70}}, "a number or null is needed"),
+        ({"estimate": {"flags": 5}}, "flags = '5'; a list of texts is needed"),
+    ],
+)
 def test_an_estimate_or_event_that_no_table_can_hold_is_named(
     parts: dict[str, Any], said: str, ending: str, tmp_path: Path
 ) -> None:
@@ -200,17 +229,23 @@ def nested(chunk: Chunk) -> None:
 ZSTD, LZ4 = CompressionType.ZSTD, CompressionType.LZ4
 
 
-@pytest.mark.parametrize(("count", "packed", "change", "said"), [
-    (1, ZSTD, told(2**62), "a chunk unpacks to 4611686018427387904 bytes; 1048576 are allowed"),
-    (1, ZSTD, told(100), "unpacks to 262205 bytes or more; it says 100"),
-    (1, LZ4, told(100), "unpacks to 262205 bytes or more; it says 100"),
-    (1, ZSTD, packed_by("brotli"), "packed by 'brotli'; zstd and lz4 are allowed"),
-    (1, ZSTD, nested, "a chunk stands within a chunk"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("count", "packed", "change", "said"),
+    [
+        (1, ZSTD, told(2**62), "a chunk unpacks to 4611686018427387904 bytes; 1048576 are allowed"),
+        (1, ZSTD, told(100), "unpacks to 262205 bytes or more; it says 100"),
+        (1, LZ4, told(100), "unpacks to 262205 bytes or more; it says 100"),
+        (1, ZSTD, packed_by("brotli"), "packed by 'brotli'; zstd and lz4 are allowed"),
+        (1, ZSTD, nested, "a chunk stands within a chunk"),
+    ],
+)
 def test_a_chunk_that_lies_is_refused(
-    count: int, packed: CompressionType, change: Callable[[Chunk], None], said: str,
+    count: int,
+    packed: CompressionType,
+    change: Callable[[Chunk], None],
+    said: str,
     monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
+) -> None:
     monkeypatch.setattr(records, "LARGEST", 2**20)
     with pytest.raises(RecordingError, match=said):
         list(records.records(chunks(count, packed, change)))

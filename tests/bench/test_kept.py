@@ -97,9 +97,14 @@ class System:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.policy, self.priority, self.nice = 0, 0, 0
-        linux = {"SCHED_RR": 2, "SCHED_RESET_ON_FORK": 0x4000_0000, "sched_param": int,
-                 "sched_setscheduler": self.set, "sched_getscheduler": lambda _: self.policy,
-                 "nice": self.be_nice}  # fmt: skip
+        linux = {
+            "SCHED_RR": 2,
+            "SCHED_RESET_ON_FORK": 0x4000_0000,
+            "sched_param": int,
+            "sched_setscheduler": self.set,
+            "sched_getscheduler": lambda _: self.policy,
+            "nice": self.be_nice,
+        }
         for name, value in linux.items():  # other systems have none of them
             monkeypatch.setattr(os, name, value, raising=False)
 

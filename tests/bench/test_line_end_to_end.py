@@ -21,13 +21,41 @@ def result(path: Path) -> dict[str, Any]:
 def test_two_wheels_over_slcan_are_estimated_recorded_replayed_and_exported(
     spawn: Spawn, campaign: Path, toy_fmus: dict[int, Path], tmp_path: Path
 ) -> None:
-    sender = Line(spawn, tmp_path, "--campaign", campaign, "--run", 2, "--format", "RAW16",
-                  "--wheel", 0, "--wheel", 2, "--conditions", tmp_path / "c.json",
-                  "--json", tmp_path / "e.json")  # fmt: skip
-    live = spawn("run", "--port", f"slcan:{sender.port}", "--data-bitrate", 5_000_000, "--fmu",
-                 toy_fmus[16], "--conditions", tmp_path / "c.json", "--record",
-                 tmp_path / "a.mcap", "--json", tmp_path / "live.json", "--every-turn",
-                 "--no-page")  # fmt: skip
+    sender = Line(
+        spawn,
+        tmp_path,
+        "--campaign",
+        campaign,
+        "--run",
+        2,
+        "--format",
+        "RAW16",
+        "--wheel",
+        0,
+        "--wheel",
+        2,
+        "--conditions",
+        tmp_path / "c.json",
+        "--json",
+        tmp_path / "e.json",
+    )
+    live = spawn(
+        "run",
+        "--port",
+        f"slcan:{sender.port}",
+        "--data-bitrate",
+        5_000_000,
+        "--fmu",
+        toy_fmus[16],
+        "--conditions",
+        tmp_path / "c.json",
+        "--record",
+        tmp_path / "a.mcap",
+        "--json",
+        tmp_path / "live.json",
+        "--every-turn",
+        "--no-page",
+    )
     code, out, _ = sender.heard_by(live)
     assert code == 0, out
     seen = result(tmp_path / "live.json")
@@ -38,8 +66,16 @@ def test_two_wheels_over_slcan_are_estimated_recorded_replayed_and_exported(
     line = seen["line"]
     assert line["frames"] == result(tmp_path / "e.json")["frames"]
     assert line["lost_samples"] == line["framing_bad"] == line["unknown_type"] == 0
-    words = ("replay", tmp_path / "a.mcap", "--fmu", toy_fmus[16], "--pace", 20,
-             "--json", tmp_path / "again.json")  # fmt: skip
+    words = (
+        "replay",
+        tmp_path / "a.mcap",
+        "--fmu",
+        toy_fmus[16],
+        "--pace",
+        20,
+        "--json",
+        tmp_path / "again.json",
+    )
     outcome = CliRunner().invoke(program, [str(word) for word in words])
     assert outcome.exit_code == 0, outcome.output
     again = result(tmp_path / "again.json")
@@ -56,12 +92,33 @@ def events(path: Path) -> list[str]:
 def test_a_cable_in_and_out_loses_what_was_sent_meanwhile_and_no_more(
     spawn: Spawn, campaign: Path, tmp_path: Path
 ) -> None:
-    emulator = spawn("emulate", "--campaign", campaign, "--all", "--loop", "--link",
-                     tmp_path / "port", "--unplug", 0.7, "--replug", 0.3, "--json",
-                     tmp_path / "e.json")  # fmt: skip
+    emulator = spawn(
+        "emulate",
+        "--campaign",
+        campaign,
+        "--all",
+        "--loop",
+        "--link",
+        tmp_path / "port",
+        "--unplug",
+        0.7,
+        "--replug",
+        0.3,
+        "--json",
+        tmp_path / "e.json",
+    )
     wait_until((tmp_path / "port").is_symlink)
-    live = spawn("record", "--port", tmp_path / "port", "--out", tmp_path / "a.mcap",
-                 "--reconnect", PATIENCE, "--json", tmp_path / "r.json")  # fmt: skip
+    live = spawn(
+        "record",
+        "--port",
+        tmp_path / "port",
+        "--out",
+        tmp_path / "a.mcap",
+        "--reconnect",
+        PATIENCE,
+        "--json",
+        tmp_path / "r.json",
+    )
     live.says("->")
     wait_until(lambda: events(tmp_path / "a.mcap").count(BACK) >= 2)
     live.send_signal(signal.SIGINT)

@@ -28,8 +28,18 @@ from tests.bench.clocks import Clock
 from tests.bench.programs import PATIENCE, wait_until
 from tests.bench.test_slcan import Keep, keys, some_frames
 
-CANNOT = {"canalystii", "etas", "gs_usb", "iscan", "ixxat", "neousys", "neovi", "nican",
-          "robotell", "usb2can"}  # fmt: skip
+CANNOT = {
+    "canalystii",
+    "etas",
+    "gs_usb",
+    "iscan",
+    "ixxat",
+    "neousys",
+    "neovi",
+    "nican",
+    "robotell",
+    "usb2can",
+}
 """Interfaces of python-can that cannot be told to be silent."""
 
 
@@ -39,8 +49,13 @@ def test_a_bus_is_silent_or_refused_unless_transmission_is_asked_for(
 ) -> None:
     asked: list[dict[str, object]] = []
     monkeypatch.setattr(can, "Bus", lambda **given: asked.append(given))
-    words = {"listen_only": True, "monitor": True, "driver_mode": False,
-             "operation_mode": "silent", "state": can.BusState.PASSIVE}  # fmt: skip
+    words = {
+        "listen_only": True,
+        "monitor": True,
+        "driver_mode": False,
+        "operation_mode": "silent",
+        "state": can.BusState.PASSIVE,
+    }
     software = interface in ("virtual", "udp_multicast", "serial", "socketcan", "socketcand")
     refused = False
     with suppress(DeviceError):
@@ -67,8 +82,9 @@ def terminal() -> Iterator[PseudoTerminal]:
 
 def fd_frames(count: int) -> CanBatch:
     rng = np.random.default_rng(1)
-    return same_kind(0x120 + np.arange(count) % 4, rng.integers(0, 256, (count, 64), np.uint8),
-                     fd=True)  # fmt: skip
+    return same_kind(
+        0x120 + np.arange(count) % 4, rng.integers(0, 256, (count, 64), np.uint8), fd=True
+    )
 
 
 def gathered(link: Link, until: Callable[[bytes], bool]) -> bytes:
@@ -159,10 +175,14 @@ def test_an_adapter_is_opened_to_listen_and_its_lines_are_read(terminal: PseudoT
     link.close()
 
 
-@pytest.mark.parametrize(("rates", "transmit", "opening"), [
-    ((500_000, None), False, b"\r\rC\rS6\rL\r"), ((500_000, None), True, b"\r\rC\rS6\rO\r"),
-    ((500_000, 2_000_000), True, b"\r\rC\rS6\rY2\rM0\rO\r"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("rates", "transmit", "opening"),
+    [
+        ((500_000, None), False, b"\r\rC\rS6\rL\r"),
+        ((500_000, None), True, b"\r\rC\rS6\rO\r"),
+        ((500_000, 2_000_000), True, b"\r\rC\rS6\rY2\rM0\rO\r"),
+    ],
+)
 def test_transmission_must_be_asked_for(
     terminal: PseudoTerminal, rates: tuple[int, int | None], transmit: bool, opening: bytes
 ) -> None:
@@ -227,8 +247,10 @@ def test_a_socketcand_server_is_read_and_its_end_is_told() -> None:
             read = link.receive(end)
             batch = None if read is None else unpack(read.data)
             if batch is not None:
-                seen += [(int(i), d.tobytes()) for i, d in zip(batch.identifier, batch.data[:, :8],
-                                                               strict=True)]  # fmt: skip
+                seen += [
+                    (int(i), d.tobytes())
+                    for i, d in zip(batch.identifier, batch.data[:, :8], strict=True)
+                ]
         heard.set()
         assert seen == frames
         thread.join()
@@ -243,22 +265,35 @@ def test_a_missing_can_interface_is_told() -> None:
         PortPlan("can:socketcan:none9").open()
 
 
-@pytest.mark.parametrize(("typed", "message"), [
-    ("can:nonsense:0", r"interfaces are .*socketcan"), ("can:virtual", r"no channel"),
-    ("slcan:/dev/none", r"the port cannot be opened"), ("/dev/none", r"there is no such port"),
-    ("/dev", r"it is a folder"), ("/dev/null", r"it is no serial port"), ("COM99", r"no such port"),
-    ("slcan", r"'slcan' is no name of a port"), ("can", r"'can' is no name of a port"),
-    ("slcan:", r"no serial port; slcan:PORT is needed"),
-    ("sclan:/dev/none", r"'sclan' is no kind of a port"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("typed", "message"),
+    [
+        ("can:nonsense:0", r"interfaces are .*socketcan"),
+        ("can:virtual", r"no channel"),
+        ("slcan:/dev/none", r"the port cannot be opened"),
+        ("/dev/none", r"there is no such port"),
+        ("/dev", r"it is a folder"),
+        ("/dev/null", r"it is no serial port"),
+        ("COM99", r"no such port"),
+        ("slcan", r"'slcan' is no name of a port"),
+        ("can", r"'can' is no name of a port"),
+        ("slcan:", r"no serial port; slcan:PORT is needed"),
+        ("sclan:/dev/none", r"'sclan' is no kind of a port"),
+    ],
+)
 def test_a_port_that_is_none_says_so(typed: str, message: str) -> None:
     with pytest.raises((LinkError, DeviceError), match=message):
         PortPlan(typed).open()
 
 
-@pytest.mark.parametrize(("port", "kind"), [
-    ("/dev/none", SerialLink), ("slcan:/dev/none", SlcanLink), ("can:virtual:x", CanLink),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("port", "kind"),
+    [
+        ("/dev/none", SerialLink),
+        ("slcan:/dev/none", SlcanLink),
+        ("can:virtual:x", CanLink),
+    ],
+)
 def test_whoever_stands_by_can_load_what_a_port_needs(
     port: str, kind: type, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -69,11 +69,34 @@ def compare(bench: dict[str, Any], library: dict[str, Any]) -> None:
 def test_library_live_and_replay_give_the_same_estimates(
     spawn: Spawn, campaign: Path, calibration: Calibration, fmus: dict[int, Path], tmp_path: Path
 ) -> None:
-    line = Line(spawn, tmp_path, "--campaign", campaign, "--all", "--speedup", 2,
-                "--conditions", tmp_path / "c.json", "--json", tmp_path / "e.json")  # fmt: skip
-    live = spawn("run", "--port", line.port, "--fmu", fmus[16], "--conditions",
-                 tmp_path / "c.json", "--record", tmp_path / "a.mcap", "--json",
-                 tmp_path / "live.json", "--every-turn", "--no-page")  # fmt: skip
+    line = Line(
+        spawn,
+        tmp_path,
+        "--campaign",
+        campaign,
+        "--all",
+        "--speedup",
+        2,
+        "--conditions",
+        tmp_path / "c.json",
+        "--json",
+        tmp_path / "e.json",
+    )
+    live = spawn(
+        "run",
+        "--port",
+        line.port,
+        "--fmu",
+        fmus[16],
+        "--conditions",
+        tmp_path / "c.json",
+        "--record",
+        tmp_path / "a.mcap",
+        "--json",
+        tmp_path / "live.json",
+        "--every-turn",
+        "--no-page",
+    )
     code, out, _ = line.heard_by(live)
     assert code == 0
     observations = observe([read_campaign(campaign)])
@@ -102,12 +125,45 @@ def test_library_live_and_replay_give_the_same_estimates(
 def test_every_fault_is_counted_and_none_passes_for_a_number(
     spawn: Spawn, campaign: Path, fmus: dict[int, Path], tmp_path: Path
 ) -> None:
-    sender = Line(spawn, tmp_path, "--campaign", campaign, "--run", 2, "--json",
-                  tmp_path / "e.json", "--seed", 3, "--fault", "flips=0.03", "--fault",
-                  "lost=0.03", "--fault", "dup=0.05", "--fault", "saturate=5")  # fmt: skip
-    live = spawn("run", "--port", sender.port, "--fmu", fmus[16], "--speed", 64.8, "--pressure",
-                 2.3, "--camber", 0, "--record", tmp_path / "a.mcap", "--json",
-                 tmp_path / "live.json", "--every-turn", "--no-page")  # fmt: skip
+    sender = Line(
+        spawn,
+        tmp_path,
+        "--campaign",
+        campaign,
+        "--run",
+        2,
+        "--json",
+        tmp_path / "e.json",
+        "--seed",
+        3,
+        "--fault",
+        "flips=0.03",
+        "--fault",
+        "lost=0.03",
+        "--fault",
+        "dup=0.05",
+        "--fault",
+        "saturate=5",
+    )
+    live = spawn(
+        "run",
+        "--port",
+        sender.port,
+        "--fmu",
+        fmus[16],
+        "--speed",
+        64.8,
+        "--pressure",
+        2.3,
+        "--camber",
+        0,
+        "--record",
+        tmp_path / "a.mcap",
+        "--json",
+        tmp_path / "live.json",
+        "--every-turn",
+        "--no-page",
+    )
     sender.heard_by(live)
     sent, seen = result(tmp_path / "e.json"), result(tmp_path / "live.json")
     done, line = sent["faults"], seen["line"]
@@ -128,12 +184,26 @@ def test_every_fault_is_counted_and_none_passes_for_a_number(
 def test_an_unplugged_cable_is_told_and_the_recording_kept(
     spawn: Spawn, campaign: Path, toy_fmus: dict[int, Path], tmp_path: Path
 ) -> None:
-    emulator = spawn("emulate", "--campaign", campaign, "--all", "--loop", "--port-file",
-                     tmp_path / "port")  # fmt: skip
+    emulator = spawn(
+        "emulate", "--campaign", campaign, "--all", "--loop", "--port-file", tmp_path / "port"
+    )
     port = port_of(tmp_path / "port", emulator)
-    live = spawn("run", "--port", port, "--fmu", toy_fmus[16], "--speed", 65, "--record",
-                 tmp_path / "a.mcap", "--json", tmp_path / "live.json", "--reconnect", 0,
-                 "--no-page")  # fmt: skip
+    live = spawn(
+        "run",
+        "--port",
+        port,
+        "--fmu",
+        toy_fmus[16],
+        "--speed",
+        65,
+        "--record",
+        tmp_path / "a.mcap",
+        "--json",
+        tmp_path / "live.json",
+        "--reconnect",
+        0,
+        "--no-page",
+    )
     live.says(A_TURN)
     emulator.terminate()  # it pulls the cable
     code, out, _ = live.finish()
@@ -153,8 +223,7 @@ def test_a_stopped_or_killed_run_leaves_a_recording_that_replays(
     spawn("emulate", "--campaign", campaign, "--all", "--loop", "--port-file", tmp_path / "port")
     port = port_of(tmp_path / "port")
     record = tmp_path / "a.mcap"
-    live = spawn("run", "--port", port, "--fmu", toy_fmus[16], "--speed", 65, "--record",
-                 record)  # fmt: skip
+    live = spawn("run", "--port", port, "--fmu", toy_fmus[16], "--speed", 65, "--record", record)
     live.says(A_TURN)
     wait_until(lambda: record.stat().st_size > 2 * SECOND)
     live.send_signal(number)
@@ -182,14 +251,21 @@ def test_bad_input_ends_with_code_2_and_a_message(
         "the port cannot be opened": ("run", "--port", tmp_path / "none", "--fmu", fmu),
         "it is no FMU": ("run", "--port", "p", "--fmu", tmp_path / "x.fmu"),
         "just one of [scale] and [bridge]": (
-            "run", "--port", "p", "--fmu", fmu, "--device", tmp_path / "d.toml"),
+            "run",
+            "--port",
+            "p",
+            "--fmu",
+            fmu,
+            "--device",
+            tmp_path / "d.toml",
+        ),
         "it cannot be read": ("run", "--replay", tmp_path / "none.mcap", "--fmu", fmu),
         "run 9; its runs are 1, 2, 3": ("emulate", "--campaign", campaign, "--run", 9),
         "'rust' is not known": ("emulate", "--campaign", campaign, "--fault", "rust"),
         "no such command 'rnu'; there are ports, load, emulate, run": ("rnu",),
         "did you mean 'replay'?": ("repaly",),
         "nobody opened the port in time": ("emulate", "--campaign", campaign, "--wait", 0.1),
-    }  # fmt: skip
+    }
     for message, arguments in cases.items():
         outcome = CliRunner().invoke(program, [str(argument) for argument in arguments])
         said = str(outcome.exception) + outcome.output

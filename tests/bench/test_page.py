@@ -46,21 +46,47 @@ def memory() -> Iterator[Board]:
 
 
 def outputs(number: int, contact: float, **more: float) -> dict[str, float]:
-    values = {"Fz": 3000.0 + number, "alpha": 0.02, "kappa": -0.01, "Fy": -900.0, "valid": 1.0,
-              "contact_time": contact, "turn_rate": OMEGA, "age": 0.0}  # fmt: skip
+    values = {
+        "Fz": 3000.0 + number,
+        "alpha": 0.02,
+        "kappa": -0.01,
+        "Fy": -900.0,
+        "valid": 1.0,
+        "contact_time": contact,
+        "turn_rate": OMEGA,
+        "age": 0.0,
+    }
     values |= {f"{name}_std": 0.1 * abs(values[name]) for name in UNITS}
     return {**values, **{f"contact_length_{g}": 0.1 + 0.01 * g for g in range(1, 6)}, **more}
 
 
 def turn(number: int, contact: float = 0.0, wheel: int = 0, **more: float) -> Turn:
-    return Turn(0, 0, contact, contact, 0.08 * number, outputs(number, contact, **more), {}, 0,
-                (0,) * 5, wheel)  # fmt: skip
+    return Turn(
+        0,
+        0,
+        contact,
+        contact,
+        0.08 * number,
+        outputs(number, contact, **more),
+        {},
+        0,
+        (0,) * 5,
+        wheel,
+    )
 
 
 def block(start: int, strain: Any, segment: int = 0) -> Samples:
     n = len(strain)
-    return Samples(segment, "", start, 100 * start, PERIOD, np.asarray(strain, float),
-                   np.zeros(n, np.bool_), np.zeros((n, 5), np.bool_))  # fmt: skip
+    return Samples(
+        segment,
+        "",
+        start,
+        100 * start,
+        PERIOD,
+        np.asarray(strain, float),
+        np.zeros(n, np.bool_),
+        np.zeros((n, 5), np.bool_),
+    )
 
 
 def test_units_are_those_of_a_document() -> None:
@@ -271,10 +297,17 @@ class Peaks:
 
 @pytest.mark.parametrize(
     "document",
-    [[], 3, {}, {"command": "stop"}, {"command": "marker", "text": "x" * 201},
-     {"command": "marker", "text": "two\nlines"}, {"command": "marker", "text": 3},
-     {"command": "record", "on": "yes"}],
-)  # fmt: skip
+    [
+        [],
+        3,
+        {},
+        {"command": "stop"},
+        {"command": "marker", "text": "x" * 201},
+        {"command": "marker", "text": "two\nlines"},
+        {"command": "marker", "text": 3},
+        {"command": "record", "on": "yes"},
+    ],
+)
 def test_a_command_that_is_none_is_refused(document: Any) -> None:
     with pytest.raises(DeviceError):
         parse_command(document)
@@ -329,8 +362,11 @@ def test_recordings_are_turned_on_and_off_and_markers_land_in_them(tmp_path: Pat
     assert say(command="record", on=True)["text"] == "recording a-2.mcap"
     assert say(command="record", on=False)["good"]
     chain.recorded.answer = "a-3.mcap: it cannot be written"
-    assert say(command="record", on=True) == {"number": 7, "good": False,
-                                              "text": "a-3.mcap: it cannot be written"}  # fmt: skip
+    assert say(command="record", on=True) == {
+        "number": 7,
+        "good": False,
+        "text": "a-3.mcap: it cannot be written",
+    }
     assert not desk.state()["recording"]["on"]
     writing.close()  # the page's process has died
     desk._next = 0.0

@@ -81,15 +81,19 @@ def test_a_value_that_is_not_known_changes_nothing_and_each_wheel_has_its_own_al
 
 def test_limits_come_from_a_file_and_its_faults_are_told_together(tmp_path: Path) -> None:
     file = tmp_path / "a.toml"
-    file.write_text('format = "tirebench-alarms/1"\n[loss]\nhigh = 2.0\nhysteresis = 1.0\n'
-                    "[silence]\noff = true\n[tire_pressure]\nlow = 2.1\n")  # fmt: skip
+    file.write_text(
+        'format = "tirebench-alarms/1"\n[loss]\nhigh = 2.0\nhysteresis = 1.0\n'
+        "[silence]\noff = true\n[tire_pressure]\nlow = 2.1\n"
+    )
     rules = read_alarms(file)
     assert (rules["loss"].high, rules["loss"].hysteresis) == (2.0, 1.0)
     assert rules["silence"].high is None
     assert rules["tire_pressure"].low == 2.1
     assert rules["signal"] == RULES["signal"]
-    file.write_text('format = "tirebench-alarms/1"\n[los]\nhigh = 2\n[rate]\nlow = "x"\n'
-                    "[Fz]\nlow = 10\nhigh = 20\n[signal]\nmuch = 1\n")  # fmt: skip
+    file.write_text(
+        'format = "tirebench-alarms/1"\n[los]\nhigh = 2\n[rate]\nlow = "x"\n'
+        "[Fz]\nlow = 10\nhigh = 20\n[signal]\nmuch = 1\n"
+    )
     with pytest.raises(DeviceError) as refused:
         read_alarms(file)
     said = str(refused.value)
@@ -162,8 +166,9 @@ def test_alarms_are_on_the_page_and_in_the_recording_and_a_full_disk_is_one() ->
     source, noted = Full(0), []
     source.wheels.heard[0].rssi = -95
     with Board() as board:
-        feed = Feed(board, source, About("p"), lambda: {"chain": source.counts()},
-                    note=noted.append)  # fmt: skip
+        feed = Feed(
+            board, source, About("p"), lambda: {"chain": source.counts()}, note=noted.append
+        )
         feed.watch(News())
         state = feed.state()
         assert len(json.dumps(state)) < RINGS["state"].room
@@ -182,9 +187,13 @@ def test_what_is_wrong_with_the_run_is_an_alarm_and_the_transmitter_is_not_blame
     source, raw, given_up, noted = FakeSource(0), {"alarm": ""}, {1: ""}, []
     source.heard = time.time() - 60.0
     with Board() as board:
-        feed = Feed(board, source, About("p"),
-                    lambda: {"chain": {"raw": raw, "given_up": given_up}},
-                    note=noted.append)  # fmt: skip
+        feed = Feed(
+            board,
+            source,
+            About("p"),
+            lambda: {"chain": {"raw": raw, "given_up": given_up}},
+            note=noted.append,
+        )
         active = [alarm["name"] for alarm in feed.state()["alarms"]["active"]]
         assert active == ["silence"]
         raw["alarm"] = "too busy"
@@ -220,23 +229,31 @@ def test_what_is_wrong_with_a_run_is_told_once_and_recorded_when_it_begins_and_e
     assert alarms.given_up == {1: f"{away.gone}; the port is still tried"}
     line.passing, recorded.error = False, "the disk is full"
     assert told(None, PortState("/dev/b")) == [
-        DECODED_AGAIN, "/dev/b: it is back", "the disk is full",
-    ]  # fmt: skip
+        DECODED_AGAIN,
+        "/dev/b: it is back",
+        "the disk is full",
+    ]
     line.wheels.heard[0].timeline._rate.contradiction = "wheel 0: another rate"
     recorded.error = ""
     assert told() == ["wheel 0: another rate; no turn of it is told", RECORDED_AGAIN]
     assert [(event["name"], event["state"]) for event in written] == [
-        ("busy", "on"), ("source 1", "on"), ("busy", "off"), ("source 1", "off"),
+        ("busy", "on"),
+        ("source 1", "on"),
+        ("busy", "off"),
+        ("source 1", "off"),
         ("sample rate", "on"),
-    ]  # fmt: skip
+    ]
 
 
 def test_a_source_without_a_frame_and_a_wheel_that_never_sends_are_told() -> None:
     """Three sources: one good, one at a wrong rate, one silent."""
     source, noted = FakeSource(), []
-    source.wheels = wheels_of([SourcePlan(PortPlan(name), wheel=number)
-                               for number, name in enumerate(("good", "garbage", "silent"))]
-                              )  # fmt: skip
+    source.wheels = wheels_of(
+        [
+            SourcePlan(PortPlan(name), wheel=number)
+            for number, name in enumerate(("good", "garbage", "silent"))
+        ]
+    )
     source.hear(0)
     source.wheels.push(b"temperature 23.1\r\n" * 9, source=1)
     line = counters(source.wheels)

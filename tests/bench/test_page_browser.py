@@ -86,20 +86,48 @@ def opened(browser: Any, url: str, visit: Visit) -> Any:
 
 @pytest.fixture(scope="module")
 def visit(
-    browser: Any, spawn_all: Spawn, campaign: Path, calibration: Calibration,
+    browser: Any,
+    spawn_all: Spawn,
+    campaign: Path,
+    calibration: Calibration,
     tmp_path_factory: pytest.TempPathFactory,
-) -> Visit:  # fmt: skip
+) -> Visit:
     folder, seen = tmp_path_factory.mktemp("visit"), Visit()
     write_calibration(calibration, folder / "cal.toml")
     fmu = build_fmu(folder / "cal.toml", folder / "StrainTire.fmu", samples_per_step=16)
-    emulator = spawn_all("emulate", "--campaign", campaign, "--all", "--loop", "--wheel", 0,
-                          "--wheel", 5, "--port-file", folder / "port", "--fault", "lost=0.002",
-                          "--speedup", 0.4,
-                          "--conditions", folder / "c.json")  # fmt: skip
+    emulator = spawn_all(
+        "emulate",
+        "--campaign",
+        campaign,
+        "--all",
+        "--loop",
+        "--wheel",
+        0,
+        "--wheel",
+        5,
+        "--port-file",
+        folder / "port",
+        "--fault",
+        "lost=0.002",
+        "--speedup",
+        0.4,
+        "--conditions",
+        folder / "c.json",
+    )
     port = port_of(folder / "port", emulator)
-    run = spawn_all("run", "--port", port, "--fmu", fmu, "--trust", "--conditions",
-                     folder / "c.json", "--record", folder / "a.mcap",
-                     "--every-turn")  # fmt: skip
+    run = spawn_all(
+        "run",
+        "--port",
+        port,
+        "--fmu",
+        fmu,
+        "--trust",
+        "--conditions",
+        folder / "c.json",
+        "--record",
+        folder / "a.mcap",
+        "--every-turn",
+    )
     url = run.says(r"live page: (\S+)\n")[1]
     seen.host = re.split("[/?]", url)[2]
     page = opened(browser, url, seen)
@@ -126,13 +154,13 @@ def visit(
     other.context.close()
     run.send_signal(signal.SIGINT)
     run.finish()
-    replay = spawn_all("replay", folder / "a.mcap", "--fmu", fmu,
-                        "--json", folder / "r.json")  # fmt: skip
+    replay = spawn_all("replay", folder / "a.mcap", "--fmu", fmu, "--json", folder / "r.json")
     assert replay.finish()[0] == 0
     seen.replay = result(folder / "r.json")
     recording = Recording(folder / "a.mcap")
-    events = [json.loads(data) for channel, _, data in recording.messages()
-              if channel.topic == EVENTS]  # fmt: skip
+    events = [
+        json.loads(data) for channel, _, data in recording.messages() if channel.topic == EVENTS
+    ]
     seen.markers = [event["text"] for event in events if event["event"] == "marker"]
     recording.close()
     return seen
@@ -333,8 +361,14 @@ def test_without_data_the_page_says_what_it_waits_for(browser: Any) -> None:
 class FourWheels(FakeSource):
     """Four wheels, a weak signal, a full disk; and a recording that goes on."""
 
-    recorded: ClassVar = {"file": "a.mcap", "bytes": 2.5e6, "minutes": 3.0, "free_bytes": 4e8,
-                          "minutes_left": 5.0, "error": "no space is left"}  # fmt: skip
+    recorded: ClassVar = {
+        "file": "a.mcap",
+        "bytes": 2.5e6,
+        "minutes": 3.0,
+        "free_bytes": 4e8,
+        "minutes_left": 5.0,
+        "error": "no space is left",
+    }
     bytes, name = 1, "a.mcap"
 
     def __init__(self, folder: Path) -> None:
@@ -374,11 +408,17 @@ def test_all_wheels_alarms_what_is_in_use_and_the_zero_of_the_gages(
             assert part in said
         page.keyboard.press("3")
         wait_for(page, "tirebench.wheel === 2 && !tirebench.all")
-        use = {cell.get_attribute("data-use"): cell.inner_text()
-               for cell in page.locator("#use-list dd[data-use]").all()}  # fmt: skip
-        assert use == {"speed": "64.8 km/h bus", "pressure": "2.30 bar option",
-                       "camber": "not known", "recording": "a.mcap 2.5 MB, 3.0 min",
-                       "room": "400.0 MB free for 5.0 min"}  # fmt: skip
+        use = {
+            cell.get_attribute("data-use"): cell.inner_text()
+            for cell in page.locator("#use-list dd[data-use]").all()
+        }
+        assert use == {
+            "speed": "64.8 km/h bus",
+            "pressure": "2.30 bar option",
+            "camber": "not known",
+            "recording": "a.mcap 2.5 MB, 3.0 min",
+            "room": "400.0 MB free for 5.0 min",
+        }
         page.keyboard.press("g")
         page.locator("#zero-set").click()
         assert list(tmp_path.iterdir()) == []  # asked once more before anything is written

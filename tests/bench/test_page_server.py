@@ -66,8 +66,9 @@ class Served:
         self.cookie = f"tirebench-{self.port}={self.token}"
         self.good = {"Host": self.host, "Cookie": self.cookie}
 
-    def ask(self, path: str, *, method: str = "GET", body: bytes | None = None,
-            **headers: str) -> Answer:  # fmt: skip
+    def ask(
+        self, path: str, *, method: str = "GET", body: bytes | None = None, **headers: str
+    ) -> Answer:
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE)
         connection.putrequest(method, path, skip_host=True, skip_accept_encoding=True)
         for name, value in headers.items():
@@ -105,10 +106,17 @@ class Served:
         host = headers.pop("Host", self.host)
         origin: Any = headers.pop("Origin", None)
         connection = socket.create_connection(("127.0.0.1", self.port))
-        with connection, connect(
-            f"ws://{host}/stream", additional_headers=headers, origin=origin, proxy=None,
-            sock=connection, open_timeout=PATIENCE,
-        ) as stream:  # fmt: skip
+        with (
+            connection,
+            connect(
+                f"ws://{host}/stream",
+                additional_headers=headers,
+                origin=origin,
+                proxy=None,
+                sock=connection,
+                open_timeout=PATIENCE,
+            ) as stream,
+        ):
             yield stream
 
 
@@ -204,9 +212,18 @@ def test_a_token_in_the_address_opens_nothing_but_the_first_page(served: Served)
 
 @pytest.mark.parametrize(
     "path",
-    ["/../page.py", "/static/../server.py", "/..%2f..%2fpyproject.toml", "/%2e%2e/server.py",
-     "//etc/passwd", "/page.js/../../server.py", "/page.js%00.py", "/..\\server.py", "/server.py"],
-)  # fmt: skip
+    [
+        "/../page.py",
+        "/static/../server.py",
+        "/..%2f..%2fpyproject.toml",
+        "/%2e%2e/server.py",
+        "//etc/passwd",
+        "/page.js/../../server.py",
+        "/page.js%00.py",
+        "/..\\server.py",
+        "/server.py",
+    ],
+)
 def test_no_path_leads_to_a_file_that_is_not_of_the_page(served: Served, path: str) -> None:
     status, _, body = served.ask(path, **served.good)
     assert status == 404
@@ -289,8 +306,12 @@ def test_a_connection_without_a_request_ends(asked: bool) -> None:
 
 
 def test_of_idle_connections_the_oldest_of_who_has_most_gives_way() -> None:
-    idle = [SimpleNamespace(client=(peer, n), opened=age) for n, (peer, age) in enumerate(
-        [("10.0.0.1", 0.0), ("10.0.0.2", 3.0), ("10.0.0.2", 1.0), ("10.0.0.2", 2.0)])]  # fmt: skip
+    idle = [
+        SimpleNamespace(client=(peer, n), opened=age)
+        for n, (peer, age) in enumerate(
+            [("10.0.0.1", 0.0), ("10.0.0.2", 3.0), ("10.0.0.2", 1.0), ("10.0.0.2", 2.0)]
+        )
+    ]
     assert least_needed(idle) is idle[2]
 
 

@@ -179,11 +179,22 @@ def test_a_run_that_is_killed_while_the_wheel_sends_leaves_no_process_behind(
     spawn: Spawn, campaign: Path, toy_fmus: dict[int, Path], tmp_path: Path
 ) -> None:
     spawn("emulate", "--campaign", campaign, "--all", "--loop", "--port-file", tmp_path / "port")
-    run = spawn("run", "--port", port_of(tmp_path / "port"), "--fmu", toy_fmus[16], "--no-page",
-                "--record", tmp_path / "a.mcap")  # fmt: skip
+    run = spawn(
+        "run",
+        "--port",
+        port_of(tmp_path / "port"),
+        "--fmu",
+        toy_fmus[16],
+        "--no-page",
+        "--record",
+        tmp_path / "a.mcap",
+    )
     run.says(A_TURN)
-    started = [int(pid) for task in Path(f"/proc/{run.pid}/task").iterdir()
-               for pid in (task / "children").read_text().split()]  # fmt: skip
+    started = [
+        int(pid)
+        for task in Path(f"/proc/{run.pid}/task").iterdir()
+        for pid in (task / "children").read_text().split()
+    ]
     assert len(started) >= 3
     run.kill()
     run.wait()
@@ -193,8 +204,19 @@ def test_a_run_that_is_killed_while_the_wheel_sends_leaves_no_process_behind(
 def test_a_cable_in_and_out_is_told_and_every_time_it_comes_back(
     spawn: Spawn, campaign: Path, tmp_path: Path
 ) -> None:
-    spawn("emulate", "--campaign", campaign, "--all", "--loop", "--link", tmp_path / "port",
-          "--unplug", 0.5, "--replug", 0.2)  # fmt: skip
+    spawn(
+        "emulate",
+        "--campaign",
+        campaign,
+        "--all",
+        "--loop",
+        "--link",
+        tmp_path / "port",
+        "--unplug",
+        0.5,
+        "--replug",
+        0.2,
+    )
     wait_until((tmp_path / "port").is_symlink)
     with LiveChain(plan_of(str(tmp_path / "port"), None, tmp_path / "a.mcap")) as chain:
         lost = 0
@@ -229,9 +251,13 @@ class Turns:
 
 
 def stepped(
-    blocks: list[Block], late: slice = slice(0), gone: slice = slice(0), *, again: bool = False,
+    blocks: list[Block],
+    late: slice = slice(0),
+    gone: slice = slice(0),
+    *,
+    again: bool = False,
     every: bool = False,
-) -> News:  # fmt: skip
+) -> News:
     """Step blocks in the estimator's process, but here; some come late, some not at all."""
     exchange = Exchange.create(CONTEXT, 1)
     now = time.monotonic_ns()
@@ -263,10 +289,18 @@ def blocks() -> list[Block]:
     return [b for i in range(0, len(wire), 3) for b in wheels.push(b"".join(wire[i : i + 3]))]
 
 
-@pytest.mark.parametrize("case", [
-    {}, {"late": slice(60, 90)}, {"gone": slice(60, 90)}, {"gone": slice(120, 170)},
-    {"again": True}, {"late": slice(0, 30)}, {"late": slice(60, 90), "every": True},
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "case",
+    [
+        {},
+        {"late": slice(60, 90)},
+        {"gone": slice(60, 90)},
+        {"gone": slice(120, 170)},
+        {"again": True},
+        {"late": slice(0, 30)},
+        {"late": slice(60, 90), "every": True},
+    ],
+)
 def test_what_an_estimator_leaves_out_is_flagged_and_a_replay_leaves_it_out_too(
     blocks: list[Block], case: dict[str, Any]
 ) -> None:
@@ -389,8 +423,10 @@ def test_a_start_that_takes_long_says_what_is_awaited(
     chain._estimators.kept = dict.fromkeys(range(3), cast(Any, SimpleNamespace(starts=1, look=int)))
     chain._estimators.ready = {1}
     loading = chain._estimators.awaited
-    for awaited, text in ((chain._opening, "the reader to open p"),
-                          (loading, "estimator 0, estimator 2 to load ")):  # fmt: skip
+    for awaited, text in (
+        (chain._opening, "the reader to open p"),
+        (loading, "estimator 0, estimator 2 to load "),
+    ):
         with pytest.raises(LinkTimeoutError, match=f"waited 0 s for: {text}"):
             chain._wait(lambda: False, awaited)
         assert said.pop().startswith(f"waiting for: {text}")

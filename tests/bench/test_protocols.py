@@ -58,9 +58,14 @@ def test_single_samples_arrive_as_they_were_sent(seed: int, counter: int) -> Non
 
 
 @given(
-    st.integers(0, 65535), st.integers(-128, 127), st.integers(-128, 127), st.integers(0, 255),
-    st.integers(0, 255), st.integers(0, 65535), st.integers(0, 2**32 - 1),
-)  # fmt: skip
+    st.integers(0, 65535),
+    st.integers(-128, 127),
+    st.integers(-128, 127),
+    st.integers(0, 255),
+    st.integers(0, 255),
+    st.integers(0, 65535),
+    st.integers(0, 2**32 - 1),
+)
 def test_health_and_sync_arrive(a: int, b: int, c: int, d: int, e: int, f: int, g: int) -> None:
     sent = Health(a, b, c, 0.02 * d, 2000.0 * e, f)
     back = layouts.decode_health(layouts.encode_health(sent)[0])
@@ -75,17 +80,26 @@ def test_the_published_databases_are_the_ones_in_the_repository() -> None:
         assert path.read_text(encoding="utf-8") == database(kinds)
 
 
-@pytest.mark.parametrize(("file", "kind"), [
-    (FD_FILE, RAW16), (FD_FILE, RAW12), (CLASSIC_FILE, RAW12C), (CLASSIC_FILE, "SYNC"),
-    (CLASSIC_FILE, "HEALTH"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("file", "kind"),
+    [
+        (FD_FILE, RAW16),
+        (FD_FILE, RAW12),
+        (CLASSIC_FILE, RAW12C),
+        (CLASSIC_FILE, "SYNC"),
+        (CLASSIC_FILE, "HEALTH"),
+    ],
+)
 def test_cantools_reads_what_is_sent(file: Path, kind: str) -> None:
     """The published database and our layouts say the same, bit for bit."""
     db = cantools.database.load_file(file)
     message = db.get_message_by_name(f"{kind}_2")
     layout = LAYOUTS[kind]
     assert (message.frame_id, message.length, message.is_fd) == (
-        layout.base + 2, layout.length, layout.fd)  # fmt: skip
+        layout.base + 2,
+        layout.length,
+        layout.fd,
+    )
     rng = np.random.default_rng(3)
     data = rng.integers(0, 256, (50, layout.length)).astype(np.uint8)
     ours = raw_values(data, signals(kind))
@@ -101,9 +115,12 @@ def test_cantools_reads_what_is_sent(file: Path, kind: str) -> None:
 
 
 @given(
-    start=st.integers(0, 40), length=st.integers(1, 24), signed=st.booleans(), big=st.booleans(),
+    start=st.integers(0, 40),
+    length=st.integers(1, 24),
+    signed=st.booleans(),
+    big=st.booleans(),
     value=st.integers(0, 2**24 - 1),
-)  # fmt: skip
+)
 def test_a_signal_is_found_wherever_a_dbc_puts_it(
     start: int, length: int, signed: bool, big: bool, value: int
 ) -> None:
@@ -231,9 +248,12 @@ def test_packed_frames_come_back(seed: int, fd: bool, count: int) -> None:
     rng = np.random.default_rng(seed)
     width = 64 if fd else 8
     batch = CanBatch(
-        rng.integers(0, 2**11, count), rng.random(count) < 0.5, np.full(count, fd),
-        np.full(count, width), rng.integers(0, 256, (count, width)).astype(np.uint8),
-    )  # fmt: skip
+        rng.integers(0, 2**11, count),
+        rng.random(count) < 0.5,
+        np.full(count, fd),
+        np.full(count, width),
+        rng.integers(0, 256, (count, width)).astype(np.uint8),
+    )
     back = unpack(pack(batch))
     assert back is not None
     for name in CanBatch.__slots__:

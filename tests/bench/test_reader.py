@@ -46,8 +46,10 @@ def read_until(killed_before: int, *, room: bool = True) -> tuple[list[list[byte
     exchange = Exchange.create(CONTEXT, 2)
     plan = ReaderPlan((SourcePlan(PortPlan("p")),), 60.0)
     lines = [WIRE, write_script(tiny_runs()[:1], Device(), Faults({}), wheel=1).frames]
-    reads = [Read(i + 1, b"".join(part for line in lines for part in line[3 * i : 3 * i + 3]))
-             for i in range(4)]  # fmt: skip
+    reads = [
+        Read(i + 1, b"".join(part for line in lines for part in line[3 * i : 3 * i + 3]))
+        for i in range(4)
+    ]
     calls = 0
 
     def counted(method: Callable[..., Any]) -> Callable[..., Any]:
@@ -164,7 +166,11 @@ def test_what_waits_too_long_is_recorded_and_a_replay_leaves_it_out_too(
     recorded: list[Read] = [pickle.loads(message) for message in iter(exchange.raw.read, None)]
     passed = [read for read in recorded if read.event in (PASSED, DECODED)]
     assert [(read.arrival // 10**9 - 10, read.event) for read in passed] == [
-        (2, PASSED), (5, DECODED), (8, PASSED), (9, DECODED)]  # fmt: skip
+        (2, PASSED),
+        (5, DECODED),
+        (8, PASSED),
+        (9, DECODED),
+    ]
     assert b"".join(read.data for read in recorded) == b"".join(WIRE[:30])
     with Recorder(tmp_path / "a.mcap", RecordingHeader({}), Conditions.constant()) as recorder:
         for read in recorded:

@@ -155,11 +155,18 @@ def test_a_wrong_sidecar_says_what_is_wrong(tmp_path: Path, text: str, message: 
         read_conditions(tmp_path / "c.json")
 
 
-@pytest.mark.parametrize("change", [
-    {"loop_us": math.inf}, {"speed": 5}, {"speed": {"unit": "m/s", "values": 5}}, {"t_us": [{}]},
-    {"runs": [3]}, {"runs": [{"run": 1, "t_us": 0, "start_s": 0.0, "truth": [1]}]},
-    {"campaign": 7},
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"loop_us": math.inf},
+        {"speed": 5},
+        {"speed": {"unit": "m/s", "values": 5}},
+        {"t_us": [{}]},
+        {"runs": [3]},
+        {"runs": [{"run": 1, "t_us": 0, "start_s": 0.0, "truth": [1]}]},
+        {"campaign": 7},
+    ],
+)
 def test_a_sidecar_of_another_make_is_refused(change: dict[str, Any]) -> None:
     sound = conditions_document(Conditions.constant(18.0))
     assert parse_conditions(sound, "c.json").t_us == (0,)

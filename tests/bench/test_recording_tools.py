@@ -44,8 +44,11 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Record a second of a wheel with two sources, and all that a run makes of it."""
     path = tmp_path_factory.mktemp("tools") / "a.mcap"
     wheels = Wheels.of_one(SerialDecoder(), {None: Device()})
-    header = RecordingHeader({}, protocol={"encoding": "serial-v1", "name": "/dev/ttyUSB0"},
-                             more=({"encoding": "can", "name": "can0"},))  # fmt: skip
+    header = RecordingHeader(
+        {},
+        protocol={"encoding": "serial-v1", "name": "/dev/ttyUSB0"},
+        more=({"encoding": "can", "name": "can0"},),
+    )
     frames = list(write_script(tiny_runs()[:1], Device(), Faults({})).frames[:200])
     frames[50] = frames[151] = b""  # lost
     with Recorder(path, header, Conditions.constant(18.0)) as recorder:
@@ -83,8 +86,17 @@ def contents(path: Path) -> dict[str, list[Any]]:
     return found
 
 
-TOPICS = {"/raw/0", "/raw/1", "/events", "/conditions", "/line", "/wheel/0/strain",
-          "/wheel/0/conditions", "/wheel/0/link", "/wheel/2/estimate"}  # fmt: skip
+TOPICS = {
+    "/raw/0",
+    "/raw/1",
+    "/events",
+    "/conditions",
+    "/line",
+    "/wheel/0/strain",
+    "/wheel/0/conditions",
+    "/wheel/0/link",
+    "/wheel/2/estimate",
+}
 
 
 def test_an_indexed_reader_lists_all_topics_and_every_message_follows_its_schema(
@@ -95,15 +107,22 @@ def test_an_indexed_reader_lists_all_topics_and_every_message_follows_its_schema
     assert found["/wheel/2/estimate"][0][1]["Fz"] == 4321.5
     assert found["/wheel/0/conditions"][0][1] == {"pressure_bar": pytest.approx(2.3)}
     assert found["/raw/1"][0][1] == b"bus"
-    assert all(message.publish_time == message.log_time > 1.5e18 for topic in found.values()
-               for message, _ in topic)  # fmt: skip
+    assert all(
+        message.publish_time == message.log_time > 1.5e18
+        for topic in found.values()
+        for message, _ in topic
+    )
 
 
 def test_strain_stands_in_the_recording_as_it_was_decoded(recording: Path) -> None:
     reader = Recording(recording)
     wheels = Wheels.of_one(SerialDecoder(), {None: Device()})
-    decoded = [block.content for read in reader.reads() if read.source == 0
-               for block in wheels.push(read.data, read.arrival)]  # fmt: skip
+    decoded = [
+        block.content
+        for read in reader.reads()
+        if read.source == 0
+        for block in wheels.push(read.data, read.arrival)
+    ]
     reader.close()
     strain = np.concatenate([b.strain for b in decoded if isinstance(b, Samples)]).T * 1e6
     messages = contents(recording)["/wheel/0/strain"]

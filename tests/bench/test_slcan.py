@@ -45,10 +45,14 @@ def some_frames(count: int, seed: int) -> CanBatch:
 
 def keys(batch: CanBatch) -> list[tuple[object, ...]]:
     return [
-        (int(batch.identifier[i]), bool(batch.extended[i]), bool(batch.fd[i]),
-         batch.data[i, : batch.length[i]].tobytes())
+        (
+            int(batch.identifier[i]),
+            bool(batch.extended[i]),
+            bool(batch.fd[i]),
+            batch.data[i, : batch.length[i]].tobytes(),
+        )
         for i in range(len(batch))
-    ]  # fmt: skip
+    ]
 
 
 @given(count=st.integers(1, 30), seed=st.integers(0, 10**6), longest=st.integers(1, 300))

@@ -64,8 +64,9 @@ def test_an_address_in_use_or_nobody_there_is_told(udp: SocketLink) -> None:
         PortPlan(f"rfc2217://127.0.0.1:{closed}").open()
 
 
-@pytest.mark.parametrize("url", ["tcp://", "tcp://host", "tcp://:5", "udp://h:x", "udp://h:70000",
-                                 "tcp://h:1/path"])  # fmt: skip
+@pytest.mark.parametrize(
+    "url", ["tcp://", "tcp://host", "tcp://:5", "udp://h:x", "udp://h:70000", "tcp://h:1/path"]
+)
 def test_a_wrong_address_says_how_it_is_written(url: str) -> None:
     with pytest.raises(DeviceError, match=r"it is no address; tcp://HOST:PORT or udp://"):
         PortPlan(url).check()

@@ -161,8 +161,13 @@ def test_two_wheels_and_the_vehicle_on_one_clock_are_replayed_to_the_bit(
     )
     head, *more = (source.as_header() for source in sources)
     header = RecordingHeader({}, protocol=head, more=tuple(more))
-    plan = LivePlan(ReaderPlan(sources, 60.0, every_turn=True), file, Conditions.constant(), header,
-                    tmp_path / "a.mcap")  # fmt: skip
+    plan = LivePlan(
+        ReaderPlan(sources, 60.0, every_turn=True),
+        file,
+        Conditions.constant(),
+        header,
+        tmp_path / "a.mcap",
+    )
     news = News()
     with LiveChain(plan) as chain:
         gathered(chain, news, lambda: speed_of(chain) == pytest.approx(65.0))
@@ -206,8 +211,11 @@ def test_a_wheel_with_a_wrong_rate_is_recorded_to_the_end_and_exported(tmp_path:
     server = Server(frames)
     plan = ReaderPlan((SourcePlan(PortPlan(server.url)),), 60.0, estimated=False)
     news, size = News(), sum(map(len, frames))
-    with LiveChain(LivePlan(plan, None, Conditions.constant(), RecordingHeader({}),
-                            tmp_path / "a.mcap", laps=False)) as chain:  # fmt: skip
+    with LiveChain(
+        LivePlan(
+            plan, None, Conditions.constant(), RecordingHeader({}), tmp_path / "a.mcap", laps=False
+        )
+    ) as chain:
         gathered(chain, news, lambda: chain.wheels.line_counts(0).bytes == size)
         news.add(chain.poll(Deadline.after(0.2)))
         chain.finish("stopped")
@@ -227,8 +235,13 @@ def test_a_wheel_with_a_wrong_rate_gets_no_estimates_and_the_others_do() -> None
     both = Wheels([Line(SerialDecoder(), {}), Line(SerialDecoder(), {})])
     seen = []
     for one, two in zip(wrong_clock(), good, strict=True):
-        seen.append({block.wheel for number, data in enumerate((one, two))
-                     for block in both.agreeing(both.push(data, 1, number))})  # fmt: skip
+        seen.append(
+            {
+                block.wheel
+                for number, data in enumerate((one, two))
+                for block in both.agreeing(both.push(data, 1, number))
+            }
+        )
     assert seen[-1] == {1}
     assert list(both.contradicted) == [0]
     alone = Wheels([Line(SerialDecoder(), {})])
@@ -243,8 +256,9 @@ class Reads:
     name, live = "reads", False
 
     def __init__(self, *sources: list[bytes]) -> None:
-        both = (Read(n, one[n], "", s) for n in range(len(sources[0])) for s, one in
-                enumerate(sources))  # fmt: skip
+        both = (
+            Read(n, one[n], "", s) for n in range(len(sources[0])) for s, one in enumerate(sources)
+        )
         self._reads = iter(both)
 
     def receive(self, deadline: Deadline) -> Read | None:
@@ -274,8 +288,14 @@ def test_a_port_of_several_that_is_killed_is_read_again(tmp_path: Path) -> None:
     held = Server(frames, lambda number: more.wait() if number > 9 else None)
     other = Server([told(50.0)])
     sources = (SourcePlan(PortPlan(held.url)), vehicle(other.url))
-    plan = LivePlan(ReaderPlan(sources, 60.0), None, Conditions.constant(),
-                    RecordingHeader({}, more=({},)), tmp_path / "a.mcap", laps=False)  # fmt: skip
+    plan = LivePlan(
+        ReaderPlan(sources, 60.0),
+        None,
+        Conditions.constant(),
+        RecordingHeader({}, more=({},)),
+        tmp_path / "a.mcap",
+        laps=False,
+    )
     news = News()
     with LiveChain(plan) as chain:
         gathered(chain, news, lambda: chain.wheels.line_counts(0).ok >= 9)
@@ -315,8 +335,13 @@ def test_reads_of_several_ports_come_in_the_order_of_the_clock(exchange: Exchang
     assert link.name == "port 0 + port 1"
     reads = [link.receive(Deadline.after(1.0)) for _ in range(6)]
     assert [(r.arrival, r.source) for r in reads if r] == [
-        (1, 0), (2, 1), (3, 1), (4, 0), (5, 0), (5, 1),
-    ]  # fmt: skip
+        (1, 0),
+        (2, 1),
+        (3, 1),
+        (4, 0),
+        (5, 0),
+        (5, 1),
+    ]
     nothing = link.receive(Deadline.after(0.0))
     assert nothing is not None
     assert nothing.data == b""
@@ -354,8 +379,14 @@ def test_a_source_that_is_given_up_is_an_alarm_and_the_other_goes_on(tmp_path: P
     url = f"tcp://127.0.0.1:{away.getsockname()[1]}"
     away.close()  # nobody is there
     sources = (SourcePlan(PortPlan(held.url)), SourcePlan(PortPlan(url), wheel=3))
-    plan = LivePlan(ReaderPlan(sources, 60.0, wait=0.1), None, Conditions.constant(),
-                    RecordingHeader({}, more=({},)), tmp_path / "a.mcap", laps=False)  # fmt: skip
+    plan = LivePlan(
+        ReaderPlan(sources, 60.0, wait=0.1),
+        None,
+        Conditions.constant(),
+        RecordingHeader({}, more=({},)),
+        tmp_path / "a.mcap",
+        laps=False,
+    )
     news = News()
     with LiveChain(plan) as chain:
         gathered(chain, news, lambda: any(url in said for said in news.alarms))
@@ -384,7 +415,10 @@ def test_an_error_after_the_first_turn_is_raised_when_all_is_written() -> None:
     source.poll = poll
     outcome = Session(source).run()
     assert (outcome.reason, outcome.turns, str(outcome.error)) == (
-        "error", [turn], "wheel 3 comes twice")  # fmt: skip
+        "error",
+        [turn],
+        "wheel 3 comes twice",
+    )
     with pytest.raises(DeviceError):
         Session(source).run()
 
@@ -428,8 +462,9 @@ def test_a_wheel_that_comes_from_two_sources_is_refused() -> None:
 
 def test_a_source_of_one_wheel_refuses_a_second() -> None:
     wheels = Wheels([Line(SerialDecoder(), {}, 5, "left")])
-    frames = [encode(strain_frames(np.zeros((16, 5), np.int16), period=1000, wheel=w))[0]
-              for w in (1, 2)]  # fmt: skip
+    frames = [
+        encode(strain_frames(np.zeros((16, 5), np.int16), period=1000, wheel=w))[0] for w in (1, 2)
+    ]
     wheels.push(frames[0], 1)
     assert list(wheels.heard) == [5]
     with pytest.raises(DeviceError, match="left: wheels 1, 2 are heard; one is allowed"):
@@ -440,12 +475,23 @@ def serial(port: str, wheel: int | None = None) -> SourcePlan:
     return SourcePlan(PortPlan(port), wheel=wheel)
 
 
-@pytest.mark.parametrize(("sources", "conditions", "message"), [
-    ((serial("a"), serial("a")), None, "--port a: it comes twice"),
-    ((serial("a", 1), serial("b", 1)), None, "wheel 1 comes from a and b"),
-    ((vehicle("a"), vehicle("b")), None, "told twice: speed from slcan:a, pressure of wheel 3 fr"),
-    ((serial("a"), vehicle("b")), Conditions.constant(18.0), "speed comes from slcan:b, and from"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("sources", "conditions", "message"),
+    [
+        ((serial("a"), serial("a")), None, "--port a: it comes twice"),
+        ((serial("a", 1), serial("b", 1)), None, "wheel 1 comes from a and b"),
+        (
+            (vehicle("a"), vehicle("b")),
+            None,
+            "told twice: speed from slcan:a, pressure of wheel 3 fr",
+        ),
+        (
+            (serial("a"), vehicle("b")),
+            Conditions.constant(18.0),
+            "speed comes from slcan:b, and from",
+        ),
+    ],
+)
 def test_sources_that_contradict_each_other_are_refused(
     sources: tuple[SourcePlan, ...], conditions: Conditions | None, message: str
 ) -> None:
@@ -480,18 +526,24 @@ def test_a_setup_lists_sources_and_the_options_fill_in(tmp_path: Path) -> None:
     assert bus.protocol.user_map is not None
 
 
-@pytest.mark.parametrize(("change", "message"), [
-    (("tirebench-setup/1", "x/1"), "'x/1'; 'tirebench-setup/1' is understood"),
-    (("wheel = 0", "wheel = 300"), "source 1: wheel = 300; 0 .. 255"),
-    (("bitrate = 1000000", 'bitrate = "fast"'), "source 2: bitrate = 'fast'; .* type int"),
-    (("wheel = 0", "weel = 0"), "source 1: weel is not known; allowed are port"),
-    (('port = "/dev/ttyUSB0"', ""), "source 1: port is missing"),
-    (("[[source]]", "[[sources]]"), "sources is not known"),
-    (('map = "vehicle.toml"', 'map = "none.toml"'), "source 2: .*none.toml: it cannot be read"),
-    (('"vehicle.toml"', '"left.toml"'), "s.toml: source 2: .*left.toml: .*'tirebench-map/1'"),
-    (('"left.toml"', '"vehicle.toml"'), "s.toml: source 1: .*vehicle.toml: .*tirebench-device/1"),
-    (("[[source]]", "[source]"), "cannot be read|tables"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("tirebench-setup/1", "x/1"), "'x/1'; 'tirebench-setup/1' is understood"),
+        (("wheel = 0", "wheel = 300"), "source 1: wheel = 300; 0 .. 255"),
+        (("bitrate = 1000000", 'bitrate = "fast"'), "source 2: bitrate = 'fast'; .* type int"),
+        (("wheel = 0", "weel = 0"), "source 1: weel is not known; allowed are port"),
+        (('port = "/dev/ttyUSB0"', ""), "source 1: port is missing"),
+        (("[[source]]", "[[sources]]"), "sources is not known"),
+        (('map = "vehicle.toml"', 'map = "none.toml"'), "source 2: .*none.toml: it cannot be read"),
+        (('"vehicle.toml"', '"left.toml"'), "s.toml: source 2: .*left.toml: .*'tirebench-map/1'"),
+        (
+            ('"left.toml"', '"vehicle.toml"'),
+            "s.toml: source 1: .*vehicle.toml: .*tirebench-device/1",
+        ),
+        (("[[source]]", "[source]"), "cannot be read|tables"),
+    ],
+)
 def test_a_wrong_setup_says_what_is_wrong(
     change: tuple[str, str], message: str, tmp_path: Path
 ) -> None:
@@ -502,11 +554,17 @@ def test_a_wrong_setup_says_what_is_wrong(
         read_setup(tmp_path / "s.toml", serial(""))
 
 
-@pytest.mark.parametrize(("words", "message"), [
-    (("--port", "1=/dev/a", "--port", "1=/dev/b"), "wheel 1 comes from /dev/a and /dev/b"),
-    (("--port", "300=/dev/a"), r"--port 300=/dev/a: wheel 300; 0 \.\. 255 is allowed"),
-    (("--port", "/dev/a", "--device", "256=a.toml"), r"--device 256=a.toml: wheel 256; 0 \.\. 255"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--port", "1=/dev/a", "--port", "1=/dev/b"), "wheel 1 comes from /dev/a and /dev/b"),
+        (("--port", "300=/dev/a"), r"--port 300=/dev/a: wheel 300; 0 \.\. 255 is allowed"),
+        (
+            ("--port", "/dev/a", "--device", "256=a.toml"),
+            r"--device 256=a.toml: wheel 256; 0 \.\. 255",
+        ),
+    ],
+)
 def test_options_that_cannot_be_end_the_command(
     toy_fmus: dict[int, Path], words: tuple[str, ...], message: str
 ) -> None:

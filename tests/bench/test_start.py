@@ -160,11 +160,30 @@ def test_a_port_that_does_not_come_is_told_with_what_was_wrong(
 def test_a_run_may_begin_before_its_port_is_there(
     spawn: Spawn, campaign: Path, toy_fmus: dict[int, Path], tmp_path: Path
 ) -> None:
-    run = spawn("run", "--port", tmp_path / "wheel", "--wait", PATIENCE, "--fmu", toy_fmus[16],
-                "--record", tmp_path / "a.mcap", "--no-page")  # fmt: skip
+    run = spawn(
+        "run",
+        "--port",
+        tmp_path / "wheel",
+        "--wait",
+        PATIENCE,
+        "--fmu",
+        toy_fmus[16],
+        "--record",
+        tmp_path / "a.mcap",
+        "--no-page",
+    )
     run.says("samples a step")  # all is loaded, and nothing to read
-    wheel = spawn("emulate", "--campaign", campaign, "--all", "--loop", "--link",
-                  tmp_path / "wheel", "--port-file", tmp_path / "port")  # fmt: skip
+    wheel = spawn(
+        "emulate",
+        "--campaign",
+        campaign,
+        "--all",
+        "--loop",
+        "--link",
+        tmp_path / "wheel",
+        "--port-file",
+        tmp_path / "port",
+    )
     run.says(A_TURN)
     run.send_signal(signal.SIGINT)
     code, text, _ = run.finish()

@@ -45,8 +45,19 @@ def test_a_run_that_is_stopped_while_it_starts_leaves_nothing(
     temporary, file = tmp_path / "temporary", tmp_path / "a.mcap"
     temporary.mkdir()
     monkeypatch.setenv("TMPDIR", str(temporary))
-    run = spawn("run", "--port", tmp_path / "none", "--wait", "--fmu", endless, "--record", file,
-                "--json", tmp_path / "a.json", "--no-page")  # fmt: skip
+    run = spawn(
+        "run",
+        "--port",
+        tmp_path / "none",
+        "--wait",
+        "--fmu",
+        endless,
+        "--record",
+        file,
+        "--json",
+        tmp_path / "a.json",
+        "--no-page",
+    )
     wait_until(lambda: file.exists() or run.poll() is not None)
     assert list(temporary.glob(f"tirebench-*-{run.pid}-*"))  # the FMU
     run.send_signal(signal.SIGHUP)

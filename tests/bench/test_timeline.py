@@ -189,11 +189,15 @@ def test_a_rate_is_judged_anew_after_each_start_and_is_not_waited_for_without_en
         judged.append(timeline.judged)
     waited = begun + LONGEST_WAIT - 1
     assert [now for now, then in pairwise(judged) if now != then] == [
-        False, True, False,
-    ]  # fmt: skip
+        False,
+        True,
+        False,
+    ]
     assert [judged.index(True), judged.index(False, JUDGED), judged.index(True, begun)] == [
-        JUDGED - 1, begun, waited,
-    ]  # fmt: skip
+        JUDGED - 1,
+        begun,
+        waited,
+    ]
 
 
 @given(

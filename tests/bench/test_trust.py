@@ -38,10 +38,17 @@ def altered(fmu: Path, out: Path, name: str, data: bytes) -> Path:
     return out
 
 
-@pytest.mark.parametrize("name", [
-    "binaries/linux64/StrainTire.so", "resources/slavemodule.txt", "resources/evil.py",
-    "resources/settings.json", "resources/calibration.toml", "modelDescription.xml",
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "name",
+    [
+        "binaries/linux64/StrainTire.so",
+        "resources/slavemodule.txt",
+        "resources/evil.py",
+        "resources/settings.json",
+        "resources/calibration.toml",
+        "modelDescription.xml",
+    ],
+)
 def test_a_changed_copy_of_ours_is_unknown(ours: Path, tmp_path: Path, name: str) -> None:
     copy = altered(ours, tmp_path / "y.fmu", name, b"{}")
     with pytest.raises(FmuError, match=r"sha256 [0-9a-f]{64} is unknown; .*--trust once"):

@@ -186,12 +186,21 @@ def test_without_a_checksum_a_frame_counts_where_another_follows() -> None:
     assert numbers.tolist() == [n for n in range(49) if n != 20]
 
 
-@pytest.mark.parametrize(("line", "counter"), [
-    (b"$W;1;2;3;4;5;6*00\n", "crc"), (b"$V 1 2\n", "framing"), (b"$V 1 x 3\n", "framing"),
-    (b"$V 1_0 2 3\n", "framing"), (b"$V inf 2 3\n", "framing"), (b"\xff\xfe\n", "framing"),
-    (b"$X 1 2 3\n", "unknown"), (b"W;1;2;3;4;5;6\n", "unknown"),
-    (b"$W;1;2;3;4;5;6\n", "crc"), (b"x" * 5000 + b"\n", "framing"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("line", "counter"),
+    [
+        (b"$W;1;2;3;4;5;6*00\n", "crc"),
+        (b"$V 1 2\n", "framing"),
+        (b"$V 1 x 3\n", "framing"),
+        (b"$V 1_0 2 3\n", "framing"),
+        (b"$V inf 2 3\n", "framing"),
+        (b"\xff\xfe\n", "framing"),
+        (b"$X 1 2 3\n", "unknown"),
+        (b"W;1;2;3;4;5;6\n", "unknown"),
+        (b"$W;1;2;3;4;5;6\n", "crc"),
+        (b"x" * 5000 + b"\n", "framing"),
+    ],
+)
 def test_a_wrong_line_is_counted_and_left_out(line: bytes, counter: str) -> None:
     decoder = plan_of(TEXT).decoder()
     decoder.push(text(1)[0])
@@ -225,19 +234,26 @@ def test_a_gage_that_is_not_there_is_unknown() -> None:
     np.testing.assert_allclose(1e6 * strain[0, :4], GAGES[0, :4] / 2.0)
 
 
-@pytest.mark.parametrize(("map_text", "change", "message"), [
-    (BINARY, ('"AA55"', '"AA5"'), "sync, struct and fields; or .* are needed"),
-    (BINARY, ('"<HxI5hB"', '"HxI5hB"'), "struct begins with < or >"),
-    (BINARY, ('"<HxI5hB"', '"<HxI5h4sB"'), "struct knows x b B"),
-    (BINARY, ('"<HxI5hB"', '"<HxI5h"'), "struct has 7 values, fields has more"),
-    (BINARY, ("CRC-16/MODBUS", "CRC-17"), "checksum = 'CRC-17' is not known; SUM-8"),
-    (BINARY, ('"AA55"', '"AA55"\nlength = 3'), "length: not known"),
-    (TEXT, ("bits = 16", "bits = 40"), "bits is 1 .. 32"),
-    (TEXT, ('{ name = "count", bits = 16 }', '"count"'), "must be integers.*bits of the column"),
-    (TEXT, ('separator = ";"', 'separator = "; "'), "separator is one character"),
-    (TEXT, ('starts = "$V"', 'id = 3'), "id: not known"),
-    (BINARY, ('["g1", "g2", "g3", "g4", "g5"]', '["", "", "", "", ""]'), "one at least"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("map_text", "change", "message"),
+    [
+        (BINARY, ('"AA55"', '"AA5"'), "sync, struct and fields; or .* are needed"),
+        (BINARY, ('"<HxI5hB"', '"HxI5hB"'), "struct begins with < or >"),
+        (BINARY, ('"<HxI5hB"', '"<HxI5h4sB"'), "struct knows x b B"),
+        (BINARY, ('"<HxI5hB"', '"<HxI5h"'), "struct has 7 values, fields has more"),
+        (BINARY, ("CRC-16/MODBUS", "CRC-17"), "checksum = 'CRC-17' is not known; SUM-8"),
+        (BINARY, ('"AA55"', '"AA55"\nlength = 3'), "length: not known"),
+        (TEXT, ("bits = 16", "bits = 40"), "bits is 1 .. 32"),
+        (
+            TEXT,
+            ('{ name = "count", bits = 16 }', '"count"'),
+            "must be integers.*bits of the column",
+        ),
+        (TEXT, ('separator = ";"', 'separator = "; "'), "separator is one character"),
+        (TEXT, ('starts = "$V"', "id = 3"), "id: not known"),
+        (BINARY, ('["g1", "g2", "g3", "g4", "g5"]', '["", "", "", "", ""]'), "one at least"),
+    ],
+)
 def test_a_wrong_map_of_a_line_says_what_is_wrong(
     map_text: str, change: tuple[str, str], message: str
 ) -> None:
@@ -287,8 +303,11 @@ def toy_of_three(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_three_gages_where_the_estimator_has_three(toy_of_three: Path) -> None:
     strain = 1e6 * np.asarray(tiny_runs()[0].strain)[1:4].T
-    lines = [f"{number},{row[0]:.3f},{row[1]:.3f},{row[2]:.3f}\n".encode()
-             for number, row in enumerate(strain) if number not in range(3000, 3010)]  # fmt: skip
+    lines = [
+        f"{number},{row[0]:.3f},{row[1]:.3f},{row[2]:.3f}\n".encode()
+        for number, row in enumerate(strain)
+        if number not in range(3000, 3010)
+    ]
     source = SourcePlan(PortPlan("p"), plan_of(THREE))
     with FmuFile(read_fmu(toy_of_three)) as file, FmuModel(file) as model:
         assert (file.samples, file.gages) == (16, 3)
@@ -316,8 +335,11 @@ def test_wheels_with_other_gages_than_the_calibration_are_refused() -> None:
 
 
 def test_the_text_line_of_the_handbook_is_read_with_its_map() -> None:
-    (example,) = [block for block in re.findall(r"```toml\n(.*?)```", DOCS.read_text(), re.DOTALL)
-                  if "starts " in block]  # fmt: skip
+    (example,) = [
+        block
+        for block in re.findall(r"```toml\n(.*?)```", DOCS.read_text(), re.DOTALL)
+        if "starts " in block
+    ]
     (line,) = re.findall(r"# (\$W;.*)", example)
     source = SourcePlan(PortPlan("p"), plan_of(example))
     wheels = wheels_of([source])

@@ -93,8 +93,11 @@ def test_a_dbc_and_a_map_are_enough(tmp_path: Path) -> None:
         decoder = UserCan(which.user_map, which.decoder().counts)
         timeline = Timeline(which.device, 2)
         batch = same_kind(529, frames_of(sent), fd=True)
-        items = [i for rows in np.array_split(np.arange(600), 5)
-                 for i in decoder.push(batch.take(rows), int(rows[-1]) * 1_000_000)]  # fmt: skip
+        items = [
+            i
+            for rows in np.array_split(np.arange(600), 5)
+            for i in decoder.push(batch.take(rows), int(rows[-1]) * 1_000_000)
+        ]
         blocks = [b for item in items for b in timeline.push(item)]
         strain = np.concatenate([b.strain for b in blocks])
         np.testing.assert_allclose(1e6 * strain, sent, atol=1e-9)
@@ -105,8 +108,9 @@ def test_signals_may_be_listed_without_a_dbc() -> None:
     user = parse_map(LISTED, "", "m.toml")
     assert user.wheels[0].strain[1].start == 10
     counts = np.arange(50)[:, None] + np.arange(5)
-    words = [sum(int(c) << (10 * g) for g, c in enumerate(row)) | i << 52
-             for i, row in enumerate(counts)]  # fmt: skip
+    words = [
+        sum(int(c) << (10 * g) for g, c in enumerate(row)) | i << 52 for i, row in enumerate(counts)
+    ]
     data = np.frombuffer(b"".join(w.to_bytes(8, "little") for w in words), np.uint8).reshape(-1, 8)
     frames = UserCan(user, ProtocolPlan(CAN, 2e3, user).decoder().counts).push(
         same_kind(0x210, data, fd=False), 0
@@ -179,12 +183,15 @@ def test_multiplexed_and_real_signals_are_read_as_cantools_wrote_them() -> None:
     np.testing.assert_allclose(speeds.seen, told, rtol=1e-12)
 
 
-@pytest.mark.parametrize(("change", "message"), [
-    (('counter = "count"', 'counter = "other"'), "must stand in the same frames"),
-    (('strain_unit = "ustrain"', ""), "real numbers are no counts"),
-    (('"g5"]]', '"count"]]'), "all gages need one length, sign and factor"),
-    (('counter = "count"', 'counter = "g1"'), "counter and time must be integers"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (('counter = "count"', 'counter = "other"'), "must stand in the same frames"),
+        (('strain_unit = "ustrain"', ""), "real numbers are no counts"),
+        (('"g5"]]', '"count"]]'), "all gages need one length, sign and factor"),
+        (('counter = "count"', 'counter = "g1"'), "counter and time must be integers"),
+    ],
+)
 def test_a_wrong_map_of_pages_says_what_is_wrong(change: tuple[str, str], message: str) -> None:
     with pytest.raises(DeviceError, match=message):
         parse_map(PAGED_MAP.replace(*change), PAGED, "m.toml")
@@ -214,8 +221,15 @@ def test_a_speed_on_the_bus_holds_from_the_sample_after_it(reads: int) -> None:
     speed[:, :2] = np.array([3600, 7200], "<u2").view(np.uint8).reshape(2, 2)
     told = same_kind(700, speed, fd=True)
     rows = np.arange(100)
-    batch = joined([strain.take(rows[:10]), told.take(rows[:1]), strain.take(rows[10:61]),
-                    told.take(rows[1:2]), strain.take(rows[61:])])  # fmt: skip
+    batch = joined(
+        [
+            strain.take(rows[:10]),
+            told.take(rows[:1]),
+            strain.take(rows[10:61]),
+            told.take(rows[1:2]),
+            strain.take(rows[61:]),
+        ]
+    )
     plan, speeds = ProtocolPlan(CAN, 1e3, user), Speeds()
     wheels = Wheels.of_one(plan.decoder(), {None: plan.device})
     estimation = Estimation(lambda _: speeds, Conditions.constant(5.0))
@@ -234,21 +248,24 @@ def test_what_is_held_is_bounded_and_the_newest_counts() -> None:
     assert len(held._told) < 300
 
 
-@pytest.mark.parametrize(("change", "message"), [
-    (('"tirebench-map/1"', '"x/1"'), "'x/1'; 'tirebench-map/1' is understood"),
-    (("rate_hz = 1000", "rate_hz = 1"), "rate_hz = 1; 153 .. 200000 Hz"),
-    (('"g5"', '"g9"'), "signal = 'g9'; WHEEL_FL has the signals g1"),
-    (('"WHEEL_FL"', '"FR"'), "message = 'FR'; known are ABS, WHEEL_FL"),
-    (('time = "stamp"', ""), "time_unit|wraps after 256"),
-    (('"ms"', '"bar"'), "time_unit = 'bar'; a unit of time is needed"),
-    (('strain_unit = "ustrain"', 'strain_unit = "N"'), "a unit of strain is needed"),
-    (('unit = "km/h"', 'unit = "N"'), "a unit of speed is needed"),
-    (("[speed]", "[sped]"), "sped is not known"),
-    (("[speed]", "[[speed]]\nwheel = 300"), r"speed: wheel = 300; 0 \.\. 255 is needed"),
-    (("rate_hz = 1000", "rate_hz = 1000\ncamber = 5"), r"camber = 5; a table \[camber\]"),
-    (("[[wheel]]", "wheel = [1, 2]\n[other]"), r"wheel = \[1, 2\]; tables \[\[wheel\]\]"),
-    (('[["g1", "g2", "g3", "g4", "g5"]]', "1.5"), r"samples = 1.5; lists of 1 to 16 signals"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (('"tirebench-map/1"', '"x/1"'), "'x/1'; 'tirebench-map/1' is understood"),
+        (("rate_hz = 1000", "rate_hz = 1"), "rate_hz = 1; 153 .. 200000 Hz"),
+        (('"g5"', '"g9"'), "signal = 'g9'; WHEEL_FL has the signals g1"),
+        (('"WHEEL_FL"', '"FR"'), "message = 'FR'; known are ABS, WHEEL_FL"),
+        (('time = "stamp"', ""), "time_unit|wraps after 256"),
+        (('"ms"', '"bar"'), "time_unit = 'bar'; a unit of time is needed"),
+        (('strain_unit = "ustrain"', 'strain_unit = "N"'), "a unit of strain is needed"),
+        (('unit = "km/h"', 'unit = "N"'), "a unit of speed is needed"),
+        (("[speed]", "[sped]"), "sped is not known"),
+        (("[speed]", "[[speed]]\nwheel = 300"), r"speed: wheel = 300; 0 \.\. 255 is needed"),
+        (("rate_hz = 1000", "rate_hz = 1000\ncamber = 5"), r"camber = 5; a table \[camber\]"),
+        (("[[wheel]]", "wheel = [1, 2]\n[other]"), r"wheel = \[1, 2\]; tables \[\[wheel\]\]"),
+        (('[["g1", "g2", "g3", "g4", "g5"]]', "1.5"), r"samples = 1.5; lists of 1 to 16 signals"),
+    ],
+)
 def test_a_wrong_map_says_what_is_wrong(change: tuple[str, str], message: str) -> None:
     if change[0] == 'time = "stamp"':
         text = MAP.replace('counter = "count"', "").replace('time = "stamp"', "")

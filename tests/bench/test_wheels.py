@@ -59,8 +59,9 @@ def played(
 
 def test_a_line_without_a_frame_says_what_to_look_at() -> None:
     wheels = Wheels.of_one(ProtocolPlan().decoder(), {None: Device()})
-    assert counters(wheels).endswith("0 frames; no byte came: is the transmitter on, and is this "
-                                     "its port?")  # fmt: skip
+    assert counters(wheels).endswith(
+        "0 frames; no byte came: is the transmitter on, and is this its port?"
+    )
     wheels.push(b"temperature 23.1\r\n" * 9)  # text: not even a bad frame
     assert "--baud" in counters(wheels)
     wheels, _ = played((0, 2), (5,))

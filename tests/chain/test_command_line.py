@@ -17,8 +17,11 @@ def run(*words: object, cwd: Path | None = None) -> subprocess.CompletedProcess[
     program = "import sys; from tirelib.cli import main; sys.argv[0] = 'tirelib'; main()"
     return subprocess.run(
         [sys.executable, "-c", program, *map(str, words)],
-        capture_output=True, text=True, check=False, cwd=cwd,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=cwd,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -26,8 +29,9 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("journey")
     write(folder / "set1", cornering_runs())
     write(folder / "day2", cornering_runs(seed=5))
-    made = run("calibrate", folder / "set1", "--out", folder / "cal.toml", "--json",
-               folder / "cal.json")  # fmt: skip
+    made = run(
+        "calibrate", folder / "set1", "--out", folder / "cal.toml", "--json", folder / "cal.json"
+    )
     assert made.returncode == 0, made.stderr
     return folder
 
@@ -58,8 +62,9 @@ def test_calibrate_prints_and_stores_statistics(place: Path) -> None:
 
 
 def test_estimate_writes_the_contract(place: Path) -> None:
-    done = run("estimate", place / "day2", "--calibration", place / "cal.toml", "--json",
-               place / "e.json")  # fmt: skip
+    done = run(
+        "estimate", place / "day2", "--calibration", place / "cal.toml", "--json", place / "e.json"
+    )
     assert done.returncode == 0, done.stderr
     document = json.loads((place / "e.json").read_text())
     assert document["format"] == "tirelib-estimate/1"
@@ -73,8 +78,20 @@ def test_estimate_writes_the_contract(place: Path) -> None:
     assert document["not_given"] == []
     assert "was not given" not in done.stdout
     turn = next(turn for turn in document["turns"] if turn["valid"])
-    assert set(turn) >= {"run", "t", "Fz", "Fz_std", "alpha", "alpha_std", "kappa", "kappa_std",
-                         "Fy", "Fy_std", "valid", "flags"}  # fmt: skip
+    assert set(turn) >= {
+        "run",
+        "t",
+        "Fz",
+        "Fz_std",
+        "alpha",
+        "alpha_std",
+        "kappa",
+        "kappa_std",
+        "Fy",
+        "Fy_std",
+        "valid",
+        "flags",
+    }
     assert turn["flags"] == []
     first = document["turns"][0]
     assert first["flags"] == ["first_turn", *first["flags"][1:]]
@@ -90,8 +107,14 @@ def test_the_condition_that_costs_most_is_named(place: Path, tmp_path: Path) -> 
     shutil.copytree(place / "day2", tmp_path / "day2")
     plan = tmp_path / "day2" / "runs.csv"
     pd.read_csv(plan).drop(columns="tread_depth_mm").to_csv(plan, index=False)
-    done = run("estimate", tmp_path / "day2", "--calibration", place / "cal.toml", "--json",
-               tmp_path / "e.json")  # fmt: skip
+    done = run(
+        "estimate",
+        tmp_path / "day2",
+        "--calibration",
+        place / "cal.toml",
+        "--json",
+        tmp_path / "e.json",
+    )
     assert done.returncode == 0, done.stderr
     rows = json.loads((tmp_path / "e.json").read_text())["not_given"]
     (load,) = (row for row in rows if row["quantity"] == "Fz")
@@ -108,8 +131,14 @@ def test_a_quantity_without_calibration_is_null(place: Path, tmp_path: Path) -> 
     runs = [synthetic_run(i, slip_ratio=k, kind="drive") for i, k in enumerate(slips)]
     write(tmp_path / "drive", runs)
     assert run("calibrate", tmp_path / "drive", "--out", tmp_path / "c.toml").returncode == 0
-    done = run("estimate", tmp_path / "drive", "--calibration", tmp_path / "c.toml", "--json",
-               tmp_path / "e.json")  # fmt: skip
+    done = run(
+        "estimate",
+        tmp_path / "drive",
+        "--calibration",
+        tmp_path / "c.toml",
+        "--json",
+        tmp_path / "e.json",
+    )
     assert done.returncode == 0
     document = json.loads((tmp_path / "e.json").read_text())
     assert document["summary"]["Fz"] is None
@@ -178,8 +207,14 @@ def test_bad_input_ends_with_exit_code_two_and_a_message(place: Path, tmp_path: 
 
 def test_names_with_markup_stay_names(place: Path, tmp_path: Path) -> None:
     write(tmp_path / "day [b]", [synthetic_run(0)], name="x [/b] y [red]z")
-    done = run("estimate", tmp_path / "day [b]", "--calibration", place / "cal.toml", "--json",
-               tmp_path / "a[/b].json")  # fmt: skip
+    done = run(
+        "estimate",
+        tmp_path / "day [b]",
+        "--calibration",
+        place / "cal.toml",
+        "--json",
+        tmp_path / "a[/b].json",
+    )
     assert done.returncode == 0, done.stderr
     assert "x [/b] y [red]z" in done.stdout
     assert "a[/b].json" in done.stdout

@@ -53,16 +53,23 @@ def strain_runs(seed: int = 0, plant: float = 0.0, copies: int = 0) -> Iterable[
         strain = np.interp(folded, np.append(GRID, np.pi), np.append(waves[i], waves[i, 0]))
         noise = 4e-6 * rng.standard_normal((len(LATERAL), phi.size))
         top = np.floor((phi - np.pi) / (2 * np.pi))
-        rig = {"Fz": load, "pressure": pressure, "speed": speed, "omega": omega,
-               "loaded_radius": 0.3155 - shown.deflection[i]}  # fmt: skip
+        rig = {
+            "Fz": load,
+            "pressure": pressure,
+            "speed": speed,
+            "omega": omega,
+            "loaded_radius": 0.3155 - shown.deflection[i],
+        }
         yield Run(
-            RunPlan(i, f"runs/{i:03d}.mf4", "free", load, pressure, speed, 0.0, 0.0, 0.0,
-                    start=12.0 * i),
-            strain=strain + 2e-3 + noise, rate=RATE,
+            RunPlan(
+                i, f"runs/{i:03d}.mf4", "free", load, pressure, speed, 0.0, 0.0, 0.0, start=12.0 * i
+            ),
+            strain=strain + 2e-3 + noise,
+            rate=RATE,
             trigger=np.concatenate(([False], np.diff(top) > 0.5)),
             rig={name: np.full(20, value) for name, value in rig.items()},
             rig_time=np.arange(20) / 100.0,
-        )  # fmt: skip
+        )
 
 
 def force_runs(excess: float = 0.0, repeats: int = 2) -> Iterable[Run]:
@@ -73,25 +80,52 @@ def force_runs(excess: float = 0.0, repeats: int = 2) -> Iterable[Run]:
         for angle in (-6.0, -4.5, -3.0, -1.0, 0.0, 1.0, 3.0, 4.5, 6.0):
             for _ in range(repeats):
                 alpha = float(np.deg2rad(angle))
-                one = {name: np.array([value]) for name, value in (
-                    ("load", load), ("pressure", 2.1e5), ("slip_angle", alpha),
-                    ("slip_ratio", 0.0), ("camber", 0.0), ("omega", 60.0), ("Fx", 0.0),
-                    ("Fy", 0.0), ("Mz", 0.0))}  # fmt: skip
+                one = {
+                    name: np.array([value])
+                    for name, value in (
+                        ("load", load),
+                        ("pressure", 2.1e5),
+                        ("slip_angle", alpha),
+                        ("slip_ratio", 0.0),
+                        ("camber", 0.0),
+                        ("omega", 60.0),
+                        ("Fx", 0.0),
+                        ("Fy", 0.0),
+                        ("Mz", 0.0),
+                    )
+                }
                 data = ForceData(**one, block=np.zeros(1, dtype=np.int64))
                 at = PointConditions(data.load, data.slip_angle)
                 found = predict_forces(brush_of(brush_file(), data), at)
                 side = float(found.Fy[0]) + 8.0 * float(rng.standard_normal())
                 if abs(angle) > 4.0:
                     side -= excess * np.sign(side)
-                rig = {"Fz": load, "pressure": 2.1e5, "slip_angle": alpha, "camber": 0.0,
-                       "speed": 18.0, "omega": 60.0, "Fy": side,
-                       "Mz": float(found.Mz[0]) + 0.5 * float(rng.standard_normal())}  # fmt: skip
+                rig = {
+                    "Fz": load,
+                    "pressure": 2.1e5,
+                    "slip_angle": alpha,
+                    "camber": 0.0,
+                    "speed": 18.0,
+                    "omega": 60.0,
+                    "Fy": side,
+                    "Mz": float(found.Mz[0]) + 0.5 * float(rng.standard_normal()),
+                }
                 yield Run(
-                    RunPlan(i, f"runs/{i:03d}.mf4", "corner", load, 2.1e5, 18.0, alpha, 0.0, 0.0,
-                            start=12.0 * i),
+                    RunPlan(
+                        i,
+                        f"runs/{i:03d}.mf4",
+                        "corner",
+                        load,
+                        2.1e5,
+                        18.0,
+                        alpha,
+                        0.0,
+                        0.0,
+                        start=12.0 * i,
+                    ),
                     rig={name: np.full(20, value) for name, value in rig.items()},
                     rig_time=np.arange(20) / 100.0,
-                )  # fmt: skip
+                )
                 i += 1
 
 
@@ -120,8 +154,16 @@ def compared(place: Path, campaign: str, model: str, *words: str) -> dict[str, A
 
 
 def test_the_contract_holds_as_other_programs_call_it(place: Path) -> None:
-    done = run("compare", place / "strain", "--model", place / "M.toml", "--out", place / "out",
-               "--json", place / "S.json")  # fmt: skip
+    done = run(
+        "compare",
+        place / "strain",
+        "--model",
+        place / "M.toml",
+        "--out",
+        place / "out",
+        "--json",
+        place / "S.json",
+    )
     assert done.returncode == 0, done.stderr
     found = json.loads((place / "S.json").read_text())
     assert found == json.loads((place / "out/comparison.json").read_text())

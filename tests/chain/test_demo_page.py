@@ -22,8 +22,11 @@ LOADS = (1500.0, 4500.0, 7500.0)
 def demo(*words: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, ROOT / "build/demo.py", *map(str, words)],
-        capture_output=True, text=True, check=False, cwd=ROOT,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=ROOT,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -140,9 +143,14 @@ def test_a_difference_makes_the_demonstration_fail(
 
     out, _ = made
     live = out / "live"
-    files = LiveFiles(out / "set1-unseen.json", out / "fmu.json", live / "live.json",
-                      live / "replay.json", live / "conditions.json",
-                      live / "device.toml")  # fmt: skip
+    files = LiveFiles(
+        out / "set1-unseen.json",
+        out / "fmu.json",
+        live / "live.json",
+        live / "replay.json",
+        live / "conditions.json",
+        live / "device.toml",
+    )
     judge, data = demo_module().judge, campaigns / "set1-unseen"
     judge(Console(), files, data)
     for name in ("fmu", "replay"):

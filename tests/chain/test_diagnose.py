@@ -66,8 +66,9 @@ def planted(model: Path) -> Any:
     with pytest.MonkeyPatch.context() as patch:
         use(patch, waves(EFFECT, STRENGTH))
         out, target = model.parent / "report", model.parent / "D.json"
-        found = call("diagnose", "anywhere", "--model", model, "--members", 8, "--out", out,
-                     "--json", target)  # fmt: skip
+        found = call(
+            "diagnose", "anywhere", "--model", model, "--members", 8, "--out", out, "--json", target
+        )
     assert found.exit_code == 0, found.output
     return SimpleNamespace(told=json.loads(target.read_text()), out=out, said=found.output)
 
@@ -76,14 +77,33 @@ def test_the_contracts_keys_are_there(planted: Any) -> None:
     told = planted.told
     assert told["format"] == "tirelib-diagnosis/1"
     assert told["quantity"] == "strain"
-    assert {"noise", "floor", "error_before", "verdict", "named", "candidates", "dead",
-            "unexplained", "next_test"} <= set(told)  # fmt: skip
+    assert {
+        "noise",
+        "floor",
+        "error_before",
+        "verdict",
+        "named",
+        "candidates",
+        "dead",
+        "unexplained",
+        "next_test",
+    } <= set(told)
     assert set(told["unexplained"]) >= {"where", "scaling"}
     for entry in told["candidates"]:
         assert set(entry) >= {
-            "effect", "rank", "score", "threshold", "level", "strength", "std", "in_range",
-            "error_after", "heldout_error_after", "twins", "power",
-        }  # fmt: skip
+            "effect",
+            "rank",
+            "score",
+            "threshold",
+            "level",
+            "strength",
+            "std",
+            "in_range",
+            "error_after",
+            "heldout_error_after",
+            "twins",
+            "power",
+        }
     assert [entry["rank"] for entry in told["candidates"]] == list(
         range(1, len(told["candidates"]) + 1)
     )
@@ -128,8 +148,9 @@ def test_the_named_effect_is_added_and_no_longer_a_candidate(
     use(monkeypatch, waves(EFFECT, STRENGTH))
     monkeypatch.setattr("tirelib.extend.extension.add_effect", lambda *_, **__: added()[0])
     second, target = tmp_path / "M2.toml", tmp_path / "A.json"
-    found = call("add", EFFECT, "--model", model, "--data", "anywhere", "--out", second,
-                 "--json", target)  # fmt: skip
+    found = call(
+        "add", EFFECT, "--model", model, "--data", "anywhere", "--out", second, "--json", target
+    )
     assert found.exit_code == 0, found.output
     told = json.loads(target.read_text())
     assert told["format"] == "tirelib-extension/1"

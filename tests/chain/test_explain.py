@@ -19,11 +19,29 @@ from tirelib.errors import TirelibError
 from tirelib.parameters import read_tire, write_tire
 
 KEYS = {
-    "format", "campaign", "quantity", "verdict", "named", "added", "error_unit", "noise",
-    "error_before", "error_after", "floor", "heldout_error_before", "heldout_error_after",
-    "held_out", "residual_rms_before", "residual_rms_after", "residual_rms_unit", "steps", "pages",
-    "commands", "messages", "explanation",
-}  # fmt: skip
+    "format",
+    "campaign",
+    "quantity",
+    "verdict",
+    "named",
+    "added",
+    "error_unit",
+    "noise",
+    "error_before",
+    "error_after",
+    "floor",
+    "heldout_error_before",
+    "heldout_error_after",
+    "held_out",
+    "residual_rms_before",
+    "residual_rms_after",
+    "residual_rms_unit",
+    "steps",
+    "pages",
+    "commands",
+    "messages",
+    "explanation",
+}
 
 
 def call(*words: object) -> Result:
@@ -141,16 +159,24 @@ def test_its_commands_are_those_of_the_verbs(kind: str, request: pytest.FixtureR
     verbs = [shlex.split(line)[:2] for line in told["commands"]]
     adds = [["tirelib", "add"]] * len(told["added"])
     assert verbs == [
-        ["tirelib", "compare"], ["tirelib", "diagnose"], *adds, ["tirelib", "compare"],
-    ]  # fmt: skip
+        ["tirelib", "compare"],
+        ["tirelib", "diagnose"],
+        *adds,
+        ["tirelib", "compare"],
+    ]
     for line in told["commands"]:
         for word in shlex.split(line):
             assert word in request.getfixturevalue(kind).page.replace("&#39;", "'")
 
 
 def test_the_page_shows_each_run_and_before_beside_after(strain: Any) -> None:
-    for plot in ("run-errors", "waveform-worst", "heat-runs-before", "heat-runs-after",
-                 "history-strain"):  # fmt: skip
+    for plot in (
+        "run-errors",
+        "waveform-worst",
+        "heat-runs-before",
+        "heat-runs-after",
+        "history-strain",
+    ):
         assert f'id="plot-{plot}"' in strain.page, plot
     assert 'src="http' not in strain.page
     added = json.loads((strain.out / f"added-{EFFECT}.json").read_text())

@@ -64,20 +64,51 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def told(place: Path) -> dict[str, Any]:
-    return done("diagnose", place / "sweep", "--model", place / "M.toml", "--quantity", "Fy",
-                "--members", 30, "--out", place / "D", "--json", place / "D.json")  # fmt: skip
+    return done(
+        "diagnose",
+        place / "sweep",
+        "--model",
+        place / "M.toml",
+        "--quantity",
+        "Fy",
+        "--members",
+        30,
+        "--out",
+        place / "D",
+        "--json",
+        place / "D.json",
+    )
 
 
 def test_the_contracts_keys_are_there(told: dict[str, Any]) -> None:
     assert told["format"] == "tirelib-diagnosis/1"
     assert (told["quantity"], told["unit"], told["error_unit"]) == ("Fy", "N", "noise")
-    assert {"noise", "floor", "error_before", "verdict", "named", "candidates", "dead",
-            "unexplained", "next_test"} <= set(told)  # fmt: skip
+    assert {
+        "noise",
+        "floor",
+        "error_before",
+        "verdict",
+        "named",
+        "candidates",
+        "dead",
+        "unexplained",
+        "next_test",
+    } <= set(told)
     for entry in told["candidates"]:
         assert set(entry) >= {
-            "effect", "rank", "score", "threshold", "level", "strength", "std", "in_range",
-            "error_after", "heldout_error_after", "twins", "power",
-        }  # fmt: skip
+            "effect",
+            "rank",
+            "score",
+            "threshold",
+            "level",
+            "strength",
+            "std",
+            "in_range",
+            "error_after",
+            "heldout_error_after",
+            "twins",
+            "power",
+        }
     assert [entry["rank"] for entry in told["candidates"]] == list(
         range(1, len(told["candidates"]) + 1)
     )
@@ -128,8 +159,18 @@ def test_adding_what_was_named_lets_the_held_out_error_fall_step_by_step(
     model, errors = place / "M.toml", []
     for k, name in enumerate(told["named"]):
         target = place / f"M{k + 2}.toml"
-        added = done("add", name, "--model", model, "--data", place / "sweep", "--out", target,
-                     "--json", place / "A.json")  # fmt: skip
+        added = done(
+            "add",
+            name,
+            "--model",
+            model,
+            "--data",
+            place / "sweep",
+            "--out",
+            target,
+            "--json",
+            place / "A.json",
+        )
         assert added["quantity"] == "Fy"
         assert added["error_after"] < added["error_before"]
         assert added["heldout_error_after"] < added["heldout_error_before"]
@@ -143,8 +184,9 @@ def test_adding_what_was_named_lets_the_held_out_error_fall_step_by_step(
     assert [entry["effect"] for entry in added["history"]] == told["named"]
     # what is left is near the floor that the shape of the brush leaves
     assert added["error_after"] < 1.3 * added["floor"]
-    again = done("compare", place / "sweep", "--model", model, "--quantity", "Fy", "--json",
-                 place / "C.json")  # fmt: skip
+    again = done(
+        "compare", place / "sweep", "--model", model, "--quantity", "Fy", "--json", place / "C.json"
+    )
     assert [used["effect"] for used in again["effects"]] == told["named"]
     assert again["error"] == pytest.approx(added["error_after"], rel=0.02)
 
@@ -152,8 +194,18 @@ def test_adding_what_was_named_lets_the_held_out_error_fall_step_by_step(
 def test_the_next_test_of_forces_is_the_diagnosis_s_advice(
     place: Path, told: dict[str, Any]
 ) -> None:
-    plan = done("next-test", place / "sweep", "--model", place / "M.toml", "--quantity", "Fy",
-                "--members", 30, "--json", place / "N.json")  # fmt: skip
+    plan = done(
+        "next-test",
+        place / "sweep",
+        "--model",
+        place / "M.toml",
+        "--quantity",
+        "Fy",
+        "--members",
+        30,
+        "--json",
+        place / "N.json",
+    )
     assert plan["format"] == "tirelib-next-test/1"
     assert (plan["quantity"], plan["verdict"]) == ("Fy", told["verdict"])
     # named effects whose twins are as good as ruled out are not in doubt
@@ -167,9 +219,17 @@ def test_the_next_test_of_forces_is_the_diagnosis_s_advice(
 
 def test_a_point_in_the_place_of_a_sweep_may_be_asked_for(place: Path) -> None:
     words = (
-        "next-test", place / "sweep", "--model", place / "M.toml", "--quantity", "Fy",
-        "--suspects", "friction_pressure,friction_drift", "--json", place / "P.json",
-    )  # fmt: skip
+        "next-test",
+        place / "sweep",
+        "--model",
+        place / "M.toml",
+        "--quantity",
+        "Fy",
+        "--suspects",
+        "friction_pressure,friction_drift",
+        "--json",
+        place / "P.json",
+    )
     found = call(*words)
     assert found.exit_code == 0, found.output
     assert re.search(r"-\d[\d.]* to", found.output), found.output
@@ -202,8 +262,16 @@ def test_a_tire_whose_curve_is_no_brush_but_lacks_no_effect_is_given_no_name(
 ) -> None:
     campaign = write_sweep(tmp_path / "sweep", seed, {})
     write_tire(brush_file(campaign), tmp_path / "M.toml", "tirelib-model/1")
-    found = done("diagnose", tmp_path / "sweep", "--model", tmp_path / "M.toml", "--members", 20,
-                 "--json", tmp_path / "D.json")  # fmt: skip
+    found = done(
+        "diagnose",
+        tmp_path / "sweep",
+        "--model",
+        tmp_path / "M.toml",
+        "--members",
+        20,
+        "--json",
+        tmp_path / "D.json",
+    )
     assert (found["verdict"], found["named"]) == ("none", [])
     # the misfit is there: the verdict is none because variants of the brush show as much
     assert found["error_before"] > 1.2
@@ -222,8 +290,16 @@ def test_steady_runs_name_friction_over_load_and_cannot_know_relaxation(place: P
 
 
 def test_without_repeats_there_are_hints_only(place: Path) -> None:
-    found = done("diagnose", place / "single", "--model", place / "S.toml", "--members", 10,
-                 "--json", place / "N.json")  # fmt: skip
+    found = done(
+        "diagnose",
+        place / "single",
+        "--model",
+        place / "S.toml",
+        "--members",
+        10,
+        "--json",
+        place / "N.json",
+    )
     assert found["noise"] is None
     assert (found["verdict"], found["named"], found["error_unit"]) == ("none", [], "N")
     assert {entry["level"] for entry in found["candidates"]} <= {"hint", "quiet"}
@@ -231,8 +307,16 @@ def test_without_repeats_there_are_hints_only(place: Path) -> None:
 
 
 def test_a_model_that_does_not_fit_at_all_gets_no_name(place: Path) -> None:
-    found = done("diagnose", place / "wrong", "--model", place / "S.toml", "--members", 10,
-                 "--json", place / "W.json")  # fmt: skip
+    found = done(
+        "diagnose",
+        place / "wrong",
+        "--model",
+        place / "S.toml",
+        "--members",
+        10,
+        "--json",
+        place / "W.json",
+    )
     assert found["named"] == []
     assert any("does not fit at all" in line for line in found["messages"])
 
@@ -261,9 +345,19 @@ def test_a_users_effect_joins_and_a_strength_out_of_range_is_flagged(
 ) -> None:
     (tmp_path / "mine.py").write_text(MINE.format(unit="1"))
     found = call(
-        "add", "mine", "--effects", tmp_path / "mine.py", "--model", place / "S.toml", "--data",
-        place / "steady", "--out", tmp_path / "M2.toml", "--json", tmp_path / "A.json",
-    )  # fmt: skip
+        "add",
+        "mine",
+        "--effects",
+        tmp_path / "mine.py",
+        "--model",
+        place / "S.toml",
+        "--data",
+        place / "steady",
+        "--out",
+        tmp_path / "M2.toml",
+        "--json",
+        tmp_path / "A.json",
+    )
     assert found.exit_code == 0, found.output
     added = json.loads((tmp_path / "A.json").read_text())
     # friction falls with load there: the law would need a strength below zero
@@ -279,12 +373,28 @@ def test_real_flat_belt_data_name_pressure_load_temperature_and_camber(
     shared: Callable[[str], Path], tmp_path: Path
 ) -> None:
     source = shared("real/cornering.mat").parent
-    found = call("import", source / "cornering.mat", "--map", source / "cornering.map.toml",
-                 "--out", tmp_path / "real")  # fmt: skip
+    found = call(
+        "import",
+        source / "cornering.mat",
+        "--map",
+        source / "cornering.map.toml",
+        "--out",
+        tmp_path / "real",
+    )
     assert found.exit_code == 0, found.output
     write_tire(brush_file(read_campaign(tmp_path / "real")), tmp_path / "M.toml", "tirelib-model/1")
-    told = done("diagnose", tmp_path / "real", "--model", tmp_path / "M.toml", "--quantity", "Fy",
-                "--members", 12, "--json", tmp_path / "D.json")  # fmt: skip
+    told = done(
+        "diagnose",
+        tmp_path / "real",
+        "--model",
+        tmp_path / "M.toml",
+        "--quantity",
+        "Fy",
+        "--members",
+        12,
+        "--json",
+        tmp_path / "D.json",
+    )
     named = set(told["named"])
     for condition in ("pressure", "load", "temperature", "camber"):
         assert any(name.endswith(condition) for name in named), condition

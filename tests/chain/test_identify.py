@@ -104,9 +104,12 @@ def test_what_strain_tells_is_near_the_truth(
     entries = {entry["name"]: entry for entry in document["parameters"]}
     assert not entries["radial_stiffness"]["flags"]
     near = {
-        "bending_stiffness": 0.05, "radial_stiffness": 0.02, "innerliner_offset": 0.02,
-        "extension_stiffness": 0.15, "radial_pressure_slope": 0.1,
-    }  # fmt: skip
+        "bending_stiffness": 0.05,
+        "radial_stiffness": 0.02,
+        "innerliner_offset": 0.02,
+        "extension_stiffness": 0.15,
+        "radial_pressure_slope": 0.1,
+    }
     for name, share in near.items():
         assert entries[name]["value"] == pytest.approx(true[name], rel=share), name
         assert "at_boundary" not in entries[name]["flags"], name
@@ -253,9 +256,15 @@ def test_a_tire_that_is_not_there_is_an_error_of_two(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert "none-such" in refused(
-        monkeypatch, capsys,
-        "identify", campaign, "--tire", "none-such", "--out", tmp_path / "M.toml",
-    )  # fmt: skip
+        monkeypatch,
+        capsys,
+        "identify",
+        campaign,
+        "--tire",
+        "none-such",
+        "--out",
+        tmp_path / "M.toml",
+    )
 
 
 def test_a_tire_may_be_given_as_start_and_nothing_identified_is_one(

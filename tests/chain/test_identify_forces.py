@@ -41,8 +41,11 @@ def forces(load: np.ndarray, angle: np.ndarray, seed: int) -> dict[str, np.ndarr
     rng = np.random.default_rng(seed)
     noise = 30.0 * rng.standard_normal((2, load.size))
     return {
-        "Fz": load, "slip_angle": angle, "Fy": found.Fy + noise[0], "Mz": found.Mz + noise[1] / 50,
-    }  # fmt: skip
+        "Fz": load,
+        "slip_angle": angle,
+        "Fy": found.Fy + noise[0],
+        "Mz": found.Mz + noise[1] / 50,
+    }
 
 
 def steady(folder: Path, angles: np.ndarray = ANGLES, drop: tuple[str, ...] = ()) -> Path:
@@ -65,9 +68,16 @@ def call(folder: Path, out: Path, *options: str) -> Result:
     out.mkdir(exist_ok=True)
     return CliRunner().invoke(
         program,
-        ["identify", str(folder), "--out", str(out / "M.toml"), "--json", str(out / "I.json"),
-         *options],
-    )  # fmt: skip
+        [
+            "identify",
+            str(folder),
+            "--out",
+            str(out / "M.toml"),
+            "--json",
+            str(out / "I.json"),
+            *options,
+        ],
+    )
 
 
 def document(out: Path) -> dict[str, Any]:
@@ -92,9 +102,13 @@ def test_the_brush_comes_back_with_units_and_intervals(alone: tuple[Path, str]) 
     by_name = {each["name"]: each for each in found["brush"]["parameters"]}
     size = float(1e3 * half(np.array([3000.0]))[0])
     for name, true, unit in (
-        ("bristle_lateral", C_PY, "N/m^2"), ("friction", MU, "1"), ("half_length", size, "mm"),
-        ("slip_angle_offset", 0.0, "deg"), ("Fy_offset", 0.0, "N"), ("Mz_offset", 0.0, "Nm"),
-    ):  # fmt: skip
+        ("bristle_lateral", C_PY, "N/m^2"),
+        ("friction", MU, "1"),
+        ("half_length", size, "mm"),
+        ("slip_angle_offset", 0.0, "deg"),
+        ("Fy_offset", 0.0, "N"),
+        ("Mz_offset", 0.0, "Nm"),
+    ):
         each = by_name[name]
         assert each["unit"] == unit
         low, high = each["interval"]

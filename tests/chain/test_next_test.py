@@ -56,18 +56,36 @@ def planned(model: Path) -> Any:
         use(patch, waves(EFFECT, STRENGTH))
         out, target = model.parent / "next", model.parent / "N.json"
         found = call(
-            "next-test", "anywhere", "--model", model, "--suspects", f"{EFFECT}, temperature",
-            "--load-range", 2000, 6500, "--speed-range", 54, 54, "--out", out, "--json", target,
-        )  # fmt: skip
+            "next-test",
+            "anywhere",
+            "--model",
+            model,
+            "--suspects",
+            f"{EFFECT}, temperature",
+            "--load-range",
+            2000,
+            6500,
+            "--speed-range",
+            54,
+            54,
+            "--out",
+            out,
+            "--json",
+            target,
+        )
     assert found.exit_code == 0, found.output
     return SimpleNamespace(told=json.loads(target.read_text()), out=out, said=found.output)
 
 
 def diagnosis(folder: Path, **changes: Any) -> Path:
     told = {
-        "format": "tirelib-diagnosis/1", "quantity": "strain", "verdict": "none", "named": [],
-        "candidates": [], "has": [],
-    }  # fmt: skip
+        "format": "tirelib-diagnosis/1",
+        "quantity": "strain",
+        "verdict": "none",
+        "named": [],
+        "candidates": [],
+        "has": [],
+    }
     file = folder / "D.json"
     file.write_text(json.dumps(told | changes))
     return file
@@ -84,8 +102,13 @@ def test_the_contracts_keys_are_there(planned: Any) -> None:
     assert told["quantity"] == "strain"
     for entry in told["candidates"]:
         assert set(entry) >= {
-            "load_N", "pressure_bar", "speed_kmh", "separation", "resolves_probability", "pair"
-        }  # fmt: skip
+            "load_N",
+            "pressure_bar",
+            "speed_kmh",
+            "separation",
+            "resolves_probability",
+            "pair",
+        }
     assert told["best"] == told["candidates"][0]
     assert {e["effect"] for e in told["suspects"]} == {EFFECT, "temperature"}
     assert told["envelope"]["declared"] == ["load", "speed"]
@@ -118,9 +141,17 @@ def test_where_nothing_is_in_doubt_the_list_is_empty_and_the_exit_code_zero(
 ) -> None:
     file, target = diagnosis(tmp_path), tmp_path / "N.json"
     found = call(
-        "next-test", "x", "--model", model, "--diagnosis", file, "--json", target,
-        "--out", tmp_path / "page",
-    )  # fmt: skip
+        "next-test",
+        "x",
+        "--model",
+        model,
+        "--diagnosis",
+        file,
+        "--json",
+        target,
+        "--out",
+        tmp_path / "page",
+    )
     assert found.exit_code == 0, found.output
     told = json.loads(target.read_text())
     assert told["candidates"] == []
@@ -158,9 +189,23 @@ def test_bad_input_is_told(model: Path, tmp_path: Path, monkeypatch: pytest.Monk
 
 def test_a_selftest_tells_chances_on_page_and_screen(model: Path, tmp_path: Path) -> None:
     found = call(
-        "selftest", "x", "--model", model, "--effects-of", "low_pass", "--ratio", 1.1,
-        "--repeats", 2, "--members", 8, "--out", tmp_path, "--json", tmp_path / "S.json",
-    )  # fmt: skip
+        "selftest",
+        "x",
+        "--model",
+        model,
+        "--effects-of",
+        "low_pass",
+        "--ratio",
+        1.1,
+        "--repeats",
+        2,
+        "--members",
+        8,
+        "--out",
+        tmp_path,
+        "--json",
+        tmp_path / "S.json",
+    )
     assert found.exit_code == 0, found.output
     told = json.loads((tmp_path / "S.json").read_text())
     assert told["format"] == "tirelib-selftest/1"

@@ -40,8 +40,17 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
         for module in (waveforms, sys.modules["tirelib.compare.compare"]):
             patch.setattr(module, "measure_waveforms", lambda c, progress: c.measured)
         call("compare")
-        call("selftest", "--members", 4, "--repeats", 1, "--effects-of", "hydroplaning", "--ratio",
-             1.5)  # fmt: skip
+        call(
+            "selftest",
+            "--members",
+            4,
+            "--repeats",
+            1,
+            "--effects-of",
+            "hydroplaning",
+            "--ratio",
+            1.5,
+        )
         call("next-test", "--suspects", "hydroplaning,sidewall_damping")
     return out
 

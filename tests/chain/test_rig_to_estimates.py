@@ -38,8 +38,12 @@ def days(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("rig")
     run_plan(plan("first", LOADS, ANGLES), TIRES["reference"], folder / "first", seed=1)
     # loads and slip angles that lie between those of the first day
-    run_plan(plan("second", (2200.0, 5200.0, 6700.0), (-3.0, 0.5, 3.0)), TIRES["reference"],
-             folder / "second", seed=2)  # fmt: skip
+    run_plan(
+        plan("second", (2200.0, 5200.0, 6700.0), (-3.0, 0.5, 3.0)),
+        TIRES["reference"],
+        folder / "second",
+        seed=2,
+    )
     return {name: folder / name for name in ("first", "second")}
 
 

@@ -104,8 +104,11 @@ def test_out_writes_figure_curves_and_document(tmp_path: Path) -> None:
     done = run("simulate", *words)
     assert done.returncode == 0, done.stderr
     assert sorted(file.name for file in folder.iterdir()) == [
-        "simulation.csv", "simulation.json", "simulation.png", "simulation.svg",
-    ]  # fmt: skip
+        "simulation.csv",
+        "simulation.json",
+        "simulation.png",
+        "simulation.svg",
+    ]
     for name in ("png", "svg", "csv", "json"):
         assert f"simulation.{name}" in done.stdout
     found = json.loads((folder / "simulation.json").read_text())
@@ -218,7 +221,7 @@ WRONG = {
     "damping": (["--load", "4000", "--damping", "-0.1"], "damping = -0.1"),
     "lists": (["--load", "1000,2000", "--speed", "1,2,3"], "2 values beside 3"),
     "contact": (["--load", "4000", "--contact", "magic"], "'radial', 'shear'"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", WRONG)
@@ -281,10 +284,12 @@ def test_a_model_file_gives_the_waveforms_that_compare_uses(
     words = [
         name
         for option, unit, values in (
-            ("--load", 1.0, at.load), ("--pressure", 1e5, at.pressure), ("--omega", 1.0, at.omega)
+            ("--load", 1.0, at.load),
+            ("--pressure", 1e5, at.pressure),
+            ("--omega", 1.0, at.omega),
         )
         for name in (option, ",".join(repr(float(x / unit)) for x in values))
-    ]  # fmt: skip
+    ]
     found = document(tmp_path, "--model", identified, *words, "--out", tmp_path / "out")
     assert (found["ring"], found["effects_left_out"]) == ("large displacements", [])
     assert found["effects"] == [name for name, _ in EFFECTS]

@@ -20,9 +20,12 @@ from tirelib.signal import cut_turns
 
 RATE, SPEED, PRESSURE, DRY = 1e4, 65.0 / 3.6, 2.3e5, 0.95
 HEADER = CampaignHeader(
-    "virtual", "iso", TireGeometry("virtual", 0.316, 0.303, 0.0115, 0.168, -0.003),
-    (-0.06, -0.03, 0.0, 0.03, 0.06), RATE,
-)  # fmt: skip
+    "virtual",
+    "iso",
+    TireGeometry("virtual", 0.316, 0.303, 0.0115, 0.168, -0.003),
+    (-0.06, -0.03, 0.0, 0.03, 0.06),
+    RATE,
+)
 
 
 MEASURED = {"Fz": "Fz", "alpha": "slip_angle", "kappa": "slip_ratio", "Fy": "Fy"}
@@ -44,9 +47,16 @@ def shown(conditions: Sequence[tuple[float, ...]], day: int = 0) -> Observations
         strain = strain * (1.0 + 3e-3 * rng.standard_normal((5, 1)))  # gains, from run to run
         strain = strain + 4e-6 * rng.standard_normal(strain.shape)
         turns = cut_turns(
-            strain, RATE, surface.lateral.tolist(), speed=SPEED, pressure=PRESSURE, camber=0.0,
-            friction=friction, tread_depth=0.008, tread_temperature=313.0,
-        )  # fmt: skip
+            strain,
+            RATE,
+            surface.lateral.tolist(),
+            speed=SPEED,
+            pressure=PRESSURE,
+            camber=0.0,
+            friction=friction,
+            tread_depth=0.008,
+            tread_temperature=313.0,
+        )
         parts.append(extract_features(turns))
         measured = (force[0], force[1], load, force[2], angle, at[2])
         truths.append(np.tile(measured, (len(parts[-1]), 1)))
@@ -54,9 +64,15 @@ def shown(conditions: Sequence[tuple[float, ...]], day: int = 0) -> Observations
     run = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
     nominal = {"load": truth[2], "slip_angle": truth[4]}
     return Observations(
-        concatenate_features(parts), run, 0 * run, run, run < 0,
-        dict(zip(TRUTH, truth, strict=True)), nominal, (HEADER,),
-    )  # fmt: skip
+        concatenate_features(parts),
+        run,
+        0 * run,
+        run,
+        run < 0,
+        dict(zip(TRUTH, truth, strict=True)),
+        nominal,
+        (HEADER,),
+    )
 
 
 @pytest.fixture(scope="module")

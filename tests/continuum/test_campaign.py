@@ -102,9 +102,11 @@ def test_plans_repeat_conditions_and_errors_belong_to_the_run() -> None:
 
 @pytest.mark.parametrize(
     ("hidden", "message"),
-    [({"camber": 0.1}, "'camber' is unknown; allowed are sidewall_load"),
-     ({"tread_wear": 1.2}, r"tread_wear, strength = 1.2 1; allowed are 0 to 0.6 1")],
-)  # fmt: skip
+    [
+        ({"camber": 0.1}, "'camber' is unknown; allowed are sidewall_load"),
+        ({"tread_wear": 1.2}, r"tread_wear, strength = 1.2 1; allowed are 0 to 0.6 1"),
+    ],
+)
 def test_what_cannot_be_hidden_is_refused(
     tmp_path: Path, hidden: dict[str, float], message: str
 ) -> None:

@@ -81,9 +81,15 @@ def test_the_stiffness_is_the_derivative_of_the_residual() -> None:
 
     def at_(du: np.ndarray | float, height: float = 0.0, rolling: float = 0.0):
         return balance(
-            tire, base.law, COND, base.mesh, base.u + du, base.height + height,
-            base.rolling + rolling, 60.0,
-        )  # fmt: skip
+            tire,
+            base.law,
+            COND,
+            base.mesh,
+            base.u + du,
+            base.height + height,
+            base.rolling + rolling,
+            60.0,
+        )
 
     now, up, down = at_(0.0), at_(step), at_(-step)
     told = now.mesh.add.matrix(list(now.stiffness)) @ step.ravel()

@@ -15,9 +15,15 @@ from tests.continuum.rolling import hanging
 PRESSURE = 2.1e5
 BARE = replace(
     Tire(),
-    tread_thickness=1e-3, tread_upright=1e6, tread_shear=3e5, tread_along=3e4, liner_modulus=2e6,
-    crown_curvature=0.0, shoulder_share=0.0, tread_density=1.0,
-)  # fmt: skip
+    tread_thickness=1e-3,
+    tread_upright=1e6,
+    tread_shear=3e5,
+    tread_along=3e4,
+    liner_modulus=2e6,
+    crown_curvature=0.0,
+    shoulder_share=0.0,
+    tread_density=1.0,
+)
 """A belt, and next to nothing on it."""
 
 

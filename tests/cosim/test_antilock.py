@@ -180,8 +180,10 @@ def test_the_target_follows_friction_and_slip_angle() -> None:
 @pytest.fixture(scope="module")
 def mirrored() -> list[StopRun]:
     """The first second on a road whose left, or right, side is slippery."""
-    return [stop(BY_NAME[f"split_{side}_leaving"], Today(), end_speed=20.0)
-            for side in ("left", "right")]  # fmt: skip
+    return [
+        stop(BY_NAME[f"split_{side}_leaving"], Today(), end_speed=20.0)
+        for side in ("left", "right")
+    ]
 
 
 def test_the_mirrored_road_makes_the_mirrored_stop(mirrored: list[StopRun]) -> None:
@@ -196,8 +198,9 @@ def test_the_mirrored_road_makes_the_mirrored_stop(mirrored: list[StopRun]) -> N
 def test_the_tires_own_knowledge_lets_an_axle_differ_and_stops_shorter(
     mirrored: list[StopRun],
 ) -> None:
-    run = stop(BY_NAME["split_left_leaving"], TractionBrakes(Perfect(), fused=False),
-               end_speed=20.0)  # fmt: skip
+    run = stop(
+        BY_NAME["split_left_leaving"], TractionBrakes(Perfect(), fused=False), end_speed=20.0
+    )
     assert run.distance < 0.97 * mirrored[0].distance
     assert run.kappa.min() > -0.2
     assert np.ptp(run.torque[-1, :2]) > APART + 100.0

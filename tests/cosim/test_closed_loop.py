@@ -104,9 +104,12 @@ def test_a_wheel_that_slips_out_of_what_can_be_told_comes_back() -> None:
 def study() -> Study:
     """From 100 to 79 km/h: nine turns of a wheel."""
     return closed_loop.study(
-        fmus.virtual(), fmus.strain(), closed_loop.ROADS[:1], closed_loop.STARTS[:1],
+        fmus.virtual(),
+        fmus.strain(),
+        closed_loop.ROADS[:1],
+        closed_loop.STARTS[:1],
         end_speed=22.0,
-    )  # fmt: skip
+    )
 
 
 def test_four_strain_tires_stop_the_vehicle_as_the_truth_does(study: Study) -> None:
@@ -156,8 +159,11 @@ def test_the_study_is_a_document_a_table_and_figures(study: Study) -> None:
     document = json.loads(json.dumps(study.document(), allow_nan=False))
     assert document["from_kmh"] == pytest.approx(100.0)
     assert [row["source"] for row in document["rows"]] == [
-        "perfect", "one turn late", "once per turn", "strain"
-    ]  # fmt: skip
+        "perfect",
+        "one turn late",
+        "once per turn",
+        "strain",
+    ]
     assert document["rows"][0]["loss"] == 0.0
     table = closed_loop_report.table(study)
     assert len(table.rows) == 4

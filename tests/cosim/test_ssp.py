@@ -99,11 +99,27 @@ def test_another_engine_gives_the_same(engine: str) -> None:
         pytest.skip(reason)
     out = live.folder() / f"{engine}.npz"
     done = subprocess.run(
-        [sys.executable, "-m", "cosim.ssp_run", str(archive()), "--engine", engine, "--step",
-         str(fmus.STEP), "--stop", str(fmus.STEP * STEPS), "--out", str(out)],
-        capture_output=True, text=True, cwd=BUILD, timeout=1200,
-        env={**os.environ, "PYTHONPATH": str(BUILD)}, check=False,
-    )  # fmt: skip
+        [
+            sys.executable,
+            "-m",
+            "cosim.ssp_run",
+            str(archive()),
+            "--engine",
+            engine,
+            "--step",
+            str(fmus.STEP),
+            "--stop",
+            str(fmus.STEP * STEPS),
+            "--out",
+            str(out),
+        ],
+        capture_output=True,
+        text=True,
+        cwd=BUILD,
+        timeout=1200,
+        env={**os.environ, "PYTHONPATH": str(BUILD)},
+        check=False,
+    )
     assert out.is_file(), done.stderr[-2000:]
     with np.load(out) as found:
         gaps = ssp_run.differences(truth(), dict(found))

@@ -43,8 +43,9 @@ def vehicle() -> Vehicle:
     return make_vehicle()
 
 
-def driven(vehicle: Vehicle, time: float, given: Controls, step: float = 1e-3, speed: float = 25.0
-           ) -> tuple[Drive, list[Any]]:  # fmt: skip
+def driven(
+    vehicle: Vehicle, time: float, given: Controls, step: float = 1e-3, speed: float = 25.0
+) -> tuple[Drive, list[Any]]:
     drive = Drive(vehicle, vehicle.at_rest(speed), step)
     motions = [drive.look(given)]
     for _ in range(round(time / step)):
@@ -160,8 +161,9 @@ def test_mirror_image(vehicle: Vehicle) -> None:
     )
     one, _ = driven(vehicle, 0.3, road, 2e-3)
     two, _ = driven(vehicle, 0.3, other, 2e-3)
-    sign = np.array([1, -1, 1, -1, 1, -1, *[1] * 4, 1, -1, 1, -1, 1, -1, *[1] * 8, *[-1] * 4,
-                     *[1] * 4])  # fmt: skip
+    sign = np.array(
+        [1, -1, 1, -1, 1, -1, *[1] * 4, 1, -1, 1, -1, 1, -1, *[1] * 8, *[-1] * 4, *[1] * 4]
+    )
     mirrored = two.state * sign
     for part in (TRAVEL, slice(16, 20), SPIN, SIDE_SLIP, LONG_SLIP):
         mirrored[part] = mirrored[part][LEFT_RIGHT]
@@ -207,10 +209,12 @@ def test_understeer_gradient_is_that_of_the_bicycle(vehicle: Vehicle) -> None:
         # 0 = sum F - m v r, 0 = sum M with alpha_i = beta + x_i r / v - delta_i
         x = np.array([a, b])
         shift = float(p.per_wheel(p.unsprung_mass) @ p.x)  # of the whole's centre of gravity
-        matrix = np.array([
-            [-y.sum(), -(y @ x) / speed - p.mass * speed],
-            [-n.sum(), -(n @ x) / speed - shift * speed],
-        ])  # fmt: skip
+        matrix = np.array(
+            [
+                [-y.sum(), -(y @ x) / speed - p.mass * speed],
+                [-n.sum(), -(n @ x) / speed - shift * speed],
+            ]
+        )
         _, yaw_rate = np.linalg.solve(matrix, [-y[0], -n[0]])
         steer = 1e-4
         state, _ = steady_turn(car, steer, speed)

@@ -31,12 +31,17 @@ class Host:
     def __init__(self, path: Path) -> None:
         description = read_model_description(str(path))
         self.at = {v.name: v.valueReference for v in description.modelVariables}
-        self.outputs = [v.valueReference for v in description.modelVariables
-                        if v.causality == "output" and v.type == "Real"]  # fmt: skip
+        self.outputs = [
+            v.valueReference
+            for v in description.modelVariables
+            if v.causality == "output" and v.type == "Real"
+        ]
         self.slave: Any = FMU2Slave(
-            guid=description.guid, unzipDirectory=extract(str(path)), instanceName="car",
+            guid=description.guid,
+            unzipDirectory=extract(str(path)),
+            instanceName="car",
             modelIdentifier=description.coSimulation.modelIdentifier,
-        )  # fmt: skip
+        )
         self.slave.instantiate()
 
     def start(self, **values: float) -> None:

@@ -124,8 +124,12 @@ def test_the_mirrored_steer_has_the_mirrored_estimates(left: Recording, wheels: 
     quite alike, and the vehicle's tire is shifted a little."""
     right = record(_steer(-1.0), wheels)
     swap = [1, 0, 3, 2]
-    size = {"Fz": 0.015 * left.static.max(), "alpha": np.radians(0.125), "kappa": 0.005,
-            "Fy": 0.05 * np.nanmax(np.abs(left.told["tire_fy"]))}  # fmt: skip
+    size = {
+        "Fz": 0.015 * left.static.max(),
+        "alpha": np.radians(0.125),
+        "kappa": 0.005,
+        "Fy": 0.05 * np.nanmax(np.abs(left.told["tire_fy"])),
+    }
     for name, most in size.items():
         side = -1.0 if name in ("alpha", "Fy") else 1.0
         here, there = left.told[name], side * right.told[name][:, swap]
@@ -200,7 +204,7 @@ def test_every_wheel_has_the_friction_of_the_road_under_it(wheels: FourWheels) -
     state = WheelStates(
         *(np.full(size, x) for x in (4000.0, 0.13, -0.01, 0.0, 20.0)),
         friction=OWN_FRICTION * factor,
-    )  # fmt: skip
+    )
     wheels.start(state)
     told = wheels.step(0.0, STEP, state)
     left_out = virtual_host.friction().about["left_out"]["friction 0.3 .. 0.5"]["Fy_N_rms"]
@@ -287,9 +291,13 @@ def test_the_page_names_what_is_not_reached(braked: Recording, tmp_path: Path) -
     checks = [{"case": "x", "valid_before": True, "turns": 3.0, "stays": True, "passed": False}]
     strict = dict.fromkeys(LIMITS, 1e-09)
     document = {
-        "vehicle": "one", "step_s": STEP, "limits": strict, "manoeuvres": scores, "range": checks,
+        "vehicle": "one",
+        "step_s": STEP,
+        "limits": strict,
+        "manoeuvres": scores,
+        "range": checks,
         "missed": reached(scores, checks),
-    }  # fmt: skip
+    }
     assert "range: x" in document["missed"]
     page = write_cosim(document, [series(drawn)], tmp_path).read_text(encoding="utf-8")
     for words in ("Not reached: range: x.", "MISSED", "tracks-mu_split", "front left", " *"):

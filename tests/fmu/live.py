@@ -32,13 +32,28 @@ HEADER = CampaignHeader(
 )
 
 
-def strain_of(load: float, tilt: float, *, seed: int = 0, turns: float = 3.4, speed: float = SPEED,
-              start: float = np.pi) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+def strain_of(
+    load: float,
+    tilt: float,
+    *,
+    seed: int = 0,
+    turns: float = 3.4,
+    speed: float = SPEED,
+    start: float = np.pi,
+) -> tuple[np.ndarray, np.ndarray]:
     """Strain and trigger at a load [N] and a lateral tilt [1], at `RATE`."""
     strain, trigger, _ = record(
-        turns=turns, speed=speed, radius=RADIUS, start=start, half=0.1 + 2.5e-5 * load, tilt=tilt,
-        dip=1e-3 + 4e-7 * load, noise=4e-6, rate=RATE, seed=seed,
-    )  # fmt: skip
+        turns=turns,
+        speed=speed,
+        radius=RADIUS,
+        start=start,
+        half=0.1 + 2.5e-5 * load,
+        tilt=tilt,
+        dip=1e-3 + 4e-7 * load,
+        noise=4e-6,
+        rate=RATE,
+        seed=seed,
+    )
     return strain, trigger
 
 
@@ -49,17 +64,30 @@ def make_run(number: int, load: float, tilt: float, **options: float) -> Run:
     angle = -0.3 * tilt
     random = np.random.default_rng(number)
     means = {
-        "Fz": load, "Fy": -4e4 * angle * load / 4e3, "slip_angle": angle, "camber": 0.0,
-        "slip_ratio": 0.0, "speed": options.get("speed", SPEED), "pressure": PRESSURE, "Fx": 0.0,
-    }  # fmt: skip
+        "Fz": load,
+        "Fy": -4e4 * angle * load / 4e3,
+        "slip_angle": angle,
+        "camber": 0.0,
+        "slip_ratio": 0.0,
+        "speed": options.get("speed", SPEED),
+        "pressure": PRESSURE,
+        "Fx": 0.0,
+    }
     rig = {
         name: mean + 1e-3 * abs(mean) * random.standard_normal(times.size)
         for name, mean in means.items()
     }
     plan = RunPlan(
-        number, f"runs/{number:03d}.mf4", "corner" if tilt else "free", load, PRESSURE, SPEED,
-        angle, 0.0, 0.0,
-    )  # fmt: skip
+        number,
+        f"runs/{number:03d}.mf4",
+        "corner" if tilt else "free",
+        load,
+        PRESSURE,
+        SPEED,
+        angle,
+        0.0,
+        0.0,
+    )
     return Run(plan, strain, RATE, 0.0, trigger, rig, times)
 
 
@@ -95,9 +123,10 @@ def calibration_file() -> Path:
     trained = train(observations).calibration
     turn = typical_turn([campaign], observations, trained)
     write_calibration(
-        replace(trained, reference=turn), path,
+        replace(trained, reference=turn),
+        path,
         {"statistics": {"Fz": told}, "data": [{"name": "live"}]},
-    )  # fmt: skip
+    )
     return path
 
 

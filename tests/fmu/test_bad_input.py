@@ -173,10 +173,16 @@ def refused(fmu: LoadedFmu, step: float, cause: str) -> dict[str, Any]:
 
 @pytest.mark.parametrize(
     ("step", "cause"),
-    [(0.0, "a whole number of samples is needed"), (-0.002, "a whole number"),
-     (np.nan, "a whole number"), (np.inf, "a whole number"), (-np.inf, "a whole number"),
-     (3.2, "allowed is above 0 and up to 3 s"), (1e9, "allowed is above 0 and up to 3 s")],
-)  # fmt: skip
+    [
+        (0.0, "a whole number of samples is needed"),
+        (-0.002, "a whole number"),
+        (np.nan, "a whole number"),
+        (np.inf, "a whole number"),
+        (-np.inf, "a whole number"),
+        (3.2, "allowed is above 0 and up to 3 s"),
+        (1e9, "allowed is above 0 and up to 3 s"),
+    ],
+)
 def test_a_step_that_cannot_be_is_an_error_and_nothing_is_valid_until_a_good_one(
     fmu: LoadedFmu, strain: np.ndarray, step: float, cause: str
 ) -> None:
@@ -232,10 +238,12 @@ def test_a_wrong_parameter_fails_the_start_and_a_reset_heals_it(
 ) -> None:
     at = fmu.references
     for name, value, cause in (
-        ("sample_rate", 5.0, "allowed are 100"), ("sample_rate", np.nan, "allowed are 100"),
+        ("sample_rate", 5.0, "allowed are 100"),
+        ("sample_rate", np.nan, "allowed are 100"),
         ("filter_order", 30.0, "the calibration was made with 24 cycles per turn"),
-        ("filter_order", -1.0, "made with 24 cycles"), ("filter_order", np.nan, "made with 24"),
-    ):  # fmt: skip
+        ("filter_order", -1.0, "made with 24 cycles"),
+        ("filter_order", np.nan, "made with 24"),
+    ):
         fmu.slave.reset()
         fmu.messages.clear()
         fmu.slave.setReal([at[name]], [value])
@@ -286,9 +294,11 @@ def test_two_versions_in_one_process_each_run_their_own_code(
 
     monkeypatch.setattr(build, "collect", doubled)
     second = build.build_fmu(
-        live.calibration_file(), tmp_path / "second.fmu", samples_per_step=10,
+        live.calibration_file(),
+        tmp_path / "second.fmu",
+        samples_per_step=10,
         sample_rate=live.RATE,
-    )  # fmt: skip
+    )
     with LoadedFmu(second) as other, LoadedFmu(live.fmu_file(10)) as third:
         for one in (fmu, other, third):
             one.start(live.RATE)
@@ -327,9 +337,10 @@ def test_a_fault_at_every_step_is_logged_a_few_times_and_the_values_are_held(
         fmu.step(strain[:, first : first + 10], GOOD)
     assert count[0] == 300
     assert fmu.messages[:3] == [
-        "RuntimeError: each one differs", "RuntimeError: each one differs (10 times by now)",
+        "RuntimeError: each one differs",
+        "RuntimeError: each one differs (10 times by now)",
         "RuntimeError: each one differs (100 times by now)",
-    ]  # fmt: skip
+    ]
     assert len(fmu.messages) == 3 + 49 + 1
     assert fmu.messages[-1].startswith("50 different causes were told")
     last = fmu.read()

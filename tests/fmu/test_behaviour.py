@@ -42,12 +42,14 @@ def test_after_every_step_the_outputs_are_those_of_the_library(fmu: LoadedFmu) -
             assert values[f"{quantity}_valid"] == estimator.is_valid(quantity)
         np.testing.assert_allclose(
             [values[f"contact_length_{gage}"] for gage in range(1, 6)],
-            latest.estimates.contact_length[0], rtol=1e-9,
-        )  # fmt: skip
+            latest.estimates.contact_length[0],
+            rtol=1e-9,
+        )
         np.testing.assert_allclose(
             [values[f"contact_length_std_{gage}"] for gage in range(1, 6)],
-            latest.estimates.contact_length_std[0], rtol=1e-9,
-        )  # fmt: skip
+            latest.estimates.contact_length_std[0],
+            rtol=1e-9,
+        )
         np.testing.assert_allclose(values["contact_time"], latest.time, rtol=1e-9)
         assert values["rolling"] == latest.estimates.rolling[0]
     assert "reduced_gages" in values["status"]

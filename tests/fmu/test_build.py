@@ -23,9 +23,21 @@ from tirelib.fmu.run import LoadedFmu
 from tirelib.stream.estimator import RATES
 from tirelib.units import TABLE
 
-GIVEN = {"1": "ratio", "N": "force", "rad": "angle", "m": "length", "m/s": "speed",
-         "Pa": "pressure", "rad/s": "angular_speed", "s": "time", "Hz": "frequency",
-         "N m": "moment", "1/s": "strain_rate", "kg": "mass", "m/s2": "acceleration"}  # fmt: skip
+GIVEN = {
+    "1": "ratio",
+    "N": "force",
+    "rad": "angle",
+    "m": "length",
+    "m/s": "speed",
+    "Pa": "pressure",
+    "rad/s": "angular_speed",
+    "s": "time",
+    "Hz": "frequency",
+    "N m": "moment",
+    "1/s": "strain_rate",
+    "kg": "mass",
+    "m/s2": "acceleration",
+}
 
 
 @pytest.mark.parametrize("samples", [1, 10])
@@ -130,12 +142,23 @@ def test_it_brings_icon_page_licences_and_default_experiment() -> None:
         names = set(archive.namelist())
         assert archive.read("model.png")[:8] == b"\x89PNG\r\n\x1a\n"
         page = archive.read("documentation/index.html").decode()
-        licenses = [archive.read(f"documentation/licenses/{n}.txt").decode()
-                    for n in ("license", "pythonfmu")]  # fmt: skip
+        licenses = [
+            archive.read(f"documentation/licenses/{n}.txt").decode()
+            for n in ("license", "pythonfmu")
+        ]
         description = Xml.fromstring(archive.read("modelDescription.xml"))
     assert {"resources/settings.json", "resources/calibration.toml"} <= names
-    for text in ("<svg", "Accuracy", "cross-validated", "12.3 N", "Limits", "alpha_std",
-                 "live tire", "Calibrated range", description.get("version")):  # fmt: skip
+    for text in (
+        "<svg",
+        "Accuracy",
+        "cross-validated",
+        "12.3 N",
+        "Limits",
+        "alpha_std",
+        "live tire",
+        "Calibrated range",
+        description.get("version"),
+    ):
         assert text in page, text
     assert "{version}" not in page
     Xml.fromstring(page.split("\n", 1)[1].replace('<meta charset="utf-8">', ""))
@@ -150,8 +173,12 @@ def test_it_brings_icon_page_licences_and_default_experiment() -> None:
 def test_a_fmu_loaded_in_this_process_does_not_disturb_its_own_rebuild(tmp_path: Path) -> None:
     with LoadedFmu(live.fmu_file(10)) as fmu:
         fmu.start(live.RATE)
-        twin = build_fmu(live.calibration_file(), tmp_path / "twin.fmu", samples_per_step=10,
-                         sample_rate=live.RATE)  # fmt: skip
+        twin = build_fmu(
+            live.calibration_file(),
+            tmp_path / "twin.fmu",
+            samples_per_step=10,
+            sample_rate=live.RATE,
+        )
         assert twin.read_bytes() == live.fmu_file(10).read_bytes()
         fmu.step(np.zeros((5, 10)), CONDITIONS)
 
@@ -238,8 +265,19 @@ print(json.dumps([done, sorted({{name.split(".")[0] for name in sys.modules}})])
 def test_it_runs_without_the_repository_and_with_numpy_and_scipy_only(tmp_path: Path) -> None:
     folder = extract(str(live.fmu_file(1)), unzipdir=str(tmp_path))
     resources = str(Path(folder) / "resources")
-    blocked = ["tirelib", "pandas", "sklearn", "statsmodels", "asammdf", "matplotlib", "click",
-               "rich", "tomli_w", "fmpy", "pyarrow"]  # fmt: skip
+    blocked = [
+        "tirelib",
+        "pandas",
+        "sklearn",
+        "statsmodels",
+        "asammdf",
+        "matplotlib",
+        "click",
+        "rich",
+        "tomli_w",
+        "fmpy",
+        "pyarrow",
+    ]
     script = _ALONE.format(blocked=blocked, resources=resources)
     told = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, cwd="/", check=False

@@ -75,8 +75,11 @@ def test_what_was_built_passes_and_leaves_a_page_and_json(
     assert code == 0, told
     assert "Passed: it validates, runs, and gives what its reference signals expect." in told
     found = json.loads((tmp_path / "c.json").read_text())
-    assert (found["format"], found["passed"], found["compared"]) == ("tirelib-fmu-check/1", True,
-                                                                     True)  # fmt: skip
+    assert (found["format"], found["passed"], found["compared"]) == (
+        "tirelib-fmu-check/1",
+        True,
+        True,
+    )
     assert {row["name"] for row in found["variables"]} > {"Fz", "alpha", "kappa", "Fy", "valid"}
     assert all(row["magnitude"] > 1e-6 for row in found["variables"])
     page = (tmp_path / "p" / "index.html").read_text()
@@ -189,15 +192,27 @@ def test_what_is_no_fmu_is_bad_input(tmp_path: Path) -> None:
     (tmp_path / "cut.fmu").write_bytes(live.fmu_file(10).read_bytes()[:9000])
     with zipfile.ZipFile(tmp_path / "zip.fmu", "w") as archive:
         archive.writestr("readme.txt", "a zip")
-    for name, cause in (("none", "cannot be read"), ("text", "is no FMU"),
-                        ("cut", "is cut short or damaged"),
-                        ("zip", "without modelDescription.xml")):  # fmt: skip
+    for name, cause in (
+        ("none", "cannot be read"),
+        ("text", "is no FMU"),
+        ("cut", "is cut short or damaged"),
+        ("zip", "without modelDescription.xml"),
+    ):
         with pytest.raises(FormatError, match=cause):
             check_fmu(tmp_path / f"{name}.fmu")
     told = subprocess.run(
-        [sys.executable, "-c", "from tirelib.cli import main; main()", "fmu", "check",
-         str(tmp_path / "text.fmu")], capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        [
+            sys.executable,
+            "-c",
+            "from tirelib.cli import main; main()",
+            "fmu",
+            "check",
+            str(tmp_path / "text.fmu"),
+        ],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert told.returncode == 2
     assert "Traceback" not in told.stderr
 

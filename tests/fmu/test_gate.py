@@ -84,8 +84,9 @@ except Exception as error:
 slave.reset()
 slave.freeInstance()
 """,
-        unpacked(live.fmu_file(10), tmp_path / "x"), text,
-    )  # fmt: skip
+        unpacked(live.fmu_file(10), tmp_path / "x"),
+        text,
+    )
     assert text in said
     assert "%%" not in said
     assert "status 3" in said
@@ -110,11 +111,18 @@ def instantiated(folder: Path, **changed: Any) -> tuple[FMU2Slave, list[str]]:
     """Call fmi2Instantiate with one argument changed; return what it gave and what it said."""
     description = read_model_description(str(folder))
     messages: list[str] = []
-    slave = FMU2Slave(guid=description.guid, unzipDirectory=str(folder), instanceName="w",
-                      modelIdentifier=description.coSimulation.modelIdentifier)  # fmt: skip
+    slave = FMU2Slave(
+        guid=description.guid,
+        unzipDirectory=str(folder),
+        instanceName="w",
+        modelIdentifier=description.coSimulation.modelIdentifier,
+    )
     slave.callbacks = keeping(messages)
-    given = {"type": fmi2CoSimulation, "guid": description.guid,
-             "place": (folder / "resources").as_uri()} | changed  # fmt: skip
+    given = {
+        "type": fmi2CoSimulation,
+        "guid": description.guid,
+        "place": (folder / "resources").as_uri(),
+    } | changed
     texts = [None if given[k] is None else given[k].encode() for k in ("guid", "place")]
     slave.component = slave.fmi2Instantiate(b"w", given["type"], *texts, slave.callbacks, 0, 0)
     return slave, messages
@@ -133,13 +141,16 @@ def test_a_place_that_is_a_plain_path_or_has_a_host_will_do(folder: Path) -> Non
         slave.freeInstance()
 
 
-@pytest.mark.parametrize(("changed", "said"), [
-    ({"guid": "{00000000-0000-0000-0000-000000000000}"}, "come from different builds"),
-    ({"guid": None}, "fmuGUID = missing"),
-    ({"type": fmi2ModelExchange}, "fmuType is model exchange; this FMU is for co-simulation"),
-    ({"place": "file:///no/such/50%25"}, "file:///no/such/50%25; it holds no slave"),
-    ({"place": None}, "fmuResourceLocation is missing"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"guid": "{00000000-0000-0000-0000-000000000000}"}, "come from different builds"),
+        ({"guid": None}, "fmuGUID = missing"),
+        ({"type": fmi2ModelExchange}, "fmuType is model exchange; this FMU is for co-simulation"),
+        ({"place": "file:///no/such/50%25"}, "file:///no/such/50%25; it holds no slave"),
+        ({"place": None}, "fmuResourceLocation is missing"),
+    ],
+)
 def test_what_is_not_this_fmu_is_refused(folder: Path, changed: dict[str, Any], said: str) -> None:
     slave, messages = instantiated(folder, **changed)
     assert not slave.component

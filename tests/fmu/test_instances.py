@@ -76,9 +76,11 @@ def test_instances_come_and_go_without_growth(file: Callable[[int], Path]) -> No
 
     def cycle() -> None:
         slave = FMU2Slave(
-            guid=description.guid, unzipDirectory=folder, instanceName="cycle",
+            guid=description.guid,
+            unzipDirectory=folder,
+            instanceName="cycle",
             modelIdentifier=description.coSimulation.modelIdentifier,
-        )  # fmt: skip
+        )
         slave.instantiate()
         slave.setupExperiment(startTime=0.0)
         slave.enterInitializationMode()

@@ -90,13 +90,21 @@ def play(seconds: float, law: Any, *, rate: float = RATE, samples: int = 20) -> 
         strain.append(np.array(reals[: 5 * samples]).reshape(samples, 5))
         rows.append([*(inputs[name] for name in known.inputs), reals[5 * samples]])
     held = np.repeat(np.array(rows), samples, axis=0).T
-    return {"strain": np.concatenate(strain).T,
-            **dict(zip((*known.inputs, "omega"), held, strict=True))}  # fmt: skip
+    return {
+        "strain": np.concatenate(strain).T,
+        **dict(zip((*known.inputs, "omega"), held, strict=True)),
+    }
 
 
 def steadily(load: float, speed: float, kappa: float = 0.0) -> dict[str, float]:
-    return {"Fz": load, "alpha": 0.0, "kappa": kappa, "camber": 0.0, "speed": speed,
-            "pressure": 2.3e5}  # fmt: skip
+    return {
+        "Fz": load,
+        "alpha": 0.0,
+        "kappa": kappa,
+        "camber": 0.0,
+        "speed": speed,
+        "pressure": 2.3e5,
+    }
 
 
 @cache
@@ -104,13 +112,22 @@ def calibration() -> Calibration:
     """Made on steady runs of the virtual tire, loads and speeds about those of the ramps."""
     known, place = surface(), live.folder() / "ramp_calibration"
     header = CampaignHeader(
-        name="steady", axes="iso", tire=TireGeometry("virtual", 0.316, 0.303, 0.0115, 0.168, -3e-3),
-        gage_lateral=tuple(known.lateral.tolist()), rate=RATE,
-    )  # fmt: skip
-    points = [(load, speed, 0.0) for load in (1500.0, 2500.0, 3500.0, 4500.0)
-              for speed in (8.0, 15.0, 23.0)]  # fmt: skip
-    points += [(load, 15.0, kappa) for load in (1500.0, 2500.0, 3500.0, 4500.0)
-               for kappa in (-0.06, -0.03, 0.03)]  # fmt: skip
+        name="steady",
+        axes="iso",
+        tire=TireGeometry("virtual", 0.316, 0.303, 0.0115, 0.168, -3e-3),
+        gage_lateral=tuple(known.lateral.tolist()),
+        rate=RATE,
+    )
+    points = [
+        (load, speed, 0.0)
+        for load in (1500.0, 2500.0, 3500.0, 4500.0)
+        for speed in (8.0, 15.0, 23.0)
+    ]
+    points += [
+        (load, 15.0, kappa)
+        for load in (1500.0, 2500.0, 3500.0, 4500.0)
+        for kappa in (-0.06, -0.03, 0.03)
+    ]
     runs = []
     for number, (load, speed, kappa) in enumerate(points, start=1):
         made = play(7.5 / speed, lambda _, at=(load, speed, kappa): steadily(*at))

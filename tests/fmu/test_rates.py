@@ -18,9 +18,20 @@ from tirelib.held import HELD
 
 RATE = 1e4
 CONDITIONS = player.CONDITIONS
-ESTIMATES = ("Fz", "alpha", "kappa", "Fy", "Fz_std", "alpha_std", "kappa_std", "Fy_std",
-             *(f"contact_length_{g}" for g in range(1, 6)), "rolling_radius", "turn_rate",
-             "contact_time")  # fmt: skip
+ESTIMATES = (
+    "Fz",
+    "alpha",
+    "kappa",
+    "Fy",
+    "Fz_std",
+    "alpha_std",
+    "kappa_std",
+    "Fy_std",
+    *(f"contact_length_{g}" for g in range(1, 6)),
+    "rolling_radius",
+    "turn_rate",
+    "contact_time",
+)
 
 
 @pytest.fixture(scope="module")
@@ -98,8 +109,9 @@ def push(fmu: LoadedFmu, frame: np.ndarray, step: float) -> None:
     """A buffered step of any length."""
     names = [f"strain_{s}_{g}" for s in range(1, frame.shape[1] + 1) for g in range(1, 6)]
     at = fmu.references
-    fmu.slave.setReal([at[n] for n in (*names, *HELD)],
-                      [*frame.T.ravel().tolist(), *CONDITIONS.tolist()])  # fmt: skip
+    fmu.slave.setReal(
+        [at[n] for n in (*names, *HELD)], [*frame.T.ravel().tolist(), *CONDITIONS.tolist()]
+    )
     fmu.slave.setInteger([at["samples"]], [frame.shape[1]])
     fmu.slave.doStep(0.0, step)
 

@@ -45,8 +45,14 @@ def told(command: Any, *arguments: str) -> Any:
 @pytest.fixture(scope="module")
 def wanted(tmp_path_factory: pytest.TempPathFactory) -> Any:
     path = tmp_path_factory.mktemp("estimate") / "e.json"
-    told(estimate, str(live.campaign_folder()), "--calibration", str(live.calibration_file()),
-         "--json", str(path))  # fmt: skip
+    told(
+        estimate,
+        str(live.campaign_folder()),
+        "--calibration",
+        str(live.calibration_file()),
+        "--json",
+        str(path),
+    )
     return json.loads(path.read_text())
 
 
@@ -54,9 +60,17 @@ def wanted(tmp_path_factory: pytest.TempPathFactory) -> Any:
 def test_the_document_is_that_of_estimate(tmp_path: Path, wanted: Any, samples: int) -> None:
     file, result = tmp_path / "X.fmu", tmp_path / "f.json"
     output = told(
-        fmu, "build", "--calibration", str(live.calibration_file()), "--out", str(file),
-        "--samples-per-step", str(samples), "--sample-rate", "4000",
-    )  # fmt: skip
+        fmu,
+        "build",
+        "--calibration",
+        str(live.calibration_file()),
+        "--out",
+        str(file),
+        "--samples-per-step",
+        str(samples),
+        "--sample-rate",
+        "4000",
+    )
     assert "live tire" in output
     output = told(fmu, "run", str(file), str(live.campaign_folder()), "--json", str(result))
     given = json.loads(result.read_text())
@@ -82,8 +96,14 @@ def test_a_campaign_that_lacks_a_channel_gives_the_document_of_estimate(
     """Where the rig did not measure, the set point holds; after its end, nothing does."""
     runs = [lacking(run, channel) for run in live.make_runs()[3:6]]
     write_campaign(tmp_path / "c", live.HEADER, runs)
-    told(estimate, str(tmp_path / "c"), "--calibration", str(live.calibration_file()),
-         "--json", str(tmp_path / "e"))  # fmt: skip
+    told(
+        estimate,
+        str(tmp_path / "c"),
+        "--calibration",
+        str(live.calibration_file()),
+        "--json",
+        str(tmp_path / "e"),
+    )
     told(fmu, "run", str(live.fmu_file(10)), str(tmp_path / "c"), "--json", str(tmp_path / "f"))
     given, wanted = (json.loads((tmp_path / name).read_text()) for name in "fe")
     assert_equal(given, wanted)
@@ -160,7 +180,15 @@ def test_lab_data_give_the_numbers_of_estimate(
     calibration, file = tmp_path / "cal.toml", tmp_path / "x.fmu"
     told(calibrate, str(folder), "--out", str(calibration))
     told(estimate, str(folder), "--calibration", str(calibration), "--json", str(tmp_path / "e"))
-    told(fmu, "build", "--calibration", str(calibration), "--out", str(file),
-         "--samples-per-step", "10")  # fmt: skip
+    told(
+        fmu,
+        "build",
+        "--calibration",
+        str(calibration),
+        "--out",
+        str(file),
+        "--samples-per-step",
+        "10",
+    )
     told(fmu, "run", str(file), str(folder), "--json", str(tmp_path / "f"))
     assert_equal(json.loads((tmp_path / "f").read_text()), json.loads((tmp_path / "e").read_text()))

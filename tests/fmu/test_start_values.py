@@ -31,9 +31,21 @@ def strain_tire() -> Iterator[LoadedFmu]:
 
 
 def seen(host: Host) -> dict[str, Any]:
-    names = ["omega", "wheel_angle", "alpha_relaxed", "kappa_relaxed", "Fx_rig", "Fy_rig",
-             "Mz_rig", "loaded_radius", "rolling_radius", "samples", "frame_valid", "moving",
-             "status"]  # fmt: skip
+    names = [
+        "omega",
+        "wheel_angle",
+        "alpha_relaxed",
+        "kappa_relaxed",
+        "Fx_rig",
+        "Fy_rig",
+        "Mz_rig",
+        "loaded_radius",
+        "rolling_radius",
+        "samples",
+        "frame_valid",
+        "moving",
+        "status",
+    ]
     return {**{name: host.get(name) for name in names}, "frame": host.frame().tolist()}
 
 

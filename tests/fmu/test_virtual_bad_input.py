@@ -37,11 +37,22 @@ def refused(host: Host, step: float, cause: str) -> None:
 
 @pytest.mark.parametrize(
     "inputs",
-    [{"Fz": np.nan}, {"Fz": np.inf}, {"alpha": -np.inf}, {"kappa": np.nan}, {"camber": np.inf},
-     {"speed": np.inf}, {"speed": -np.inf}, {"speed": -20.0}, {"pressure": np.nan},
-     {"pressure": -np.inf}, {"kappa": -1.5}, {"Fz": 1e308, "alpha": -1e308},
-     dict.fromkeys(TYPICAL, np.nan)],
-)  # fmt: skip
+    [
+        {"Fz": np.nan},
+        {"Fz": np.inf},
+        {"alpha": -np.inf},
+        {"kappa": np.nan},
+        {"camber": np.inf},
+        {"speed": np.inf},
+        {"speed": -np.inf},
+        {"speed": -20.0},
+        {"pressure": np.nan},
+        {"pressure": -np.inf},
+        {"kappa": -1.5},
+        {"Fz": 1e308, "alpha": -1e308},
+        dict.fromkeys(TYPICAL, np.nan),
+    ],
+)
 def test_what_cannot_be_is_named_held_and_forgotten(ten: Host, inputs: dict[str, float]) -> None:
     ten.start(relaxation_length=0.05, relaxation_length_kappa=0.05)
     wanted = ten.play(3)
@@ -59,13 +70,15 @@ def test_what_cannot_be_is_named_held_and_forgotten(ten: Host, inputs: dict[str,
 
 @pytest.mark.parametrize(
     ("step", "cause"),
-    [(0.0, "communication step = 0.0 s; allowed is above 0"),
-     (-1e-3, "communication step = -0.001 s; allowed is above 0"),
-     (math.nan, "communication step = nan s; allowed is above 0"),
-     (math.inf, "communication step = inf s; allowed is above 0"),
-     (0.11, "communication step = 0.11 s brings 1100 samples"),  # a turn takes 0.1 s
-     (1e300, "communication step = 1e+300 s brings")],
-)  # fmt: skip
+    [
+        (0.0, "communication step = 0.0 s; allowed is above 0"),
+        (-1e-3, "communication step = -0.001 s; allowed is above 0"),
+        (math.nan, "communication step = nan s; allowed is above 0"),
+        (math.inf, "communication step = inf s; allowed is above 0"),
+        (0.11, "communication step = 0.11 s brings 1100 samples"),  # a turn takes 0.1 s
+        (1e300, "communication step = 1e+300 s brings"),
+    ],
+)
 def test_a_step_that_cannot_be_is_an_error_with_its_cause(
     ten: Host, step: float, cause: str
 ) -> None:
@@ -91,11 +104,22 @@ def test_steps_before_the_start_and_after_the_end_are_refused(ten: Host) -> None
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("sample_rate", 1.0), ("sample_rate", math.nan), ("relaxation_length", -0.1),
-     ("relaxation_length_kappa", math.inf), ("noise_std", math.nan), ("start_angle", 4.0),
-     ("fault_start", -1.0), ("saturation", 2.0), ("drift", -math.inf), ("dropped_frames", 1.5),
-     ("dead_gage", 6), ("dead_gage", -1), ("seed", -1)],
-)  # fmt: skip
+    [
+        ("sample_rate", 1.0),
+        ("sample_rate", math.nan),
+        ("relaxation_length", -0.1),
+        ("relaxation_length_kappa", math.inf),
+        ("noise_std", math.nan),
+        ("start_angle", 4.0),
+        ("fault_start", -1.0),
+        ("saturation", 2.0),
+        ("drift", -math.inf),
+        ("dropped_frames", 1.5),
+        ("dead_gage", 6),
+        ("dead_gage", -1),
+        ("seed", -1),
+    ],
+)
 def test_a_parameter_out_of_range_fails_the_start_by_name_and_a_reset_heals_it(
     ten: Host, name: str, value: float
 ) -> None:

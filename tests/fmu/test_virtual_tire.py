@@ -136,8 +136,9 @@ def test_slip_is_felt_after_the_relaxation_length(ten: Host, length: float) -> N
     assert left == pytest.approx(np.exp(-1.0), rel=1e-9)
     along = (ten.get("kappa_relaxed") - 0.03) / -0.04
     assert along == pytest.approx(np.exp(-length / 0.1), rel=1e-9)
-    felt = np.array([[4000.0, ten.get("alpha_relaxed"), ten.get("kappa_relaxed"), 0.01, 20.0,
-                      2.3e5]])  # fmt: skip
+    felt = np.array(
+        [[4000.0, ten.get("alpha_relaxed"), ten.get("kappa_relaxed"), 0.01, 20.0, 2.3e5]]
+    )
     now = surface().strain(surface().answers(felt), np.array([ten.get("wheel_angle")]))
     np.testing.assert_allclose(ten.frame()[-1:], now, atol=1e-11)
     assert ten.get("Fy_rig") == pytest.approx(surface().forces_of(surface().answers(felt))[0, 1])
@@ -211,10 +212,20 @@ def test_dropped_frames_are_marked_and_hold_the_last_one(ten: Host) -> None:
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("Fz", 500.0), ("Fz", -1.0), ("alpha", 0.2), ("kappa", -0.2), ("camber", -0.1),
-     ("speed", 2.0), ("speed", -20.0), ("pressure", 4e5), ("Fz", np.nan), ("alpha", np.inf),
-     ("speed", np.nan)],
-)  # fmt: skip
+    [
+        ("Fz", 500.0),
+        ("Fz", -1.0),
+        ("alpha", 0.2),
+        ("kappa", -0.2),
+        ("camber", -0.1),
+        ("speed", 2.0),
+        ("speed", -20.0),
+        ("pressure", 4e5),
+        ("Fz", np.nan),
+        ("alpha", np.inf),
+        ("speed", np.nan),
+    ],
+)
 def test_out_of_range_nothing_is_extrapolated_and_the_input_is_named(
     ten: Host, name: str, value: float
 ) -> None:
@@ -235,9 +246,12 @@ def test_out_of_range_nothing_is_extrapolated_and_the_input_is_named(
 
 @pytest.mark.parametrize(
     ("why", "inputs"),
-    [("standstill", {"speed": 0.0, "kappa": np.nan, "alpha": 1.0}),
-     ("locked", {"kappa": -1.0}), ("locked", {"kappa": -1.0, "speed": 2.0})],
-)  # fmt: skip
+    [
+        ("standstill", {"speed": 0.0, "kappa": np.nan, "alpha": 1.0}),
+        ("locked", {"kappa": -1.0}),
+        ("locked", {"kappa": -1.0, "speed": 2.0}),
+    ],
+)
 def test_a_wheel_that_does_not_turn_keeps_the_strain_of_its_angle(
     ten: Host, why: str, inputs: dict[str, float]
 ) -> None:
@@ -249,8 +263,9 @@ def test_a_wheel_that_does_not_turn_keeps_the_strain_of_its_angle(
     assert ten.get("moving") is True
     ten.put(**inputs)
     found = np.concatenate((ten.play(2), ten.play(1)))
-    np.testing.assert_allclose(found, np.tile(steady(TYPICAL, np.array([angle])), (30, 1)),
-                               atol=1e-11)  # fmt: skip
+    np.testing.assert_allclose(
+        found, np.tile(steady(TYPICAL, np.array([angle])), (30, 1)), atol=1e-11
+    )
     told = [ten.get(name) for name in ("moving", "omega", "wheel_angle", "frame_valid", "status")]
     assert told == [False, 0.0, angle, True, why]
     ten.put(Fz=np.nan)

@@ -25,8 +25,14 @@ from tirelib.fmu.virtual.surface import Surface, mirrored, read_surface
 from tirelib.observations import observe
 
 RATE = 1e4
-TYPICAL = {"Fz": 4000.0, "alpha": 0.03, "kappa": -0.01, "camber": 0.01, "speed": 20.0,
-           "pressure": 2.3e5}  # fmt: skip
+TYPICAL = {
+    "Fz": 4000.0,
+    "alpha": 0.03,
+    "kappa": -0.01,
+    "camber": 0.01,
+    "speed": 20.0,
+    "pressure": 2.3e5,
+}
 QUIET = {"noise_std": 0.0}
 
 
@@ -98,9 +104,11 @@ class Host:
         self.samples = len(self.strains) // 5
         self.folder = extract(str(path))
         self.slave: Any = FMU2Slave(
-            guid=description.guid, unzipDirectory=self.folder,
-            modelIdentifier=description.coSimulation.modelIdentifier, instanceName="wheel",
-        )  # fmt: skip
+            guid=description.guid,
+            unzipDirectory=self.folder,
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            instanceName="wheel",
+        )
         self.messages: list[str] = [] if messages is None else messages
         self.slave.instantiate(loggingOn=True, callbacks=keeping(self.messages))
         self.time = 0.0
@@ -151,11 +159,17 @@ def calibration_file() -> Path:
     place = live.folder() / "virtual_campaign"
     geometry = TireGeometry("virtual", 0.316, 0.303, 0.0115, 0.168, -0.003)
     header = CampaignHeader(
-        name="virtual", axes="iso", tire=geometry,
-        gage_lateral=tuple(surface().lateral.tolist()), rate=RATE,
-    )  # fmt: skip
-    points = [(load, alpha) for load in (3200.0, 4000.0, 4800.0, 5600.0)
-              for alpha in (-0.06, -0.03, 0.0, 0.03, 0.06)]  # fmt: skip
+        name="virtual",
+        axes="iso",
+        tire=geometry,
+        gage_lateral=tuple(surface().lateral.tolist()),
+        rate=RATE,
+    )
+    points = [
+        (load, alpha)
+        for load in (3200.0, 4000.0, 4800.0, 5600.0)
+        for alpha in (-0.06, -0.03, 0.0, 0.03, 0.06)
+    ]
     write_campaign(place, header, [_run(n, *point) for n, point in enumerate(points, start=1)])
     path = live.folder() / "virtual.toml"
     write_calibration(train(observe([read_campaign(place)])).calibration, path, {})
@@ -172,12 +186,34 @@ def _run(number: int, load: float, alpha: float) -> Run:
     turn = np.floor((angle + np.pi) / (2.0 * np.pi))
     fx, fy = surface().forces_of(answers)[0, :2]
     times = np.arange(0.0, angle.size / RATE, 0.01)
-    held = {"Fz": load, "Fy": fy, "Fx": fx, "slip_angle": alpha, "camber": 0.0,
-            "slip_ratio": slip, "speed": 20.0, "pressure": 2.3e5}  # fmt: skip
-    plan = RunPlan(number, f"runs/{number:03d}.mf4", "corner" if alpha else "free", load, 2.3e5,
-                   20.0, alpha, 0.0, 0.0)  # fmt: skip
+    held = {
+        "Fz": load,
+        "Fy": fy,
+        "Fx": fx,
+        "slip_angle": alpha,
+        "camber": 0.0,
+        "slip_ratio": slip,
+        "speed": 20.0,
+        "pressure": 2.3e5,
+    }
+    plan = RunPlan(
+        number,
+        f"runs/{number:03d}.mf4",
+        "corner" if alpha else "free",
+        load,
+        2.3e5,
+        20.0,
+        alpha,
+        0.0,
+        0.0,
+    )
     strain = (surface().strain(answers, angle) + noise).T
     return Run(
-        plan, strain, RATE, 0.0, np.concatenate(([False], np.diff(turn) > 0.0)),
-        {name: np.full(times.size, value) for name, value in held.items()}, times,
-    )  # fmt: skip
+        plan,
+        strain,
+        RATE,
+        0.0,
+        np.concatenate(([False], np.diff(turn) > 0.0)),
+        {name: np.full(times.size, value) for name, value in held.items()},
+        times,
+    )

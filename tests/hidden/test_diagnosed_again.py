@@ -22,9 +22,13 @@ def twice(runs: StraightRuns, members: int) -> tuple[Diagnosis, Diagnosis]:
     first = diagnose(runs, estimated(runs)[1].values, catalogue, members=members)
     model = first.final
     second = diagnose(
-        runs, model.values, catalogue, effects=model.effects, strengths=model.strengths,
+        runs,
+        model.values,
+        catalogue,
+        effects=model.effects,
+        strengths=model.strengths,
         members=members,
-    )  # fmt: skip
+    )
     return first, second
 
 

@@ -10,8 +10,13 @@ from bench.rig.hidden import HIDDEN
 
 def row(kind: str, outcome: str, wanted_ratio: float = 1.5, **more: object) -> dict:
     known = all(HIDDEN[name].known for name in kind.split("+") if name != NONE)
-    return {"kind": kind, "outcome": outcome, "wanted": wanted_ratio, "known": known,
-            "named": []} | more  # fmt: skip
+    return {
+        "kind": kind,
+        "outcome": outcome,
+        "wanted": wanted_ratio,
+        "known": known,
+        "named": [],
+    } | more
 
 
 def added(before: float, after: float, floor: float) -> dict:
@@ -22,15 +27,20 @@ def added(before: float, after: float, floor: float) -> dict:
 
 
 ROWS = [
-    row(NONE, "quiet"), row(NONE, "alarm", named=["tread_load"]), row(NONE, "alarm"),
+    row(NONE, "quiet"),
+    row(NONE, "alarm", named=["tread_load"]),
+    row(NONE, "alarm"),
     row(NONE, "quiet", named=["belt_shear"]),
     row("temperature", "right", **added(1.5, 1.0, 1.0)),
     row("tread_load", "wrong", **added(1.5, 1.06, 1.0)),
     row("gage_drift", "twins", **added(1.5, 1.04, 1.0)),
-    row("gage_drift", "missed", 1.2), row("roughness", "failed"),
-    row("oval_tire", "flagged"), row("flat_spot", "wrong"),
-    row("temperature+gage_drift", "right"), row("temperature+low_pass", "partly"),
-]  # fmt: skip
+    row("gage_drift", "missed", 1.2),
+    row("roughness", "failed"),
+    row("oval_tire", "flagged"),
+    row("flat_spot", "wrong"),
+    row("temperature+gage_drift", "right"),
+    row("temperature+low_pass", "partly"),
+]
 
 
 def test_shares_are_of_the_cases_that_ran() -> None:

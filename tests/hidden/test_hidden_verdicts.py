@@ -38,11 +38,13 @@ def test_a_warm_up_with_another_law_is_named_and_its_addition_takes_the_error_aw
     assert found["named"] == ["temperature"], "that the belt shears is in the base"
     assert found["outcome"] == "right"
     error = found["error"]
-    assert error["before"] / error["floor"] == pytest.approx(case("1000-temperature-1.20").ratio,
-                                                             abs=0.05)  # fmt: skip
+    assert error["before"] / error["floor"] == pytest.approx(
+        case("1000-temperature-1.20").ratio, abs=0.05
+    )
     assert error["after"] <= 1.05 * error["floor"]
-    gone = (error["before"] ** 2 - error["after"] ** 2) / (error["before"] ** 2
-                                                           - error["floor"] ** 2)  # fmt: skip
+    gone = (error["before"] ** 2 - error["after"] ** 2) / (
+        error["before"] ** 2 - error["floor"] ** 2
+    )
     assert gone > 0.7  # the law is another one, so that a part stays
     held = found["held_out"]["load"]
     assert held["after"] < held["before"]

@@ -16,9 +16,15 @@ from tirelib.campaign import read_campaign
 from tirelib.waveforms import measure_waveforms
 
 EXACT = Chain(
-    load_setting=0.0, pressure_setting=0.0, speed_setting=0.0, angle_setting=0.0,
-    slip_setting=0.0, gain_repeatability=0.0, gage_noise=1e-7, gage_bits=20,
-)  # fmt: skip
+    load_setting=0.0,
+    pressure_setting=0.0,
+    speed_setting=0.0,
+    angle_setting=0.0,
+    slip_setting=0.0,
+    gain_repeatability=0.0,
+    gage_noise=1e-7,
+    gage_bits=20,
+)
 COND = Condition(5000.0, 2.1e5, 20.0)
 PLANTED = {"gage_saturation": 0.05, "sidewall_pressure": 0.5}
 
@@ -48,12 +54,17 @@ def test_files_and_shortcut_give_the_same_waveform(tmp_path: Path) -> None:
 
 def test_a_seed_is_a_day_of_twelve_conditions_repeats_and_runs_held_out() -> None:
     today = day(1001)
-    fitted = {(c.load, c.pressure, c.speed) for c, out in zip(
-        today.nominal, today.held_out, strict=True) if not out}  # fmt: skip
+    fitted = {
+        (c.load, c.pressure, c.speed)
+        for c, out in zip(today.nominal, today.held_out, strict=True)
+        if not out
+    }
     assert len(fitted) == 12
     assert [sorted({f[k] for f in fitted}) for k in range(3)] == [
-        sorted(LOADS), sorted(PRESSURES), sorted(SPEEDS),
-    ]  # fmt: skip
+        sorted(LOADS),
+        sorted(PRESSURES),
+        sorted(SPEEDS),
+    ]
     assert len(today.nominal) == 18
     assert today.held_out.sum() == 3
     again = day(1001)
@@ -63,8 +74,14 @@ def test_a_seed_is_a_day_of_twelve_conditions_repeats_and_runs_held_out() -> Non
 
 def test_a_tire_of_the_benchmark_hides_nothing() -> None:
     drawn, base = tire(1003), RigTire()
-    for name in ("sidewall_damping", "friction", "sidewall_softening", "tread_cubic",
-                 "tread_roughness", "road_curvature"):  # fmt: skip
+    for name in (
+        "sidewall_damping",
+        "friction",
+        "sidewall_softening",
+        "tread_cubic",
+        "tread_roughness",
+        "road_curvature",
+    ):
         assert getattr(drawn, name) == 0.0
     assert drawn.belt_laws == drawn.road_laws == ()
     for name in ("extension", "shear", "bending", "mass", "tread_normal", "ring_radius"):

@@ -18,10 +18,21 @@ from tirelib.errors import ParameterError
 from tirelib.model.brush import BrushConditions, BrushState, brush_forces, brush_state
 
 NAMES = [
-    "ring_pressure", "stiffness_load", "stiffness_pressure", "stiffness_temperature",
-    "friction_load", "friction_pressure", "friction_temperature", "friction_speed", "brush_camber",
-    "carcass", "ply_steer", "conicity", "relaxation", "combined_slip",
-]  # fmt: skip
+    "ring_pressure",
+    "stiffness_load",
+    "stiffness_pressure",
+    "stiffness_temperature",
+    "friction_load",
+    "friction_pressure",
+    "friction_temperature",
+    "friction_speed",
+    "brush_camber",
+    "carcass",
+    "ply_steer",
+    "conicity",
+    "relaxation",
+    "combined_slip",
+]
 DRIFTS = ["stiffness_drift", "friction_drift"]
 """Of two components; registration tries them."""
 FORCES = ("Fx", "Fy", "Mz")
@@ -42,18 +53,22 @@ def points() -> BrushConditions:
     rng = np.random.default_rng(3)
     n = 120
     return BrushConditions(
-        load=rng.uniform(1e3, 6e3, n), pressure=rng.uniform(1.5e5, 2.7e5, n),
-        slip_angle=rng.uniform(-0.15, 0.15, n), slip_ratio=rng.uniform(-0.1, 0.1, n),
+        load=rng.uniform(1e3, 6e3, n),
+        pressure=rng.uniform(1.5e5, 2.7e5, n),
+        slip_angle=rng.uniform(-0.15, 0.15, n),
+        slip_ratio=rng.uniform(-0.1, 0.1, n),
         camber=rng.uniform(-0.07, 0.07, n),
         speed=rng.choice([-1.0, 1.0], n) * rng.uniform(5, 30, n),
-        temperature=rng.uniform(300.0, 370.0, n), slip_rate=rng.uniform(-0.2, 0.2, n),
+        temperature=rng.uniform(300.0, 370.0, n),
+        slip_rate=rng.uniform(-0.2, 0.2, n),
         order=np.linspace(0.0, 1.0, n),
-    )  # fmt: skip
+    )
 
 
 POINTS = points()
-BRUSH = PointParameters(lateral_stiffness=8e6, longitudinal_stiffness=1.1e7, friction=0.95,
-                        half_length=0.06)  # fmt: skip
+BRUSH = PointParameters(
+    lateral_stiffness=8e6, longitudinal_stiffness=1.1e7, friction=0.95, half_length=0.06
+)
 
 
 def state(at: BrushConditions = POINTS, **values: Any) -> BrushState:
@@ -120,8 +135,11 @@ def test_the_whole_range_can_be_computed_and_the_argument_stays(
     for end in (e.low, e.high):
         assert np.isfinite(forces(e.at(end))).all()
     before = state()
-    copies = {f.name: np.copy(getattr(before, f.name)) for f in fields(before)
-              if isinstance(getattr(before, f.name), np.ndarray)}  # fmt: skip
+    copies = {
+        f.name: np.copy(getattr(before, f.name))
+        for f in fields(before)
+        if isinstance(getattr(before, f.name), np.ndarray)
+    }
     e.at(e.step)[1](before)
     for field, copy in copies.items():
         np.testing.assert_array_equal(getattr(before, field), copy)
@@ -143,8 +161,9 @@ def test_only_ply_steer_and_conicity_know_left_from_right(
 
 
 def test_ply_steer_changes_side_with_the_direction_of_rolling_and_conicity_does_not() -> None:
-    straight = replace(POINTS, slip_angle=0.0 * POINTS.load, slip_ratio=0.0 * POINTS.load,
-                       camber=0.0 * POINTS.load)  # fmt: skip
+    straight = replace(
+        POINTS, slip_angle=0.0 * POINTS.load, slip_ratio=0.0 * POINTS.load, camber=0.0 * POINTS.load
+    )
     back = replace(straight, speed=-straight.speed)
     ply, cone = CATALOGUE["ply_steer"].at(0.2), CATALOGUE["conicity"].at(10.0)
     np.testing.assert_allclose(forces(ply, at=back)[1], -forces(ply, at=straight)[1], rtol=1e-12)
@@ -200,8 +219,9 @@ def test_relaxation_does_nothing_in_steady_runs_and_lags_in_sweeps() -> None:
     e = CATALOGUE["relaxation"].at(0.5)
     steady = replace(POINTS, slip_rate=0.0 * POINTS.load)
     np.testing.assert_array_equal(forces(e, at=steady), forces(at=steady))
-    late = replace(POINTS, slip_angle=POINTS.slip_angle - 0.5 / np.abs(POINTS.speed)
-                   * POINTS.slip_rate)  # fmt: skip
+    late = replace(
+        POINTS, slip_angle=POINTS.slip_angle - 0.5 / np.abs(POINTS.speed) * POINTS.slip_rate
+    )
     np.testing.assert_allclose(forces(e), forces(at=late), rtol=1e-9, atol=1e-6)
 
 
@@ -211,9 +231,11 @@ def test_combined_slip_leaves_pure_cornering_and_scales_pure_braking() -> None:
     np.testing.assert_array_equal(forces(e, at=corner), forces(at=corner))
     brake = replace(POINTS, slip_angle=0.0 * POINTS.load)
     np.testing.assert_allclose(
-        forces(e, at=brake), forces(at=brake, mu=np.full(len(POINTS), 1.2 * 0.95)), rtol=1e-12,
+        forces(e, at=brake),
+        forces(at=brake, mu=np.full(len(POINTS), 1.2 * 0.95)),
+        rtol=1e-12,
         atol=1e-9,
-    )  # fmt: skip
+    )
 
 
 def test_a_softer_carcass_lowers_the_side_force() -> None:
@@ -229,9 +251,11 @@ def test_the_rings_pressure_is_as_strong_as_the_ring_says() -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(
-    c=st.floats(-0.8, 2.8), angle=st.floats(-0.3, 0.3), ratio=st.floats(-0.3, 0.3),
+    c=st.floats(-0.8, 2.8),
+    angle=st.floats(-0.3, 0.3),
+    ratio=st.floats(-0.3, 0.3),
     load=st.floats(500.0, 9e3),
-)  # fmt: skip
+)
 @example(c=-0.5, angle=0.125, ratio=0.0, load=3497.0)  # sticks in the middle only
 def test_a_shaped_pressure_carries_what_each_bristle_carries(
     c: float, angle: float, ratio: float, load: float

@@ -214,10 +214,13 @@ def test_the_energys_slope_is_its_difference() -> None:
 
 SOFT = replace(RING, extension_stiffness=4e6)
 MOVED = {
-    "ea": ("extension_stiffness", 4e6), "ei": ("bending_stiffness", 1.8),
-    "pb": ("inflation", 2.1e5 * 0.165), "ku": ("radial_stiffness", 4.5e5),
-    "kv": ("tangential_stiffness", 1.6e5), "kt": ("normal_stiffness", 8.5e7),
-}  # fmt: skip
+    "ea": ("extension_stiffness", 4e6),
+    "ei": ("bending_stiffness", 1.8),
+    "pb": ("inflation", 2.1e5 * 0.165),
+    "ku": ("radial_stiffness", 4.5e5),
+    "kv": ("tangential_stiffness", 1.6e5),
+    "kt": ("normal_stiffness", 8.5e7),
+}
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -290,10 +293,18 @@ def test_a_thin_belt_under_a_hard_tread_is_refused_for_the_short_contact() -> No
     """A bicycle's wheel at 30 N: its linear start settles, and the reason is the true one."""
     base = read_tire("table-6-1").tire
     bicycle = base.changed(
-        ring_radius=0.330, free_radius=0.3335, belt_width=0.026, tread_thickness=0.0035,
-        innerliner_offset=-0.001, bending_stiffness=0.0207, mass=0.25, pressure=5.664e5,
-        radial_stiffness=2.6e4, tangential_stiffness=4e4, tread_stiffness=2.79e9,
-    )  # fmt: skip
+        ring_radius=0.330,
+        free_radius=0.3335,
+        belt_width=0.026,
+        tread_thickness=0.0035,
+        innerliner_offset=-0.001,
+        bending_stiffness=0.0207,
+        mass=0.25,
+        pressure=5.664e5,
+        radial_stiffness=2.6e4,
+        tangential_stiffness=4e4,
+        tread_stiffness=2.79e9,
+    )
     at = Ring.of(bicycle, bicycle.pressure), Tread.of(bicycle)
     with pytest.raises(ParameterError, match=r"resolve 0\.015 rad.*a softer tread"):
         load_exact(*at, 30.0)

@@ -33,8 +33,9 @@ def test_without_damping_speed_changes_nothing() -> None:
     done = speeds(0.0)
     for values in (done.pressure, done.strain, done.edges):
         scale = np.abs(values[0]).max()
-        np.testing.assert_allclose(values, np.broadcast_to(values[:1], values.shape),
-                                   atol=1e-6 * scale)  # fmt: skip
+        np.testing.assert_allclose(
+            values, np.broadcast_to(values[:1], values.shape), atol=1e-6 * scale
+        )
 
 
 def test_damping_shifts_the_pressure_to_the_entry_and_more_so_with_speed() -> None:

@@ -25,12 +25,24 @@ from tirelib.strain.innerliner import strain_harmonics
 from tirelib.traces import StrainTrace
 
 TIRE = Tire(
-    ring_radius=0.3035, free_radius=0.3165, belt_width=0.168, tread_thickness=0.0115,
-    innerliner_offset=-0.003, bending_stiffness=2.6, mass=3.6, pressure=2.3e5,
-    radial_stiffness=4.83e5, tangential_stiffness=1.9e5, tread_stiffness=5.38e7, damping=0.03,
-    tread_hardening=1.0, crown_curvature=0.7, lateral_bending=8000.0, lateral_stiffness=3.64e5,
+    ring_radius=0.3035,
+    free_radius=0.3165,
+    belt_width=0.168,
+    tread_thickness=0.0115,
+    innerliner_offset=-0.003,
+    bending_stiffness=2.6,
+    mass=3.6,
+    pressure=2.3e5,
+    radial_stiffness=4.83e5,
+    tangential_stiffness=1.9e5,
+    tread_stiffness=5.38e7,
+    damping=0.03,
+    tread_hardening=1.0,
+    crown_curvature=0.7,
+    lateral_bending=8000.0,
+    lateral_stiffness=3.64e5,
     roll_lever=0.005,
-)  # fmt: skip
+)
 SHEAR = 1.2e4
 RIG = RigTire()
 BASE = Condition(4800.0, 2.3e5, 65.0 / 3.6)
@@ -52,9 +64,13 @@ def contact(
 ) -> StripContact:
     side, along, up, lean = np.broadcast_arrays(np.atleast_1d(fy), fx, fz, camber)
     return press_strips(
-        tire, up.astype(float), omega=59.0, camber=lean.astype(float), lateral_shear=SHEAR,
+        tire,
+        up.astype(float),
+        omega=59.0,
+        camber=lean.astype(float),
+        lateral_shear=SHEAR,
         forces=RoadForces(along.astype(float), side.astype(float)),
-    )  # fmt: skip
+    )
 
 
 def read(trace: StrainTrace) -> Features:
@@ -178,9 +194,10 @@ def test_the_trace_is_that_of_the_measured_chain() -> None:
         assert inside[0] == pytest.approx(-half, abs=2e-3)
         assert inside[-1] == pytest.approx(half, abs=2e-3)
     np.testing.assert_allclose(
-        t.rate[..., 1:-1], np.gradient(t.strain, t.spacing, axis=-1)[..., 1:-1],
+        t.rate[..., 1:-1],
+        np.gradient(t.strain, t.spacing, axis=-1)[..., 1:-1],
         atol=0.01 * np.abs(t.rate).max(),
-    )  # fmt: skip
+    )
     mean = gage_trace(c, TIRE.innerliner_offset, phi=fine.phi, reference="mean")
     assert np.abs(mean.strain[..., :-1].mean(axis=-1)).max() < 1e-12
 
@@ -216,11 +233,13 @@ def test_a_lateral_beam_stretches_the_side_that_the_force_points_to() -> None:
     # without shear of the strips only Fiala's beam is left: TP rises on the side of Fy
     t = gage_trace(
         press_strips(
-            TIRE.changed(roll_lever=0.0, lateral_bending=1500.0), 4800.0, lateral_shear=1e3,
+            TIRE.changed(roll_lever=0.0, lateral_bending=1500.0),
+            4800.0,
+            lateral_shear=1e3,
             forces=RoadForces(np.zeros(1), np.array([2000.0])),
         ),
         TIRE.innerliner_offset,
-    )  # fmt: skip
+    )
     top = t.strain.max(axis=-1)[0]
     assert top[4] > top[0]
 

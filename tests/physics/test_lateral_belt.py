@@ -14,8 +14,11 @@ from tirelib.ring.lateral import infinite_beam as infinite
 
 R = 0.3
 BELT: dict[str, Any] = {
-    "radius": R, "bending_stiffness": 4000.0, "tension": 1.15e4, "foundation": 3.6e5,
-}  # fmt: skip
+    "radius": R,
+    "bending_stiffness": 4000.0,
+    "tension": 1.15e4,
+    "foundation": 3.6e5,
+}
 AWAY = np.array([[0.05, 0.1, 0.2, 0.4, 0.9]])
 
 

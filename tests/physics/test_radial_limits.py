@@ -261,8 +261,16 @@ def test_a_bicycles_short_contact_is_one_patch() -> None:
     """The nodes at its ends keep a tension of 3e-5 of the peak, which is no lift-off."""
     base = read_tire("table-6-1").tire
     bicycle = base.changed(
-        ring_radius=0.330, free_radius=0.3335, belt_width=0.04065, tread_thickness=0.0035,
-        innerliner_offset=-0.001, bending_stiffness=0.009382, mass=0.25, pressure=2.946e5,
-        radial_stiffness=1.73e5, tangential_stiffness=4e4, tread_stiffness=1.191e8,
-    )  # fmt: skip
+        ring_radius=0.330,
+        free_radius=0.3335,
+        belt_width=0.04065,
+        tread_thickness=0.0035,
+        innerliner_offset=-0.001,
+        bending_stiffness=0.009382,
+        mass=0.25,
+        pressure=2.946e5,
+        radial_stiffness=1.73e5,
+        tangential_stiffness=4e4,
+        tread_stiffness=1.191e8,
+    )
     assert simulate(bicycle, load=100.0).load[0] == pytest.approx(100.0)

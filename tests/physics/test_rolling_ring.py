@@ -21,15 +21,40 @@ LOADS = np.array([1500.0, 4000.0, 7000.0])
 OFFSET = np.full(3, -0.003)
 N = 360
 BARE: dict[str, Any] = {
-    "radius": 0.303, "free_radius": 0.316, "EA": 4.6e6, "GA": np.inf, "EI": 2.6, "mass": 3.6,
-    "rotary_inertia": 0.0, "inflation": 2.3e5 * 0.168, "tension": 0.0, "k_u": 4.8e5, "k_v": 1.9e5,
-    "dashpots": 0.0, "k_t": 5.4e7, "hardening": 0.0, "thickness": 0.0125, "crown": 0.0,
-    "half_width": 0.084, "k_s": 0.0, "friction": 0.0, "omega": 1.0, "load": LOADS, "torque": 0.0,
-}  # fmt: skip
+    "radius": 0.303,
+    "free_radius": 0.316,
+    "EA": 4.6e6,
+    "GA": np.inf,
+    "EI": 2.6,
+    "mass": 3.6,
+    "rotary_inertia": 0.0,
+    "inflation": 2.3e5 * 0.168,
+    "tension": 0.0,
+    "k_u": 4.8e5,
+    "k_v": 1.9e5,
+    "dashpots": 0.0,
+    "k_t": 5.4e7,
+    "hardening": 0.0,
+    "thickness": 0.0125,
+    "crown": 0.0,
+    "half_width": 0.084,
+    "k_s": 0.0,
+    "friction": 0.0,
+    "omega": 1.0,
+    "load": LOADS,
+    "torque": 0.0,
+}
 WHOLE = {
-    **BARE, "GA": 5e4, "rotary_inertia": 6e-5, "k_s": 1.8e7, "friction": 0.9, "hardening": 1.0,
-    "dashpots": 0.05, "omega": 70.0, "crown": 0.5,
-}  # fmt: skip
+    **BARE,
+    "GA": 5e4,
+    "rotary_inertia": 6e-5,
+    "k_s": 1.8e7,
+    "friction": 0.9,
+    "hardening": 1.0,
+    "dashpots": 0.05,
+    "omega": 70.0,
+    "crown": 0.5,
+}
 
 
 def ring(base: dict[str, Any] = BARE, **values: Any) -> Constants:
@@ -83,10 +108,18 @@ def test_the_matrix_is_the_derivative_of_the_residual() -> None:
 def test_without_shear_and_friction_it_is_the_exact_ring_of_harmonics() -> None:
     one = np.ones(3)
     exact = load_exact(
-        Ring(0.303 * one, 2.6 * one, 3.6 * one, 2.3e5 * 0.168 * one, 4.8e5 * one, 1.9e5 * one,
-             extension_stiffness=4.6e6 * one),
-        Tread(0.316 * one, 5.4e7 * one, 0.0125 * one, 0.0 * one), LOADS,
-    )  # fmt: skip
+        Ring(
+            0.303 * one,
+            2.6 * one,
+            3.6 * one,
+            2.3e5 * 0.168 * one,
+            4.8e5 * one,
+            1.9e5 * one,
+            extension_stiffness=4.6e6 * one,
+        ),
+        Tread(0.316 * one, 5.4e7 * one, 0.0125 * one, 0.0 * one),
+        LOADS,
+    )
     found = solve(ring())
     np.testing.assert_allclose(found.deflection, exact.deflection, rtol=5e-4)
     phi = found.on_turn(N).phi
@@ -155,14 +188,25 @@ def test_a_finer_mesh_converges() -> None:
 
 @settings(max_examples=15, deadline=None)
 @given(
-    st.floats(1000.0, 7000.0), st.floats(2.5e4, 5e5), st.floats(1e6, 6e7), st.floats(0.05, 1.5),
-    st.floats(0.0, 0.1), st.floats(1.0, 110.0),
-)  # fmt: skip
+    st.floats(1000.0, 7000.0),
+    st.floats(2.5e4, 5e5),
+    st.floats(1e6, 6e7),
+    st.floats(0.05, 1.5),
+    st.floats(0.0, 0.1),
+    st.floats(1.0, 110.0),
+)
 def test_it_is_solved_for_every_tire(
     load: float, shear: float, grip: float, friction: float, damping: float, omega: float
 ) -> None:
-    k = ring(WHOLE, GA=shear, k_s=grip, friction=friction, dashpots=damping, omega=omega,
-             load=np.array([load]))  # fmt: skip
+    k = ring(
+        WHOLE,
+        GA=shear,
+        k_s=grip,
+        friction=friction,
+        dashpots=damping,
+        omega=omega,
+        load=np.array([load]),
+    )
     found = solve(k)
     turn = found.on_turn(2000)
     assert 0.002 < found.deflection[0] < 0.06

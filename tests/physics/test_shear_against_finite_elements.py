@@ -132,10 +132,15 @@ EXACT = {
 }
 
 RESOLVED = {
-    "centre tension": 0.008, "deepest compression": 0.010, "strain inside": 0.0025,
-    "strain outside": 0.0010, "deflection": 0.0003, "edge": 0.0008, "centre pressure": 0.0015,
+    "centre tension": 0.008,
+    "deepest compression": 0.010,
+    "strain inside": 0.0025,
+    "strain outside": 0.0010,
+    "deflection": 0.0003,
+    "edge": 0.0008,
+    "centre pressure": 0.0015,
     "largest pressure": 0.0015,
-}  # fmt: skip
+}
 """By how much finer modes move the distances in `EXACT`: compression at a single angle settles
 slowest, as the bend at the contact's end is a kink."""
 
@@ -187,8 +192,9 @@ def test_these_distances_are_the_ring_s_and_not_of_its_resolution(
         coarse = apart(exact(fem), fem)
     for name, most in RESOLVED.items():
         assert np.abs(usual[name] - fine[name]).max() < most, name
-    ringing = [np.abs(found["strain outside"] - fine["strain outside"]).mean()
-               for found in (usual, coarse)]  # fmt: skip
+    ringing = [
+        np.abs(found["strain outside"] - fine["strain outside"]).mean() for found in (usual, coarse)
+    ]
     assert ringing[0] < 0.4 * ringing[1]
 
 

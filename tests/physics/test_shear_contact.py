@@ -58,9 +58,12 @@ def test_kinematics_are_those_of_plain_vectors_and_not_the_printed_ones() -> Non
         assert abs(way @ t - g) < 1e-15
         eta = angle + beta
         printed.append(
-            -0.287 * np.sin(eta) + (0.306 * angle + 2e-3) * np.cos(eta)
-            - (R + u) * np.sin(angle - eta) + v * np.sin(angle - eta) - g
-        )  # fmt: skip
+            -0.287 * np.sin(eta)
+            + (0.306 * angle + 2e-3) * np.cos(eta)
+            - (R + u) * np.sin(angle - eta)
+            + v * np.sin(angle - eta)
+            - g
+        )
     assert np.abs(printed).max() > 1e-3
 
 
@@ -95,14 +98,29 @@ def linearized(state: Array, phi: Array, r_e: float, r_l: float, sign: float) ->
     u, v, eta = state[..., 0], state[..., 1], state[..., 2] + phi
     ke, kg, s, c = 7.5e7, 2.5e7, np.sin(phi), np.cos(phi)
     s2 = np.sin(2.0 * phi)
-    q_u = ke * ((-H0 + r_l + r_e * eta * phi) * c - (R + u) * c**2 - (R * eta - v / 2) * s2
-                + (r_l - H0) * eta * s)  # fmt: skip
-    q_u -= kg * ((r_l * eta - r_e * phi) * s + (R + u) * s**2 - (R * eta - v / 2) * s2
-                 + r_e * eta * phi * c)  # fmt: skip
-    q_v = ke * ((H0 - r_l - r_e * eta * phi) * s + (R + u) / 2 * s2 + (R * eta - v) * s**2
-                + (r_l - H0) * eta * c - R * eta * c**2)  # fmt: skip
-    bracket = ((r_e * phi - r_l * eta) * c - (R + u) / 2 * s2 + (R * eta - v) * c**2
-               + r_e * eta * phi * s - R * eta * s**2)  # fmt: skip
+    q_u = ke * (
+        (-H0 + r_l + r_e * eta * phi) * c
+        - (R + u) * c**2
+        - (R * eta - v / 2) * s2
+        + (r_l - H0) * eta * s
+    )
+    q_u -= kg * (
+        (r_l * eta - r_e * phi) * s + (R + u) * s**2 - (R * eta - v / 2) * s2 + r_e * eta * phi * c
+    )
+    q_v = ke * (
+        (H0 - r_l - r_e * eta * phi) * s
+        + (R + u) / 2 * s2
+        + (R * eta - v) * s**2
+        + (r_l - H0) * eta * c
+        - R * eta * c**2
+    )
+    bracket = (
+        (r_e * phi - r_l * eta) * c
+        - (R + u) / 2 * s2
+        + (R * eta - v) * c**2
+        + r_e * eta * phi * s
+        - R * eta * s**2
+    )
     q_b = kg * H0 * (-r_l * eta + r_e * phi - (R + u) * s + (R * eta - v) * c)
     return np.stack([q_u, q_v + sign * kg * bracket, q_b], axis=-1)
 
@@ -134,9 +152,15 @@ def test_small_deflections_give_the_linear_loads_with_the_corrected_sign() -> No
 def test_derivatives_of_all_equations_are_those_of_differences(mu: float) -> None:
     tread = Tread(R + H0, 7.5e7, H0, hardening=0.8).spread(1)
     problem = ShearProblem(
-        Constant(ring(0.09)), tread, Shear(2.5e7, mu).spread(1), None, np.array([6000.0]), None,
-        np.array([20.0]), 1e3 * np.exp(-np.arange(61.0))[None, :, None] * np.array([1.0, 1j, 0.01]),
-    )  # fmt: skip
+        Constant(ring(0.09)),
+        tread,
+        Shear(2.5e7, mu).spread(1),
+        None,
+        np.array([6000.0]),
+        None,
+        np.array([20.0]),
+        1e3 * np.exp(-np.arange(61.0))[None, :, None] * np.array([1.0, 1j, 0.01]),
+    )
     mesh = Mesh.of(6)
     x = start(radial.press(ring(0.09), tread, 0.03), mesh)
     rng = np.random.default_rng(1)

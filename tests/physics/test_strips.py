@@ -21,12 +21,24 @@ from tirelib.ring.ring import Ring
 
 # the rig's own constants where it has them, none fitted
 TIRE = Tire(
-    ring_radius=0.3035, free_radius=0.3165, belt_width=0.168, tread_thickness=0.0115,
-    innerliner_offset=-0.003, bending_stiffness=2.6, mass=3.6, pressure=2.3e5,
-    radial_stiffness=4.83e5, tangential_stiffness=1.9e5, tread_stiffness=5.38e7, damping=0.03,
-    tread_hardening=1.0, crown_curvature=0.7, lateral_bending=8000.0, lateral_stiffness=3.64e5,
+    ring_radius=0.3035,
+    free_radius=0.3165,
+    belt_width=0.168,
+    tread_thickness=0.0115,
+    innerliner_offset=-0.003,
+    bending_stiffness=2.6,
+    mass=3.6,
+    pressure=2.3e5,
+    radial_stiffness=4.83e5,
+    tangential_stiffness=1.9e5,
+    tread_stiffness=5.38e7,
+    damping=0.03,
+    tread_hardening=1.0,
+    crown_curvature=0.7,
+    lateral_bending=8000.0,
+    lateral_stiffness=3.64e5,
     roll_lever=0.005,
-)  # fmt: skip
+)
 SHEAR = 1.2e4
 """The rig's belt between its strips: 4 x 1e5 N/m x 0.03 m."""
 RIG = RigTire()
@@ -92,10 +104,14 @@ def test_every_point_carries_its_load() -> None:
     rng = np.random.default_rng(5)
     fz = rng.uniform(1500.0, 8000.0, 12)
     c = press_strips(
-        TIRE, fz, omega=rng.uniform(5.0, 100.0, 12), camber=rng.uniform(-0.05, 0.05, 12),
-        pressure=rng.uniform(1.8e5, 2.8e5, 12), lateral_shear=SHEAR,
+        TIRE,
+        fz,
+        omega=rng.uniform(5.0, 100.0, 12),
+        camber=rng.uniform(-0.05, 0.05, 12),
+        pressure=rng.uniform(1.8e5, 2.8e5, 12),
+        lateral_shear=SHEAR,
         forces=RoadForces(rng.uniform(-0.4, 0.4, 12) * fz, rng.uniform(-0.5, 0.5, 12) * fz),
-    )  # fmt: skip
+    )
     np.testing.assert_allclose(c.load.sum(axis=1), fz, rtol=1e-6)
 
 
@@ -152,17 +168,21 @@ def test_force_to_the_right_loads_the_left() -> None:
 
 def test_the_roll_lever_alone_moves_load_to_the_side_it_must() -> None:
     still = press_strips(
-        TIRE.changed(roll_lever=0.0), 4800.0, lateral_shear=1e-3,
+        TIRE.changed(roll_lever=0.0),
+        4800.0,
+        lateral_shear=1e-3,
         forces=RoadForces(np.zeros(1), np.array([-2500.0])),
-    )  # fmt: skip
+    )
     assert abs(still.overturning[0]) < 0.05
     lever = [
         press_strips(
-            TIRE.changed(roll_lever=h), 4800.0, lateral_shear=1e-3,
+            TIRE.changed(roll_lever=h),
+            4800.0,
+            lateral_shear=1e-3,
             forces=RoadForces(np.zeros(1), np.array([-2500.0])),
         ).overturning[0]
         for h in (0.005, 0.01)
-    ]  # fmt: skip
+    ]
     assert 0.0 < lever[0] < 0.005 * 2500.0  # the sidewalls keep a part
     assert lever[1] == pytest.approx(2.0 * lever[0], rel=0.02)
 
@@ -180,9 +200,11 @@ def test_roll_loads_are_a_pure_moment() -> None:
 def test_a_belt_stiff_in_its_plane_rolls_where_it_curves() -> None:
     # strips shift by v = -y w' and roll by u = y R w''; low harmonics, where nothing else yields
     c = press_strips(
-        TIRE.changed(lateral_bending=1e6), 4800.0, lateral_shear=1e9,
+        TIRE.changed(lateral_bending=1e6),
+        4800.0,
+        lateral_shear=1e9,
         forces=RoadForces(np.zeros(1), np.array([-2000.0])),
-    )  # fmt: skip
+    )
     n = np.arange(1, 8)
     arm = c.layout.lateral / np.sum(c.layout.lateral**2)
     slope = 1j * n / c.radius[0] * c.bending.displacement[0, n]

@@ -11,11 +11,22 @@ from tirelib.strain.gages import gage_trace
 from tirelib.strain.tread_traction import TreadBeam, outward_shear, tread_strain
 
 TIRE = Tire(
-    ring_radius=0.3035, free_radius=0.3165, belt_width=0.168, tread_thickness=0.0115,
-    innerliner_offset=-0.003, bending_stiffness=2.6, mass=3.6, pressure=2.3e5,
-    radial_stiffness=4.83e5, tangential_stiffness=1.9e5, tread_stiffness=5.38e7, damping=0.03,
-    tread_hardening=1.0, tread_shear_stiffness=1.7e7, friction=0.95,
-)  # fmt: skip
+    ring_radius=0.3035,
+    free_radius=0.3165,
+    belt_width=0.168,
+    tread_thickness=0.0115,
+    innerliner_offset=-0.003,
+    bending_stiffness=2.6,
+    mass=3.6,
+    pressure=2.3e5,
+    radial_stiffness=4.83e5,
+    tangential_stiffness=1.9e5,
+    tread_stiffness=5.38e7,
+    damping=0.03,
+    tread_hardening=1.0,
+    tread_shear_stiffness=1.7e7,
+    friction=0.95,
+)
 LOADS = np.array([2400.0, 3600.0, 4800.0, 6000.0, 7200.0])
 CENTRE = np.zeros(1)
 

@@ -151,8 +151,11 @@ def test_four_wheels_against_real_time(benchmark: Any, samples: int, lists: bool
     frames, n = looped(samples)
     rows: Any = frames.tolist() if lists else frames
     fmus = [LoadedFmu(live.fmu_file(samples), name=f"wheel_{w}") for w in range(4)]
-    given = [v.name for v in inputs(live.calibration().lateral, samples)
-             if v.kind == "Real" and v.name != "omega"]  # fmt: skip
+    given = [
+        v.name
+        for v in inputs(live.calibration().lateral, samples)
+        if v.kind == "Real" and v.name != "omega"
+    ]
     steps = [wheel_step(fmu, given, samples, lists=lists) for fmu in fmus]
     count = min(n, 10_000 // samples)
     used = []

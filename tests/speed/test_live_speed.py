@@ -94,9 +94,13 @@ def gathered(chain: LiveChain, news: News, enough: Callable[[], bool]) -> None:
 
 @pytest.mark.parametrize(("line", "wheels"), [(SERIAL, 1), (SLCAN, 4)])
 def test_an_estimate_comes_soon_after_its_bytes(
-    benchmark: Any, emulate: Callable[..., str], folder: Path, tmp_path: Path, line: str,
+    benchmark: Any,
+    emulate: Callable[..., str],
+    folder: Path,
+    tmp_path: Path,
+    line: str,
     wheels: int,
-) -> None:  # fmt: skip
+) -> None:
     numbers = [word for wheel in range(wheels) for word in ("--wheel", wheel)]
     kind = ["--format", "RAW16"] if line == SLCAN else []
     name = emulate(*kind, *numbers)
@@ -116,11 +120,17 @@ def test_an_estimate_comes_soon_after_its_bytes(
         counts = chain.wheels.counts
         chain.finish("stopped")
     middle, high = np.percentile(news.latency, (50.0, 99.0))
-    benchmark.extra_info |= {"median_ms": 1e3 * middle, "p99_ms": 1e3 * high, "cores": share,
-                             "load_average": os.getloadavg()[0]}  # fmt: skip
+    benchmark.extra_info |= {
+        "median_ms": 1e3 * middle,
+        "p99_ms": 1e3 * high,
+        "cores": share,
+        "load_average": os.getloadavg()[0],
+    }
     benchmark(lambda: None)
-    print(f"{wheels} wheels over {line}: median {1e3 * middle:.1f} ms, "
-          f"99 % {1e3 * high:.1f} ms, {share:.2f} cores")  # fmt: skip
+    print(
+        f"{wheels} wheels over {line}: median {1e3 * middle:.1f} ms, "
+        f"99 % {1e3 * high:.1f} ms, {share:.2f} cores"
+    )
     assert counts[1].lost_samples == 0
     assert high < LATENCY
     assert share < wheels

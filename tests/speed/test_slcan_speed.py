@@ -82,11 +82,15 @@ def cost(reader: Callable[[PseudoTerminal], Callable[[], int]], fd: bool) -> flo
 def test_bulk_reading_is_much_faster(benchmark: object, fd: bool) -> None:
     theirs, ours = cost(read_by_python_can, fd), cost(read_in_bulk, fd)
     benchmark.extra_info |= {
-        "python_can_us": 1e6 * theirs, "ours_us": 1e6 * ours, "speed_up": theirs / ours,
-    }  # fmt: skip
+        "python_can_us": 1e6 * theirs,
+        "ours_us": 1e6 * ours,
+        "speed_up": theirs / ours,
+    }
     benchmark(lambda: None)
-    print(f"fd={fd}: python-can {1e6 * theirs:.1f} us, ours {1e6 * ours:.1f} us a frame, "
-          f"speed-up {theirs / ours:.0f}")  # fmt: skip
+    print(
+        f"fd={fd}: python-can {1e6 * theirs:.1f} us, ours {1e6 * ours:.1f} us a frame, "
+        f"speed-up {theirs / ours:.0f}"
+    )
     assert theirs > (LEAST if fd else 2.0) * ours
 
 

@@ -21,8 +21,15 @@ BRUSH = {"lateral_stiffness": 9e6, "friction": 0.95}
 
 def sweep_run(data: ForceData) -> Run:
     """Return samples as the recording of one sweep."""
-    names = {"Fz": "load", "pressure": "pressure", "slip_angle": "slip_angle", "camber": "camber",
-             "speed": "speed", "tread_temperature": "temperature", "Fy": "Fy"}  # fmt: skip
+    names = {
+        "Fz": "load",
+        "pressure": "pressure",
+        "slip_angle": "slip_angle",
+        "camber": "camber",
+        "speed": "speed",
+        "tread_temperature": "temperature",
+        "Fy": "Fy",
+    }
     plan = RunPlan(0, "runs/000.mf4", "sweep", *(float("nan"),) * 6)
     rig = {quantity: getattr(data, name) for quantity, name in names.items()}
     return Run(plan, rig=rig, rig_time=data.time)
@@ -42,18 +49,35 @@ def steady_runs(
         for angle in np.deg2rad(angles):
             for _ in range(repeats):
                 mu = BRUSH["friction"] * (load / 4000.0) ** -slope
-                brush = PointParameters(BRUSH["lateral_stiffness"], mu,
-                                        0.06 * (load / 4000.0) ** 0.45)  # fmt: skip
+                brush = PointParameters(
+                    BRUSH["lateral_stiffness"], mu, 0.06 * (load / 4000.0) ** 0.45
+                )
                 found = predict_forces(brush, PointConditions(load, angle))
                 side = factor * found.Fy.item() + 6.0 * rng.standard_normal()
-                rig = {"Fz": load, "pressure": 2.1e5, "slip_angle": angle, "camber": 0.0,
-                       "speed": 18.0, "Fy": side}  # fmt: skip
+                rig = {
+                    "Fz": load,
+                    "pressure": 2.1e5,
+                    "slip_angle": angle,
+                    "camber": 0.0,
+                    "speed": 18.0,
+                    "Fy": side,
+                }
                 yield Run(
-                    RunPlan(number, f"runs/{number:03d}.mf4", "corner", load, 2.1e5, 18.0, angle,
-                            0.0, 0.0, start=12.0 * number),
+                    RunPlan(
+                        number,
+                        f"runs/{number:03d}.mf4",
+                        "corner",
+                        load,
+                        2.1e5,
+                        18.0,
+                        angle,
+                        0.0,
+                        0.0,
+                        start=12.0 * number,
+                    ),
                     rig={name: np.full(8, value) for name, value in rig.items()},
                     rig_time=np.arange(8) / 100.0,
-                )  # fmt: skip
+                )
                 number += 1
 
 
@@ -75,7 +99,9 @@ def brush_file(campaign: Campaign) -> TireFile:
     values = {k: v for k, v in fit.values.items() if k != "lateral_compliance"}
     source = "fit of the test"
     numbers = dict(stored_number(k, v, float("nan"), "fitted", source) for k, v in values.items())
-    for name, value in (("reference_load", fit.reference.load),
-                        ("reference_pressure", fit.reference.pressure)):  # fmt: skip
+    for name, value in (
+        ("reference_load", fit.reference.load),
+        ("reference_pressure", fit.reference.pressure),
+    ):
         numbers[name] = Number(value, float("nan"), "fitted", source)
     return TireFile("fitted brush", numbers, {})

@@ -82,12 +82,24 @@ class Asked:
     __iter__ = __len__ = __getitem__ = __float__ = __bool__ = lambda self, *_: self.any
 
 
-@pytest.mark.parametrize(("function", "count", "named"), [
-    (identify, 1, ()), (identify_whole, 1, ()), (identify_forces, 1, ()), (compare, 2, ()),
-    (diagnose, 3, ()), (diagnose_force, 3, ("noise", "repeats")), (add_effect, 3, ()),
-    (add_brush_effect, 2, ()), (next_test, 4, ("noise",)), (selftest, 3, ()), (train, 1, ()),
-    (simulate, 1, ("load",)), (solve, 2, ()),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("function", "count", "named"),
+    [
+        (identify, 1, ()),
+        (identify_whole, 1, ()),
+        (identify_forces, 1, ()),
+        (compare, 2, ()),
+        (diagnose, 3, ()),
+        (diagnose_force, 3, ("noise", "repeats")),
+        (add_effect, 3, ()),
+        (add_brush_effect, 2, ()),
+        (next_test, 4, ("noise",)),
+        (selftest, 3, ()),
+        (train, 1, ()),
+        (simulate, 1, ("load",)),
+        (solve, 2, ()),
+    ],
+)
 def test_heavy_work_of_the_library_has_one_thread(
     function: Callable[..., Any], count: int, named: tuple[str, ...]
 ) -> None:
@@ -138,23 +150,33 @@ sys.argv = ["x", "--version"]
 """
 
 
-@pytest.mark.parametrize("start", [
-    "from tirelib.cli import main; main()",
-    "from bench.cli import main; main()",
-    "import runpy; runpy.run_module('bench', run_name='__main__')",
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "start",
+    [
+        "from tirelib.cli import main; main()",
+        "from bench.cli import main; main()",
+        "import runpy; runpy.run_module('bench', run_name='__main__')",
+    ],
+)
 def test_a_program_has_one_thread_whatever_the_environment_says(start: str) -> None:
     others = {name: text for name, text in os.environ.items() if name not in VARIABLES}
     done = subprocess.run(
-        [sys.executable, "-c", TELL + start], env=others | {"OPENBLAS_NUM_THREADS": "2"},
-        check=True, capture_output=True, text=True, cwd=ROOT,
-    )  # fmt: skip
+        [sys.executable, "-c", TELL + start],
+        env=others | {"OPENBLAS_NUM_THREADS": "2"},
+        check=True,
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+    )
     assert set(json.loads(done.stdout.splitlines()[-1])) == {1}
 
 
 def test_every_build_program_has_one_thread() -> None:
-    programs = [path for path in (ROOT / "build").rglob("*.py")
-                if "out" not in path.parts and "__main__" in path.read_text()]  # fmt: skip
+    programs = [
+        path
+        for path in (ROOT / "build").rglob("*.py")
+        if "out" not in path.parts and "__main__" in path.read_text()
+    ]
     assert len(programs) > 20
     bound = {path.name for path in programs if "with one_thread():" in path.read_text()}
     assert {path.name for path in programs} - bound == {"fmu_gate.py"}

@@ -86,9 +86,15 @@ def friction_from_moment(
     (True, 0.9)
     """
     force, moment, Fz, a, s_force, s_moment, s_load, s_a = _inputs(
-        Fy=Fy, Mz=Mz, load=load, half_length=half_length, Fy_std=Fy_std, Mz_std=Mz_std,
-        load_std=load_std, half_length_std=half_length_std,
-    )  # fmt: skip
+        Fy=Fy,
+        Mz=Mz,
+        load=load,
+        half_length=half_length,
+        Fy_std=Fy_std,
+        Mz_std=Mz_std,
+        load_std=load_std,
+        half_length_std=half_length_std,
+    )
     _check(most_std, (s_force, s_moment, s_load, s_a), load=Fz, half_length=a)
     some = force != 0.0
     size = np.where(some, np.abs(force), 1.0)
@@ -142,10 +148,15 @@ def friction_from_stiffness(
         If a load, stiffness or standard deviation is out of range.
     """
     force, alpha, Fz, C, s_force, s_alpha, s_load, s_C = _inputs(
-        Fy=Fy, slip_angle=slip_angle, load=load, cornering_stiffness=cornering_stiffness,
-        Fy_std=Fy_std, slip_angle_std=slip_angle_std, load_std=load_std,
+        Fy=Fy,
+        slip_angle=slip_angle,
+        load=load,
+        cornering_stiffness=cornering_stiffness,
+        Fy_std=Fy_std,
+        slip_angle_std=slip_angle_std,
+        load_std=load_std,
         cornering_stiffness_std=cornering_stiffness_std,
-    )  # fmt: skip
+    )
     _check(most_std, (s_force, s_alpha, s_load, s_C), load=Fz, cornering_stiffness=C)
     some = (force != 0.0) & (alpha != 0.0)
     tangent = np.where(some, np.tan(np.abs(alpha)), 1.0)

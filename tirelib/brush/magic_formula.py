@@ -191,11 +191,16 @@ class _Search:
         )
         runs = [
             least_squares(
-                residual, [start[n] for n in self.free], bounds=self.bounds, xtol=1e-13,
-                ftol=1e-13, gtol=1e-13, max_nfev=2000,
+                residual,
+                [start[n] for n in self.free],
+                bounds=self.bounds,
+                xtol=1e-13,
+                ftol=1e-13,
+                gtol=1e-13,
+                max_nfev=2000,
             )
             for start in starts
-        ]  # fmt: skip
+        ]
         return min(runs, key=lambda run: float(run.cost))
 
     def at_limit(self, values: FloatArray) -> tuple[str, ...]:

@@ -131,9 +131,13 @@ def _combined_y(
 
 
 def _moment(
-    tire: MagicTire, at: Inputs, dfz: FloatArray, across: _Pure, long_slip: FloatArray,
+    tire: MagicTire,
+    at: Inputs,
+    dfz: FloatArray,
+    across: _Pure,
+    long_slip: FloatArray,
     trail_force: FloatArray,
-) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+) -> tuple[FloatArray, FloatArray]:
     """Return Mz without the arm of Fx, and its curvature factor."""
     c, Fz, alpha, R0 = tire.coefficients, at.Fz, at.alpha, tire.radius
     gamma = at.gamma * c.LGAZ

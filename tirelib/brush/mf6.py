@@ -89,8 +89,9 @@ def magic_forces_6(
         Fy = G * across.Fyo + shift  # (4.E58)
         trail_force = G_upright * upright.Fyo  # (4.E74)
         well = (E_x <= 1.0) & (E_y <= 1.0)
-    Mz, E_t = _moment(tire, at, dfz, across, (along.K, kappa), (Fx if combined else None, Fy),
-                      trail_force)  # fmt: skip
+    Mz, E_t = _moment(
+        tire, at, dfz, across, (along.K, kappa), (Fx if combined else None, Fy), trail_force
+    )
     well = well & (along.E <= 1.0) & (across.E <= 1.0) & (E_t <= 1.0)
     return MagicForces(Fx, Fy, Mz, across.K, along.K, along.mu, across.mu, at.in_range, well)
 

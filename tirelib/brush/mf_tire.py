@@ -15,10 +15,16 @@ from tirelib.errors import FormatError, ParameterError, ShapeError
 REQUIRED = ("PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
 """Without these there is no curve at all; every other absent coefficient is neutral."""
 SECTIONS = (
-    "SCALING_COEFFICIENTS", "LONGITUDINAL_COEFFICIENTS", "LATERAL_COEFFICIENTS",
-    "ALIGNING_COEFFICIENTS", "OVERTURNING_COEFFICIENTS", "ROLLING_COEFFICIENTS",
-    "TURNSLIP_COEFFICIENTS", "VERTICAL", "STRUCTURAL",
-)  # fmt: skip
+    "SCALING_COEFFICIENTS",
+    "LONGITUDINAL_COEFFICIENTS",
+    "LATERAL_COEFFICIENTS",
+    "ALIGNING_COEFFICIENTS",
+    "OVERTURNING_COEFFICIENTS",
+    "ROLLING_COEFFICIENTS",
+    "TURNSLIP_COEFFICIENTS",
+    "VERTICAL",
+    "STRUCTURAL",
+)
 """Sections whose coefficients are the tire's; all others are the vendor's own."""
 _NAME = re.compile(r"([PQRS])[A-Z]{1,3}\d{1,2}|L[A-Z]{1,6}")
 

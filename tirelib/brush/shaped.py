@@ -68,8 +68,9 @@ def predict_shaped(
             f"{LOWEST:g} to {HIGHEST:g}, 0 is the parabola"
         )
     plain = _Contact.of(parameters, conditions)
-    contact = _Shaped(plain.c_px, plain.c_py, plain.stick, plain.slide, plain.a, plain.kappa,
-                      plain.tangent, c)  # fmt: skip
+    contact = _Shaped(
+        plain.c_px, plain.c_py, plain.stick, plain.slide, plain.a, plain.kappa, plain.tangent, c
+    )
     return _answer(contact, parameters)
 
 

@@ -43,24 +43,45 @@ FORMAT = "tirelib-model/1"
 
 @click.command(epilog=_EXAMPLE)
 @click.argument("effect_name", metavar="EFFECT", required=False)
-@click.option("--model", "model_name", metavar="M.toml|NAME", required=True,
-              help="Model that `tirelib identify` or `tirelib add` wrote.")  # fmt: skip
-@click.option("--data", "folder", metavar="CAMPAIGN", type=CAMPAIGN,
-              help="Campaign to fit (not for --undo).")  # fmt: skip
-@click.option("--effects", "effect_files", metavar="FILE.py", type=FILE, multiple=True,
-              help="Effects of your own; may be given again.")  # fmt: skip
+@click.option(
+    "--model",
+    "model_name",
+    metavar="M.toml|NAME",
+    required=True,
+    help="Model that `tirelib identify` or `tirelib add` wrote.",
+)
+@click.option(
+    "--data", "folder", metavar="CAMPAIGN", type=CAMPAIGN, help="Campaign to fit (not for --undo)."
+)
+@click.option(
+    "--effects",
+    "effect_files",
+    metavar="FILE.py",
+    type=FILE,
+    multiple=True,
+    help="Effects of your own; may be given again.",
+)
 @click.option("--remove", is_flag=True, help="Take EFFECT out instead, and fit anew.")
-@click.option("--undo", is_flag=True,
-              help="Go back to before the last entry of the history, to the digit.")  # fmt: skip
-@click.option("--quantity", metavar="strain|Fy|Fx|Mz",
-              help="Measured quantity to fit; default: strain, and for an effect of the brush the "
-                   "force of the last step, else the one that it helps most.")  # fmt: skip
+@click.option(
+    "--undo", is_flag=True, help="Go back to before the last entry of the history, to the digit."
+)
+@click.option(
+    "--quantity",
+    metavar="strain|Fy|Fx|Mz",
+    help="Measured quantity to fit; default: strain, and for an effect of the brush the "
+    "force of the last step, else the one that it helps most.",
+)
 @click.option(
     "--out", "out", metavar="M2.toml", type=NEW_FILE, required=True, help="New model file."
 )
-@click.option("--report", "report", metavar="DIR", type=NEW_FOLDER,
-              help="Write extension.html and extension.md: the waterfall of the error, each run, "
-                   "what was held out.")  # fmt: skip
+@click.option(
+    "--report",
+    "report",
+    metavar="DIR",
+    type=NEW_FOLDER,
+    help="Write extension.html and extension.md: the waterfall of the error, each run, "
+    "what was held out.",
+)
 @click.option(
     "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
 )
@@ -105,10 +126,16 @@ def _undo(model_name: str, out: Path, json_file: Path | None) -> None:
     console.print(f"written: {out}")
     if json_file is not None:
         history = [{k: v for k, v in e.items() if k != "before"} for e in file.extra["history"]]
-        write_json(json_file, {
-            "format": EXTENSION, "action": "undo", "effect": entry.get("effect"),
-            "effects": file.extra["effects"], "history": history,
-        })  # fmt: skip
+        write_json(
+            json_file,
+            {
+                "format": EXTENSION,
+                "action": "undo",
+                "effect": entry.get("effect"),
+                "effects": file.extra["effects"],
+                "history": history,
+            },
+        )
         console.print(f"written: {json_file}")
 
 

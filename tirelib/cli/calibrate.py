@@ -58,10 +58,20 @@ Several campaigns must be of the same tire and gages. More conditions in the dat
 
 @click.command(epilog=_EXAMPLE)
 @click.argument("folders", metavar="DIR...", type=CAMPAIGN, nargs=-1, required=True)
-@click.option("--out", "target", metavar="CAL.toml", type=NEW_FILE, required=True,
-              help="Calibration to write.")  # fmt: skip
-@click.option("--report", metavar="FOLDER", type=NEW_FOLDER,
-              help="Write statistics and residual plots as HTML.")  # fmt: skip
+@click.option(
+    "--out",
+    "target",
+    metavar="CAL.toml",
+    type=NEW_FILE,
+    required=True,
+    help="Calibration to write.",
+)
+@click.option(
+    "--report",
+    metavar="FOLDER",
+    type=NEW_FOLDER,
+    help="Write statistics and residual plots as HTML.",
+)
 @click.option("--quick", is_flag=True, help="Leave out the cross-validation by level.")
 @low_pass_options
 @click.option(
@@ -259,18 +269,24 @@ def _print(console: Console, trained: Trained, document: dict[str, Any]) -> None
         for column in ("term", "coefficient", "std error", "p value"):
             table.add_column(column, justify="left" if column == "term" else "right")
         for term in regression.terms:
-            table.add_row(term.name, f"{term.coefficient:.5g}", f"{term.std_error:.3g}",
-                          f"{term.p_value:.3f}")  # fmt: skip
+            table.add_row(
+                term.name, f"{term.coefficient:.5g}", f"{term.std_error:.3g}", f"{term.p_value:.3f}"
+            )
         console.print(table)
     for name, reason in trained.skipped.items():
         console.print(f"not fitted: {name}: {reason}")
-    table = Table(title="Estimators in use (conditions held out)", box=SIMPLE_HEAD,
-                  title_justify="left")  # fmt: skip
+    table = Table(
+        title="Estimators in use (conditions held out)", box=SIMPLE_HEAD, title_justify="left"
+    )
     for column in ("quantity", "rmse", "unit", "R2", "runs", "terms"):
         table.add_column(column, justify="left" if column in ("quantity", "unit") else "right")
     chain = trained.calibration.chains[-1]
-    models = {"Fz": chain.load, "kappa": chain.radius, "Fy": chain.force,
-              "alpha": chain.angle.polynomial if chain.angle else None}  # fmt: skip
+    models = {
+        "Fz": chain.load,
+        "kappa": chain.radius,
+        "Fy": chain.force,
+        "alpha": chain.angle.polynomial if chain.angle else None,
+    }
     for quantity in QUANTITIES:
         entry, model = document["in_use"][quantity], models[quantity]
         if entry is None or model is None:
@@ -279,9 +295,13 @@ def _print(console: Console, trained: Trained, document: dict[str, Any]) -> None
             continue
         r2 = "-" if entry["r2"] is None else f"{entry['r2']:.5f}"
         table.add_row(
-            quantity, f"{entry['cross_validated_rmse']:.4g}", entry["unit"], r2, str(entry["n"]),
+            quantity,
+            f"{entry['cross_validated_rmse']:.4g}",
+            entry["unit"],
+            r2,
+            str(entry["n"]),
             str(len(model.terms)),
-        )  # fmt: skip
+        )
     console.print(table)
     if document["held_out"]:
         console.print(_held_out_table(document["held_out"]))
@@ -289,12 +309,24 @@ def _print(console: Console, trained: Trained, document: dict[str, Any]) -> None
 
 def _held_out_table(rows: list[dict[str, Any]]) -> Table:
     """Worst rmse over the levels of each condition: the dissertation's and ours."""
-    table = Table(title="Worst level held out, within the others (rmse over run means)",
-                  box=SIMPLE_HEAD, title_justify="left",
-                  caption="in use: turns in range; flagged: most turns of a level that are out of "
-                          "range; with these: rmse of all", caption_justify="left")  # fmt: skip
-    for column in ("held out", "quantity", "dissertation", "in use", "flagged", "with these",
-                   "unit", "levels"):  # fmt: skip
+    table = Table(
+        title="Worst level held out, within the others (rmse over run means)",
+        box=SIMPLE_HEAD,
+        title_justify="left",
+        caption="in use: turns in range; flagged: most turns of a level that are out of "
+        "range; with these: rmse of all",
+        caption_justify="left",
+    )
+    for column in (
+        "held out",
+        "quantity",
+        "dissertation",
+        "in use",
+        "flagged",
+        "with these",
+        "unit",
+        "levels",
+    ):
         table.add_column(
             column, justify="left" if column in ("held out", "quantity", "unit") else "right"
         )
@@ -306,8 +338,13 @@ def _held_out_table(rows: list[dict[str, Any]]) -> Table:
         seen = [r["in_use_in_range"] for r in part if r["in_use_in_range"] is not None]
         flagged = 1.0 - min(r["in_range"] for r in part)
         table.add_row(
-            condition, quantity, f"{max(old):.4g}" if old else "-",
-            f"{max(seen):.4g}" if seen else "-", f"{flagged:.0%}",
-            f"{max(r['in_use'] for r in part):.4g}", part[0]["unit"], str(len(part)),
-        )  # fmt: skip
+            condition,
+            quantity,
+            f"{max(old):.4g}" if old else "-",
+            f"{max(seen):.4g}" if seen else "-",
+            f"{flagged:.0%}",
+            f"{max(r['in_use'] for r in part):.4g}",
+            part[0]["unit"],
+            str(len(part)),
+        )
     return table

@@ -56,8 +56,9 @@ Exit code: 0 no error (warnings are allowed), 1 errors were found,
 
 @campaign.command(epilog=_CHECK_EXAMPLE)
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE,
-              help="Write the problems as JSON.")  # fmt: skip
+@click.option(
+    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the problems as JSON."
+)
 @click.pass_context
 def check(context: click.Context, folder: Path, json_file: Path | None) -> None:
     """List all problems of the campaign in DIR at once."""
@@ -122,10 +123,15 @@ Example:
 
 @campaign.command(epilog=_SHOW_EXAMPLE)
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-@click.option("--out", metavar="DIR", type=NEW_FOLDER,
-              help="Folder for the overview plot; default build/out/show-NAME.")  # fmt: skip
-@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE,
-              help="Write header and runs as JSON.")  # fmt: skip
+@click.option(
+    "--out",
+    metavar="DIR",
+    type=NEW_FOLDER,
+    help="Folder for the overview plot; default build/out/show-NAME.",
+)
+@click.option(
+    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write header and runs as JSON."
+)
 def show(folder: Path, out: Path | None, json_file: Path | None) -> None:
     """Show header, runs with set points and measured means, and an overview plot of DIR."""
     from tirelib.campaign.overview import RunRow, representative_plans, run_row

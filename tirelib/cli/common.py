@@ -92,8 +92,9 @@ def write_json(path: Path, document: dict[str, Any]) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(plain(document), indent=1, allow_nan=False) + "\n")
     except OSError as error:
-        raise FormatError(f"{path}: cannot be written ({error.strerror}); choose another "
-                          "file") from None  # fmt: skip
+        raise FormatError(
+            f"{path}: cannot be written ({error.strerror}); choose another file"
+        ) from None
 
 
 def plain(value: Any) -> Any:
@@ -116,10 +117,16 @@ def plain(value: Any) -> Any:
 def low_pass_options(function: Callable[..., None]) -> Callable[..., None]:
     """Add the options that choose the low-pass."""
     function = click.option(
-        "--cut-off", type=float, metavar="HZ", default=None,
+        "--cut-off",
+        type=float,
+        metavar="HZ",
+        default=None,
         help="Fixed cut-off instead; turns that it does not suit are flagged.",
-    )(function)  # fmt: skip
+    )(function)
     return click.option(
-        "--order", type=float, metavar="N", default=None,
+        "--order",
+        type=float,
+        metavar="N",
+        default=None,
         help="Cut-off of the low-pass in cycles per turn (default 24: 225 Hz at 65 km/h).",
-    )(function)  # fmt: skip
+    )(function)

@@ -30,15 +30,32 @@ words and numbers. Errors are in units of the noise between repeated runs. Exit 
 
 @click.command(epilog=_EXAMPLE)
 @click.argument("folder", metavar="CAMPAIGN", type=CAMPAIGN)
-@click.option("--model", metavar="M.toml|NAME", required=True,
-              help="Model or tire file, or the name of a tire of tirelib.")  # fmt: skip
-@click.option("--quantity", metavar="strain|Fy|Fx|Mz",
-              help="Default: strain where the campaign has it, else the force that fits "
-                   "worst.")  # fmt: skip
-@click.option("--effects", "effect_files", metavar="FILE.py", type=FILE, multiple=True,
-              help="Effects of your own that the model has; may be given again.")  # fmt: skip
-@click.option("--out", "out", metavar="DIR", type=NEW_FOLDER,
-              help="Write the page, comparison.md and comparison.json.")  # fmt: skip
+@click.option(
+    "--model",
+    metavar="M.toml|NAME",
+    required=True,
+    help="Model or tire file, or the name of a tire of tirelib.",
+)
+@click.option(
+    "--quantity",
+    metavar="strain|Fy|Fx|Mz",
+    help="Default: strain where the campaign has it, else the force that fits worst.",
+)
+@click.option(
+    "--effects",
+    "effect_files",
+    metavar="FILE.py",
+    type=FILE,
+    multiple=True,
+    help="Effects of your own that the model has; may be given again.",
+)
+@click.option(
+    "--out",
+    "out",
+    metavar="DIR",
+    type=NEW_FOLDER,
+    help="Write the page, comparison.md and comparison.json.",
+)
 @click.option(
     "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
 )

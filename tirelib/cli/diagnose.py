@@ -47,13 +47,26 @@ QUANTITIES = ("strain", "Fy", "Fx", "Mz")
 
 @click.command(epilog=_EXAMPLE)
 @click.argument("folder", metavar="CAMPAIGN", type=CAMPAIGN)
-@click.option("--model", "model_name", metavar="M.toml|NAME", required=True,
-              help="Model that `tirelib identify` or `tirelib add` wrote.")  # fmt: skip
-@click.option("--quantity", metavar="strain|Fy|Fx|Mz",
-              help="Default: strain where the campaign has it, else the force that fits "
-                   "worst.")  # fmt: skip
-@click.option("--effects", "effect_files", metavar="FILE.py", type=FILE, multiple=True,
-              help="Effects of your own; may be given again.")  # fmt: skip
+@click.option(
+    "--model",
+    "model_name",
+    metavar="M.toml|NAME",
+    required=True,
+    help="Model that `tirelib identify` or `tirelib add` wrote.",
+)
+@click.option(
+    "--quantity",
+    metavar="strain|Fy|Fx|Mz",
+    help="Default: strain where the campaign has it, else the force that fits worst.",
+)
+@click.option(
+    "--effects",
+    "effect_files",
+    metavar="FILE.py",
+    type=FILE,
+    multiple=True,
+    help="Effects of your own; may be given again.",
+)
 @click.option(
     "--members",
     metavar="N",
@@ -62,10 +75,21 @@ QUANTITIES = ("strain", "Fy", "Fx", "Mz")
     show_default=True,
     help="Variants of the model that the threshold is from.",
 )
-@click.option("--seed", metavar="N", type=click.IntRange(min=0), default=0, show_default=True,
-              help="Of the variants.")  # fmt: skip
-@click.option("--out", "out", metavar="DIR", type=NEW_FOLDER,
-              help="Write diagnosis.html, diagnosis.md and diagnosis.json.")  # fmt: skip
+@click.option(
+    "--seed",
+    metavar="N",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Of the variants.",
+)
+@click.option(
+    "--out",
+    "out",
+    metavar="DIR",
+    type=NEW_FOLDER,
+    help="Write diagnosis.html, diagnosis.md and diagnosis.json.",
+)
 @click.option(
     "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
 )
@@ -159,19 +183,27 @@ def _of_strain(
     used = [each for each in model.used if each.effect.hook != "brush"]
     runs = straight_runs(measure_waveforms(campaign, progress=progress))
     found = diagnose_model(
-        runs, model.values, list(catalogue.values()),
+        runs,
+        model.values,
+        list(catalogue.values()),
         effects=[each.effect for each in used],
         strengths=[np.atleast_1d(np.asarray(each.strength, dtype=float)) for each in used],
-        members=members, seed=seed, progress=progress,
-    )  # fmt: skip
+        members=members,
+        seed=seed,
+        progress=progress,
+    )
     told = assess(found, model, progress=progress)
     document = diagnosis_document(told)
     if document["verdict"] == "indistinguishable":
         try:
             document["next_test"] |= next_test_document(
-                document, found.data, found.base, catalogue,
-                noise=repeated_noise(runs, found.data, found.base), progress=progress,
-            )  # fmt: skip
+                document,
+                found.data,
+                found.base,
+                catalogue,
+                noise=repeated_noise(runs, found.data, found.base),
+                progress=progress,
+            )
         except TirelibError as error:
             document["messages"].append(f"no next test: {error}")
     return told, document
@@ -238,8 +270,18 @@ def _say(document: dict[str, Any], lines: Sequence[tuple[str, str]]) -> None:
 def _table(candidates: list[dict[str, Any]]) -> Table:
     table = Table(box=SIMPLE_HEAD)
     longest = max((len(entry["effect"]) for entry in candidates), default=0)
-    for column in ("effect", "level", "score/threshold", "strength", "std", "unit", "in range",
-                   "error after", "held out", "twins"):  # fmt: skip
+    for column in (
+        "effect",
+        "level",
+        "score/threshold",
+        "strength",
+        "std",
+        "unit",
+        "in range",
+        "error after",
+        "held out",
+        "twins",
+    ):
         words = column in ("effect", "level", "unit", "in range", "twins")
         # a name that is cut short cannot be added
         width = longest if column == "effect" else None
@@ -247,12 +289,17 @@ def _table(candidates: list[dict[str, Any]]) -> Table:
     for entry in candidates:
         held = entry["heldout_error_after"]
         table.add_row(
-            entry["effect"], entry["level"], f"{entry['score'] / entry['threshold']:.2f}",
-            _numbers(entry["strength"]), _numbers(entry["std"]), entry["unit"],
-            "yes" if entry["in_range"] else "no", f"{entry['error_after']:.3g}",
+            entry["effect"],
+            entry["level"],
+            f"{entry['score'] / entry['threshold']:.2f}",
+            _numbers(entry["strength"]),
+            _numbers(entry["std"]),
+            entry["unit"],
+            "yes" if entry["in_range"] else "no",
+            f"{entry['error_after']:.3g}",
             f"{held:.3g}" if np.isfinite(held) else "-",
             ", ".join(f"{t['effect']} {t['angle_deg']:.0f} deg" for t in entry["twins"]),
-        )  # fmt: skip
+        )
     return table
 
 

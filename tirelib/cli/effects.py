@@ -23,8 +23,14 @@ take part; 2 one may not.
 
 
 @click.command(epilog=_EXAMPLE)
-@click.option("--effects", "effect_files", metavar="FILE.py", type=FILE, multiple=True,
-              help="Effects of your own; may be given again.")  # fmt: skip
+@click.option(
+    "--effects",
+    "effect_files",
+    metavar="FILE.py",
+    type=FILE,
+    multiple=True,
+    help="Effects of your own; may be given again.",
+)
 def effects(effect_files: tuple[Path, ...]) -> None:
     """List the effects of the catalogue, or register effects of your own."""
     from tirelib.effects import CATALOGUE

@@ -40,10 +40,17 @@ another one.
 
 @click.command(epilog=_EXAMPLE)
 @click.argument("folder", metavar="DIR", type=CAMPAIGN)
-@click.option("--calibration", "calibration_file", metavar="CAL.toml", type=FILE, required=True,
-              help="Made by `tirelib calibrate`.")  # fmt: skip
-@click.option("--report", metavar="FOLDER", type=NEW_FOLDER,
-              help="Write accuracy and figures as HTML.")  # fmt: skip
+@click.option(
+    "--calibration",
+    "calibration_file",
+    metavar="CAL.toml",
+    type=FILE,
+    required=True,
+    help="Made by `tirelib calibrate`.",
+)
+@click.option(
+    "--report", metavar="FOLDER", type=NEW_FOLDER, help="Write accuracy and figures as HTML."
+)
 @click.option(
     "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write every turn as JSON."
 )
@@ -63,8 +70,9 @@ def estimate(
         header.tire.name, header.gage_lateral, str(folder), geometry_of(header)
     )
     if not campaign.header.gage_lateral:
-        raise CalibrationError(f"{folder}: the campaign holds no strain; there is nothing to "
-                               "estimate from")  # fmt: skip
+        raise CalibrationError(
+            f"{folder}: the campaign holds no strain; there is nothing to estimate from"
+        )
     low_pass = LowPass(calibration.order, calibration.cut_off)
     with progress_bar("reading", len(campaign.plans)) as progress:
         observations = observe([campaign], low_pass=low_pass, progress=progress)
@@ -130,8 +138,12 @@ def _summary_table(summary: dict[str, Any]) -> Table:
         r2 = "-" if entry["r2"] is None else f"{entry['r2']:.5f}"
         percent = entry["rmse_percent_of_range"]
         table.add_row(
-            quantity, f"{entry['rmse']:.4g}", entry["unit"],
-            "-" if percent is None else f"{percent:.2f}", r2, str(entry["n"]),
+            quantity,
+            f"{entry['rmse']:.4g}",
+            entry["unit"],
+            "-" if percent is None else f"{percent:.2f}",
+            r2,
+            str(entry["n"]),
             f"{100 * entry['coverage_95']:.0f} %",
-        )  # fmt: skip
+        )
     return table

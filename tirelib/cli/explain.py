@@ -48,17 +48,41 @@ be run one by one. Exit code: 0 whatever the verdict, 2 bad input or no model co
 
 @click.command(epilog=_EXAMPLE)
 @click.argument("folder", metavar="CAMPAIGN", type=CAMPAIGN)
-@click.option("--model", "model_name", metavar="M.toml|NAME",
-              help="Start from this model instead of identifying one.")  # fmt: skip
-@click.option("--quantity", metavar="strain|Fy|Fx|Mz",
-              help="Default: strain where the campaign has it, else the force that fits "
-                   "worst.")  # fmt: skip
-@click.option("--effects", "effect_files", metavar="FILE.py", type=FILE, multiple=True,
-              help="Effects of your own; may be given again.")  # fmt: skip
-@click.option("--members", metavar="N", type=click.IntRange(min=4), default=100,
-              show_default=True, help="Variants of the model that diagnose judges by.")  # fmt: skip
-@click.option("--out", "out", metavar="FOLDER", type=NEW_FOLDER, required=True,
-              help="Write the page, the models and the page of each step.")  # fmt: skip
+@click.option(
+    "--model",
+    "model_name",
+    metavar="M.toml|NAME",
+    help="Start from this model instead of identifying one.",
+)
+@click.option(
+    "--quantity",
+    metavar="strain|Fy|Fx|Mz",
+    help="Default: strain where the campaign has it, else the force that fits worst.",
+)
+@click.option(
+    "--effects",
+    "effect_files",
+    metavar="FILE.py",
+    type=FILE,
+    multiple=True,
+    help="Effects of your own; may be given again.",
+)
+@click.option(
+    "--members",
+    metavar="N",
+    type=click.IntRange(min=4),
+    default=100,
+    show_default=True,
+    help="Variants of the model that diagnose judges by.",
+)
+@click.option(
+    "--out",
+    "out",
+    metavar="FOLDER",
+    type=NEW_FOLDER,
+    required=True,
+    help="Write the page, the models and the page of each step.",
+)
 @click.option(
     "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
 )
@@ -134,10 +158,18 @@ class Steps:
         about = self._about(model, quantity)
         before = self._compared(model, about, "compared-before")
         told = self._run(
-            "diagnose", str(self.folder), "--model", model, *about, *self.effects,
-            "--members", str(self.members), "--out", str(self.out / "diagnosed"),
+            "diagnose",
+            str(self.folder),
+            "--model",
+            model,
+            *about,
+            *self.effects,
+            "--members",
+            str(self.members),
+            "--out",
+            str(self.out / "diagnosed"),
             json_name="diagnosis",
-        )  # fmt: skip
+        )
         added: list[dict[str, Any]] = []
         last = model
         if told["verdict"] in ("named", "form_inadequate"):
@@ -170,9 +202,16 @@ class Steps:
 
     def _compared(self, model: str, about: tuple[str, ...], name: str) -> dict[str, Any]:
         return self._run(
-            "compare", str(self.folder), "--model", model, *about, *self.effects, "--out",
-            str(self.out / name), json_name=name,
-        )  # fmt: skip
+            "compare",
+            str(self.folder),
+            "--model",
+            model,
+            *about,
+            *self.effects,
+            "--out",
+            str(self.out / name),
+            json_name=name,
+        )
 
     def _added(
         self, effect: str, model: str, about: tuple[str, ...], number: int
@@ -181,10 +220,20 @@ class Steps:
         target = str(self.out / f"M{number}.toml")
         try:
             step = self._run(
-                "add", effect, "--model", model, "--data", str(self.folder), *about,
-                *self.effects, "--out", target, "--report", str(self.out / f"added-{effect}"),
+                "add",
+                effect,
+                "--model",
+                model,
+                "--data",
+                str(self.folder),
+                *about,
+                *self.effects,
+                "--out",
+                target,
+                "--report",
+                str(self.out / f"added-{effect}"),
                 json_name=f"added-{effect}",
-            )  # fmt: skip
+            )
         except TirelibError as error:
             self.messages.append(f"{effect} is named but could not be added: {error}")
             return model, None
@@ -222,9 +271,11 @@ class Steps:
 
         paths = tuple(Path(word) for word in self.effects[1::2])
         return compare(
-            read_campaign(self.folder), read_tire(model), quantity,
+            read_campaign(self.folder),
+            read_tire(model),
+            quantity,
             effects=registered_effects(paths),
-        )  # fmt: skip
+        )
 
     def _document(
         self,
@@ -239,16 +290,24 @@ class Steps:
 
         raw = told["residual_rms_unit"]
         steps = [
-            {"model": model, "what": "the base" + _has(told), "error": before["error"],
-             "heldout_error": added[0]["heldout_error_before"] if added else None,
-             "residual_rms_raw": before["residual_rms_raw"]}
-        ]  # fmt: skip
+            {
+                "model": model,
+                "what": "the base" + _has(told),
+                "error": before["error"],
+                "heldout_error": added[0]["heldout_error_before"] if added else None,
+                "residual_rms_raw": before["residual_rms_raw"],
+            }
+        ]
         steps += [
-            {"model": step["model"], "what": f"with {step['effect']}",
-             "error": step["error_after"], "heldout_error": step["heldout_error_after"],
-             "residual_rms_raw": step["residual_rms_after"]}
+            {
+                "model": step["model"],
+                "what": f"with {step['effect']}",
+                "error": step["error_after"],
+                "heldout_error": step["heldout_error_after"],
+                "residual_rms_raw": step["residual_rms_after"],
+            }
             for step in added
-        ]  # fmt: skip
+        ]
         document: dict[str, Any] = {
             "format": FORMAT,
             "campaign": told["campaign"],
@@ -279,9 +338,11 @@ class Steps:
         pages = [
             ("compare: where the model fails, before", "compared-before/index.html"),
             ("diagnose: which effect is missing", "diagnosed/diagnosis.html"),
-            *((f"add {s['effect']}: how the error falls", f"added-{s['effect']}/extension.html")
-              for s in added),
-        ]  # fmt: skip
+            *(
+                (f"add {s['effect']}: how the error falls", f"added-{s['effect']}/extension.html")
+                for s in added
+            ),
+        ]
         if added:
             pages.append(("compare again: where it fails, after", "compared-after/index.html"))
         return [{"title": title, "path": path} for title, path in pages]

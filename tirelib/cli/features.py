@@ -34,8 +34,14 @@ gage's contact, ISO 8855 axes. FILE may end in .parquet or .csv.
 
 @click.command(epilog=_EXAMPLE)
 @click.argument("folder", metavar="DIR", type=CAMPAIGN)
-@click.option("--out", "target", metavar="FILE", type=NEW_FILE, required=True,
-              help="Table to write: .parquet or .csv.")  # fmt: skip
+@click.option(
+    "--out",
+    "target",
+    metavar="FILE",
+    type=NEW_FILE,
+    required=True,
+    help="Table to write: .parquet or .csv.",
+)
 @low_pass_options
 @click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write a summary as JSON.")
 def features(
@@ -46,8 +52,9 @@ def features(
         raise FormatError(f"{target}: ends in {target.suffix!r}; allowed are .parquet and .csv")
     campaign = read_campaign(folder)
     with progress_bar("reading", len(campaign.plans)) as progress:
-        observations = observe([campaign], low_pass=make_low_pass(order, cut_off),
-                               progress=progress)  # fmt: skip
+        observations = observe(
+            [campaign], low_pass=make_low_pass(order, cut_off), progress=progress
+        )
     table = feature_frame(observations.features, run=observations.run)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -56,8 +63,9 @@ def features(
         else:
             table.to_parquet(target, index=False)
     except OSError as error:
-        raise FormatError(f"{target}: cannot be written ({error.strerror}); choose another "
-                          "file") from None  # fmt: skip
+        raise FormatError(
+            f"{target}: cannot be written ({error.strerror}); choose another file"
+        ) from None
     summary = _summary(observations)
     console = output()
     console.print(
@@ -68,8 +76,16 @@ def features(
         console.print(f"  {count:5d} turns flagged {name}")
     console.print(f"written: {target}")
     if json_file is not None:
-        write_json(json_file, {"format": FORMAT, "axes": "iso", "table": str(target),
-                               "units": dict(units()), **summary})  # fmt: skip
+        write_json(
+            json_file,
+            {
+                "format": FORMAT,
+                "axes": "iso",
+                "table": str(target),
+                "units": dict(units()),
+                **summary,
+            },
+        )
 
 
 def make_low_pass(order: float | None, cut_off: float | None) -> LowPass | None:

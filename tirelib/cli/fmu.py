@@ -74,27 +74,58 @@ fmu.add_command(virtual)
 
 
 @fmu.command(epilog=_BUILD)
-@click.option("--calibration", metavar="CAL.toml", type=FILE, required=True,
-              help="Made by `tirelib calibrate`; it is embedded.")  # fmt: skip
+@click.option(
+    "--calibration",
+    metavar="CAL.toml",
+    type=FILE,
+    required=True,
+    help="Made by `tirelib calibrate`; it is embedded.",
+)
 @click.option("--out", metavar="X.fmu", type=NEW_FILE, required=True, help="The FMU to write.")
-@click.option("--samples-per-step", metavar="K", type=int, default=1, show_default=True,
-              help="Samples of every gage that one communication step brings.")  # fmt: skip
-@click.option("--sample-rate", metavar="HZ", type=float, default=DEFAULT_RATE, show_default=True,
-              help="Start value of the parameter of that name.")  # fmt: skip
-@click.option("--buffered", is_flag=True,
-              help="Steps of any length, with up to K samples each.")  # fmt: skip
-@click.option("--missing", metavar="NUMBER", type=float, default=math.nan, show_default="NaN",
-              help="What outputs show where there is no value; see docs.")  # fmt: skip
+@click.option(
+    "--samples-per-step",
+    metavar="K",
+    type=int,
+    default=1,
+    show_default=True,
+    help="Samples of every gage that one communication step brings.",
+)
+@click.option(
+    "--sample-rate",
+    metavar="HZ",
+    type=float,
+    default=DEFAULT_RATE,
+    show_default=True,
+    help="Start value of the parameter of that name.",
+)
+@click.option("--buffered", is_flag=True, help="Steps of any length, with up to K samples each.")
+@click.option(
+    "--missing",
+    metavar="NUMBER",
+    type=float,
+    default=math.nan,
+    show_default="NaN",
+    help="What outputs show where there is no value; see docs.",
+)
 def build(
-    calibration: Path, out: Path, samples_per_step: int, sample_rate: float, buffered: bool,
+    calibration: Path,
+    out: Path,
+    samples_per_step: int,
+    sample_rate: float,
+    buffered: bool,
     missing: float,
-) -> None:  # fmt: skip
+) -> None:
     """Write StrainTire.fmu with a calibration inside."""
     with progress_bar("building", 3) as progress:
         path = build_fmu(
-            calibration, out, samples_per_step=samples_per_step, sample_rate=sample_rate,
-            buffered=buffered, missing=missing, progress=progress,
-        )  # fmt: skip
+            calibration,
+            out,
+            samples_per_step=samples_per_step,
+            sample_rate=sample_rate,
+            buffered=buffered,
+            missing=missing,
+            progress=progress,
+        )
     loaded = embedded_calibration(path)
     gages = ", ".join(f"{1e3 * y:+g}" for y in loaded.lateral)
     step = 1e3 * samples_per_step / sample_rate
@@ -131,17 +162,21 @@ def run(context: click.Context, file: Path, folder: Path, json_file: Path | None
 
 @fmu.command(epilog=_CHECK)
 @click.argument("file", metavar="X.fmu", type=FILE)
-@click.option("--reference", metavar="DIR", type=CAMPAIGN,
-              help="Reference signals, where the FMU holds none.")  # fmt: skip
+@click.option(
+    "--reference", metavar="DIR", type=CAMPAIGN, help="Reference signals, where the FMU holds none."
+)
 @click.option("--out", metavar="REPORT", type=NEW_FOLDER, help="Folder for the page.")
 @click.option(
     "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the result as JSON."
 )
 @click.pass_context
 def check(
-    context: click.Context, file: Path, reference: Path | None, out: Path | None,
+    context: click.Context,
+    file: Path,
+    reference: Path | None,
+    out: Path | None,
     json_file: Path | None,
-) -> None:  # fmt: skip
+) -> None:
     """Validate X.fmu, play its reference signals, compare with what they expect."""
     with progress_bar("checking", 3) as progress:
         document = check_fmu(file, reference=reference, progress=progress)
@@ -156,8 +191,9 @@ def check(
         try:
             page = write_check(document, out)
         except OSError as error:
-            raise FormatError(f"{out}: cannot be written ({error.strerror}); choose another "
-                              "folder") from None  # fmt: skip
+            raise FormatError(
+                f"{out}: cannot be written ({error.strerror}); choose another folder"
+            ) from None
         output().print(f"written: {page}")
     context.exit(0 if document["passed"] else 1)
 

@@ -23,14 +23,31 @@ for StrainTire.fmu with the same samples per step. Needs CPython with numpy and 
 
 @click.command(epilog=_EPILOG)
 @click.option("--out", metavar="X.fmu", type=NEW_FILE, required=True, help="The FMU to write.")
-@click.option("--samples-per-step", metavar="K", type=int, default=10, show_default=True,
-              help="Most samples of every gage that one communication step brings.")  # fmt: skip
-@click.option("--sample-rate", metavar="HZ", type=float, default=DEFAULT_RATE, show_default=True,
-              help="Start value of the parameter of that name.")  # fmt: skip
-@click.option("--surface", metavar="FILE.npz", type=FILE,
-              help="Response surface; by default the reference tire's.")  # fmt: skip
-@click.option("--friction", is_flag=True,
-              help="The reference tire's surface that has friction as an input.")  # fmt: skip
+@click.option(
+    "--samples-per-step",
+    metavar="K",
+    type=int,
+    default=10,
+    show_default=True,
+    help="Most samples of every gage that one communication step brings.",
+)
+@click.option(
+    "--sample-rate",
+    metavar="HZ",
+    type=float,
+    default=DEFAULT_RATE,
+    show_default=True,
+    help="Start value of the parameter of that name.",
+)
+@click.option(
+    "--surface",
+    metavar="FILE.npz",
+    type=FILE,
+    help="Response surface; by default the reference tire's.",
+)
+@click.option(
+    "--friction", is_flag=True, help="The reference tire's surface that has friction as an input."
+)
 def virtual(
     out: Path, samples_per_step: int, sample_rate: float, surface: Path | None, friction: bool
 ) -> None:
@@ -43,9 +60,12 @@ def virtual(
     usual = friction_surface() if friction else default_surface()
     with progress_bar("building", 3) as progress:
         path = build_virtual(
-            out, samples_per_step=samples_per_step, sample_rate=sample_rate,
-            surface=surface or usual, progress=progress,
-        )  # fmt: skip
+            out,
+            samples_per_step=samples_per_step,
+            sample_rate=sample_rate,
+            surface=surface or usual,
+            progress=progress,
+        )
     console = output()
     console.print(f"communication step up to {1e3 * samples_per_step / sample_rate:g} ms")
     console.print(f"written: {path} ({path.stat().st_size / 1e3:.0f} kB)")

@@ -35,13 +35,28 @@ nothing could be identified, or no ring although the plan holds straight runs fo
 
 @click.command(epilog=_EXAMPLE)
 @click.argument("folder", metavar="DIR", type=CAMPAIGN)
-@click.option("--tire", "tire_file", metavar="T.toml|NAME",
-              help="Start and priors (default: the campaign's geometry, literature).")  # fmt: skip
-@click.option("--base", type=click.Choice(BASES), default="plain", show_default=True,
-              help="The plain tire: belt shear, section inertia, a tread that sticks and hardens; "
-              "or the dissertation's ring, in which these are effects to be found.")  # fmt: skip
-@click.option("--out", "out", metavar="M.toml", type=NEW_FILE, required=True,
-              help="The identified model; the other verbs read it.")  # fmt: skip
+@click.option(
+    "--tire",
+    "tire_file",
+    metavar="T.toml|NAME",
+    help="Start and priors (default: the campaign's geometry, literature).",
+)
+@click.option(
+    "--base",
+    type=click.Choice(BASES),
+    default="plain",
+    show_default=True,
+    help="The plain tire: belt shear, section inertia, a tread that sticks and hardens; "
+    "or the dissertation's ring, in which these are effects to be found.",
+)
+@click.option(
+    "--out",
+    "out",
+    metavar="M.toml",
+    type=NEW_FILE,
+    required=True,
+    help="The identified model; the other verbs read it.",
+)
 @click.option(
     "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
 )
@@ -131,8 +146,16 @@ def _say_routes(
     """Contact angles with the bias of their reading, and loads by angle (Fig. 6-12, 6-21)."""
     if dynamic is not None:
         table = Table(box=SIMPLE_HEAD)
-        for column in ("run", "load N", "half angle read", "bias", "corrected", "+-",
-                       "load error % as printed", "corrected"):  # fmt: skip
+        for column in (
+            "run",
+            "load N",
+            "half angle read",
+            "bias",
+            "corrected",
+            "+-",
+            "load error % as printed",
+            "corrected",
+        ):
             table.add_column(column, justify="right")
         angles = {row["run"]: row for row in dynamic["contact_angles"]}
         loads = dynamic["loads"]
@@ -142,10 +165,15 @@ def _say_routes(
             half = [0.5 * (row[key][1] - row[key][0]) for key in ("read_deg", "corrected_deg")]
             printed = load["as_printed_percent"]
             table.add_row(
-                str(load["run"]), f"{load['measured_N']:.0f}", f"{half[0]:.2f} deg",
-                f"{row['half_bias_deg']:+.2f}", f"{half[1]:.2f}", f"{row['half_std_deg']:.2f}",
-                "" if printed is None else f"{printed:+.1f}", f"{load['corrected_percent']:+.1f}",
-            )  # fmt: skip
+                str(load["run"]),
+                f"{load['measured_N']:.0f}",
+                f"{half[0]:.2f} deg",
+                f"{row['half_bias_deg']:+.2f}",
+                f"{half[1]:.2f}",
+                f"{row['half_std_deg']:.2f}",
+                "" if printed is None else f"{printed:+.1f}",
+                f"{load['corrected_percent']:+.1f}",
+            )
         console.print(
             "contact angles from strain-rate peaks, the bias of that reading, and the load that "
             "they give" + (f" (every {step}. run; all with --json)" if step > 1 else "")
@@ -211,15 +239,19 @@ def _say_brush(console: Console, document: dict[str, Any]) -> None:
         )
     console.print(table)
     where = {"ring": "the ring", "Mz": "Mz", "assumed": "an assumption"}[brush["half_length_from"]]
-    console.print(f"  contact length from {where}; values hold at the median load, "
-                  f"{brush['reference']['load_N']:.0f} N")  # fmt: skip
+    console.print(
+        f"  contact length from {where}; values hold at the median load, "
+        f"{brush['reference']['load_N']:.0f} N"
+    )
     for note in brush["notes"]:
         console.print(f"  {note}")
 
 
 def _say_pressure(console: Console, found: dict[str, Any]) -> None:
-    console.print("lateral force by the ring's pressure against the parabola, rms error N "
-                  "(unseen points in brackets)")  # fmt: skip
+    console.print(
+        "lateral force by the ring's pressure against the parabola, rms error N "
+        "(unseen points in brackets)"
+    )
     table = Table(box=SIMPLE_HEAD)
     for column in ("by", "from", "to", "points", "ring", "parabola", "better"):
         words = column in ("by", "better")
@@ -228,11 +260,15 @@ def _say_pressure(console: Console, found: dict[str, Any]) -> None:
         ends = ("", "") if row["by"] == "all" else (f"{row['low']:.4g}", f"{row['high']:.4g}")
         unit = f" {row['range_unit']}" if row["range_unit"] else ""
         table.add_row(
-            row["by"].replace("_", " ") + unit, *ends, str(row["points"]),
-            *(f"{row[f'{k}_rmse']:.0f} ({row[f'{k}_rmse_unseen']:.0f})"
-              for k in ("ring", "parabola")),
+            row["by"].replace("_", " ") + unit,
+            *ends,
+            str(row["points"]),
+            *(
+                f"{row[f'{k}_rmse']:.0f} ({row[f'{k}_rmse_unseen']:.0f})"
+                for k in ("ring", "parabola")
+            ),
             row["better"],
-        )  # fmt: skip
+        )
     console.print(table)
 
 
@@ -243,9 +279,11 @@ def _say_parameters(console: Console, parameters: list[dict[str, Any]]) -> None:
         table.add_column(column, justify="left" if words else "right")
     for entry in parameters:
         table.add_row(
-            entry["name"], *(f"{entry[key]:.4g}" for key in ("value", "low", "high")),
-            entry["unit"], ", ".join(entry["flags"]),
-        )  # fmt: skip
+            entry["name"],
+            *(f"{entry[key]:.4g}" for key in ("value", "low", "high")),
+            entry["unit"],
+            ", ".join(entry["flags"]),
+        )
     console.print(table)
     for entry in parameters:
         if entry["helps"]:

@@ -45,8 +45,7 @@ Exit code: 0 done, 2 bad input (all faults are listed, nothing is written).
 @click.command("import", epilog=_EXAMPLE)
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE)
 @click.option("--map", "map_file", metavar="MAP.toml", type=FILE, help="The import map.")
-@click.option("--out", metavar="DIR", type=NEW_FOLDER,
-              help="Campaign folder.")  # fmt: skip
+@click.option("--out", metavar="DIR", type=NEW_FOLDER, help="Campaign folder.")
 @click.option("--force", is_flag=True, help="Replace the campaign that is in DIR.")
 @click.option("--list", "show_list", is_flag=True, help="List the columns of each FILE, then stop.")
 @click.option("--suggest", is_flag=True, help="Print a draft of the map for FILE, then stop.")
@@ -129,8 +128,15 @@ def _listed(file: Path, layout: CsvOptions | None) -> dict[str, Any]:
         grid.add_column(heading, justify="right" if right else "left", no_wrap=True)
     for item in columns:
         low, high = ("-" if math.isnan(v) else f"{v:.6g}" for v in (item.low, item.high))
-        grid.add_row(item.name, item.unit, str(item.rows), low, high,
-                     str(item.missing) if item.missing else "", item.quantity)  # fmt: skip
+        grid.add_row(
+            item.name,
+            item.unit,
+            str(item.rows),
+            low,
+            high,
+            str(item.missing) if item.missing else "",
+            item.quantity,
+        )
     console = output()
     console.print(grid)
     for name, reason in table.left_out.items():

@@ -57,7 +57,10 @@ def not_checked(calibration: Calibration) -> list[str]:
     if not calibration.knows_tire:
         found.append(
             "Another tire would not be noticed: the calibration "
-            + ("is of an earlier version" if calibration.version < 2 else
-               "has too few conditions for that (17 are needed); calibrate on more")
-        )  # fmt: skip
+            + (
+                "is of an earlier version"
+                if calibration.version < 2
+                else "has too few conditions for that (17 are needed); calibrate on more"
+            )
+        )
     return found

@@ -48,11 +48,14 @@ out. Exit code: 0 done, also when nothing is in doubt; 2 bad input.
 """
 SHOWN = 8
 RANGES = {
-    "load": "Loads that the rig allows [N].", "pressure": "Pressures, gauge [bar].",
-    "speed": "Speeds [km/h].", "slip_angle": "Slip angles, for forces [deg].",
-    "slip_ratio": "Slip ratios, for forces.", "camber": "Cambers, for forces [deg].",
+    "load": "Loads that the rig allows [N].",
+    "pressure": "Pressures, gauge [bar].",
+    "speed": "Speeds [km/h].",
+    "slip_angle": "Slip angles, for forces [deg].",
+    "slip_ratio": "Slip ratios, for forces.",
+    "camber": "Cambers, for forces [deg].",
     "temperature": "Tread temperatures, for forces [degC].",
-}  # fmt: skip
+}
 
 
 def range_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -69,30 +72,79 @@ DIAGNOSIS = "tirelib-diagnosis/1"
 
 @click.command("next-test", epilog=_EXAMPLE)
 @click.argument("folder", metavar="CAMPAIGN", type=CAMPAIGN)
-@click.option("--model", "model_name", metavar="M.toml|NAME", required=True,
-              help="Model that `tirelib identify` or `tirelib add` wrote.")  # fmt: skip
-@click.option("--quantity", metavar="strain|Fy|Fx|Mz",
-              help="Default: strain where the campaign has it, else the force that fits "
-                   "worst.")  # fmt: skip
-@click.option("--diagnosis", "diagnosis_file", metavar="D.json", type=FILE,
-              help="Of `tirelib diagnose` on this campaign and model.")  # fmt: skip
-@click.option("--suspects", "names", metavar="A,B",
-              help="Effects to tell apart; one alone stands against nothing.")  # fmt: skip
+@click.option(
+    "--model",
+    "model_name",
+    metavar="M.toml|NAME",
+    required=True,
+    help="Model that `tirelib identify` or `tirelib add` wrote.",
+)
+@click.option(
+    "--quantity",
+    metavar="strain|Fy|Fx|Mz",
+    help="Default: strain where the campaign has it, else the force that fits worst.",
+)
+@click.option(
+    "--diagnosis",
+    "diagnosis_file",
+    metavar="D.json",
+    type=FILE,
+    help="Of `tirelib diagnose` on this campaign and model.",
+)
+@click.option(
+    "--suspects",
+    "names",
+    metavar="A,B",
+    help="Effects to tell apart; one alone stands against nothing.",
+)
 @range_options
-@click.option("--sweep/--no-sweep", "sweep", default=None,
-              help="Forces: whether a further run is a sweep of the slip, or one point; by default "
-                   "as the campaign's runs are.")  # fmt: skip
-@click.option("--separation", "wanted", metavar="X", type=click.FloatRange(min=0, min_open=True),
-              default=20.0, show_default=True,
-              help="Separation for which repeats are counted.")  # fmt: skip
-@click.option("--effects", "effect_files", metavar="FILE.py", type=FILE, multiple=True,
-              help="Effects of your own; may be given again.")  # fmt: skip
-@click.option("--members", metavar="N", type=click.IntRange(min=4), default=100,
-              show_default=True, help="Variants of the model, if diagnosed here.")  # fmt: skip
-@click.option("--seed", metavar="N", type=click.IntRange(min=0), default=0, show_default=True,
-              help="Of the variants.")  # fmt: skip
-@click.option("--out", "out", metavar="DIR", type=NEW_FOLDER,
-              help="Write next_test.html, next_test.md and next_test.json.")  # fmt: skip
+@click.option(
+    "--sweep/--no-sweep",
+    "sweep",
+    default=None,
+    help="Forces: whether a further run is a sweep of the slip, or one point; by default "
+    "as the campaign's runs are.",
+)
+@click.option(
+    "--separation",
+    "wanted",
+    metavar="X",
+    type=click.FloatRange(min=0, min_open=True),
+    default=20.0,
+    show_default=True,
+    help="Separation for which repeats are counted.",
+)
+@click.option(
+    "--effects",
+    "effect_files",
+    metavar="FILE.py",
+    type=FILE,
+    multiple=True,
+    help="Effects of your own; may be given again.",
+)
+@click.option(
+    "--members",
+    metavar="N",
+    type=click.IntRange(min=4),
+    default=100,
+    show_default=True,
+    help="Variants of the model, if diagnosed here.",
+)
+@click.option(
+    "--seed",
+    metavar="N",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Of the variants.",
+)
+@click.option(
+    "--out",
+    "out",
+    metavar="DIR",
+    type=NEW_FOLDER,
+    help="Write next_test.html, next_test.md and next_test.json.",
+)
 @click.option(
     "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
 )
@@ -135,9 +187,18 @@ def next_test(
     declared: dict[str, Any] = {name: _si(name, ranges[f"{name}_range"]) for name in RANGES}
     if explains_forces(quantity, campaign, file):
         answer, force_plan = _for_force(
-            campaign, file, catalogue, quantity, diagnosis_file, names, declared, members, seed,
-            wanted, sweep,
-        )  # fmt: skip
+            campaign,
+            file,
+            catalogue,
+            quantity,
+            diagnosis_file,
+            names,
+            declared,
+            members,
+            seed,
+            wanted,
+            sweep,
+        )
         _give(answer, force_plan, out, json_file)
         return
     if sweep is not None:
@@ -153,9 +214,11 @@ def next_test(
     suspects = None
     if names is not None:
         suspects = given_suspects(
-            [name.strip() for name in names.split(",")], [e.name for e in effects], catalogue,
+            [name.strip() for name in names.split(",")],
+            [e.name for e in effects],
+            catalogue,
             in_base=in_base(model.values),
-        )  # fmt: skip
+        )
     elif told is not None:
         _belongs(told, campaign, [e.name for e in effects], diagnosis_file)
         suspects = suspects_of(told, catalogue)
@@ -166,18 +229,30 @@ def next_test(
         base: Refit | None = None
         if suspects is None:
             found = diagnose(
-                runs, model.values, list(catalogue.values()), effects=effects,
-                strengths=strengths, members=members, seed=seed, progress=progress,
-            )  # fmt: skip
+                runs,
+                model.values,
+                list(catalogue.values()),
+                effects=effects,
+                strengths=strengths,
+                members=members,
+                seed=seed,
+                progress=progress,
+            )
             told = diagnosis_document(assess(found, model, progress=progress))
             suspects, base = suspects_of(told, catalogue), found.base
         elif suspects.effects:
             base = refit(data, model.values, effects, strengths, progress=progress)
         noise = np.nan if base is None else repeated_noise(runs, data, base)
         plan = plan_test(
-            data, base, suspects, envelope, noise=noise, campaign=campaign.header.name,
-            wanted=wanted, progress=progress,
-        )  # fmt: skip
+            data,
+            base,
+            suspects,
+            envelope,
+            noise=noise,
+            campaign=campaign.header.name,
+            wanted=wanted,
+            progress=progress,
+        )
     document = plan_document(plan) | error_of(runs, model).told
     if told is not None:
         document["verdict"] = told["verdict"]
@@ -223,8 +298,7 @@ def _for_force(
         plan = plan_force_test(case, suspects, envelope, wanted=wanted, progress=progress)
     document = plan_document(plan) | {"error": case.given, "error_unit": case.unit}
     if told is not None:
-        document |= {"verdict": told["verdict"],
-                     "would_revive": told["next_test"]["would_revive"]}  # fmt: skip
+        document |= {"verdict": told["verdict"], "would_revive": told["next_test"]["would_revive"]}
         if plan.test is None:
             document |= dict.fromkeys(("what", "message"), told["next_test"]["what"])
     return document, plan
@@ -333,8 +407,9 @@ def _say(document: dict[str, Any]) -> None:
         table.add_row(
             *[_condition(entry, axis) for axis in axes],
             f"{entry['separation']:.1f} +- {entry['separation_std']:.1f}",
-            f"{100 * entry['resolves_probability']:.0f} %", " / ".join(entry["pair"]),
-        )  # fmt: skip
+            f"{100 * entry['resolves_probability']:.0f} %",
+            " / ".join(entry["pair"]),
+        )
     console.print(table)
     median = document["random_median"]
     console.print(

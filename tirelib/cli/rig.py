@@ -28,24 +28,51 @@ in SI and ISO signs.
 @click.command(epilog=_EXAMPLE)
 @click.option("--plan", "plan_name", metavar="NAME", help="The test plan, see --list.")
 @click.option("--out", metavar="DIR", type=NEW_FOLDER, help="Campaign folder.")
-@click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0),
-              help="The day: other noise and set-point errors, same tire and gages.")  # fmt: skip
-@click.option("--repeats", type=click.IntRange(min=0), metavar="K",
-              help="Runs repeated at the end.  [default: the plan's own]")  # fmt: skip
-@click.option("--tire", "tire_name", default="reference", show_default=True, metavar="NAME",
-              help="The virtual tire, see --list.")  # fmt: skip
-@click.option("--friction", type=float, metavar="MU",
-              help="Friction of the road in every run.  [default: the tire's own]")  # fmt: skip
-@click.option("--tread-depth", "tread_depth_mm", type=float, metavar="MM",
-              help="Depth of the grooves; 8 mm is a new tread.  [default: 8]")  # fmt: skip
-@click.option("--axes", default="iso", show_default=True, metavar="NAME",
-              help="Axis system of the files: iso, sae or adapted_sae.")  # fmt: skip
-@click.option("--jobs", default=2, show_default=True, type=click.IntRange(min=1),
-              help="Processes.")  # fmt: skip
+@click.option(
+    "--seed",
+    default=0,
+    show_default=True,
+    type=click.IntRange(min=0),
+    help="The day: other noise and set-point errors, same tire and gages.",
+)
+@click.option(
+    "--repeats",
+    type=click.IntRange(min=0),
+    metavar="K",
+    help="Runs repeated at the end.  [default: the plan's own]",
+)
+@click.option(
+    "--tire",
+    "tire_name",
+    default="reference",
+    show_default=True,
+    metavar="NAME",
+    help="The virtual tire, see --list.",
+)
+@click.option(
+    "--friction",
+    type=float,
+    metavar="MU",
+    help="Friction of the road in every run.  [default: the tire's own]",
+)
+@click.option(
+    "--tread-depth",
+    "tread_depth_mm",
+    type=float,
+    metavar="MM",
+    help="Depth of the grooves; 8 mm is a new tread.  [default: 8]",
+)
+@click.option(
+    "--axes",
+    default="iso",
+    show_default=True,
+    metavar="NAME",
+    help="Axis system of the files: iso, sae or adapted_sae.",
+)
+@click.option("--jobs", default=2, show_default=True, type=click.IntRange(min=1), help="Processes.")
 @click.option("--force", is_flag=True, help="Write into a folder that is not empty.")
 @click.option("--list", "show_list", is_flag=True, help="List plans and tires, then stop.")
-@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE,
-              help="Write a summary as JSON.")  # fmt: skip
+@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write a summary as JSON.")
 def rig(
     plan_name: str | None,
     out: Path | None,

@@ -36,22 +36,63 @@ Exit code: 0 done, 2 bad input.
 
 @click.command(epilog=_EXAMPLE)
 @click.argument("folder", metavar="CAMPAIGN", type=CAMPAIGN)
-@click.option("--model", "model_name", metavar="M.toml|NAME", required=True,
-              help="Model that `tirelib identify` or `tirelib add` wrote.")  # fmt: skip
-@click.option("--effects", "effect_files", metavar="FILE.py", type=FILE, multiple=True,
-              help="Effects of your own; may be given again.")  # fmt: skip
+@click.option(
+    "--model",
+    "model_name",
+    metavar="M.toml|NAME",
+    required=True,
+    help="Model that `tirelib identify` or `tirelib add` wrote.",
+)
+@click.option(
+    "--effects",
+    "effect_files",
+    metavar="FILE.py",
+    type=FILE,
+    multiple=True,
+    help="Effects of your own; may be given again.",
+)
 @click.option("--effects-of", "names", metavar="A,B", help="Plant these only.")
-@click.option("--ratio", "ratios", metavar="X", type=click.FloatRange(min=1.0, min_open=True),
-              multiple=True, default=(1.05, 1.2, 1.5), show_default=True,
-              help="Error with the effect over that without; may be given again.")  # fmt: skip
-@click.option("--repeats", metavar="N", type=click.IntRange(min=1), default=10, show_default=True,
-              help="Tires in which each effect is planted.")  # fmt: skip
-@click.option("--members", metavar="N", type=click.IntRange(min=4), default=100,
-              show_default=True, help="Variants that the thresholds are from.")  # fmt: skip
-@click.option("--seed", metavar="N", type=click.IntRange(min=0), default=0, show_default=True,
-              help="Of the variants.")  # fmt: skip
-@click.option("--out", "out", metavar="DIR", type=NEW_FOLDER,
-              help="Write selftest.html, selftest.md and selftest.json.")  # fmt: skip
+@click.option(
+    "--ratio",
+    "ratios",
+    metavar="X",
+    type=click.FloatRange(min=1.0, min_open=True),
+    multiple=True,
+    default=(1.05, 1.2, 1.5),
+    show_default=True,
+    help="Error with the effect over that without; may be given again.",
+)
+@click.option(
+    "--repeats",
+    metavar="N",
+    type=click.IntRange(min=1),
+    default=10,
+    show_default=True,
+    help="Tires in which each effect is planted.",
+)
+@click.option(
+    "--members",
+    metavar="N",
+    type=click.IntRange(min=4),
+    default=100,
+    show_default=True,
+    help="Variants that the thresholds are from.",
+)
+@click.option(
+    "--seed",
+    metavar="N",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Of the variants.",
+)
+@click.option(
+    "--out",
+    "out",
+    metavar="DIR",
+    type=NEW_FOLDER,
+    help="Write selftest.html, selftest.md and selftest.json.",
+)
 @click.option(
     "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
 )
@@ -85,12 +126,18 @@ def selftest(
     with progress_bar("planting") as progress:
         runs = straight_runs(measure_waveforms(campaign, progress=progress))
         found = test_plan(
-            runs, model.values, list(catalogue.values()),
+            runs,
+            model.values,
+            list(catalogue.values()),
             effects=[each.effect for each in used],
             strengths=[np.atleast_1d(np.asarray(each.strength, dtype=float)) for each in used],
-            only=only, ratios=tuple(dict.fromkeys(ratios)), repeats=repeats, members=members,
-            seed=seed, progress=progress,
-        )  # fmt: skip
+            only=only,
+            ratios=tuple(dict.fromkeys(ratios)),
+            repeats=repeats,
+            members=members,
+            seed=seed,
+            progress=progress,
+        )
     document = selftest_document(found) | error_of(runs, model).told
     _say(document)
     console = output()
@@ -154,9 +201,11 @@ def _say(document: dict[str, Any]) -> None:
         for result in entry["results"]:
             cells += _cells(result)
         table.add_row(
-            entry["effect"], *cells, f"{entry['largest_ratio']:.3g}",
+            entry["effect"],
+            *cells,
+            f"{entry['largest_ratio']:.3g}",
             ", ".join(f"{t['effect']} {t['angle_deg']:.0f} deg" for t in entry["twins"]),
-        )  # fmt: skip
+        )
     console.print(table)
     for name, why in document["dead"].items():
         console.print(f"  dead: {name}: {why}")

@@ -58,38 +58,75 @@ def _numbers(
     except ValueError:
         raise click.BadParameter(
             f"{text!r} is no number and no list like 1500,3000,4500; separate numbers with commas "
-            "only, without spaces", context, option,
-        ) from None  # fmt: skip
+            "only, without spaces",
+            context,
+            option,
+        ) from None
 
 
 @click.command(epilog=_EXAMPLE)
-@click.option("--model", metavar="M.toml|NAME", required=True,
-              help="Tire or model file, or the name of a tire of tirelib.")  # fmt: skip
+@click.option(
+    "--model",
+    metavar="M.toml|NAME",
+    required=True,
+    help="Tire or model file, or the name of a tire of tirelib.",
+)
 @click.option("--load", metavar="N", callback=_numbers, help="Vertical load Fz; or --deflection.")
 @click.option("--deflection", metavar="MM", callback=_numbers, help="Free minus loaded radius.")
 @click.option(
     "--pressure", metavar="BAR", callback=_numbers, help="Inflation, gauge; default: tire's."
 )
-@click.option("--speed", metavar="KMH", callback=_numbers,
-              help="Free rolling; turn rate = speed / ring radius, as a belt of "
-                   "constant length rolls. Default 0.")  # fmt: skip
+@click.option(
+    "--speed",
+    metavar="KMH",
+    callback=_numbers,
+    help="Free rolling; turn rate = speed / ring radius, as a belt of "
+    "constant length rolls. Default 0.",
+)
 @click.option("--omega", metavar="RAD_S", callback=_numbers, help="Turn rate, instead of --speed.")
-@click.option("--contact", type=click.Choice(CONTACTS), default=CONTACTS[0], show_default=True,
-              help="Tread springs: along the radius, or pressed and sheared.")  # fmt: skip
-@click.option("--ring", type=click.Choice(tuple(RINGS)),
-              help="Default: the model file's; linear for a tire file.")  # fmt: skip
+@click.option(
+    "--contact",
+    type=click.Choice(CONTACTS),
+    default=CONTACTS[0],
+    show_default=True,
+    help="Tread springs: along the radius, or pressed and sheared.",
+)
+@click.option(
+    "--ring",
+    type=click.Choice(tuple(RINGS)),
+    help="Default: the model file's; linear for a tire file.",
+)
 @click.option("--camber", metavar="DEG", callback=_numbers, help="For effects of it; default 0.")
-@click.option("--temperature", metavar="DEGC", callback=_numbers,
-              help="Of the tread, for effects of it; unknown by default.")  # fmt: skip
-@click.option("--effects", "effect_files", metavar="FILE.py", type=FILE, multiple=True,
-              help="Effects of your own that the model has; may be given again.")  # fmt: skip
-@click.option("--damping", metavar="LAMBDA", type=float,
-              help="lambda of c_n = 2 lambda sqrt(m_n k_n); default: tire's.")  # fmt: skip
+@click.option(
+    "--temperature",
+    metavar="DEGC",
+    callback=_numbers,
+    help="Of the tread, for effects of it; unknown by default.",
+)
+@click.option(
+    "--effects",
+    "effect_files",
+    metavar="FILE.py",
+    type=FILE,
+    multiple=True,
+    help="Effects of your own that the model has; may be given again.",
+)
+@click.option(
+    "--damping",
+    metavar="LAMBDA",
+    type=float,
+    help="lambda of c_n = 2 lambda sqrt(m_n k_n); default: tire's.",
+)
 @click.option(
     "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the results as JSON."
 )
-@click.option("--out", "folder", metavar="DIR", type=NEW_FOLDER,
-              help="Write simulation.png, .svg, .csv (curves) and .json.")  # fmt: skip
+@click.option(
+    "--out",
+    "folder",
+    metavar="DIR",
+    type=NEW_FOLDER,
+    help="Write simulation.png, .svg, .csv (curves) and .json.",
+)
 def simulate(
     model: str,
     load: tuple[float, ...] | None,
@@ -127,11 +164,14 @@ def simulate(
     inflation = None if pressure is None else _si(pressure, "bar", "pressure")
     if chosen is not None:
         done = simulate_file(
-            chosen, tire, inflation=inflation, turn_rate=turn_rate,
+            chosen,
+            tire,
+            inflation=inflation,
+            turn_rate=turn_rate,
             camber=None if camber is None else _si(camber, "deg", "angle"),
             temperature=None if temperature is None else _si(temperature, "degC", "temperature"),
             **pressed,
-        )  # fmt: skip
+        )
     elif camber is None and temperature is None:
         done = simulate_tire(
             tire, inflation=inflation, turn_rate=turn_rate, contact=contact, **pressed
@@ -203,13 +243,13 @@ def _document(
         "contact": done.contact,
         "damping": done.tire.damping,
         "signs": "wheel angle 0 below the axle, entry < 0 < exit; u outward, shear toward "
-                 "the exit, pressure inward, tension positive",
+        "the exit, pressure inward, tension positive",
         "ring": RINGS["large" if chosen is not None and chosen.large else "linear"],
         "effects": [] if chosen is None else [used.effect.name for used in _acting(chosen)],
         "effects_left_out": _left_out(file, chosen),
         "notes": list(notes),
         **points[0],
-    }  # fmt: skip
+    }
     if len(points) > 1:
         document["points"] = points
     return document
@@ -273,9 +313,12 @@ def _overload(done: Simulation) -> list[str]:
     )
     try:
         bearable = simulate_tire(
-            tire, deflection=largest, inflation=done.inflation[point],
-            turn_rate=done.turn_rate[point], contact=done.contact,
-        )  # fmt: skip
+            tire,
+            deflection=largest,
+            inflation=done.inflation[point],
+            turn_rate=done.turn_rate[point],
+            contact=done.contact,
+        )
     except (ParameterError, ConvergenceError):
         return [note]  # the model ends before: no range to name
     return [f"{note}; range: up to {bearable.load[0]:.0f} N at this inflation"]
@@ -289,8 +332,9 @@ def _write(done: Simulation, name: str, folder: Path) -> list[Path]:
     write_curves(done, curves)
     save(figure_simulation(done, name), folder, "simulation")
     return [folder / f"simulation.{end}" for end in ("png", "svg")] + [
-        curves, folder / "simulation.json",
-    ]  # fmt: skip
+        curves,
+        folder / "simulation.json",
+    ]
 
 
 def _print(file: TireFile, done: Simulation, notes: Sequence[str]) -> None:

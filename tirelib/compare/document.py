@@ -159,7 +159,9 @@ def _gage(gage: Gage, found: Comparison) -> dict[str, Any]:
         "rms": 1e6 * gage.rms,
         "rms_noise": gage.rms / gage.noise.std,
         "sectors": [_cell(cell, gage.noise.std) for cell in gage.table],
-        "departure": None if departure is None else {
+        "departure": None
+        if departure is None
+        else {
             "sector": place(departure.region, found.prediction.edges),
             "from_rad": departure.region.start,
             "to_rad": departure.region.stop,
@@ -168,7 +170,7 @@ def _gage(gage: Gage, found: Comparison) -> dict[str, Any]:
             "mean_of_all_gages": 1e6 * departure.of_all,
             "p": departure.region.p,
         },
-    }  # fmt: skip
+    }
 
 
 def _sources(found: Comparison) -> list[dict[str, str]]:

@@ -83,9 +83,11 @@ class ModelError:
     def told(self) -> dict[str, Any]:
         """The keys under which every document tells an error: value, unit, noise, raw rms."""
         return {
-            "error": self.value, "error_unit": self.unit, "noise": 1e6 * self.noise,
+            "error": self.value,
+            "error_unit": self.unit,
+            "noise": 1e6 * self.noise,
             "residual_rms_raw": 1e6 * self.rms,
-        }  # fmt: skip
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,17 +120,24 @@ class Yardstick:
         """Return the yardstick of a campaign's straight runs."""
         waves = runs.waves
         return cls(
-            runs.strain, operating_points(waves), scales(runs.tolerance, waves.angle_std),
-            runs.noise.std, tuple(waves.header.gage_lateral[g] for g in runs.gages),
+            runs.strain,
+            operating_points(waves),
+            scales(runs.tolerance, waves.angle_std),
+            runs.noise.std,
+            tuple(waves.header.gage_lateral[g] for g in runs.gages),
             waves.low_pass,
-        )  # fmt: skip
+        )
 
     def take(self, chosen: BoolArray) -> "Yardstick":
         """Return the yardstick of some of the runs; the unit stays."""
         return Yardstick(
-            self.strain[chosen], self.at.take(chosen), self.scale[chosen], self.noise,
-            self.lateral, self.low_pass,
-        )  # fmt: skip
+            self.strain[chosen],
+            self.at.take(chosen),
+            self.scale[chosen],
+            self.noise,
+            self.lateral,
+            self.low_pass,
+        )
 
     @property
     def unit(self) -> str:

@@ -60,8 +60,9 @@ def curves_of(found: ForceComparison) -> tuple[Curve, ...]:
         if member.size < LEAST_POINTS:
             continue
         member = member[np.argsort(slip[member], kind="stable")]
-        load, pressure = (float(getattr(data, name)[member].mean()) for name in
-                          ("load", "pressure"))  # fmt: skip
+        load, pressure = (
+            float(getattr(data, name)[member].mean()) for name in ("load", "pressure")
+        )
         angle = float(key[2] * CELL_ANGLE)
         words = told("load", 50.0 * round(load / 50.0)) if np.isfinite(load) else "load unknown"
         if several[1] and np.isfinite(pressure):

@@ -155,8 +155,9 @@ class ForceBench:
                 )
             half = half_lengths(tire, data.load, data.pressure)
             flatness = _ring_flatness(tire, data.load, data.pressure)
-        return cls(points, points.conditions, model.brush.reference, half, flatness,
-                   model.reference)  # fmt: skip
+        return cls(
+            points, points.conditions, model.brush.reference, half, flatness, model.reference
+        )
 
     def state(self, values: Mapping[str, float]) -> BrushState:
         """Return the base brush with parameters `values`."""
@@ -173,10 +174,13 @@ class ForceBench:
         """Return the bench of some of the points, by index or mask."""
         flat = self.ring_flatness
         return ForceBench(
-            self.points.take(chosen), self.conditions.take(chosen), self.law,
+            self.points.take(chosen),
+            self.conditions.take(chosen),
+            self.law,
             None if self.half is None else self.half[chosen],
-            flat[chosen] if isinstance(flat, np.ndarray) else flat, self.reference,
-        )  # fmt: skip
+            flat[chosen] if isinstance(flat, np.ndarray) else flat,
+            self.reference,
+        )
 
 
 def _ring_flatness(tire: Tire, load: FloatArray, pressure: FloatArray) -> FloatArray:

@@ -95,8 +95,12 @@ def _scaled(points: ForcePoints) -> FloatArray:
     """Return the conditions in cells, those that are known everywhere, shape (n, k)."""
     d = points.data
     columns = [
-        np.log(d.load) / CELL_SHARE, np.log(np.maximum(d.pressure, 1.0)) / CELL_SHARE,
-        np.log(np.maximum(np.abs(d.speed), 1e-3)) / CELL_SHARE, d.slip_angle / CELL_ANGLE,
-        d.camber / CELL_ANGLE, d.slip_ratio / CELL_RATIO, d.temperature / CELL_TEMPERATURE,
-    ]  # fmt: skip
+        np.log(d.load) / CELL_SHARE,
+        np.log(np.maximum(d.pressure, 1.0)) / CELL_SHARE,
+        np.log(np.maximum(np.abs(d.speed), 1e-3)) / CELL_SHARE,
+        d.slip_angle / CELL_ANGLE,
+        d.camber / CELL_ANGLE,
+        d.slip_ratio / CELL_RATIO,
+        d.temperature / CELL_TEMPERATURE,
+    ]
     return np.stack([column for column in columns if np.isfinite(column).all()], axis=1)

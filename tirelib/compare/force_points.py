@@ -55,9 +55,12 @@ class ForcePoints:
     def take(self, chosen: IntArray | BoolArray) -> "ForcePoints":
         """Return some of the points."""
         return ForcePoints(
-            self.data.take(chosen), self.slip_rate[chosen], self.samples[chosen],
-            self.cell[chosen], self.sweep[chosen],
-        )  # fmt: skip
+            self.data.take(chosen),
+            self.slip_rate[chosen],
+            self.samples[chosen],
+            self.cell[chosen],
+            self.sweep[chosen],
+        )
 
     @property
     def conditions(self) -> BrushConditions:
@@ -68,9 +71,16 @@ class ForcePoints:
         sense = np.where(d.omega < 0.0, -1.0, 1.0)
         speed = np.where(d.speed < 0.0, d.speed, sense * d.speed)
         return BrushConditions(
-            d.load, d.pressure, d.slip_angle, d.slip_ratio, d.camber, speed, d.temperature,
-            self.slip_rate, rank / max(len(d) - 1, 1),
-        )  # fmt: skip
+            d.load,
+            d.pressure,
+            d.slip_angle,
+            d.slip_ratio,
+            d.camber,
+            speed,
+            d.temperature,
+            self.slip_rate,
+            rank / max(len(d) - 1, 1),
+        )
 
 
 def force_points(data: ForceData) -> ForcePoints:
@@ -90,9 +100,12 @@ def force_points(data: ForceData) -> ForcePoints:
     first = np.zeros(samples.size, dtype=np.int64)
     first[point] = np.arange(point.size)
     return ForcePoints(
-        ForceData(**out, block=block), mean(rate), samples.astype(np.int64), cell[first],
+        ForceData(**out, block=block),
+        mean(rate),
+        samples.astype(np.int64),
+        cell[first],
         swept[first],
-    )  # fmt: skip
+    )
 
 
 def noise_of(difference: FloatArray, cell: IntArray) -> tuple[float, int, int]:
@@ -114,10 +127,14 @@ def noise_of(difference: FloatArray, cell: IntArray) -> tuple[float, int, int]:
 
 def _cells(data: ForceData) -> IntArray:
     rows = [
-        set_points(data.load), set_points(data.pressure), set_points(np.abs(data.speed)),
-        np.round(data.slip_angle / CELL_ANGLE), np.round(data.camber / CELL_ANGLE),
-        np.round(data.slip_ratio / CELL_RATIO), np.nan_to_num(np.sign(data.omega)),
-    ]  # fmt: skip
+        set_points(data.load),
+        set_points(data.pressure),
+        set_points(np.abs(data.speed)),
+        np.round(data.slip_angle / CELL_ANGLE),
+        np.round(data.camber / CELL_ANGLE),
+        np.round(data.slip_ratio / CELL_RATIO),
+        np.nan_to_num(np.sign(data.omega)),
+    ]
     if np.isfinite(data.temperature).all():
         rows.append(np.round(data.temperature / CELL_TEMPERATURE))
     _, number = np.unique(np.stack(rows), axis=1, return_inverse=True)

@@ -31,8 +31,10 @@ from tirelib.identify.error_bands import levels
 from tirelib.identify.force_data import FORCES, ForceData, force_data
 from tirelib.parameters import TireFile
 
-SLIP_LIMITS = {"slip_angle": np.deg2rad([1.0, 2.0, 4.0, 6.0, 9.0]),
-               "slip_ratio": np.array([0.02, 0.05, 0.1, 0.2])}  # fmt: skip
+SLIP_LIMITS = {
+    "slip_angle": np.deg2rad([1.0, 2.0, 4.0, 6.0, 9.0]),
+    "slip_ratio": np.array([0.02, 0.05, 0.1, 0.2]),
+}
 LEVEL, LEAST_SHARE, MOST = 0.01, 0.02, 6
 CELLS = (
     "cells of 0.5 deg in slip angle and camber, 0.01 in slip ratio, a tenth in load, pressure and "
@@ -133,9 +135,11 @@ class ForceComparison:
     def told(self) -> dict[str, Any]:
         """The keys under which every document tells an error: value, unit, noise, raw rms."""
         return {
-            "error": self.error, "error_unit": self.error_unit, "noise": self.noise,
+            "error": self.error,
+            "error_unit": self.error_unit,
+            "noise": self.noise,
             "residual_rms_raw": self.rms,
-        }  # fmt: skip
+        }
 
     @property
     def difference(self) -> FloatArray:
@@ -281,11 +285,26 @@ def _compare(
     table = _table(data, difference, measured, noise)
     said = _sentences(name, table, freedom) if verdict == "lack_of_fit" else ()
     return ForceComparison(
-        name, campaign.header.name, model.name, data, data.block, measured, predicted, noise,
-        repeats, error, rms, size, p, verdict, table, said,
-        _messages(campaign, name, points, verdict, rms / size, repeats), model.used,
+        name,
+        campaign.header.name,
+        model.name,
+        data,
+        data.block,
+        measured,
+        predicted,
+        noise,
+        repeats,
+        error,
+        rms,
+        size,
+        p,
+        verdict,
+        table,
+        said,
+        _messages(campaign, name, points, verdict, rms / size, repeats),
+        model.used,
         last_floor(model.history, name, data_hash),
-    )  # fmt: skip
+    )
 
 
 def _table(
@@ -318,9 +337,18 @@ def _table(
         if n:
             d = difference[member]
             out.append(
-                ForceCell(by, low, high, n, float(np.sqrt(np.mean(d**2))), float(d.mean()),
-                          float(excess[member].mean()), noise / np.sqrt(n), member)
-            )  # fmt: skip
+                ForceCell(
+                    by,
+                    low,
+                    high,
+                    n,
+                    float(np.sqrt(np.mean(d**2))),
+                    float(d.mean()),
+                    float(excess[member].mean()),
+                    noise / np.sqrt(n),
+                    member,
+                )
+            )
     return tuple(out)
 
 

@@ -100,11 +100,14 @@ def compare_gages(
             departure = _departure(k, strain[:, k], part, difference, noise, chosen, points)
         out.append(
             Gage(
-                number, chosen.waves.header.gage_lateral[number], noise,
+                number,
+                chosen.waves.header.gage_lateral[number],
+                noise,
                 float(np.sqrt(np.mean(part[counted] ** 2))),
-                cells(part, sector, counted, (), noise, points), departure,
+                cells(part, sector, counted, (), noise, points),
+                departure,
             )
-        )  # fmt: skip
+        )
     return tuple(out)
 
 
@@ -117,9 +120,14 @@ def _noise(strain: FloatArray, chosen: Chosen, points: SetPoints) -> RepeatNoise
 
 
 def _departure(
-    k: int, strain: FloatArray, part: FloatArray, difference: FloatArray, noise: RepeatNoise,
-    chosen: Chosen, points: SetPoints,
-) -> Departure | None:  # fmt: skip
+    k: int,
+    strain: FloatArray,
+    part: FloatArray,
+    difference: FloatArray,
+    noise: RepeatNoise,
+    chosen: Chosen,
+    points: SetPoints,
+) -> Departure | None:
     """Return where a gage is worse than the mean over the gages, by the most squares."""
     rest = _noise(strain - chosen.strain, chosen, points)
     regions = find_regions(part - difference, strain, chosen.straight, (), rest, points)

@@ -158,11 +158,20 @@ def find_regions(
             continue
         out.append(
             Region(
-                start, stop, group.by, group.side, group.value, int(count[g, 0]),
-                float(of_group[g, k]), float(std[g, k]), float(p[g, k]), float(share[g, k]),
-                float(np.mean(strain[group.member] @ weights[k])), group.member,
+                start,
+                stop,
+                group.by,
+                group.side,
+                group.value,
+                int(count[g, 0]),
+                float(of_group[g, k]),
+                float(std[g, k]),
+                float(p[g, k]),
+                float(share[g, k]),
+                float(np.mean(strain[group.member] @ weights[k])),
+                group.member,
             )
-        )  # fmt: skip
+        )
     return tuple(out)
 
 

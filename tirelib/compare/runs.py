@@ -14,8 +14,10 @@ from tirelib.waveforms import Waveforms
 _STEP = {"load": 50.0, "pressure": 5e3, "speed": 1.0 / 3.6}
 """To what levels are rounded: 50 N, 0.05 bar, 1 km/h."""
 _SLIP_STEP = {
-    "slip_angle": float(np.deg2rad(0.5)), "camber": float(np.deg2rad(0.5)), "slip_ratio": 0.01,
-}  # fmt: skip
+    "slip_angle": float(np.deg2rad(0.5)),
+    "camber": float(np.deg2rad(0.5)),
+    "slip_ratio": 0.01,
+}
 
 
 @dataclass(frozen=True, slots=True)

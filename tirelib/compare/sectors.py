@@ -11,8 +11,13 @@ from tirelib.identify.noise import RepeatNoise
 from tirelib.waveforms import GRID
 
 SECTORS = (
-    "contact", "entry edge", "exit edge", "entry flank", "exit flank", "far side",
-)  # fmt: skip
+    "contact",
+    "entry edge",
+    "exit edge",
+    "entry flank",
+    "exit flank",
+    "far side",
+)
 BOUNDS = (0.7, 1.3, 3.0)
 """Ends of contact, edge and flank, in half contact angles."""
 
@@ -107,9 +112,16 @@ def cells(
             n = int(here.sum())
             if n:
                 out.append(
-                    Cell(by, value, name, n, float(np.sqrt(square[here].mean())),
-                         float(mean[here].mean()), float(np.sqrt(variance[here].sum()) / n))
-                )  # fmt: skip
+                    Cell(
+                        by,
+                        value,
+                        name,
+                        n,
+                        float(np.sqrt(square[here].mean())),
+                        float(mean[here].mean()),
+                        float(np.sqrt(variance[here].sum()) / n),
+                    )
+                )
     return tuple(out)
 
 

@@ -10,9 +10,13 @@ from tirelib.compare.sectors import SECTORS, sector_at
 from tirelib.units import from_si
 
 UNITS = {
-    "load": ("N", "force"), "pressure": ("bar", "pressure"), "speed": ("km/h", "speed"),
-    "slip_angle": ("deg", "angle"), "camber": ("deg", "angle"), "slip_ratio": ("", "ratio"),
-}  # fmt: skip
+    "load": ("N", "force"),
+    "pressure": ("bar", "pressure"),
+    "speed": ("km/h", "speed"),
+    "slip_angle": ("deg", "angle"),
+    "camber": ("deg", "angle"),
+    "slip_ratio": ("", "ratio"),
+}
 """Unit that each condition is told in, and its dimension."""
 PLACES = {
     "contact": "in the contact",

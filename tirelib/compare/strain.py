@@ -277,9 +277,11 @@ def _beyond(fit: Fit, points: SetPoints, chosen: Chosen) -> tuple[str, ...]:
 
 
 _MEANT = {
-    "load": "strain that goes with load", "pressure": "strain that goes with pressure",
-    "gain": "size of the strain", "angle": "zero of the wheel angle",
-}  # fmt: skip
+    "load": "strain that goes with load",
+    "pressure": "strain that goes with pressure",
+    "gain": "size of the strain",
+    "angle": "zero of the wheel angle",
+}
 
 
 def _messages(chosen: Chosen, noise: RepeatNoise, fit: Fit) -> tuple[str, ...]:

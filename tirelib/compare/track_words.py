@@ -13,9 +13,11 @@ from tirelib.compare.sentences import conditions
 from tirelib.compare.tracks import Track
 
 WORDS = {
-    "contact length": ("long", "short"), "deflection": ("large", "small"),
-    "contact entry": ("late", "early"), "contact exit": ("late", "early"),
-}  # fmt: skip
+    "contact length": ("long", "short"),
+    "deflection": ("large", "small"),
+    "contact entry": ("late", "early"),
+    "contact exit": ("late", "early"),
+}
 """What a positive and a negative difference, model less measured, is called."""
 
 

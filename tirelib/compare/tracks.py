@@ -89,9 +89,10 @@ def tracks(
     moved = [
         contact_edges(prediction.strain + size * slope) - model
         for slope, size in (
-            (prediction.by_load, tolerance.load), (prediction.by_pressure, tolerance.pressure),
+            (prediction.by_load, tolerance.load),
+            (prediction.by_pressure, tolerance.pressure),
         )
-    ]  # fmt: skip
+    ]
     lengths = [np.diff(edges, axis=1)[:, 0] for edges in (measured, model)]
     spread = np.hypot(*(np.diff(part, axis=1)[:, 0] for part in moved))
     per_angle, unit, scale = np.ones(len(strain)), "deg", float(np.rad2deg(1.0))
@@ -113,9 +114,14 @@ def tracks(
 
 
 def _track(
-    name: str, unit: str, scale: float, numbers: Sequence[FloatArray], group: IntArray,
-    *, constant: bool = False,
-) -> Track:  # fmt: skip
+    name: str,
+    unit: str,
+    scale: float,
+    numbers: Sequence[FloatArray],
+    group: IntArray,
+    *,
+    constant: bool = False,
+) -> Track:
     measured, model, std = numbers
     noise, freedom = pooled(measured - model, group)
     return Track(name, unit, scale, measured, model, std, noise, freedom, constant)

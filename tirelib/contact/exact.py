@@ -172,9 +172,16 @@ def load_exact(
     even, odd = np.split(x, [energy.N_MODES + 1], axis=1)
     _check_half_angle(half, loads, ring, spread)
     solved = ExactContact(
-        constants.r[:, 0], even, np.pad(odd, ((0, 0), (1, 0))), d0, half, loads,
-        max(part[3] for part in parts), spread, constants,
-    )  # fmt: skip
+        constants.r[:, 0],
+        even,
+        np.pad(odd, ((0, 0), (1, 0))),
+        d0,
+        half,
+        loads,
+        max(part[3] for part in parts),
+        spread,
+        constants,
+    )
     dense = energy.measures(x, energy.basis_at_nodes()[: energy.N_PATCH])
     angle = energy.quadrature()[0][: energy.N_PATCH]
     pressed = energy.overlap(dense, d0[:, None], constants, angle)[0]

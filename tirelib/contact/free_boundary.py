@@ -143,9 +143,10 @@ class Start:
     def tiled(self, times: int) -> "Start":
         """Return the points repeated one after the other."""
         return Start(
-            np.tile(self.edges, (times, 1)), np.tile(self.deflection, times),
+            np.tile(self.edges, (times, 1)),
+            np.tile(self.deflection, times),
             np.tile(self.delta, (times, 1)),
-        )  # fmt: skip
+        )
 
 
 def solve(

@@ -319,9 +319,17 @@ def _contact(problem: Problem, found: Solution) -> RadialContact:
     phi, weights = place(Nodes.of(found.delta.shape[1]), found.patch)
     d0 = found.deflection
     return RadialContact(
-        found.edges, d0, phi, weights, found.delta, problem.at(d0), problem.tread, problem.extra,
-        np.zeros_like(d0), found.iterations,
-    )  # fmt: skip
+        found.edges,
+        d0,
+        phi,
+        weights,
+        found.delta,
+        problem.at(d0),
+        problem.tread,
+        problem.extra,
+        np.zeros_like(d0),
+        found.iterations,
+    )
 
 
 def _length(compliance: Compliance | ComplianceAt) -> int:

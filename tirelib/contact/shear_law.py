@@ -180,9 +180,7 @@ def elements(
     d_moment = d_height * tangential[..., None] + height[..., None] * d_tangential
     loads = np.stack([q_u, q_v, height * tangential], axis=-1)
     d_loads = np.stack([d_u, d_v, d_moment], axis=-2)
-    return Elements(
-        height, offset, normal, tangential, sliding, loads, d_height, d_offset, d_loads
-    )  # fmt: skip
+    return Elements(height, offset, normal, tangential, sliding, loads, d_height, d_offset, d_loads)
 
 
 def _limit(

@@ -165,9 +165,7 @@ class ShearContact:
         belt = evaluate_fields(self.displacement, phi)
         rolling = Rolling(self.effective_radius, self.loaded_radius, self.tip_offset)
         angles = np.broadcast_to(phi, belt.shape[:-1])
-        return elements(
-            belt, angles, rolling, self.compliance.radius, self.tread, self.tread_shear
-        )  # fmt: skip
+        return elements(belt, angles, rolling, self.compliance.radius, self.tread, self.tread_shear)
 
     def compression_at(self, phi: FloatArray) -> FloatArray:
         """Return h_0 - h at angles (n_phi,) or (n_points, n_phi), [m]; negative is clearance."""

@@ -164,9 +164,12 @@ def signature(
     rows = []
     for trial in trials:
         state = predict(
-            model.values, data.points, [*model.changes, effect.at(trial)],
-            low_pass=data.low_pass, correction=model.correction,
-        )  # fmt: skip
+            model.values,
+            data.points,
+            [*model.changes, effect.at(trial)],
+            low_pass=data.low_pass,
+            correction=model.correction,
+        )
         change = (state.wave - model.waveform) * (effect.scale / size)
         rows.append(model.whiten(change).ravel())
     return np.array(rows)

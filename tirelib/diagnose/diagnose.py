@@ -173,16 +173,33 @@ def diagnose(
     guess = None
     if left > floor or verdict == "unknown":
         guess = guess_law(
-            data.strain - last.model.waveform, last.model.waveform, data.points,
-            left_of(data, last.model).edges, last.unexplained,
-        )  # fmt: skip
+            data.strain - last.model.waveform,
+            last.model.waveform,
+            data.points,
+            left_of(data, last.model).edges,
+            last.unexplained,
+        )
     extra = {effect.name for effect in UNLISTED} - {effect.name for effect in catalogue}
     dead = {name: why for name, why in first.found.dead.items() if name not in extra}
     return Diagnosis(
-        verdict, tuple(named), findings, dead, base, last.model, left, floor, found.count, runs,
-        data, beyond, usual_size(last.model, last.ranking.structure.members), guess, like,
-        tuple(name for name in found.by_share if name in named), refitted,
-    )  # fmt: skip
+        verdict,
+        tuple(named),
+        findings,
+        dead,
+        base,
+        last.model,
+        left,
+        floor,
+        found.count,
+        runs,
+        data,
+        beyond,
+        usual_size(last.model, last.ranking.structure.members),
+        guess,
+        like,
+        tuple(name for name in found.by_share if name in named),
+        refitted,
+    )
 
 
 def _findings(first: Stage, named: Sequence[str], model: Refit, data: Data) -> tuple[Finding, ...]:
@@ -196,9 +213,12 @@ def _findings(first: Stage, named: Sequence[str], model: Refit, data: Data) -> t
             k = fitted[name]
             strength, std = model.strengths[k], model.strength_std(k)
             row = replace(
-                row, strength=strength, std=std, in_range=within(candidate.effect, strength, std),
+                row,
+                strength=strength,
+                std=std,
+                in_range=within(candidate.effect, strength, std),
                 level="alarm",
-            )  # fmt: skip
+            )
         rows.append(row)
     order = {name: k for k, name in enumerate(named)}
     rows.sort(key=lambda f: (order.get(f.effect.name, len(order)), -f.score / f.threshold))

@@ -122,17 +122,32 @@ def assess(
         messages.append(
             "nothing can be held out: three loads or two pressures, and four other runs, are needed"
         )
-    messages += [_too_large(finding) for finding in findings
-                 if finding.effect.name in named and not finding.in_range]  # fmt: skip
+    messages += [
+        _too_large(finding)
+        for finding in findings
+        if finding.effect.name in named and not finding.in_range
+    ]
     messages += [_by_share(name) for name in found.by_share if name in named]
     others = [f.effect.name for f in findings if f.level == "alarm" and f.effect.name not in named]
     if others and verdict in ("none", "named"):
         messages.append(_not_needed(others))
     return Assessment(
-        found, unit, verdict, named, findings, yardstick.error(given, start=near), refitted, after,
-        floor, chosen, held_before, held_after, held_final, _left(found, data, final),
+        found,
+        unit,
+        verdict,
+        named,
+        findings,
+        yardstick.error(given, start=near),
+        refitted,
+        after,
+        floor,
+        chosen,
+        held_before,
+        held_after,
+        held_final,
+        _left(found, data, final),
         tuple(messages),
-    )  # fmt: skip
+    )
 
 
 def _too_large(finding: Finding) -> str:

@@ -225,9 +225,12 @@ def _alike(data: Data, model: Refit) -> FloatArray:
     rows = []
     for effect, size in ALIKE.items():
         state = predict(
-            model.values, data.points, [*model.changes, effect.at(effect.step)],
-            low_pass=data.low_pass, correction=model.correction,
-        )  # fmt: skip
+            model.values,
+            data.points,
+            [*model.changes, effect.at(effect.step)],
+            low_pass=data.low_pass,
+            correction=model.correction,
+        )
         rows.append((state.wave - model.waveform) * (size / effect.step))
     return np.array(rows)
 
@@ -246,11 +249,14 @@ def _bent(data: Data, model: Refit) -> FloatArray:
 
     waves = [
         predict(
-            model.values, data.points, [*model.changes, ("strain", change)],
-            low_pass=data.low_pass, correction=model.correction,
+            model.values,
+            data.points,
+            [*model.changes, ("strain", change)],
+            low_pass=data.low_pass,
+            correction=model.correction,
         ).wave
         for change in (held, rear)
-    ]  # fmt: skip
+    ]
     return np.stack(waves) - model.waveform
 
 
@@ -265,8 +271,11 @@ def _refitted(
         step = inverse @ (rows @ model.whiten(wave - fitted).ravel())
         z = z + np.clip(step, -0.4, 0.4)
         state = predict(
-            move(model.values, z, free), data.points, model.changes, low_pass=data.low_pass,
+            move(model.values, z, free),
+            data.points,
+            model.changes,
+            low_pass=data.low_pass,
             correction=model.correction.moved(z),
-        )  # fmt: skip
+        )
         fitted = state.wave
     return fitted

@@ -130,11 +130,12 @@ class Fitter:
         start = None if before is None else before.guess(self._away(self.z))
         self.about = self.z
         self.correction = with_slopes(
-            large_displacements(
-                self.values, data.points, low_pass=data.low_pass, start=start
-            ),
-            self.values, data.points, self.free, low_pass=data.low_pass,
-        )  # fmt: skip
+            large_displacements(self.values, data.points, low_pass=data.low_pass, start=start),
+            self.values,
+            data.points,
+            self.free,
+            low_pass=data.low_pass,
+        )
         if self.follows and before is not None:
             self._follow(before)
             self._take(self._predict(self.z), self.z)
@@ -142,9 +143,14 @@ class Fitter:
             self._linearise(self.z)
         if weigh:
             self.whiten = whitening(
-                self.waveform, self.values, data.points, data.tolerance, data.angle_std,
-                data.noise, data.low_pass,
-            )  # fmt: skip
+                self.waveform,
+                self.values,
+                data.points,
+                data.tolerance,
+                data.angle_std,
+                data.noise,
+                data.low_pass,
+            )
         self.rows = self.whiten(self.slopes).reshape(self.z.size, -1)
         self.cost = self._cost(self.waveform, self.z)
 
@@ -181,9 +187,13 @@ class Fitter:
     def _linearise(self, z: FloatArray) -> None:
         values = move(self.start, z[: len(self.free)], self.free)
         base = linearised(
-            values, self.data.points, self.free, self.changes(z), low_pass=self.data.low_pass,
+            values,
+            self.data.points,
+            self.free,
+            self.changes(z),
+            low_pass=self.data.low_pass,
             correction=self.large(z),
-        )  # fmt: skip
+        )
         rows = [base.waveform_slopes, by_delay(base.waveform, self.data.points.omega)[None]]
         for k in range(self.base, z.size):
             moved, side = z.copy(), -1.0 if self.sign[k] < 0.0 else 1.0
@@ -197,9 +207,12 @@ class Fitter:
 
     def _predict(self, z: FloatArray) -> State:
         return predict(
-            move(self.start, z[: len(self.free)], self.free), self.data.points, self.changes(z),
-            low_pass=self.data.low_pass, correction=self.large(z),
-        )  # fmt: skip
+            move(self.start, z[: len(self.free)], self.free),
+            self.data.points,
+            self.changes(z),
+            low_pass=self.data.low_pass,
+            correction=self.large(z),
+        )
 
     def _cost(self, waveform: FloatArray, z: FloatArray) -> float:
         rest = self.whiten(self.data.strain - waveform)

@@ -53,9 +53,12 @@ def folds(data: Data) -> tuple[Fold, ...]:
 def part_of(data: Data, chosen: BoolArray) -> Data:
     """Return some of the runs."""
     return replace(
-        data, strain=data.strain[chosen], points=data.points.take(chosen),
-        angle_std=data.angle_std[chosen], deflection=data.deflection[chosen],
-    )  # fmt: skip
+        data,
+        strain=data.strain[chosen],
+        points=data.points.take(chosen),
+        angle_std=data.angle_std[chosen],
+        deflection=data.deflection[chosen],
+    )
 
 
 def held_out_errors(
@@ -100,9 +103,14 @@ def held_out(
     for fold in chosen:
         try:
             trained = refit(
-                part_of(data, ~fold.out), model.values, model.effects, model.strengths,
-                delay=model.delay, near=_near(model.correction, ~fold.out), progress=progress,
-            )  # fmt: skip
+                part_of(data, ~fold.out),
+                model.values,
+                model.effects,
+                model.strengths,
+                delay=model.delay,
+                near=_near(model.correction, ~fold.out),
+                progress=progress,
+            )
             seen = yardstick.take(fold.out)
             near = _near(model.correction, fold.out)
             start = near.contact if near is not None else None

@@ -81,9 +81,12 @@ def left_of(data: Data, model: Refit, beyond: FloatArray | None = None) -> Left:
     white = model.whiten(model.waveform - data.strain)
     told = white if beyond is None else beyond
     state = predict(
-        model.values, data.points, model.changes, low_pass=data.low_pass,
+        model.values,
+        data.points,
+        model.changes,
+        low_pass=data.low_pass,
         correction=model.correction,
-    )  # fmt: skip
+    )
     assert state.contact is not None  # noqa: S101 - the chain sets it
     sector = sectors_of(state.contact.edges)
     squares = told**2

@@ -115,9 +115,13 @@ class Ranking:
             std.append(scale * np.sqrt(np.diag(block)))
         every = slice(0, len(normal.right))
         return Scores(
-            np.array(score), np.array(alone), tuple(strength), tuple(std), normal.square,
+            np.array(score),
+            np.array(alone),
+            tuple(strength),
+            tuple(std),
+            normal.square,
             normal.square - _taken(normal, every),
-        )  # fmt: skip
+        )
 
     def _score(self, normal: Normal, index: int) -> tuple[float, FloatArray, FloatArray]:
         """Return score, strength in ranges, and covariance of one effect, its twins left out."""

@@ -215,9 +215,14 @@ class Refits:
                 return found
         try:
             made = refit(
-                self.data, model.values, effects, strengths,
-                delay=model.delay, near=model.correction, progress=self.progress,
-            )  # fmt: skip
+                self.data,
+                model.values,
+                effects,
+                strengths,
+                delay=model.delay,
+                near=model.correction,
+                progress=self.progress,
+            )
         except TirelibError:
             return None
         self._made.append((model, tuple(effects), made))
@@ -247,7 +252,15 @@ def _result(fitter: Fitter) -> Refit:
     normal = fitter.rows @ fitter.rows.T + np.diag(fitter.width**-2)
     covariance = np.asarray(np.linalg.inv(normal), dtype=np.float64)
     return Refit(
-        fitter.values, fitter.effects, fitter.strengths(fitter.z), fitter.delay(fitter.z),
-        fitter.waveform, fitter.deflection, fitter.slopes, fitter.large(fitter.z),
-        fitter.whiten, covariance, float(np.sqrt(np.mean(rest**2))),
-    )  # fmt: skip
+        fitter.values,
+        fitter.effects,
+        fitter.strengths(fitter.z),
+        fitter.delay(fitter.z),
+        fitter.waveform,
+        fitter.deflection,
+        fitter.slopes,
+        fitter.large(fitter.z),
+        fitter.whiten,
+        covariance,
+        float(np.sqrt(np.mean(rest**2))),
+    )

@@ -18,9 +18,12 @@ MOST = 2
 
 
 def inseparable(
-    data: Data, first: "Stage", findings: Sequence["Finding"], named: Sequence[str],
+    data: Data,
+    first: "Stage",
+    findings: Sequence["Finding"],
+    named: Sequence[str],
     refitted: Refits,
-) -> list[str]:  # fmt: skip
+) -> list[str]:
     """Return twins of the leader, in range, whose exact refit is no worse.
 
     No worse is by less than the leader's own threshold: what variants without any effect do. The

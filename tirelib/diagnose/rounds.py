@@ -98,9 +98,11 @@ def rounds(
         return stages[-1]
 
     def fitted(
-        stage: Stage, effects: Sequence[Effect], strengths: Sequence[FloatArray],
+        stage: Stage,
+        effects: Sequence[Effect],
+        strengths: Sequence[FloatArray],
         need: Callable[[Refit], bool],
-    ) -> Stage | None:  # fmt: skip
+    ) -> Stage | None:
         """Return the stage of an exact fit; None if it does not settle or is not needed."""
         model = refitted(stage.model, effects, strengths)
         return None if model is None or not need(model) else staged(model)

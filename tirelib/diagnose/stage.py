@@ -103,9 +103,15 @@ class Stage:
         bound = np.array([least.get(name, 0.0) for name in names])
         limit = limits(members, [len(candidate.own) for candidate in found.living])
         return cls(
-            model, found, ranking, scores, np.maximum(limit, bound), noise,
-            *_ranges(found, scores), ~_listed(found) & ~_has_twin(found),
-        )  # fmt: skip
+            model,
+            found,
+            ranking,
+            scores,
+            np.maximum(limit, bound),
+            noise,
+            *_ranges(found, scores),
+            ~_listed(found) & ~_has_twin(found),
+        )
 
     def of_residual(self, residual: FloatArray) -> "Stage":
         """Return the stage with another residual (n_runs, n_phi), free of delay.
@@ -170,9 +176,14 @@ class Stage:
         return np.asarray((score >= low * alone) & (score <= high * alone))
 
     def leaders(
-        self, suspects: set[str], bar: float, clear: float, barred: Collection[str] = (),
-        *, spared: bool = False,
-    ) -> list[int]:  # fmt: skip
+        self,
+        suspects: set[str],
+        bar: float,
+        clear: float,
+        barred: Collection[str] = (),
+        *,
+        spared: bool = False,
+    ) -> list[int]:
         """Return the indices of an alarm from a ratio on and of its rivals, best first.
 
         None if its ratio is not `clear` times that of every effect outside its range: what imitates
@@ -259,9 +270,12 @@ def plausible(
 
 
 def within(
-    effect: Effect, strength: FloatArray, std: FloatArray, form: float = FORM,
+    effect: Effect,
+    strength: FloatArray,
+    std: FloatArray,
+    form: float = FORM,
     imitation: float = 0.0,
-) -> bool:  # fmt: skip
+) -> bool:
     """Return whether a strength lies in its effect's range, to `RANGE_SLACK` and shares of it.
 
     An end other than zero is as uncertain as the law.

@@ -74,10 +74,14 @@ def key_of(data: Data, model: Refit, members: int, seed: int) -> str:
         for item in items:
             if isinstance(item, np.ndarray | float):
                 # a fit that starts elsewhere ends within a millionth: the same ensemble
-                told.update(np.array2string(
-                    np.asarray(item, dtype=float).ravel(), precision=5, threshold=10**9,
-                    floatmode="maxprec",
-                ).encode())  # fmt: skip
+                told.update(
+                    np.array2string(
+                        np.asarray(item, dtype=float).ravel(),
+                        precision=5,
+                        threshold=10**9,
+                        floatmode="maxprec",
+                    ).encode()
+                )
             else:
                 told.update(repr(item).encode())
             told.update(b";")

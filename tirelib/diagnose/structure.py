@@ -75,9 +75,14 @@ class Structure:
     """
 
     def __init__(
-        self, variants: FloatArray, measured: FloatArray, noise: float, nuisance: FloatArray,
-        parts: FloatArray, each: FloatArray,
-    ) -> None:  # fmt: skip
+        self,
+        variants: FloatArray,
+        measured: FloatArray,
+        noise: float,
+        nuisance: FloatArray,
+        parts: FloatArray,
+        each: FloatArray,
+    ) -> None:
         self.basis = span(nuisance.T)
         self.variance = noise**2
         self.members = self.projected(measured)

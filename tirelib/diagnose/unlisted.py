@@ -16,27 +16,42 @@ def _with_gain(state: State, share: FloatArray) -> State:
 
 
 @effect(
-    "gain_by_load", stage="gage", unit="1", low=-0.1, high=0.1, varies_with=("load",),
+    "gain_by_load",
+    stage="gage",
+    unit="1",
+    low=-0.1,
+    high=0.1,
+    varies_with=("load",),
     source="bond or gage that carries less the more it is strained (assumed size)",
-)  # fmt: skip
+)
 def gain_by_load(state: State, strength: float) -> State:
     """Gain of the gages that goes with the load."""
     return _with_gain(state, strength * (state.conditions.load / REFERENCE_LOAD - 1.0))
 
 
 @effect(
-    "gain_by_pressure", stage="gage", unit="1", low=-0.2, high=0.2, varies_with=("pressure",),
+    "gain_by_pressure",
+    stage="gage",
+    unit="1",
+    low=-0.2,
+    high=0.2,
+    varies_with=("pressure",),
     source="gage or amplifier that feels the inflation pressure (assumed size)",
-)  # fmt: skip
+)
 def gain_by_pressure(state: State, strength: float) -> State:
     """Gain of the gages that goes with the inflation pressure."""
     return _with_gain(state, strength * (state.conditions.pressure / REFERENCE_PRESSURE - 1.0))
 
 
 @effect(
-    "gain_by_speed", stage="gage", unit="1", low=-0.1, high=0.1, varies_with=("speed",),
+    "gain_by_speed",
+    stage="gage",
+    unit="1",
+    low=-0.1,
+    high=0.1,
+    varies_with=("speed",),
     source="amplifier that loses gain with frequency (assumed size)",
-)  # fmt: skip
+)
 def gain_by_speed(state: State, strength: float) -> State:
     """Gain of the gages that goes with the speed."""
     return _with_gain(state, strength * (state.conditions.omega / REFERENCE_OMEGA - 1.0))

@@ -21,11 +21,17 @@ from tirelib.model.chain import Change
 
 REFERENCE_LOAD = 4000.0
 STIFFNESSES = (
-    "bending_stiffness", "radial_stiffness", "tangential_stiffness", "extension_stiffness",
-)  # fmt: skip
+    "bending_stiffness",
+    "radial_stiffness",
+    "tangential_stiffness",
+    "extension_stiffness",
+)
 TREAD_AND_SECTIONS = (
-    "shear_stiffness", "rotary_inertia", "tread_shear_stiffness", "tread_hardening",
-)  # fmt: skip
+    "shear_stiffness",
+    "rotary_inertia",
+    "tread_shear_stiffness",
+    "tread_hardening",
+)
 SPREAD = 0.1
 """Relative standard deviation of them."""
 LARGE = 0.3
@@ -138,8 +144,9 @@ def crowned(curvature: float) -> Change:
             raise ConvergenceError(
                 f"crowned tread of {curvature:g} 1/m: the strips' load is off by up to "
                 f"{np.abs(wrong).max():.2g} N after {PASSES} passes; draw another tire",
-                pressed, float(np.abs(wrong).max()),
-            )  # fmt: skip
+                pressed,
+                float(np.abs(wrong).max()),
+            )
         belt = pressed.displacement.reshape(strips, n, *state.belt.shape[1:])
         return state.but(belt=np.tensordot(SHARES, belt, axes=1), deflection=depth)
 

@@ -7,9 +7,13 @@ from tirelib.effects.harmonics import orders, with_gain
 
 
 @effect(
-    "angle_zero", stage="gage", unit="rad", low=-0.03, high=0.03,
+    "angle_zero",
+    stage="gage",
+    unit="rad",
+    low=-0.03,
+    high=0.03,
     source="trigger mounted off the top of the wheel; gages glued off their mark",
-)  # fmt: skip
+)
 def angle_zero(state: State, strength: float) -> State:
     """Zero of the wheel angle beside the axle.
 

@@ -13,10 +13,15 @@ FOUNDATION = 2.0e5
 
 
 @effect(
-    "belt_bending", stage="strain", unit="1", low=0.0, high=0.6,
-    varies_with=("slip_angle", "lateral"), needs=("side_force",),
+    "belt_bending",
+    stage="strain",
+    unit="1",
+    low=0.0,
+    high=0.6,
+    varies_with=("slip_angle", "lateral"),
+    needs=("side_force",),
     source="Fiala (1954); dissertation, section 4.1.4, Fig. 4-10",
-)  # fmt: skip
+)
 def belt_bending(state: State, strength: float) -> State:
     """Side force bends the belt sideways: left gages are stretched for Fy > 0.
 

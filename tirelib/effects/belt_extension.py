@@ -7,9 +7,14 @@ LEAST = 1e-6
 
 
 @effect(
-    "belt_extension", stage="stiffness", unit="1/MN", low=0.0, high=1.0, varies_with=("load",),
+    "belt_extension",
+    stage="stiffness",
+    unit="1/MN",
+    low=0.0,
+    high=1.0,
+    varies_with=("load",),
     source="dissertation, Eq. (55); EA of steel belts is some 1 to 10 MN (assumed)",
-)  # fmt: skip
+)
 def belt_extension(state: State, strength: float) -> State:
     """Stretching of the belt.
 

@@ -10,10 +10,15 @@ LEAST = 1e-9
 
 
 @effect(
-    "belt_shear", stage="stiffness", unit="1/kN", low=0.0, high=0.04, varies_with=("load",),
+    "belt_shear",
+    stage="stiffness",
+    unit="1/kN",
+    low=0.0,
+    high=0.04,
+    varies_with=("load",),
     source="Timoshenko beam under tension: Haringx 1948, Reissner 1972; dissertation, chapter 7, "
     "asks for it; GA >= 25 kN (assumed)",
-)  # fmt: skip
+)
 def belt_shear(state: State, strength: float) -> State:
     """Shear of the belt: cross-sections do not stay normal to it.
 

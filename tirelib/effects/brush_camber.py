@@ -4,9 +4,14 @@ from tirelib.effects.effect import State, effect
 
 
 @effect(
-    "brush_camber", stage="brush", unit="1", low=-0.2, high=1.2, varies_with=("camber",),
+    "brush_camber",
+    stage="brush",
+    unit="1",
+    low=-0.2,
+    high=1.2,
+    varies_with=("camber",),
     source="Pacejka, Tire and Vehicle Dynamics, ch. 3: camber as a turned line of the contact",
-)  # fmt: skip
+)
 def brush_camber(state: State, strength: float) -> State:
     """Camber acts as a slip angle.
 

@@ -7,10 +7,15 @@ from tirelib.effects.effect import State, effect
 
 
 @effect(
-    "camber", stage="contact", unit="1", low=0.0, high=1.5, varies_with=("camber", "lateral"),
+    "camber",
+    stage="contact",
+    unit="1",
+    low=0.0,
+    high=1.5,
+    varies_with=("camber", "lateral"),
     needs=("camber",),
     source="dissertation, Fig. 4-16; geometry of tirelib.contact.load_transfer",
-)  # fmt: skip
+)
 def camber(state: State, strength: float) -> State:
     """Camber presses one side of the tread deeper than the other.
 

@@ -6,10 +6,14 @@ from tirelib.effects.effect import State, effect
 
 
 @effect(
-    "carcass", stage="brush", unit="deg/Nm", low=0.0, high=0.02,
+    "carcass",
+    stage="brush",
+    unit="deg/Nm",
+    low=0.0,
+    high=0.02,
     varies_with=("slip_angle",),
     source="dissertation, Eq. (2): 1 / C_yaw of the belt's line in the contact",
-)  # fmt: skip
+)
 def carcass(state: State, strength: float) -> State:
     """Contact that turns under its aligning moment, which lowers the slip angle.
 

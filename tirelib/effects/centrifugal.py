@@ -6,9 +6,14 @@ from tirelib.effects.effect import State, effect
 
 
 @effect(
-    "centrifugal", stage="inertia", unit="1", low=-1.0, high=0.0, varies_with=("speed",),
+    "centrifugal",
+    stage="inertia",
+    unit="1",
+    low=-1.0,
+    high=0.0,
+    varies_with=("speed",),
     source="dissertation, Eq. (85) with the full tension p b R + rho A R^2 Omega^2",
-)  # fmt: skip
+)
 def centrifugal(state: State, strength: float) -> State:
     """Rotating inertia of the belt is less than what its centrifugal tension stands for.
 

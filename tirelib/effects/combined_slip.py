@@ -6,10 +6,14 @@ from tirelib.effects.effect import State, effect
 
 
 @effect(
-    "combined_slip", stage="brush", unit="1", low=-0.5, high=0.5,
+    "combined_slip",
+    stage="brush",
+    unit="1",
+    low=-0.5,
+    high=0.5,
     varies_with=("slip_angle", "slip_ratio"),
     source="friction ellipse: adhesion along and across the wheel differ (Pacejka, ch. 3)",
-)  # fmt: skip
+)
 def combined_slip(state: State, strength: float) -> State:
     """Friction along the wheel differs from that across.
 

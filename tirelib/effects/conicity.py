@@ -4,10 +4,15 @@ from tirelib.effects.effect import State, effect
 
 
 @effect(
-    "conicity", stage="brush", unit="N/kN", low=-50.0, high=50.0, varies_with=("load",),
+    "conicity",
+    stage="brush",
+    unit="N/kN",
+    low=-50.0,
+    high=50.0,
+    varies_with=("load",),
     source="Pacejka, Tire and Vehicle Dynamics, ch. 4: conicity as a lateral force that keeps its "
     "side",
-)  # fmt: skip
+)
 def conicity(state: State, strength: float) -> State:
     """Belt as a cone that pushes to one side, more with load.
 

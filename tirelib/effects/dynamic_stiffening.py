@@ -9,9 +9,14 @@ REFERENCE = 20.0
 
 
 @effect(
-    "dynamic_stiffening", stage="stiffness", unit="1", low=0.0, high=0.5, varies_with=("speed",),
+    "dynamic_stiffening",
+    stage="stiffness",
+    unit="1",
+    low=0.0,
+    high=0.5,
+    varies_with=("speed",),
     source="storage modulus of filled rubber grows with the logarithm of frequency (assumed size)",
-)  # fmt: skip
+)
 def dynamic_stiffening(state: State, strength: float) -> State:
     """Rubber of sidewall and tread is stiffer the faster the tire rolls.
 

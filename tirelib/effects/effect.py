@@ -24,10 +24,19 @@ HOOKS = {
 
 VARIES_WITH = frozenset(
     {
-        "load", "pressure", "speed", "deflection", "slip_angle", "camber", "slip_ratio",
-        "temperature", "order", "angle", "lateral",
+        "load",
+        "pressure",
+        "speed",
+        "deflection",
+        "slip_angle",
+        "camber",
+        "slip_ratio",
+        "temperature",
+        "order",
+        "angle",
+        "lateral",
     }
-)  # fmt: skip
+)
 
 UNITS = frozenset(row.unit for row in TABLE) | {"MN"}
 """What a strength's unit may be made of, with blanks, `/` and `^`."""
@@ -258,8 +267,18 @@ def effect(
     def make(law: Law) -> Effect:
         title = (law.__doc__ or name).strip().splitlines()[0]
         return Effect(
-            name, title, stage, unit, float(low), float(high), tuple(varies_with), source, law,
-            components, tuple(needs), untestable,
-        )  # fmt: skip
+            name,
+            title,
+            stage,
+            unit,
+            float(low),
+            float(high),
+            tuple(varies_with),
+            source,
+            law,
+            components,
+            tuple(needs),
+            untestable,
+        )
 
     return make

@@ -6,10 +6,15 @@ from tirelib.effects.effect import State, effect
 
 
 @effect(
-    "friction_drift", stage="brush", unit="1", low=-0.3, high=0.3, varies_with=("order",),
+    "friction_drift",
+    stage="brush",
+    unit="1",
+    low=-0.3,
+    high=0.3,
+    varies_with=("order",),
     components=2,
     source="wear and polish of tread and road during a test (assumed size)",
-)  # fmt: skip
+)
 def friction_drift(state: State, strength: tuple[float, float]) -> State:
     """Friction drifts from the first run to the last.
 

@@ -4,9 +4,14 @@ from tirelib.effects.effect import State, effect
 
 
 @effect(
-    "friction_load", stage="brush", unit="1", low=-0.1, high=0.6, varies_with=("load",),
+    "friction_load",
+    stage="brush",
+    unit="1",
+    low=-0.1,
+    high=0.6,
+    varies_with=("load",),
     source="rubber friction: the true contact area grows less than the load (Schallamach)",
-)  # fmt: skip
+)
 def friction_load(state: State, strength: float) -> State:
     """Friction falls with load.
 

@@ -4,11 +4,16 @@ from tirelib.effects.effect import State, effect
 
 
 @effect(
-    "friction_pressure", stage="brush", unit="1", low=-0.8, high=0.8, varies_with=("pressure",),
+    "friction_pressure",
+    stage="brush",
+    unit="1",
+    low=-0.8,
+    high=0.8,
+    varies_with=("pressure",),
     needs=("pressure",),
     source="Besselink et al., An improved Magic Formula/Swift tyre model, 2010: pressure terms of "
     "peak friction",
-)  # fmt: skip
+)
 def friction_pressure(state: State, strength: float) -> State:
     """Friction changes with inflation pressure.
 

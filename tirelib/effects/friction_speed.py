@@ -9,10 +9,15 @@ SPAN = 10.0
 
 
 @effect(
-    "friction_speed", stage="brush", unit="1", low=-0.2, high=0.8, varies_with=("speed",),
+    "friction_speed",
+    stage="brush",
+    unit="1",
+    low=-0.2,
+    high=0.8,
+    varies_with=("speed",),
     needs=("speed",),
     source="Savkoor, 1966: friction of sliding rubber over speed",
-)  # fmt: skip
+)
 def friction_speed(state: State, strength: float) -> State:
     """Friction falls with the speed at which the tread slides.
 

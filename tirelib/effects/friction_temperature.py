@@ -9,11 +9,16 @@ REFERENCE, SPAN = 323.15, 50.0
 
 
 @effect(
-    "friction_temperature", stage="brush", unit="1", low=-0.8, high=0.8,
-    varies_with=("temperature",), needs=("temperature",),
+    "friction_temperature",
+    stage="brush",
+    unit="1",
+    low=-0.8,
+    high=0.8,
+    varies_with=("temperature",),
+    needs=("temperature",),
     source="rubber friction over temperature and speed has one peak (Grosch); below it friction "
     "rises, above it falls",
-)  # fmt: skip
+)
 def friction_temperature(state: State, strength: float) -> State:
     """Friction changes as the tread warms up.
 

@@ -4,9 +4,14 @@ from tirelib.effects.effect import State, effect
 
 
 @effect(
-    "gage_drift", stage="gage", unit="1", low=-0.1, high=0.1, varies_with=("order",),
+    "gage_drift",
+    stage="gage",
+    unit="1",
+    low=-0.1,
+    high=0.1,
+    varies_with=("order",),
     source="glue, gage factor and supply over time and temperature (assumed size)",
-)  # fmt: skip
+)
 def gage_drift(state: State, strength: float) -> State:
     """Gain of the gage that drifts during the campaign.
 

@@ -4,10 +4,14 @@ from tirelib.effects.effect import State, effect
 
 
 @effect(
-    "gage_gain", stage="gage", unit="1", low=-0.1, high=0.1,
+    "gage_gain",
+    stage="gage",
+    unit="1",
+    low=-0.1,
+    high=0.1,
     untestable="the strain is in proportion to the innerliner's offset, which the base model fits",
     source="gage factor, glue, calibration of the bridge",
-)  # fmt: skip
+)
 def gage_gain(state: State, strength: float) -> State:
     """Gain of the gage other than one.
 

@@ -7,9 +7,13 @@ from tirelib.effects.harmonics import orders, with_gain
 
 
 @effect(
-    "gage_length", stage="gage", unit="mm^2", low=0.0, high=3600.0,
+    "gage_length",
+    stage="gage",
+    unit="mm^2",
+    low=0.0,
+    high=3600.0,
     source="mean over the gage's length; gages are up to 20 mm long, piezoelectric films 60 mm",
-)  # fmt: skip
+)
 def gage_length(state: State, strength: float) -> State:
     """Mean of the strain over the gage's length.
 

@@ -6,10 +6,14 @@ from tirelib.effects.effect import State, effect
 
 
 @effect(
-    "gage_offset", stage="strain", unit="ustrain", low=-1000.0, high=1000.0,
+    "gage_offset",
+    stage="strain",
+    unit="ustrain",
+    low=-1000.0,
+    high=1000.0,
     untestable="the mean over the turn is taken off, of measured and modelled strain alike",
     source="zero of the bridge, hoop strain of inflation and speed",
-)  # fmt: skip
+)
 def gage_offset(state: State, strength: float) -> State:
     """Zero of the gage other than none.
 

@@ -10,9 +10,14 @@ REFERENCE = 5e-3
 
 
 @effect(
-    "gage_saturation", stage="gage", unit="1", low=0.0, high=1.0, varies_with=("load",),
+    "gage_saturation",
+    stage="gage",
+    unit="1",
+    low=0.0,
+    high=1.0,
+    varies_with=("load",),
     source="soft limit of glue and amplifier (assumed form)",
-)  # fmt: skip
+)
 def gage_saturation(state: State, strength: float) -> State:
     """Gage or amplifier falls short at large strain.
 

@@ -10,10 +10,14 @@ WATER = 1000.0
 
 
 @effect(
-    "hydroplaning", stage="contact", unit="1", low=0.0, high=0.4,
+    "hydroplaning",
+    stage="contact",
+    unit="1",
+    low=0.0,
+    high=0.4,
     varies_with=("speed", "pressure"),
     source="Horne and Dreher, NASA TN D-2056 (1963): lift as rho v^2 / 2 against inflation",
-)  # fmt: skip
+)
 def hydroplaning(state: State, strength: float) -> State:
     """Water lifts the leading part of the contact, with speed squared.
 

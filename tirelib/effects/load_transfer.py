@@ -9,10 +9,15 @@ DEG_PER_KN = np.deg2rad(1.0) / 1e3
 
 
 @effect(
-    "load_transfer", stage="contact", unit="deg/kN", low=0.0, high=1.5,
-    varies_with=("slip_angle", "lateral"), needs=("side_force",),
+    "load_transfer",
+    stage="contact",
+    unit="deg/kN",
+    low=0.0,
+    high=1.5,
+    varies_with=("slip_angle", "lateral"),
+    needs=("side_force",),
     source="dissertation, section 4.1.4 (inner part unloaded in cornering); assumed size",
-)  # fmt: skip
+)
 def load_transfer(state: State, strength: float) -> State:
     """Side force rolls the belt and moves load across the contact.
 

@@ -9,9 +9,15 @@ from tirelib.effects.harmonics import orders, with_gain
 
 
 @effect(
-    "low_pass", stage="gage", unit="ms", low=0.0, high=1.0, components=2, varies_with=("speed",),
+    "low_pass",
+    stage="gage",
+    unit="ms",
+    low=0.0,
+    high=1.0,
+    components=2,
+    varies_with=("speed",),
     source="lag of second order; of first order, 1 ms is a corner at 160 Hz",
-)  # fmt: skip
+)
 def low_pass(state: State, strength: Sequence[float]) -> State:
     """Amplifier that lags behind the strain.
 

@@ -8,10 +8,15 @@ from tirelib.effects.effect import State, effect
 
 
 @effect(
-    "nonuniformity", stage="gage", unit="ustrain", low=-300.0, high=300.0, components=2,
+    "nonuniformity",
+    stage="gage",
+    unit="ustrain",
+    low=-300.0,
+    high=300.0,
+    components=2,
     varies_with=("angle",),
     source="run-out, imbalance: fixed to the tire as the gage is; the ring has no first harmonic",
-)  # fmt: skip
+)
 def nonuniformity(state: State, strength: Sequence[float]) -> State:
     """Nonuniformity of the tire: a wave of one turn at the gage.
 

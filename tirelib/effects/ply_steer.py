@@ -6,10 +6,15 @@ from tirelib.effects.effect import State, effect
 
 
 @effect(
-    "ply_steer", stage="brush", unit="deg", low=-1.0, high=1.0, varies_with=("speed",),
+    "ply_steer",
+    stage="brush",
+    unit="deg",
+    low=-1.0,
+    high=1.0,
+    varies_with=("speed",),
     needs=("speed",),
     source="Pacejka, Tire and Vehicle Dynamics, ch. 4: ply-steer as an offset of the slip angle",
-)  # fmt: skip
+)
 def ply_steer(state: State, strength: float) -> State:
     """Plies of the belt steer the tire, the other way when it rolls backward.
 

@@ -6,10 +6,15 @@ from tirelib.effects.effect import State, effect
 
 
 @effect(
-    "relaxation", stage="brush", unit="m", low=0.0, high=1.0, varies_with=("slip_angle", "speed"),
+    "relaxation",
+    stage="brush",
+    unit="m",
+    low=0.0,
+    high=1.0,
+    varies_with=("slip_angle", "speed"),
     needs=("speed", "slip_rate"),
     source="Pacejka, Tire and Vehicle Dynamics, ch. 7: first-order lag over the relaxation length",
-)  # fmt: skip
+)
 def relaxation(state: State, strength: float) -> State:
     """Slip at the bristles lags by a rolled distance.
 

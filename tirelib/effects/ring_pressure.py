@@ -4,10 +4,14 @@ from tirelib.effects.effect import State, effect
 
 
 @effect(
-    "ring_pressure", stage="brush", unit="1", low=-0.5, high=2.0,
+    "ring_pressure",
+    stage="brush",
+    unit="1",
+    low=-0.5,
+    high=2.0,
     varies_with=("slip_angle", "slip_ratio"),
     source="dissertation, section 6.6: the flexible ring's pressure in the brush model",
-)  # fmt: skip
+)
 def ring_pressure(state: State, strength: float) -> State:
     """Contact pressure is flatter than a parabola.
 

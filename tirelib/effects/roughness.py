@@ -8,9 +8,14 @@ from tirelib.effects.patch import inward, pressed_again
 
 
 @effect(
-    "roughness", stage="contact", unit="mm^2", low=0.0, high=0.5, varies_with=("load",),
+    "roughness",
+    stage="contact",
+    unit="mm^2",
+    low=0.0,
+    high=0.5,
+    varies_with=("load",),
     source="Greenwood and Williamson (1966) with normal heights and springs as asperities",
-)  # fmt: skip
+)
 def roughness(state: State, strength: float) -> State:
     """Rough road touches the tread before and after the contact and smears its edges.
 

@@ -4,9 +4,14 @@ from tirelib.effects.effect import State, effect
 
 
 @effect(
-    "sidewall_damping", stage="stiffness", unit="1", low=0.0, high=0.3, varies_with=("speed",),
+    "sidewall_damping",
+    stage="stiffness",
+    unit="1",
+    low=0.0,
+    high=0.3,
+    varies_with=("speed",),
     source="dissertation, Fig. 6-33: 0 to 0.1 there; dashpots instead of the modal Eq. (107)",
-)  # fmt: skip
+)
 def sidewall_damping(state: State, strength: float) -> State:
     """Damping of the sidewall, which shifts the contact forward with speed.
 

@@ -9,9 +9,14 @@ REFERENCE = 0.020
 
 
 @effect(
-    "sidewall_load", stage="stiffness", unit="1", low=0.0, high=0.8, varies_with=("load",),
+    "sidewall_load",
+    stage="stiffness",
+    unit="1",
+    low=0.0,
+    high=0.8,
+    varies_with=("load",),
     source="dissertation, Eq. (54): k_u = A exp(B d0), B < 0",
-)  # fmt: skip
+)
 def sidewall_load(state: State, strength: float) -> State:
     """Radial stiffness of the sidewall falls as the tire is pressed.
 

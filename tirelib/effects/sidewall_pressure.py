@@ -9,10 +9,14 @@ REFERENCE = 2.0e5
 
 
 @effect(
-    "sidewall_pressure", stage="stiffness", unit="1", low=-5.0, high=5.0,
+    "sidewall_pressure",
+    stage="stiffness",
+    unit="1",
+    low=-5.0,
+    high=5.0,
     varies_with=("pressure",),
     source="dissertation, Fig. 6-18: k_u is nearly the same at 2.1 and 2.5 bar; assumed form",
-)  # fmt: skip
+)
 def sidewall_pressure(state: State, strength: float) -> State:
     """Radial stiffness of the sidewall departs from its straight line over pressure.
 

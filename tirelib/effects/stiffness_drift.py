@@ -6,10 +6,15 @@ from tirelib.effects.effect import State, effect
 
 
 @effect(
-    "stiffness_drift", stage="brush", unit="1", low=-0.4, high=0.4, varies_with=("order",),
+    "stiffness_drift",
+    stage="brush",
+    unit="1",
+    low=-0.4,
+    high=0.4,
+    varies_with=("order",),
     components=2,
     source="E b / h: a tread that wears gets stiffer; wear during a test (assumed size)",
-)  # fmt: skip
+)
 def stiffness_drift(state: State, strength: tuple[float, float]) -> State:
     """Stiffness of the bristles drifts from the first run to the last.
 

@@ -6,10 +6,15 @@ from tirelib.effects.effect import State, effect
 
 
 @effect(
-    "stiffness_load", stage="brush", unit="1", low=-0.5, high=1.0, varies_with=("load",),
+    "stiffness_load",
+    stage="brush",
+    unit="1",
+    low=-0.5,
+    high=1.0,
+    varies_with=("load",),
     source="Pacejka, Tire and Vehicle Dynamics, ch. 4: cornering stiffness less than in proportion "
     "to load",
-)  # fmt: skip
+)
 def stiffness_load(state: State, strength: float) -> State:
     """Stiffness of the bristles falls with load.
 

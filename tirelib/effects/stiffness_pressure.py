@@ -4,11 +4,16 @@ from tirelib.effects.effect import State, effect
 
 
 @effect(
-    "stiffness_pressure", stage="brush", unit="1", low=-1.5, high=1.5, varies_with=("pressure",),
+    "stiffness_pressure",
+    stage="brush",
+    unit="1",
+    low=-1.5,
+    high=1.5,
+    varies_with=("pressure",),
     needs=("pressure",),
     source="Besselink et al., An improved Magic Formula/Swift tyre model, 2010: pressure terms of "
     "slip stiffness",
-)  # fmt: skip
+)
 def stiffness_pressure(state: State, strength: float) -> State:
     """Stiffness of the contact changes with inflation pressure.
 

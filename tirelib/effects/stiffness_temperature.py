@@ -9,10 +9,15 @@ REFERENCE, SPAN = 323.15, 50.0
 
 
 @effect(
-    "stiffness_temperature", stage="brush", unit="1", low=-0.1, high=1.0,
-    varies_with=("temperature",), needs=("temperature",),
+    "stiffness_temperature",
+    stage="brush",
+    unit="1",
+    low=-0.1,
+    high=1.0,
+    varies_with=("temperature",),
+    needs=("temperature",),
     source="assumed: rubber modulus falls by some 10 % per 20 K above room temperature",
-)  # fmt: skip
+)
 def stiffness_temperature(state: State, strength: float) -> State:
     """Tread rubber softens as it warms up.
 

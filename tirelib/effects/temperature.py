@@ -11,10 +11,14 @@ SPAN = 50.0
 
 
 @effect(
-    "temperature", stage="stiffness", unit="1", low=0.0, high=0.4,
+    "temperature",
+    stage="stiffness",
+    unit="1",
+    low=0.0,
+    high=0.4,
     varies_with=("temperature", "order"),
     source="assumed: rubber modulus falls by some 10 % per 20 K above room temperature",
-)  # fmt: skip
+)
 def temperature(state: State, strength: float) -> State:
     """Rubber of sidewall and tread softens as the tire warms up.
 

@@ -8,10 +8,15 @@ from tirelib.effects.patch import pressed_again
 
 
 @effect(
-    "traction", stage="contact", unit="1", low=0.0, high=3.0, varies_with=("slip_ratio",),
+    "traction",
+    stage="contact",
+    unit="1",
+    low=0.0,
+    high=3.0,
+    varies_with=("slip_ratio",),
     needs=("drive_force",),
     source="dissertation, section 4.1.5, Fig. 4-17: braking raises the second compressive peak",
-)  # fmt: skip
+)
 def traction(state: State, strength: float) -> State:
     """Drive or brake force makes the two compressive peaks unequal.
 

@@ -10,9 +10,14 @@ START, WIDTH = 0.5, 0.2
 
 
 @effect(
-    "trailing_sliding", stage="contact", unit="1", low=0.0, high=0.5, varies_with=("load",),
+    "trailing_sliding",
+    stage="contact",
+    unit="1",
+    low=0.0,
+    high=0.5,
+    varies_with=("load",),
     source="dissertation, sections 6.3.3 and 6.5.2.2: sliding in the rear, even in free rolling",
-)  # fmt: skip
+)
 def trailing_sliding(state: State, strength: float) -> State:
     """Sliding in the rear of the contact, where the tread loses its outward shear.
 

@@ -13,10 +13,15 @@ BUILT_UP = 1.0 / 3.0
 
 
 @effect(
-    "tread_friction", stage="strain", unit="1", low=-0.05, high=0.5, components=2,
+    "tread_friction",
+    stage="strain",
+    unit="1",
+    low=-0.05,
+    high=0.5,
+    components=2,
     varies_with=("load",),
     source="dissertation, chapter 7, Fig. 7-3; on the ring as well (assumed form)",
-)  # fmt: skip
+)
 def tread_friction(state: State, strength: Sequence[float]) -> State:
     """Outward shear of the tread, held by the road, compresses the belt in the contact.
 

@@ -7,9 +7,14 @@ REFERENCE = 4000.0
 
 
 @effect(
-    "tread_load", stage="tread", unit="1", low=-0.5, high=0.5, varies_with=("load",),
+    "tread_load",
+    stage="tread",
+    unit="1",
+    low=-0.5,
+    high=0.5,
+    varies_with=("load",),
     source="rubber blocks harden when pressed, grooves close (assumed form and size)",
-)  # fmt: skip
+)
 def tread_load(state: State, strength: float) -> State:
     """Tread that is stiffer, or softer, under higher load.
 

@@ -4,9 +4,14 @@ from tirelib.effects.effect import State, effect
 
 
 @effect(
-    "tread_wear", stage="tread", unit="1", low=0.0, high=0.4, varies_with=("order",),
+    "tread_wear",
+    stage="tread",
+    unit="1",
+    low=0.0,
+    high=0.4,
+    varies_with=("order",),
     source="k_t = E b / h; loss of thickness during a campaign (assumed size)",
-)  # fmt: skip
+)
 def tread_wear(state: State, strength: float) -> State:
     """Wear: thinner, stiffer tread and a smaller radius with every run.
 

@@ -139,9 +139,7 @@ def force_families(varying: Collection[str]) -> dict[str, list[Powers]]:
     """
     slopes: list[Powers] = [{name: 1} for name in ODD]
     camber = [G1] if "camber" in varying else []
-    families = {
-        name: grid([*slopes, *camber], [{name: 1}]) for name in SHAPE if name in varying
-    }  # fmt: skip
+    families = {name: grid([*slopes, *camber], [{name: 1}]) for name in SHAPE if name in varying}
     pairs = [times(a, b) for i, a in enumerate(slopes) for b in slopes[i:]]
     families["cubes"] = _unique([grid(pairs, slopes)])[0]
     if camber:

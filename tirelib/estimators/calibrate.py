@@ -177,10 +177,8 @@ def calibrate_chain(
     turns = {**regressors, "speed_squared": regressors["speed"] ** 2}
     chain = replace(
         chain,
-        likeness=fit_likeness(
-            values, groups, varying_of(values, list(VARIES)), turns, unit, rows
-        ),
-    )  # fmt: skip
+        likeness=fit_likeness(values, groups, varying_of(values, list(VARIES)), turns, unit, rows),
+    )
     return with_ranges(with_floor(chain, regressors, unit, rows), values, truth), links
 
 
@@ -273,15 +271,27 @@ def _fit_load(
     varying, level = varying_of(values, list(VARIES)), links.load_level()
     candidates = basis.load_candidates(varying)
     grown = grow(
-        values, truth - correction, links.groups, candidates, basis.load_families(varying),
-        odd=ODD, level=level,
-    )  # fmt: skip
+        values,
+        truth - correction,
+        links.groups,
+        candidates,
+        basis.load_families(varying),
+        odd=ODD,
+        level=level,
+    )
     candidates += [grown] if grown and grown not in candidates else []
     try:
         fit = fit_best(
-            values, truth - correction, links.groups, candidates, odd=ODD, level=level,
-            between=links.between(), outermost=links.outermost(), what="Fz",
-        )  # fmt: skip
+            values,
+            truth - correction,
+            links.groups,
+            candidates,
+            odd=ODD,
+            level=level,
+            between=links.between(),
+            outermost=links.outermost(),
+            what="Fz",
+        )
     except CalibrationError as error:
         links.refused["Fz"] = str(error)
         links.values["load"] = np.full(truth.shape, mean)
@@ -312,8 +322,13 @@ def _fit_radius(links: Links, say: Callable[[str], None]) -> Polynomial | None:
         radius = np.repeat(radius, 2)
     ends = outermost({name: part[name] for name in sorted(varying)})
     fit = fit_best(
-        part, radius, groups, basis.radius_candidates(varying), outermost=list(ends), what="R_eff",
-    )  # fmt: skip
+        part,
+        radius,
+        groups,
+        basis.radius_candidates(varying),
+        outermost=list(ends),
+        what="R_eff",
+    )
     held_radius = fit.model.predict(values)[0]
     held_radius[np.flatnonzero(free)[: fit.held_out.size]] = fit.held_out[: int(free.sum())]
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -345,14 +360,28 @@ def _fit_odd(links: Links, truth: FloatArray, what: str) -> Fit:
     varying -= _frozen_with_slip(links, varying)
     candidates, odd = basis.force_candidates(varying), (*ODD, "camber")
     grown = grow(
-        values, truth, links.groups, candidates, basis.force_families(varying), odd=odd,
-        level=links.load_level(), centre=False,
-    )  # fmt: skip
+        values,
+        truth,
+        links.groups,
+        candidates,
+        basis.force_families(varying),
+        odd=odd,
+        level=links.load_level(),
+        centre=False,
+    )
     candidates += [grown] if grown and grown not in candidates else []
     return fit_best(
-        values, truth, links.groups, candidates, odd=odd, level=links.load_level(),
-        between=links.between(), outermost=links.outermost(), centre=False, what=what,
-    )  # fmt: skip
+        values,
+        truth,
+        links.groups,
+        candidates,
+        odd=odd,
+        level=links.load_level(),
+        between=links.between(),
+        outermost=links.outermost(),
+        centre=False,
+        what=what,
+    )
 
 
 def _fit_moment(
@@ -380,10 +409,16 @@ def _fit_drag(
     pull, varying = -links.truth["Fx"] / links.truth["Fz"], varying_of(links.values, list(VARIES))
     try:
         return fit_best(
-            links.values, pull, links.groups, basis.load_candidates(varying), odd=(*ODD, "camber"),
-            level=links.load_level(), between=links.between(), outermost=links.outermost(),
+            links.values,
+            pull,
+            links.groups,
+            basis.load_candidates(varying),
+            odd=(*ODD, "camber"),
+            level=links.load_level(),
+            between=links.between(),
+            outermost=links.outermost(),
             what="Fx",
-        ).model  # fmt: skip
+        ).model
     except CalibrationError:
         return None
 
@@ -396,10 +431,14 @@ def fit_sliding_of(links: Links) -> SlidingCurve | None:
         return None
     return fit_sliding(
         Runs(
-            *needed, truth["Fx"], truth["Mz"], links.values["camber"], truth["slip_ratio"],
+            *needed,
+            truth["Fx"],
+            truth["Mz"],
+            links.values["camber"],
+            truth["slip_ratio"],
             links.values["friction"],
         )
-    )  # fmt: skip
+    )
 
 
 def _road(links: Links) -> Road:
@@ -452,10 +491,18 @@ def _fit_angle(
     weights = steady / (1.0 + (sharpness * steep) ** 2)
     for _ in range(2):
         fit = fit_best(
-            values, truth, links.groups, candidates, odd=odd, level=links.load_level(),
-            between=links.between(), outermost=links.outermost(), weights=weights, centre=False,
+            values,
+            truth,
+            links.groups,
+            candidates,
+            odd=odd,
+            level=links.load_level(),
+            between=links.between(),
+            outermost=links.outermost(),
+            weights=weights,
+            centre=False,
             what="alpha",
-        )  # fmt: skip
+        )
         steep = np.maximum(steep, np.abs(fit.model.slope(values, "utilisation")))
         weights = steady / (1.0 + (sharpness * steep) ** 2)
     _keep(links, "alpha", fit, fit.held_out + moved)
@@ -470,9 +517,11 @@ def _by_friction(links: Links, sliding: SlidingCurve | None) -> tuple[FloatArray
         return none, none
     used = np.abs(links.truth["Fy"] / links.truth["Fz"])
     told = sliding.at(
-        used, links.truth["Fz"], np.where(np.isnan(friction), sliding.friction, friction),
+        used,
+        links.truth["Fz"],
+        np.where(np.isnan(friction), sliding.friction, friction),
         links.truth["slip_ratio"],
-    )  # fmt: skip
+    )
     side = np.where(links.truth["slip_angle"] < 0.0, -1.0, 1.0)
     return side * told.change, np.fmin(told.std, 1.0)
 
@@ -496,9 +545,12 @@ def _weighed(
         return float(np.sum(np.log(variance) + error**2 / variance))
 
     best = minimize(
-        surprise, np.array([-1.0, -1.0, -3.0]), method="Nelder-Mead", bounds=[(-9.0, 9.0)] * 3,
+        surprise,
+        np.array([-1.0, -1.0, -3.0]),
+        method="Nelder-Mead",
+        bounds=[(-9.0, 9.0)] * 3,
         options={"maxiter": 2000},
-    )  # fmt: skip
+    )
     constant, square, fourth = np.exp(best.x) * unit
     known = unit * (np.exp(best.x) @ shape)
     if model.border is None:

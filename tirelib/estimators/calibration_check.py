@@ -14,9 +14,19 @@ AXES = "iso"
 UNITS = {"Fz": "N", "R_eff": "m", "Fy": "N", "Mz": "1", "Fx": "1", "alpha": "rad"}
 """Models of a chain with the unit of their coefficients."""
 REGRESSORS = frozenset(
-    (*EVEN, *ODD, *SHAPE, "pressure", "speed_squared", "camber", "load", "utilisation",
-     "slip_ratio", "slip_size")
-)  # fmt: skip
+    (
+        *EVEN,
+        *ODD,
+        *SHAPE,
+        "pressure",
+        "speed_squared",
+        "camber",
+        "load",
+        "utilisation",
+        "slip_ratio",
+        "slip_size",
+    )
+)
 """Names that a polynomial or a range may use."""
 QUANTITIES = frozenset(("Fz", "alpha", "kappa", "Fy"))
 BORDER = ("near", "growth", "far")

@@ -96,11 +96,13 @@ def read_calibration(path: str | Path) -> Calibration:
     try:
         document = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
-        raise FormatError(f"{where}: cannot be read ({error.strerror}); give a file made by "
-                          "`tirelib calibrate`") from None  # fmt: skip
+        raise FormatError(
+            f"{where}: cannot be read ({error.strerror}); give a file made by `tirelib calibrate`"
+        ) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise FormatError(f"{where}: is not TOML ({error}); give a file made by "
-                          "`tirelib calibrate`") from None  # fmt: skip
+        raise FormatError(
+            f"{where}: is not TOML ({error}); give a file made by `tirelib calibrate`"
+        ) from None
     given = document.get("format")
     if given not in (FORMAT, FIRST_FORMAT):
         raise FormatError(
@@ -169,9 +171,12 @@ def _chain_table(chain: Chain) -> dict[str, Any]:
             for field in fields(curve)
         }
     models = {
-        "Fz": chain.load, "R_eff": chain.radius, "Fy": chain.force, "Mz": chain.moment,
+        "Fz": chain.load,
+        "R_eff": chain.radius,
+        "Fy": chain.force,
+        "Mz": chain.moment,
         "Fx": chain.drag,
-    }  # fmt: skip
+    }
     if chain.likeness is not None:
         table["likeness"] = _likeness_table(chain.likeness)
     for name, model in models.items():
@@ -224,8 +229,13 @@ def _chain(table: Mapping[str, Any]) -> Chain:
         gages=tuple(int(gage) - 1 for gage in table["gages"]),
         guards={
             quantity: tuple(
-                Range(str(r["name"]), float(r["low"]), float(r["high"]), float(r["slack"]),
-                      bool(r["needed"]))
+                Range(
+                    str(r["name"]),
+                    float(r["low"]),
+                    float(r["high"]),
+                    float(r["slack"]),
+                    bool(r["needed"]),
+                )
                 for r in ranges
             )
             for quantity, ranges in table["range"].items()
@@ -243,7 +253,7 @@ def _chain(table: Mapping[str, Any]) -> Chain:
         sliding=_sliding(table, angle),
         road=Road(**{name: _pair(pair) for name, pair in table.get("road", {}).items()}),
         likeness=_likeness(table["likeness"]) if "likeness" in table else None,
-    )  # fmt: skip
+    )
 
 
 def _likeness_table(known: Likeness) -> dict[str, Any]:

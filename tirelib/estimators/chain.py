@@ -333,12 +333,20 @@ class Chain:
             if self.drag is not None:
                 pull, pull_std = self.drag.predict(values)
                 pull_std = np.where(np.isfinite(slip), pull_std, np.inf)
-            widest = max([known.high for known in self.guards["alpha"] if known.name == "alpha"]
-                         or [WIDEST])  # fmt: skip
+            widest = max(
+                [known.high for known in self.guards["alpha"] if known.name == "alpha"] or [WIDEST]
+            )
             seen = Seen(
-                np.abs(used), load, slip, values.get("slip_std", 0.0 * used), moment, std, pull,
-                pull_std, unseen,
-            )  # fmt: skip
+                np.abs(used),
+                load,
+                slip,
+                values.get("slip_std", 0.0 * used),
+                moment,
+                std,
+                pull,
+                pull_std,
+                unseen,
+            )
             open_ = tell(curve, seen, widest)
             told = open_ if told is None else told.where(known, open_)
         return replace(told, change=side * told.change, sliding=unseen * told.sliding)

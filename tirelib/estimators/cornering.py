@@ -110,9 +110,12 @@ def _fit_one(angle: FloatArray, force: FloatArray) -> tuple[float, float, float,
         warnings.simplefilter("error", OptimizeWarning)
         try:
             found, covariance = curve_fit(
-                magic_formula, angle, force, p0=(slope, 1.1 * top, 0.0),
+                magic_formula,
+                angle,
+                force,
+                p0=(slope, 1.1 * top, 0.0),
                 bounds=([0.2 * slope, 0.8 * top, -10.0], [5.0 * slope, 3.0 * top, 1.0]),
-            )  # fmt: skip
+            )
         except (RuntimeError, OptimizeWarning):
             return None
     std = np.sqrt(np.diag(covariance))

@@ -15,8 +15,13 @@ from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.train import Trained, take
 from tirelib.observations import Observations, mean_by
 
-LEVELS = {"load": (250.0, "N"), "pressure": (1e4, "bar"), "speed": (0.5 / 3.6, "km/h"),
-          "camber": (0.01, "deg"), "slip_ratio": (0.005, "1")}  # fmt: skip
+LEVELS = {
+    "load": (250.0, "N"),
+    "pressure": (1e4, "bar"),
+    "speed": (0.5 / 3.6, "km/h"),
+    "camber": (0.01, "deg"),
+    "slip_ratio": (0.005, "1"),
+}
 """Conditions of which a level is held out, with the least distance of two levels (SI)."""
 FACTOR = {"bar": 1e-5, "km/h": 3.6, "deg": 180.0 / np.pi, "N": 1.0, "1": 1.0}
 TRUTH_NAME = {"Fz": "Fz", "alpha": "slip_angle", "kappa": "slip_ratio", "Fy": "Fy"}
@@ -80,14 +85,18 @@ def leave_levels_out(
             factor, unit = FACTOR[REPORT_UNIT[quantity]], observations.unit
             made.append(
                 HeldOut(
-                    condition, label, quantity, REPORT_UNIT[quantity], inside,
+                    condition,
+                    label,
+                    quantity,
+                    REPORT_UNIT[quantity],
+                    inside,
                     n=int(np.unique(unit[good]).size),
                     dissertation=_dissertation(trained.means, observations, quantity, test),
                     in_use=factor * _rmse(error, unit, good),
                     in_range=float(valid.sum() / good.sum()),
                     in_use_in_range=factor * _rmse(error, unit, valid) if valid.any() else None,
                 )
-            )  # fmt: skip
+            )
     return tuple(made)
 
 

@@ -142,9 +142,14 @@ def fit_all(means: Means) -> tuple[tuple[Regression, ...], dict[str, str]]:
     skipped: dict[str, str] = {}
 
     def add(
-        name: str, source: str, quantity: str, unit: str, y: FloatArray,
-        columns: dict[str, FloatArray], rows: BoolArray | None = None,
-    ) -> None:  # fmt: skip
+        name: str,
+        source: str,
+        quantity: str,
+        unit: str,
+        y: FloatArray,
+        columns: dict[str, FloatArray],
+        rows: BoolArray | None = None,
+    ) -> None:
         try:
             made.append(_fit(name, source, quantity, unit, y, columns, means.groups, rows))
         except CalibrationError as error:
@@ -153,19 +158,34 @@ def fit_all(means: Means) -> tuple[tuple[Regression, ...], dict[str, str]]:
     plain = ~(np.abs(means.camber) > UPRIGHT) & ~(np.abs(means.slip_ratio) > FREE)
     middle = length[:, centre]
     add(
-        "load from centre contact length", "Fig. 4-4", "Fz", "N", means.load,
-        {"CL@centre": middle, "CL@centre^2": middle**2}, plain,
-    )  # fmt: skip
+        "load from centre contact length",
+        "Fig. 4-4",
+        "Fz",
+        "N",
+        means.load,
+        {"CL@centre": middle, "CL@centre^2": middle**2},
+        plain,
+    )
     ratio = rate[:, right] / rate[:, left]
     small = plain & (np.abs(means.slip_angle) <= SMALL_ANGLE)
     add(
-        "slip angle from in/out ratio of peak rates", "Fig. 4-5", "alpha", "deg",
-        means.slip_angle, {"ratio": ratio, "ratio^2": ratio**2}, small,
-    )  # fmt: skip
+        "slip angle from in/out ratio of peak rates",
+        "Fig. 4-5",
+        "alpha",
+        "deg",
+        means.slip_angle,
+        {"ratio": ratio, "ratio^2": ratio**2},
+        small,
+    )
     add(
-        "slip angle from slope of peak rates", "Fig. 4-7", "alpha", "deg", means.slip_angle,
-        {"slope": means.rate_slope}, small,
-    )  # fmt: skip
+        "slip angle from slope of peak rates",
+        "Fig. 4-7",
+        "alpha",
+        "deg",
+        means.slip_angle,
+        {"slope": means.rate_slope},
+        small,
+    )
     force = means.lateral_force
     add("Fy from six regressors", "Table 4-1", "Fy", "N", force, lengths | peaks, small)
     add("Fy from three contact lengths", "section 4.1.4", "Fy", "N", force, lengths, small)
@@ -175,9 +195,14 @@ def fit_all(means: Means) -> tuple[tuple[Regression, ...], dict[str, str]]:
         for level in levels:
             rows = (np.round(means.camber) == level) & ~(np.abs(means.slip_ratio) > FREE)
             add(
-                f"Fy from six regressors, camber {level + 0.0:+.0f} deg", "Table 4-2", "Fy", "N",
-                force, lengths | peaks, rows,
-            )  # fmt: skip
+                f"Fy from six regressors, camber {level + 0.0:+.0f} deg",
+                "Table 4-2",
+                "Fy",
+                "N",
+                force,
+                lengths | peaks,
+                rows,
+            )
     return tuple(made), skipped
 
 

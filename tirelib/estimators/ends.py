@@ -95,8 +95,9 @@ def near(fit: Ridge, x: FloatArray) -> float:
     return float(np.quantile(leverage(x, fit.covariance), NEAR))
 
 
-def growth(errors: Sequence[FloatArray], inside: Sequence[FloatArray],
-           beyond: Sequence[FloatArray]) -> float:  # fmt: skip
+def growth(
+    errors: Sequence[FloatArray], inside: Sequence[FloatArray], beyond: Sequence[FloatArray]
+) -> float:
     """Return the growth for which errors at the worst end are one standard deviation on average.
 
     Parameters

@@ -91,10 +91,11 @@ def fit_sliding(runs: Runs) -> SlidingCurve | None:
             np.where(pulled, pull - along, 0.0),
             np.where(
                 good & free & has_moment,
-                turned / found.longest(load) - side * aligned - found.camber[1] * camber, 0.0,
+                turned / found.longest(load) - side * aligned - found.camber[1] * camber,
+                0.0,
             ),
             along,
-        )  # fmt: skip
+        )
 
     def cost(x: FloatArray) -> FloatArray:
         apart, slanted, twisted, _ = left(x)
@@ -108,8 +109,23 @@ def fit_sliding(runs: Runs) -> SlidingCurve | None:
     rows = good & free
     small = rows & (np.abs(angle) < np.median(np.abs(angle[rows])) + 1e-9)
     steep = float(abs(used[small] @ angle[small]) / max(angle[small] @ angle[small], 1e-12))
-    start = np.array([usual, 3.0, 2.0, np.log(max(steep, 1.0)), 0.0, 0.0, np.log(0.03), 0.5,
-                      0.0, 0.0, 0.0, 0.0, 0.0])  # fmt: skip
+    start = np.array(
+        [
+            usual,
+            3.0,
+            2.0,
+            np.log(max(steep, 1.0)),
+            0.0,
+            0.0,
+            np.log(0.03),
+            0.5,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        ]
+    )
     low = np.array([0.2, 1.3, 0.5, 0.0, -2.0, -2.0, -7.0, -2.0, -5.0, -40.0, -2.0, -2.0, -2.0])
     high = np.array([1.6, 8.0, 6.0, 5.0, 2.0, 2.0, -1.0, 2.0, 5.0, 40.0, 2.0, 2.0, 2.0])
     if not tilted:

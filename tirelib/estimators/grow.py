@@ -124,10 +124,14 @@ def held_out_errors(
         rows = group == number
         squares[rows] = _left_out(hat, rest, rows) ** 2
     conditions = float(np.mean(squares))
-    levels = [] if level is None else [
-        float(np.mean(_left_out(hat, rest, rows)[inside] ** 2))
-        for rows, inside in inner_levels(x, level)
-    ]  # fmt: skip
+    levels = (
+        []
+        if level is None
+        else [
+            float(np.mean(_left_out(hat, rest, rows)[inside] ** 2))
+            for rows, inside in inner_levels(x, level)
+        ]
+    )
     both = 0.5 * conditions + 0.5 * float(np.mean(levels or [conditions]))
     return Errors(float(np.sqrt(conditions)), float(np.sqrt(both)))
 

@@ -18,8 +18,18 @@ EVEN = ("contact_angle", "compression", "traction", "tension")
 """Regressors that keep their sign when left and right change places."""
 ODD = ("cp1_slope", "cp2_slope", "angle_slope", "tp_slope")
 """Regressors that change their sign when left and right change places."""
-SHAPE = ("angle_bow", "tp_bow", "cp1_bow", "cp2_bow", "fullness", "skew", "steepness",
-         "steepness_change", "lead_bend", "trail_bend")  # fmt: skip
+SHAPE = (
+    "angle_bow",
+    "tp_bow",
+    "cp1_bow",
+    "cp2_bow",
+    "fullness",
+    "skew",
+    "steepness",
+    "steepness_change",
+    "lead_bend",
+    "trail_bend",
+)
 """Even regressors of the contact's shape, over its width and along it."""
 FEWEST_FOR_BOW = 3
 CONDITIONS = ("pressure", "speed", "camber")

@@ -62,16 +62,18 @@ def cost_rows(costs: Sequence[Cost]) -> list[dict[str, Any]]:
     rows = []
     for cost in costs:
         unit, factor = EDGE_UNIT[cost.quantity]
-        rows.append({
-            "condition": cost.unknown,
-            "column": COLUMN[cost.unknown],
-            "quantity": cost.quantity,
-            "unit": unit,
-            "std": _number(factor * cost.std),
-            "std_if_given": _number(factor * cost.std_if_given),
-            "valid": cost.valid,
-            "valid_if_given": cost.valid_if_given,
-        })  # fmt: skip
+        rows.append(
+            {
+                "condition": cost.unknown,
+                "column": COLUMN[cost.unknown],
+                "quantity": cost.quantity,
+                "unit": unit,
+                "std": _number(factor * cost.std),
+                "std_if_given": _number(factor * cost.std_if_given),
+                "valid": cost.valid,
+                "valid_if_given": cost.valid_if_given,
+            }
+        )
     return rows
 
 
@@ -109,8 +111,15 @@ def _summary(
     value, std, truth = (x * factor for x in run_means(quantity, observations, estimates, floor))
     known = np.isfinite(truth)
     value, std, truth = value[known], std[known], truth[known]
-    empty = {"rmse": None, "unit": unit, "r2": None, "n": 0, "rmse_percent_of_range": None,
-             "coverage_95": None, "bias": None}  # fmt: skip
+    empty = {
+        "rmse": None,
+        "unit": unit,
+        "r2": None,
+        "n": 0,
+        "rmse_percent_of_range": None,
+        "coverage_95": None,
+        "bias": None,
+    }
     if value.size == 0:
         return empty
     error = value - truth

@@ -80,10 +80,12 @@ class Told:
 
     def where(self, rows: BoolArray, other: "Told") -> "Told":
         """Return this in the chosen rows, the other elsewhere."""
-        return Told(*(
-            np.where(rows, getattr(self, field.name), getattr(other, field.name))
-            for field in fields(self)
-        ))  # fmt: skip
+        return Told(
+            *(
+                np.where(rows, getattr(self, field.name), getattr(other, field.name))
+                for field in fields(self)
+            )
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,9 +288,17 @@ def brush_through(model: Polynomial, utilisation: float, load: tuple[float, floa
 
     def brush(friction: float) -> SlidingCurve:
         return SlidingCurve(
-            friction, USUAL_FRICTION[1], 1.0, *BRUSH, tuple(stiffness.tolist()), (0.0,), (0.0,),
-            (0.0, 0.0), np.inf, np.inf,
-        )  # fmt: skip
+            friction,
+            USUAL_FRICTION[1],
+            1.0,
+            *BRUSH,
+            tuple(stiffness.tolist()),
+            (0.0,),
+            (0.0,),
+            (0.0, 0.0),
+            np.inf,
+            np.inf,
+        )
 
     tried = np.linspace(max(0.7, 1.05 * utilisation), 1.3, 25)
     reached = [brush(mu).at(used[:1], middle, np.array([mu])).angle[0] for mu in tried.tolist()]

@@ -31,12 +31,16 @@ def extension_document(done: Extension, file: TireFile) -> dict[str, Any]:
         for fold, old, new in zip(done.folds, done.held_before, done.held_after, strict=True)
     ]
     head = {
-        "campaign": done.runs.waves.header.name, "quantity": "strain",
-        **named_errors(done.given, done.reached), "error_refitted": done.refitted.value,
-        "runs": run_errors(done), "floor": done.floor, "delay_us": 1e6 * done.after.delay,
+        "campaign": done.runs.waves.header.name,
+        "quantity": "strain",
+        **named_errors(done.given, done.reached),
+        "error_refitted": done.refitted.value,
+        "runs": run_errors(done),
+        "floor": done.floor,
+        "delay_us": 1e6 * done.after.delay,
         "heldout_error_before": pooled(done.held_before, done.folds),
         "heldout_error_after": pooled(done.held_after, done.folds),
-    }  # fmt: skip
+    }
     return step_document(done, file, head, held_out, messages)
 
 
@@ -76,9 +80,12 @@ def waterfall(file: TireFile, quantity: str) -> list[dict[str, Any]]:
 
     def row(action: str, effect: str | None, entry: Mapping[str, Any], when: str) -> dict[str, Any]:
         return {
-            "action": action, "effect": effect, "error": entry.get(f"error_{when}{suffix}"),
-            "heldout_error": entry.get(f"heldout_error_{when}{suffix}"), "unit": unit,
-        }  # fmt: skip
+            "action": action,
+            "effect": effect,
+            "error": entry.get(f"error_{when}{suffix}"),
+            "heldout_error": entry.get(f"heldout_error_{when}{suffix}"),
+            "unit": unit,
+        }
 
     first = row("start", None, told[0], "before")
     return [first, *(row(e["action"], e["effect"], e, "after") for e in told)]

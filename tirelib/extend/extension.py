@@ -131,11 +131,14 @@ class _Strain:
         """Return a step with its runs and errors."""
         near = step.before.correction.contact
         return Extension(
-            **vars(step), given=self.yardstick.error(self.model, start=near),
+            **vars(step),
+            given=self.yardstick.error(self.model, start=near),
             refitted=self.yardstick.error(step.before.model, start=near),
             reached=self.yardstick.error(step.after.model, start=step.after.correction.contact),
-            out_before=self.seen[0], out_after=self.seen[1], runs=self.runs,
-        )  # fmt: skip
+            out_before=self.seen[0],
+            out_after=self.seen[1],
+            runs=self.runs,
+        )
 
     @property
     def effects(self) -> list[Effect]:
@@ -169,16 +172,24 @@ class _Strain:
         strength, _ = candidates(self.data, before, [effect]).living[0].alone(self.data, before)
         start: FloatArray = np.clip(strength, START_INSIDE * effect.low, START_INSIDE * effect.high)
         return refit(
-            self.data, before.values, [*before.effects, effect], [*before.strengths, start],
-            delay=before.delay, progress=self.progress,
-        )  # fmt: skip
+            self.data,
+            before.values,
+            [*before.effects, effect],
+            [*before.strengths, start],
+            delay=before.delay,
+            progress=self.progress,
+        )
 
     def without(self, before: Refit, kept: Sequence[int]) -> Refit:
         """Return the fit with some of the effects."""
         return refit(
-            self.data, before.values, [before.effects[k] for k in kept],
-            [before.strengths[k] for k in kept], delay=before.delay, progress=self.progress,
-        )  # fmt: skip
+            self.data,
+            before.values,
+            [before.effects[k] for k in kept],
+            [before.strengths[k] for k in kept],
+            delay=before.delay,
+            progress=self.progress,
+        )
 
     def left_out(self) -> Sequence[Fold]:
         """Return the runs that are left out in turn."""
@@ -193,6 +204,10 @@ class _Strain:
     def floor(self, after: Refit) -> float:
         """Return the error that the structure of the ring leaves."""
         return structural_floor(
-            self.yardstick.error(after.model, start=after.correction.contact), self.runs,
-            self.data, after, members=self.members, progress=self.progress,
-        )  # fmt: skip
+            self.yardstick.error(after.model, start=after.correction.contact),
+            self.runs,
+            self.data,
+            after,
+            members=self.members,
+            progress=self.progress,
+        )

@@ -35,12 +35,15 @@ def force_extension_document(done: ForceExtension, file: TireFile) -> dict[str, 
     ]
     errors = _errors(done)
     head = {
-        "campaign": case.name, "quantity": case.quantity, "noise": case.noise,
-        "error_unit": case.unit, **errors,
+        "campaign": case.name,
+        "quantity": case.quantity,
+        "noise": case.noise,
+        "error_unit": case.unit,
+        **errors,
         "residual_rms_before": errors["error_before"] / case.factor,
         "residual_rms_after": errors["error_after"] / case.factor,
         "residual_rms_unit": UNITS[case.quantity],
-    }  # fmt: skip
+    }
     return step_document(done, file, head, held_out, messages)
 
 

@@ -150,9 +150,11 @@ class _Force:
     def without(self, before: ForceFit, kept: Sequence[int]) -> ForceFit:
         """Return the fit with some of the effects."""
         return fit_force(
-            self.case.problem, before.values, [before.effects[k] for k in kept],
+            self.case.problem,
+            before.values,
+            [before.effects[k] for k in kept],
             [before.strengths[k] for k in kept],
-        )  # fmt: skip
+        )
 
     def left_out(self) -> Sequence[ForceFold]:
         """Return the points that are left out in turn."""
@@ -170,8 +172,12 @@ class _Force:
         if not np.isfinite(case.noise):
             return float("nan")
         rests = force_ensemble(
-            case.problem, after, ForceRanking(case.problem, after, nothing), noise=case.noise,
-            members=self.members, progress=self.progress,
-        ).rests  # fmt: skip
+            case.problem,
+            after,
+            ForceRanking(case.problem, after, nothing),
+            noise=case.noise,
+            members=self.members,
+            progress=self.progress,
+        ).rests
         share = force_floor(case.problem, after, rests, case.noise) / after.error
         return case.error(after) * share

@@ -33,9 +33,12 @@ def extended_file(file: TireFile, done: Extension, data_hash: str) -> TireFile:
             faults.append(f"{coordinate.name} after the fit: {fault}; the effect is not added")
         elif np.isfinite(value):
             numbers[coordinate.name] = _number(
-                file.numbers.get(coordinate.name), value, fit_std, coordinate.unit == 0.0,
+                file.numbers.get(coordinate.name),
+                value,
+                fit_std,
+                coordinate.unit == 0.0,
                 f"strain waveforms of {name}, {len(done.runs.waves)} straight runs",
-            )  # fmt: skip
+            )
     if faults:
         raise FormatError(faults)
     history = [*file.extra.get("history", []), _entry(file, done, data_hash)]
@@ -95,12 +98,14 @@ def _effects(file: TireFile, done: Extension) -> list[dict[str, Any]]:
     out = []
     for index, effect in enumerate(done.after.effects):
         deviation = done.after.strength_std(index)
-        out.append({
-            "effect": effect.name,
-            "strength": plain(done.after.strengths[index]),
-            "std": plain(deviation),
-            "unit": effect.unit,
-        })  # fmt: skip
+        out.append(
+            {
+                "effect": effect.name,
+                "strength": plain(done.after.strengths[index]),
+                "std": plain(deviation),
+                "unit": effect.unit,
+            }
+        )
     return out
 
 
@@ -151,9 +156,11 @@ def plain(values: np.ndarray) -> float | list[float]:
 def written(number: Number) -> dict[str, Any]:
     """Return a number as a history entry holds it."""
     table: dict[str, Any] = {
-        "value_SI": number.value, "kind": number.kind, "source": number.source,
+        "value_SI": number.value,
+        "kind": number.kind,
+        "source": number.source,
         "notes": dict(number.notes),
-    }  # fmt: skip
+    }
     if np.isfinite(number.std):
         table["std_SI"] = number.std
     return table
@@ -161,6 +168,9 @@ def written(number: Number) -> dict[str, Any]:
 
 def _read(table: Mapping[str, Any]) -> Number:
     return Number(
-        float(table["value_SI"]), float(table.get("std_SI", np.nan)), str(table["kind"]),
-        str(table["source"]), dict(table.get("notes", {})),
-    )  # fmt: skip
+        float(table["value_SI"]),
+        float(table.get("std_SI", np.nan)),
+        str(table["kind"]),
+        str(table["source"]),
+        dict(table.get("notes", {})),
+    )

@@ -201,6 +201,15 @@ def _judged(
     if any(counted):
         flags.append("heldout_worse")
     return Step(
-        action, effect, strength, std, before, after, subject.floor(after), folds, held_before,
-        held_after, tuple(flags),
-    )  # fmt: skip
+        action,
+        effect,
+        strength,
+        std,
+        before,
+        after,
+        subject.floor(after),
+        folds,
+        held_before,
+        held_after,
+        tuple(flags),
+    )

@@ -82,9 +82,12 @@ def build_fmu(
 
     _check_writable(Path(out))
     spec = strain_tire(
-        calibration, samples_per_step=samples_per_step, sample_rate=sample_rate, buffered=buffered,
+        calibration,
+        samples_per_step=samples_per_step,
+        sample_rate=sample_rate,
+        buffered=buffered,
         missing=missing,
-    )  # fmt: skip
+    )
     return export(spec, out, progress)
 
 
@@ -133,7 +136,7 @@ def export(spec: SlaveSpec, out: str | Path, progress: Callable[[str], None] | N
             **spec.resources,
             "settings.json": json.dumps(settings, indent=1).encode(),
             "guid.txt": str(settings["guid"]).encode(),
-        }.items():  # fmt: skip
+        }.items():
             place = folder / path
             place.parent.mkdir(parents=True, exist_ok=True)
             place.write_bytes(data)

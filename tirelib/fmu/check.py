@@ -66,8 +66,9 @@ def check_fmu(
     path = Path(file)
     names = _archive(path)
     if importlib.util.find_spec("fmpy") is None:
-        raise FormatError("fmu check: fmpy is not installed; it runs the FMU; "
-                          "`pip install tirelib[fmu]`")  # fmt: skip
+        raise FormatError(
+            "fmu check: fmpy is not installed; it runs the FMU; `pip install tirelib[fmu]`"
+        )
     own = "resources/settings.json" in names and "resources/slavemodule.txt" in names
     document: dict[str, Any] = {
         "format": FORMAT,
@@ -105,8 +106,11 @@ def _add(document: dict[str, Any], name: str, passed: bool, detail: str) -> None
 
 
 def _environment() -> dict[str, str]:
-    found = {"python": platform.python_version(), "platform": platform.platform(),
-             "tirelib": __version__}  # fmt: skip
+    found = {
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "tirelib": __version__,
+    }
     for package in ("numpy", "scipy", "fmpy", "pythonfmu"):
         try:
             found[package] = metadata.version(package)
@@ -159,8 +163,14 @@ def _damage(path: Path) -> str:
             return "a name stands in the archive twice"
         try:
             broken = archive.testzip()
-        except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError, EOFError,
-                ValueError) as error:  # fmt: skip
+        except (
+            zipfile.BadZipFile,
+            NotImplementedError,
+            RuntimeError,
+            OSError,
+            EOFError,
+            ValueError,
+        ) as error:
             return f"a file in the archive cannot be read: {error}"
         except Exception as error:  # zlib.error and what other compressions raise
             return f"a file in the archive is damaged: {error}"
@@ -179,14 +189,22 @@ def _take_reference(source: Path, target: Path) -> None:
 def _try(path: Path, folder: Path, document: dict[str, Any]) -> None:
     """Run the trial in its own process and take over what it found."""
     command = [sys.executable, "-m", "tirelib.fmu.trial", str(path.resolve()), str(folder)]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[2]),
-                   os.environ.get("PYTHONPATH", "")]).rstrip(os.pathsep)}  # fmt: skip
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(
+            [str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")]
+        ).rstrip(os.pathsep),
+    }
     end = ""
     try:
         told = subprocess.run(
-            command, capture_output=True, timeout=TIME_LIMIT, check=False, cwd=folder,
+            command,
+            capture_output=True,
+            timeout=TIME_LIMIT,
+            check=False,
+            cwd=folder,
             env=environment,
-        )  # fmt: skip
+        )
         if told.returncode < 0:
             end = f"its process died of signal {-told.returncode}"
         elif told.returncode:
@@ -223,8 +241,13 @@ def _compare(path: Path, folder: Path, document: dict[str, Any], names: list[str
                 text = archive.read(f"{place}.csv").decode("utf-8", "replace")
     if text is None:
         if document["made_by_tirelib"] and model is not None:
-            _add(document, "reference", False, "the reference signals that `tirelib fmu build` "
-                 "puts inside are missing; build the FMU anew")  # fmt: skip
+            _add(
+                document,
+                "reference",
+                False,
+                "the reference signals that `tirelib fmu build` "
+                "puts inside are missing; build the FMU anew",
+            )
         return
     if not passed.get("run") or not (folder / "result.csv").is_file():
         _add(document, "reference", False, "not compared: the run failed")
@@ -241,8 +264,14 @@ def _compare(path: Path, folder: Path, document: dict[str, Any], names: list[str
     document["curves"] = _curves(head, wanted, shown, given)
     bad = [row["name"] for row in document["variables"] if not row["passed"]]
     rows = document["variables"]
-    _add(document, "reference", not bad, f"{', '.join(bad[:8])} differ from what is expected"
-         if bad else f"{len(rows)} outputs at {len(wanted)} points as expected")  # fmt: skip
+    _add(
+        document,
+        "reference",
+        not bad,
+        f"{', '.join(bad[:8])} differ from what is expected"
+        if bad
+        else f"{len(rows)} outputs at {len(wanted)} points as expected",
+    )
 
 
 def _table(text: str) -> tuple[list[str], Any]:
@@ -277,15 +306,17 @@ def _differences(
         size = float(np.nanmax(np.abs(a), initial=0.0))
         worst = int(apart.argmax())
         limit = document["tolerance"] * size
-        rows.append({
-            "name": name,
-            "unit": document["units"].get(name, ""),
-            "largest_difference": None if math.isinf(apart[worst]) else float(apart[worst]),
-            "allowed": limit,
-            "magnitude": size,
-            "time": float(wanted[worst, 0]),
-            "passed": bool(apart[worst] <= limit),
-        })  # fmt: skip
+        rows.append(
+            {
+                "name": name,
+                "unit": document["units"].get(name, ""),
+                "largest_difference": None if math.isinf(apart[worst]) else float(apart[worst]),
+                "allowed": limit,
+                "magnitude": size,
+                "time": float(wanted[worst, 0]),
+                "passed": bool(apart[worst] <= limit),
+            }
+        )
     return rows
 
 

@@ -65,9 +65,14 @@ def _text(value: float) -> str:
 
 
 def contact_strain(
-    angle: FloatArray, half: FloatArray | float, lateral: Sequence[float], tilt: float, dip: float,
-    tension: float, imbalance: float = 0.0,
-) -> FloatArray:  # fmt: skip
+    angle: FloatArray,
+    half: FloatArray | float,
+    lateral: Sequence[float],
+    tilt: float,
+    dip: float,
+    tension: float,
+    imbalance: float = 0.0,
+) -> FloatArray:
     """Return a smooth stand-in for innerliner strain, shape (n_gages, n). It is no tire model.
 
     A plateau of tension over the contact with smooth edges, compressive dips beside it, longer on

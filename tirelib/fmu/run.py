@@ -184,8 +184,9 @@ def play_run(fmu: LoadedFmu, run: Run) -> Iterator[dict[str, Any]]:
         If two turns end within one frame.
     """
     if run.strain is None:
-        raise CalibrationError(f"run {run.plan.run}: the file holds no strain; strain_1 .. "
-                               "strain_N are needed")  # fmt: skip
+        raise CalibrationError(
+            f"run {run.plan.run}: the file holds no strain; strain_1 .. strain_N are needed"
+        )
     times = run.time()
     table = np.stack(list(conditions_of(run, times).values()))
     fmu.start(run.rate)
@@ -274,8 +275,17 @@ def _features(rows: list[dict[str, Any]], calibration: Calibration) -> Features:
     per_gage = np.full((len(rows), len(calibration.lateral)), np.nan)
     values: dict[str, Any] = {field.name: per_gage for field in fields(Features)}
     per_turn = np.full(len(rows), np.nan)
-    unknown = ("speed", "pressure", "camber", "axis_shift", "friction", "tread_depth",
-               "tread_temperature", "angle_std", "slip_std")  # fmt: skip
+    unknown = (
+        "speed",
+        "pressure",
+        "camber",
+        "axis_shift",
+        "friction",
+        "tread_depth",
+        "tread_temperature",
+        "angle_std",
+        "slip_std",
+    )
     values |= dict.fromkeys(unknown, per_turn)
     omega = _column(rows, "turn_rate")
     values |= {

@@ -77,9 +77,12 @@ def strain_reference(
     conditions = [getattr(scene, name, math.nan) for name in HELD]
     for at in range(counts.size - 1):
         wheel.step(
-            frames[at].tolist(), step, not lost[at], *conditions,
+            frames[at].tolist(),
+            step,
+            not lost[at],
+            *conditions,
             count=int(counts[at]) if buffered else None,
-        )  # fmt: skip
+        )
         rows.append(_row(wheel))
     table = np.array(rows)
     return Reference(step, given, {name: table[:, i] for i, name in enumerate(names)})
@@ -99,9 +102,14 @@ def _counts(n: int, samples: int, buffered: bool) -> FloatArray:
 
 
 def _inputs(
-    calibration: Calibration, scene: _Scene, strain: FloatArray, counts: FloatArray, samples: int,
-    *, buffered: bool,
-) -> dict[str, FloatArray]:  # fmt: skip
+    calibration: Calibration,
+    scene: _Scene,
+    strain: FloatArray,
+    counts: FloatArray,
+    samples: int,
+    *,
+    buffered: bool,
+) -> dict[str, FloatArray]:
     n = counts.size
     frames = np.zeros((n, samples, strain.shape[0]))
     first = 0
@@ -151,9 +159,7 @@ class _Shape:
 
     def strain(self, angle: FloatArray, lateral: tuple[float, ...]) -> FloatArray:
         half = self.half * (1.0 + WAVE * np.sin(0.5 * angle + PHASE))
-        return contact_strain(
-            angle, half, lateral, TILT, self.dip, self.tension, self.imbalance
-        )  # fmt: skip
+        return contact_strain(angle, half, lateral, TILT, self.dip, self.tension, self.imbalance)
 
 
 def _made_up(calibration: Calibration, rate: float) -> _Scene:

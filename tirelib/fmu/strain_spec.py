@@ -23,14 +23,22 @@ MODEL = "StrainTire"
 DESCRIPTION = "Load, slip angle, slip ratio and lateral force from innerliner strain"
 MOST_SAMPLES = 256
 """Largest frame: a turn must be longer than a frame, or its estimate would be overwritten."""
-_SHOWN = {"Fz": ("N", 1.0), "alpha": ("deg", 180.0 / math.pi), "kappa": ("%", 100.0),
-          "Fy": ("N", 1.0)}  # fmt: skip
+_SHOWN = {
+    "Fz": ("N", 1.0),
+    "alpha": ("deg", 180.0 / math.pi),
+    "kappa": ("%", 100.0),
+    "Fy": ("N", 1.0),
+}
 
 
 def strain_tire(
-    calibration: str | Path, *, samples_per_step: int, sample_rate: float, buffered: bool,
+    calibration: str | Path,
+    *,
+    samples_per_step: int,
+    sample_rate: float,
+    buffered: bool,
     missing: float = math.nan,
-) -> SlaveSpec:  # fmt: skip
+) -> SlaveSpec:
     """Return what `tirelib.fmu.build.export` needs; see `tirelib.fmu.build.build_fmu`.
 
     Raises
@@ -98,17 +106,19 @@ def _page(
     facts = {
         "tire": calibration.tire,
         "gages": ", ".join(f"{1e3 * y:+g}" for y in calibration.lateral) + " mm, ISO 8855",
-        "samples per step": f"up to {samples} (input samples)" if settings["buffered"]
+        "samples per step": f"up to {samples} (input samples)"
+        if settings["buffered"]
         else str(samples),
         "sample rate": f"{rate:g} Hz (parameter sample_rate)",
         "communication step": f"{1e3 * samples / rate:g} ms",
         "low-pass": f"{calibration.order:g} cycles per turn"
-        if calibration.cut_off is None else f"{calibration.cut_off:g} Hz",
+        if calibration.cut_off is None
+        else f"{calibration.cut_off:g} Hz",
         "axis systems": "iso (default), sae, adapted_sae (parameter axes)",
         "needs": "CPython 3.11 or newer with numpy and scipy; linux64 or win64",
         "version": "{version}",
         "licences": "documentation/licenses: MIT, tirelib and pythonfmu",
-    }  # fmt: skip
+    }
     drawing = source_file("conventions.svg").read_text(encoding="utf-8")
     sections = {
         "Conventions": f"{drawing}\n{_CONVENTIONS}",
@@ -129,10 +139,15 @@ def _accuracy(document: Mapping[str, Any]) -> str:
         if error is None:
             continue
         fit = known.get("r2")
-        rows.append((
-            quantity, f"{error:.3g} {unit}", "" if fit is None else f"{fit:.5f}",
-            f"{known.get('n', '')}", f"{known.get('conditions', '')}",
-        ))  # fmt: skip
+        rows.append(
+            (
+                quantity,
+                f"{error:.3g} {unit}",
+                "" if fit is None else f"{fit:.5f}",
+                f"{known.get('n', '')}",
+                f"{known.get('conditions', '')}",
+            )
+        )
     data = ", ".join(str(part.get("name", "")) for part in document.get("data", []))
     if not rows:
         return "<p>The calibration holds no statistics.</p>"
@@ -154,8 +169,9 @@ def _ranges(calibration: Calibration) -> str:
         for known in guards:
             if known.name == quantity:
                 unit, factor = _SHOWN[quantity]
-                rows.append((quantity, f"{factor * known.low:.4g}", f"{factor * known.high:.4g}",
-                             unit))  # fmt: skip
+                rows.append(
+                    (quantity, f"{factor * known.low:.4g}", f"{factor * known.high:.4g}", unit)
+                )
     head = ("quantity", "from", "to", "unit")
     return f"{html_table(head, rows)}\n<p>Outside, the quantity is not valid (out_of_range).</p>"
 

@@ -85,9 +85,13 @@ def _run(record: Record, description: Any, unpacked: Path, fmu: Path, folder: Pa
         messages.append(message.decode("utf-8", "replace"))
 
     common: dict[str, Any] = {
-        "filename": str(unpacked), "model_description": description, "validate": False,
-        "logger": keep, "debug_logging": True, "timeout": 300.0,
-    }  # fmt: skip
+        "filename": str(unpacked),
+        "model_description": description,
+        "validate": False,
+        "logger": keep,
+        "debug_logging": True,
+        "timeout": 300.0,
+    }
     model = description.modelName
     signals = unpacked / "resources" / "reference"
     if (folder / "reference").is_dir():
@@ -101,9 +105,11 @@ def _run(record: Record, description: Any, unpacked: Path, fmu: Path, folder: Pa
             step = float(getattr(experiment, "stepSize", None) or 1e-3)
             start = float(getattr(experiment, "startTime", None) or 0.0)
             result = simulate_fmu(
-                **common, start_time=start, stop_time=start + MOST_STEPS * step,
+                **common,
+                start_time=start,
+                stop_time=start + MOST_STEPS * step,
                 output_interval=step,
-            )  # fmt: skip
+            )
             return f"{len(result) - 1} steps of {step:g} s without input"
         given = read_csv(signals / f"{model}_in.csv")
         wanted = read_csv(signals / f"{model}_ref.csv").dtype.names[1:]
@@ -111,11 +117,20 @@ def _run(record: Record, description: Any, unpacked: Path, fmu: Path, folder: Pa
         if missing:
             raise ValueError(f"outputs of the reference are missing: {', '.join(missing[:8])}")
         result = simulate_fmu(
-            **common, start_time=options["StartTime"], stop_time=options["StopTime"],
-            output_interval=options["StepSize"], input=given, output=list(wanted),
-        )  # fmt: skip
-        np.savetxt(folder / "result.csv", np.array(result.tolist()), delimiter=",",
-                   header=",".join(result.dtype.names), comments="")  # fmt: skip
+            **common,
+            start_time=options["StartTime"],
+            stop_time=options["StopTime"],
+            output_interval=options["StepSize"],
+            input=given,
+            output=list(wanted),
+        )
+        np.savetxt(
+            folder / "result.csv",
+            np.array(result.tolist()),
+            delimiter=",",
+            header=",".join(result.dtype.names),
+            comments="",
+        )
         return f"{len(result) - 1} steps of {options['StepSize']:g} s with the reference input"
 
     record.content["platforms"] = sorted(supported_platforms(str(fmu)))

@@ -14,8 +14,12 @@ LIMITS = {"Fz": (-1e5, 1e5), "alpha": (-RIGHT, RIGHT), "kappa": (None, None), "F
 """A number outside says that the wiring is wrong; nothing is clamped to them."""
 UNITS = {"Fz": "N", "alpha": "rad", "kappa": "1", "Fy": "N"}
 DISPLAY = {"Fz": None, "alpha": "deg", "kappa": "%", "Fy": None}
-MEANING = {"Fz": "vertical load", "alpha": "slip angle", "kappa": "slip ratio",
-           "Fy": "lateral force"}  # fmt: skip
+MEANING = {
+    "Fz": "vertical load",
+    "alpha": "slip angle",
+    "kappa": "slip ratio",
+    "Fy": "lateral force",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,25 +53,69 @@ def parameters(
 ) -> list[Variable]:
     """Return the parameters, fixed after initialisation."""
     return [
-        Variable("sample_rate", "Real", "parameter", "sample rate of the gages", sample_rate,
-                 "Hz", "kHz", 1e4, *limits, type="Frequency"),
-        Variable("filter_order", "Real", "parameter",
-                 "cut-off of the low-pass, cycles per turn: a check that the calibration was made "
-                 "with this one; 0: whatever it was made with", 0.0, "1", None, 10.0, 0.0, 1e3,
-                 type="Ratio"),
-        Variable(MISSING, "Real", "parameter",
-                 "what Real outputs show where there is no value, as before the first turn: NaN, "
-                 "or a number for importers that take none; valid and flags are the same", missing,
-                 "1", None, 1.0, -1e9, 1e9, type="Ratio"),
-        Variable("axes", "String", "parameter",
-                 "axis system of outputs and gage order: iso, sae or adapted_sae", "iso"),
-        Variable("calibration", "String", "parameter",
-                 "path of another calibration of the same tire and gage layout; empty: the "
-                 "embedded one", ""),
-        Variable("tire", "String", "parameter",
-                 "name of the tire on the wheel, which the calibration must be of; empty: the "
-                 "embedded calibration's", ""),
-    ]  # fmt: skip
+        Variable(
+            "sample_rate",
+            "Real",
+            "parameter",
+            "sample rate of the gages",
+            sample_rate,
+            "Hz",
+            "kHz",
+            1e4,
+            *limits,
+            type="Frequency",
+        ),
+        Variable(
+            "filter_order",
+            "Real",
+            "parameter",
+            "cut-off of the low-pass, cycles per turn: a check that the calibration was made "
+            "with this one; 0: whatever it was made with",
+            0.0,
+            "1",
+            None,
+            10.0,
+            0.0,
+            1e3,
+            type="Ratio",
+        ),
+        Variable(
+            MISSING,
+            "Real",
+            "parameter",
+            "what Real outputs show where there is no value, as before the first turn: NaN, "
+            "or a number for importers that take none; valid and flags are the same",
+            missing,
+            "1",
+            None,
+            1.0,
+            -1e9,
+            1e9,
+            type="Ratio",
+        ),
+        Variable(
+            "axes",
+            "String",
+            "parameter",
+            "axis system of outputs and gage order: iso, sae or adapted_sae",
+            "iso",
+        ),
+        Variable(
+            "calibration",
+            "String",
+            "parameter",
+            "path of another calibration of the same tire and gage layout; empty: the embedded one",
+            "",
+        ),
+        Variable(
+            "tire",
+            "String",
+            "parameter",
+            "name of the tire on the wheel, which the calibration must be of; empty: the "
+            "embedded calibration's",
+            "",
+        ),
+    ]
 
 
 def inputs(
@@ -90,40 +138,131 @@ def inputs(
             which = "" if samples == 1 else f", sample {sample} of {samples}, oldest first"
             text = f"raw strain at lateral position {1e3 * y:+g} mm of the chosen axes{which}"
             table.append(
-                Variable(name, "Real", "input", f"{text}; NaN: missing", 0.0, "1", "ustrain", 1e-3,
-                         -1.0, 1.0, type="Strain")
-            )  # fmt: skip
+                Variable(
+                    name,
+                    "Real",
+                    "input",
+                    f"{text}; NaN: missing",
+                    0.0,
+                    "1",
+                    "ustrain",
+                    1e-3,
+                    -1.0,
+                    1.0,
+                    type="Strain",
+                )
+            )
     table += [
-        Variable("speed", "Real", "input", "travel speed; NaN: unknown", NAN, "m/s", "km/h", 10.0,
-                 -150.0, 150.0, type="Speed"),
-        Variable("pressure", "Real", "input", "inflation pressure (gauge); NaN: unknown", NAN,
-                 "Pa", "bar", 1e5, 0.0, 2e6, type="Pressure"),
-        Variable("camber", "Real", "input", "camber angle; NaN: unknown, which a calibration at "
-                 "one camber answers with a large Fy_std and alpha_std (camber_unknown in status)",
-                 NAN, "rad", "deg", 0.1,
-                 -RIGHT, RIGHT, type="Angle"),
-        Variable("omega", "Real", "input",
-                 "measured turn rate: its change within the turn is the wheel angle's; zero: "
-                 "standing; NaN: unknown", NAN,
-                 "rad/s", "rpm", 10.0, -1e3, 1e3, type="TurnRate"),
-        Variable("friction", "Real", "input",
-                 "coefficient of friction between tread and road; NaN: unknown", NAN, "1", None,
-                 1.0, *ends["friction"], type="Ratio"),
-        Variable("tread_depth", "Real", "input",
-                 "depth of the tread's grooves that is left; NaN: unknown", NAN, "m", "mm", 0.01,
-                 *ends["tread_depth"], type="Length"),
-        Variable("tread_temperature", "Real", "input",
-                 "temperature of the tread's rubber; NaN: unknown", NAN, "K", None, 300.0,
-                 *ends["tread_temperature"], type="Temperature"),
-        Variable("frame_valid", "Boolean", "input",
-                 "false: the frame was lost or damaged, its samples are missing", True),
-    ]  # fmt: skip
+        Variable(
+            "speed",
+            "Real",
+            "input",
+            "travel speed; NaN: unknown",
+            NAN,
+            "m/s",
+            "km/h",
+            10.0,
+            -150.0,
+            150.0,
+            type="Speed",
+        ),
+        Variable(
+            "pressure",
+            "Real",
+            "input",
+            "inflation pressure (gauge); NaN: unknown",
+            NAN,
+            "Pa",
+            "bar",
+            1e5,
+            0.0,
+            2e6,
+            type="Pressure",
+        ),
+        Variable(
+            "camber",
+            "Real",
+            "input",
+            "camber angle; NaN: unknown, which a calibration at "
+            "one camber answers with a large Fy_std and alpha_std (camber_unknown in status)",
+            NAN,
+            "rad",
+            "deg",
+            0.1,
+            -RIGHT,
+            RIGHT,
+            type="Angle",
+        ),
+        Variable(
+            "omega",
+            "Real",
+            "input",
+            "measured turn rate: its change within the turn is the wheel angle's; zero: "
+            "standing; NaN: unknown",
+            NAN,
+            "rad/s",
+            "rpm",
+            10.0,
+            -1e3,
+            1e3,
+            type="TurnRate",
+        ),
+        Variable(
+            "friction",
+            "Real",
+            "input",
+            "coefficient of friction between tread and road; NaN: unknown",
+            NAN,
+            "1",
+            None,
+            1.0,
+            *ends["friction"],
+            type="Ratio",
+        ),
+        Variable(
+            "tread_depth",
+            "Real",
+            "input",
+            "depth of the tread's grooves that is left; NaN: unknown",
+            NAN,
+            "m",
+            "mm",
+            0.01,
+            *ends["tread_depth"],
+            type="Length",
+        ),
+        Variable(
+            "tread_temperature",
+            "Real",
+            "input",
+            "temperature of the tread's rubber; NaN: unknown",
+            NAN,
+            "K",
+            None,
+            300.0,
+            *ends["tread_temperature"],
+            type="Temperature",
+        ),
+        Variable(
+            "frame_valid",
+            "Boolean",
+            "input",
+            "false: the frame was lost or damaged, its samples are missing",
+            True,
+        ),
+    ]
     if buffered:
         table.append(
-            Variable("samples", "Integer", "input",
-                     "how many samples of the frame are new, oldest first; the step may have any "
-                     "length", 0, low=0, high=samples)
-        )  # fmt: skip
+            Variable(
+                "samples",
+                "Integer",
+                "input",
+                "how many samples of the frame are new, oldest first; the step may have any length",
+                0,
+                low=0,
+                high=samples,
+            )
+        )
     return table
 
 
@@ -131,50 +270,140 @@ def outputs(lateral: tuple[float, ...]) -> list[Variable]:
     """Return the outputs: what `Wheel.outputs` gives, in its order."""
     nominal = {"Fz": 1e3, "alpha": 0.1, "kappa": 0.1, "Fy": 1e3}
     table = [
-        Variable(q, "Real", "output", f"{MEANING[q]}; NaN: not to be had", NAN, UNITS[q],
-                 DISPLAY[q], nominal[q], *LIMITS[q], type=TYPE[q])
+        Variable(
+            q,
+            "Real",
+            "output",
+            f"{MEANING[q]}; NaN: not to be had",
+            NAN,
+            UNITS[q],
+            DISPLAY[q],
+            nominal[q],
+            *LIMITS[q],
+            type=TYPE[q],
+        )
         for q in QUANTITIES
-    ]  # fmt: skip
+    ]
     table += [
-        Variable(f"{q}_std", "Real", "output", f"standard deviation of {q}", NAN, UNITS[q],
-                 DISPLAY[q], 0.01 * nominal[q], 0.0, type=TYPE[q])
+        Variable(
+            f"{q}_std",
+            "Real",
+            "output",
+            f"standard deviation of {q}",
+            NAN,
+            UNITS[q],
+            DISPLAY[q],
+            0.01 * nominal[q],
+            0.0,
+            type=TYPE[q],
+        )
         for q in QUANTITIES
-    ]  # fmt: skip
+    ]
     table += [
-        Variable(f"contact_length_{gage}", "Real", "output",
-                 f"contact length, corrected for the reading's bias, at lateral position "
-                 f"{1e3 * y:+g} mm of the chosen axes", NAN, "m", "mm", 0.1, 0.0, 1.0,
-                 type="Length")
+        Variable(
+            f"contact_length_{gage}",
+            "Real",
+            "output",
+            f"contact length, corrected for the reading's bias, at lateral position "
+            f"{1e3 * y:+g} mm of the chosen axes",
+            NAN,
+            "m",
+            "mm",
+            0.1,
+            0.0,
+            1.0,
+            type="Length",
+        )
         for gage, y in enumerate(lateral, start=1)
-    ]  # fmt: skip
+    ]
     table += [
-        Variable(f"contact_length_std_{gage}", "Real", "output",
-                 f"standard deviation of contact_length_{gage}", NAN, "m", "mm", 0.01, 0.0, 1.0,
-                 type="Length")
+        Variable(
+            f"contact_length_std_{gage}",
+            "Real",
+            "output",
+            f"standard deviation of contact_length_{gage}",
+            NAN,
+            "m",
+            "mm",
+            0.01,
+            0.0,
+            1.0,
+            type="Length",
+        )
         for gage in range(1, len(lateral) + 1)
-    ]  # fmt: skip
+    ]
     return [
         *table,
-        Variable("rolling_radius", "Real", "output", "effective rolling radius", NAN, "m", "mm",
-                 0.3, 0.0, 2.0, type="Length"),
-        Variable("turn_rate", "Real", "output", "turn rate from the strain's contacts", NAN,
-                 "rad/s", "rpm", 10.0, 0.0, type="TurnRate"),
-        Variable("contact_time", "Real", "output",
-                 "middle of the contact, since the start of the first sample", NAN, "s", "ms", 1.0,
-                 0.0, type="Time"),
-        Variable("age", "Real", "output", "time since the estimate was made", NAN, "s", "ms", 0.1,
-                 0.0, type="Time"),
+        Variable(
+            "rolling_radius",
+            "Real",
+            "output",
+            "effective rolling radius",
+            NAN,
+            "m",
+            "mm",
+            0.3,
+            0.0,
+            2.0,
+            type="Length",
+        ),
+        Variable(
+            "turn_rate",
+            "Real",
+            "output",
+            "turn rate from the strain's contacts",
+            NAN,
+            "rad/s",
+            "rpm",
+            10.0,
+            0.0,
+            type="TurnRate",
+        ),
+        Variable(
+            "contact_time",
+            "Real",
+            "output",
+            "middle of the contact, since the start of the first sample",
+            NAN,
+            "s",
+            "ms",
+            1.0,
+            0.0,
+            type="Time",
+        ),
+        Variable(
+            "age",
+            "Real",
+            "output",
+            "time since the estimate was made",
+            NAN,
+            "s",
+            "ms",
+            0.1,
+            0.0,
+            type="Time",
+        ),
         Variable("turn", "Integer", "output", "number of contacts since the start", 0, low=0),
-        Variable("flags", "Integer", "output", "sum of flag bits, named in status", 1, low=0,
-                 high=2 * max(TurnFlag) - 1),
-        Variable("valid", "Boolean", "output",
-                 "every calibrated quantity may be used now", False),
+        Variable(
+            "flags",
+            "Integer",
+            "output",
+            "sum of flag bits, named in status",
+            1,
+            low=0,
+            high=2 * max(TurnFlag) - 1,
+        ),
+        Variable("valid", "Boolean", "output", "every calibrated quantity may be used now", False),
         *(
             Variable(f"{q}_valid", "Boolean", "output", f"{q} may be used now", False)
             for q in QUANTITIES
         ),
         Variable("rolling", "String", "output", "free, braking, driving or unknown", "unknown"),
-        Variable("status", "String", "output",
-                 "names of flags and notes, by semicolons; the cause of a fault or refused step",
-                 "first_turn"),
-    ]  # fmt: skip
+        Variable(
+            "status",
+            "String",
+            "output",
+            "names of flags and notes, by semicolons; the cause of a fault or refused step",
+            "first_turn",
+        ),
+    ]

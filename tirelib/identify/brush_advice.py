@@ -78,10 +78,9 @@ def advice(study: Study) -> dict[str, str]:
             if name in best and share[k] < best[name][1]:
                 best[name] = (candidate.words, float(share[k]))
     return {
-        name: words if words == NO_RUN
-        else f"{words} (standard deviation to {100 * share:.0f} %)"
+        name: words if words == NO_RUN else f"{words} (standard deviation to {100 * share:.0f} %)"
         for name, (words, share) in best.items()
-    }  # fmt: skip
+    }
 
 
 def candidates(study: Study) -> tuple[Candidate, ...]:
@@ -95,27 +94,48 @@ def candidates(study: Study) -> tuple[Candidate, ...]:
     angles = np.array([-far, -0.8 * far, 0.8 * far, far])
     small = np.array([s * a for a in _ANGLES for s in (-1.0, 1.0)])
     ratios = np.array([s * r for r in _RATIOS for s in (-1.0, 1.0)])
-    other = 0.5 * float(data.load.min()) if np.ptp(data.load) < 0.3 * load else 1.5 * float(
-        data.load.max())  # fmt: skip
+    other = (
+        0.5 * float(data.load.min())
+        if np.ptp(data.load) < 0.3 * load
+        else 1.5 * float(data.load.max())
+    )
     out = [
-        Candidate(f"slip angles up to {far:.0f} deg at {load:.0f} N", side,
-                  _runs(study, np.deg2rad(angles), load, pressure)),
-        Candidate(f"slip angles of 1 to 6 deg, either sign, at {load:.0f} N", side,
-                  _runs(study, np.deg2rad(small), load, pressure)),
-        Candidate(f"slip angles of 1 to 6 deg at another load, {other:.0f} N", side,
-                  _runs(study, np.deg2rad(small), other, pressure)),
-        Candidate(f"slip ratios of 0.01 to 0.15, drive and brake, at {load:.0f} N", along,
-                  _runs(study, ratios, load, pressure, along=True)),
-    ]  # fmt: skip
+        Candidate(
+            f"slip angles up to {far:.0f} deg at {load:.0f} N",
+            side,
+            _runs(study, np.deg2rad(angles), load, pressure),
+        ),
+        Candidate(
+            f"slip angles of 1 to 6 deg, either sign, at {load:.0f} N",
+            side,
+            _runs(study, np.deg2rad(small), load, pressure),
+        ),
+        Candidate(
+            f"slip angles of 1 to 6 deg at another load, {other:.0f} N",
+            side,
+            _runs(study, np.deg2rad(small), other, pressure),
+        ),
+        Candidate(
+            f"slip ratios of 0.01 to 0.15, drive and brake, at {load:.0f} N",
+            along,
+            _runs(study, ratios, load, pressure, along=True),
+        ),
+    ]
     if np.isfinite(pressure):
         out.append(
-            Candidate(f"slip angles of 1 to 6 deg at {1.3e-5 * pressure:.2g} bar", side,
-                      _runs(study, np.deg2rad(small), load, 1.3 * pressure))
-        )  # fmt: skip
+            Candidate(
+                f"slip angles of 1 to 6 deg at {1.3e-5 * pressure:.2g} bar",
+                side,
+                _runs(study, np.deg2rad(small), load, 1.3 * pressure),
+            )
+        )
     if "Mz" not in fit.rmse and np.ptp(data.slip_angle) > 0.0:
         step = max(1, len(data) // 200)
-        out.append(Candidate("Mz recorded in the same runs", ("Mz",), data.take(
-            np.arange(0, len(data), step))))  # fmt: skip
+        out.append(
+            Candidate(
+                "Mz recorded in the same runs", ("Mz",), data.take(np.arange(0, len(data), step))
+            )
+        )
     return tuple(out)
 
 
@@ -157,9 +177,12 @@ def _information(
     """Return J^T K^-1 J of one force at points, with scatter and smooth misfit in K."""
     joined = _joined(parts)
     here = replace(
-        problem, data=joined, forces=(force,), half=_half(study, joined),
+        problem,
+        data=joined,
+        forces=(force,),
+        half=_half(study, joined),
         scale=np.array([_scale(study, force)]),
-    )  # fmt: skip
+    )
     slope = here.jacobian(z)
     if known is None:
         shape, variance = Shape(0.5, 1.0, 0.9), 1.0
@@ -167,9 +190,13 @@ def _information(
         shape, variance = known.shape, min(known.variance, _MOST_VARIANCE)
     brush = point_parameters(_values(study), joined, study.fit.reference, here.half)
     at = Conditions(
-        joined.load, np.nan_to_num(joined.pressure, nan=1.0), joined.slip_angle,
-        joined.slip_ratio, joined.camber, *sliding_slips(brush, joined.load),
-    )  # fmt: skip
+        joined.load,
+        np.nan_to_num(joined.pressure, nan=1.0),
+        joined.slip_angle,
+        joined.slip_ratio,
+        joined.camber,
+        *sliding_slips(brush, joined.load),
+    )
     scatter = (at.load / study.misfit.load) ** 2
     smooth = kernel(force, shape, at, study.misfit.load)
     K = shape.share * smooth + np.diag((1.0 - shape.share) * scatter)
@@ -199,9 +226,17 @@ def _points(at: Conditions) -> ForceData:
     n = at.load.size
     one = np.ones(n)
     return ForceData(
-        at.load, at.pressure, at.slip_angle, at.slip_ratio, at.camber, np.full(n, np.nan),
-        one, one, one, np.arange(n),
-    )  # fmt: skip
+        at.load,
+        at.pressure,
+        at.slip_angle,
+        at.slip_ratio,
+        at.camber,
+        np.full(n, np.nan),
+        one,
+        one,
+        one,
+        np.arange(n),
+    )
 
 
 def _scale(study: Study, force: str) -> float:

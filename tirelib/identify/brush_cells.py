@@ -86,9 +86,14 @@ def cells_of(problem: Problem, z: FloatArray, robust: float | None) -> tuple[Cel
             weight = weight * robust / np.maximum(np.abs(residual[k]), robust)
         mean = _Mean(number, weight)
         at = Conditions(
-            mean(data.load), mean(np.nan_to_num(data.pressure, nan=1.0)), mean(data.slip_angle),
-            mean(data.slip_ratio), mean(data.camber), mean(angle), mean(ratio),
-        )  # fmt: skip
+            mean(data.load),
+            mean(np.nan_to_num(data.pressure, nan=1.0)),
+            mean(data.slip_angle),
+            mean(data.slip_ratio),
+            mean(data.camber),
+            mean(angle),
+            mean(ratio),
+        )
         columns = [mean(slope[k, :, j]) for j in range(z.size)]
         misfit = -mean(residual[k])
         bend = mean(_bend(name, brush, data)) / float(scale[k])
@@ -154,9 +159,12 @@ def cell_numbers(data: ForceData) -> IntArray:
     share = 1.0
     while True:
         rows = [
-            levels(data.load), levels(data.pressure), np.round(data.camber / (_CAMBER * share)),
-            _bins(data.slip_angle, share), _bins(data.slip_ratio, share),
-        ]  # fmt: skip
+            levels(data.load),
+            levels(data.pressure),
+            np.round(data.camber / (_CAMBER * share)),
+            _bins(data.slip_angle, share),
+            _bins(data.slip_ratio, share),
+        ]
         _, number = np.unique(np.stack(rows), axis=1, return_inverse=True)
         if number.max() < MOST:
             return np.asarray(number, dtype=np.int64).ravel()

@@ -164,8 +164,11 @@ def with_help(estimate: BrushEstimate, helps: str) -> BrushEstimate:
 def slip_stiffness(study: Study) -> tuple[SlipStiffness, ...]:
     """Return cornering and longitudinal stiffness at each load and pressure of the data."""
     data, fit = study.problem.data, study.fit
-    slips = [s for s, names in (("slip_angle", ("Fy", "Mz")), ("slip_ratio", ("Fx",)))
-             if set(names) & set(fit.rmse)]  # fmt: skip
+    slips = [
+        s
+        for s, names in (("slip_angle", ("Fy", "Mz")), ("slip_ratio", ("Fx",)))
+        if set(names) & set(fit.rmse)
+    ]
     pair = np.stack([levels(data.load), levels(data.pressure)])
     _, number = np.unique(pair, axis=1, return_inverse=True)
     number = np.asarray(number).ravel()
@@ -184,16 +187,23 @@ def slip_stiffness(study: Study) -> tuple[SlipStiffness, ...]:
     errors = _errors(
         study,
         np.stack([gradient[slip][i] for slip, i in keys]),
-        [slope_terms(study, slip, 1.0, float(load[i]), float(pressure[i]), float(value[slip][i]))
-         for slip, i in keys],
-    )  # fmt: skip
+        [
+            slope_terms(study, slip, 1.0, float(load[i]), float(pressure[i]), float(value[slip][i]))
+            for slip, i in keys
+        ],
+    )
     out = []
     for (slip, i), error in zip(keys, errors, strict=True):
         size = float(value[slip][i])
         out.append(
             SlipStiffness(
-                slip, float(load[i]), float(pressure[i]), size, size * error.std,
-                size * float(np.exp(error.low)), size * float(np.exp(error.high)),
+                slip,
+                float(load[i]),
+                float(pressure[i]),
+                size,
+                size * error.std,
+                size * float(np.exp(error.low)),
+                size * float(np.exp(error.high)),
             )
-        )  # fmt: skip
+        )
     return tuple(out)

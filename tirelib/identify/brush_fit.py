@@ -90,10 +90,14 @@ class BrushFit:
             half = float(half_lengths(self.tire, *at)[0])
         assert half is not None  # noqa: S101 - without a ring it is fitted or held
         size = 2.0 * values["lateral_stiffness"] * half**2
-        slope = np.array([
-            {"lateral_stiffness": 1.0, "half_length": 2.0}.get(n, 0.0) * size / values[n]
-            if values[n] else 0.0 for n in self.names
-        ])  # fmt: skip
+        slope = np.array(
+            [
+                {"lateral_stiffness": 1.0, "half_length": 2.0}.get(n, 0.0) * size / values[n]
+                if values[n]
+                else 0.0
+                for n in self.names
+            ]
+        )
         used = slope != 0.0
         part = self.covariance[np.ix_(used, used)]
         return size, float(np.sqrt(slope[used] @ part @ slope[used]))
@@ -173,10 +177,17 @@ def fit_brush(
     with np.errstate(invalid="ignore"):
         covariance = covariance_z * np.outer(slope, slope)
     status = tuple(
-        _status(name, at, spread, limit, assumed="half_length" in fixed and not tire
-                and fixed["half_length"][1].startswith("assumed"))
+        _status(
+            name,
+            at,
+            spread,
+            limit,
+            assumed="half_length" in fixed
+            and not tire
+            and fixed["half_length"][1].startswith("assumed"),
+        )
         for name, at, spread in zip(names, value, deviation, strict=True)
-    )  # fmt: skip
+    )
     found = problem.predicted(z)
     measured = {name: getattr(data, name) for name in wanted}
     error = {name: getattr(found, name) - measured[name] for name in wanted}
@@ -252,14 +263,17 @@ def _choose(
         "lateral_stiffness": "" if side or yaw else "no slip angle varies",
         "longitudinal_stiffness": "" if along else "no Fx over slip ratio",
         "half_length": "from the ring" if ring else "" if yaw else "assumed: Mz is not fitted",
-        "load_power": "from the ring" if ring
-        else "" if data.load.max() > LOAD_RATIO * data.load.min() else "one load only",
+        "load_power": "from the ring"
+        if ring
+        else ""
+        if data.load.max() > LOAD_RATIO * data.load.min()
+        else "one load only",
         "slip_angle_offset": "" if side or yaw else "no slip angle varies",
         "Fy_offset": "" if side else "Fy is not fitted",
         "Mz_offset": "" if yaw else "Mz is not fitted",
         "slip_ratio_offset": "" if along else "Fx is not fitted",
         "Fx_offset": "" if along else "Fx is not fitted",
-    }  # fmt: skip
+    }
     if ring:
         extra = extra - {"pressure_power"}
     names: list[str] = []
@@ -283,8 +297,11 @@ def _choose(
 def _status(name: str, value: float, spread: float, limit: float, *, assumed: bool) -> str:
     spec = SPECS[name]
     room = 1e-3 * (np.log(spec.high / spec.low) if spec.log else spec.high - spec.low)
-    low, high = (np.log([value / spec.low, spec.high / value]) if spec.log
-                 else (value - spec.low, spec.high - value))  # fmt: skip
+    low, high = (
+        np.log([value / spec.low, spec.high / value])
+        if spec.log
+        else (value - spec.low, spec.high - value)
+    )
     if min(low, high) < room:
         return "at boundary"
     stiffness = name in ("lateral_stiffness", "longitudinal_stiffness")

@@ -55,12 +55,8 @@ half_length is a0 at the reference load and pressure; load_power is n, pressure_
 """
 
 NEUTRAL: Mapping[str, float] = MappingProxyType(
-    {
-        name: 0.0
-        for name, spec in SPECS.items()
-        if not spec.log
-    }
-)  # fmt: skip
+    {name: 0.0 for name, spec in SPECS.items() if not spec.log}
+)
 """Values that change nothing."""
 
 

@@ -116,10 +116,12 @@ def brush_of(file: TireFile) -> BrushModel:
                 f"model {file.name} states {power} but no {name}, at which its half length holds; "
                 f"give [brush.{name}]"
             )
-    reference = Reference(*(
-        file.numbers[name].value if name in file.numbers else math.nan
-        for name in ("reference_load", "reference_pressure")
-    ))  # fmt: skip
+    reference = Reference(
+        *(
+            file.numbers[name].value if name in file.numbers else math.nan
+            for name in ("reference_load", "reference_pressure")
+        )
+    )
     return BrushModel(file.name, MappingProxyType(values), reference, tire)
 
 

@@ -60,9 +60,13 @@ class Problem:
         stiffness = float(np.median(used[0][small] * d.load[small] / slip[small]))
         c = max(1.3 * stiffness, 100.0) / (2.0 * size**2)
         start = {
-            "lateral_stiffness": c, "longitudinal_stiffness": c, "friction": friction,
-            "half_length": size, "yaw_compliance": 2e-5, "lateral_compliance": 2e-6,
-        }  # fmt: skip
+            "lateral_stiffness": c,
+            "longitudinal_stiffness": c,
+            "friction": friction,
+            "half_length": size,
+            "yaw_compliance": 2e-5,
+            "lateral_compliance": 2e-6,
+        }
         value = np.array([start.get(name, 0.0) for name in self.names])
         low, high = self._bounds()
         return np.clip(self.z_of(value), low + 1e-6, high - 1e-6)

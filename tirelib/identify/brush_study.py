@@ -71,9 +71,7 @@ def stiffness_at(
     """Return 2 c a^2 over slip angle [N/rad] and slip ratio [N], shapes as the load's."""
     zero, none = np.zeros_like(load), np.full_like(load, np.nan)
     where = np.full_like(load, fit.reference.pressure) if pressure is None else pressure
-    data = ForceData(
-        load, where, zero, zero, zero, none, none, none, none, zero.astype(np.int64)
-    )  # fmt: skip
+    data = ForceData(load, where, zero, zero, zero, none, none, none, none, zero.astype(np.int64))
     half = None if fit.tire is None else half_lengths(fit.tire, load, where)
     at = point_parameters(fit.values, data, fit.reference, half)
     size = 2.0 * np.asarray(at.half_length, dtype=np.float64) ** 2

@@ -21,8 +21,14 @@ from tirelib.identify.strain_notes import (
 from tirelib.model.base import operating_points
 from tirelib.waveforms import GRID, Waveforms
 
-__all__ = ["LEAST_RUNS", "StraightRuns", "straight_noise", "straight_runs", "usable",
-           "working_gages"]  # fmt: skip
+__all__ = [
+    "LEAST_RUNS",
+    "StraightRuns",
+    "straight_noise",
+    "straight_runs",
+    "usable",
+    "working_gages",
+]
 
 TYPICAL_TOLERANCE = Tolerance(0.005, 0.002, 0.001, 0.003)
 """Of set points, where a campaign does not say its own."""

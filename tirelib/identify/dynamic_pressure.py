@@ -106,9 +106,11 @@ def dynamic_pressure(
             "numbers, a load > 0 and a pressure >= 0 are needed"
         )
     tread = Tread(
-        values["free_radius"], values["tread_stiffness"], values["tread_thickness"],
+        values["free_radius"],
+        values["tread_stiffness"],
+        values["tread_thickness"],
         values["tread_hardening"],
-    )  # fmt: skip
+    )
     deflection = np.zeros(Fz.size)
     for _ in range(SETTLE if values["radial_deflection_rate"] else 1):
         ring = damped_compliance(_ring(values, p, deflection), w, values["damping"], law)
@@ -139,9 +141,16 @@ def _radial_map(contact: radial.RadialContact, load: FloatArray) -> PressureMap:
     phi = contact.edges[:, :1] + share * span
     pressure = contact.pressure_at(phi)
     return PressureMap(
-        "radial", load, contact.deflection, contact.edges, phi, pressure, np.zeros_like(pressure),
-        contact.pressure_centre, contact.compliance.radius * span[:, 0],
-    )  # fmt: skip
+        "radial",
+        load,
+        contact.deflection,
+        contact.edges,
+        phi,
+        pressure,
+        np.zeros_like(pressure),
+        contact.pressure_centre,
+        contact.compliance.radius * span[:, 0],
+    )
 
 
 def _sheared_map(
@@ -153,6 +162,13 @@ def _sheared_map(
     centre = np.sum(weight * contact.phi, axis=1) / np.sum(weight, axis=1)
     radius = contact.compliance.radius
     return PressureMap(
-        "sheared", load, contact.deflection, contact.edges, contact.phi, contact.pressure,
-        contact.shear_traction, radius * centre, radius * np.diff(contact.edges, axis=1)[:, 0],
-    )  # fmt: skip
+        "sheared",
+        load,
+        contact.deflection,
+        contact.edges,
+        contact.phi,
+        contact.pressure,
+        contact.shear_traction,
+        radius * centre,
+        radius * np.diff(contact.edges, axis=1)[:, 0],
+    )

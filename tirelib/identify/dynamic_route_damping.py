@@ -242,10 +242,16 @@ def fit_damping(
         with_angle = _quantity("damping", middle[0], scatter, spread)
     value = without if with_angle is None else _joined(without, with_angle)
     return Damping(
-        law, value, without, with_angle,
-        read.lag, _between(table[0], trial, value.value),
-        read.middle, _between(table[1], trial, value.value) + np.nan_to_num(zero), zero,
-    )  # fmt: skip
+        law,
+        value,
+        without,
+        with_angle,
+        read.lag,
+        _between(table[0], trial, value.value),
+        read.middle,
+        _between(table[1], trial, value.value) + np.nan_to_num(zero),
+        zero,
+    )
 
 
 def _read(

@@ -167,29 +167,55 @@ class Problem:
         for p in self.levels:
             above = float(p) - tire.pressure
             for side, usual, low, high in (
-                ("radial", 0.4, 2e4, 5e6), ("tangential", 0.5, 5e3, 3e6)
-            ):  # fmt: skip
+                ("radial", 0.4, 2e4, 5e6),
+                ("tangential", 0.5, 5e3, 3e6),
+            ):
                 name = f"{side}_stiffness"
                 slope = getattr(tire, f"{side}_pressure_slope")
                 value = float(np.clip(getattr(tire, name) + slope * above, 2 * low, high / 2))
                 out.append(
-                    Parameter(f"{name} at {p / 1e5:.2f} bar", "N/m^2", value, low, high,
-                              prior_std=spread(name, usual))
-                )  # fmt: skip
+                    Parameter(
+                        f"{name} at {p / 1e5:.2f} bar",
+                        "N/m^2",
+                        value,
+                        low,
+                        high,
+                        prior_std=spread(name, usual),
+                    )
+                )
         out.append(
-            Parameter("radial_deflection_rate", "1/m", tire.radial_deflection_rate, -30.0, 20.0,
-                      scaled=False, prior_std=B_STD)
-        )  # fmt: skip
+            Parameter(
+                "radial_deflection_rate",
+                "1/m",
+                tire.radial_deflection_rate,
+                -30.0,
+                20.0,
+                scaled=False,
+                prior_std=B_STD,
+            )
+        )
         if self.options.use_peaks:
             out.append(
-                Parameter("bending_stiffness", "N m^2", tire.bending_stiffness, 0.1, 50.0,
-                          prior_std=spread("bending_stiffness", 0.5))
-            )  # fmt: skip
+                Parameter(
+                    "bending_stiffness",
+                    "N m^2",
+                    tire.bending_stiffness,
+                    0.1,
+                    50.0,
+                    prior_std=spread("bending_stiffness", 0.5),
+                )
+            )
         if self.options.free_tread:
             out.append(
-                Parameter("tread_stiffness", "N/m^2", tire.tread_stiffness, 5e6, 2e9,
-                          prior_std=spread("tread_stiffness", 0.5))
-            )  # fmt: skip
+                Parameter(
+                    "tread_stiffness",
+                    "N/m^2",
+                    tire.tread_stiffness,
+                    5e6,
+                    2e9,
+                    prior_std=spread("tread_stiffness", 0.5),
+                )
+            )
         return tuple(out)
 
     def values(self, x: FloatArray) -> dict[str, float | FloatArray]:
@@ -266,9 +292,12 @@ class Problem:
             common[0, : len(self.points)] = slope * structure / self.sigma
             common[1, len(self.points) :] = 1.0
             few = fit_few(
-                self.residual, self.parameters, where=self.runs.waves.header.name,
-                common=common, begin=x,
-            )  # fmt: skip
+                self.residual,
+                self.parameters,
+                where=self.runs.waves.header.name,
+                common=common,
+                begin=x,
+            )
             x = np.array(list(few.values.values()))
             self.deflection = predicted_deflection(self.values(x), self.points, exact=False)
         return Solved(few, x, self.correction, self.estimate(x)[0], self.sigma)
@@ -298,9 +327,12 @@ class Problem:
         """Return contact angles, corrected with the fitted tire."""
         plausible = {k: v for k, v in self.relative_std(fit).items() if k != "mass"}
         bias = edge_bias(
-            self.values(fit.x_values), self.points, plausible=plausible,
-            low_pass=self.runs.waves.low_pass, correction=fit.correction,
-        )  # fmt: skip
+            self.values(fit.x_values),
+            self.points,
+            plausible=plausible,
+            low_pass=self.runs.waves.low_pass,
+            correction=fit.correction,
+        )
         waves = self.runs.waves
         return corrected(waves.run.astype(float), self.reading, bias, waves.angle_std)
 
@@ -312,8 +344,9 @@ class Problem:
             name, unit = f"{side}_pressure_slope", "N/m^2/Pa"
             if p.size < 2:
                 start = float(getattr(self.start.tire, name))
-                out.append(Quantity(name, unit, start, np.inf, -np.inf, np.inf,
-                                    ("not_identifiable",)))  # fmt: skip
+                out.append(
+                    Quantity(name, unit, start, np.inf, -np.inf, np.inf, ("not_identifiable",))
+                )
                 continue
             rows = np.arange(offset, 2 * p.size, 2)
             k = np.array(list(few.values.values()))[rows]

@@ -110,9 +110,14 @@ def vertical_stiffness(runs: StraightRuns, predicted: FloatArray) -> VerticalSti
             continue
         slope, std = _slope(runs.deflection[member], load)
         rows.append(
-            (c["pressure"][member].mean(), c["speed"][member].mean(), slope, std,
-             _slope(predicted[member], load)[0])
-        )  # fmt: skip
+            (
+                c["pressure"][member].mean(),
+                c["speed"][member].mean(),
+                slope,
+                std,
+                _slope(predicted[member], load)[0],
+            )
+        )
     return VerticalStiffness(*np.array(rows).T) if rows else None
 
 

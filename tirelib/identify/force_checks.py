@@ -44,8 +44,9 @@ def refuse_wrong_forces(data: ForceData, forces: tuple[str, ...]) -> None:
         Naming force, size and slip.
     """
     for name, slip, words, sign in (
-        ("Fy", data.slip_angle, "slip angle", -1.0), ("Fx", data.slip_ratio, "slip ratio", 1.0),
-    ):  # fmt: skip
+        ("Fy", data.slip_angle, "slip angle", -1.0),
+        ("Fx", data.slip_ratio, "slip ratio", 1.0),
+    ):
         if name not in forces:
             continue
         force = getattr(data, name)

@@ -118,9 +118,13 @@ def identify_forces(
         tell("ring pressure against the parabola")
         comparison = _compared(data, ring, notes)
     return ForceIdentification(
-        fit, estimates, stiffness, comparison, tuple(notes),
+        fit,
+        estimates,
+        stiffness,
+        comparison,
+        tuple(notes),
         MappingProxyType(_numbers(campaign, fit, estimates, len(data))),
-    )  # fmt: skip
+    )
 
 
 def _with_pressure(data: ForceData, ring: Tire, notes: list[str]) -> tuple[ForceData, Tire | None]:
@@ -194,11 +198,13 @@ def _compared(data: ForceData, ring: Tire, notes: list[str]) -> PressureComparis
 def _told(data: ForceData, chosen: IntArray, notes: list[str]) -> IntArray:
     """Return the points whose load and pressure hold enough slip angles for a stiffness."""
     cell = cells_of_load(data.take(chosen))
-    enough = np.array([
-        np.count_nonzero(cell == k) >= LEAST_COMPARED
-        and np.ptp(data.slip_angle[chosen[cell == k]]) >= ANGLE_SPAN
-        for k in range(int(cell.max()) + 1)
-    ])[cell]  # fmt: skip
+    enough = np.array(
+        [
+            np.count_nonzero(cell == k) >= LEAST_COMPARED
+            and np.ptp(data.slip_angle[chosen[cell == k]]) >= ANGLE_SPAN
+            for k in range(int(cell.max()) + 1)
+        ]
+    )[cell]
     if not enough.all():
         notes.append(
             f"ring pressure against parabola: {int((~enough).sum())} of {enough.size} points are "
@@ -216,8 +222,9 @@ def _numbers(
     pairs = []
     for each in estimates:
         notes: dict[str, object] = {
-            "interval_SI": [each.low, each.high], "flags": list(each.flags),
-        }  # fmt: skip
+            "interval_SI": [each.low, each.high],
+            "flags": list(each.flags),
+        }
         if each.helps:
             notes["helps"] = each.helps
         pairs.append(stored_number(each.name, each.value, each.std, "fitted", source, notes))

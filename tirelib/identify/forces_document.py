@@ -70,11 +70,15 @@ def brush_document(found: ForceIdentification) -> dict[str, Any]:
     with np.errstate(invalid="ignore"):
         correlation = fit.covariance / np.outer(deviation, deviation)
     held = [
-        {"name": STORED[name], "value": _edge(name, value), "unit": NUMBERS[STORED[name]].unit,
-         "reason": why}
+        {
+            "name": STORED[name],
+            "value": _edge(name, value),
+            "unit": NUMBERS[STORED[name]].unit,
+            "reason": why,
+        }
         for name, (value, why) in fit.held.items()
         if not (name == "half_length" and fit.tire is not None)
-    ]  # fmt: skip
+    ]
     source = "ring" if fit.tire is not None else "Mz" if "half_length" in fit.names else "assumed"
     return {
         "reference": {
@@ -113,13 +117,21 @@ def pressure_document(found: PressureComparison) -> dict[str, Any]:
     """Return lateral force by the ring's pressure against the parabola (Fig. 6-38 to 6-42), [N]."""
     rows = []
     for row in found.table:
-        rows.append({
-            "by": row.by, **_range(row.by, row.low, row.high), "points": row.points,
-            "ring_rmse": row.ring, "parabola_rmse": row.parabola,
-            "ring_bias": row.ring_bias, "parabola_bias": row.parabola_bias,
-            "ring_rmse_unseen": row.ring_unseen, "parabola_rmse_unseen": row.parabola_unseen,
-            "gain": row.gain, "better": row.better,
-        })  # fmt: skip
+        rows.append(
+            {
+                "by": row.by,
+                **_range(row.by, row.low, row.high),
+                "points": row.points,
+                "ring_rmse": row.ring,
+                "parabola_rmse": row.parabola,
+                "ring_bias": row.ring_bias,
+                "parabola_bias": row.parabola_bias,
+                "ring_rmse_unseen": row.ring_unseen,
+                "parabola_rmse_unseen": row.parabola_unseen,
+                "gain": row.gain,
+                "better": row.better,
+            }
+        )
     return {"unit": "N", "stiffness": "each load and pressure its own", "table": rows}
 
 
@@ -169,9 +181,12 @@ def _stiffness(each: SlipStiffness) -> dict[str, Any]:
 
 def _band(row: BandError) -> dict[str, Any]:
     return {
-        "by": row.by, **_range(row.by, row.low, row.high), "points": row.points,
-        "rmse": row.rmse, "bias": row.bias,
-    }  # fmt: skip
+        "by": row.by,
+        **_range(row.by, row.low, row.high),
+        "points": row.points,
+        "rmse": row.rmse,
+        "bias": row.bias,
+    }
 
 
 def _range(by: str, low: float, high: float) -> dict[str, Any]:

@@ -36,11 +36,13 @@ _LITERATURE: Mapping[str, tuple[float, float, str]] = {
 _PLAIN: Mapping[str, tuple[float, float, str]] = {
     "shear_stiffness": (6e4, 0.7, "assumed: 25 kN and more, of which the belt's tension takes 20"),
     "rotary_inertia": (
-        5e-5, 1.0, "rho A h^2 / 12 of 12.5 mm of belt and tread, and room for blocks"
+        5e-5,
+        1.0,
+        "rho A h^2 / 12 of 12.5 mm of belt and tread, and room for blocks",
     ),
     "tread_shear_stiffness": (2.5e7, 1.0, "k_t / 3, for rubber keeps its volume"),
     "tread_hardening": (1.0, 0.7, "assumed: blocks bulge into their grooves"),
-}  # fmt: skip
+}
 """Value, relative standard deviation and source of what no campaign header holds."""
 BASES = ("plain", "dissertation")
 """The plain tire, and the ring whose belt does not shear on a road without friction."""
@@ -316,9 +318,16 @@ def _estimate(fit: WaveformFit, k: int, start: TireFile) -> Estimate:
     if not fit.quadratic[k]:
         flags.append("not_quadratic")
     return Estimate(
-        name, FIELDS[name].unit, value, float(np.hypot(fit_std, structure)), low, high, fit_std,
-        tuple(flags), "",
-    )  # fmt: skip
+        name,
+        FIELDS[name].unit,
+        value,
+        float(np.hypot(fit_std, structure)),
+        low,
+        high,
+        fit_std,
+        tuple(flags),
+        "",
+    )
 
 
 def _help(estimate: Estimate, fit: WaveformFit, k: int, ways: NextRun) -> str:

@@ -74,36 +74,76 @@ def laboratory_tests(
         return lambda tire: np.log(np.array([_rim(tire, p) for p in at])).ravel()
 
     def modes(tire: Tire) -> FloatArray:
-        return np.asarray(np.log(natural_frequency(
-            ORDERS, ring_radius=tire.ring_radius, bending_stiffness=tire.bending_stiffness,
-            radial_stiffness=tire.radial_stiffness, tangential_stiffness=tire.tangential_stiffness,
-            inflation=at * tire.belt_width, mass=tire.mass,
-        )))  # fmt: skip
+        return np.asarray(
+            np.log(
+                natural_frequency(
+                    ORDERS,
+                    ring_radius=tire.ring_radius,
+                    bending_stiffness=tire.bending_stiffness,
+                    radial_stiffness=tire.radial_stiffness,
+                    tangential_stiffness=tire.tangential_stiffness,
+                    inflation=at * tire.belt_width,
+                    mass=tire.mass,
+                )
+            )
+        )
 
     weighed = np.full((ORDERS.size, ORDERS.size), (0.5 * MASS) ** 2)
     apart: tuple[Test, ...] = ()
     if _stands(values, pressures):
         apart = (
-            Test(f"torsional sidewall tests (S_theta to {SIDEWALL:.0%}) at {bars} bar",
-                 rows(turn(*pressures)), _independent(2, SIDEWALL), True),
-            Test(f"sidewall tests (S_v, S_theta to {SIDEWALL:.0%}) at {bars} bar",
-                 rows(rim(*pressures)), _independent(4, SIDEWALL), True),
-        )  # fmt: skip
+            Test(
+                f"torsional sidewall tests (S_theta to {SIDEWALL:.0%}) at {bars} bar",
+                rows(turn(*pressures)),
+                _independent(2, SIDEWALL),
+                True,
+            ),
+            Test(
+                f"sidewall tests (S_v, S_theta to {SIDEWALL:.0%}) at {bars} bar",
+                rows(rim(*pressures)),
+                _independent(4, SIDEWALL),
+                True,
+            ),
+        )
     return (
-        Test(f"a torsional sidewall test (S_theta to {SIDEWALL:.0%})", rows(turn(at)),
-             _independent(1, SIDEWALL), True),
-        Test(f"sidewall tests (S_v, S_theta to {SIDEWALL:.0%})", rows(rim(at)),
-             _independent(2, SIDEWALL), True),
+        Test(
+            f"a torsional sidewall test (S_theta to {SIDEWALL:.0%})",
+            rows(turn(at)),
+            _independent(1, SIDEWALL),
+            True,
+        ),
+        Test(
+            f"sidewall tests (S_v, S_theta to {SIDEWALL:.0%})",
+            rows(rim(at)),
+            _independent(2, SIDEWALL),
+            True,
+        ),
         *apart,
-        Test(f"a modal test (orders 1 to 8 to {MODAL:.0%}, mass to {MASS:.0%})", rows(modes),
-             _independent(ORDERS.size, MODAL) + weighed, True),
-        Test(f"a press test of the tread alone (k_t to {TREAD:.0%})",
-             rows(lambda tire: [np.log(tire.tread_stiffness)]), _independent(1, TREAD), True),
-        Test(f"the growth of the belt with pressure (EA to {GROWTH:.0%})",
-             rows(lambda tire: [np.log(tire.extension_stiffness)]), _independent(1, GROWTH), True),
-        Test(f"a cut section (gage offset to {SECTION:.0%})",
-             rows(lambda tire: [np.log(-tire.innerliner_offset)]), _independent(1, SECTION), True),
-    )  # fmt: skip
+        Test(
+            f"a modal test (orders 1 to 8 to {MODAL:.0%}, mass to {MASS:.0%})",
+            rows(modes),
+            _independent(ORDERS.size, MODAL) + weighed,
+            True,
+        ),
+        Test(
+            f"a press test of the tread alone (k_t to {TREAD:.0%})",
+            rows(lambda tire: [np.log(tire.tread_stiffness)]),
+            _independent(1, TREAD),
+            True,
+        ),
+        Test(
+            f"the growth of the belt with pressure (EA to {GROWTH:.0%})",
+            rows(lambda tire: [np.log(tire.extension_stiffness)]),
+            _independent(1, GROWTH),
+            True,
+        ),
+        Test(
+            f"a cut section (gage offset to {SECTION:.0%})",
+            rows(lambda tire: [np.log(-tire.innerliner_offset)]),
+            _independent(1, SECTION),
+            True,
+        ),
+    )
 
 
 def _independent(size: int, accuracy: float) -> FloatArray:

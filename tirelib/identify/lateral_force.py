@@ -37,13 +37,15 @@ SIGNIFICANT = 2.0
 """Standard errors of the mean difference from which one pressure counts as better."""
 KINDS = ("ring", "parabola")
 FITTED = (
-    "lateral_stiffness", "friction", "slip_angle_offset", "Fy_offset", "camber_thrust",
-)  # fmt: skip
+    "lateral_stiffness",
+    "friction",
+    "slip_angle_offset",
+    "Fy_offset",
+    "camber_thrust",
+)
 """Constants of the brush; the camber thrust only where camber varies."""
 _FOLDS = 5
-_SIZE = MappingProxyType(
-    {"slip_angle_offset": 0.01, "Fy_offset": 200.0, "camber_thrust": 0.5}
-)  # fmt: skip
+_SIZE = MappingProxyType({"slip_angle_offset": 0.01, "Fy_offset": 200.0, "camber_thrust": 0.5})
 
 
 @dataclass(frozen=True, slots=True)
@@ -323,8 +325,18 @@ def _table(
         bias = [float(over[kind][m].mean()) for kind in KINDS]
         out.append(
             PressureBand(
-                band.by, band.low, band.high, int(m.sum()),
-                rms[0], rms[1], bias[0], bias[1], rms[2], rms[3], gain, better,
+                band.by,
+                band.low,
+                band.high,
+                int(m.sum()),
+                rms[0],
+                rms[1],
+                bias[0],
+                bias[1],
+                rms[2],
+                rms[3],
+                gain,
+                better,
             )
-        )  # fmt: skip
+        )
     return tuple(out)

@@ -157,8 +157,11 @@ def next_run(fit: WaveformFit, structure: FloatArray, discrepancy: Discrepancy |
     press = _press_test(fit)
     tests += [press] if press is not None else []
     half = 1.96 * np.sqrt(np.diag(state.covariance()) + state.structure)
-    return NextRun(half, _sorted(runs, len(fit.free)),
-                   _sorted([state.after_test(test) for test in tests], len(fit.free)))  # fmt: skip
+    return NextRun(
+        half,
+        _sorted(runs, len(fit.free)),
+        _sorted([state.after_test(test) for test in tests], len(fit.free)),
+    )
 
 
 def _sorted(found: Sequence[list[Remedy]], size: int) -> tuple[tuple[Remedy, ...], ...]:
@@ -179,15 +182,21 @@ def _candidates(have: Operating) -> tuple[Operating, list[tuple[str, tuple[int, 
     grid = np.stack(np.meshgrid(speeds, pressures, loads, indexing="ij"), axis=-1)
     speed, pressure, load = grid.reshape(-1, 3).T
     n = load.size
-    fields = {name: np.zeros(n) for name in ("camber", "slip_angle", "slip_ratio", "side_force",
-                                             "drive_force", "order")}  # fmt: skip
+    fields = {
+        name: np.zeros(n)
+        for name in ("camber", "slip_angle", "slip_ratio", "side_force", "drive_force", "order")
+    }
     points = Operating(
-        load=load, pressure=pressure, speed=speed,
+        load=load,
+        pressure=pressure,
+        speed=speed,
         omega=speed * float(np.nanmedian(have.omega / have.speed)),
-        temperature=np.full(n, float(np.nanmean(have.temperature)) if
-                            np.isfinite(have.temperature).any() else np.nan),
+        temperature=np.full(
+            n,
+            float(np.nanmean(have.temperature)) if np.isfinite(have.temperature).any() else np.nan,
+        ),
         **fields,
-    )  # fmt: skip
+    )
     index = np.arange(n).reshape(grid.shape[:-1])
     sets: list[tuple[int, ...]] = [(i,) for i in range(n)]
     for plane in index:
@@ -232,8 +241,9 @@ def _information(
     angle = float(np.median(known)) if known.size else np.inf
     whiten = whitening_of(
         tangents(model.waveform, slopes.waveform[-2], slopes.waveform[-1]),
-        scales(data.tolerance, np.full(len(points), angle)), data.noise,
-    )  # fmt: skip
+        scales(data.tolerance, np.full(len(points), angle)),
+        data.noise,
+    )
     rows = [whiten(slopes.waveform[:k])]
     if discrepancy is not None:
         radius = float(np.max(fit.values["free_radius"]))
@@ -247,11 +257,15 @@ def _press_test(fit: WaveformFit) -> Test | None:
     have = fit.cost.data.points
     load, pressure = float(np.median(have.load)), float(np.median(have.pressure))
     points = have.take(np.zeros(2, dtype=int))
-    points = Operating(*[
-        {"load": load * np.array([1.0 - PRESS_SPAN, 1.0 + PRESS_SPAN]),
-         "pressure": np.full(2, pressure)}.get(name, getattr(points, name))
-        for name in Operating.__slots__
-    ])  # fmt: skip
+    points = Operating(
+        *[
+            {
+                "load": load * np.array([1.0 - PRESS_SPAN, 1.0 + PRESS_SPAN]),
+                "pressure": np.full(2, pressure),
+            }.get(name, getattr(points, name))
+            for name in Operating.__slots__
+        ]
+    )
     solved = _solved(fit, points)
     if solved is None:
         return None

@@ -97,9 +97,12 @@ def repeat_noise(strain: FloatArray, group: IntArray, tangent: FloatArray) -> Re
     if total <= 0.0:
         smooth, total = np.ones_like(smooth), float(twice.sum())
     return RepeatNoise(
-        std, groups, std**2 * twice * smooth / total, more * independent(every),
+        std,
+        groups,
+        std**2 * twice * smooth / total,
+        more * independent(every),
         2.0 * SMOOTH * more,
-    )  # fmt: skip
+    )
 
 
 def measured_tangents(waves: Waveforms, strain: FloatArray) -> FloatArray:

@@ -234,16 +234,27 @@ def _result(
     shapes = _shapes(problem, fit, quantities, contact, x)
     misfit = np.sqrt(np.mean((problem.deformation(x) - problem.measured) ** 2, axis=1))
     return StaticRoute(
-        series.waves.run, float(c["pressure"].mean()), float(c["speed"].mean()), quantities,
-        () if pressed_fit is None else pressed_fit.quantities(), fit.correlation,
-        np.zeros((0, 0)) if pressed_fit is None else pressed_fit.correlation, misfit, load_error,
+        series.waves.run,
+        float(c["pressure"].mean()),
+        float(c["speed"].mean()),
+        quantities,
+        () if pressed_fit is None else pressed_fit.quantities(),
+        fit.correlation,
+        np.zeros((0, 0)) if pressed_fit is None else pressed_fit.correlation,
+        misfit,
+        load_error,
         edges,
         ContactLengths(
-            c["Fz"], rolled * edges.reading.half, rolled * edges.half, rolled * edges.half_std,
-            rolled * half, rolled * half_std,
+            c["Fz"],
+            rolled * edges.reading.half,
+            rolled * edges.half,
+            rolled * edges.half_std,
+            rolled * half,
+            rolled * half_std,
         ),
-        shapes, tuple(reasons),
-    )  # fmt: skip
+        shapes,
+        tuple(reasons),
+    )
 
 
 def _shapes(
@@ -269,11 +280,15 @@ def _shapes(
             other = np.interp(grid / R, contact.angle[k], contact.pressure[k], left=0.0, right=0.0)
         out.append(
             PressureShape(
-                float(problem.load[k]), grid, strain_based[k], other,
+                float(problem.load[k]),
+                grid,
+                strain_based[k],
+                other,
                 Quantity.of("centre_pressure", "N/m", float(centre[k]), float(std[k])),
-                quantities[3 + 2 * k], quantities[4 + 2 * k],
+                quantities[3 + 2 * k],
+                quantities[4 + 2 * k],
             )
-        )  # fmt: skip
+        )
     return tuple(out)
 
 

@@ -195,10 +195,16 @@ def fit_few(
 
     span = 1e-6 * (high - low)
     found = least_squares(
-        everything, np.clip(first, low + span, high - span), bounds=(low, high),
-        jac=slopes, x_scale=1.0 / np.maximum(weight, 1.0),
-        max_nfev=60, xtol=1e-5, ftol=1e-6, gtol=1e-8,
-    )  # fmt: skip
+        everything,
+        np.clip(first, low + span, high - span),
+        bounds=(low, high),
+        jac=slopes,
+        x_scale=1.0 / np.maximum(weight, 1.0),
+        max_nfev=60,
+        xtol=1e-5,
+        ftol=1e-6,
+        gtol=1e-8,
+    )
     if found.status <= 0:
         raise ConvergenceError(
             f"{where}: no minimum after {found.nfev} steps, cost {2 * found.cost:.4g}; give start "
@@ -312,9 +318,14 @@ def _held(
 
     span = 1e-9 * (high - low)
     found = least_squares(
-        everything, np.clip(start, low + span, high - span), bounds=(low, high), max_nfev=12,
-        jac=slopes, xtol=1e-5, ftol=1e-6,
-    )  # fmt: skip
+        everything,
+        np.clip(start, low + span, high - span),
+        bounds=(low, high),
+        max_nfev=12,
+        jac=slopes,
+        xtol=1e-5,
+        ftol=1e-6,
+    )
     return float(2.0 * found.cost + prior**2)
 
 

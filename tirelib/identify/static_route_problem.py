@@ -58,9 +58,14 @@ class StrainProblem:
         angle = arc_nodes(-half, half, NODES)
         strain = series_strain(coefficients, angle)
         found = contact_deformation(
-            strain, -half, half, deflection=self.deflection, ring_radius=self.radius,
-            free_radius=tire.free_radius, liner_offset=self.offset,
-        )  # fmt: skip
+            strain,
+            -half,
+            half,
+            deflection=self.deflection,
+            ring_radius=self.radius,
+            free_radius=tire.free_radius,
+            liner_offset=self.offset,
+        )
         pick = np.linspace(NODES // 2, NODES - 1, COMPARED).round().astype(int)
         self.measured = found.deformation[:, pick]
         self.shape = self._ring_at(angle, pick, series.waves.low_pass)
@@ -79,9 +84,14 @@ class StrainProblem:
             # amplitudes, since a strain of one is refused
             unit = np.concatenate([np.zeros((1, NODES)), SMALL * lost[k].T])
             solved = contact_deformation(
-                unit, -half, half, deflection=self.deflection[k], ring_radius=self.radius,
-                free_radius=tire.free_radius, liner_offset=self.offset,
-            ).deformation  # fmt: skip
+                unit,
+                -half,
+                half,
+                deflection=self.deflection[k],
+                ring_radius=self.radius,
+                free_radius=tire.free_radius,
+                liner_offset=self.offset,
+            ).deformation
             out.append(wave[k] + (solved[1:] - solved[0]).T / SMALL)
         return np.stack(out)[:, pick]
 
@@ -98,9 +108,10 @@ class StrainProblem:
             crown = 5000.0 * (half * self.radius) ** 2
             shapes += [
                 Parameter(f"n_p at {load:.0f} N", "-", 3.0, 0.5, 30.0, prior_std=1.0),
-                Parameter(f"S_f at {load:.0f} N", "-", crown, 1e-2 * crown, 1e2 * crown,
-                          prior_std=1.5),
-            ]  # fmt: skip
+                Parameter(
+                    f"S_f at {load:.0f} N", "-", crown, 1e-2 * crown, 1e2 * crown, prior_std=1.5
+                ),
+            ]
         return (*ring, *shapes)
 
     def pressure(self, x: FloatArray, at: FloatArray | None = None) -> tuple[FloatArray, ...]:
@@ -166,9 +177,13 @@ class StrainProblem:
         self, half: FloatArray | None = None, zero: float = 0.0, offset_factor: float = 1.0
     ) -> "StrainProblem":
         return StrainProblem(
-            self.series, self.start, self.half if half is None else half, self.middle,
-            zero=zero, offset_factor=offset_factor,
-        )  # fmt: skip
+            self.series,
+            self.start,
+            self.half if half is None else half,
+            self.middle,
+            zero=zero,
+            offset_factor=offset_factor,
+        )
 
 
 class Conventional:
@@ -185,22 +200,28 @@ class Conventional:
         self.sigma = np.hypot(own, stiffness * 1e-4)
         self.common = (1.5 * stiffness * DEFLECTION_STD / self.sigma)[None, :]
         self.parameters = (
-            Parameter("bending_stiffness", "N m^2", tire.bending_stiffness, 0.05, 100.0,
-                      prior_std=0.5),
-            Parameter("radial_stiffness", "N/m^2", 1.5 * tire.radial_stiffness, 5e4, 1e7,
-                      prior_std=1.0),
-            Parameter("radial_deflection_rate", "1/m", -1.0, -40.0, 0.0, scaled=False,
-                      prior_std=4.0),
+            Parameter(
+                "bending_stiffness", "N m^2", tire.bending_stiffness, 0.05, 100.0, prior_std=0.5
+            ),
+            Parameter(
+                "radial_stiffness", "N/m^2", 1.5 * tire.radial_stiffness, 5e4, 1e7, prior_std=1.0
+            ),
+            Parameter(
+                "radial_deflection_rate", "1/m", -1.0, -40.0, 0.0, scaled=False, prior_std=4.0
+            ),
             Parameter("tread_stiffness", "N/m^2", tire.tread_stiffness, 5e6, 2e9, prior_std=0.5),
-        )  # fmt: skip
+        )
 
     def contact(self, x: FloatArray) -> StaticContact:
         """Return the contact at the measured deflections."""
         tire = StaticTire(
-            ring_radius=self.start.tire.ring_radius, free_radius=self.start.tire.free_radius,
-            bending_stiffness=float(x[0]), radial_stiffness=float(x[1]),
-            softening=min(float(x[2]), 0.0), tread_stiffness=float(x[3]),
-        )  # fmt: skip
+            ring_radius=self.start.tire.ring_radius,
+            free_radius=self.start.tire.free_radius,
+            bending_stiffness=float(x[0]),
+            radial_stiffness=float(x[1]),
+            softening=min(float(x[2]), 0.0),
+            tread_stiffness=float(x[3]),
+        )
         return press_to_deflection(tire, self.deflection, nodes=STATIC_NODES)
 
     def residual(self, x: FloatArray) -> FloatArray:

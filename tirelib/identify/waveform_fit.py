@@ -176,16 +176,24 @@ class Solver:
         if self.slopes is not None:
             start = self.slopes.start(self.model, z - self.z)
         return solve_whole(
-            move(self.start, z, self.free), self.data.points, self.changes,
-            low_pass=self.data.low_pass, start=start, exact=self.exact,
-        )  # fmt: skip
+            move(self.start, z, self.free),
+            self.data.points,
+            self.changes,
+            low_pass=self.data.low_pass,
+            start=start,
+            exact=self.exact,
+        )
 
     def refresh(self, *, renew: bool = True) -> None:
         """Bring the slopes up to the present solution, and if asked for the cost as well."""
         self.slopes = whole_slopes(
-            self.model, self.values, self.data.points, self.free, self.changes,
+            self.model,
+            self.values,
+            self.data.points,
+            self.free,
+            self.changes,
             low_pass=self.data.low_pass,
-        )  # fmt: skip
+        )
         if renew:
             radius = float(np.max(self.start["free_radius"]))
             self.cost = Cost.about(
@@ -241,14 +249,26 @@ class Solver:
         interval, quadratic = self.ridges(covariance)
         rest = self.data.strain - self.model.waveform
         linear = Linear(
-            self.model.waveform, self.model.deflection, self.slopes.waveform[:k],
+            self.model.waveform,
+            self.model.deflection,
+            self.slopes.waveform[:k],
             self.slopes.deflection[:k],
-        )  # fmt: skip
+        )
         return WaveformFit(
-            self.values, self.free, covariance, self.prior.std, linear, self.cost.whiten,
-            self.cost.misfit(self.model), interval, quadratic, self.cost.error(self.model),
-            float(np.sqrt(np.mean(rest**2))), steps, self.cost,
-        )  # fmt: skip
+            self.values,
+            self.free,
+            covariance,
+            self.prior.std,
+            linear,
+            self.cost.whiten,
+            self.cost.misfit(self.model),
+            interval,
+            quadratic,
+            self.cost.error(self.model),
+            float(np.sqrt(np.mean(rest**2))),
+            steps,
+            self.cost,
+        )
 
     def rise(self, dz: FloatArray) -> float:
         """Return how much higher the cost is after a move; infinite where the model fails."""

@@ -179,10 +179,11 @@ class Correction:
     def tiled(self, times: int) -> "Correction":
         """Return the correction for points repeated one after the other."""
         return Correction(
-            np.tile(self.waveform, (times, 1)), np.tile(self.deflection, times),
+            np.tile(self.waveform, (times, 1)),
+            np.tile(self.deflection, times),
             start=self.start.tiled(times) if self.start else None,
             depth=None if self.depth is None else np.tile(self.depth, times),
-        )  # fmt: skip
+        )
 
     @property
     def by_waveform(self) -> FloatArray:
@@ -233,9 +234,11 @@ def large_displacements(
     solved = solve(made.constants, start=start)
     strain = smoothed(solved.strain(made.offset, phi.size), points, low_pass)
     return Correction(
-        strain - state.wave, solved.deflection - state.deflection, solved,
+        strain - state.wave,
+        solved.deflection - state.deflection,
+        solved,
         state.contact.start if state.contact else None,
-    )  # fmt: skip
+    )
 
 
 def smoothed(strain: FloatArray, points: Operating, low_pass: LowPass) -> FloatArray:
@@ -292,9 +295,12 @@ def linearised(
         moved = np.broadcast_to(coordinate.moved(value, z), (k + 1, n))
         columns[coordinate.name] = np.ascontiguousarray(moved).ravel()
     state = predict(
-        columns, points.tiled(k + 1), changes, low_pass=low_pass,
+        columns,
+        points.tiled(k + 1),
+        changes,
+        low_pass=low_pass,
         correction=correction.tiled(k + 1) if correction else None,
-    )  # fmt: skip
+    )
     waves = state.wave.reshape(k + 1, n, -1)
     depth = state.deflection.reshape(k + 1, n)
     by_wave, by_depth = (waves[1:] - waves[0]) / step, (depth[1:] - depth[0]) / step

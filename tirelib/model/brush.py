@@ -126,16 +126,23 @@ def brush_state(
     p = parameters
     along = p.lateral_stiffness if p.longitudinal_stiffness is None else p.longitudinal_stiffness
     return BrushState(
-        conditions, *reference,
-        c_py=column(p.lateral_stiffness), c_px=column(along), mu=column(p.friction),
-        a=column(p.half_length), flatness=np.zeros(n), ring_flatness=column(ring_flatness),
+        conditions,
+        *reference,
+        c_py=column(p.lateral_stiffness),
+        c_px=column(along),
+        mu=column(p.friction),
+        a=column(p.half_length),
+        flatness=np.zeros(n),
+        ring_flatness=column(ring_flatness),
         camber_thrust=column(p.camber_thrust),
         slip_angle=conditions.slip_angle + column(p.slip_angle_offset),
         slip_ratio=conditions.slip_ratio + column(p.slip_ratio_offset),
-        Fx_offset=column(p.Fx_offset), Fy_offset=column(p.Fy_offset),
-        Mz_offset=column(p.Mz_offset), yaw_compliance=column(p.yaw_compliance),
+        Fx_offset=column(p.Fx_offset),
+        Fy_offset=column(p.Fy_offset),
+        Mz_offset=column(p.Mz_offset),
+        yaw_compliance=column(p.yaw_compliance),
         lateral_compliance=column(p.lateral_compliance),
-    )  # fmt: skip
+    )
 
 
 def brush_forces(state: BrushState, changes: Sequence[tuple[str, BrushChange]] = ()) -> PointForces:
@@ -157,10 +164,16 @@ def brush_forces(state: BrushState, changes: Sequence[tuple[str, BrushChange]] =
             state = change(state)
     at = state.conditions
     parameters = PointParameters(
-        lateral_stiffness=state.c_py, longitudinal_stiffness=state.c_px, friction=state.mu,
-        half_length=state.a, camber_thrust=state.camber_thrust, Fx_offset=state.Fx_offset,
-        Fy_offset=state.Fy_offset, Mz_offset=state.Mz_offset, yaw_compliance=state.yaw_compliance,
+        lateral_stiffness=state.c_py,
+        longitudinal_stiffness=state.c_px,
+        friction=state.mu,
+        half_length=state.a,
+        camber_thrust=state.camber_thrust,
+        Fx_offset=state.Fx_offset,
+        Fy_offset=state.Fy_offset,
+        Mz_offset=state.Mz_offset,
+        yaw_compliance=state.yaw_compliance,
         lateral_compliance=state.lateral_compliance,
-    )  # fmt: skip
+    )
     seen = PointConditions(at.load, state.slip_angle, state.slip_ratio, at.camber)
     return predict_shaped(parameters, seen, state.flatness)

@@ -16,11 +16,24 @@ REFERENCE = (4000.0, 2.0e5)
 SCALES = {"Fy": 3000.0, "Fx": 3000.0, "Mz": 80.0}
 """Typical forces: what is compared are forces over these."""
 COORDINATES = (
-    "lateral_stiffness", "longitudinal_stiffness", "friction", "half_length", "load_power",
-    "slip_angle_offset", "slip_ratio_offset", "Fx_offset", "Fy_offset", "Mz_offset",
-)  # fmt: skip
-UNITS = {"slip_angle_offset": 0.01, "slip_ratio_offset": 0.01, "Fx_offset": 50.0,
-         "Fy_offset": 50.0, "Mz_offset": 2.0}  # fmt: skip
+    "lateral_stiffness",
+    "longitudinal_stiffness",
+    "friction",
+    "half_length",
+    "load_power",
+    "slip_angle_offset",
+    "slip_ratio_offset",
+    "Fx_offset",
+    "Fy_offset",
+    "Mz_offset",
+)
+UNITS = {
+    "slip_angle_offset": 0.01,
+    "slip_ratio_offset": 0.01,
+    "Fx_offset": 50.0,
+    "Fy_offset": 50.0,
+    "Mz_offset": 2.0,
+}
 """Sizes of what is moved by addition; the others are moved by a factor."""
 STEP = 1e-5
 DEAD = 1e-5

@@ -48,16 +48,29 @@ def made_of(values: Values, points: Operating) -> Made:
     v, width = values, np.asarray(values["belt_width"])
     above = points.pressure - v["pressure"]
     constants = Constants.of(
-        radius=v["ring_radius"], free_radius=v["free_radius"], EA=v["extension_stiffness"],
-        GA=v["shear_stiffness"], EI=v["bending_stiffness"], mass=v["mass"],
-        rotary_inertia=v["rotary_inertia"], inflation=points.pressure * width, tension=0.0,
+        radius=v["ring_radius"],
+        free_radius=v["free_radius"],
+        EA=v["extension_stiffness"],
+        GA=v["shear_stiffness"],
+        EI=v["bending_stiffness"],
+        mass=v["mass"],
+        rotary_inertia=v["rotary_inertia"],
+        inflation=points.pressure * width,
+        tension=0.0,
         k_u=v["radial_stiffness"] + v["radial_pressure_slope"] * above,
         k_v=v["tangential_stiffness"] + v["tangential_pressure_slope"] * above,
-        dashpots=0.0, k_t=v["tread_stiffness"], hardening=v["tread_hardening"],
-        thickness=v["tread_thickness"], crown=0.0, half_width=0.5 * width,
-        k_s=v["tread_shear_stiffness"], friction=FRICTION, omega=points.omega,
-        load=points.load, torque=0.0,
-    )  # fmt: skip
+        dashpots=0.0,
+        k_t=v["tread_stiffness"],
+        hardening=v["tread_hardening"],
+        thickness=v["tread_thickness"],
+        crown=0.0,
+        half_width=0.5 * width,
+        k_s=v["tread_shear_stiffness"],
+        friction=FRICTION,
+        omega=points.omega,
+        load=points.load,
+        torque=0.0,
+    )
     offset = np.broadcast_to(np.asarray(v["innerliner_offset"], dtype=float), (len(points),))
     return Made(constants, offset)
 

@@ -43,9 +43,11 @@ class Plan:
 def reference_plan(tire: Tire) -> Plan:
     """Return 5 loads x 3 pressures x 4 speeds of free rolling, and slip and camber at the sides."""
     grid = np.meshgrid(
-        [1500.0, 2750.0, 4000.0, 5250.0, 6500.0], [1.6e5, 2.1e5, 2.6e5], [5.0, 15.0, 25.0, 35.0],
+        [1500.0, 2750.0, 4000.0, 5250.0, 6500.0],
+        [1.6e5, 2.1e5, 2.6e5],
+        [5.0, 15.0, 25.0, 35.0],
         indexing="ij",
-    )  # fmt: skip
+    )
     # six runs with slip angle, camber or slip ratio, each seen by the left and the right gage
     slip = np.deg2rad([3.0, -3.0, 0.0, 0.0, 0.0, 0.0])
     camber = np.deg2rad([0.0, 0.0, 4.0, -4.0, 0.0, 0.0])

@@ -23,10 +23,18 @@ FORMAT = "tirelib-tire/1"
 FORMATS = (FORMAT, "tirelib-model/1")
 KINDS = ("measured", "fitted", "literature", "assumed")
 REQUIRED = (
-    "ring_radius", "free_radius", "belt_width", "tread_thickness", "innerliner_offset",
-    "bending_stiffness", "mass", "pressure", "radial_stiffness", "tangential_stiffness",
+    "ring_radius",
+    "free_radius",
+    "belt_width",
+    "tread_thickness",
+    "innerliner_offset",
+    "bending_stiffness",
+    "mass",
+    "pressure",
+    "radial_stiffness",
+    "tangential_stiffness",
     "tread_stiffness",
-)  # fmt: skip
+)
 
 BRUSH_NEEDS = ("bristle_lateral", "friction")
 """Without these a file states no brush."""
@@ -194,11 +202,14 @@ def _numbers(document: Mapping[str, Any]) -> tuple[dict[str, Number], list[str]]
     faults += [
         f"[brush.{name}] is missing: the half length of the contact goes with it "
         f"({NUMBERS[name].meaning}); add value and unit"
-        for name, because in (("reference_load", "load_power"),
-                              ("reference_pressure", "pressure_power"))
-        if because in numbers and numbers[because].value != 0.0
+        for name, because in (
+            ("reference_load", "load_power"),
+            ("reference_pressure", "pressure_power"),
+        )
+        if because in numbers
+        and numbers[because].value != 0.0
         and name not in _table(document, "brush")
-    ]  # fmt: skip
+    ]
     return numbers, faults
 
 

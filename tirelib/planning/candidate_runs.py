@@ -64,8 +64,9 @@ def _forecast(
     found = guess.solved(data, points, near)
     slopes, by_set_point = guess.slopes(found, data, points)
     tolerance = data.tolerance
-    scale = [max(x, SMALLEST_TOLERANCE) for x in (tolerance.load, tolerance.pressure,
-                                                  tolerance.gain)]  # fmt: skip
+    scale = [
+        max(x, SMALLEST_TOLERANCE) for x in (tolerance.load, tolerance.pressure, tolerance.gain)
+    ]
     scale.append(float(np.mean(np.minimum(data.angle_std, 1.0))))
     random = [*by_set_point, found.waveform, angle_slope(found.waveform)]
     return Forecast(

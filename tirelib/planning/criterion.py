@@ -266,10 +266,12 @@ def judged(
     smaller = np.argmin(ways, axis=1)[:, None]
     stds = np.take_along_axis(spreads, smaller, axis=1)[:, 0]
     gaps = [rivals[j].cost - rivals[i].cost for i, j in pairs]
-    chances = np.array([
-        resolving(way[0], way[1], gap, list(spread))
-        for way, gap, spread in zip(ways, gaps, spreads, strict=True)
-    ])  # fmt: skip
+    chances = np.array(
+        [
+            resolving(way[0], way[1], gap, list(spread))
+            for way, gap, spread in zip(ways, gaps, spreads, strict=True)
+        ]
+    )
     counted = [k for k, gap in enumerate(gaps) if abs(gap) < RESOLVED] or list(range(len(gaps)))
     hardest = np.array(counted)[np.argmin(sizes[counted], axis=0)]
     chance = chances[counted].mean(axis=0)
@@ -286,9 +288,17 @@ def judged(
         limit = _least(rivals, there, pair, noise, ENDLESS)
         found.append(PairForecast(names, gap, size[order], likely[order], repeated, limit))
     return NextTest(
-        envelope, points[order], score[order], std[order], chance[order],
-        tuple(hardest[order].tolist()), tuple(found), trial, dropped, noise,
-    )  # fmt: skip
+        envelope,
+        points[order],
+        score[order],
+        std[order],
+        chance[order],
+        tuple(hardest[order].tolist()),
+        tuple(found),
+        trial,
+        dropped,
+        noise,
+    )
 
 
 def _both(
@@ -303,8 +313,11 @@ def _both(
     That nothing is missing is a special case of every effect: only the other direction counts.
     """
     i, j = pair
-    ways = [told[b].missed(told[a], noise, repeats)
-            for a, b in ((i, j), (j, i)) if rivals[a].name != NOTHING]  # fmt: skip
+    ways = [
+        told[b].missed(told[a], noise, repeats)
+        for a, b in ((i, j), (j, i))
+        if rivals[a].name != NOTHING
+    ]
     mean, variance = (np.array([way[k] for way in (ways[0], ways[-1])]) for k in (0, 1))
     return mean, np.sqrt(np.maximum(variance, 0.0))
 

@@ -94,13 +94,21 @@ def plan_test(
         return Plan(suspects, None, {}, wanted, campaign)
     if suspects.beside:
         base = refit(
-            data, base.values, [*base.effects, *(effect for effect, _ in suspects.beside)],
-            [*base.strengths, *(strength for _, strength in suspects.beside)], progress=progress,
-        )  # fmt: skip
+            data,
+            base.values,
+            [*base.effects, *(effect for effect, _ in suspects.beside)],
+            [*base.strengths, *(strength for _, strength in suspects.beside)],
+            progress=progress,
+        )
     test = next_test(
-        data, base.on_time(data.points), suspects.effects, envelope, noise=noise,
-        with_nothing=suspects.with_nothing, progress=progress,
-    )  # fmt: skip
+        data,
+        base.on_time(data.points),
+        suspects.effects,
+        envelope,
+        noise=noise,
+        with_nothing=suspects.with_nothing,
+        progress=progress,
+    )
     return Plan(suspects, test, gains(test.trial, test.noise), wanted, campaign)
 
 
@@ -125,13 +133,19 @@ def plan_force_test(
     if not suspects.effects or envelope is None:
         return Plan(suspects, None, {}, wanted, case.name, case.quantity)
     base = fit_force(
-        case.problem, case.model.values, [*case.effects, *(e for e, _ in suspects.beside)],
+        case.problem,
+        case.model.values,
+        [*case.effects, *(e for e, _ in suspects.beside)],
         [*case.strengths, *(strength for _, strength in suspects.beside)],
-    )  # fmt: skip
+    )
     test = force_next_test(
-        case, base, suspects.effects, envelope, with_nothing=suspects.with_nothing,
+        case,
+        base,
+        suspects.effects,
+        envelope,
+        with_nothing=suspects.with_nothing,
         progress=progress,
-    )  # fmt: skip
+    )
     again = gains(test.trial, test.noise)
     return Plan(suspects, test, again, wanted, case.name, case.quantity)
 
@@ -168,9 +182,14 @@ def next_test_document(
     if not suspects.effects:
         return plan_document(Plan(suspects, None, {}, WANTED, str(told.get("campaign", ""))))
     plan = plan_test(
-        data, base, suspects, Envelope.of(data.points), noise=noise,
-        campaign=str(told.get("campaign", "")), progress=progress,
-    )  # fmt: skip
+        data,
+        base,
+        suspects,
+        Envelope.of(data.points),
+        noise=noise,
+        campaign=str(told.get("campaign", "")),
+        progress=progress,
+    )
     return plan_document(plan)
 
 
@@ -190,15 +209,24 @@ def plan_document(plan: Plan) -> dict[str, Any]:
     if test is None or not len(test.points):
         left_out = dict(test.trial.left_out) if test else {}
         return head | {
-            "suspects": [], "left_out": left_out, "present": [], "candidates": [], "best": None,
-            "random_median": None, "repeats": None, "envelope": None, "dropped": 0,
-        }  # fmt: skip
+            "suspects": [],
+            "left_out": left_out,
+            "present": [],
+            "candidates": [],
+            "best": None,
+            "random_median": None,
+            "repeats": None,
+            "envelope": None,
+            "dropped": 0,
+        }
     candidates = [_candidate(test, k) for k in range(len(test.points))]
     return head | {
         "suspects": [
             {
-                "effect": rival.name, "strength": rival.strength.tolist(),
-                "chi_square": rival.cost, "in_range": rival.in_range,
+                "effect": rival.name,
+                "strength": rival.strength.tolist(),
+                "chi_square": rival.cost,
+                "in_range": rival.in_range,
             }
             for rival in test.trial.rivals
         ],
@@ -216,7 +244,7 @@ def plan_document(plan: Plan) -> dict[str, Any]:
         "dropped": test.dropped,
         **_noise(plan, test),
         "misfit_size": test.trial.size,
-    }  # fmt: skip
+    }
 
 
 def _noise(plan: Plan, test: NextTest) -> dict[str, Any]:
@@ -250,10 +278,13 @@ def _slips(envelope: Envelope) -> dict[str, Any]:
 
 def _present(pair: PairForecast) -> dict[str, Any]:
     return {
-        "pair": list(pair.names), "gap": pair.gap, "better": pair.better,
-        "resolved": pair.resolved, "best_run_separation": float(pair.separation[0]),
+        "pair": list(pair.names),
+        "gap": pair.gap,
+        "better": pair.better,
+        "resolved": pair.resolved,
+        "best_run_separation": float(pair.separation[0]),
         "best_run_probability": float(pair.probability[0]),
-    }  # fmt: skip
+    }
 
 
 def _repeats(plan: Plan, test: NextTest) -> dict[str, Any]:
@@ -265,30 +296,33 @@ def _repeats(plan: Plan, test: NextTest) -> dict[str, Any]:
         "separation": {str(n): reached for n, reached in pair.repeats.items()},
         "of_plan": {
             name: {
-                "times": next((int(n) for n, x in by.items() if n < ENDLESS and x >= RESOLVED),
-                              None),
-                "gain_now": by[1], "gain_limit": by[ENDLESS],
+                "times": next(
+                    (int(n) for n, x in by.items() if n < ENDLESS and x >= RESOLVED), None
+                ),
+                "gain_now": by[1],
+                "gain_limit": by[ENDLESS],
             }
             for name, by in plan.gains.items()
         },
-    }  # fmt: skip
+    }
 
 
 def _envelope(envelope: Envelope) -> dict[str, Any]:
-    told = {AXES[name].key: [float(AXES[name].told(x)) for x in ends]
-            for name, ends in envelope.ranges.items()}  # fmt: skip
+    told = {
+        AXES[name].key: [float(AXES[name].told(x)) for x in ends]
+        for name, ends in envelope.ranges.items()
+    }
     free = [name for name in envelope.names if name not in envelope.declared]
     if envelope.sweep is not None:
         axis, values = AXES[envelope.sweep.name], envelope.sweep.values
         told[axis.key] = [float(axis.told(x)) for x in (values.min(), values.max())]
     return {
-        **told, "declared": list(envelope.declared),
+        **told,
+        "declared": list(envelope.declared),
         "widened_percent": {name: 100.0 * AXES[name].wider for name in free},
-        "levels": {
-            name: envelope.levels.get(name, AXES[name].levels) for name in envelope.names
-        },
+        "levels": {name: envelope.levels.get(name, AXES[name].levels) for name in envelope.names},
         "points_of_run": envelope.points,
-    }  # fmt: skip
+    }
 
 
 def advice(plan: Plan) -> str:

@@ -50,16 +50,19 @@ class Axis:
         return from_si(value, self.unit, self.dimension)
 
 
-AXES: Mapping[str, Axis] = MappingProxyType({
-    "load": Axis("load", "N", "force", "load_N", 0.25, 5),
-    "pressure": Axis("pressure", "bar", "pressure", "pressure_bar", 0.15, 3),
-    "speed": Axis("speed", "km/h", "speed", "speed_kmh", 0.25, 5),
-    "slip_angle": Axis("slip angle", "deg", "angle", "slip_angle_deg", 0.0, 7, False,
-                       "slip_angles_deg"),
-    "slip_ratio": Axis("slip ratio", "1", "ratio", "slip_ratio", 0.0, 7, False, "slip_ratios"),
-    "camber": Axis("camber", "deg", "angle", "camber_deg", 0.0, 2, False),
-    "temperature": Axis("tread temperature", "degC", "temperature", "temperature_degC", 0.0, 2),
-})  # fmt: skip
+AXES: Mapping[str, Axis] = MappingProxyType(
+    {
+        "load": Axis("load", "N", "force", "load_N", 0.25, 5),
+        "pressure": Axis("pressure", "bar", "pressure", "pressure_bar", 0.15, 3),
+        "speed": Axis("speed", "km/h", "speed", "speed_kmh", 0.25, 5),
+        "slip_angle": Axis(
+            "slip angle", "deg", "angle", "slip_angle_deg", 0.0, 7, False, "slip_angles_deg"
+        ),
+        "slip_ratio": Axis("slip ratio", "1", "ratio", "slip_ratio", 0.0, 7, False, "slip_ratios"),
+        "camber": Axis("camber", "deg", "angle", "camber_deg", 0.0, 2, False),
+        "temperature": Axis("tread temperature", "degC", "temperature", "temperature_degC", 0.0, 2),
+    }
+)
 """Every condition that may be planned."""
 STRAIN = ("load", "pressure", "speed")
 """Those of a straight run."""
@@ -224,9 +227,15 @@ def operating_at(wanted: FloatArray, present: Operating) -> Operating:
     n = len(wanted)
     mean = {
         name: np.full(n, _mean(getattr(present, name)))
-        for name in ("camber", "slip_angle", "slip_ratio", "side_force", "drive_force",
-                     "temperature")
-    }  # fmt: skip
+        for name in (
+            "camber",
+            "slip_angle",
+            "slip_ratio",
+            "side_force",
+            "drive_force",
+            "temperature",
+        )
+    }
     load, pressure, speed = wanted.T
     rate = float(np.median(present.omega / present.speed))
     return Operating(

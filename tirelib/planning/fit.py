@@ -81,9 +81,12 @@ class Guess:
         # a law may leave its domain on the way of a step that is then taken back
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             return solve_whole(
-                self.values, points, self.changes, low_pass=data.low_pass,
+                self.values,
+                points,
+                self.changes,
+                low_pass=data.low_pass,
                 start=near.contact.x if near is not None and near.contact else None,
-            )  # fmt: skip
+            )
 
     def slopes(self, found: Whole, data: Data, points: Operating) -> tuple[FloatArray, FloatArray]:
         """Return slopes by the coordinates, and by relative load and pressure."""

@@ -130,17 +130,20 @@ def set_points(ahead: Problem, fit: ForceFit) -> FloatArray:
     """Return the change of the force for one standard deviation of each set point, (n, 4)."""
     at, here = ahead.bench.conditions, ahead.predict(fit.values, fit.changes)
     steps = {
-        "load": SET_POINT * at.load, "pressure": SET_POINT * at.pressure,
-        "slip_angle": np.full(len(at), ANGLE), "slip_ratio": RATIO * at.slip_ratio,
-    }  # fmt: skip
+        "load": SET_POINT * at.load,
+        "pressure": SET_POINT * at.pressure,
+        "slip_angle": np.full(len(at), ANGLE),
+        "slip_ratio": RATIO * at.slip_ratio,
+    }
     columns = []
     for name, step in steps.items():
         moved = getattr(at, name) + step
         data = replace(ahead.bench.points.data, **{name: moved})
         bench = replace(
-            ahead.bench, points=replace(ahead.bench.points, data=data),
+            ahead.bench,
+            points=replace(ahead.bench.points, data=data),
             conditions=replace(at, **{name: moved}),
-        )  # fmt: skip
+        )
         there = replace(ahead, bench=bench).predict(fit.values, fit.changes)
         columns.append(np.nan_to_num(there - here))
     return np.stack(columns, axis=1)

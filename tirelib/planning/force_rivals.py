@@ -98,9 +98,10 @@ def force_axes(case: ForceCase) -> tuple[str, ...]:
     slip = ("slip_ratio",) if case.quantity == "Fx" else ("slip_angle",)
     known = [name for name in ("load", "pressure", "speed") if np.isfinite(getattr(at, name)).all()]
     other = [
-        name for name in ("slip_angle", "slip_ratio", "camber", "temperature")
+        name
+        for name in ("slip_angle", "slip_ratio", "camber", "temperature")
         if name not in slip and varies(at, name)
-    ]  # fmt: skip
+    ]
     return (*known, *slip, *other)
 
 
@@ -150,18 +151,22 @@ def points_ahead(case: ForceCase, envelope: Envelope, wanted: FloatArray) -> Pro
     points = case.problem.bench.points
     every = {k: np.concatenate([getattr(data, k), v]) for k, v in more.items()}
     joint = ForcePoints(
-        ForceData(**every), np.concatenate([points.slip_rate, rate]),
+        ForceData(**every),
+        np.concatenate([points.slip_rate, rate]),
         np.concatenate([points.samples, np.ones(n, dtype=np.int64)]),
         np.concatenate([points.cell, points.cell.max() + 1 + np.arange(n)]),
         np.concatenate([points.sweep, np.full(n, bool(rate.any()))]),
-    )  # fmt: skip
+    )
     bench = ForceBench.of(case.model, joint)
     order = np.concatenate([case.problem.bench.conditions.order, np.ones(n)])
     bench = replace(bench, conditions=replace(bench.conditions, order=order))
     return Problem(
-        bench, case.quantity, np.concatenate([case.problem.measured, np.full(n, np.nan)]),
-        case.problem.scale, every["block"],
-    )  # fmt: skip
+        bench,
+        case.quantity,
+        np.concatenate([case.problem.measured, np.full(n, np.nan)]),
+        case.problem.scale,
+        every["block"],
+    )
 
 
 def structure_rows(
@@ -225,21 +230,25 @@ def try_force_suspects(
     progress : callable, optional
     """
     noise, white = counted_noise(case, base, structure, _suspected(case, base, suspects))
-    fits = {effect.name: partial(_with, case, base, effect, structure, white)
-            for effect, _ in suspects}  # fmt: skip
+    fits = {
+        effect.name: partial(_with, case, base, effect, structure, white) for effect, _ in suspects
+    }
     rivals, left_out = fitted_rivals(
-        fits, _rival(case, NOTHING, base, structure, white), with_nothing=with_nothing,
+        fits,
+        _rival(case, NOTHING, base, structure, white),
+        with_nothing=with_nothing,
         progress=progress,
-    )  # fmt: skip
+    )
     return ForceTrial(rivals, left_out, 1.0, noise, white)
 
 
 def _faint(case: ForceCase, base: ForceFit, effect: Effect) -> ForceFit:
     """Return the base with an effect of strength zero, and the slopes there."""
     zero = replace(
-        base, effects=(*base.effects, effect),
+        base,
+        effects=(*base.effects, effect),
         strengths=(*base.strengths, np.zeros(effect.components)),
-    )  # fmt: skip
+    )
     return replace(zero, slopes=slopes_at(case.problem, zero))
 
 
@@ -316,8 +325,10 @@ def force_forecasts(
         off = set_points(ahead, rival.fit)
         told.append(
             Forecast(
-                wave.reshape(-1, size), slopes.reshape(len(slopes), -1, size),
-                trial.counted.share * off.reshape(-1, size, off.shape[1]), rival.covariance,
+                wave.reshape(-1, size),
+                slopes.reshape(len(slopes), -1, size),
+                trial.counted.share * off.reshape(-1, size, off.shape[1]),
+                rival.covariance,
             )
-        )  # fmt: skip
+        )
     return told

@@ -66,9 +66,14 @@ def next_test(
     ahead = operating_at(points, data.points)
     shapes = structure_shapes(data, base, ahead, progress=progress)
     trial = try_suspects(
-        data, base, suspects, noise=noise, shapes=shapes, with_nothing=with_nothing,
+        data,
+        base,
+        suspects,
+        noise=noise,
+        shapes=shapes,
+        with_nothing=with_nothing,
         progress=progress,
-    )  # fmt: skip
+    )
     random = noise_of(trial, noise)
     try:
         told = forecasts(trial, data, ahead, progress=progress)

@@ -200,6 +200,11 @@ def _in_range(found: Fitted) -> bool:
 
 def _whitening(data: Data, base: Refit, noise: float) -> Whitening:
     return whitening(
-        base.waveform, base.values, data.points, data.tolerance, data.angle_std, noise,
+        base.waveform,
+        base.values,
+        data.points,
+        data.tolerance,
+        data.angle_std,
+        noise,
         data.low_pass,
-    )  # fmt: skip
+    )

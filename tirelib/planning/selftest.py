@@ -171,8 +171,11 @@ def selftest(
     plantings = []
     known = {effect.name for effect in catalogue}
     # a diagnosis ranks more beside them, which it never names
-    living = {k: candidate for k, candidate in enumerate(ranking.found.living)
-              if candidate.effect.name in known}  # fmt: skip
+    living = {
+        k: candidate
+        for k, candidate in enumerate(ranking.found.living)
+        if candidate.effect.name in known
+    }
     for candidate in living.values():
         if only and candidate.effect.name not in only:
             continue
@@ -181,11 +184,19 @@ def selftest(
                 progress(f"{candidate.effect.name} at {ratio:g}")
             plantings.append(_planted(candidate, ratio, floor, errors, judge))
     return SelfTest(
-        tuple(plantings), named, ranking.found.dead,
+        tuple(plantings),
+        named,
+        ranking.found.dead,
         {c.effect.name: ranking.found.twins(k) for k, c in living.items()},
         {c.effect.name: _ratio_at(c, _share_of_end(c), floor) for c in living.values()},
-        floor, size, noise, repeats, members, seed, runs.waves.header.name,
-    )  # fmt: skip
+        floor,
+        size,
+        noise,
+        repeats,
+        members,
+        seed,
+        runs.waves.header.name,
+    )
 
 
 def _track(data: Data, base: Refit, size: float, noise: float, repeats: int, seed: int) -> Track:
@@ -195,9 +206,13 @@ def _track(data: Data, base: Refit, size: float, noise: float, repeats: int, see
     for _ in range(ATTEMPTS):
         try:
             track = Track.of(
-                draw_variants(repeats, size, random), base, data, data.points, noise=noise,
+                draw_variants(repeats, size, random),
+                base,
+                data,
+                data.points,
+                noise=noise,
                 random=random,
-            )  # fmt: skip
+            )
             track.measured(base.changes, data)
         except TirelibError as error:
             failure = error
@@ -263,9 +278,12 @@ class _Judge:
             deflection=np.concatenate([one.deflection for one in large]),
         )
         found = predict(
-            values, data.points.tiled(count), base.changes, low_pass=data.low_pass,
+            values,
+            data.points.tiled(count),
+            base.changes,
+            low_pass=data.low_pass,
             correction=correction,
-        ).wave  # fmt: skip
+        ).wave
         return found.reshape(count, len(data.points), -1)
 
 

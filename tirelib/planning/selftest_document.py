@@ -37,12 +37,15 @@ def selftest_document(found: SelfTest) -> dict[str, Any]:
         "floor_whitened": found.floor,
         "false_alarms": {
             "share": sum(map(bool, found.nothing)) / max(len(found.nothing), 1),
-            "n": len(found.nothing), "named": sorted({name for name in found.nothing if name}),
+            "n": len(found.nothing),
+            "named": sorted({name for name in found.nothing if name}),
         },
         "summary": [_summary(found, ratio) for ratio in ratios],
         "effects": [
             {
-                "effect": name, "title": each[0].effect.title, "unit": each[0].effect.unit,
+                "effect": name,
+                "title": each[0].effect.title,
+                "unit": each[0].effect.unit,
                 "largest_ratio": found.largest[name],
                 "twins": [
                     {"effect": twin, "angle_deg": float(np.rad2deg(angle))}
@@ -53,7 +56,7 @@ def selftest_document(found: SelfTest) -> dict[str, Any]:
             for name, each in by_name.items()
         ],
         "dead": dict(found.dead),
-    }  # fmt: skip
+    }
 
 
 def _summary(found: SelfTest, ratio: float) -> dict[str, Any]:
@@ -62,9 +65,12 @@ def _summary(found: SelfTest, ratio: float) -> dict[str, Any]:
     n = sum(len(p.named) for p in done)
     right, wrong = sum(p.right for p in done), sum(p.wrong for p in done)
     return {
-        "ratio": ratio, "effects": len(done), "n": n,
-        "found": right / n if n else None, "wrong": wrong / n if n else None,
-    }  # fmt: skip
+        "ratio": ratio,
+        "effects": len(done),
+        "n": n,
+        "found": right / n if n else None,
+        "wrong": wrong / n if n else None,
+    }
 
 
 def _result(planting: Planting, found: SelfTest) -> dict[str, Any]:

@@ -76,10 +76,13 @@ def structure_shapes(
     n = len(data.points)
     every = data.points if points is None else joined(data.points, points)
     quiet = replace(
-        data, strain=np.zeros((len(every), GRID.size)), points=every,
-        tolerance=Tolerance(0.0, 0.0, 0.0, 0.0), angle_std=np.zeros(len(every)),
+        data,
+        strain=np.zeros((len(every), GRID.size)),
+        points=every,
+        tolerance=Tolerance(0.0, 0.0, 0.0, 0.0),
+        angle_std=np.zeros(len(every)),
         deflection=np.full(len(every), np.nan),
-    )  # fmt: skip
+    )
     model = _at(base, data, every)
     rests = variants(quiet, model, members=members, seed=seed, progress=progress)
     rows = data.noise * rests.reshape(len(rests), len(every), -1) / np.sqrt(max(len(rests), 1))
@@ -127,8 +130,11 @@ def _at(base: Refit, data: Data, points: Operating) -> Refit:
     """Return a fitted model at other points, whitened by noise alone; residuals as they are."""
     correction = with_slopes(
         large_displacements(base.values, points, low_pass=data.low_pass),
-        base.values, points, coordinates(base.values), low_pass=data.low_pass,
-    )  # fmt: skip
+        base.values,
+        points,
+        coordinates(base.values),
+        low_pass=data.low_pass,
+    )
     found = linearised(
         base.values,
         points,
@@ -140,6 +146,10 @@ def _at(base: Refit, data: Data, points: Operating) -> Refit:
     n = len(points)
     white = Whitening(np.zeros((n, GRID.size, 4)), np.zeros((n, 4, 4)), data.noise)
     return replace(
-        base, waveform=found.waveform, deflection=found.deflection, slopes=found.waveform_slopes,
-        correction=correction, whiten=white,
-    )  # fmt: skip
+        base,
+        waveform=found.waveform,
+        deflection=found.deflection,
+        slopes=found.waveform_slopes,
+        correction=correction,
+        whiten=white,
+    )

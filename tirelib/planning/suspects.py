@@ -102,9 +102,11 @@ def _of(
         return effect, np.atleast_1d(np.asarray(strength, dtype=float))
 
     return Suspects(
-        tuple(pair(name) for name in names), tuple(pair(name) for name in beside), with_nothing,
+        tuple(pair(name) for name in names),
+        tuple(pair(name) for name in beside),
+        with_nothing,
         why,
-    )  # fmt: skip
+    )
 
 
 def given_suspects(

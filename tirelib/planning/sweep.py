@@ -92,9 +92,10 @@ def campaign_sweep(points: ForcePoints, name: str, wanted: bool | None = None) -
     cell = np.round(slip / (CELL_ANGLE if name == "slip_angle" else CELL_RATIO)).astype(np.int64)
     run = _runs(points)
     several = [
-        index for index in (np.flatnonzero(run == k) for k in range(int(run.max()) + 1))
+        index
+        for index in (np.flatnonzero(run == k) for k in range(int(run.max()) + 1))
         if np.unique(cell[index]).size >= LEAST
-    ]  # fmt: skip
+    ]
     if sum(index.size for index in several) > SHARE * len(points):
         chosen = max(several, key=lambda index: np.unique(cell[index]).size)
         return _once(name, slip[chosen], cell[chosen], points.slip_rate[chosen])
@@ -107,10 +108,11 @@ def _runs(points: ForcePoints) -> IntArray:
     """Return the number of each point's run."""
     data = points.data
     known: Sequence[IntArray] = [
-        set_points(data.load) // _LEVEL, set_points(data.pressure) // _LEVEL,
+        set_points(data.load) // _LEVEL,
+        set_points(data.pressure) // _LEVEL,
         set_points(np.abs(data.speed)) // _LEVEL,
         np.round(data.camber / CELL_ANGLE).astype(np.int64),
-    ]  # fmt: skip
+    ]
     order = np.argsort(points.conditions.order, kind="stable")
     new = np.zeros(len(points), dtype=bool)
     for level in known:

@@ -23,9 +23,12 @@ from tirelib.waveforms import GRID
 
 REFERENCE_LOAD = 4000.0
 CONSTANTS: Mapping[str, float] = {
-    "bending_stiffness": 0.12, "radial_stiffness": 0.06, "tangential_stiffness": 0.12,
-    "extension_stiffness": 0.15, "mass": 0.05,
-}  # fmt: skip
+    "bending_stiffness": 0.12,
+    "radial_stiffness": 0.06,
+    "tangential_stiffness": 0.12,
+    "extension_stiffness": 0.15,
+    "mass": 0.05,
+}
 """Relative standard deviation by which constants differ from the fitted ones."""
 TERMS = 6
 """Waves of the smooth misfit between the ends of its reach."""
@@ -143,12 +146,15 @@ class Track:
         values = _values(variants, model, shown)
         angle = min(float(np.mean(data.angle_std)), 0.01)
         return cls(
-            variants, values, really, shown,
+            variants,
+            values,
+            really,
+            shown,
             large_displacements(values, really, low_pass=data.low_pass),
             1.0 + tolerance.gain * drawn[2],
             angle * drawn[3] + variants.delay[:, None] * shown.omega,
             noise * random.standard_normal((*shape, GRID.size)),
-        )  # fmt: skip
+        )
 
     def measured(self, changes: Changes, data: Data) -> FloatArray:
         """Return the waveforms that the gages show with changes, (n_variants, n_points, n_phi).

@@ -143,18 +143,32 @@ def write_comparison(found: Comparison | ForceComparison, folder: Path) -> tuple
     by_name = {s.name: s for s in shown}
     views = [
         {
-            "title": part.title, "anchor": part.anchor, "text": part.text, "tables": part.tables,
-            "plots": [by_name[plot.name] for plot in part.plots], "sources": part.sources,
+            "title": part.title,
+            "anchor": part.anchor,
+            "text": part.text,
+            "tables": part.tables,
+            "plots": [by_name[plot.name] for plot in part.plots],
+            "sources": part.sources,
         }
         for part in parts
-    ]  # fmt: skip
+    ]
     page = write_page(
-        folder, "comparison.html", title=title, sections=(), parts=views,
-        summary=summary_of(found), answer=answer_of(found), messages=found.messages,
-        sentences=found.sentences, sentence_note=SENTENCE_NOTE, lines=(), links=(), commands=(),
+        folder,
+        "comparison.html",
+        title=title,
+        sections=(),
+        parts=views,
+        summary=summary_of(found),
+        answer=answer_of(found),
+        messages=found.messages,
+        sentences=found.sentences,
+        sentence_note=SENTENCE_NOTE,
+        lines=(),
+        links=(),
+        commands=(),
         plotly=Markup(get_plotlyjs()),
         figures=Markup(figures.replace("</", "<\\/")),
-    )  # fmt: skip
+    )
     words = folder / "comparison.md"
     words.write_text(markdown(found, parts, title), encoding="utf-8")
     return page, words
@@ -202,7 +216,8 @@ def strain_parts(found: Comparison) -> list[Part]:
     return [
         Part("Noise, error, floor", "noise", floor_text(found), tables=[number_table(found)]),
         Part(
-            "Where: angle and condition", "maps",
+            "Where: angle and condition",
+            "maps",
             "Model less measured; set-point errors taken out. Angle 0 is below the axle, "
             "the entry is negative.",
             plots=heat_maps(found),
@@ -211,13 +226,15 @@ def strain_parts(found: Comparison) -> list[Part]:
         Part("Best, median and worst run", "waveforms", plots=waveform_plots(found)),
         Part("Trends", "trends", plots=trend_plots(found)),
         Part(
-            "Contact and deflection", "tracks", tables=[track_table(found)],
+            "Contact and deflection",
+            "tracks",
+            tables=[track_table(found)],
             plots=track_plots(found),
         ),
         Part("Table", "table", tables=sector_tables(found)),
         Part("Set points", "points", tables=[point_table(found)], plots=[set_point_plot(found)]),
         Part("Sources", "sources", tables=_provenance(found), sources=_bibliography(found)),
-    ]  # fmt: skip
+    ]
 
 
 def force_parts(found: ForceComparison) -> list[Part]:
@@ -228,13 +245,17 @@ def force_parts(found: ForceComparison) -> list[Part]:
     return [
         Part("Noise, error, floor", "noise", force_floor_text(found), tables=[noise]),
         Part("Where: slip and condition", "where", plots=force_plots(found)),
-        Part("Best, median and worst curve", "curves", tables=[listed] if curves else (),
-             text="" if curves else "No set point has three points or more: there is no curve.",
-             plots=curve_plots(found, curves)),
+        Part(
+            "Best, median and worst curve",
+            "curves",
+            tables=[listed] if curves else (),
+            text="" if curves else "No set point has three points or more: there is no curve.",
+            plots=curve_plots(found, curves),
+        ),
         Part("Trends", "trends", plots=force_trends(found)),
         Part("Table", "table", tables=[table]),
         Part("Sources", "sources", sources=[*effects, *BRUSH]),
-    ]  # fmt: skip
+    ]
 
 
 def _provenance(found: Comparison) -> list[Table]:
@@ -250,7 +271,7 @@ def _provenance(found: Comparison) -> list[Table]:
             Table(
                 "Effects in the model", ["effect", "what", "strength", "source"], effects, texts=4
             ),
-        )  # fmt: skip
+        )
     return out
 
 
@@ -269,8 +290,14 @@ def markdown(found: Comparison | ForceComparison, parts: Sequence[Part], title: 
     lines = [f"# {title}", "", summary_of(found), "", f"**{answer_of(found)}**", ""]
     lines += [f"> {message}\n" for message in found.messages]
     if found.sentences:
-        lines += ["## Lack of fit", "", *(f"- {text}" for text in found.sentences), "",
-                  SENTENCE_NOTE, ""]  # fmt: skip
+        lines += [
+            "## Lack of fit",
+            "",
+            *(f"- {text}" for text in found.sentences),
+            "",
+            SENTENCE_NOTE,
+            "",
+        ]
     return "\n".join([*lines, *markdown_parts(parts)]).rstrip() + "\n"
 
 

@@ -19,19 +19,25 @@ def number_table(found: Comparison) -> Table:
     """Return noise, error and floor."""
     fit, noise = found.fit, found.noise
     rows = [
-        [f"noise of a run's waveform, from {noise.repeats} repeated set points [microstrain]",
-         number(1e6 * noise.std, 3)],
+        [
+            f"noise of a run's waveform, from {noise.repeats} repeated set points [microstrain]",
+            number(1e6 * noise.std, 3),
+        ],
         [f"error [{found.error.unit}]", number(found.error.value, 4)],
-        ["delay of the gages against the trigger, counted out [microseconds]",
-         f"{number(1e6 * found.error.delay, 3)} \u00b1 {number(1e6 * found.error.delay_std, 2)}"],
+        [
+            "delay of the gages against the trigger, counted out [microseconds]",
+            f"{number(1e6 * found.error.delay, 3)} \u00b1 {number(1e6 * found.error.delay_std, 2)}",
+        ],
         ["rms difference, set points and delay taken out [noise]", number(fit.rms / noise.std, 4)],
         ["rms difference, set points and delay taken out [microstrain]", number(1e6 * fit.rms, 4)],
-        ["rms difference, the delay taken out, set points left in [microstrain]",
-         number(1e6 * found.error.rms, 4)],
+        [
+            "rms difference, the delay taken out, set points left in [microstrain]",
+            number(1e6 * found.error.rms, 4),
+        ],
         ["rms measured strain [microstrain]", number(1e6 * fit.strain_rms, 4)],
         ["floor as far as known [noise]", number(found.floor.value, 4)],
         ["error without a smooth misfit [noise]", number(found.floor.smooth, 4)],
-    ]  # fmt: skip
+    ]
     note = "The error counts straight, freely rolling runs." if found.error.known else ""
     return Table("Noise, error and floor", ["", "value"], rows, note=note)
 
@@ -49,48 +55,75 @@ def sector_tables(found: Comparison) -> list[Table]:
         out.append(
             Table(
                 title,
-                ["level", "sector", "runs", f"rms [{unit}]", "rms [microstrain]",
-                 "mean [microstrain]", "95 % \u00b1 [microstrain]"],
-                rows, texts=2, folded=by != "all",
+                [
+                    "level",
+                    "sector",
+                    "runs",
+                    f"rms [{unit}]",
+                    "rms [microstrain]",
+                    "mean [microstrain]",
+                    "95 % \u00b1 [microstrain]",
+                ],
+                rows,
+                texts=2,
+                folded=by != "all",
                 note="Model less measured; a positive mean is too much tension.",
             )
-        )  # fmt: skip
+        )
     return out
 
 
 def _row(cell: Cell, factor: float) -> list[str]:
     level = "all" if cell.by == "all" else told(cell.by, cell.value)
     return [
-        level, cell.sector, str(cell.runs), number(factor * cell.rms, 3), number(1e6 * cell.rms, 4),
-        number(1e6 * cell.mean, 4), number(1.96e6 * cell.std, 2),
-    ]  # fmt: skip
+        level,
+        cell.sector,
+        str(cell.runs),
+        number(factor * cell.rms, 3),
+        number(1e6 * cell.rms, 4),
+        number(1e6 * cell.mean, 4),
+        number(1.96e6 * cell.std, 2),
+    ]
 
 
 def gage_tables(found: Comparison) -> list[Table]:
     """Return every gage's noise and rms, and its mean difference in every sector."""
     gages = sorted(found.gages, key=lambda g: -g.lateral)
     rows = [
-        [millimeters(g.lateral), str(g.number + 1), number(1e6 * g.noise.std, 3),
-         number(1e6 * g.rms, 4), number(g.rms / g.noise.std, 4)]
+        [
+            millimeters(g.lateral),
+            str(g.number + 1),
+            number(1e6 * g.noise.std, 3),
+            number(1e6 * g.rms, 4),
+            number(g.rms / g.noise.std, 4),
+        ]
         for g in gages
-    ]  # fmt: skip
+    ]
     cells = [{cell.sector: cell for cell in gage.table} for gage in gages]
-    means = [[name, *(_mean(cell[name]) if name in cell else "" for cell in cells)]
-             for name in SECTORS]  # fmt: skip
+    means = [
+        [name, *(_mean(cell[name]) if name in cell else "" for cell in cells)] for name in SECTORS
+    ]
     return [
         Table(
             "Difference of each gage, counted runs",
-            ["y (ISO 8855)", "gage", "noise [microstrain]", "rms [microstrain]",
-             "rms [noise of the gage]"],
-            rows, note="y to the left; set points taken out.",
+            [
+                "y (ISO 8855)",
+                "gage",
+                "noise [microstrain]",
+                "rms [microstrain]",
+                "rms [noise of the gage]",
+            ],
+            rows,
+            note="y to the left; set points taken out.",
         ),
         Table(
             "Mean difference of each gage in each sector [microstrain]",
-            ["sector", *(f"y = {millimeters(g.lateral)}" for g in gages)], means,
+            ["sector", *(f"y = {millimeters(g.lateral)}" for g in gages)],
+            means,
             note="Model less measured, with 95 % intervals by the noise of the gage and by set "
-                 "points. A positive mean is too much tension.",
+            "points. A positive mean is too much tension.",
         ),
-    ]  # fmt: skip
+    ]
 
 
 def _mean(cell: Cell) -> str:
@@ -103,22 +136,37 @@ def track_table(found: Comparison) -> Table:
     rows = []
     for track in found.tracks:
         fit, scale = track_fit(track, found.chosen.straight), track.scale
-        rows.append([
-            f"{track.name} [{track.unit}]", str(fit.runs), number(scale * track.noise, 2),
-            number(scale * fit.mean, 3), number(1.96 * scale * fit.std, 2),
-            number(scale * fit.rms, 3), number(track.in_noise(fit.rms), 3),
-            number(scale * fit.rms_beside, 3),
-        ])  # fmt: skip
+        rows.append(
+            [
+                f"{track.name} [{track.unit}]",
+                str(fit.runs),
+                number(scale * track.noise, 2),
+                number(scale * fit.mean, 3),
+                number(1.96 * scale * fit.std, 2),
+                number(scale * fit.rms, 3),
+                number(track.in_noise(fit.rms), 3),
+                number(scale * fit.rms_beside, 3),
+            ]
+        )
     note = (
         "Model less measured. No number is corrected for a constant offset of the campaign; the "
         "last column is what stays beside one."
     )
     return Table(
         "Counted runs",
-        ["", "runs", "noise of a run", "mean", "95 % \u00b1", "rms", "rms [noise]",
-         "rms beside the mean"],
-        rows, note=note,
-    )  # fmt: skip
+        [
+            "",
+            "runs",
+            "noise of a run",
+            "mean",
+            "95 % \u00b1",
+            "rms",
+            "rms [noise]",
+            "rms beside the mean",
+        ],
+        rows,
+        note=note,
+    )
 
 
 def point_table(found: Comparison) -> Table:
@@ -129,51 +177,78 @@ def point_table(found: Comparison) -> Table:
     for k, name in enumerate(NAMES):
         unit, factor = units[k]
         worst = int(np.argmax(np.abs(scaled[:, k])))
-        rows.append([
-            "angle zero" if name == "angle" else name,
-            f"{number(factor * float(np.median(tolerance[:, k])), 3)} {unit}",
-            number(float(np.sqrt(np.mean(scaled[:, k] ** 2))), 3),
-            number(float(scaled[worst, k]), 3), str(found.run[worst]),
-        ])  # fmt: skip
+        rows.append(
+            [
+                "angle zero" if name == "angle" else name,
+                f"{number(factor * float(np.median(tolerance[:, k])), 3)} {unit}",
+                number(float(np.sqrt(np.mean(scaled[:, k] ** 2))), 3),
+                number(float(scaled[worst, k]), 3),
+                str(found.run[worst]),
+            ]
+        )
     return Table(
         "Random part of the set points",
         ["set point", "tolerance (1 sigma)", "rms [tolerance]", "largest [tolerance]", "in run"],
-        rows, texts=2,
+        rows,
+        texts=2,
         note="An rms far above 1 is misfit that looks like a set-point error; far below 1, the "
-             "misfit hides the set points.",
-    )  # fmt: skip
+        "misfit hides the set points.",
+    )
 
 
 def force_tables(found: ForceComparison, curves: tuple[Curve, ...]) -> tuple[Table, Table, Table]:
     """Return a force's noise and error, its differences by condition, and its curves."""
     unit = FORCE_UNITS[found.quantity]
     noise = Table(
-        "Noise and error", ["", "value"],
-        [[f"noise of a point, from {found.repeats} repeated conditions [{unit}]",
-          number(found.noise, 3)],
-         [f"error [{found.error_unit}]", number(found.error, 4)],
-         ["floor as far as known [noise]", number(found.floor, 4)],
-         [f"rms difference [{unit}]", number(found.rms, 4)],
-         [f"rms measured [{unit}]", number(found.measured_rms, 4)]],
-    )  # fmt: skip
+        "Noise and error",
+        ["", "value"],
+        [
+            [
+                f"noise of a point, from {found.repeats} repeated conditions [{unit}]",
+                number(found.noise, 3),
+            ],
+            [f"error [{found.error_unit}]", number(found.error, 4)],
+            ["floor as far as known [noise]", number(found.floor, 4)],
+            [f"rms difference [{unit}]", number(found.rms, 4)],
+            [f"rms measured [{unit}]", number(found.measured_rms, 4)],
+        ],
+    )
     rows = [
-        [CONDITIONS.get(cell.by, "all points"), range_of(cell),
-         str(cell.points), number(cell.rms, 3), number(cell.rms / found.noise, 3),
-         number(cell.mean, 3), number(cell.excess, 3), number(1.96 * cell.excess_std, 2)]
+        [
+            CONDITIONS.get(cell.by, "all points"),
+            range_of(cell),
+            str(cell.points),
+            number(cell.rms, 3),
+            number(cell.rms / found.noise, 3),
+            number(cell.mean, 3),
+            number(cell.excess, 3),
+            number(1.96 * cell.excess_std, 2),
+        ]
         for cell in found.table
-    ]  # fmt: skip
+    ]
     table = Table(
         "Difference, model less measured (slips by size)",
-        ["by", "range", "points", f"rms [{unit}]", "rms [noise]", f"mean [{unit}]",
-         f"size too large by [{unit}]", f"95 % \u00b1 [{unit}]"],
-        rows, texts=2,
-    )  # fmt: skip
+        [
+            "by",
+            "range",
+            "points",
+            f"rms [{unit}]",
+            "rms [noise]",
+            f"mean [{unit}]",
+            f"size too large by [{unit}]",
+            f"95 % \u00b1 [{unit}]",
+        ],
+        rows,
+        texts=2,
+    )
     each = [
         [curve.words, str(curve.points), number(curve.rms, 3), number(curve.rms / found.noise, 3)]
         for curve in curves
     ]
     listed = Table(
-        "Curves, the best first", ["set point", "points", f"rms [{unit}]", "rms [noise]"], each,
+        "Curves, the best first",
+        ["set point", "points", f"rms [{unit}]", "rms [noise]"],
+        each,
         folded=len(each) > 8,
-    )  # fmt: skip
+    )
     return noise, table, listed

@@ -76,10 +76,14 @@ def write_cosim(
         If the folder cannot be written.
     """
     page, _ = write_parts_page(
-        folder, "index", [*parts_of(document, series), *more], title=TITLE,
-        summary=_summary(document), answer=_answer(document),
+        folder,
+        "index",
+        [*parts_of(document, series), *more],
+        title=TITLE,
+        summary=_summary(document),
+        answer=_answer(document),
         messages=[f"Not reached: {m}." for m in document["missed"]],
-    )  # fmt: skip
+    )
     return page
 
 
@@ -106,20 +110,27 @@ def parts_of(document: Mapping[str, Any], series: Sequence[Series]) -> list[Part
     by_name = {one["name"]: one for one in document["manoeuvres"]}
     drives = [
         Part(
-            _words(one.name), one.name, f"{one.about[0].upper()}{one.about[1:]}.",
-            tables=[_wheels(by_name[one.name])], plots=[_tracks(one)],
+            _words(one.name),
+            one.name,
+            f"{one.about[0].upper()}{one.about[1:]}.",
+            tables=[_wheels(by_name[one.name])],
+            plots=[_tracks(one)],
         )
         for one in series
-    ]  # fmt: skip
+    ]
     return [
-        Part("Errors", "errors", _METHOD,
-             tables=[_errors(document, "steady"), _errors(document, "transient")],
-             plots=[_shares(document)]),
+        Part(
+            "Errors",
+            "errors",
+            _METHOD,
+            tables=[_errors(document, "steady"), _errors(document, "transient")],
+            plots=[_shares(document)],
+        ),
         Part("Intervals", "intervals", tables=[_intervals(document)]),
         Part("Delay and validity", "delay", tables=[_delays(document), _held(document)]),
         Part("Out of range", "range", tables=[_range(document)]),
         *drives,
-    ]  # fmt: skip
+    ]
 
 
 def _words(name: str) -> str:
@@ -129,19 +140,24 @@ def _words(name: str) -> str:
 def _errors(document: Mapping[str, Any], part: str) -> Table:
     limits = document["limits"]
     rows = [
-        [_words(one["name"]), f"{one['all'][part]['turns']}",
-         *(_against(one["all"][part][name], limits[name], part) for name in QUANTITIES)]
+        [
+            _words(one["name"]),
+            f"{one['all'][part]['turns']}",
+            *(_against(one["all"][part][name], limits[name], part) for name in QUANTITIES),
+        ]
         for one in document["manoeuvres"]
-    ]  # fmt: skip
+    ]
     goal = [["goal", "", *(number(limits[name]) for name in QUANTITIES)]]
     heads = [f"{name} [{unit}]" for name, (_, _, unit) in QUANTITIES.items()]
     note = (
         "A star marks an error above the goal." if part == "steady" else "Goals bind steady turns."
     )
     return Table(
-        f"{part.capitalize()} turns, all wheels", ["manoeuvre", "turns", *heads],
-        rows + (goal if part == "steady" else []), note=note,
-    )  # fmt: skip
+        f"{part.capitalize()} turns, all wheels",
+        ["manoeuvre", "turns", *heads],
+        rows + (goal if part == "steady" else []),
+        note=note,
+    )
 
 
 def _against(value: float, limit: float, part: str) -> str:
@@ -150,56 +166,86 @@ def _against(value: float, limit: float, part: str) -> str:
 
 def _wheels(one: Mapping[str, Any]) -> Table:
     rows = [
-        [WHEELS[at], part, f"{wheel[part]['turns']}",
-         *(number(wheel[part][name], 3) for name in QUANTITIES)]
+        [
+            WHEELS[at],
+            part,
+            f"{wheel[part]['turns']}",
+            *(number(wheel[part][name], 3) for name in QUANTITIES),
+        ]
         for at, wheel in enumerate(one["wheels"].values())
         for part in ("steady", "transient")
-    ]  # fmt: skip
+    ]
     heads = [f"{name} [{unit}]" for name, (_, _, unit) in QUANTITIES.items()]
-    return Table("Errors of each wheel (rms)", ["wheel", "part", "turns", *heads], rows, texts=2,
-                 note=f"Peak of Fy: {number(one['peak_Fy_N'], 3)} N.", folded=True)  # fmt: skip
+    return Table(
+        "Errors of each wheel (rms)",
+        ["wheel", "part", "turns", *heads],
+        rows,
+        texts=2,
+        note=f"Peak of Fy: {number(one['peak_Fy_N'], 3)} N.",
+        folded=True,
+    )
 
 
 def _intervals(document: Mapping[str, Any]) -> Table:
     rows = []
     for one in document["manoeuvres"]:
         parts = [one["all"]["interval"][name] for name in QUANTITIES]
-        rows.append([
-            _words(one["name"]), number(one["least_friction"], 2),
-            *(number(100.0 * part["valid"], 3) for part in parts),
-            *(number(100.0 * part["covered"], 3) for part in parts),
-            *(number(part["worst"], 2) for part in parts),
-        ])  # fmt: skip
+        rows.append(
+            [
+                _words(one["name"]),
+                number(one["least_friction"], 2),
+                *(number(100.0 * part["valid"], 3) for part in parts),
+                *(number(100.0 * part["covered"], 3) for part in parts),
+                *(number(part["worst"], 2) for part in parts),
+            ]
+        )
     heads = (
         *(f"{name}: valid [%]" for name in QUANTITIES),
         *(f"{name}: covered [%]" for name in QUANTITIES),
         *(f"{name}: largest [std]" for name in QUANTITIES),
     )
     return Table(
-        "What the 95 % intervals hold, all turns", ["manoeuvre", "friction", *heads], rows,
+        "What the 95 % intervals hold, all turns",
+        ["manoeuvre", "friction", *heads],
+        rows,
         note="Friction: the least under any wheel, as a factor of the calibrated road's. Valid: "
         "share of the turns. Covered: share of the valid turns whose truth lies within 1.96 "
         "standard deviations; 95 is right. Largest: error over standard deviation. The calibration "
         "is made on the numerical rig, so its intervals do not know the error of the surface that "
         "stands for the rig here.",
-    )  # fmt: skip
+    )
 
 
 def _delays(document: Mapping[str, Any]) -> Table:
     rows = []
     for one in document["manoeuvres"]:
         whole = one["all"]
-        rows.append([
-            _words(one["name"]), f"{whole['turns']}", number(whole["age_ms"], 3),
-            number(whole["lag_deg"], 3), number(whole["over_deg"], 3),
-            number(100.0 * whole["false_alarms"], 2), number(100.0 * whole["gage_out"], 2),
-            number(whole["out_of_range_s"], 3),
-            number(whole["missed_s"], 3),
-        ])  # fmt: skip
+        rows.append(
+            [
+                _words(one["name"]),
+                f"{whole['turns']}",
+                number(whole["age_ms"], 3),
+                number(whole["lag_deg"], 3),
+                number(whole["over_deg"], 3),
+                number(100.0 * whole["false_alarms"], 2),
+                number(100.0 * whole["gage_out"], 2),
+                number(whole["out_of_range_s"], 3),
+                number(whole["missed_s"], 3),
+            ]
+        )
     return Table(
         "Output and validity",
-        ["manoeuvre", "turns", "age [ms]", "lag [deg]", "late [deg]", "false alarms [%]",
-         "gage out [%]", "out of range [s]", "of it valid [s]"],
+        [
+            "manoeuvre",
+            "turns",
+            "age [ms]",
+            "lag [deg]",
+            "late [deg]",
+            "false alarms [%]",
+            "gage out [%]",
+            "out of range [s]",
+            "of it valid [s]",
+        ],
         rows,
         note="Age: from the middle of the contact to the output, median. Lag: largest wheel angle "
         "from the trailing edge to the output. Late: largest lag beyond 20 deg, half the filter "
@@ -207,31 +253,39 @@ def _delays(document: Mapping[str, Any]) -> Table:
         "not valid though everything was in the calibrated range for two turns. Gage out: every "
         "quantity may be used, but `valid` is false, because the strip over an outer gage carries "
         "next to nothing. Out of range: for two turns, by more than a tenth of the range.",
-    )  # fmt: skip
+    )
 
 
 def _held(document: Mapping[str, Any]) -> Table:
     rows = [
-        [_words(one["name"]),
-         *(number(one["all"]["held"][name], 3) for name in QUANTITIES),
-         *(number(one["all"]["delay_ms"][name], 3) for name in QUANTITIES)]
+        [
+            _words(one["name"]),
+            *(number(one["all"]["held"][name], 3) for name in QUANTITIES),
+            *(number(one["all"]["delay_ms"][name], 3) for name in QUANTITIES),
+        ]
         for one in document["manoeuvres"]
-    ]  # fmt: skip
+    ]
     heads = [f"{name} [{unit}]" for name, (_, _, unit) in QUANTITIES.items()]
     return Table(
         "What a controller meets: the value held, at every step",
-        ["manoeuvre", *heads, *(f"{name}: delay [ms]" for name in QUANTITIES)], rows,
+        ["manoeuvre", *heads, *(f"{name}: delay [ms]" for name in QUANTITIES)],
+        rows,
         note=f"Delay: that of the truth which fits the held value best; {DASH} where the truth "
         "hardly changes or no delay stands out.",
-    )  # fmt: skip
+    )
 
 
 def _range(document: Mapping[str, Any]) -> Table:
     rows = [
-        [check["case"], "yes" if check["valid_before"] else "no", number(check["turns"], 3),
-         "yes" if check["stays"] else "no", "passed" if check["passed"] else "MISSED"]
+        [
+            check["case"],
+            "yes" if check["valid_before"] else "no",
+            number(check["turns"], 3),
+            "yes" if check["stays"] else "no",
+            "passed" if check["passed"] else "MISSED",
+        ]
         for check in document["range"]
-    ]  # fmt: skip
+    ]
     return Table(
         "A wheel that rolls steadily leaves the range in one quantity",
         ["to", "valid before", "turns until not valid", "stays so", "within two turns"],
@@ -253,65 +307,101 @@ def _shares(document: Mapping[str, Any]) -> Plot:
     figure.update_yaxes(title="steady error / goal", rangemode="tozero")
     styled_figure(figure, 380, barmode="group", legend={"orientation": "h", "y": 1.12})
     return Plot(
-        "shares", "Steady errors as a share of the goal", "Below the line: reached.", figure,
-        ["manoeuvre", "quantity", "error / goal"], rows,
-    )  # fmt: skip
+        "shares",
+        "Steady errors as a share of the goal",
+        "Below the line: reached.",
+        figure,
+        ["manoeuvre", "quantity", "error / goal"],
+        rows,
+    )
 
 
 def _tracks(one: Series) -> Plot:
     """Draw truth and estimates: a row a quantity, a column a wheel."""
     figure = make_subplots(
-        rows=len(QUANTITIES), cols=len(WHEELS), shared_xaxes=True, shared_yaxes="rows",
-        column_titles=list(WHEELS), vertical_spacing=0.03, horizontal_spacing=0.015,
-    )  # fmt: skip
+        rows=len(QUANTITIES),
+        cols=len(WHEELS),
+        shared_xaxes=True,
+        shared_yaxes="rows",
+        column_titles=list(WHEELS),
+        vertical_spacing=0.03,
+        horizontal_spacing=0.015,
+    )
     rows: list[list[Any]] = []
     for row, (name, (title, factor, _)) in enumerate(QUANTITIES.items(), start=1):
         for wheel in range(len(WHEELS)):
             place = {"row": row, "col": wheel + 1}
             first = row == 1 and wheel == 0
             figure.add_scatter(
-                x=np.round(one.time, 4), y=_short(factor * one.truth[name][:, wheel]),
-                mode="lines", name="truth", line={"color": FAINT, "width": 1.6},
-                legendgroup="truth", showlegend=first, **place,
-            )  # fmt: skip
+                x=np.round(one.time, 4),
+                y=_short(factor * one.truth[name][:, wheel]),
+                mode="lines",
+                name="truth",
+                line={"color": FAINT, "width": 1.6},
+                legendgroup="truth",
+                showlegend=first,
+                **place,
+            )
             _marks(figure, one, wheel, name, factor, first, place)
             rows += [
                 [WHEELS[wheel], name, float(t), float(v), bool(good), bool(still)]
                 for t, v, good, still in zip(
-                    one.contact[wheel], one.told[wheel][name], one.valid[wheel][name],
-                    one.steady[wheel], strict=True,
+                    one.contact[wheel],
+                    one.told[wheel][name],
+                    one.valid[wheel][name],
+                    one.steady[wheel],
+                    strict=True,
                 )
-            ]  # fmt: skip
+            ]
         figure.update_yaxes(title=title, row=row, col=1)
     figure.update_xaxes(title="time [s]", row=len(QUANTITIES))
     styled_figure(figure, 860, legend={"orientation": "h", "y": 1.09})
     return Plot(
-        f"tracks-{one.name}", "Truth and estimates of each wheel",
+        f"tracks-{one.name}",
+        "Truth and estimates of each wheel",
         "Estimates stand at the middle of the contact that they are of; they are put out about "
         "30 deg of wheel angle after its end. Filled: steady turn; open: transient; cross: not "
         "valid. ISO 8855.",
-        figure, ["wheel", "quantity", "contact [s]", "estimate (SI)", "valid", "steady"], rows,
-    )  # fmt: skip
+        figure,
+        ["wheel", "quantity", "contact [s]", "estimate (SI)", "valid", "steady"],
+        rows,
+    )
 
 
 def _marks(
-    figure: go.Figure, one: Series, wheel: int, name: str, factor: float, first: bool,
+    figure: go.Figure,
+    one: Series,
+    wheel: int,
+    name: str,
+    factor: float,
+    first: bool,
     place: Mapping[str, int],
-) -> None:  # fmt: skip
+) -> None:
     valid, steady = one.valid[wheel][name], one.steady[wheel]
     kinds = (
         ("estimate, steady", valid & steady, {"symbol": "circle", "color": BLUE, "size": 5}),
-        ("estimate, transient", valid & ~steady,
-         {"symbol": "circle-open", "color": ORANGE, "size": 6}),
-        ("not valid", ~valid, {"symbol": "x-thin", "color": RED, "size": 6,
-                               "line": {"color": RED, "width": 1.5}}),
-    )  # fmt: skip
+        (
+            "estimate, transient",
+            valid & ~steady,
+            {"symbol": "circle-open", "color": ORANGE, "size": 6},
+        ),
+        (
+            "not valid",
+            ~valid,
+            {"symbol": "x-thin", "color": RED, "size": 6, "line": {"color": RED, "width": 1.5}},
+        ),
+    )
     for words, which, marker in kinds:
         figure.add_scatter(
             x=np.round(one.contact[wheel][which], 4),
-            y=_short(factor * one.told[wheel][name][which]), mode="markers", name=words,
-            marker=marker, legendgroup=words, showlegend=first, **place,
-        )  # fmt: skip
+            y=_short(factor * one.told[wheel][name][which]),
+            mode="markers",
+            name=words,
+            marker=marker,
+            legendgroup=words,
+            showlegend=first,
+            **place,
+        )
 
 
 def _short(values: FloatArray) -> list[float | None]:

@@ -183,14 +183,19 @@ def _comparison(trained: Trained) -> Table:
     return Table(
         "The dissertation's regressions on the cornering campaign (set1)",
         (
-            "regression", "source", "unit", "R\u00b2 in the dissertation", "R\u00b2 here",
-            "held-out error here", "estimator in use, held out",
+            "regression",
+            "source",
+            "unit",
+            "R\u00b2 in the dissertation",
+            "R\u00b2 here",
+            "held-out error here",
+            "estimator in use, held out",
         ),
         rows,
         texts=3,
         note="Another tire, so other numbers. Where a regression is much worse here, its figure "
         "shows why: mostly it also depends on the load.",
-    )  # fmt: skip
+    )
 
 
 Part = tuple[str, str, str, list[Drawing]]

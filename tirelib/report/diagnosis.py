@@ -81,9 +81,15 @@ def write_diagnosis(
         If the folder cannot be written.
     """
     return write_parts_page(
-        folder, "diagnosis", parts_of(told, history), title=TITLE, summary=_summary(told),
-        answer=answer_of(told), messages=told.messages, lines=lines,
-    )  # fmt: skip
+        folder,
+        "diagnosis",
+        parts_of(told, history),
+        title=TITLE,
+        summary=_summary(told),
+        answer=answer_of(told),
+        messages=told.messages,
+        lines=lines,
+    )
 
 
 def parts_of(told: Assessment, history: Sequence[Mapping[str, Any]] = ()) -> list[Part]:
@@ -95,14 +101,19 @@ def parts_of(told: Assessment, history: Sequence[Mapping[str, Any]] = ()) -> lis
     if told.named:
         plots.append(_map(told, told.left, "after", f"With {', '.join(told.named)}"))
     return [
-        Part("Candidates", "candidates", METHOD_TEXT, tables=[_candidates(told)],
-             plots=[score_bars(told.findings, ALARM)]),
+        Part(
+            "Candidates",
+            "candidates",
+            METHOD_TEXT,
+            tables=[_candidates(told)],
+            plots=[score_bars(told.findings, ALARM)],
+        ),
         Part("Error", "error", tables=[_errors(told)], plots=[fall] if fall else []),
         Part("What is left", "left", _left_text(told), plots=plots),
         Part("What this plan cannot show", "blind", tables=dead_effects(told.diagnosis.dead)),
         Part("Next", "next", advice(next_test(told))),
         Part("Sources", "sources", sources=_sources(told)),
-    ]  # fmt: skip
+    ]
 
 
 def _summary(told: Assessment) -> str:
@@ -126,24 +137,41 @@ def _candidates(told: Assessment) -> Table:
     unit = _unit(told)
     rows = [
         [
-            f.effect.name, f.level, "yes" if f.in_range else "no",
+            f.effect.name,
+            f.level,
+            "yes" if f.in_range else "no",
             ", ".join(f"{twin} {np.rad2deg(angle):.0f}\u00b0" for twin, angle in f.twins),
-            number(f.score / f.threshold, 3), _strength(f.strength), _strength(f.std),
-            f.effect.unit, number(told.error_with(f), 3),
+            number(f.score / f.threshold, 3),
+            _strength(f.strength),
+            _strength(f.std),
+            f.effect.unit,
+            number(told.error_with(f), 3),
             number(pooled(told.held_after.get(f.effect.name, ()), told.folds), 3),
             number(f.power, 2),
         ]
         for f in told.findings
-    ]  # fmt: skip
+    ]
     return Table(
         "Effects by rank",
-        ["effect", "level", "in range", "twins (angle)", "score / threshold", "strength", "std",
-         "unit", f"error with it [{unit}]", f"held out [{unit}]", "power"],
-        rows, texts=4,
+        [
+            "effect",
+            "level",
+            "in range",
+            "twins (angle)",
+            "score / threshold",
+            "strength",
+            "std",
+            "unit",
+            f"error with it [{unit}]",
+            f"held out [{unit}]",
+            "power",
+        ],
+        rows,
+        texts=4,
         note="Twins: effects whose signatures are less than 30 degrees apart. Power: chance that a "
-             "third of the range would be an alarm. Errors with effects that are not named are "
-             "of first order.",
-    )  # fmt: skip
+        "third of the range would be an alarm. Errors with effects that are not named are "
+        "of first order.",
+    )
 
 
 def _errors(told: Assessment) -> Table:
@@ -173,11 +201,13 @@ def _errors(told: Assessment) -> Table:
         after = [
             f"{name}: {number(errors[k], 3)}" for name, errors in told.held_after.items() if errors
         ]
-        rows.append([
-            f"highest {fold.name} left out of the fit ({int(fold.out.sum())} runs): error there "
-            f"without, and with one effect [{unit}]",
-            f"{number(told.held_before[k], 3)}; {', '.join(after)}",
-        ])  # fmt: skip
+        rows.append(
+            [
+                f"highest {fold.name} left out of the fit ({int(fold.out.sum())} runs): "
+                f"error there without, and with one effect [{unit}]",
+                f"{number(told.held_before[k], 3)}; {', '.join(after)}",
+            ]
+        )
     return Table("Errors", ["", "value"], rows)
 
 
@@ -212,24 +242,33 @@ def _map(told: Assessment, left: Left, name: str, title: str) -> Plot:
     degrees = np.rad2deg(GRID)
     figure = go.Figure(
         go.Heatmap(
-            z=np.round(data, 2), x=np.round(degrees, 2), y=list(range(len(order))), zmin=-limit,
-            zmax=limit, colorscale=DIVERGING,
+            z=np.round(data, 2),
+            x=np.round(degrees, 2),
+            y=list(range(len(order))),
+            zmin=-limit,
+            zmax=limit,
+            colorscale=DIVERGING,
             hovertemplate="%{x:.0f} deg: %{z:.3g} " + unit + "<extra></extra>",
             colorbar={"title": {"text": f"model less<br>measured<br>[{unit}]"}},
         )
-    )  # fmt: skip
+    )
     figure.update_xaxes(title=ANGLE_TITLE, range=[-180, 180], dtick=30)
     marks = list(range(0, len(order), max(1, len(order) // 10)))
     figure.update_yaxes(
-        title="runs, by load", tickvals=marks, showgrid=False,
+        title="runs, by load",
+        tickvals=marks,
+        showgrid=False,
         ticktext=[f"run {run[order[k]]}: {points.load[order[k]]:.0f} N" for k in marks],
-    )  # fmt: skip
+    )
     styled_figure(figure, 480)
     labels = [f"run {run[k]}: {points.load[k]:.0f} N [{unit}]" for k in order]
     rows = [[round(float(a), 3), *np.round(data[:, j], 3).tolist()] for j, a in enumerate(degrees)]
     return Plot(
-        f"residual-{name}", title,
+        f"residual-{name}",
+        title,
         "Model less measured, set-point errors weighed down as the fit does. One colour scale for "
         "both maps. Red: the model shows too much tension; blue: too much compression.",
-        figure, ["wheel angle [deg]", *labels], rows,
-    )  # fmt: skip
+        figure,
+        ["wheel angle [deg]", *labels],
+        rows,
+    )

@@ -75,9 +75,16 @@ def accuracy_table(
 ) -> Table:
     """Return the accuracy table; `names` adds a first column, the campaign of each row."""
     columns = [
-        "quantity", "unit", "rmse", "% of range", "R\u00b2", "turns in 95 % interval", "runs",
-        "valid turns", "measured turns",
-    ]  # fmt: skip
+        "quantity",
+        "unit",
+        "rmse",
+        "% of range",
+        "R\u00b2",
+        "turns in 95 % interval",
+        "runs",
+        "valid turns",
+        "measured turns",
+    ]
     cells = [
         [
             row.title,
@@ -113,11 +120,14 @@ def _validity(estimates: Estimates, calibration: Calibration) -> Table:
         "Valid turns",
         ("quantity", "valid turns", "of"),
         [
-            (TITLE[q], str(int(estimates.valid[q].sum())) if chain.has(q) else "not calibrated",
-             str(total))
+            (
+                TITLE[q],
+                str(int(estimates.valid[q].sum())) if chain.has(q) else "not calibrated",
+                str(total),
+            )
             for q in QUANTITIES
         ],
-    )  # fmt: skip
+    )
 
 
 def _flags(estimates: Estimates) -> Table:

@@ -14,9 +14,11 @@ import numpy as np
 from tirelib.report.page import number
 
 TITLES = {
-    "missing": "What is missing", "sure": "How sure", "error": "The error",
+    "missing": "What is missing",
+    "sure": "How sure",
+    "error": "The error",
     "next": "What to do next",
-}  # fmt: skip
+}
 """What each line is about, by its key in a document's `explanation`."""
 SENSE = 3
 """Significant digits of an error in a sentence."""
@@ -142,8 +144,11 @@ def _alternatives(told: Mapping[str, Any]) -> list[str]:
         return []
     rivals = [name for entry in told.get("held_back", ()) for name in entry["rivals"]]
     named = set(told["named"])
-    others = [e["effect"] for e in told["candidates"]
-              if e["effect"] not in named and e["level"] != "quiet"]  # fmt: skip
+    others = [
+        e["effect"]
+        for e in told["candidates"]
+        if e["effect"] not in named and e["level"] != "quiet"
+    ]
     if rivals:
         return [f"Held back, since others would serve as well: {_some(rivals)}."]
     if others:
@@ -250,8 +255,10 @@ def held_out_line(told: Mapping[str, Any]) -> str:
 
 def fold_name(fold: Mapping[str, Any]) -> str:
     """Say what was left out of a fit."""
-    names = {"time": f"part {fold['value']:.0f} of the time",
-             "cell": f"part {fold['value']:.0f} of the conditions"}  # fmt: skip
+    names = {
+        "time": f"part {fold['value']:.0f} of the time",
+        "cell": f"part {fold['value']:.0f} of the conditions",
+    }
     size = f"{fold['runs']} runs" if "runs" in fold else f"{fold['points']} points"
     usual = f"the {fold['condition']} {number(fold['value'], 4)} {fold['unit']}"
     return f"{names.get(fold['condition'], usual)} ({size})"

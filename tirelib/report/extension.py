@@ -29,29 +29,53 @@ def write_extension(told: Mapping[str, Any], folder: Path) -> tuple[Path, Path]:
     done = {"add": "Added", "remove": "Removed"}[told["action"]]
     fall = waterfall_of(told["history"], told["quantity"])
     parts = [
-        Part("The error, step by step", "error", tables=[_errors(told)],
-             plots=[fall] if fall is not None else []),
-        Part("Each part of the measurements, before and after", "runs",
-             plots=[*part_errors(told), *run_errors([told], told["error_unit"])]),
-    ]  # fmt: skip
+        Part(
+            "The error, step by step",
+            "error",
+            tables=[_errors(told)],
+            plots=[fall] if fall is not None else [],
+        ),
+        Part(
+            "Each part of the measurements, before and after",
+            "runs",
+            plots=[*part_errors(told), *run_errors([told], told["error_unit"])],
+        ),
+    ]
     return write_parts_page(
-        folder, "extension", [part for part in parts if part.tables or part.plots],
+        folder,
+        "extension",
+        [part for part in parts if part.tables or part.plots],
         title=f"{done}: {told['effect']}",
-        summary=f"Campaign {told['campaign']}, {told['quantity']}.", answer="",
+        summary=f"Campaign {told['campaign']}, {told['quantity']}.",
+        answer="",
         messages=told["messages"],
-        lines=((done, f"{told['effect']} ({told['title'].rstrip('.')}), strength "
-                f"{said_strength(told)}."), ("The error", error_line(told))),
-    )  # fmt: skip
+        lines=(
+            (
+                done,
+                f"{told['effect']} ({told['title'].rstrip('.')}), strength {said_strength(told)}.",
+            ),
+            ("The error", error_line(told)),
+        ),
+    )
 
 
 def _errors(told: Mapping[str, Any]) -> Table:
     unit = WORDS.get(told["error_unit"], told["error_unit"])
     rows = [
         ["all that is fitted, as the model was given", number(told["error_before"], 3), ""],
-        ["its numbers fitted anew", number(told["error_refitted"], 3),
-         number(told["error_after"], 3)],
-        *([f"held out of the fit: {fold_name(fold)}", number(fold["error_before"], 3),
-           number(fold["error_after"], 3)] for fold in told["held_out"]),
+        [
+            "its numbers fitted anew",
+            number(told["error_refitted"], 3),
+            number(told["error_after"], 3),
+        ],
+        *(
+            [
+                f"held out of the fit: {fold_name(fold)}",
+                number(fold["error_before"], 3),
+                number(fold["error_after"], 3),
+            ]
+            for fold in told["held_out"]
+        ),
         ["what noise and structure explain (floor)", "", number(told["floor"], 3)],
-    ]  # fmt: skip
+    ]
     return Table("Errors", ["", f"before [{unit}]", f"after [{unit}]"], rows)

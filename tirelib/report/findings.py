@@ -42,28 +42,37 @@ def score_bars(findings: Sequence[Finding], alarm: float) -> Plot:
     ratio = [f.score / f.threshold for f in findings]
     figure = go.Figure(
         go.Bar(
-            x=np.maximum(np.round(ratio, 4), LEAST_SHOWN), y=names, orientation="h",
+            x=np.maximum(np.round(ratio, 4), LEAST_SHOWN),
+            y=names,
+            orientation="h",
             marker={"color": [_LEVELS[f.level] for f in findings]},
             hovertemplate="%{y}: %{x:.3g}<extra></extra>",
         )
-    )  # fmt: skip
+    )
     for at, text in ((1.0, "hint"), (alarm, "alarm")):
         figure.add_vline(x=at, line={"dash": "dot", "color": FAINT})
         # places of annotations on an axis of powers are powers
         figure.add_annotation(
-            x=float(np.log10(at)), y=1.0, yref="paper", yanchor="bottom", text=text,
-            showarrow=False, xanchor="left" if at > 1.0 else "right",
-        )  # fmt: skip
+            x=float(np.log10(at)),
+            y=1.0,
+            yref="paper",
+            yanchor="bottom",
+            text=text,
+            showarrow=False,
+            xanchor="left" if at > 1.0 else "right",
+        )
     figure.update_yaxes(autorange="reversed")
     figure.update_xaxes(title="score / threshold", type="log")
     styled_figure(figure, 160 + 22 * len(names), showlegend=False)
     return Plot(
-        "scores", "Score over threshold",
+        "scores",
+        "Score over threshold",
         f"Red: alarm; blue: hint; gray: quiet. An effect beyond {alarm:g} that is no alarm lies "
         "outside its range, or an exact refit does as well without it.",
-        figure, ["effect", "score / threshold", "level"],
+        figure,
+        ["effect", "score / threshold", "level"],
         [[f.effect.name, r, f.level] for f, r in zip(findings, ratio, strict=True)],
-    )  # fmt: skip
+    )
 
 
 def dead_effects(dead: Mapping[str, str]) -> list[Table]:

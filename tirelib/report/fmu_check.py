@@ -14,15 +14,20 @@ from tirelib.report.style import BLUE, ORANGE, new_figure, styled
 
 Document = Mapping[str, Any]
 _TITLES = {
-    "archive": "archive", "validation": "validation", "description": "description",
-    "run": "run", "reference": "reference signals", "end": "end of the process",
-}  # fmt: skip
+    "archive": "archive",
+    "validation": "validation",
+    "description": "description",
+    "run": "run",
+    "reference": "reference signals",
+    "end": "end of the process",
+}
 
 
 def verdict(document: Document) -> str:
     """Say the result in a sentence."""
-    failed = [_TITLES.get(part["name"], part["name"]) for part in document["parts"]
-              if not part["passed"]]  # fmt: skip
+    failed = [
+        _TITLES.get(part["name"], part["name"]) for part in document["parts"] if not part["passed"]
+    ]
     if failed:
         return f"Failed: {', '.join(failed)}."
     if document["compared"]:
@@ -44,27 +49,42 @@ def write_check(document: Document, folder: Path) -> Path:
     curves = document.get("curves")
     if curves:
         drawings.append(
-            Drawing("outputs", "Outputs and what is expected of them",
-                    "Broad: expected by the reference signals inside; thin: what this FMU gave "
-                    "here. SI units.", partial(_draw, curves, document["units"]))
-        )  # fmt: skip
+            Drawing(
+                "outputs",
+                "Outputs and what is expected of them",
+                "Broad: expected by the reference signals inside; thin: what this FMU gave "
+                "here. SI units.",
+                partial(_draw, curves, document["units"]),
+            )
+        )
     pictures = draw_all(folder, drawings)
     sections = [
         Section("What was tried", "parts", tables=[_parts(document)]),
         Section("The FMU", "facts", tables=[_facts(document)]),
     ]
     if document["variables"]:
-        sections.insert(1, Section("Against the reference", "reference",
-                                   tables=[_variables(document)], pictures=pictures))  # fmt: skip
+        sections.insert(
+            1,
+            Section(
+                "Against the reference",
+                "reference",
+                tables=[_variables(document)],
+                pictures=pictures,
+            ),
+        )
     if document["messages"]:
         rows = [[message] for message in document["messages"]]
         sections.append(
             Section("What the FMU logged", "log", tables=[Table("Log", ["message"], rows)])
         )
     return write_page(
-        folder, "fmu_check.html", title=f"Check of {name}", verdict=verdict(document),
-        lead=f"File {document['file']}, {document['size'] / 1e3:.0f} kB.", sections=sections,
-    )  # fmt: skip
+        folder,
+        "fmu_check.html",
+        title=f"Check of {name}",
+        verdict=verdict(document),
+        lead=f"File {document['file']}, {document['size'] / 1e3:.0f} kB.",
+        sections=sections,
+    )
 
 
 def _parts(document: Document) -> Table:
@@ -94,19 +114,24 @@ def _facts(document: Document) -> Table:
 def _variables(document: Document) -> Table:
     rows = [
         [
-            row["name"], row["unit"], "as expected" if row["passed"] else "DIFFERS",
-            number(_known(row["largest_difference"]), 2), number(row["allowed"], 2),
-            number(row["magnitude"]), number(row["time"]),
+            row["name"],
+            row["unit"],
+            "as expected" if row["passed"] else "DIFFERS",
+            number(_known(row["largest_difference"]), 2),
+            number(row["allowed"], 2),
+            number(row["magnitude"]),
+            number(row["time"]),
         ]
         for row in document["variables"]
-    ]  # fmt: skip
+    ]
     return Table(
         "Largest difference of every output",
         ["output", "unit", "result", "difference", "allowed", "magnitude", "at [s]"],
-        rows, texts=3,
+        rows,
+        texts=3,
         note=f"Allowed: {document['tolerance']:g} of the largest magnitude of the output. A dash: "
         "a number where none is expected, or the other way round.",
-    )  # fmt: skip
+    )
 
 
 def _known(value: float | None) -> float:

@@ -63,9 +63,15 @@ def write_force_diagnosis(
         If the folder cannot be written.
     """
     return write_parts_page(
-        folder, "diagnosis", parts_of(told), title=f"Which effect is missing: {told.case.quantity}",
-        summary=_summary(told), answer=answer_of(told), messages=told.messages, lines=lines,
-    )  # fmt: skip
+        folder,
+        "diagnosis",
+        parts_of(told),
+        title=f"Which effect is missing: {told.case.quantity}",
+        summary=_summary(told),
+        answer=answer_of(told),
+        messages=told.messages,
+        lines=lines,
+    )
 
 
 def parts_of(told: ForceAssessment) -> list[Part]:
@@ -75,14 +81,19 @@ def parts_of(told: ForceAssessment) -> list[Part]:
     if told.named:
         maps.append(residual_map(told, found.final, "after", f"With {', '.join(told.named)}"))
     return [
-        Part("Candidates", "candidates", METHOD_TEXT, tables=[_candidates(told)],
-             plots=[score_bars(told.findings, ALARM)] if told.findings else []),
+        Part(
+            "Candidates",
+            "candidates",
+            METHOD_TEXT,
+            tables=[_candidates(told)],
+            plots=[score_bars(told.findings, ALARM)] if told.findings else [],
+        ),
         Part("Error", "error", tables=[_errors(told)], plots=_fall(told)),
         Part("What is left", "left", _left_text(told), plots=maps),
         Part("What this plan cannot show", "blind", tables=dead_effects(told.diagnosis.dead)),
         Part("Next", "next", advice(next_test(told))),
         Part("Sources", "sources", sources=_sources(told)),
-    ]  # fmt: skip
+    ]
 
 
 def _summary(told: ForceAssessment) -> str:
@@ -99,46 +110,69 @@ def _candidates(told: ForceAssessment) -> Table:
     unit, factor, folds = told.case.unit, told.case.factor, told.diagnosis.folds
     rows = [
         [
-            f.effect.name, f.level, "yes" if f.in_range else "no",
+            f.effect.name,
+            f.level,
+            "yes" if f.in_range else "no",
             ", ".join(f"{twin} {np.rad2deg(angle):.0f}\u00b0" for twin, angle in f.twins),
             number(f.score / f.threshold, 3),
             ", ".join(number(float(x), 3) for x in f.strength),
             ", ".join(number(float(x), 2) for x in f.std),
-            f.effect.unit, number(factor * f.error_after, 3),
-            number(factor * pooled(f.held_after, folds), 3), number(f.power, 2),
+            f.effect.unit,
+            number(factor * f.error_after, 3),
+            number(factor * pooled(f.held_after, folds), 3),
+            number(f.power, 2),
         ]
         for f in told.findings
-    ]  # fmt: skip
+    ]
     return Table(
         "Effects by rank",
-        ["effect", "level", "in range", "twins (angle)", "score / threshold", "strength", "std",
-         "unit", f"error with it alone [{unit}]", f"held out [{unit}]", "power"],
-        rows, texts=4,
+        [
+            "effect",
+            "level",
+            "in range",
+            "twins (angle)",
+            "score / threshold",
+            "strength",
+            "std",
+            "unit",
+            f"error with it alone [{unit}]",
+            f"held out [{unit}]",
+            "power",
+        ],
+        rows,
+        texts=4,
         note="Twins: effects whose signatures are less than 30 degrees apart. Power: chance that a "
-             "third of the range would be an alarm. Held out: for alarms only.",
-    )  # fmt: skip
+        "third of the range would be an alarm. Held out: for alarms only.",
+    )
 
 
 def _errors(told: ForceAssessment) -> Table:
     found, factor, unit = told.diagnosis, told.case.factor, told.case.unit
     scale = factor * told.case.problem.scale
     rows = [
-        [f"noise of a point, from {told.case.repeats} repeated cells "
-         f"[{'Nm' if told.case.quantity == 'Mz' else 'N'}]", number(told.case.noise, 3)],
+        [
+            f"noise of a point, from {told.case.repeats} repeated cells "
+            f"[{'Nm' if told.case.quantity == 'Mz' else 'N'}]",
+            number(told.case.noise, 3),
+        ],
         [f"error of the model as it is given [{unit}]", number(told.before, 4)],
         [f"error with its numbers fitted anew [{unit}]", number(told.case.error(found.base), 4)],
         [f"error with the named effects [{unit}]", number(told.after, 4)],
-        [f"floor: part of it that noise and the brush's structure explain [{unit}]",
-         number(told.floor, 4)],
+        [
+            f"floor: part of it that noise and the brush's structure explain [{unit}]",
+            number(told.floor, 4),
+        ],
         [f"left when all effects are fitted at once [{unit}]", number(scale * found.left, 4)],
         [f"the same, largest of the variants [{unit}]", number(scale * found.most_left, 4)],
-    ]  # fmt: skip
+    ]
     for fold, old, new in zip(found.folds, found.held_before, found.held_final, strict=True):
-        rows.append([
-            f"left out of the fit: {fold_words(fold)} ({int(fold.out.sum())} points), error there "
-            f"without and with the named effects [{unit}]",
-            f"{number(factor * old, 3)}; {number(factor * new, 3)}",
-        ])  # fmt: skip
+        rows.append(
+            [
+                f"left out of the fit: {fold_words(fold)} ({int(fold.out.sum())} points), "
+                f"error there without and with the named effects [{unit}]",
+                f"{number(factor * old, 3)}; {number(factor * new, 3)}",
+            ]
+        )
     return Table("Errors", ["", "value"], rows)
 
 
@@ -149,8 +183,15 @@ def _fall(told: ForceAssessment) -> list[Plot]:
     first = Step("base", factor * found.base.error, factor * pooled(found.held_before, found.folds))
     steps = [Step(name, factor * e, factor * h) for name, e, h in found.steps]
     history = waterfall_of(told.case.model.history, told.case.quantity)
-    plots = [waterfall([first, *steps], told.case.unit, told.floor, "fall",
-                       "The named effects one after the other")]  # fmt: skip
+    plots = [
+        waterfall(
+            [first, *steps],
+            told.case.unit,
+            told.floor,
+            "fall",
+            "The named effects one after the other",
+        )
+    ]
     if history is not None:
         plots.append(history)
     return plots

@@ -65,10 +65,17 @@ def write_journey(journey: Journey, folder: Path) -> tuple[Path, Path]:
     told = journey.document
     links = [(page["title"], page["path"]) for page in told["pages"]]
     return write_parts_page(
-        folder, "index", parts_of(journey), title=TITLE, summary=_summary(told), answer="",
-        messages=told["messages"], lines=titled(told["explanation"]), links=links,
+        folder,
+        "index",
+        parts_of(journey),
+        title=TITLE,
+        summary=_summary(told),
+        answer="",
+        messages=told["messages"],
+        lines=titled(told["explanation"]),
+        links=links,
         commands=told["commands"],
-    )  # fmt: skip
+    )
 
 
 def _summary(told: Mapping[str, Any]) -> str:
@@ -92,13 +99,21 @@ def parts_of(journey: Journey) -> list[Part]:
         errors = run_errors(journey.steps, before.error.unit)
     fall = waterfall_of(journey.history, journey.document["quantity"])
     return [
-        Part("The error, step by step", "error", tables=[_table(journey)],
-             plots=[fall] if fall is not None else []),
-        Part("Each part of the measurements, before and after", "runs",
-             tables=_held_out(journey), plots=errors),
+        Part(
+            "The error, step by step",
+            "error",
+            tables=[_table(journey)],
+            plots=[fall] if fall is not None else [],
+        ),
+        Part(
+            "Each part of the measurements, before and after",
+            "runs",
+            tables=_held_out(journey),
+            plots=errors,
+        ),
         Part("Measured, before and after", "curves", plots=curves),
         Part("Where the model fails, before and after", "maps", plots=maps),
-    ]  # fmt: skip
+    ]
 
 
 def _table(journey: Journey) -> Table:
@@ -106,17 +121,22 @@ def _table(journey: Journey) -> Table:
     unit = WORDS.get(told["error_unit"], told["error_unit"])
     rows = [
         [
-            step["model"], step["what"], number(step["error"], 3),
-            number(step["heldout_error"], 3), number(step["residual_rms_raw"], 3),
+            step["model"],
+            step["what"],
+            number(step["error"], 3),
+            number(step["heldout_error"], 3),
+            number(step["residual_rms_raw"], 3),
         ]
         for step in told["steps"]
-    ]  # fmt: skip
+    ]
     raw = WORDS.get(told["residual_rms_unit"], told["residual_rms_unit"])
     return Table(
-        "The models", ["model", "what it has", f"error [{unit}]", f"held out [{unit}]",
-                       f"rms left [{raw}]"], rows, texts=2,
+        "The models",
+        ["model", "what it has", f"error [{unit}]", f"held out [{unit}]", f"rms left [{raw}]"],
+        rows,
+        texts=2,
         note="Held out: the error on runs that took no part in the fit.",
-    )  # fmt: skip
+    )
 
 
 def _held_out(journey: Journey) -> list[Table]:
@@ -147,18 +167,26 @@ def part_errors(told: Mapping[str, Any]) -> list[Plot]:
     rows = [told, *told["held_out"]]
     figure = go.Figure()
     for when, colour in (("before", RED), ("after", BLUE)):
-        figure.add_bar(x=names, y=[row[f"error_{when}"] for row in rows], name=when,
-                       marker={"color": colour})  # fmt: skip
+        figure.add_bar(
+            x=names, y=[row[f"error_{when}"] for row in rows], name=when, marker={"color": colour}
+        )
     figure.update_yaxes(title=f"error [{unit}]", rangemode="tozero")
     figure.update_xaxes(tickangle=-25)
     styled_figure(figure, 420, barmode="group", legend={"orientation": "h", "y": 1.12, "x": 0.0})
-    data = [[name, row["error_before"], row["error_after"]]
-            for name, row in zip(names, rows, strict=True)]  # fmt: skip
-    return [Plot(
-        "part-errors", "All that is fitted, and each part held out",
-        "Held out: the error on what took no part in the fit.", figure,
-        ["part", f"before [{unit}]", f"after [{unit}]"], data,
-    )]  # fmt: skip
+    data = [
+        [name, row["error_before"], row["error_after"]]
+        for name, row in zip(names, rows, strict=True)
+    ]
+    return [
+        Plot(
+            "part-errors",
+            "All that is fitted, and each part held out",
+            "Held out: the error on what took no part in the fit.",
+            figure,
+            ["part", f"before [{unit}]", f"after [{unit}]"],
+            data,
+        )
+    ]
 
 
 def run_errors(steps: Sequence[Mapping[str, Any]], unit: str) -> list[Plot]:
@@ -189,20 +217,33 @@ def run_errors(steps: Sequence[Mapping[str, Any]], unit: str) -> list[Plot]:
         (out_after, "after, held out of the fit", BLUE, "circle-open"),
     ):
         figure.add_scatter(
-            x=names, y=values, mode="markers", name=name,
+            x=names,
+            y=values,
+            mode="markers",
+            name=name,
             marker={"color": colour, "symbol": symbol, "size": 8, "line": {"width": 2}},
-        )  # fmt: skip
+        )
     figure.update_yaxes(title=f"error [{told}]", rangemode="tozero")
     figure.update_xaxes(title="runs, by load", tickangle=-60, tickfont={"size": 10})
     styled_figure(figure, 480, barmode="group", legend={"orientation": "h", "y": 1.12, "x": 0.0})
     rows = [list(row) for row in zip(names, before, after, out_before, out_after, strict=True)]
-    return [Plot(
-        "run-errors", "The error of each run",
-        "Bars: of the fit to all runs. Marks: of a fit that has not seen the run, with its load or "
-        "its pressure held out (the larger of both where a run is in both).",
-        figure, ["run", f"before [{told}]", f"after [{told}]", f"before, held out [{told}]",
-                 f"after, held out [{told}]"], rows,
-    )]  # fmt: skip
+    return [
+        Plot(
+            "run-errors",
+            "The error of each run",
+            "Bars: of the fit to all runs. Marks: of a fit that has not seen the run, with its "
+            "load or its pressure held out (the larger of both where a run is in both).",
+            figure,
+            [
+                "run",
+                f"before [{told}]",
+                f"after [{told}]",
+                f"before, held out [{told}]",
+                f"after, held out [{told}]",
+            ],
+            rows,
+        )
+    ]
 
 
 def _worst(row: Mapping[str, Any], key: str) -> float | None:
@@ -229,14 +270,27 @@ def _waveform(before: Comparison, after: Comparison, i: int, name: str) -> Plot:
     figure = make_subplots(
         rows=2, cols=1, shared_xaxes=True, row_heights=[0.62, 0.38], vertical_spacing=0.06
     )
-    figure.add_scatter(x=DEGREES, y=measured, name="measured", line={"color": INK, "width": 2.5},
-                       row=1, col=1)  # fmt: skip
+    figure.add_scatter(
+        x=DEGREES, y=measured, name="measured", line={"color": INK, "width": 2.5}, row=1, col=1
+    )
     for k, (word, colour, dash) in enumerate((("before", RED, "dash"), ("after", BLUE, "solid"))):
-        figure.add_scatter(x=DEGREES, y=models[k], name=f"model {word}", row=1, col=1,
-                           line={"color": colour, "width": 1.8, "dash": dash})  # fmt: skip
-        figure.add_scatter(x=DEGREES, y=left[k], name=f"model {word} less measured", row=2, col=1,
-                           line={"color": colour, "width": 1.5, "dash": dash},
-                           showlegend=False)  # fmt: skip
+        figure.add_scatter(
+            x=DEGREES,
+            y=models[k],
+            name=f"model {word}",
+            row=1,
+            col=1,
+            line={"color": colour, "width": 1.8, "dash": dash},
+        )
+        figure.add_scatter(
+            x=DEGREES,
+            y=left[k],
+            name=f"model {word} less measured",
+            row=2,
+            col=1,
+            line={"color": colour, "width": 1.5, "dash": dash},
+            showlegend=False,
+        )
     for edge in np.rad2deg(after.prediction.edges[i]):
         figure.add_vline(x=float(edge), line={"color": FAINT, "width": 1, "dash": "dot"})
     figure.update_xaxes(range=[-HALF, HALF], dtick=20)
@@ -254,11 +308,21 @@ def _waveform(before: Comparison, after: Comparison, i: int, name: str) -> Plot:
         f"{size[1]:.0f}. Strain without its mean over the turn, mean over the gages, tension "
         "positive. Dotted: edges of the contact of the model after.",
         figure,
-        ["wheel angle [deg]", *(f"{what} [microstrain]" for what in (
-            "measured", "model before", "model after", "before less measured",
-            "after less measured"))],
+        [
+            "wheel angle [deg]",
+            *(
+                f"{what} [microstrain]"
+                for what in (
+                    "measured",
+                    "model before",
+                    "model after",
+                    "before less measured",
+                    "after less measured",
+                )
+            ),
+        ],
         rows,
-    )  # fmt: skip
+    )
 
 
 def _maps(before: Comparison, after: Comparison) -> list[Plot]:
@@ -283,18 +347,40 @@ def _force_curve(before: ForceComparison, after: ForceComparison, curve: Curve, 
     figure = make_subplots(
         rows=2, cols=1, shared_xaxes=True, row_heights=[0.62, 0.38], vertical_spacing=0.06
     )
-    figure.add_scatter(x=x, y=measured, mode="markers", name="measured", row=1, col=1,
-                       marker={"color": INK, "size": 7, "symbol": "circle-open"})  # fmt: skip
+    figure.add_scatter(
+        x=x,
+        y=measured,
+        mode="markers",
+        name="measured",
+        row=1,
+        col=1,
+        marker={"color": INK, "size": 7, "symbol": "circle-open"},
+    )
     columns = [x, measured]
     for found, word, colour, symbol in (
-        (before, "before", RED, "x"), (after, "after", BLUE, "circle")
-    ):  # fmt: skip
+        (before, "before", RED, "x"),
+        (after, "after", BLUE, "circle"),
+    ):
         marker = {"color": colour, "size": 5, "symbol": symbol}
-        figure.add_scatter(x=x, y=found.predicted[k], mode="markers", name=f"model {word}",
-                           marker=marker, row=1, col=1)  # fmt: skip
-        figure.add_scatter(x=x, y=found.difference[k], mode="markers", showlegend=False,
-                           name=f"model {word} less measured", marker=marker,
-                           row=2, col=1)  # fmt: skip
+        figure.add_scatter(
+            x=x,
+            y=found.predicted[k],
+            mode="markers",
+            name=f"model {word}",
+            marker=marker,
+            row=1,
+            col=1,
+        )
+        figure.add_scatter(
+            x=x,
+            y=found.difference[k],
+            mode="markers",
+            showlegend=False,
+            name=f"model {word} less measured",
+            marker=marker,
+            row=2,
+            col=1,
+        )
         columns += [found.predicted[k], found.difference[k]]
     figure.add_hline(y=0.0, line={"color": FAINT, "width": 1}, row=2, col=1)
     figure.update_xaxes(title=title, row=2, col=1)
@@ -303,14 +389,26 @@ def _force_curve(before: ForceComparison, after: ForceComparison, curve: Curve, 
     styled_figure(figure, 540, legend={"orientation": "h", "y": 1.1, "x": 0.0})
     size = [float(np.sqrt(np.mean(found.difference[k] ** 2))) for found in (before, after)]
     return Plot(
-        f"curve-{name}", f"{name.capitalize()} curve of before: {curve.words}",
+        f"curve-{name}",
+        f"{name.capitalize()} curve of before: {curve.words}",
         f"The difference was {number(size[0], 3)} {unit} rms and is {number(size[1], 3)}. The "
-        "models are computed at the conditions of each point.", figure,
-        [title, *(f"{what} [{unit}]" for what in (
-            "measured", "model before", "before less measured", "model after",
-            "after less measured"))],
+        "models are computed at the conditions of each point.",
+        figure,
+        [
+            title,
+            *(
+                f"{what} [{unit}]"
+                for what in (
+                    "measured",
+                    "model before",
+                    "before less measured",
+                    "model after",
+                    "after less measured",
+                )
+            ),
+        ],
         np.round(np.stack(columns, axis=1), 5).tolist(),
-    )  # fmt: skip
+    )
 
 
 def _force_maps(before: ForceComparison, after: ForceComparison) -> list[Plot]:
@@ -320,8 +418,11 @@ def _force_maps(before: ForceComparison, after: ForceComparison) -> list[Plot]:
     limit = max(float(plot.figure.data[0].zmax) for plot in maps)
     for plot in maps:
         plot.figure.data[0].update(zmin=-limit, zmax=limit)
-    return [plot for pair, when in zip(pairs, ("before", "after"), strict=True)
-            for plot in _named(pair, when)]  # fmt: skip
+    return [
+        plot
+        for pair, when in zip(pairs, ("before", "after"), strict=True)
+        for plot in _named(pair, when)
+    ]
 
 
 def _named(plots: Sequence[Plot], when: str) -> list[Plot]:

@@ -136,10 +136,8 @@ def live_drawing(files: LiveFiles, campaign: Campaign, low_pass: LowPass) -> Dra
         "Top: strain of the last turn on the line. Below: estimates of the bench, turn after turn "
         "and run after run, with their 95 % bands, beside the mean that the rig measured in the "
         "run; right, their difference. The first turn of a run has no estimate.",
-        lambda: figures.figure_live(
-            last_turn(files, campaign, low_pass), read_strip(files)
-        ),
-    )  # fmt: skip
+        lambda: figures.figure_live(last_turn(files, campaign, low_pass), read_strip(files)),
+    )
 
 
 def read_strip(files: LiveFiles) -> Strip:

@@ -43,9 +43,14 @@ def write_next_test(plan: Plan, folder: Path) -> tuple[Path, Path]:
     """
     text = advice(plan)
     return write_parts_page(
-        folder, "next_test", parts_of(plan), title=TITLE, summary=_summary(plan),
-        answer=f"{text[0].upper()}{text[1:]}.", messages=_messages(plan),
-    )  # fmt: skip
+        folder,
+        "next_test",
+        parts_of(plan),
+        title=TITLE,
+        summary=_summary(plan),
+        answer=f"{text[0].upper()}{text[1:]}.",
+        messages=_messages(plan),
+    )
 
 
 def _summary(plan: Plan) -> str:
@@ -67,13 +72,21 @@ def parts_of(plan: Plan) -> list[Part]:
     shown = test.open_pairs or test.pairs
     return [
         Part("Runs by rank", "runs", tables=[_runs(test)]),
-        Part("Where suspects part", "map", _envelope_text(test),
-             plots=[_map(test, pair) for pair in shown]),
+        Part(
+            "Where suspects part",
+            "map",
+            _envelope_text(test),
+            plots=[_map(test, pair) for pair in shown],
+        ),
         Part("Suspects on the present runs", "suspects", tables=[_suspects(test), _pairs(test)]),
-        Part("Repeats", "repeats", tables=_repeat_tables(plan, test),
-             plots=[_repeats(plan, test, shown)]),
+        Part(
+            "Repeats",
+            "repeats",
+            tables=_repeat_tables(plan, test),
+            plots=[_repeats(plan, test, shown)],
+        ),
         Part("Method", "method", METHOD, sources=SOURCES),
-    ]  # fmt: skip
+    ]
 
 
 def _said(pair: PairForecast) -> str:
@@ -84,23 +97,40 @@ def _runs(test: NextTest) -> Table:
     rows = []
     names, swept = test.envelope.names, [test.envelope.slips] if test.envelope.sweep else []
     for k in range(min(SHOWN, len(test.points))):
-        rows.append([
-            str(k + 1), *_told(test, test.points[k]), *swept,
-            number(test.score[k], 3), number(float(test.std[k]), 2),
-            number(100.0 * test.probability[k], 2), _said(test.pairs[test.hardest[k]]),
-        ])  # fmt: skip
+        rows.append(
+            [
+                str(k + 1),
+                *_told(test, test.points[k]),
+                *swept,
+                number(test.score[k], 3),
+                number(float(test.std[k]), 2),
+                number(100.0 * test.probability[k], 2),
+                _said(test.pairs[test.hardest[k]]),
+            ]
+        )
     median = [
-        "any run", *[""] * (len(names) + len(swept)), number(float(np.median(test.score)), 3), "",
-        number(100.0 * float(np.mean(test.probability)), 2), "",
-    ]  # fmt: skip
+        "any run",
+        *[""] * (len(names) + len(swept)),
+        number(float(np.median(test.score)), 3),
+        "",
+        number(100.0 * float(np.mean(test.probability)), 2),
+        "",
+    ]
     return Table(
         "Possible runs",
-        ["rank", *[_heading(name) for name in names], *["sweep"] * len(swept), "separation", "std",
-         "chance to resolve [%]", "hardest pair"],
+        [
+            "rank",
+            *[_heading(name) for name in names],
+            *["sweep"] * len(swept),
+            "separation",
+            "std",
+            "chance to resolve [%]",
+            "hardest pair",
+        ],
         [*rows, median],
         note="Separation of the pair that is hardest there; the chance is a mean over the pairs in "
-             "doubt. Last row: median separation and mean chance over all possible runs.",
-    )  # fmt: skip
+        "doubt. Last row: median separation and mean chance over all possible runs.",
+    )
 
 
 def _heading(name: str) -> str:
@@ -116,8 +146,9 @@ def _told(test: NextTest, point: FloatArray) -> list[str]:
 
 def _envelope_text(test: NextTest) -> str:
     envelope = test.envelope
-    low, high = (envelope.text(np.array(ends)) for ends in
-                 zip(*envelope.ranges.values(), strict=True))  # fmt: skip
+    low, high = (
+        envelope.text(np.array(ends)) for ends in zip(*envelope.ranges.values(), strict=True)
+    )
     open_ = [n for n in envelope.names if n not in envelope.declared and AXES[n].wider > 0.0]
     text = f"Envelope: from {low} to {high}."
     if envelope.sweep is not None:
@@ -163,9 +194,11 @@ def _map(test: NextTest, pair: PairForecast) -> Plot:
     upward = np.round(_upward(test, y, ys), 2)
     hover = _hover(names[x], names[y] if y is not None else None)
     figure = make_subplots(
-        cols=len(panels), shared_yaxes=True, horizontal_spacing=0.03,
+        cols=len(panels),
+        shared_yaxes=True,
+        horizontal_spacing=0.03,
         subplot_titles=[f"{AXES['pressure'].told(p):.3g} bar" for p in panels] if panel else None,
-    )  # fmt: skip
+    )
     for column, level in enumerate(panels, start=1):
         grid = np.full((len(ys), len(xs)), np.nan)
         chance = grid.copy()
@@ -174,29 +207,45 @@ def _map(test: NextTest, pair: PairForecast) -> Plot:
             grid[at], chance[at] = pair.separation[k], 100.0 * pair.probability[k]
         figure.add_trace(
             go.Heatmap(
-                z=np.round(grid, 3), x=across, y=upward, customdata=np.round(chance),
-                coloraxis="coloraxis", hovertemplate=hover,
-                texttemplate="%{z:.2~r}", textfont={"size": 11},
+                z=np.round(grid, 3),
+                x=across,
+                y=upward,
+                customdata=np.round(chance),
+                coloraxis="coloraxis",
+                hovertemplate=hover,
+                texttemplate="%{z:.2~r}",
+                textfont={"size": 11},
             ),
-            row=1, col=column,
-        )  # fmt: skip
+            row=1,
+            col=column,
+        )
     at_best = AXES[names[x]].told(best[x]), float(_upward(test, y, height[0]))
     figure.add_trace(
         go.Scatter(
-            x=[at_best[0]], y=[at_best[1]], mode="markers", showlegend=False,
+            x=[at_best[0]],
+            y=[at_best[1]],
+            mode="markers",
+            showlegend=False,
             marker={"symbol": "circle-open", "size": 30, "color": RED, "line": {"width": 3}},
             hovertemplate="advised<extra></extra>",
         ),
-        row=1, col=int(np.searchsorted(panels, of_panel[0])) + 1,
-    )  # fmt: skip
+        row=1,
+        col=int(np.searchsorted(panels, of_panel[0])) + 1,
+    )
     figure.update_xaxes(title=_heading(names[x]))
     figure.update_yaxes(title=_heading(names[y]) if y is not None else "", col=1)
     if len(ys) == 1:
         figure.update_yaxes(tickvals=list(upward) if y is not None else [])
     styled_figure(
-        figure, 420, coloraxis={"colorscale": "Viridis", "cmin": 0.0, "cmax": top,
-                                "colorbar": {"title": {"text": "separation"}}},
-    )  # fmt: skip
+        figure,
+        420,
+        coloraxis={
+            "colorscale": "Viridis",
+            "cmin": 0.0,
+            "cmax": top,
+            "colorbar": {"title": {"text": "separation"}},
+        },
+    )
     note = (
         "Chi-square that one run is expected to add against the wrong suspect. The ring marks the "
         "advised run; blank fields are beyond the tire's validity."
@@ -204,10 +253,13 @@ def _map(test: NextTest, pair: PairForecast) -> Plot:
     if others:
         note += " What is not drawn is as in the advised run."
     return Plot(
-        f"separation-{'-'.join(pair.names)}", f"Separation of {_said(pair)}", note, figure,
+        f"separation-{'-'.join(pair.names)}",
+        f"Separation of {_said(pair)}",
+        note,
+        figure,
         [*[_heading(name) for name in names], "separation", "chance to resolve"],
         [_row(test, pair, k) for k in range(len(test.points))],
-    )  # fmt: skip
+    )
 
 
 def _upward(test: NextTest, y: int | None, values: FloatArray) -> FloatArray:
@@ -233,27 +285,41 @@ def _row(test: NextTest, pair: PairForecast, k: int) -> list[float]:
 def _suspects(test: NextTest) -> Table:
     rows = [
         [
-            rival.name.replace(NOTHING, "no effect"), "yes" if rival.in_range else "no",
-            ", ".join(number(float(x), 3) for x in rival.strength), number(rival.cost, 4),
+            rival.name.replace(NOTHING, "no effect"),
+            "yes" if rival.in_range else "no",
+            ", ".join(number(float(x), 3) for x in rival.strength),
+            number(rival.cost, 4),
         ]
         for rival in test.trial.rivals
-    ]  # fmt: skip
+    ]
     return Table("Suspects", ["suspect", "in range", "strength", "chi-square left"], rows, texts=2)
 
 
 def _pairs(test: NextTest) -> Table:
     rows = [
-        [_said(pair), pair.better.replace(NOTHING, "no effect"), "yes" if pair.resolved else "no",
-         number(abs(pair.gap), 3), number(float(pair.separation[0]), 3),
-         number(100.0 * float(pair.probability[0]), 2)]
+        [
+            _said(pair),
+            pair.better.replace(NOTHING, "no effect"),
+            "yes" if pair.resolved else "no",
+            number(abs(pair.gap), 3),
+            number(float(pair.separation[0]), 3),
+            number(100.0 * float(pair.probability[0]), 2),
+        ]
         for pair in test.pairs
-    ]  # fmt: skip
+    ]
     return Table(
         "Pairs",
-        ["pair", "better now", "resolved now", "chi-square apart now", "advised run adds",
-         "chance [%]"],
-        rows, texts=3,
-    )  # fmt: skip
+        [
+            "pair",
+            "better now",
+            "resolved now",
+            "chi-square apart now",
+            "advised run adds",
+            "chance [%]",
+        ],
+        rows,
+        texts=3,
+    )
 
 
 def _repeats(plan: Plan, test: NextTest, pairs: tuple[PairForecast, ...]) -> Plot:
@@ -265,22 +331,33 @@ def _repeats(plan: Plan, test: NextTest, pairs: tuple[PairForecast, ...]) -> Plo
             go.Scatter(x=times, y=np.round(reached, 3), mode="lines+markers", name=_said(pair))
         )
         figure.add_trace(
-            go.Scatter(x=[1, times[-1]], y=[pair.limit] * 2, mode="lines", hoverinfo="skip",
-                       line={"dash": "dot", "color": FAINT}, name=f"limit, {_said(pair)}")
-        )  # fmt: skip
+            go.Scatter(
+                x=[1, times[-1]],
+                y=[pair.limit] * 2,
+                mode="lines",
+                hoverinfo="skip",
+                line={"dash": "dot", "color": FAINT},
+                name=f"limit, {_said(pair)}",
+            )
+        )
         rows += [[_said(pair), n, float(f"{x:.5g}")] for n, x in pair.repeats.items()]
     figure.add_hline(
-        y=plan.wanted, line={"dash": "dash", "color": BLUE}, annotation_text="wanted",
+        y=plan.wanted,
+        line={"dash": "dash", "color": BLUE},
+        annotation_text="wanted",
         annotation_position="top left",
-    )  # fmt: skip
+    )
     figure.update_xaxes(title="repeats of the advised run", rangemode="tozero")
     figure.update_yaxes(title="separation", rangemode="tozero")
     styled_figure(figure, 380, showlegend=True)
     return Plot(
-        "repeats", "What repeats of the advised run add",
+        "repeats",
+        "What repeats of the advised run add",
         f"Dotted: what no number of repeats exceeds, for {plan.structure} does not average out.",
-        figure, ["pair", "repeats", "separation"], rows,
-    )  # fmt: skip
+        figure,
+        ["pair", "repeats", "separation"],
+        rows,
+    )
 
 
 def _repeat_tables(plan: Plan, test: NextTest) -> list[Table]:
@@ -288,15 +365,23 @@ def _repeat_tables(plan: Plan, test: NextTest) -> list[Table]:
     if not of_plan:
         return []
     rows = [
-        [name, number(entry["gain_now"], 3), number(entry["gain_limit"], 3),
-         str(entry["times"] or "never")]
+        [
+            name,
+            number(entry["gain_now"], 3),
+            number(entry["gain_limit"], 3),
+            str(entry["times"] or "never"),
+        ]
         for name, entry in of_plan.items()
-    ]  # fmt: skip
+    ]
     return [
         Table(
             "Repeating the whole plan",
-            ["effect", "chi-square over no effect, now", "the same, endless repeats",
-             f"times the plan until {RESOLVED:.0f}"],
+            [
+                "effect",
+                "chi-square over no effect, now",
+                "the same, endless repeats",
+                f"times the plan until {RESOLVED:.0f}",
+            ],
             rows,
         )
-    ]  # fmt: skip
+    ]

@@ -46,21 +46,36 @@ def write_parts_page(
     by_name = {s.name: s for s in shown}
     views = [
         {
-            "title": part.title, "anchor": part.anchor, "text": part.text, "tables": part.tables,
-            "plots": [by_name[plot.name] for plot in part.plots], "sources": part.sources,
+            "title": part.title,
+            "anchor": part.anchor,
+            "text": part.text,
+            "tables": part.tables,
+            "plots": [by_name[plot.name] for plot in part.plots],
+            "sources": part.sources,
         }
         for part in parts
-    ]  # fmt: skip
+    ]
     folder.mkdir(parents=True, exist_ok=True)
     page, words = folder / f"{name}.html", folder / f"{name}.md"
     # pages are written as index.html, which may be another report's in this folder
     with tempfile.TemporaryDirectory() as aside:
         made = write_page(
-            Path(aside), "comparison.html", title=title, sections=(), parts=views,
-            summary=summary, answer=answer, messages=messages, sentences=(), sentence_note="",
-            lines=lines, links=links, commands=commands,
-            plotly=Markup(get_plotlyjs()), figures=Markup(figures.replace("</", "<\\/")),
-        )  # fmt: skip
+            Path(aside),
+            "comparison.html",
+            title=title,
+            sections=(),
+            parts=views,
+            summary=summary,
+            answer=answer,
+            messages=messages,
+            sentences=(),
+            sentence_note="",
+            lines=lines,
+            links=links,
+            commands=commands,
+            plotly=Markup(get_plotlyjs()),
+            figures=Markup(figures.replace("</", "<\\/")),
+        )
         page.write_text(made.read_text(encoding="utf-8"), encoding="utf-8")
     head = [f"- **{what}**: {said}" for what, said in lines] or [f"**{answer}**"]
     out = [f"# {title}", "", summary, "", *head, ""]

@@ -24,9 +24,14 @@ def write_selftest(document: Mapping[str, Any], folder: Path) -> tuple[Path, Pat
         If the folder cannot be written.
     """
     return write_parts_page(
-        folder, "selftest", parts_of(document), title=TITLE, summary=_summary(document),
-        answer=_answer(document), messages=[document["note"]],
-    )  # fmt: skip
+        folder,
+        "selftest",
+        parts_of(document),
+        title=TITLE,
+        summary=_summary(document),
+        answer=_answer(document),
+        messages=[document["note"]],
+    )
 
 
 def _summary(document: Mapping[str, Any]) -> str:
@@ -57,12 +62,16 @@ def parts_of(document: Mapping[str, Any]) -> list[Part]:
     dead = [[name, why] for name, why in document["dead"].items()]
     tables = [Table("Dead effects", ["effect", "why"], dead, texts=2)] if dead else []
     return [
-        Part("Chance of finding", "chance",
-             "The error ratio is the rms residual of the fitted model with the effect, over that "
-             "without.", plots=[_map(document)] if document["effects"] else []),
+        Part(
+            "Chance of finding",
+            "chance",
+            "The error ratio is the rms residual of the fitted model with the effect, over that "
+            "without.",
+            plots=[_map(document)] if document["effects"] else [],
+        ),
         Part("Effects", "effects", tables=[_effects(document)]),
         Part("What this plan cannot show", "blind", tables=tables),
-    ]  # fmt: skip
+    ]
 
 
 def _map(document: Mapping[str, Any]) -> Plot:
@@ -81,20 +90,30 @@ def _map(document: Mapping[str, Any]) -> Plot:
             rows.append([entry["effect"], *(result[key] for key in _KEYS)])
     figure = go.Figure(
         go.Heatmap(
-            z=chance, x=ratios, y=names, zmin=0.0, zmax=100.0, colorscale="Blues", text=words,
-            texttemplate="%{text}", hoverongaps=False,
+            z=chance,
+            x=ratios,
+            y=names,
+            zmin=0.0,
+            zmax=100.0,
+            colorscale="Blues",
+            text=words,
+            texttemplate="%{text}",
+            hoverongaps=False,
             hovertemplate="%{y} at %{x}: %{z:.0f} %<extra></extra>",
             colorbar={"title": {"text": "found [%]"}},
         )
-    )  # fmt: skip
+    )
     figure.update_xaxes(title="error ratio", type="category", showgrid=False)
     figure.update_yaxes(autorange="reversed", showgrid=False)
     styled_figure(figure, 150 + 26 * len(names))
     return Plot(
-        "chance", "Chance that the planted effect comes first",
+        "chance",
+        "Chance that the planted effect comes first",
         "Beyond range: no plausible strength makes the error that much larger.",
-        figure, ["effect", *_KEYS], rows,
-    )  # fmt: skip
+        figure,
+        ["effect", *_KEYS],
+        rows,
+    )
 
 
 _KEYS = ("ratio", "strength", "n", "found", "found_low", "found_high", "wrong", "ratio_reached")
@@ -106,21 +125,41 @@ def _effects(document: Mapping[str, Any]) -> Table:
         twins = ", ".join(f"{t['effect']} {t['angle_deg']:.0f}\u00b0" for t in entry["twins"])
         for result in entry["results"]:
             some = result["n"] > 0
-            rows.append([
-                entry["effect"], ", ".join(result["named"]), twins, number(result["ratio"]),
-                number(result["strength"], 3), entry["unit"], number(result["ratio_reached"], 3),
-                _percent(result["found"]) if some else DASH,
-                f"{_percent(result['found_low'])} to {_percent(result['found_high'])}"
-                if some else DASH,
-                _percent(result["wrong"]) if some else DASH,
-                _percent(result["wrong_twin"]) if some else DASH,
-            ])  # fmt: skip
+            rows.append(
+                [
+                    entry["effect"],
+                    ", ".join(result["named"]),
+                    twins,
+                    number(result["ratio"]),
+                    number(result["strength"], 3),
+                    entry["unit"],
+                    number(result["ratio_reached"], 3),
+                    _percent(result["found"]) if some else DASH,
+                    f"{_percent(result['found_low'])} to {_percent(result['found_high'])}"
+                    if some
+                    else DASH,
+                    _percent(result["wrong"]) if some else DASH,
+                    _percent(result["wrong_twin"]) if some else DASH,
+                ]
+            )
     return Table(
         "Effects",
-        ["effect", "named", "twins (angle)", "error ratio", "strength", "unit", "ratio reached",
-         "found [%]", "95 %", "another named [%]", "of these a twin [%]"],
-        rows, texts=3,
-    )  # fmt: skip
+        [
+            "effect",
+            "named",
+            "twins (angle)",
+            "error ratio",
+            "strength",
+            "unit",
+            "ratio reached",
+            "found [%]",
+            "95 %",
+            "another named [%]",
+            "of these a twin [%]",
+        ],
+        rows,
+        texts=3,
+    )
 
 
 def _percent(share: float) -> str:

@@ -250,8 +250,7 @@ def find_peaks(phi: FloatArray, strain: FloatArray, rate: FloatArray, edges: Flo
     cp1 = extreme(phi, np.where(before, -strain, -np.inf))
     cp2 = extreme(phi, np.where(after, -strain, -np.inf))
     tp, up, down = (extreme(phi, x) for x in (strain, rate, -rate))
-    return Peaks(-cp1[1], tp[1], -cp2[1], up[1], -down[1],
-                 cp1[0], tp[0], cp2[0], up[0], down[0])  # fmt: skip
+    return Peaks(-cp1[1], tp[1], -cp2[1], up[1], -down[1], cp1[0], tp[0], cp2[0], up[0], down[0])
 
 
 def points_of(*given: Any) -> tuple[FloatArray, ...]:
@@ -275,16 +274,24 @@ def check_turn_rate(tire: Tire, turn_rate: FloatArray) -> None:
     ParameterError
     """
     check_range(
-        "turn rate", turn_rate, LARGEST_BELT_SPEED / tire.ring_radius, "rad/s", "angular_speed",
+        "turn rate",
+        turn_rate,
+        LARGEST_BELT_SPEED / tire.ring_radius,
+        "rad/s",
+        "angular_speed",
         f"no tire's belt runs faster than {from_si(LARGEST_BELT_SPEED, 'km/h', 'speed'):.0f} km/h; "
         "check value and unit",
-    )  # fmt: skip
+    )
 
 
 def check_range(
-    what: str, value: FloatArray, highest: float, unit: str, dimension: str,
+    what: str,
+    value: FloatArray,
+    highest: float,
+    unit: str,
+    dimension: str,
     reason: str = "check value and unit",
-) -> None:  # fmt: skip
+) -> None:
     """Refuse values below 0 or above the highest, and what is no number.
 
     Raises
@@ -332,10 +339,25 @@ def _radial(tire: Tire, found: RadialContact, p: FloatArray, omega: FloatArray) 
     middle = found.pressure_at(found.edges.mean(axis=1)[:, None])[:, 0]
     u, v, strain, rate, peaks = _shape(tire, found.displacement, found.edges)
     return Simulation(
-        tire, "radial", p, omega, found.load, found.deflection, found.edges, middle,
-        found.pressure_centre, phi, u, v, q, q * np.cos(phi), -q * np.sin(phi), strain, rate,
+        tire,
+        "radial",
+        p,
+        omega,
+        found.load,
+        found.deflection,
+        found.edges,
+        middle,
+        found.pressure_centre,
+        phi,
+        u,
+        v,
+        q,
+        q * np.cos(phi),
+        -q * np.sin(phi),
+        strain,
+        rate,
         fine_peaks=peaks,
-    )  # fmt: skip
+    )
 
 
 def _sheared(tire: Tire, found: ShearContact, p: FloatArray, omega: FloatArray) -> Simulation:
@@ -346,10 +368,28 @@ def _sheared(tire: Tire, found: ShearContact, p: FloatArray, omega: FloatArray) 
     ring = compliance(Ring.of(tire, p, found.deflection), omega, N_SERIES)
     u, v, strain, rate, peaks = _shape(tire, long_series(found, ring, N_ANGLES), found.edges)
     return Simulation(
-        tire, "shear", p, omega, found.load, found.deflection, found.edges, middle,
-        found.pressure_centre, phi, u, v, q, normal, along, strain, rate,
-        found.effective_radius, found.torque, found.sliding_onset, peaks,
-    )  # fmt: skip
+        tire,
+        "shear",
+        p,
+        omega,
+        found.load,
+        found.deflection,
+        found.edges,
+        middle,
+        found.pressure_centre,
+        phi,
+        u,
+        v,
+        q,
+        normal,
+        along,
+        strain,
+        rate,
+        found.effective_radius,
+        found.torque,
+        found.sliding_onset,
+        peaks,
+    )
 
 
 def _tractions(found: ShearContact, phi: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -87,5 +87,6 @@ def write_curves(done: Simulation, path: Path) -> None:
                 force = f"{done.load[point]:.6g}"
                 writer.writerows([point, force, *(f"{x:.9g}" for x in row)] for row in curves)
     except OSError as error:
-        raise FormatError(f"{path}: cannot be written ({error.strerror}); choose another "
-                          "file") from None  # fmt: skip
+        raise FormatError(
+            f"{path}: cannot be written ({error.strerror}); choose another file"
+        ) from None

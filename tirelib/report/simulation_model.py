@@ -65,10 +65,12 @@ def simulate_file(
     """
     pressed = load if load is not None else deflection
     target, p, omega, lean, warm = points_of(
-        pressed, tire.pressure if inflation is None else inflation,
-        0.0 if turn_rate is None else turn_rate, 0.0 if camber is None else camber,
+        pressed,
+        tire.pressure if inflation is None else inflation,
+        0.0 if turn_rate is None else turn_rate,
+        0.0 if camber is None else camber,
         np.nan if temperature is None else temperature,
-    )  # fmt: skip
+    )
     check_range("inflation pressure", p, FIELDS["pressure"].highest, "bar", "pressure")
     check_turn_rate(tire, omega)
     conditions = Conditions(p, omega, lean, warm)
@@ -98,11 +100,18 @@ class Conditions:
         """Return free rolling at loads, in the order of the points."""
         none, n = np.zeros(load.size), load.size
         return Operating(
-            load=load, pressure=self.inflation, omega=self.turn_rate,
-            speed=self.turn_rate * ring_radius, camber=self.camber, slip_angle=none,
-            slip_ratio=none, side_force=none, drive_force=none,
-            order=np.arange(n) / max(n - 1, 1), temperature=self.temperature,
-        )  # fmt: skip
+            load=load,
+            pressure=self.inflation,
+            omega=self.turn_rate,
+            speed=self.turn_rate * ring_radius,
+            camber=self.camber,
+            slip_angle=none,
+            slip_ratio=none,
+            side_force=none,
+            drive_force=none,
+            order=np.arange(n) / max(n - 1, 1),
+            temperature=self.temperature,
+        )
 
 
 @one_thread()
@@ -238,10 +247,25 @@ def _simulation(
     u, v, pressure, up, along, strain, rate, wave = curves
     phi = np.append(TURN, np.pi)
     return Simulation(
-        tire, "radial", points.pressure, points.omega, points.load, state.deflection, edges,
-        _at_middle(phi, pressure, edges), _centre(phi, pressure, tire.ring_radius), phi, u, v,
-        pressure, up, along, strain, rate, gage=wave,
-    )  # fmt: skip
+        tire,
+        "radial",
+        points.pressure,
+        points.omega,
+        points.load,
+        state.deflection,
+        edges,
+        _at_middle(phi, pressure, edges),
+        _centre(phi, pressure, tire.ring_radius),
+        phi,
+        u,
+        v,
+        pressure,
+        up,
+        along,
+        strain,
+        rate,
+        gage=wave,
+    )
 
 
 def _on_turn(harmonics: ComplexArray) -> FloatArray:

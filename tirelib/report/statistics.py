@@ -123,15 +123,21 @@ def in_use_table(trained: Trained) -> Table:
     return Table(
         "Estimators in use: errors at conditions that the fit had not seen",
         (
-            "quantity", "unit", "held out", f"up to {SMALL_ANGLE} deg", "dissertation, held out",
-            "R\u00b2", "measurements", "terms",
+            "quantity",
+            "unit",
+            "held out",
+            f"up to {SMALL_ANGLE} deg",
+            "dissertation, held out",
+            "R\u00b2",
+            "measurements",
+            "terms",
         ),
         rows,
         texts=2,
         note="Held out: one condition after the other is left out of the fit and then estimated. "
         "The dissertation's column is the best of its own regressions of the quantity, on the same "
         f"data up to {SMALL_ANGLE} deg of slip angle.",
-    )  # fmt: skip
+    )
 
 
 def _same(regression: Regression, quantity: str) -> bool:
@@ -217,8 +223,18 @@ def held_out_table(rows: Sequence[Mapping[str, Any]]) -> Table:
     """Return the cross-validation by level: each level of a condition left out of the fit."""
     return Table(
         "Error at a level that the fit had not seen",
-        ("held out", "level", "quantity", "unit", "where", "runs", "dissertation", "in use",
-         "in range", "in use, in range"),
+        (
+            "held out",
+            "level",
+            "quantity",
+            "unit",
+            "where",
+            "runs",
+            "dissertation",
+            "in use",
+            "in range",
+            "in use, in range",
+        ),
         [
             (
                 str(row["held_out"]).replace("_", " "),
@@ -237,7 +253,7 @@ def held_out_table(rows: Sequence[Mapping[str, Any]]) -> Table:
         texts=5,
         note="A level beyond the others is an extrapolation. Root mean square over run means. What "
         "is not in range is flagged: the last column is of what is.",
-    )  # fmt: skip
+    )
 
 
 def refused_table(trained: Trained) -> Table:

@@ -187,9 +187,15 @@ def bend_belt(
             f"lateral belt: force has shape {force.shape}; (n_points, n_modes + 1) is needed"
         )
     r, ei, tension, k, shear, m, lam, w = columns(
-        belt.radius, belt.bending_stiffness, belt.tension, belt.foundation, belt.shear_stiffness,
-        belt.mass, belt.damping, omega,
-    )  # fmt: skip
+        belt.radius,
+        belt.bending_stiffness,
+        belt.tension,
+        belt.foundation,
+        belt.shear_stiffness,
+        belt.mass,
+        belt.damping,
+        omega,
+    )
     if not np.isfinite(w).all():
         raise ParameterError("lateral belt: the turn rate is not a finite number; give it in rad/s")
     n = np.arange(force.shape[1], dtype=float)

@@ -273,11 +273,14 @@ def _places(n_elements: int) -> tuple[Any, ...]:
     lower = (row < 0) & (column >= 0) & ~own
     n_inner = WIDTH * (3 * n_elements - 1)
     return (
-        np.flatnonzero(inner), band[inner],
-        np.flatnonzero(right), (row * BORDER + column + WIDTH)[right],
-        np.flatnonzero(lower), ((row + WIDTH) * n_inner + column)[lower],
+        np.flatnonzero(inner),
+        band[inner],
+        np.flatnonzero(right),
+        (row * BORDER + column + WIDTH)[right],
+        np.flatnonzero(lower),
+        ((row + WIDTH) * n_inner + column)[lower],
         n_inner,
-    )  # fmt: skip
+    )
 
 
 def _banded(element: FloatArray, sides: FloatArray, rows: FloatArray, corner: FloatArray) -> Matrix:

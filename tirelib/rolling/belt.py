@@ -122,7 +122,17 @@ def _dashpots(c: dict[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
 
 def _columns(k: Constants, more: int) -> dict[str, FloatArray]:
     names = (
-        "radius", "EA", "GA", "EI", "mass", "rotary_inertia", "inflation", "tension", "k_u", "k_v",
-        "dashpots", "omega",
-    )  # fmt: skip
+        "radius",
+        "EA",
+        "GA",
+        "EI",
+        "mass",
+        "rotary_inertia",
+        "inflation",
+        "tension",
+        "k_u",
+        "k_v",
+        "dashpots",
+        "omega",
+    )
     return {name: getattr(k, name).reshape(-1, *[1] * more) for name in names}

@@ -98,9 +98,12 @@ def mesh(fine: int = FINE, coarse: int = COARSE) -> Mesh:
     node = (ends[:-1, None] + np.diff(ends)[:, None] * at).ravel()
     patch = slice(coarse, coarse + fine)
     return Mesh(
-        ends, patch, node, _points(ends, slice(0, ends.size - 1), N_BELT),
+        ends,
+        patch,
+        node,
+        _points(ends, slice(0, ends.size - 1), N_BELT),
         _points(ends, patch, N_ROAD),
-    )  # fmt: skip
+    )
 
 
 def _growth(total: float, n: int) -> float:
@@ -118,10 +121,12 @@ def _points(ends: FloatArray, which: slice, n: int) -> Points:
     start, size = ends[:-1][which], np.diff(ends)[which]
     value, slope = _lagrange(x)
     return Points(
-        start[:, None] + size[:, None] * x, size[:, None] * w, value,
+        start[:, None] + size[:, None] * x,
+        size[:, None] * w,
+        value,
         slope / size[:, None, None],
         np.array([np.interp(x, np.arange(4.0) / ORDER, row) for row in np.eye(4)]).T,
-    )  # fmt: skip
+    )
 
 
 def _lagrange(x: FloatArray) -> tuple[FloatArray, FloatArray]:

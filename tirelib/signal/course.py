@@ -129,8 +129,9 @@ def _alike(left: FloatArray, lag: int) -> float:
     return max((1.0 + correlation) / (1.0 - correlation), 1.0)
 
 
-_LEGENDRE = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [-0.5, 0.0, 1.5, 0.0],
-                      [0.0, -1.5, 0.0, 2.5]])  # fmt: skip
+_LEGENDRE = np.array(
+    [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [-0.5, 0.0, 1.5, 0.0], [0.0, -1.5, 0.0, 2.5]]
+)
 """Rows: Legendre polynomials by their powers."""
 _MEANS = np.array([1.0, -1.0 / 2.0, 1.0 / 3.0, -1.0 / 4.0])
 """Means of the powers from -1 to 0."""

@@ -211,9 +211,13 @@ class TurnCutter:
         }
         seconds = turn / self.rate
         law = angle_law(
-            contact.middle, turn, stop - contact.middle, courses, self._past,
+            contact.middle,
+            turn,
+            stop - contact.middle,
+            courses,
+            self._past,
             unknown=0.5 * USUAL_CHANGE * seconds**2,
-        )  # fmt: skip
+        )
         unseen = unseen_change(
             courses["speed"], turn / self.rate, _pulse(contact, law), _pulse(before, law)
         )

@@ -54,8 +54,9 @@ def to_plain(value: Any) -> Any:
     name = type(value).__name__
     if is_dataclass(value) and name in _classes():
         return {name: [to_plain(getattr(value, field.name)) for field in fields(value)]}
-    raise FormatError(f"state: {type(value).__name__} cannot be saved; teach tirelib.stream about "
-                      "it")  # fmt: skip
+    raise FormatError(
+        f"state: {type(value).__name__} cannot be saved; teach tirelib.stream about it"
+    )
 
 
 def from_plain(plain: Any) -> Any:

@@ -23,9 +23,18 @@ from tirelib.fmu.virtual.surface import read_surface
 from tirelib.threads import one_thread
 
 TARGET = Path(__file__).parents[3] / "models" / "vehicle14" / "tire.toml"
-START = {"mu": 0.95, "mu_load": -0.02, "C_y": 4.2e4, "C_y_top": 2.0, "C_x": 7.5e4,
-         "C_x_power": 1.3, "a": 0.06, "camber": 0.06, "camber_load": 0.0,
-         "rolling": -0.01}  # fmt: skip
+START = {
+    "mu": 0.95,
+    "mu_load": -0.02,
+    "C_y": 4.2e4,
+    "C_y_top": 2.0,
+    "C_x": 7.5e4,
+    "C_x_power": 1.3,
+    "a": 0.06,
+    "camber": 0.06,
+    "camber_load": 0.0,
+    "rolling": -0.01,
+}
 ROLLING = (-0.02, -0.005)
 """Limits of the rolling resistance: a tire does not push."""
 SPEED, PRESSURE, POINTS = 80.0 / 3.6, 2.3e5, 2048

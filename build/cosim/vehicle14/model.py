@@ -150,9 +150,11 @@ class Vehicle:
         heights = state[2] + turn[2] @ place
         pressed = np.maximum(road + p.tire_radius - heights, 0.0)
         kinetic = 0.5 * (
-            p.sprung_mass * v @ v + np.asarray(p.inertia) @ w**2 + mass @ (speed**2).sum(axis=0)
+            p.sprung_mass * v @ v
+            + np.asarray(p.inertia) @ w**2
+            + mass @ (speed**2).sum(axis=0)
             + p.spin_inertia * state[SPIN] @ state[SPIN]
-        )  # fmt: skip
+        )
         high = GRAVITY * (p.sprung_mass * state[2] + mass @ heights)
         held = p.preload @ s + 0.5 * (spring @ s**2) + 0.25 * stabilizer @ (s - p.opposite(s)) ** 2
         return float(kinetic + high + held + 0.5 * p.tire_spring * pressed @ pressed)
@@ -173,9 +175,12 @@ class Vehicle:
         strut = self._struts(state)
         drag = -p.drag * np.sqrt(v @ v + _EPS) * v
         body = self._accelerate(
-            turn[2], place, (v, w, around, state[TRAVEL_RATE]), (force, strut, drag),
+            turn[2],
+            place,
+            (v, w, around, state[TRAVEL_RATE]),
+            (force, strut, drag),
             lever - (about + torque) * axle,
-        )  # fmt: skip
+        )
         rate = np.empty(SIZE)
         rate[POSITION] = turn @ v
         rate[ANGLES] = angle_rates(state[ANGLES], w)
@@ -183,14 +188,23 @@ class Vehicle:
         rate[VELOCITY], rate[RATES] = body[:3], body[3:6]
         rate[SPIN] = (torque + about) / p.spin_inertia
         rate[SIDE_SLIP], rate[LONG_SLIP] = slip_rates
-        power = self._power(state, (axle, torque), (force, lever, about), (turn, place, speed),
-                            (wheels, given.road, drag))  # fmt: skip
+        power = self._power(
+            state,
+            (axle, torque),
+            (force, lever, about),
+            (turn, place, speed),
+            (wheels, given.road, drag),
+        )
         return Motion(rate, wheels, power, body[:3] + around @ v)
 
     def _road(
-        self, state: FloatArray, given: Controls, vertical: Any, place: FloatArray,
+        self,
+        state: FloatArray,
+        given: Controls,
+        vertical: Any,
+        place: FloatArray,
         speed: FloatArray,
-    ) -> Any:  # fmt: skip
+    ) -> Any:
         """Return axles, wheel quantities, force and moment of the road in the body's axes."""
         p = self.parameters
         up, above, tilting = vertical  # the world's vertical, as a cross product, turned by w
@@ -218,8 +232,19 @@ class Vehicle:
         slow = v_x < SLOW
         ratio = np.where(slow, np.nan, roll / np.where(slow, 1.0, v_x))
         kappa = np.where(slow, np.nan, state[SPIN] * radius / np.where(slow, 1.0, travel) - 1.0)
-        wheels = Wheels(load, Fx, Fy, Mz, np.arctan2(v_y, way), kappa, ratio, camber, travel,
-                        radius, given.friction)  # fmt: skip
+        wheels = Wheels(
+            load,
+            Fx,
+            Fy,
+            Mz,
+            np.arctan2(v_y, way),
+            kappa,
+            ratio,
+            camber,
+            travel,
+            radius,
+            given.friction,
+        )
         flat = Fx * ahead + Fy * aside
         lever = Mz * up[:, None] - height * (above @ flat)
         return axle, wheels, (flat + load * up[:, None], lever), rates
@@ -229,9 +254,11 @@ class Vehicle:
         spring, damper, stabilizer = self._springs
         s = state[TRAVEL]
         return np.asarray(
-            self.parameters.preload + spring * s + damper * state[TRAVEL_RATE]
+            self.parameters.preload
+            + spring * s
+            + damper * state[TRAVEL_RATE]
             + stabilizer * (s - self.parameters.opposite(s))
-        )  # fmt: skip
+        )
 
     def _accelerate(
         self, up: FloatArray, place: FloatArray, rates: Any, forces: Any, moments: FloatArray
@@ -307,11 +334,13 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
 def rotation(angles: FloatArray) -> FloatArray:
     """Return the matrix from the body's axes to the world's, of roll, pitch and yaw [rad]."""
     (cr, cp, cy), (sr, sp, sy) = np.cos(angles).tolist(), np.sin(angles).tolist()
-    return np.array((
-        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
-        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
-        (-sp, cp * sr, cp * cr),
-    ))  # fmt: skip
+    return np.array(
+        (
+            (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+            (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+            (-sp, cp * sr, cp * cr),
+        )
+    )
 
 
 def angle_rates(angles: FloatArray, w: FloatArray) -> FloatArray:

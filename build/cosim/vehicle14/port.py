@@ -16,17 +16,36 @@ from .tire import BrushTires
 
 PER_WHEEL = ("drive", "brake", "friction", "road")
 SHOWN = ("Fz", "Fx", "Fy", "Mz", "alpha", "kappa", "camber", "speed", "omega", "travel")
-BODY = ("x", "y", "z", "roll", "pitch", "yaw", "vx", "vy", "vz", "roll_rate", "pitch_rate",
-        "yaw_rate", "ax", "ay", "az")  # fmt: skip
+BODY = (
+    "x",
+    "y",
+    "z",
+    "roll",
+    "pitch",
+    "yaw",
+    "vx",
+    "vy",
+    "vz",
+    "roll_rate",
+    "pitch_rate",
+    "yaw_rate",
+    "ax",
+    "ay",
+    "az",
+)
 INPUTS = ("steer_front", "steer_rear", *(f"{name}_{w}" for name in PER_WHEEL for w in WHEELS))
 PARAMETERS = ("start_speed", "start_yaw", "longest_step", "sprung_mass", "height")
 MOST = 1.0
 """Longest communication step [s]."""
 RIGHT = 0.5 * math.pi
 _START = {"start_speed": 100.0 / 3.6, "start_yaw": 0.0, "longest_step": LONGEST}
-_LIMITS = {"start_speed": (1.0, 100.0), "start_yaw": (-math.pi, math.pi),
-           "longest_step": (1e-5, 5e-3), "sprung_mass": (300.0, 5000.0),
-           "height": (0.2, 1.5)}  # fmt: skip
+_LIMITS = {
+    "start_speed": (1.0, 100.0),
+    "start_yaw": (-math.pi, math.pi),
+    "longest_step": (1e-5, 5e-3),
+    "sprung_mass": (300.0, 5000.0),
+    "height": (0.2, 1.5),
+}
 
 
 def parameters(variable: Callable[..., Any]) -> list[Any]:
@@ -38,37 +57,81 @@ def parameters(variable: Callable[..., Any]) -> list[Any]:
         "start_yaw": ("heading at the start", "rad", "deg", 1.0, "Angle"),
         "longest_step": ("longest step of the integration", "s", "ms", 1e-3, "Time"),
         "sprung_mass": ("sprung mass", "kg", None, 1e3, "Mass"),
-        "height": ("centre of gravity of the sprung mass above the road, at rest", "m", "mm", 1.0,
-                   "Length"),
-    }  # fmt: skip
+        "height": (
+            "centre of gravity of the sprung mass above the road, at rest",
+            "m",
+            "mm",
+            1.0,
+            "Length",
+        ),
+    }
     return [
-        variable(name, "Real", "parameter", text, start[name], unit, display, nominal,
-                 *_LIMITS[name], type=kind)
+        variable(
+            name,
+            "Real",
+            "parameter",
+            text,
+            start[name],
+            unit,
+            display,
+            nominal,
+            *_LIMITS[name],
+            type=kind,
+        )
         for name, (text, unit, display, nominal, kind) in rows.items()
-    ]  # fmt: skip
+    ]
 
 
 def inputs(variable: Callable[..., Any]) -> list[Any]:
     """Return the inputs, in the order of `INPUTS`."""
     rows = {
         "drive": ("torque on the wheel", 0.0, "N m", "kN m", 1e3, -1e5, 1e5, "Moment"),
-        "brake": ("torque of the brake, against the turn", 0.0, "N m", "kN m", 1e3, 0.0, 1e5,
-                  "Moment"),
+        "brake": (
+            "torque of the brake, against the turn",
+            0.0,
+            "N m",
+            "kN m",
+            1e3,
+            0.0,
+            1e5,
+            "Moment",
+        ),
         "friction": ("scale of the road's friction", 1.0, "1", None, 1.0, 1e-3, 10.0, "Ratio"),
         "road": ("height of the road", 0.0, "m", "mm", 0.1, -1.0, 1.0, "Length"),
-    }  # fmt: skip
+    }
     table = [
-        variable(f"steer_{axle}", "Real", "input",
-                 f"steering angle of the {axle} wheels, left positive", 0.0, "rad", "deg", 0.1,
-                 -RIGHT, RIGHT, type="Angle")
+        variable(
+            f"steer_{axle}",
+            "Real",
+            "input",
+            f"steering angle of the {axle} wheels, left positive",
+            0.0,
+            "rad",
+            "deg",
+            0.1,
+            -RIGHT,
+            RIGHT,
+            type="Angle",
+        )
         for axle in ("front", "rear")
-    ]  # fmt: skip
+    ]
     return table + [
-        variable(f"{name}_{wheel}", "Real", "input", f"{text}, {wheel}", start, unit, display,
-                 nominal, low, high, type=kind)
+        variable(
+            f"{name}_{wheel}",
+            "Real",
+            "input",
+            f"{text}, {wheel}",
+            start,
+            unit,
+            display,
+            nominal,
+            low,
+            high,
+            type=kind,
+        )
         for name, (text, start, unit, display, nominal, low, high, kind) in rows.items()
         for wheel in WHEELS
-    ]  # fmt: skip
+    ]
 
 
 _WHEEL_ROWS = {
@@ -86,24 +149,44 @@ _WHEEL_ROWS = {
 _BODY_ROWS = {
     **dict.fromkeys("xyz", ("centre of gravity of the sprung mass", "m", None, 1.0, "Length")),
     **dict.fromkeys(("roll", "pitch", "yaw"), ("angle of the body", "rad", "deg", 0.1, "Angle")),
-    **dict.fromkeys(("vx", "vy", "vz"), ("velocity along the body's axis", "m/s", "km/h", 1.0,
-                                         "Speed")),
-    **dict.fromkeys(("roll_rate", "pitch_rate", "yaw_rate"),
-                    ("turn rate about the body's axis", "rad/s", None, 1.0, "TurnRate")),
-    **dict.fromkeys(("ax", "ay", "az"), ("acceleration of the centre of gravity along the body's "
-                                         "axis", "m/s2", None, 1.0, "Acceleration")),
-}  # fmt: skip
+    **dict.fromkeys(
+        ("vx", "vy", "vz"), ("velocity along the body's axis", "m/s", "km/h", 1.0, "Speed")
+    ),
+    **dict.fromkeys(
+        ("roll_rate", "pitch_rate", "yaw_rate"),
+        ("turn rate about the body's axis", "rad/s", None, 1.0, "TurnRate"),
+    ),
+    **dict.fromkeys(
+        ("ax", "ay", "az"),
+        (
+            "acceleration of the centre of gravity along the body's axis",
+            "m/s2",
+            None,
+            1.0,
+            "Acceleration",
+        ),
+    ),
+}
 
 
 def outputs(variable: Callable[..., Any]) -> list[Any]:
     """Return the outputs, in the order of `Port.outputs`."""
     nan = math.nan
     table = [
-        variable(f"{name}_{wheel}", "Real", "output", f"{text}, {wheel}", nan, unit, display,
-                 nominal, type=kind)
+        variable(
+            f"{name}_{wheel}",
+            "Real",
+            "output",
+            f"{text}, {wheel}",
+            nan,
+            unit,
+            display,
+            nominal,
+            type=kind,
+        )
         for name, (text, unit, display, nominal, kind) in _WHEEL_ROWS.items()
         for wheel in WHEELS
-    ]  # fmt: skip
+    ]
     table += [
         variable(name, "Real", "output", f"{name}: {text}", nan, unit, display, nominal, type=kind)
         for name, (text, unit, display, nominal, kind) in _BODY_ROWS.items()
@@ -188,9 +271,9 @@ class Port:
         """Return the values of the Real outputs and of the others, in the table's order."""
         state, motion = self.drive.state, self.drive.motion
         w = motion.wheels
-        wheels = np.concatenate((
-            w.Fz, w.Fx, w.Fy, w.Mz, w.alpha, w.kappa, w.camber, w.speed, state[20:24], state[6:10]
-        ))  # fmt: skip
+        wheels = np.concatenate(
+            (w.Fz, w.Fx, w.Fy, w.Mz, w.alpha, w.kappa, w.camber, w.speed, state[20:24], state[6:10])
+        )
         body = np.concatenate((state[:6], state[10:16], motion.acceleration))
         return [*wheels.tolist(), *body.tolist()], (self._valid, self._status)
 

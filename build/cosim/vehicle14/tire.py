@@ -13,8 +13,18 @@ if TYPE_CHECKING:
 
 NOMINAL = 4000.0
 """Load that the constants refer to [N]."""
-NAMES = ("mu", "mu_load", "C_y", "C_y_top", "C_x", "C_x_power", "a", "camber", "camber_load",
-         "rolling")  # fmt: skip
+NAMES = (
+    "mu",
+    "mu_load",
+    "C_y",
+    "C_y_top",
+    "C_x",
+    "C_x_power",
+    "a",
+    "camber",
+    "camber_load",
+    "rolling",
+)
 FORMAT = "tirelib-vehicle-tire/1"
 LEAST = 1.0
 """Load below which a tire has no force [N]."""

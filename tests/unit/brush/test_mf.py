@@ -35,39 +35,146 @@ ALPMIN=-0.3
 [LATERAL_COEFFICIENTS]
 """
 PLAIN = {
-    "PCX1": 1.6, "PDX1": 1.1, "PDX2": -0.1, "PEX1": -0.4, "PEX2": 0.2, "PEX3": 0.1, "PKX1": 22.0,
-    "PKX2": 0.6, "PKX3": 0.2, "PCY1": 1.35, "PDY1": 1.0, "PDY2": -0.14, "PEY1": -0.8, "PEY2": -0.5,
-    "PKY1": -19.0, "PKY2": 1.7, "QBZ1": 9.0, "QBZ2": -1.2, "QBZ3": -0.6, "QCZ1": 1.15,
-    "QDZ1": 0.11, "QDZ2": -0.005, "QEZ1": -1.5, "QEZ2": 0.3, "QEZ3": -0.4, "RBX1": 12.0,
-    "RBX2": -10.0, "RCX1": 1.05, "REX1": -0.5, "REX2": -0.2, "RBY1": 11.0, "RBY2": 8.0,
-    "RCY1": 1.02, "REY1": -0.3, "REY2": 0.1,
-}  # fmt: skip
+    "PCX1": 1.6,
+    "PDX1": 1.1,
+    "PDX2": -0.1,
+    "PEX1": -0.4,
+    "PEX2": 0.2,
+    "PEX3": 0.1,
+    "PKX1": 22.0,
+    "PKX2": 0.6,
+    "PKX3": 0.2,
+    "PCY1": 1.35,
+    "PDY1": 1.0,
+    "PDY2": -0.14,
+    "PEY1": -0.8,
+    "PEY2": -0.5,
+    "PKY1": -19.0,
+    "PKY2": 1.7,
+    "QBZ1": 9.0,
+    "QBZ2": -1.2,
+    "QBZ3": -0.6,
+    "QCZ1": 1.15,
+    "QDZ1": 0.11,
+    "QDZ2": -0.005,
+    "QEZ1": -1.5,
+    "QEZ2": 0.3,
+    "QEZ3": -0.4,
+    "RBX1": 12.0,
+    "RBX2": -10.0,
+    "RCX1": 1.05,
+    "REX1": -0.5,
+    "REX2": -0.2,
+    "RBY1": 11.0,
+    "RBY2": 8.0,
+    "RCY1": 1.02,
+    "REY1": -0.3,
+    "REY2": 0.1,
+}
 SHIFTS = {
-    "PHX1": 1e-3, "PHX2": 4e-4, "PVX1": 2e-3, "PVX2": 1e-3, "PEX4": 0.1, "PHY1": 2e-3,
-    "PHY2": 1e-3, "PVY1": 0.02, "PVY2": -0.01, "PEY3": 0.1, "QHZ1": 3e-3, "QHZ2": -1e-3,
-    "QEZ4": 0.2, "QBZ10": -0.5, "QDZ6": -2e-3, "QDZ7": 1e-3, "RHX1": 5e-3, "RBY3": 0.02,
-    "RHY1": 4e-3, "RHY2": 2e-3, "RVY1": 0.05, "RVY2": 0.02, "RVY4": 12.0, "RVY5": 1.8,
-    "RVY6": -9.0, "SSZ1": 0.01, "SSZ2": -0.02, "QBZ9": 8.0,
-}  # fmt: skip
+    "PHX1": 1e-3,
+    "PHX2": 4e-4,
+    "PVX1": 2e-3,
+    "PVX2": 1e-3,
+    "PEX4": 0.1,
+    "PHY1": 2e-3,
+    "PHY2": 1e-3,
+    "PVY1": 0.02,
+    "PVY2": -0.01,
+    "PEY3": 0.1,
+    "QHZ1": 3e-3,
+    "QHZ2": -1e-3,
+    "QEZ4": 0.2,
+    "QBZ10": -0.5,
+    "QDZ6": -2e-3,
+    "QDZ7": 1e-3,
+    "RHX1": 5e-3,
+    "RBY3": 0.02,
+    "RHY1": 4e-3,
+    "RHY2": 2e-3,
+    "RVY1": 0.05,
+    "RVY2": 0.02,
+    "RVY4": 12.0,
+    "RVY5": 1.8,
+    "RVY6": -9.0,
+    "SSZ1": 0.01,
+    "SSZ2": -0.02,
+    "QBZ9": 8.0,
+}
 CAMBER = {
-    "PDX3": 2.0, "PDY3": 1.5, "PEY4": -3.0, "PEY5": 4.0, "PKY3": 0.4, "PKY5": 0.8, "PKY6": -0.9,
-    "PKY7": -0.2, "PVY3": -0.3, "PVY4": -0.1, "QBZ4": 0.3, "QBZ5": -0.3, "QDZ3": 0.4, "QDZ4": 3.0,
-    "QDZ8": 0.15, "QDZ9": 0.05, "QDZ10": 0.2, "QDZ11": 0.1, "QEZ5": -2.0, "QHZ3": 0.05,
-    "QHZ4": 0.02, "RBX3": 20.0, "RBY4": 15.0, "RVY3": -0.3, "SSZ3": 0.3, "SSZ4": 0.1, "QBZ6": 1.1,
-}  # fmt: skip
+    "PDX3": 2.0,
+    "PDY3": 1.5,
+    "PEY4": -3.0,
+    "PEY5": 4.0,
+    "PKY3": 0.4,
+    "PKY5": 0.8,
+    "PKY6": -0.9,
+    "PKY7": -0.2,
+    "PVY3": -0.3,
+    "PVY4": -0.1,
+    "QBZ4": 0.3,
+    "QBZ5": -0.3,
+    "QDZ3": 0.4,
+    "QDZ4": 3.0,
+    "QDZ8": 0.15,
+    "QDZ9": 0.05,
+    "QDZ10": 0.2,
+    "QDZ11": 0.1,
+    "QEZ5": -2.0,
+    "QHZ3": 0.05,
+    "QHZ4": 0.02,
+    "RBX3": 20.0,
+    "RBY4": 15.0,
+    "RVY3": -0.3,
+    "SSZ3": 0.3,
+    "SSZ4": 0.1,
+    "QBZ6": 1.1,
+}
 PRESSURE = {
-    "PPX1": -0.3, "PPX2": 0.2, "PPX3": -0.08, "PPX4": 0.1, "PPY1": 0.5, "PPY2": 0.8, "PPY3": -0.1,
-    "PPY4": 0.05, "PPY5": 0.3, "PPZ1": -0.4, "PPZ2": 0.2,
-}  # fmt: skip
+    "PPX1": -0.3,
+    "PPX2": 0.2,
+    "PPX3": -0.08,
+    "PPX4": 0.1,
+    "PPY1": 0.5,
+    "PPY2": 0.8,
+    "PPY3": -0.1,
+    "PPY4": 0.05,
+    "PPY5": 0.3,
+    "PPZ1": -0.4,
+    "PPZ2": 0.2,
+}
 EVERY = {**PLAIN, "PKY4": 1.9, **SHIFTS, **CAMBER, **PRESSURE}
-EVERY_5 = {**PLAIN, **SHIFTS, **{k: v for k, v in CAMBER.items() if k not in
-           ("PEY5", "PKY5", "PKY6", "PKY7", "RBX3", "RBY4", "QDZ10", "QDZ11", "QBZ6")},
-           "PHY3": 0.03}  # fmt: skip
+EVERY_5 = {
+    **PLAIN,
+    **SHIFTS,
+    **{
+        k: v
+        for k, v in CAMBER.items()
+        if k not in ("PEY5", "PKY5", "PKY6", "PKY7", "RBX3", "RBY4", "QDZ10", "QDZ11", "QBZ6")
+    },
+    "PHY3": 0.03,
+}
 SCALES = {
-    "LFZO": 0.9, "LCX": 1.1, "LMUX": 0.8, "LEX": 1.1, "LKX": 1.2, "LHX": 1.3, "LVX": 0.7,
-    "LCY": 1.1, "LMUY": 0.8, "LEY": 1.2, "LKY": 0.9, "LHY": 1.3, "LVY": 0.7, "LTR": 0.9,
-    "LRES": 1.2, "LXAL": 1.1, "LYKA": 0.9, "LVYKA": 1.2, "LS": 0.8,
-}  # fmt: skip
+    "LFZO": 0.9,
+    "LCX": 1.1,
+    "LMUX": 0.8,
+    "LEX": 1.1,
+    "LKX": 1.2,
+    "LHX": 1.3,
+    "LVX": 0.7,
+    "LCY": 1.1,
+    "LMUY": 0.8,
+    "LEY": 1.2,
+    "LKY": 0.9,
+    "LHY": 1.3,
+    "LVY": 0.7,
+    "LTR": 0.9,
+    "LRES": 1.2,
+    "LXAL": 1.1,
+    "LYKA": 0.9,
+    "LVYKA": 1.2,
+    "LS": 0.8,
+}
 FZ0, R0, P0 = 4000.0, 0.32, 220_000.0
 
 
@@ -215,9 +322,12 @@ def test_version_5_camber_shifts_the_curve() -> None:
 
 
 @pytest.mark.parametrize(
-    ("values", "fit"), [({**EVERY, **SCALES, "LKYC": 1.1, "LKZC": 0.9}, 61),
-                        ({**EVERY_5, **SCALES, "LGAX": 1.1, "LGAY": 0.9, "LGAZ": 1.2}, 52)]
-)  # fmt: skip
+    ("values", "fit"),
+    [
+        ({**EVERY, **SCALES, "LKYC": 1.1, "LKZC": 0.9}, 61),
+        ({**EVERY_5, **SCALES, "LGAX": 1.1, "LGAY": 0.9, "LGAZ": 1.2}, 52),
+    ],
+)
 def test_every_coefficient_counts(values: dict[str, float], fit: int) -> None:
     """A term that was forgotten would not notice its coefficient."""
     at = {"load": 5500.0, "slip_angle": 0.06, "slip_ratio": -0.04, "camber": 0.05}

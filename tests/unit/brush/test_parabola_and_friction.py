@@ -141,8 +141,10 @@ def test_tiny_slip_tells_nothing() -> None:
     b = friction_from_stiffness(force, alpha, LOAD, STIFFNESS, Fy_std=2.0)
     c = friction_from_two_angles(
         lateral_force(np.array([alpha, 2 * alpha]), CPY, 0.9, LOAD, A),
-        np.array([alpha, 2 * alpha]), LOAD, Fy_std=2.0,
-    )  # fmt: skip
+        np.array([alpha, 2 * alpha]),
+        LOAD,
+        Fy_std=2.0,
+    )
     for found in (a, b, c):
         assert not found.told
         assert np.isnan(found.friction)

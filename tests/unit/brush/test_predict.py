@@ -37,10 +37,15 @@ def test_closed_form_is_the_integrated_brush(seed: int) -> None:
     arm, yaw = 7e-6, 1e-4
     found = predict_forces(
         PointParameters(
-            cy, mu, a, cx, 0.8 * mu, lateral_compliance=arm,
+            cy,
+            mu,
+            a,
+            cx,
+            0.8 * mu,
+            lateral_compliance=arm,
         ),
         PointConditions(load, alpha, kappa),
-    )  # fmt: skip
+    )
     plain = parabola(load, -a, a)
     assert_same(
         found,
@@ -78,9 +83,16 @@ def test_signs_are_iso() -> None:
 
 def test_offsets_and_camber_are_where_they_say() -> None:
     shifted = PointParameters(
-        CPY, MU, A, camber_thrust=0.2, slip_angle_offset=0.01, slip_ratio_offset=0.02,
-        Fx_offset=-50.0, Fy_offset=30.0, Mz_offset=4.0,
-    )  # fmt: skip
+        CPY,
+        MU,
+        A,
+        camber_thrust=0.2,
+        slip_angle_offset=0.01,
+        slip_ratio_offset=0.02,
+        Fx_offset=-50.0,
+        Fy_offset=30.0,
+        Mz_offset=4.0,
+    )
     one = predict_forces(shifted, PointConditions(LOAD, 0.03, -0.05, camber=0.1))
     two = predict_forces(BRUSH, PointConditions(LOAD, 0.03 + 0.01 + 0.02, -0.03))
     assert float(one.Fx + 50.0) == pytest.approx(float(two.Fx))

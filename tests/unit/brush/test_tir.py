@@ -122,9 +122,15 @@ PDY1=0.9
 """
     tire = parse_tir(text)
     expected = {
-        "LONGVL": 16.6, "UNLOADED_RADIUS": 0.31, "FNOMIN": 4500.0, "VERTICAL_STIFFNESS": 2e5,
-        "IYY": 1.0, "NOMPRES": 206842.718795, "ALPMAX": 1.5707963267949, "PDY1": 0.9,
-    }  # fmt: skip
+        "LONGVL": 16.6,
+        "UNLOADED_RADIUS": 0.31,
+        "FNOMIN": 4500.0,
+        "VERTICAL_STIFFNESS": 2e5,
+        "IYY": 1.0,
+        "NOMPRES": 206842.718795,
+        "ALPMAX": 1.5707963267949,
+        "PDY1": 0.9,
+    }
     for key, value in expected.items():
         assert tire.number(key) == pytest.approx(value, rel=1e-9), key
     assert tire.number("WIDTH") is None
@@ -138,12 +144,19 @@ def test_pressure_without_unit_is_force_per_length_squared() -> None:
 @pytest.mark.parametrize(
     ("base", "word", "si"),
     [
-        ("length", "Inch", 0.0254), ("length", "foot", 0.3048), ("force", "pound_force", 4.4482216),
-        ("force", "KILO_NEWTON", 1e3), ("force", "kg_force", 9.80665), ("mass", "slug", 14.5939029),
-        ("mass", "pound_mass", 0.45359237), ("time", "minute", 60.0), ("pressure", "bar", 1e5),
-        ("pressure", "kPa", 1e3), ("angle", "deg", 0.017453292519943295),
+        ("length", "Inch", 0.0254),
+        ("length", "foot", 0.3048),
+        ("force", "pound_force", 4.4482216),
+        ("force", "KILO_NEWTON", 1e3),
+        ("force", "kg_force", 9.80665),
+        ("mass", "slug", 14.5939029),
+        ("mass", "pound_mass", 0.45359237),
+        ("time", "minute", 60.0),
+        ("pressure", "bar", 1e5),
+        ("pressure", "kPa", 1e3),
+        ("angle", "deg", 0.017453292519943295),
     ],
-)  # fmt: skip
+)
 def test_unit_words(base: str, word: str, si: float) -> None:
     assert factor(base, word) == pytest.approx(si, rel=1e-8)
 

@@ -57,10 +57,18 @@ def make_run(
     trigger = np.diff(np.floor((angle + np.pi) / (2 * np.pi)), prepend=0.0) > 0.0
     times = np.arange(0.0, count / RATE, 0.01)
     means = {
-        "Fx": 0.0, "Fy": lateral_force, "Fz": load, "Mz": -0.03 * lateral_force,
-        "slip_angle": slip_angle, "camber": 0.0, "slip_ratio": 0.0, "speed": SPEED,
-        "omega": omega, "pressure": 2.3e5, "loaded_radius": RADIUS - load / 2.2e5,
-    }  # fmt: skip
+        "Fx": 0.0,
+        "Fy": lateral_force,
+        "Fz": load,
+        "Mz": -0.03 * lateral_force,
+        "slip_angle": slip_angle,
+        "camber": 0.0,
+        "slip_ratio": 0.0,
+        "speed": SPEED,
+        "omega": omega,
+        "pressure": 2.3e5,
+        "loaded_radius": RADIUS - load / 2.2e5,
+    }
     spread = {"Fx": 20.0, "Fy": 20.0, "Fz": 20.0, "Mz": 1.0, "slip_angle": 5e-4, "camber": 5e-4}
     rig = {
         name: mean + spread.get(name, 2e-3 * abs(mean) + 1e-4) * random.standard_normal(times.size)

@@ -37,10 +37,18 @@ def points_of(conditions: Sequence[Condition]) -> Operating:
     n = load.size
     nothing, unknown = np.zeros(n), np.full(n, np.nan)
     return Operating(
-        load=load, pressure=pressure, omega=speed / 0.302, speed=speed, camber=nothing,
-        slip_angle=nothing, slip_ratio=nothing, side_force=nothing, drive_force=nothing,
-        order=np.linspace(0.0, 1.0, n), temperature=unknown,
-    )  # fmt: skip
+        load=load,
+        pressure=pressure,
+        omega=speed / 0.302,
+        speed=speed,
+        camber=nothing,
+        slip_angle=nothing,
+        slip_ratio=nothing,
+        side_force=nothing,
+        drive_force=nothing,
+        order=np.linspace(0.0, 1.0, n),
+        temperature=unknown,
+    )
 
 
 def waveforms(
@@ -84,10 +92,14 @@ def waveforms(
     _, group = np.unique(np.array(conditions), axis=0, return_inverse=True)
     unknown = np.full(n, np.nan)
     given = {
-        "Fz": nominal.load, "pressure": nominal.pressure, "omega": nominal.omega,
-        "speed": nominal.speed, "slip_angle": np.zeros(n), "camber": np.zeros(n),
+        "Fz": nominal.load,
+        "pressure": nominal.pressure,
+        "omega": nominal.omega,
+        "speed": nominal.speed,
+        "slip_angle": np.zeros(n),
+        "camber": np.zeros(n),
         "slip_ratio": np.zeros(n),
-    }  # fmt: skip
+    }
     return Waveforms(
         header=header(),
         strain=gages - gages.mean(axis=2, keepdims=True),

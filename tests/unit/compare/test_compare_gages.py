@@ -78,8 +78,13 @@ def test_json_and_page_hold_every_gage_by_its_lateral_position(found: Comparison
     assert rows[3]["departure"]["mean"] == pytest.approx(-1e6 * PLANT, rel=0.12)
     assert rows[0]["departure"] is None
     part = next(part for part in strain_parts(found) if part.anchor == "gages")
-    assert [row[0] for row in part.tables[0].rows] == ["+60 mm", "+30 mm", "0 mm", "-30 mm",
-                                                       "-60 mm"]  # fmt: skip
+    assert [row[0] for row in part.tables[0].rows] == [
+        "+60 mm",
+        "+30 mm",
+        "0 mm",
+        "-30 mm",
+        "-60 mm",
+    ]
     heat = part.plots[0].figure
     # from the right to the left, upward
     assert next(iter(heat.layout.yaxis.ticktext)) == "y = -60 mm"

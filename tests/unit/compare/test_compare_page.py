@@ -20,12 +20,41 @@ from tirelib.compare.strain import Comparison, compare_strain
 from tirelib.report.comparison import strain_parts, write_comparison
 
 KEYS = {
-    "format", "campaign", "model", "effects", "axes", "quantity", "unit", "verdict", "error", "p",
-    "noise", "repeats", "residual_rms", "residual_rms_noise", "residual_rms_raw", "measured_rms",
-    "error_unit", "delay_us", "delay_std_us", "floor", "floor_source", "smooth_floor",
-    "smooth_share", "statements", "regions", "messages", "table", "set_points", "tracks", "gages",
-    "curves", "runs", "ranked", "sources",
-}  # fmt: skip
+    "format",
+    "campaign",
+    "model",
+    "effects",
+    "axes",
+    "quantity",
+    "unit",
+    "verdict",
+    "error",
+    "p",
+    "noise",
+    "repeats",
+    "residual_rms",
+    "residual_rms_noise",
+    "residual_rms_raw",
+    "measured_rms",
+    "error_unit",
+    "delay_us",
+    "delay_std_us",
+    "floor",
+    "floor_source",
+    "smooth_floor",
+    "smooth_share",
+    "statements",
+    "regions",
+    "messages",
+    "table",
+    "set_points",
+    "tracks",
+    "gages",
+    "curves",
+    "runs",
+    "ranked",
+    "sources",
+}
 
 
 class Links(HTMLParser):

@@ -122,9 +122,14 @@ def test_the_floor_is_what_the_history_says_and_only_for_these_data() -> None:
 
 
 def test_a_smooth_misfit_is_known_as_smooth_and_a_ripple_is_not() -> None:
-    smooth = compare_strain(waveforms(plant=lambda load, phi: np.outer(
-        load / 4000.0, 5e-5 * np.exp(-((phi / 0.2) ** 2)))), MODEL)  # fmt: skip
-    ripple = compare_strain(waveforms(plant=lambda load, phi: np.outer(
-        np.cos(load), 5e-5 * np.cos(23 * phi))), MODEL)  # fmt: skip
+    smooth = compare_strain(
+        waveforms(
+            plant=lambda load, phi: np.outer(load / 4000.0, 5e-5 * np.exp(-((phi / 0.2) ** 2)))
+        ),
+        MODEL,
+    )
+    ripple = compare_strain(
+        waveforms(plant=lambda load, phi: np.outer(np.cos(load), 5e-5 * np.cos(23 * phi))), MODEL
+    )
     assert smooth.floor.share > 0.8
     assert ripple.floor.share < 0.5

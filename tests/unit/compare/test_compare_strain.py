@@ -68,9 +68,14 @@ def test_set_points_far_outside_their_tolerance_show_in_units_of_it() -> None:
 
 @pytest.mark.parametrize(
     ("start", "stop", "size", "least"),
-    [(-0.1, 0.1, 3e-4, 3900.0), (-0.1, 0.1, -3e-4, 3900.0), (0.3, 0.5, 5e-5, 0.0),
-     (-0.45, -0.25, -1e-4, 5100.0), (-0.05, 0.15, 6e-4, 2700.0)],
-)  # fmt: skip
+    [
+        (-0.1, 0.1, 3e-4, 3900.0),
+        (-0.1, 0.1, -3e-4, 3900.0),
+        (0.3, 0.5, 5e-5, 0.0),
+        (-0.45, -0.25, -1e-4, 5100.0),
+        (-0.05, 0.15, 6e-4, 2700.0),
+    ],
+)
 def test_a_planted_difference_is_described_where_it_is(
     start: float, stop: float, size: float, least: float
 ) -> None:
@@ -100,9 +105,13 @@ def test_few_runs_with_noise_alone_give_no_region() -> None:
     for seed in range(10):
         found = compared(waveforms([*few, *few[:2]], seed=seed))
         assert not find_regions(
-            found.difference, found.chosen.strain, found.chosen.straight, found.chosen.factors,
-            found.noise, found.points,
-        )  # fmt: skip
+            found.difference,
+            found.chosen.strain,
+            found.chosen.straight,
+            found.chosen.factors,
+            found.noise,
+            found.points,
+        )
 
 
 def test_words_tell_the_sign_and_the_kind_of_strain() -> None:
@@ -120,9 +129,7 @@ def test_words_tell_the_sign_and_the_kind_of_strain() -> None:
 
 
 @settings(max_examples=6)
-@given(
-    middle=st.floats(-1.0, 1.0), size=st.sampled_from([-2e-4, 2e-4]), seed=st.integers(0, 99)
-)  # fmt: skip
+@given(middle=st.floats(-1.0, 1.0), size=st.sampled_from([-2e-4, 2e-4]), seed=st.integers(0, 99))
 def test_the_first_sentence_has_the_planted_sign_and_overlaps_its_place(
     middle: float, size: float, seed: int
 ) -> None:
@@ -247,8 +254,10 @@ def test_runs_without_load_are_refused_with_the_channel() -> None:
 
 
 def test_an_unknown_effect_or_ring_is_refused_with_every_fault() -> None:
-    extra = {"effects": [{"effect": "magic", "strength": 1.0}, {"effect": "x"}],
-             "model": {"ring": "cubic"}}  # fmt: skip
+    extra = {
+        "effects": [{"effect": "magic", "strength": 1.0}, {"effect": "x"}],
+        "model": {"ring": "cubic"},
+    }
     with pytest.raises(FormatError) as caught:
         model_of(replace(model_file(), extra=extra))
     assert len(caught.value.problems) == 3
@@ -262,9 +271,11 @@ def test_slip_runs_do_not_count_and_have_their_own_level() -> None:
     strain = waves.strain.copy()
     strain[-4:] += 5e-4 * ((GRID > -0.1) & (GRID < 0.1))
     slipped = replace(
-        waves, strain=strain, conditions={**waves.conditions, "slip_angle": angle},
+        waves,
+        strain=strain,
+        conditions={**waves.conditions, "slip_angle": angle},
         group=np.where(angle > 0, waves.group + 100, waves.group),
-    )  # fmt: skip
+    )
     found = compared(slipped)
     assert found.chosen.straight.sum() == len(waves) - 4
     assert found.fit.verdict == "fits"

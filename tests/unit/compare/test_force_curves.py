@@ -23,15 +23,40 @@ def comparison(noise: float = 5.0) -> ForceComparison:
     angle = np.tile(ANGLES, len(EXCESS))
     flat, unknown = np.zeros(load.size), np.full(load.size, np.nan)
     measured = -5.0 * load * angle
-    data = ForceData(load, np.full(load.size, 2.1e5), angle, flat, flat, unknown, unknown,
-                     measured, unknown, np.arange(load.size))  # fmt: skip
+    data = ForceData(
+        load,
+        np.full(load.size, 2.1e5),
+        angle,
+        flat,
+        flat,
+        unknown,
+        unknown,
+        measured,
+        unknown,
+        np.arange(load.size),
+    )
     share = np.array([EXCESS[value] for value in load])
     predicted = measured * (1.0 + share)
     rms = float(np.sqrt(np.mean((predicted - measured) ** 2)))
     return ForceComparison(
-        "Fy", "made", "model", data, np.arange(load.size), measured, predicted, noise, 3,
-        rms / noise, rms, 1.0, 0.0, "lack_of_fit", (), (), (),
-    )  # fmt: skip
+        "Fy",
+        "made",
+        "model",
+        data,
+        np.arange(load.size),
+        measured,
+        predicted,
+        noise,
+        3,
+        rms / noise,
+        rms,
+        1.0,
+        0.0,
+        "lack_of_fit",
+        (),
+        (),
+        (),
+    )
 
 
 def test_curves_are_set_points_in_the_order_of_their_difference() -> None:
@@ -79,8 +104,14 @@ def test_json_has_the_curves() -> None:
 
 def test_every_figure_has_units_and_data_and_the_map_is_in_noise() -> None:
     plots = {plot.name: plot for part in force_parts(comparison()) for plot in part.plots}
-    assert {"force-map", "force-best", "force-median", "force-worst", "force-trend-load",
-            "force-trend-slip-angle"} <= set(plots)  # fmt: skip
+    assert {
+        "force-map",
+        "force-best",
+        "force-median",
+        "force-worst",
+        "force-trend-load",
+        "force-trend-slip-angle",
+    } <= set(plots)
     for plot in plots.values():
         assert plot.rows, plot.name
         assert {len(row) for row in plot.rows} == {len(plot.columns)}, plot.name

@@ -19,9 +19,17 @@ def steady(load: list[float], angle: list[float]) -> ForceData:
     column = np.asarray
     nothing, flat = np.full(n, np.nan), np.zeros(n)
     return ForceData(
-        column(load), np.full(n, 2e5), column(angle), flat, flat, nothing, nothing,
-        -5.0 * column(load) * column(angle), nothing, np.arange(n),
-    )  # fmt: skip
+        column(load),
+        np.full(n, 2e5),
+        column(angle),
+        flat,
+        flat,
+        nothing,
+        nothing,
+        -5.0 * column(load) * column(angle),
+        nothing,
+        np.arange(n),
+    )
 
 
 def test_steady_runs_are_one_point_each_in_their_order() -> None:

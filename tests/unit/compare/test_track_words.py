@@ -25,8 +25,9 @@ def track(name: str, difference: np.ndarray, seed: int = 0) -> Track:
     measured = 0.02 * LOADS / 1000.0
     model = measured + difference + NOISE * rng.standard_normal(LOADS.size)
     noise, freedom = pooled(model - measured, LEVEL)
-    return Track(name, "mm", 1e3, measured, model, np.zeros(LOADS.size), noise, freedom,
-                 name == "deflection")  # fmt: skip
+    return Track(
+        name, "mm", 1e3, measured, model, np.zeros(LOADS.size), noise, freedom, name == "deflection"
+    )
 
 
 def said(one: Track) -> tuple[str, ...]:
@@ -75,8 +76,15 @@ def test_numbers_are_not_corrected_for_the_constant() -> None:
 
 def test_without_repeats_nothing_is_told() -> None:
     one = track("contact length", np.full(LOADS.size, 2e-3))
-    bare = Track(one.name, one.unit, one.scale, one.measured, one.model, one.model_std,
-                 *pooled(one.difference, np.arange(LOADS.size)))  # fmt: skip
+    bare = Track(
+        one.name,
+        one.unit,
+        one.scale,
+        one.measured,
+        one.model,
+        one.model_std,
+        *pooled(one.difference, np.arange(LOADS.size)),
+    )
     assert said(bare) == ()
 
 

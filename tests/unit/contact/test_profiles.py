@@ -61,9 +61,15 @@ def test_concave_profile_carries_its_load(n_p: float, S_f: float, S: float) -> N
     profile = convex_concave(4000.0, A1, A2, n_p, S_f, S)
     p, f = 1.0 / n_p, S_f / (5000.0 * H**2)
     half, _ = quad(
-        lambda s: ((1.0 + s) * (f + s**2)) ** p, 0.0, 1.0,
-        weight="alg", wvar=(0.0, p), epsabs=0.0, epsrel=1e-12, limit=200,
-    )  # fmt: skip
+        lambda s: ((1.0 + s) * (f + s**2)) ** p,
+        0.0,
+        1.0,
+        weight="alg",
+        wvar=(0.0, p),
+        epsabs=0.0,
+        epsrel=1e-12,
+        limit=200,
+    )
     base = 2.0 * half
     middle = float(profile.pressure_at(MIDDLE)[0])
     assert middle == pytest.approx(4000.0 / H * f**p / base, rel=1e-9)

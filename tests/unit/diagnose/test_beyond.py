@@ -18,10 +18,11 @@ def beyond(rms: float, noise: WhiteNoise, runs: int) -> float:
     variance = spread_of(noise.smooth, runs) ** 2
     after = runs * SAMPLES * rms**2 / variance  # as the metric counts what nothing explains
     stage: Any = SimpleNamespace(
-        noise=noise, scores=SimpleNamespace(after=after),
+        noise=noise,
+        scores=SimpleNamespace(after=after),
         model=SimpleNamespace(waveform=np.zeros((runs, SAMPLES))),
         ranking=SimpleNamespace(structure=SimpleNamespace(variance=variance)),
-    )  # fmt: skip
+    )
     return float(vars(Stage)["beyond"].fget(stage))
 
 

@@ -82,9 +82,12 @@ def test_the_model_shows_the_delay_wherever_it_is_solved(
 ) -> None:
     for model in (fitted[1], fitted[1].on_time(data.points)):
         wave = predict(
-            model.values, data.points, model.changes, low_pass=data.low_pass,
+            model.values,
+            data.points,
+            model.changes,
+            low_pass=data.low_pass,
             correction=model.correction,
-        ).wave  # fmt: skip
+        ).wave
         np.testing.assert_allclose(wave, model.waveform, atol=1e-9)
     assert model.delay == 0.0
 

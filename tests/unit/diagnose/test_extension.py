@@ -72,9 +72,11 @@ def test_the_model_file_holds_values_effect_and_history_and_comes_back_equal(
     assert back.tire.bending_stiffness == pytest.approx(done.after.values["bending_stiffness"])
     (entry,) = back.extra["effects"]
     assert entry == {
-        "effect": EFFECT, "strength": done.strength[0], "std": done.std[0],
+        "effect": EFFECT,
+        "strength": done.strength[0],
+        "std": done.std[0],
         "unit": CATALOGUE[EFFECT].unit,
-    }  # fmt: skip
+    }
     (step,) = back.extra["history"]
     assert step["data_sha256"] == "hash"
     assert step["error_after"] < step["error_before"]

@@ -20,10 +20,17 @@ from tirelib.identify.brush_law import Reference
 from tirelib.identify.brush_model import BrushModel
 from tirelib.identify.force_data import ForceData
 
-VALUES = {"lateral_stiffness": 8e6, "friction": 0.95, "half_length": 0.06, "load_power": 0.5,
-          "slip_angle_offset": 0.0, "Fy_offset": 0.0}  # fmt: skip
-MODEL = ForceModel("made up", BrushModel("made up", VALUES, Reference(4e3, 2e5), None), (),
-                   (4e3, 2e5), ())  # fmt: skip
+VALUES = {
+    "lateral_stiffness": 8e6,
+    "friction": 0.95,
+    "half_length": 0.06,
+    "load_power": 0.5,
+    "slip_angle_offset": 0.0,
+    "Fy_offset": 0.0,
+}
+MODEL = ForceModel(
+    "made up", BrushModel("made up", VALUES, Reference(4e3, 2e5), None), (), (4e3, 2e5), ()
+)
 LOADS, PRESSURES, ANGLES = (2e3, 4e3, 6e3), (1.7e5, 2.3e5), np.deg2rad(np.linspace(-8, 8, 9))
 
 
@@ -37,12 +44,22 @@ def problem(
     alpha, load, pressure, _ = (x.ravel() for x in grid)
     n = alpha.size
     nothing, flat = np.full(n, np.nan), np.zeros(n)
-    brush = PointParameters(8e6, 0.95 * (load / 4e3) ** friction_power,
-                            0.06 * (load / 4e3) ** 0.5)  # fmt: skip
+    brush = PointParameters(8e6, 0.95 * (load / 4e3) ** friction_power, 0.06 * (load / 4e3) ** 0.5)
     side = predict_forces(brush, PointConditions(load, alpha)).Fy
     side = side + noise * np.random.default_rng(1).standard_normal(n)
-    data = ForceData(load, pressure, alpha, flat, flat, nothing, nothing, side, nothing,
-                     np.arange(n), np.full(n, 20.0))  # fmt: skip
+    data = ForceData(
+        load,
+        pressure,
+        alpha,
+        flat,
+        flat,
+        nothing,
+        nothing,
+        side,
+        nothing,
+        np.arange(n),
+        np.full(n, 20.0),
+    )
     return Problem.of(ForceBench.of(MODEL, force_points(data)), "Fy", noise)
 
 
@@ -93,8 +110,9 @@ def test_what_could_not_be_true_does_not_hide_what_is() -> None:
     other = problem(friction_power=-0.15)
     fitted = fit_force(other, VALUES)
 
-    @effect("wrong", stage="brush", unit="1", low=0.0, high=1.0, varies_with=("load",),
-            source="test")  # fmt: skip
+    @effect(
+        "wrong", stage="brush", unit="1", low=0.0, high=1.0, varies_with=("load",), source="test"
+    )
     def wrong(state: object, strength: float) -> object:
         "The same law with the other sign, which its range rules out."
         return CATALOGUE["friction_load"].law(state, -strength)
@@ -118,8 +136,9 @@ def test_the_score_is_what_comes_back_when_an_effect_is_taken_out() -> None:
     rest = made.measured - base.predicted
     scores = ranking.scores(rest)
     first = found.names.index("friction_load")
-    fewer = force_candidates(made, base, [c.effect for i, c in enumerate(found.living)
-                                          if i != first])  # fmt: skip
+    fewer = force_candidates(
+        made, base, [c.effect for i, c in enumerate(found.living) if i != first]
+    )
     without = ForceRanking(made, base, fewer).scores(rest)
     back = (without.after**2 - scores.after**2) / scores.after
     assert scores.score[first] == pytest.approx(back, rel=1e-6)
@@ -159,8 +178,11 @@ def test_cells_are_held_out_where_no_set_point_can_be_spared() -> None:
 
 def test_the_held_out_error_is_over_the_points_of_the_folds_that_count() -> None:
     few, many = np.arange(10) < 2, np.arange(10) >= 2
-    folds = (ForceFold("time", 0.0, few, main=True), ForceFold("time", 1.0, many, main=True),
-             ForceFold("load", 0.0, few, main=False))  # fmt: skip
+    folds = (
+        ForceFold("time", 0.0, few, main=True),
+        ForceFold("time", 1.0, many, main=True),
+        ForceFold("load", 0.0, few, main=False),
+    )
     assert pooled((3.0, 1.0, 99.0), folds) == pytest.approx(np.sqrt((2 * 9.0 + 8 * 1.0) / 10.0))
     assert np.isnan(pooled((3.0, float("nan"), 1.0), folds))
     assert np.isnan(pooled((), ()))

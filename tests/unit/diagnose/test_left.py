@@ -129,13 +129,15 @@ def test_errors_are_in_noise_or_without_repeats_in_microstrain() -> None:
 def _told(verdict: str, *named: str) -> Any:
     findings = [SimpleNamespace(effect=CATALOGUE[name]) for name in named]
     return SimpleNamespace(
-        verdict=verdict, named=named, findings=findings,
+        verdict=verdict,
+        named=named,
+        findings=findings,
         diagnosis=SimpleNamespace(
             dead={"camber": "no run has a camber", "gage_gain": "always"}, like=None
         ),
         left=SimpleNamespace(where="in the contact", scaling="grows with load"),
         unit=SimpleNamespace(known=True),
-    )  # fmt: skip
+    )
 
 
 def test_the_next_test_parts_two_that_look_alike_by_what_only_one_varies_with() -> None:

@@ -71,16 +71,31 @@ def test_a_law_that_ends_at_zero_is_fitted_from_there_and_held_there(
         return state.but(k_u=state.k_u * (1.0 - 0.5 * np.abs(strength) * state.deflection / 0.02))
 
     low, high = sorted((0.0, 0.5 * side))
-    law = effect("softer", stage="stiffness", unit="1", low=low, high=high,
-                 varies_with=("load",), source="test")(softer)  # fmt: skip
+    law = effect(
+        "softer",
+        stage="stiffness",
+        unit="1",
+        low=low,
+        high=high,
+        varies_with=("load",),
+        source="test",
+    )(softer)
     data, model = lacking
     found = refit(data, model.values, [law], delay=model.delay)  # it starts from zero
     assert side * found.strengths[0][0] > 0.1
     assert found.error < 0.7 * model.error
-    other = effect("harder", stage="stiffness", unit="1", low=low, high=high,
-                   varies_with=("load",), source="test")(
-        lambda state, strength: softer(state, strength).but(k_u=2.0 * state.k_u
-                                                            - softer(state, strength).k_u)
-    )  # fmt: skip
+    other = effect(
+        "harder",
+        stage="stiffness",
+        unit="1",
+        low=low,
+        high=high,
+        varies_with=("load",),
+        source="test",
+    )(
+        lambda state, strength: softer(state, strength).but(
+            k_u=2.0 * state.k_u - softer(state, strength).k_u
+        )
+    )
     held = refit(data, model.values, [other], [np.array([0.1 * side])], delay=model.delay)
     assert held.strengths[0][0] == pytest.approx(0.0, abs=1e-9)

@@ -14,9 +14,13 @@ from tirelib.effects import CATALOGUE
 
 def finding(name: str, twins: tuple[str, ...] = (), level: str = "alarm") -> Any:
     return SimpleNamespace(
-        effect=CATALOGUE[name], strength=np.array([0.1 * CATALOGUE[name].high]), threshold=10.0,
-        twins=[(twin, 0.2) for twin in twins], in_range=True, level=level,
-    )  # fmt: skip
+        effect=CATALOGUE[name],
+        strength=np.array([0.1 * CATALOGUE[name].high]),
+        threshold=10.0,
+        twins=[(twin, 0.2) for twin in twins],
+        in_range=True,
+        level=level,
+    )
 
 
 def look(
@@ -38,9 +42,11 @@ def look(
     first: Any = SimpleNamespace(model=base, ranking=SimpleNamespace(structure=structure))
     data: Any = SimpleNamespace(strain=np.zeros((1, 1)), points=None)
     findings = [
-        finding("temperature", ("tread_wear", "gage_drift")), finding("tread_wear"),
-        finding("gage_drift", level="hint"), finding("belt_shear", ("temperature",)),
-    ]  # fmt: skip
+        finding("temperature", ("tread_wear", "gage_drift")),
+        finding("tread_wear"),
+        finding("gage_drift", level="hint"),
+        finding("belt_shear", ("temperature",)),
+    ]
     return inseparable(data, first, findings, named, refit), made
 
 
@@ -75,9 +81,11 @@ def test_two_that_are_hidden_have_no_twins_and_the_shear_alone_may(
 def test_the_verdict_names_the_twins_without_the_shear() -> None:
     def stage(misfit: float, error: float) -> Any:
         return SimpleNamespace(
-            scores=SimpleNamespace(misfit=misfit), unit=1.0, beyond=1.0,
+            scores=SimpleNamespace(misfit=misfit),
+            unit=1.0,
+            beyond=1.0,
             model=SimpleNamespace(error=error),
-        )  # fmt: skip
+        )
 
     named = ["temperature", "belt_shear"]
     found = Rounds(stage(1.0, 0.1), named, 1, None, ())

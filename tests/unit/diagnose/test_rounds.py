@@ -211,9 +211,13 @@ def test_an_effect_that_a_later_one_replaces_goes() -> None:
 
 
 def judged(
-    ratio: Sequence[float], alone: Sequence[float], outside: float = 0.0,
-    score: Sequence[float] = (0.0, 0.0, 0.0), *, apart: bool = False,
-) -> Any:  # fmt: skip
+    ratio: Sequence[float],
+    alone: Sequence[float],
+    outside: float = 0.0,
+    score: Sequence[float] = (0.0, 0.0, 0.0),
+    *,
+    apart: bool = False,
+) -> Any:
     """Return a stage as far as its leaders go; all but the last may be named.
 
     `apart`: whether the last is independent.
@@ -222,11 +226,15 @@ def judged(
         alone=np.array([*alone, 1.0]), score=np.array([*score, 1.0 if apart else 0.0])
     )
     return SimpleNamespace(
-        ratio=np.array([*ratio, outside]), in_range=np.array([True, True, True, False]),
-        impossible=np.array([False, False, False, True]), over=np.zeros(4, dtype=bool),
-        unlisted=np.zeros(4, dtype=bool), names=[*NAMES, "impossible"], scores=scores,
+        ratio=np.array([*ratio, outside]),
+        in_range=np.array([True, True, True, False]),
+        impossible=np.array([False, False, False, True]),
+        over=np.zeros(4, dtype=bool),
+        unlisted=np.zeros(4, dtype=bool),
+        names=[*NAMES, "impossible"],
+        scores=scores,
         independent=Stage.independent.__get__(SimpleNamespace(scores=scores)),
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize(("outside", "told"), [(0.0, [0, 1]), (19.9, [0, 1]), (20.1, [])])
@@ -254,9 +262,9 @@ def test_a_further_effect_has_to_be_clear_of_what_imitates_the_impossible() -> N
 
 
 @pytest.mark.parametrize(
-    ("share", "told"), [(OWN[0] - 0.01, []), (OWN[0] + 0.01, [1]), (OWN[1] - 0.01, [1]),
-                        (OWN[1] + 0.01, [])]
-)  # fmt: skip
+    ("share", "told"),
+    [(OWN[0] - 0.01, []), (OWN[0] + 0.01, [1]), (OWN[1] - 0.01, [1]), (OWN[1] + 0.01, [])],
+)
 def test_what_nothing_else_could_take_is_no_imitation(share: float, told: list[int]) -> None:
     stage = judged([20.0, 15.0, 0.0], [100.0, 90.0, 0.0], 19.0, [10.0, share * 90.0, 0.0])
     names = set(stage.names)
@@ -325,10 +333,14 @@ def test_hints_alone_have_no_leader() -> None:
         (FELL + 0.01, "weak", "close", "strong"),
     ],
     ids=[
-        "takes nothing", "takes something", "nothing takes most", "no leader",
-        "one takes most beside the shear", "the joint fit goes first",
+        "takes nothing",
+        "takes something",
+        "nothing takes most",
+        "no leader",
+        "one takes most beside the shear",
+        "the joint fit goes first",
     ],
-)  # fmt: skip
+)
 def test_what_takes_most_of_the_error_is_looked_for_where_no_leader_takes_any(
     monkeypatch: pytest.MonkeyPatch, gone: float | None, clear: str, itself: str, named: str
 ) -> None:

@@ -45,9 +45,12 @@ def true_change(effect: str, strength: float) -> FloatArray:
     """Return what the base cannot mimic of an effect's whole change."""
     data, base, structure = case(effect, strength)
     wave = predict(
-        base.values, data.points, [CATALOGUE[effect].at(strength)], low_pass=data.low_pass,
+        base.values,
+        data.points,
+        [CATALOGUE[effect].at(strength)],
+        low_pass=data.low_pass,
         correction=base.correction,
-    ).wave  # fmt: skip
+    ).wave
     return structure.projected(base.whiten(wave - base.waveform).ravel())
 
 

@@ -38,9 +38,12 @@ SLIGHT = float(np.sqrt(1.0 - FELL)) + 0.001
 def model(*names: str, error: float, part: float = 0.5) -> Any:
     effects = [EFFECTS[name] for name in names]
     return SimpleNamespace(
-        error=error, effects=effects, strengths=[np.array([part * e.high]) for e in effects],
-        strength_std=lambda k: np.array([1e-3 * effects[k].high]), needed=list,
-    )  # fmt: skip
+        error=error,
+        effects=effects,
+        strengths=[np.array([part * e.high]) for e in effects],
+        strength_std=lambda k: np.array([1e-3 * effects[k].high]),
+        needed=list,
+    )
 
 
 def stage_of(one: Any, misfit: float, ratio: float, **more: Any) -> Any:
@@ -49,11 +52,13 @@ def stage_of(one: Any, misfit: float, ratio: float, **more: Any) -> Any:
     names = [name for name in NAMES if name not in has]
     each = {"in_range": True, "independent": False} | more
     return SimpleNamespace(
-        model=one, names=names, ratio=np.full(len(names), ratio),
+        model=one,
+        names=names,
+        ratio=np.full(len(names), ratio),
         scores=SimpleNamespace(misfit=misfit),
         unlisted=np.array([name == "gain_by_load" for name in names]),
         **{key: np.full(len(names), value) for key, value in each.items()},
-    )  # fmt: skip
+    )
 
 
 def look(
@@ -110,11 +115,12 @@ def look(
             SimpleNamespace(
                 effect=EFFECTS[name],
                 alone=lambda _, here, left=1.0 - share: (
-                    np.array([first]), here.error * float(np.sqrt(left))
+                    np.array([first]),
+                    here.error * float(np.sqrt(left)),
                 ),
             )
             for name, share in shares.items()
-        ]  # fmt: skip
+        ]
         return SimpleNamespace(living=living)
 
     def refitted(_: Any, effects: Any, strengths: Any) -> Any:

@@ -48,8 +48,10 @@ def test_a_second_call_reads_the_same_numbers(
     # whatever it depends on makes another
     ensemble_of(*fitted, noise=1e-6, members=4, seed=1)
     data, model = fitted
-    stiffer = Refit(**{name: getattr(model, name) for name in model.__slots__}
-                    | {"values": dict(model.values) | {"bending_stiffness": 2.5}})  # fmt: skip
+    stiffer = Refit(
+        **{name: getattr(model, name) for name in model.__slots__}
+        | {"values": dict(model.values) | {"bending_stiffness": 2.5}}
+    )
     ensemble_of(data, stiffer, noise=1e-6, members=4)
     assert len(calls) == 3
 

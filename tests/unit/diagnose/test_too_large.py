@@ -34,9 +34,11 @@ def test_what_explains_all_is_named_and_told_to_be_too_large() -> None:
 
 def test_what_is_named_for_its_share_is_told_to_be_so() -> None:
     found = diagnose(
-        runs(EFFECT, STRENGTH), model_of(model_file()).values, [CATALOGUE[EFFECT], *OTHERS],
+        runs(EFFECT, STRENGTH),
+        model_of(model_file()).values,
+        [CATALOGUE[EFFECT], *OTHERS],
         members=MEMBERS,
-    )  # fmt: skip
+    )
     assert found.named == (EFFECT,)
     assert found.by_share == (), "its score names it"
     given = model_of(model_file())

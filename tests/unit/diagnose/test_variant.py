@@ -30,11 +30,18 @@ def points(speed: float = 20.0, pressure: float = 2e5) -> Operating:
     n = LOADS.size
     still = np.zeros(n)
     return Operating(
-        load=LOADS, pressure=np.full(n, pressure), omega=np.full(n, speed / TIRE.ring_radius),
-        speed=np.full(n, speed), camber=still, slip_angle=still, slip_ratio=still,
-        side_force=still, drive_force=still, order=np.linspace(0.0, 1.0, n),
+        load=LOADS,
+        pressure=np.full(n, pressure),
+        omega=np.full(n, speed / TIRE.ring_radius),
+        speed=np.full(n, speed),
+        camber=still,
+        slip_angle=still,
+        slip_ratio=still,
+        side_force=still,
+        drive_force=still,
+        order=np.linspace(0.0, 1.0, n),
         temperature=np.full(n, np.nan),
-    )  # fmt: skip
+    )
 
 
 def wave(curvature: float) -> FloatArray:

@@ -14,9 +14,12 @@ def stage(misfit: float, error: float, beyond: float = 1.0, **told: float) -> An
     """Return what a verdict looks at of a stage."""
     seen = {"outside": 0.0, "imitated": 0.0} | told
     return SimpleNamespace(
-        scores=SimpleNamespace(misfit=misfit), unit=100.0, beyond=beyond,
-        model=SimpleNamespace(error=error), **seen,
-    )  # fmt: skip
+        scores=SimpleNamespace(misfit=misfit),
+        unit=100.0,
+        beyond=beyond,
+        model=SimpleNamespace(error=error),
+        **seen,
+    )
 
 
 FIRST = stage(1100.0, 1.0, 5.0)
@@ -71,9 +74,7 @@ def test_what_cannot_be_but_explains_tells_of_something_unknown(
     outside: float, imitated: float, verdict: str
 ) -> None:
     scores = SimpleNamespace(misfit=1.0)
-    stage = SimpleNamespace(
-        scores=scores, unit=1.0, beyond=1.0, outside=outside, imitated=imitated
-    )  # fmt: skip
+    stage = SimpleNamespace(scores=scores, unit=1.0, beyond=1.0, outside=outside, imitated=imitated)
     assert _verdict([], (), stage, told(stage), None) == (verdict, [])
 
 

@@ -110,7 +110,7 @@ LAWS: list[tuple[Any, tuple[str, ...]]] = [
     (lambda s, x: s.but(k_u=s.k_u * 1j), ("k_u is complex",)),
     (lambda s, x: s.but(k_u=s.k_u > 0), ("k_u holds bool",)),
     (lambda s, x: s.but(stiffness=1.0), ("TypeError",)),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("law", "words"), LAWS)

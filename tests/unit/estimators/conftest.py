@@ -24,10 +24,11 @@ def pressures(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     runs = [
         synthetic_run(i, load=load, pressure=pressure, kind="free")
         for i, (load, pressure) in enumerate(
-            (load, pressure) for load in (2500.0, 4500.0, 6500.0)
+            (load, pressure)
+            for load in (2500.0, 4500.0, 6500.0)
             for pressure in (1.7e5, 2.0e5, 2.3e5, 2.6e5)
         )
-    ]  # fmt: skip
+    ]
     return read_campaign(write(tmp_path_factory.mktemp("c") / "pressures", runs))
 
 
@@ -35,10 +36,14 @@ def pressures(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
 def braking(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     slips = np.array([-0.3, -0.1, -0.05, -0.02, 0.0, 0.02, 0.05, 0.1, 0.3])
     runs = [
-        synthetic_run(i, load=4500.0, slip_ratio=float(k),
-                      kind="free" if k == 0 else "brake" if k < 0 else "drive")
+        synthetic_run(
+            i,
+            load=4500.0,
+            slip_ratio=float(k),
+            kind="free" if k == 0 else "brake" if k < 0 else "drive",
+        )
         for i, k in enumerate(slips)
-    ]  # fmt: skip
+    ]
     return read_campaign(write(tmp_path_factory.mktemp("c") / "braking", runs))
 
 

@@ -19,9 +19,12 @@ def fitted(y_of: Callable[[np.ndarray, np.ndarray], np.ndarray], *, ends: bool =
     terms = [{}, {"a": 1}, {"a": 2}, {"b": 1}, {"b": 2}, {"a": 1, "b": 1}]
     y = y_of(a, b) + 0.01 * rng.standard_normal(a.size)
     return fit_best(
-        {"a": a, "b": b}, y, np.arange(a.size), [terms],
+        {"a": a, "b": b},
+        y,
+        np.arange(a.size),
+        [terms],
         outermost=list(outermost({"a": a})) if ends else [],
-    )  # fmt: skip
+    )
 
 
 def surprise(fit: Fit, y_of: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:

@@ -28,8 +28,12 @@ def put(*path: str | int, value: object) -> Edit:
     return edit
 
 
-CLOUD = {"names": ["traction", "cp1_slope"], "scale": [1.0, 1.0], "points": [[0.0, 0.0]],
-         "reach": 0.1}  # fmt: skip
+CLOUD = {
+    "names": ["traction", "cp1_slope"],
+    "scale": [1.0, 1.0],
+    "points": [[0.0, 0.0]],
+    "reach": 0.1,
+}
 TURN = ReferenceTurn(np.zeros((5, 128)), 20.0, float("nan"), 0.0, 66.0, "somewhere, run 1")
 FZ = ("chain", 0, "Fz")
 FAULTS: dict[str, tuple[Edit, str]] = {
@@ -63,7 +67,7 @@ FAULTS: dict[str, tuple[Edit, str]] = {
     "turn's hole": (put("reference_turn", "strain", 1, 7, value=float("nan")), "finite numbers"),
     "turn's length": (put("reference_turn", "strain", 1, value=[1] * 99), "equally many"),
     "twice": (put("chain", 1, "missing_gage", value=0), "each once"),
-}  # fmt: skip
+}
 
 
 @pytest.fixture(scope="module")

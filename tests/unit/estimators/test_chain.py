@@ -33,8 +33,9 @@ def test_another_day_is_estimated_within_the_stated_intervals(
     trained: Trained, another_day: Campaign
 ) -> None:
     day = observe([another_day])
-    summary = estimate_document(day, trained.calibration.estimate(day.features),
-                                trained.calibration)["summary"]  # fmt: skip
+    summary = estimate_document(
+        day, trained.calibration.estimate(day.features), trained.calibration
+    )["summary"]
     assert summary["Fz"]["rmse"] < 0.005 * 7500.0
     assert summary["alpha"]["rmse"] < 0.12
     assert summary["Fy"]["rmse"] < 0.01 * 6000.0
@@ -107,9 +108,15 @@ def test_without_the_centre_gage_there_is_no_estimate(trained: Trained) -> None:
 
 @pytest.mark.parametrize(
     "outside",
-    [{"load": 9500.0}, {"load": 600.0}, {"slip_ratio": -0.3}, {"camber": 0.06},
-     {"pressure": 1.0e5}, {"pressure": 3.2e5}],
-)  # fmt: skip
+    [
+        {"load": 9500.0},
+        {"load": 600.0},
+        {"slip_ratio": -0.3},
+        {"camber": 0.06},
+        {"pressure": 1.0e5},
+        {"pressure": 3.2e5},
+    ],
+)
 def test_outside_the_calibrated_range_is_flagged(
     trained: Trained, outside: dict[str, float]
 ) -> None:

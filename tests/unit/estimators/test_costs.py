@@ -59,8 +59,16 @@ def test_a_condition_without_which_nothing_is_valid_is_the_dearest(
     trained: Trained, observed: Observations
 ) -> None:
     """Where a model needs the camber there is no standard deviation at all without it."""
-    row = {"condition": "camber", "column": "camber_deg", "quantity": "Fy", "unit": "N",
-           "std": None, "std_if_given": 80.0, "valid": 0.0, "valid_if_given": 0.9}  # fmt: skip
+    row = {
+        "condition": "camber",
+        "column": "camber_deg",
+        "quantity": "Fy",
+        "unit": "N",
+        "std": None,
+        "std_if_given": 80.0,
+        "valid": 0.0,
+        "valid_if_given": 0.9,
+    }
     line = not_given([row])
     assert "Fy is unknown instead of 80 N and valid in 0% instead of 90% of turns" in line
     assert not_given([]) == ""

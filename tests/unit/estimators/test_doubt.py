@@ -8,9 +8,11 @@ from tirelib.estimators.doubt import ANGLE_STEP, doubt
 
 
 @given(
-    load=st.floats(500.0, 8e3), std=st.floats(0.0, 0.1), power=st.floats(-2.0, 2.0),
+    load=st.floats(500.0, 8e3),
+    std=st.floats(0.0, 0.1),
+    power=st.floats(-2.0, 2.0),
     higher=st.floats(-500.0, 500.0),
-)  # fmt: skip
+)
 def test_doubt_is_the_slope_over_the_angle_times_its_std_beside_what_the_offset_moves(
     load: float, std: float, power: float, higher: float
 ) -> None:

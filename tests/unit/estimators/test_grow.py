@@ -68,14 +68,17 @@ LARGER: list[basis.Powers] = [{}, *({"angle": k} for k in range(1, 7))]
         ({2: (1.0, 1.0), 3: (0.98, 0.5), 4: (1.1, 0.9)}, BASE),
         ({2: (1.0, 1.0), 3: (0.5, 0.98), 4: (0.5, 1.2)}, BASE),
         ({2: (1.0, 1.0), 3: (0.9, 0.9), 4: (0.8, 0.8), 5: (0.7, 0.79)}, [*BASE, *TWO_MORE]),
-        ({2: (1.0, 1.0), 3: (0.9, 0.9), 4: (0.8, 0.8), 5: (0.7, 0.7)},
-         [*BASE, *TWO_MORE, *ONE_MORE]),
+        (
+            {2: (1.0, 1.0), 3: (0.9, 0.9), 4: (0.8, 0.8), 5: (0.7, 0.7)},
+            [*BASE, *TWO_MORE, *ONE_MORE],
+        ),
     ],
-)  # fmt: skip
+)
 def test_the_best_family_goes_first_and_both_errors_must_fall(
-    monkeypatch: pytest.MonkeyPatch, errors: dict[int, tuple[float, float]],
+    monkeypatch: pytest.MonkeyPatch,
+    errors: dict[int, tuple[float, float]],
     wanted: list[basis.Powers],
-) -> None:  # fmt: skip
+) -> None:
     """Errors by the number of terms; where the best family helps with one error only, none."""
     monkeypatch.setattr(
         "tirelib.estimators.grow.held_out_errors",

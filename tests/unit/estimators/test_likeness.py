@@ -28,8 +28,9 @@ Regressors = Mapping[str, FloatArray]
 
 def other(features: Features) -> Features:
     """Return what a tire with longer edges of the contact would show: each edge is less steep."""
-    return replace(features, rate_lead=0.8 * features.rate_lead,
-                   rate_trail=0.8 * features.rate_trail)  # fmt: skip
+    return replace(
+        features, rate_lead=0.8 * features.rate_lead, rate_trail=0.8 * features.rate_trail
+    )
 
 
 def flagged(found: Estimates) -> np.ndarray:
@@ -56,9 +57,9 @@ def test_another_shape_of_the_contact_is_another_tire(
     assert not found.turn_valid[told].any()
     assert not any(found.valid[quantity][told].any() for quantity in found.valid)
     assert np.isfinite(found.value["Fz"][told]).all()
-    document = estimate_document(
-        replace(day, features=strange), found, trained.calibration
-    )["other_tire"]  # fmt: skip
+    document = estimate_document(replace(day, features=strange), found, trained.calibration)[
+        "other_tire"
+    ]
     assert document["suspected"]
     assert document["turns"] == told.sum()
 
@@ -75,9 +76,10 @@ def test_a_file_keeps_what_the_tire_looks_like(trained: Trained, tmp_path: Path)
     write_calibration(trained.calibration, tmp_path / "cal.toml")
     again = read_calibration(tmp_path / "cal.toml")
     strange = other(measure_run(synthetic_run(0), header())[0])
-    assert flagged(again.estimate(strange)).tolist() == flagged(
-        trained.calibration.estimate(strange)
-    ).tolist()  # fmt: skip
+    assert (
+        flagged(again.estimate(strange)).tolist()
+        == flagged(trained.calibration.estimate(strange)).tolist()
+    )
     assert again.geometry == trained.calibration.geometry
     assert again.geometry["free_radius"] == header().tire.free_radius
 
@@ -114,8 +116,17 @@ def test_an_uncertain_wheel_angle_is_no_other_tire(trained: Trained) -> None:
         values = getattr(longer, name)
         return np.asarray(values[:n] + scale * (values[n : 2 * n] - values[:n]))
 
-    names = ("lead", "trail", "cp1_angle", "cp2_angle", "tp_angle", "rate_lead", "rate_trail",
-             "e_vertical", "skew")  # fmt: skip
+    names = (
+        "lead",
+        "trail",
+        "cp1_angle",
+        "cp2_angle",
+        "tp_angle",
+        "rate_lead",
+        "rate_trail",
+        "e_vertical",
+        "skew",
+    )
     strange = replace(features, **{name: stretched(name) for name in names})
     known = trained.calibration.estimate(strange)
     doubtful = trained.calibration.estimate(replace(strange, angle_std=np.full(n, 0.03)))

@@ -9,8 +9,11 @@ from tirelib.estimators.polynomial import Range, all_inside
 NUMBERS = st.floats(-10.0, 10.0)
 RANGES = st.builds(
     lambda low, width, slack, needed: Range("x", low, low + width, slack, needed),
-    NUMBERS, st.floats(0.0, 5.0), st.floats(0.0, 2.0), st.booleans(),
-)  # fmt: skip
+    NUMBERS,
+    st.floats(0.0, 5.0),
+    st.floats(0.0, 2.0),
+    st.booleans(),
+)
 
 
 @given(ranges=st.lists(RANGES, min_size=1, max_size=4), data=st.data())

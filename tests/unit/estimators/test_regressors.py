@@ -29,9 +29,13 @@ def features() -> Features:
     }
     for name in ("omega", "speed", "pressure", "camber"):
         made[name] = made[name][:, 0]
-    made |= {"lead": -0.2 * made["lead"], "trail": 0.2 * made["trail"],
-             "cp1_angle": -0.4 * made["cp1_angle"], "cp2_angle": 0.4 * made["cp2_angle"],
-             "rate_trail": -made["rate_trail"]}  # fmt: skip
+    made |= {
+        "lead": -0.2 * made["lead"],
+        "trail": 0.2 * made["trail"],
+        "cp1_angle": -0.4 * made["cp1_angle"],
+        "cp2_angle": 0.4 * made["cp2_angle"],
+        "rate_trail": -made["rate_trail"],
+    }
     made["time"] = made["time"][:, 0]
     return Features(**made, lateral=np.array([-0.06, -0.03, 0.0, 0.03, 0.06]))
 
@@ -62,16 +66,37 @@ def test_a_contact_run_through_from_behind_changes_ends(features: Features) -> N
     """Leading and trailing change places, and so do both peaks; what is left stays."""
     f = features
     other = replace(
-        f, lead=-f.trail, trail=-f.lead, rate_lead=-f.rate_trail, rate_trail=-f.rate_lead,
-        cp1=f.cp2, cp2=f.cp1, cp1_angle=-f.cp2_angle, cp2_angle=-f.cp1_angle, skew=-f.skew,
-    )  # fmt: skip
+        f,
+        lead=-f.trail,
+        trail=-f.lead,
+        rate_lead=-f.rate_trail,
+        rate_trail=-f.rate_lead,
+        cp1=f.cp2,
+        cp2=f.cp1,
+        cp1_angle=-f.cp2_angle,
+        cp2_angle=-f.cp1_angle,
+        skew=-f.skew,
+    )
     here, there = of(f), of(other)
-    for one, two in (("lead_bend", "trail_bend"), ("cp1_slope", "cp2_slope"),
-                     ("cp1_bow", "cp2_bow")):  # fmt: skip
+    for one, two in (
+        ("lead_bend", "trail_bend"),
+        ("cp1_slope", "cp2_slope"),
+        ("cp1_bow", "cp2_bow"),
+    ):
         np.testing.assert_allclose(there[one], here[two], rtol=1e-9, atol=1e-12, err_msg=one)
         assert (np.abs(here[one] - here[two]) > 1e-3).any()
-    for name in ("contact_angle", "compression", "tension", "angle_slope", "tp_slope", "angle_bow",
-                 "tp_bow", "fullness", "steepness", *REVERSED):  # fmt: skip
+    for name in (
+        "contact_angle",
+        "compression",
+        "tension",
+        "angle_slope",
+        "tp_slope",
+        "angle_bow",
+        "tp_bow",
+        "fullness",
+        "steepness",
+        *REVERSED,
+    ):
         sign = REVERSED.get(name, 1.0)
         np.testing.assert_allclose(there[name], sign * here[name], rtol=1e-9, err_msg=name)
 
@@ -90,8 +115,9 @@ def test_levels_slopes_and_bows_are_those_of_a_parabola_over_the_width(features:
     np.testing.assert_allclose(found["cp1_slope"], slope / 2.0)
     np.testing.assert_allclose(found["cp1_bow"], bow / 2.0)
     np.testing.assert_allclose(found["tp_bow"], 0.0, atol=1e-12)
-    np.testing.assert_allclose(found["traction"] + np.mean(even.cp2, axis=1) / 2.0,
-                               (level + bow * np.mean(y**2)) / 2.0)  # fmt: skip
+    np.testing.assert_allclose(
+        found["traction"] + np.mean(even.cp2, axis=1) / 2.0, (level + bow * np.mean(y**2)) / 2.0
+    )
     few = compute_regressors(even, (0, 2, 3, 4))
     np.testing.assert_allclose(few["cp1_bow"], bow / 2.0)
     np.testing.assert_allclose(of(features)["skew"], features.skew.mean(axis=1))

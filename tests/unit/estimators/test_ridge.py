@@ -26,8 +26,11 @@ def library(x: np.ndarray, y: np.ndarray, weights: np.ndarray, centre: bool) -> 
     ridge = BayesianRidge(fit_intercept=False, max_iter=MOST_STEPS, tol=CLOSE)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
-        ridge.fit(x / np.sqrt(np.mean(x**2, axis=0)), (y - middle) / spread,
-                  sample_weight=weights / weights.mean())  # fmt: skip
+        ridge.fit(
+            x / np.sqrt(np.mean(x**2, axis=0)),
+            (y - middle) / spread,
+            sample_weight=weights / weights.mean(),
+        )
     ridge.middle_, ridge.spread_ = middle, spread
     return ridge
 
@@ -41,11 +44,16 @@ def test_each_part_is_fitted_as_the_library_fits_it(centre: bool) -> None:
         wanted = library(x[rows], y[rows], weights[rows], centre)
         coefficients = wanted.coef_ * wanted.spread_ / fit.size
         coefficients[0] += wanted.middle_
-        np.testing.assert_allclose(fit.coefficients * fit.size, coefficients * fit.size,
-                                   rtol=1e-8, atol=1e-8 * wanted.spread_)  # fmt: skip
+        np.testing.assert_allclose(
+            fit.coefficients * fit.size,
+            coefficients * fit.size,
+            rtol=1e-8,
+            atol=1e-8 * wanted.spread_,
+        )
         covariance = wanted.sigma_ * wanted.spread_**2 / np.outer(fit.size, fit.size)
-        np.testing.assert_allclose(fit.covariance, covariance, rtol=1e-7,
-                                   atol=1e-9 * np.abs(covariance).max())  # fmt: skip
+        np.testing.assert_allclose(
+            fit.covariance, covariance, rtol=1e-7, atol=1e-9 * np.abs(covariance).max()
+        )
         assert fit.noise == pytest.approx(wanted.spread_ / np.sqrt(wanted.alpha_), rel=1e-8)
         assert fit.penalty == pytest.approx(wanted.lambda_ / wanted.alpha_, rel=1e-7)
 

@@ -18,9 +18,18 @@ from tirelib.flags import TurnFlag
 from tirelib.observations import Observations
 
 CURVE = SlidingCurve(
-    friction=0.95, friction_std=0.0, grip=0.97, sharpness=2.5, fading=1.8, stiffness=(2.5, -0.3),
-    trail=(-3.6, 0.6), ratio=(0.3, 0.2), camber=(0.0, 0.0), misfit=0.01, slant=0.03,
-)  # fmt: skip
+    friction=0.95,
+    friction_std=0.0,
+    grip=0.97,
+    sharpness=2.5,
+    fading=1.8,
+    stiffness=(2.5, -0.3),
+    trail=(-3.6, 0.6),
+    ratio=(0.3, 0.2),
+    camber=(0.0, 0.0),
+    misfit=0.01,
+    slant=0.03,
+)
 WIDEST = np.deg2rad(8.0)
 
 
@@ -123,8 +132,9 @@ def test_intervals_hold_the_slip_angles_of_the_roads_that_may_be(
     read = read + slant + (noise if known else 0.0) * rng.standard_normal(n)
     told = (
         told_of(used, load, pull=(read, noise), slip_ratio=slip)
-        if braked else told_of(used, load, (read, noise))
-    )  # fmt: skip
+        if braked
+        else told_of(used, load, (read, noise))
+    )
     valid = told.std < LARGEST_ANGLE_STD
     inside = np.abs(told.angle - angle) <= TWO_SIGMA * told.std
     assert valid.mean() > (0.6 if known else 0.25)
@@ -177,10 +187,16 @@ def test_the_curve_is_found_from_a_dry_road(known: bool) -> None:
     nothing = np.full(load.shape, np.nan)
     found = fit_sliding(
         Runs(
-            angle, load, -side * used * load, -pull * load, side * moment * load, 0.0 * load, slip,
+            angle,
+            load,
+            -side * used * load,
+            -pull * load,
+            side * moment * load,
+            0.0 * load,
+            slip,
             np.full(load.shape, CURVE.friction) if known else nothing,
         )
-    )  # fmt: skip
+    )
     assert found is not None
     assert found.friction * found.grip == pytest.approx(0.95 * 0.97, rel=0.01)
     assert (found.friction_std == 0.0) == known
@@ -230,9 +246,15 @@ def test_friction_that_was_calibrated_is_no_longer_unseen() -> None:
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("friction", 0.0), ("friction", 100.0), ("tread_depth", 0.0), ("tread_depth", -0.0035),
-     ("tread_depth", 8.0), ("tread_temperature", 40.0)],
-)  # fmt: skip
+    [
+        ("friction", 0.0),
+        ("friction", 100.0),
+        ("tread_depth", 0.0),
+        ("tread_depth", -0.0035),
+        ("tread_depth", 8.0),
+        ("tread_temperature", 40.0),
+    ],
+)
 def test_a_friction_or_tread_that_cannot_be_is_named_and_nothing_is_valid(
     trained: Trained, observed: Observations, name: str, value: float
 ) -> None:

@@ -39,8 +39,10 @@ RING = np.array([(np.cos(a), np.sin(a)) for a in np.arange(8) * np.pi / 4]) * 0.
 def test_what_lies_between_calibrated_combinations_counts() -> None:
     assert inside(cloud(RING), (0.0, 0.0)) == [False]
     assert inside(cloud(RING, around=0.4), (0.0, 0.0), (0.0, 0.45), (2.0, 2.0)) == [
-        True, False, False
-    ]  # fmt: skip
+        True,
+        False,
+        False,
+    ]
     # half a ring surrounds nothing outside its hull
     half = RING[[0, 1, 2, 3, 4]]
     assert inside(cloud(half, around=0.4), (0.0, 0.12), (0.0, -0.12)) == [True, False]
@@ -112,8 +114,13 @@ def test_the_shape_of_the_contact_decides_where_a_model_uses_it(trained: Trained
 def of_one(model: Polynomial | None, name: str) -> Polynomial:
     """Return a model that uses one regressor only."""
     assert model is not None
-    return replace(model, variables=(Variable(name, 0.0, 1.0),), terms=((1,),),
-                   coefficients=np.ones(1), covariance=np.eye(1))  # fmt: skip
+    return replace(
+        model,
+        variables=(Variable(name, 0.0, 1.0),),
+        terms=((1,),),
+        coefficients=np.ones(1),
+        covariance=np.eye(1),
+    )
 
 
 def test_what_an_estimate_is_made_from_decides_on_it(trained: Trained) -> None:
@@ -122,8 +129,12 @@ def test_what_an_estimate_is_made_from_decides_on_it(trained: Trained) -> None:
     bare = replace(chain, load=of_one(chain.load, "fullness"), force=of_one(chain.force, "skew"))
     ranges = with_ranges(bare, links.values, links.truth).guards
     shape = {q: {limit.name for limit in ranges[q]} & set(SHAPE) for q in ranges}
-    assert shape == {"Fz": {"fullness"}, "Fy": {"skew"}, "alpha": {"fullness", "skew"},
-                     "kappa": set()}  # fmt: skip
+    assert shape == {
+        "Fz": {"fullness"},
+        "Fy": {"skew"},
+        "alpha": {"fullness", "skew"},
+        "kappa": set(),
+    }
 
 
 @pytest.mark.parametrize(("n", "reach"), [(35, REACH[0]), (22, 1.5 * 2.0 / 21), (9, REACH[1])])

@@ -134,14 +134,32 @@ def test_a_number_that_no_tire_has_is_not_written(added: ForceExtension, model: 
 def test_the_fall_is_shown_by_quantity_in_one_unit() -> None:
     history = [
         {"effect": "sidewall_load", "action": "add", "error_before": 3.0, "error_after": 2.0},
-        {"effect": "friction_load", "action": "add", "quantity": "Fy", "error_before_N": 90.0,
-         "error_after_N": 60.0},
-        {"effect": "friction_load", "action": "add", "quantity": "Fy", "error_before": 9.0,
-         "error_after": 6.0, "heldout_error_before": 10.0, "heldout_error_after": 7.0,
-         "floor": 2.0},
-        {"effect": "friction_load", "action": "remove", "quantity": "Fy", "error_before": 6.0,
-         "error_after": 9.0, "floor": 2.0},
-    ]  # fmt: skip
+        {
+            "effect": "friction_load",
+            "action": "add",
+            "quantity": "Fy",
+            "error_before_N": 90.0,
+            "error_after_N": 60.0,
+        },
+        {
+            "effect": "friction_load",
+            "action": "add",
+            "quantity": "Fy",
+            "error_before": 9.0,
+            "error_after": 6.0,
+            "heldout_error_before": 10.0,
+            "heldout_error_after": 7.0,
+            "floor": 2.0,
+        },
+        {
+            "effect": "friction_load",
+            "action": "remove",
+            "quantity": "Fy",
+            "error_before": 6.0,
+            "error_after": 9.0,
+            "floor": 2.0,
+        },
+    ]
     plot = waterfall_of(history, "Fy")
     assert plot is not None
     assert [row[0] for row in plot.rows] == ["before", "1: friction_load", "2: -friction_load"]

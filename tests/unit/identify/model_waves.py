@@ -15,11 +15,21 @@ from tirelib.signal import LowPass
 from tirelib.waveforms import CONDITIONS, Waveforms
 
 TIRE = Tire(
-    ring_radius=0.302, free_radius=0.3155, belt_width=0.165, tread_thickness=0.012,
-    innerliner_offset=-0.0033, bending_stiffness=2.4, mass=3.3, pressure=2.1e5,
-    radial_stiffness=4.6e5, radial_pressure_slope=1.1, tangential_stiffness=1.9e5,
-    tangential_pressure_slope=0.4, tread_stiffness=5.6e7, extension_stiffness=4.5e6,
-)  # fmt: skip
+    ring_radius=0.302,
+    free_radius=0.3155,
+    belt_width=0.165,
+    tread_thickness=0.012,
+    innerliner_offset=-0.0033,
+    bending_stiffness=2.4,
+    mass=3.3,
+    pressure=2.1e5,
+    radial_stiffness=4.6e5,
+    radial_pressure_slope=1.1,
+    tangential_stiffness=1.9e5,
+    tangential_pressure_slope=0.4,
+    tread_stiffness=5.6e7,
+    extension_stiffness=4.5e6,
+)
 """Not the start of a fit; its mass is, for a campaign does not tell it."""
 TOLERANCE = Tolerance(0.005, 0.002, 0.001, 0.003)
 ANGLE_STD = 5e-4
@@ -32,8 +42,19 @@ def operating(load: FloatArray, pressure: FloatArray, speed: float = 18.0) -> Op
     n = load.size
     zero, none = np.zeros(n), np.full(n, np.nan)
     turn = np.full(n, speed / TIRE.ring_radius)
-    return Operating(load, pressure, turn, np.full(n, speed), zero, zero, zero, zero, zero,
-                     np.arange(n) / max(n - 1, 1), none)  # fmt: skip
+    return Operating(
+        load,
+        pressure,
+        turn,
+        np.full(n, speed),
+        zero,
+        zero,
+        zero,
+        zero,
+        zero,
+        np.arange(n) / max(n - 1, 1),
+        none,
+    )
 
 
 def exact_waveform(tire: Tire, points: Operating) -> tuple[FloatArray, FloatArray]:
@@ -75,10 +96,15 @@ def made_waves(
     strain = wave[:, None] + noise * rng.standard_normal((n, len(LATERAL), wave.shape[1]))
     said = operating(load, pressure)
     given = {
-        "Fz": load, "pressure": pressure, "omega": said.omega, "speed": said.speed,
-        "slip_angle": np.zeros(n), "camber": np.zeros(n), "slip_ratio": np.zeros(n),
+        "Fz": load,
+        "pressure": pressure,
+        "omega": said.omega,
+        "speed": said.speed,
+        "slip_angle": np.zeros(n),
+        "camber": np.zeros(n),
+        "slip_ratio": np.zeros(n),
         "loaded_radius": tire.free_radius - deflection if radius else np.full(n, np.nan),
-    }  # fmt: skip
+    }
     return Waveforms(
         header=replace(header(), tolerance=TOLERANCE),
         strain=strain,

@@ -22,10 +22,12 @@ Condition = tuple[float, float, float]
 SERIES: Sequence[Condition] = [
     (load, bar, 65.0)
     for bar, loads in (
-        (1.7, (1700, 3400, 6800)), (2.1, (1700, 2600, 4300, 6000, 6800)), (2.5, (1700, 3400, 6800))
+        (1.7, (1700, 3400, 6800)),
+        (2.1, (1700, 2600, 4300, 6000, 6800)),
+        (2.5, (1700, 3400, 6800)),
     )
     for load in loads
-]  # fmt: skip
+]
 FIVE_LOADS: Sequence[Condition] = [
     (load, bar, 65.0) for bar in (1.7, 2.1, 2.5) for load in (1700, 2600, 4300, 6000, 6800)
 ]
@@ -69,21 +71,44 @@ def waves(
     load, bar, kmh = np.array(conditions, dtype=float).T
     n = load.size
     header = CampaignHeader(
-        "made by the model", "iso",
-        TireGeometry("known", of.free_radius, of.ring_radius, of.tread_thickness, of.belt_width,
-                     of.innerliner_offset),
-        (-0.03, 0.0, 0.03), 10e3, tolerance=Tolerance(0.003, 0.002, 0.001, 0.001),
-    )  # fmt: skip
+        "made by the model",
+        "iso",
+        TireGeometry(
+            "known",
+            of.free_radius,
+            of.ring_radius,
+            of.tread_thickness,
+            of.belt_width,
+            of.innerliner_offset,
+        ),
+        (-0.03, 0.0, 0.03),
+        10e3,
+        tolerance=Tolerance(0.003, 0.002, 0.001, 0.001),
+    )
     zero = np.zeros(n)
     known: Mapping[str, FloatArray] = {
-        "Fz": load, "pressure": bar * BAR, "speed": kmh * KMH, "omega": kmh * KMH / 0.305,
-        "slip_angle": zero, "camber": zero, "slip_ratio": zero,
-    }  # fmt: skip
+        "Fz": load,
+        "pressure": bar * BAR,
+        "speed": kmh * KMH,
+        "omega": kmh * KMH / 0.305,
+        "slip_angle": zero,
+        "camber": zero,
+        "slip_ratio": zero,
+    }
     plain = Waveforms(
-        header, np.zeros((n, 3, 360)), np.arange(1, n + 1), np.full(n, 9), np.full(n, 3.0 * noise),
-        np.full(n, angle_std if angle_std else 1e-5), np.arange(n, dtype=float), np.arange(n),
-        {name: known.get(name, np.full(n, np.nan)) for name in CONDITIONS}, {}, LowPass(), {},
-    )  # fmt: skip
+        header,
+        np.zeros((n, 3, 360)),
+        np.arange(1, n + 1),
+        np.full(n, 9),
+        np.full(n, 3.0 * noise),
+        np.full(n, angle_std if angle_std else 1e-5),
+        np.arange(n, dtype=float),
+        np.arange(n),
+        {name: known.get(name, np.full(n, np.nan)) for name in CONDITIONS},
+        {},
+        LowPass(),
+        {},
+    )
     points, values = operating_points(plain), values_of(of)
     correction = large_displacements(values, points) if exact else None
     state = predict(values, points, correction=correction)

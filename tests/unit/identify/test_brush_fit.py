@@ -70,8 +70,10 @@ def test_exact_forces_give_the_brush_back(robust: float | None) -> None:
     data = make(WIDE, ratios=(-0.08, -0.02, 0.0, 0.03), Fy_offset=40.0, slip_angle_offset=0.003)
     fit = fit_brush(data, robust=robust)
     wanted = TRUTH | {
-        "longitudinal_stiffness": 1.5 * C, "Fy_offset": 40.0, "slip_angle_offset": 0.003,
-    }  # fmt: skip
+        "longitudinal_stiffness": 1.5 * C,
+        "Fy_offset": 40.0,
+        "slip_angle_offset": 0.003,
+    }
     for name, value in wanted.items():
         assert fit.values[name] == pytest.approx(value, rel=1e-5), name
     for name in ("Fx_offset", "Mz_offset", "slip_ratio_offset"):
@@ -93,9 +95,7 @@ def test_exact_forces_give_the_brush_back(robust: float | None) -> None:
 )
 def test_what_is_freed_is_found(name_value: tuple[str, float]) -> None:
     name, value = name_value
-    data = make(
-        WIDE, ratios=(-0.05, 0.0, 0.04), pressures=(1.6e5, 2.0e5, 2.4e5), **{name: value}
-    )  # fmt: skip
+    data = make(WIDE, ratios=(-0.05, 0.0, 0.04), pressures=(1.6e5, 2.0e5, 2.4e5), **{name: value})
     fit = fit_brush(data, free=(name,))
     assert fit.values[name] == pytest.approx(value, rel=1e-3)
     assert fit.values["lateral_stiffness"] == pytest.approx(C, rel=1e-3)
@@ -244,18 +244,34 @@ class TestRing:
     ("data", "options", "error", "message"),
     [
         (make(np.zeros(8)), {}, CalibrationError, "slip angles span 0 deg and slip ratios 0"),
-        (make(np.zeros(8), ratios=(0.0, 0.1)), {"forces": ("Fy",)}, CalibrationError,
-         "the slip angle does not vary, so Fy tells nothing"),
+        (
+            make(np.zeros(8), ratios=(0.0, 0.1)),
+            {"forces": ("Fy",)},
+            CalibrationError,
+            "the slip angle does not vary, so Fy tells nothing",
+        ),
         (make(WIDE), {"forces": ("Fx",)}, CalibrationError, "the slip ratio does not vary"),
         (make(WIDE), {"forces": ("Fz",)}, ParameterError, "'Fz'; allowed are Fy, Fx, Mz"),
         (make(WIDE), {"free": ("colour",)}, ParameterError, "'colour' is no parameter"),
         (make(WIDE), {"held": {"half_length": 62.0}}, ParameterError, r"0.005 .. 0.5 m; give SI"),
         (make(WIDE), {"robust": -1.0}, ParameterError, "robust = -1"),
-        (make(WIDE), {"forces": ("Fy",), "held": {"lateral_stiffness": C, "friction": MU,
-         "load_power": N, "slip_angle_offset": 0.0, "Fy_offset": 0.0}}, ParameterError,
-         "every parameter is held"),
+        (
+            make(WIDE),
+            {
+                "forces": ("Fy",),
+                "held": {
+                    "lateral_stiffness": C,
+                    "friction": MU,
+                    "load_power": N,
+                    "slip_angle_offset": 0.0,
+                    "Fy_offset": 0.0,
+                },
+            },
+            ParameterError,
+            "every parameter is held",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_cannot_be_fitted_is_refused(
     data: ForceData, options: dict, error: type[Exception], message: str
 ) -> None:

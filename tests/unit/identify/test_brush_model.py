@@ -15,11 +15,21 @@ from tirelib.parameters import NUMBERS, Number, TireFile, read_tire, write_tire
 BASE = read_tire("table-6-1")
 DATA = make(WIDE, ratios=(-0.05, 0.0), loads=LOADS[:2], pressures=(1.2e5, 1.4e5))
 VALUES = {
-    "lateral_stiffness": 8e6, "longitudinal_stiffness": 1.1e7, "friction": 0.93,
-    "half_length": 0.061, "load_power": 0.45, "pressure_power": -0.3, "camber_thrust": 0.1,
-    "slip_angle_offset": 0.003, "slip_ratio_offset": -0.002, "Fx_offset": -12.0,
-    "Fy_offset": 25.0, "Mz_offset": -1.5, "yaw_compliance": 3e-5, "lateral_compliance": 4e-6,
-}  # fmt: skip
+    "lateral_stiffness": 8e6,
+    "longitudinal_stiffness": 1.1e7,
+    "friction": 0.93,
+    "half_length": 0.061,
+    "load_power": 0.45,
+    "pressure_power": -0.3,
+    "camber_thrust": 0.1,
+    "slip_angle_offset": 0.003,
+    "slip_ratio_offset": -0.002,
+    "Fx_offset": -12.0,
+    "Fy_offset": 25.0,
+    "Mz_offset": -1.5,
+    "yaw_compliance": 3e-5,
+    "lateral_compliance": 4e-6,
+}
 REFERENCE = {"reference_load": 2500.0, "reference_pressure": 1.3e5}
 
 

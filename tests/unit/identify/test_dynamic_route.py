@@ -44,9 +44,12 @@ WRONG = tire(
     tread_stiffness=0.75 * TRUE.tread_stiffness,
 )
 START = tire_file(
-    WRONG, bending_stiffness=0.5, radial_stiffness=0.4, tangential_stiffness=0.5,
+    WRONG,
+    bending_stiffness=0.5,
+    radial_stiffness=0.4,
+    tangential_stiffness=0.5,
     tread_stiffness=0.5,
-)  # fmt: skip
+)
 
 
 @pytest.fixture(scope="module")
@@ -273,9 +276,10 @@ def test_the_numerical_rig_s_damping_and_stiffness_come_back(tmp_path) -> None:
     truth = RigTire(sidewall_damping=0.07)
     points = ((2400.0, 20.0), (4800.0, 20.0), (7200.0, 20.0), (4800.0, 110.0))
     plan = Plan(
-        "small", "three loads, two speeds",
+        "small",
+        "three loads, two speeds",
         tuple(Condition(load, 2.1e5, kmh / 3.6) for load, kmh in points),
-    )  # fmt: skip
+    )
     run_plan(plan, truth, tmp_path / "rig", seed=3, jobs=1)
     data = straight_runs(measure_waveforms(read_campaign(tmp_path / "rig")))
     found = dynamic_route(data, start_file(data.waves.header, data, None, "dissertation"))

@@ -17,9 +17,12 @@ from tirelib.identify.force_notes import force_notes
 
 TIME = np.arange(20) / 10.0
 FULL = {
-    "Fz": np.full(20, 3000.0), "Fy": np.full(20, -900.0), "slip_angle": np.full(20, 0.02),
-    "slip_ratio": np.zeros(20), "camber": np.zeros(20),
-}  # fmt: skip
+    "Fz": np.full(20, 3000.0),
+    "Fy": np.full(20, -900.0),
+    "slip_angle": np.full(20, 0.02),
+    "slip_ratio": np.zeros(20),
+    "camber": np.zeros(20),
+}
 
 
 def notes(folder: Path, *rigs: dict[str, np.ndarray], kind: str = "corner") -> tuple[str, ...]:

@@ -189,11 +189,22 @@ def test_too_many_points_are_refused() -> None:
 
 
 RIG = Tire(
-    ring_radius=0.3035, free_radius=0.3165, belt_width=0.168, tread_thickness=0.0115,
-    innerliner_offset=-0.003, bending_stiffness=2.6, mass=3.6, pressure=2.3e5,
-    radial_stiffness=4.83e5, tangential_stiffness=1.9e5, tread_stiffness=5.38e7, damping=0.03,
-    tread_hardening=1.0, radial_pressure_slope=1.1, tangential_pressure_slope=0.35,
-)  # fmt: skip
+    ring_radius=0.3035,
+    free_radius=0.3165,
+    belt_width=0.168,
+    tread_thickness=0.0115,
+    innerliner_offset=-0.003,
+    bending_stiffness=2.6,
+    mass=3.6,
+    pressure=2.3e5,
+    radial_stiffness=4.83e5,
+    tangential_stiffness=1.9e5,
+    tread_stiffness=5.38e7,
+    damping=0.03,
+    tread_hardening=1.0,
+    radial_pressure_slope=1.1,
+    tangential_pressure_slope=0.35,
+)
 
 
 def test_ring_pressure_serves_the_rig_better_at_one_load(tmp_path: Path) -> None:
@@ -215,10 +226,16 @@ def test_ring_pressure_serves_the_rig_better_at_one_load(tmp_path: Path) -> None
 def test_ring_pressure_on_a_laboratory_campaign(shared: Callable[[str], Path]) -> None:
     folder = shared("lab-set1")
     lab = replace(
-        RIG, ring_radius=0.302, free_radius=0.3155, belt_width=0.165, tread_thickness=0.012,
-        innerliner_offset=-0.0033, radial_stiffness=3.93e5, radial_pressure_slope=1.9,
+        RIG,
+        ring_radius=0.302,
+        free_radius=0.3155,
+        belt_width=0.165,
+        tread_thickness=0.012,
+        innerliner_offset=-0.0033,
+        radial_stiffness=3.93e5,
+        radial_pressure_slope=1.9,
         tread_stiffness=5.4e7,
-    )  # fmt: skip
+    )
     table = compare_pressures(force_data(read_campaign(folder)), lab).table
     assert table[0].better == "ring"
     assert table[0].ring < 0.4 * table[0].parabola

@@ -17,9 +17,13 @@ from tirelib.model.state import Operating
 NAMES = [c.name for c in BARE]
 K_V, K_U_SLOPE, K_T, EI = (
     NAMES.index(name)
-    for name in ("tangential_stiffness", "radial_pressure_slope", "tread_stiffness",
-                 "bending_stiffness")
-)  # fmt: skip
+    for name in (
+        "tangential_stiffness",
+        "radial_pressure_slope",
+        "tread_stiffness",
+        "bending_stiffness",
+    )
+)
 STRUCTURE = np.array([0.1, 0.03, 0.04, 0.2, 0.25, 0.2, 0.01, 0.06])
 PRIOR = Prior(np.array([0.5, 0.5, 1.0, 0.5, 1.0, 0.5, 0.1, 0.5]))
 
@@ -49,14 +53,19 @@ def added(data: Data, load: float, pressure: float, speed: float) -> Data:
     """Return the data with one more run as the model makes it."""
     more = operating(np.array([load]), np.array([pressure]), speed)
     wave = exact_waveform(TIRE, more)[0]
-    points = Operating(*[
-        np.append(getattr(data.points, name), getattr(more, name)) for name in Operating.__slots__
-    ])  # fmt: skip
+    points = Operating(
+        *[
+            np.append(getattr(data.points, name), getattr(more, name))
+            for name in Operating.__slots__
+        ]
+    )
     return replace(
-        data, strain=np.concatenate([data.strain, wave]), points=points,
+        data,
+        strain=np.concatenate([data.strain, wave]),
+        points=points,
         angle_std=np.append(data.angle_std, data.angle_std[0]),
         deflection=np.append(data.deflection, np.nan),
-    )  # fmt: skip
+    )
 
 
 def test_now_is_fit_and_structure(fit: WaveformFit, ways: NextRun) -> None:

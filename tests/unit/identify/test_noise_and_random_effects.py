@@ -49,8 +49,9 @@ def simulated(waveform: np.ndarray, draws: int, angle_std: float) -> np.ndarray:
 
 def whiten(waveform: np.ndarray, residual: np.ndarray, angle_std: float) -> np.ndarray:
     points = operating(LOADS, np.full(3, 2.1e5))
-    white = whitening(waveform, values_of(TIRE), points, TOLERANCE, np.full(3, angle_std), NOISE,
-                      LowPass())  # fmt: skip
+    white = whitening(
+        waveform, values_of(TIRE), points, TOLERANCE, np.full(3, angle_std), NOISE, LowPass()
+    )
     return white(residual)
 
 
@@ -88,10 +89,13 @@ def test_tangents_are_derivatives(waveform: np.ndarray) -> None:
     h = 2e-4
     for k, name in ((0, "load"), (1, "pressure")):
         ends = [
-            predict(values_of(TIRE), replace(points, **{name: getattr(points, name) * (1.0 + s)}),
-                    low_pass=LowPass()).waveform
+            predict(
+                values_of(TIRE),
+                replace(points, **{name: getattr(points, name) * (1.0 + s)}),
+                low_pass=LowPass(),
+            ).waveform
             for s in (-h, h)
-        ]  # fmt: skip
+        ]
         assert ends[0] is not None
         assert ends[1] is not None
         slope = (ends[1] - ends[0]) / (2.0 * h)

@@ -30,19 +30,26 @@ def static_runs() -> tuple[StraightRuns, FloatArray]:
     data = runs(TRUE, ONE_PRESSURE, exact=False)
     loads = data.waves.conditions["Fz"]
     ring = StaticTire(
-        ring_radius=TRUE.ring_radius, free_radius=TRUE.free_radius, bending_stiffness=EI,
-        radial_stiffness=K_U, softening=RATE, tread_stiffness=K_T,
-    )  # fmt: skip
+        ring_radius=TRUE.ring_radius,
+        free_radius=TRUE.free_radius,
+        bending_stiffness=EI,
+        radial_stiffness=K_U,
+        softening=RATE,
+        tread_stiffness=K_T,
+    )
     pressed = press_to_load(ring, loads, nodes=201)
     k_u = K_U * np.exp(RATE * pressed.deflection)
     at = {"ring_radius": TRUE.ring_radius, "bending_stiffness": EI, "radial_stiffness": k_u}
     u, bend = (
         pressed_shape(
-            np.broadcast_to(GRID, (loads.size, GRID.size)), pressed.angle, pressed.pressure,
-            derivative=d, **at,
+            np.broadcast_to(GRID, (loads.size, GRID.size)),
+            pressed.angle,
+            pressed.pressure,
+            derivative=d,
+            **at,
         )
         for d in (0, 2)
-    )  # fmt: skip
+    )
     strain = -TRUE.innerliner_offset / TRUE.ring_radius**2 * (u + bend)
     strain = smoothed(strain, operating_points(data.waves), LowPass())
     known = replace(data, strain=strain, deflection=pressed.deflection)
@@ -87,9 +94,13 @@ def test_the_ring_under_a_profile_is_that_of_the_green_s_function(problem: Strai
     place, _, pressure = problem.pressure(x)
     k_u = x[1] * np.exp(x[2] * problem.deflection)
     closed = pressed_shape(
-        np.zeros((problem.load.size, 1)), place / problem.radius, pressure,
-        ring_radius=problem.radius, bending_stiffness=x[0], radial_stiffness=k_u,
-    )[:, 0]  # fmt: skip
+        np.zeros((problem.load.size, 1)),
+        place / problem.radius,
+        pressure,
+        ring_radius=problem.radius,
+        bending_stiffness=x[0],
+        radial_stiffness=k_u,
+    )[:, 0]
     # the filter's part is what differs; it is a small share of the deformation
     np.testing.assert_allclose(problem.deformation(x)[:, 0], closed, rtol=0.08)
 
@@ -112,9 +123,13 @@ def test_the_filter_acts_on_the_ring_as_on_the_strain(problem: StrainProblem) ->
     data, half = static_runs()
     loads = problem.load
     ring = StaticTire(
-        ring_radius=TRUE.ring_radius, free_radius=TRUE.free_radius, bending_stiffness=EI,
-        radial_stiffness=K_U, softening=RATE, tread_stiffness=K_T,
-    )  # fmt: skip
+        ring_radius=TRUE.ring_radius,
+        free_radius=TRUE.free_radius,
+        bending_stiffness=EI,
+        radial_stiffness=K_U,
+        softening=RATE,
+        tread_stiffness=K_T,
+    )
     pressed = press_to_load(ring, loads, nodes=201)
     n = np.arange(1.0, 61.0)
     step = np.gradient(pressed.angle, axis=1)
@@ -128,8 +143,10 @@ def test_the_filter_acts_on_the_ring_as_on_the_strain(problem: StrainProblem) ->
     error = np.abs(through - problem.measured).max()
     unfiltered = StrainProblem(
         replace(data, waves=replace(data.waves, low_pass=LowPass(order=120.0))),
-        problem.start, half, problem.middle,
-    )  # fmt: skip
+        problem.start,
+        half,
+        problem.middle,
+    )
     without = np.einsum("lpn,ln->lp", unfiltered.shape, answer * harmonics)
     assert error < 0.35 * np.abs(without - problem.measured).max()
 
@@ -146,8 +163,11 @@ def test_the_route_gives_its_tables_for_a_rolling_tire() -> None:
     assert (lengths.corrected_std > 0).all()
     assert np.abs(found.load_error).max() < 0.02
     assert {q.name for q in found.conventional} == {
-        "bending_stiffness", "radial_stiffness", "radial_deflection_rate", "tread_stiffness",
-    }  # fmt: skip
+        "bending_stiffness",
+        "radial_stiffness",
+        "radial_deflection_rate",
+        "tread_stiffness",
+    }
     for shape in found.pressures:
         carried = np.trapezoid(shape.strain_based * np.cos(shape.x / TRUE.ring_radius), shape.x)
         assert carried == pytest.approx(shape.load, rel=0.02)  # 121 points, steep edges

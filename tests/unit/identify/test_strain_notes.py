@@ -121,8 +121,9 @@ def test_gages_of_the_wrong_sign_or_unit_are_named(waves: Waveforms) -> None:
 
 def test_a_measured_length_that_the_strain_contradicts_is_said(waves: Waveforms) -> None:
     start = start_file(waves.header, straight_runs(waves), None)
-    estimate = Estimate("innerliner_offset", "mm", -3.2e-3, 1e-4, -3.4e-3, -3e-3, 1e-4,
-                        ("at_boundary",), "")  # fmt: skip
+    estimate = Estimate(
+        "innerliner_offset", "mm", -3.2e-3, 1e-4, -3.4e-3, -3e-3, 1e-4, ("at_boundary",), ""
+    )
     (said,) = _contradictions(start, (estimate,))
     assert "the strain says -3.2 mm" in said
     assert "campaign.toml says -3.3 mm" in said

@@ -25,10 +25,15 @@ from tirelib.waveforms import GRID
 NOISE = 4e-5
 """Of one gage; with five of them near what structure leaves white in a campaign."""
 START = TIRE.changed(
-    bending_stiffness=1.8, radial_stiffness=5.5e5, radial_pressure_slope=1.4,
-    tangential_stiffness=1.5e5, tangential_pressure_slope=0.2, tread_stiffness=7.5e7,
-    innerliner_offset=-0.0030, extension_stiffness=3.5e6,
-)  # fmt: skip
+    bending_stiffness=1.8,
+    radial_stiffness=5.5e5,
+    radial_pressure_slope=1.4,
+    tangential_stiffness=1.5e5,
+    tangential_pressure_slope=0.2,
+    tread_stiffness=7.5e7,
+    innerliner_offset=-0.0030,
+    extension_stiffness=3.5e6,
+)
 WIDE = Prior(np.array([1.0, 1.0, 3.0, 1.0, 3.0, 1.0, 1.0, 1.0]))
 """So wide that it tells next to nothing."""
 
@@ -152,9 +157,12 @@ def test_a_fit_that_does_not_settle_says_so(monkeypatch: pytest.MonkeyPatch) -> 
 def test_progress_is_told() -> None:
     said: list[str] = []
     fit = fit_waveforms(
-        data(loads=LOADS[::2]), values_of(TIRE), Prior(WIDE.std[:7]), free=FREE,
+        data(loads=LOADS[::2]),
+        values_of(TIRE),
+        Prior(WIDE.std[:7]),
+        free=FREE,
         progress=said.append,
-    )  # fmt: skip
+    )
     assert len(said) == fit.steps
     assert all(word.startswith("error ") for word in said)
 
@@ -182,11 +190,14 @@ def test_the_correction_vanishes_for_small_loads() -> None:
 def solver_at(measured: Data, fit: WaveformFit) -> Solver:
     """Return a solver that stands at the solution."""
     solver = Solver(measured, values_of(START), WIDE, BARE, (), None, True)
-    solver.z = np.array([
-        (float(fit.values[c.name]) - float(getattr(START, c.name))) / c.unit
-        if c.unit else np.log(float(fit.values[c.name]) / float(getattr(START, c.name)))
-        for c in BARE
-    ])  # fmt: skip
+    solver.z = np.array(
+        [
+            (float(fit.values[c.name]) - float(getattr(START, c.name))) / c.unit
+            if c.unit
+            else np.log(float(fit.values[c.name]) / float(getattr(START, c.name)))
+            for c in BARE
+        ]
+    )
     solver.model = solver.at(solver.z)
     solver.refresh()
     return solver
@@ -202,9 +213,12 @@ def profile(measured: Data, fit: WaveformFit, k: int, offset: float) -> float:
         z = solver.z + dz
         model = solver.at(z)
         slopes = whole_slopes(
-            model, move(values_of(START), z, BARE), measured.points, BARE,
+            model,
+            move(values_of(START), z, BARE),
+            measured.points,
+            BARE,
             low_pass=measured.low_pass,
-        )  # fmt: skip
+        )
         normal, gradient, height = cost.normal(model, slopes, z)
         dz[others] += np.linalg.solve(normal[np.ix_(others, others)], gradient[others])
     return height - base

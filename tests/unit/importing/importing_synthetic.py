@@ -12,9 +12,16 @@ FloatArray = npt.NDArray[np.float64]
 Columns = dict[str, FloatArray]
 
 UNITS = {
-    "ET": "s", "FX": "N", "FY": "N", "FZ": "N", "SA": "deg", "IA": "deg", "P": "kPa",
-    "V": "km/h", "TSTC": "degC",
-}  # fmt: skip
+    "ET": "s",
+    "FX": "N",
+    "FY": "N",
+    "FZ": "N",
+    "SA": "deg",
+    "IA": "deg",
+    "P": "kPa",
+    "V": "km/h",
+    "TSTC": "degC",
+}
 
 
 def sae_columns(rows: int = 400, seed: int = 1) -> Columns:
@@ -96,8 +103,7 @@ def write_csv(
 def write_mat5(path: Path, columns: Mapping[str, Any]) -> Path:
     from scipy.io import savemat
 
-    savemat(path, {name: np.asarray(values) for name, values in columns.items()},
-            oned_as="column")  # fmt: skip
+    savemat(path, {name: np.asarray(values) for name, values in columns.items()}, oned_as="column")
     return path
 
 

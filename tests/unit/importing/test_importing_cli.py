@@ -52,12 +52,19 @@ def test_bad_input_exits_2_lists_all_faults_and_writes_nothing(tmp_path: Path) -
     columns["FZ"] = -columns["FZ"]
     columns["SA_"] = columns.pop("SA")
     file = write_parquet(tmp_path / "a.parquet", columns)
-    arguments = [str(file), "--map", str(write_map(tmp_path, sae_map())), "--out",
-                 str(tmp_path / "out")]  # fmt: skip
+    arguments = [
+        str(file),
+        "--map",
+        str(write_map(tmp_path, sae_map())),
+        "--out",
+        str(tmp_path / "out"),
+    ]
     done = subprocess.run(
         [sys.executable, "-c", "from tirelib.cli import main; main()", "import", *arguments],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
     assert "did you mean 'SA_'" in done.stderr

@@ -53,7 +53,7 @@ def test_a_defect_is_refused_with_the_choice_that_the_map_has(
         ("missing", "drop", 398, "2 rows without a number were left out (rows 8, 9)"),
         ("missing", "interpolate", 400, "2 numbers of column 'FZ' were interpolated"),
     ],
-)  # fmt: skip
+)
 def test_a_choice_is_carried_out_and_noted_in_the_campaign(
     tmp_path: Path, imported: Importer, defect: str, choice: str, rows: int, said: str
 ) -> None:

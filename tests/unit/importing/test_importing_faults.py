@@ -47,8 +47,10 @@ FZ = {"column": "FZ", "unit": "N"}
         (with_channels(load=FZ), ["[channels] load: the quantity is unknown"]),
         (with_channels(strain_01=FZ), ["[channels] strain_01: the quantity is unknown"]),
         (with_channels(Mz={"unit": "Nm"}), ["[channels] Mz: no column is named"]),
-        (with_channels(Fz={"column": "FZ", "unit": "bar"}),
-         ["Fz unit: unit 'bar' is a unit of pressure", "allowed for force are N"]),
+        (
+            with_channels(Fz={"column": "FZ", "unit": "bar"}),
+            ["Fz unit: unit 'bar' is a unit of pressure", "allowed for force are N"],
+        ),
         (with_channels(Fz={"column": "FZ", "unit": "newton"}), ["'newton' is not a unit"]),
         (with_channels(Fz={**FZ, "factr": 2}), ["Fz factr: the key is unknown", "'factor'"]),
         (with_channels(Fz={**FZ, "sign": 2}), ["Fz sign: 2 is given", "1 and -1"]),
@@ -58,8 +60,10 @@ FZ = {"column": "FZ", "unit": "N"}
         (with_channels(time={"column": "ET", "unit": "s", "rate_hz": 9}), ["beside a column"]),
         (with_channels(time={"rate_hz": -1.0}), ["rate_hz = -1", "above 0"]),
         (with_channels(Fz={**FZ, "override_unit": 1}), ["override_unit: 1 is given"]),
-        (with_channels(strain_1={"column": "FX", "unit": "ustrain"}, Fx=None),
-         ["[gages]", "strain_1 is mapped, but the table is missing", "lateral_m"]),
+        (
+            with_channels(strain_1={"column": "FX", "unit": "ustrain"}, Fx=None),
+            ["[gages]", "strain_1 is mapped, but the table is missing", "lateral_m"],
+        ),
         (sae_map(gages={"lateral_m": [0.0, 0.03]}), ["0 strain channels", "declares 2"]),
         (sae_map(set_points={"load": 1}), ["[set_points] load: the key is unknown", "'load_N'"]),
         (sae_map(set_points={"load_N": {"mean_to": 0}}), ["mean_to: 0", "a step above 0"]),
@@ -81,7 +85,7 @@ FZ = {"column": "FZ", "unit": "N"}
         (sae_map(tolerance={"load": 0.005}), ["[tolerance] pressure: the key is missing"]),
         ("axes = ", ["map.toml: not TOML", "tirelib-map/1"]),
     ],
-)  # fmt: skip
+)
 def test_each_fault_of_a_map_is_named(
     document: Any, parts: list[str], refused: Refused, tmp_path: Path
 ) -> None:
@@ -110,8 +114,10 @@ def test_all_faults_of_all_files_come_at_once(refused: Refused, tmp_path: Path) 
     two["Fy"] = two.pop("FY")
     two["ET"][7] = two["ET"][6]
     three["FZ"] = -three["FZ"]
-    files = [write_parquet(tmp_path / f"{n}.parquet", c)
-             for n, c in (("one", one), ("two", two), ("three", three))]  # fmt: skip
+    files = [
+        write_parquet(tmp_path / f"{n}.parquet", c)
+        for n, c in (("one", one), ("two", two), ("three", three))
+    ]
     empty = tmp_path / "four.csv"
     empty.write_text("")
     lines = refused(*files, empty)
@@ -168,14 +174,27 @@ def put(index: int, value: float) -> Callable[[Any], Any]:
         (changed("ET", put(7, 10.06)), ["time: the time of the row before stands again in row 8"]),
         (changed("ET", put(7, 1.0)), ["time: the time falls in row 8 (t = 1 s)"]),
         (changed("ET", put(7, np.nan)), ["time: no finite time in row 8"]),
-        (changed("FZ", np.negative), ["Fz of a loaded tire is negative in these axes",
-                                      "sign = -1", "(median 1499 N)"]),
-        (changed("FY", np.negative), ["Fy against slip angle contradicts axes = 'sae' in 100 %",
-                                      "opposite signs", "column 'FY' (Fy)"]),
-        (changed("FZ", lambda x: x / 1e3), ["would find 1 error", ]),
+        (
+            changed("FZ", np.negative),
+            ["Fz of a loaded tire is negative in these axes", "sign = -1", "(median 1499 N)"],
+        ),
+        (
+            changed("FY", np.negative),
+            [
+                "Fy against slip angle contradicts axes = 'sae' in 100 %",
+                "opposite signs",
+                "column 'FY' (Fy)",
+            ],
+        ),
+        (
+            changed("FZ", lambda x: x / 1e3),
+            [
+                "would find 1 error",
+            ],
+        ),
         (changed("FZ", lambda x: x / 1e3), ["a.parquet, channel Fz", "is plausible"]),
     ],
-)  # fmt: skip
+)
 def test_each_fault_of_the_numbers_is_named(
     columns: Columns, parts: list[str], refused: Refused, tmp_path: Path
 ) -> None:
@@ -203,8 +222,12 @@ def test_a_fault_that_most_files_share_is_one_line(refused: Refused, tmp_path: P
 def test_what_the_file_says_of_a_unit_must_agree(refused: Refused, tmp_path: Path) -> None:
     file = write_mat73(tmp_path / "a.mat", sae_columns(), units=True)
     bar = {"column": "P", "unit": "bar"}
-    says(refused(file, by=with_channels(pressure=bar)), "'P' (pressure)",
-         "the file states 'kPa', the map 'bar'", "override_unit")  # fmt: skip
+    says(
+        refused(file, by=with_channels(pressure=bar)),
+        "'P' (pressure)",
+        "the file states 'kPa', the map 'bar'",
+        "override_unit",
+    )
 
 
 def test_a_unit_that_is_stated_nowhere_is_asked_for(refused: Refused, tmp_path: Path) -> None:

@@ -174,9 +174,14 @@ def test_two_columns_of_one_name_are_left_out(tmp_path: Path) -> None:
 
 
 def test_matlab_structs_matrices_and_scalars_become_columns(tmp_path: Path) -> None:
-    path = write_mat5(tmp_path / "a.mat", {"run": {"FZ": np.arange(4.0), "p": 2.3, "tag": "x"},
-                                           "G": np.arange(8.0).reshape(4, 2),
-                                           "cube": np.ones((2, 2, 2))})  # fmt: skip
+    path = write_mat5(
+        tmp_path / "a.mat",
+        {
+            "run": {"FZ": np.arange(4.0), "p": 2.3, "tag": "x"},
+            "G": np.arange(8.0).reshape(4, 2),
+            "cube": np.ones((2, 2, 2)),
+        },
+    )
     table = read_table(path)
     np.testing.assert_array_equal(table.columns["run.FZ"].values, np.arange(4.0))
     np.testing.assert_array_equal(table.columns["G(:,2)"].values, [1.0, 3.0, 5.0, 7.0])
@@ -229,5 +234,12 @@ def test_a_draft_is_a_map_once_its_gaps_are_filled(
     )
     report = import_campaign([file], tmp_path / "map.toml", tmp_path / "out")
     assert set(report.runs[0].channels) == {
-        "Fx", "Fy", "Fz", "slip_angle", "camber", "pressure", "speed", "tread_temperature"
-    }  # fmt: skip
+        "Fx",
+        "Fy",
+        "Fz",
+        "slip_angle",
+        "camber",
+        "pressure",
+        "speed",
+        "tread_temperature",
+    }

@@ -156,8 +156,10 @@ def test_a_campaign_taken_apart_and_imported_is_the_same_campaign(
 ) -> None:
     """Campaign with strain to one MATLAB file a run and back: strain, trigger, rig, plans."""
     first = tmp_path / "first"
-    runs = [synthetic.synthetic_run(k, load=3000.0 + 500 * k, slip_angle=0.03, turns=3.2)
-            for k in range(3)]  # fmt: skip
+    runs = [
+        synthetic.synthetic_run(k, load=3000.0 + 500 * k, slip_angle=0.03, turns=3.2)
+        for k in range(3)
+    ]
     write_campaign(first, synthetic.header(axes=axes), runs)
     files, document = taken_apart(first, tmp_path, axes)
     report = imported(*files, by=document)
@@ -246,8 +248,10 @@ def test_loose_mdf_with_two_rates_keeps_both_clocks(
     assert run.rig_time is not None
     strains = [Channel(f"G{k}", "um/m", 1e6 * row) for k, row in enumerate(run.strain, start=1)]
     rig = [Channel("FZ", "kN", run.rig["Fz"] / 1e3)]
-    groups = [Group(0, Channel("time", "s", run.time()), tuple(strains)),
-              Group(1, Channel("time", "s", run.rig_time), tuple(rig))]  # fmt: skip
+    groups = [
+        Group(0, Channel("time", "s", run.time()), tuple(strains)),
+        Group(1, Channel("time", "s", run.rig_time), tuple(rig)),
+    ]
     write_mdf(tmp_path / "log.mf4", groups)
     document = sae_map(axes="iso", gages={"lateral_m": list(synthetic.LATERAL)})
     document["channels"] = {"Fz": {"column": "FZ", "unit": "kN"}, **mapped} | {
@@ -286,8 +290,10 @@ def test_a_run_column_divides_one_file(imported: Importer, tmp_path: Path) -> No
     assert three.extra == {"note": "wet"}
     assert (seven.start, three.start) == pytest.approx((10.0, 11.0))
     for plan, span in ((seven, slice(0, 100)), (three, slice(100, 200))):
-        assert_imported(campaign.load(plan), {k: v[span] for k, v in columns.items()
-                                              if k not in ("RUN", "PSET")})  # fmt: skip
+        assert_imported(
+            campaign.load(plan),
+            {k: v[span] for k, v in columns.items() if k not in ("RUN", "PSET")},
+        )
 
 
 def test_files_are_runs_in_the_order_given(imported: Importer, tmp_path: Path) -> None:

@@ -45,9 +45,7 @@ after the end nobody reads **
 """
 
 name = st.text(st.sampled_from("ABCDEFGHXYZ0123456789_"), min_size=1, max_size=10)
-text = st.text(
-    st.characters(min_codepoint=32, max_codepoint=126), max_size=30
-).map(str.strip)  # fmt: skip
+text = st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=30).map(str.strip)
 number = st.floats(-9.9e7, 9.9e7)
 
 
@@ -55,19 +53,25 @@ number = st.floats(-9.9e7, 9.9e7)
 def files(draw: st.DrawFn) -> TydexFile:
     names = draw(st.lists(name, min_size=1, max_size=6, unique=True))
     channels = tuple(
-        TydexChannel(n, draw(text), draw(st.sampled_from(["N", "deg", "km/h", "-", ""])),
-                     draw(st.sampled_from([1.0, 0.001, -1.0])), draw(st.integers(-99, 99)) / 4,
-                     draw(st.integers(-99, 99)) / 8)
+        TydexChannel(
+            n,
+            draw(text),
+            draw(st.sampled_from(["N", "deg", "km/h", "-", ""])),
+            draw(st.sampled_from([1.0, 0.001, -1.0])),
+            draw(st.integers(-99, 99)) / 4,
+            draw(st.integers(-99, 99)) / 8,
+        )
         for n in names
-    )  # fmt: skip
+    )
     rows = draw(st.integers(1, 5))
     cells = draw(st.lists(number, min_size=rows * len(names), max_size=rows * len(names)))
     constants = tuple(TydexEntry(n, draw(text), "N", draw(text)) for n in ("CONST1", "CONST2"))
     comments = tuple(
         c for c in draw(st.lists(text, max_size=3)) if c and not c.startswith(("!", "**"))
     )
-    return TydexFile(channels, np.reshape(cells, (rows, len(names))), comments=comments,
-                     constants=constants)  # fmt: skip
+    return TydexFile(
+        channels, np.reshape(cells, (rows, len(names))), comments=comments, constants=constants
+    )
 
 
 @given(content=files())
@@ -140,13 +144,16 @@ def test_an_empty_cell_is_no_number(tmp_path: Path) -> None:
         ("**MEASURDATA", "**MEASDATA", "**MEASURDATA is missing"),
         ("**MEASURCHANNELS", "**CHANNELS", "**MEASURCHANNELS is missing"),
         ("**COMMENTS", "**HEADER", "line 6: **HEADER comes again"),
-        ("0.02       1.0", "0.02       1,0", "line 19: 4 values that are no row of 4 numbers "
-                                              "(decimal commas?)"),
+        (
+            "0.02       1.0",
+            "0.02       1,0",
+            "line 19: 4 values that are no row of 4 numbers (decimal commas?)",
+        ),
         ("       0.0      -1.0     820.0", "       0.0      -1.0", "line 17: 3 values"),
         ("kN        0.001", "kN      0.001  ", "line 14: the channel 'FYW'"),
         ("SLIPANGL", "RUNTIME ", "line 13: channel RUNTIME comes again"),
     ],
-)  # fmt: skip
+)
 def test_each_fault_is_named_with_its_line(old: str, new: str, said: str, tmp_path: Path) -> None:
     with pytest.raises(FormatError) as caught:
         read_tydex(by_hand(tmp_path, old, new))
@@ -170,9 +177,15 @@ def test_what_is_no_tydex_is_refused(tmp_path: Path) -> None:
 
 def test_what_does_not_fit_its_columns_is_not_written(tmp_path: Path) -> None:
     one = np.ones((2, 1))
-    for channel in (TydexChannel("A" * 11), TydexChannel(""), TydexChannel("!A"),
-                    TydexChannel("A", "c" * 31), TydexChannel("A", unit="u" * 11),
-                    TydexChannel("A", "two\nlines"), TydexChannel("A", factor=np.inf)):  # fmt: skip
+    for channel in (
+        TydexChannel("A" * 11),
+        TydexChannel(""),
+        TydexChannel("!A"),
+        TydexChannel("A", "c" * 31),
+        TydexChannel("A", unit="u" * 11),
+        TydexChannel("A", "two\nlines"),
+        TydexChannel("A", factor=np.inf),
+    ):
         with pytest.raises(ParameterError):
             write_tydex(tmp_path / "a.tdx", TydexFile((channel,), one))
     with pytest.raises(ParameterError, match="NaN or infinity"):

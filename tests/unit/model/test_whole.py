@@ -23,9 +23,12 @@ def softer(state: State) -> State:
 
 
 GRIPPING = {
-    **VALUES, "shear_stiffness": 5e4, "rotary_inertia": 8e-5, "tread_shear_stiffness": 2e7,
+    **VALUES,
+    "shear_stiffness": 5e4,
+    "rotary_inertia": 8e-5,
+    "tread_shear_stiffness": 2e7,
     "tread_hardening": 1.0,
-}  # fmt: skip
+}
 CASES: dict[str, tuple[Mapping[str, float | FloatArray], Changes]] = {
     "plain": (VALUES, ()),
     "damped": ({**VALUES, "damping": 0.05}, ()),

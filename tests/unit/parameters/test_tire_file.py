@@ -47,11 +47,21 @@ def test_each_number_says_where_it_is_from(name: str) -> None:
 
 def test_values_of_table_6_1() -> None:
     assert BASE.tire == Tire(
-        ring_radius=0.30, free_radius=0.3125, belt_width=0.165, tread_thickness=0.0125,
-        innerliner_offset=-0.002, bending_stiffness=1.144, mass=3.16, pressure=1.32e5,
-        radial_stiffness=6.24e5, tangential_stiffness=2.18e5, tread_stiffness=7.5e7,
-        damping=0.04, tread_shear_stiffness=2.5e7, friction=0.65,
-    )  # fmt: skip
+        ring_radius=0.30,
+        free_radius=0.3125,
+        belt_width=0.165,
+        tread_thickness=0.0125,
+        innerliner_offset=-0.002,
+        bending_stiffness=1.144,
+        mass=3.16,
+        pressure=1.32e5,
+        radial_stiffness=6.24e5,
+        tangential_stiffness=2.18e5,
+        tread_stiffness=7.5e7,
+        damping=0.04,
+        tread_shear_stiffness=2.5e7,
+        friction=0.65,
+    )
     assert BASE.numbers["innerliner_offset"].kind == "assumed"
 
 
@@ -81,9 +91,11 @@ def test_table_6_3() -> None:
     for name, row in rows.items():
         tire = read_tire(name).tire
         assert row == (
-            tire.bending_stiffness, tire.radial_stiffness, tire.tangential_stiffness,
+            tire.bending_stiffness,
+            tire.radial_stiffness,
+            tire.tangential_stiffness,
             tire.tread_stiffness,
-        )  # fmt: skip
+        )
     for name in ("radial_stiffness", "tangential_stiffness"):
         source = read_tire("zegelaar").numbers[name].source
         assert "DOUBTFUL" in source

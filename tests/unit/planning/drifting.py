@@ -45,7 +45,19 @@ def case(kind: str, size: float, seed: int = 3) -> ForceCase:
     side = side_force((kind, size), load, pressure, angle, np.arange(n) / (n - 1.0))
     side = side + NOISE * np.random.default_rng(seed).standard_normal(n)
     nothing, flat = np.full(n, np.nan), np.zeros(n)
-    data = ForceData(load, pressure, angle, flat, flat, nothing, nothing, side, nothing,
-                     np.arange(n), np.full(n, 20.0), time=10.0 * np.arange(n))  # fmt: skip
+    data = ForceData(
+        load,
+        pressure,
+        angle,
+        flat,
+        flat,
+        nothing,
+        nothing,
+        side,
+        nothing,
+        np.arange(n),
+        np.full(n, 20.0),
+        time=10.0 * np.arange(n),
+    )
     problem = Problem.of(ForceBench.of(MODEL, force_points(data)), "Fy", NOISE)
     return ForceCase("in order", MODEL, problem, problem, NOISE, n // 2, ())

@@ -24,9 +24,13 @@ STRENGTH, STRONG = 0.014, 0.030
 """The six runs leave the first open. They tell the second from its twin by a chi-square of 87, in
 the metric in which a diagnosis weighs a ring's structure, and need no further run."""
 CONDITIONS = (
-    (3000.0, 1.8e5, 11.0), (6000.0, 2.4e5, 11.0), (4500.0, 2.1e5, 17.0),
-    (4500.0, 2.1e5, 22.0), (3000.0, 2.4e5, 28.0), (6000.0, 1.8e5, 28.0),
-)  # fmt: skip
+    (3000.0, 1.8e5, 11.0),
+    (6000.0, 2.4e5, 11.0),
+    (4500.0, 2.1e5, 17.0),
+    (4500.0, 2.1e5, 22.0),
+    (3000.0, 2.4e5, 28.0),
+    (6000.0, 1.8e5, 28.0),
+)
 """Speed rises in the order of the runs, so softening with time looks like softening with speed."""
 
 
@@ -72,9 +76,12 @@ def measured(data: Data, points: Operating, strain: FloatArray) -> Data:
     """Return runs with measured waveforms as data of the same rig."""
     n = len(points)
     return replace(
-        data, strain=strain, points=points, angle_std=np.full(n, float(np.mean(data.angle_std))),
+        data,
+        strain=strain,
+        points=points,
+        angle_std=np.full(n, float(np.mean(data.angle_std))),
         deflection=np.full(n, np.nan),
-    )  # fmt: skip
+    )
 
 
 def joined(data: Data, more: Data) -> Data:
@@ -90,7 +97,9 @@ def joined(data: Data, more: Data) -> Data:
         points, order=np.argsort(np.argsort(points.order, kind="stable")) / (count - 1)
     )
     return replace(
-        data, points=points, strain=np.concatenate([data.strain, more.strain]),
+        data,
+        points=points,
+        strain=np.concatenate([data.strain, more.strain]),
         angle_std=np.concatenate([data.angle_std, more.angle_std]),
         deflection=np.concatenate([data.deflection, more.deflection]),
-    )  # fmt: skip
+    )

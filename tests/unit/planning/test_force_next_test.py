@@ -37,8 +37,12 @@ def told(kind: str, size: float) -> ForceAssessment:
 
 
 def envelope(made: ForceCase) -> Envelope:
-    return Envelope.of(made.problem.bench.conditions, force_axes(made), speed=(20.0, 20.0),
-                       pressure=(PRESSURES[0], PRESSURES[-1]))  # fmt: skip
+    return Envelope.of(
+        made.problem.bench.conditions,
+        force_axes(made),
+        speed=(20.0, 20.0),
+        pressure=(PRESSURES[0], PRESSURES[-1]),
+    )
 
 
 @cache

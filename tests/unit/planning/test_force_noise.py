@@ -50,8 +50,9 @@ def test_what_goes_together_in_a_block_beyond_its_set_points_is_more_noise() -> 
     base = fit_force(rough, VALUES)
     none = np.zeros((0, len(rough)))
     _, counted = counted_noise(replace(made, problem=rough), base, none)
-    _, alone = counted_noise(replace(made, problem=replace(
-        rough, block=np.arange(block.size))), base, none)  # fmt: skip
+    _, alone = counted_noise(
+        replace(made, problem=replace(rough, block=np.arange(block.size))), base, none
+    )
     assert counted.excess > 1.2 * alone.excess
 
 
@@ -63,8 +64,9 @@ def test_a_forecast_holds_what_the_present_points_tell_of_structure_and_set_poin
     trial = try_force_suspects(made, base, suspects, structure)
     (rival,) = trial.rivals
     (told,) = force_forecasts(trial, problem, structure)
-    left, plain = (trial.counted(problem.measured - wave)
-                   for wave in (told.wave[:, 0], rival.fit.predicted))  # fmt: skip
+    left, plain = (
+        trial.counted(problem.measured - wave) for wave in (told.wave[:, 0], rival.fit.predicted)
+    )
     # the cost holds the priors as well; the fit alone knows nothing of structure
     assert np.sum(left**2) < rival.cost < np.sum(plain**2)
     exact = replace(trial, counted=replace(trial.counted, share=0.0))

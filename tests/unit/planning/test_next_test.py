@@ -43,9 +43,11 @@ def forecast(scale: float = 1.0) -> tuple[Forecast, np.ndarray]:
     random = np.random.default_rng(1)
     factor = random.standard_normal((3, 3))
     told = Forecast(
-        random.standard_normal((2, 20)), random.standard_normal((3, 2, 20)),
-        random.standard_normal((2, 20, 4)), scale * (factor @ factor.T + np.eye(3)),
-    )  # fmt: skip
+        random.standard_normal((2, 20)),
+        random.standard_normal((3, 2, 20)),
+        random.standard_normal((2, 20, 4)),
+        scale * (factor @ factor.T + np.eye(3)),
+    )
     return told, told.wave + random.standard_normal((2, 20))
 
 
@@ -79,9 +81,12 @@ def test_what_is_told_is_the_mean_and_the_variance_of_the_chi_square_between_riv
     """By draws of the true one's forecast; the one that misses has numbers of its own."""
     one, wave = forecast()
     other = replace(
-        one, wave=wave, slopes=2.0 * one.slopes[::-1], tangents=0.5 * one.tangents,
+        one,
+        wave=wave,
+        slopes=2.0 * one.slopes[::-1],
+        tangents=0.5 * one.tangents,
         covariance=1.5 * one.covariance,
-    )  # fmt: skip
+    )
     mean, variance = one.missed(other, SPLIT, 2.0)
     random = np.random.default_rng(6)
     for p in range(2):
@@ -188,9 +193,13 @@ def test_the_advised_run_tells_the_planted_effect_from_its_twin() -> None:
     assert not test.pairs[0].resolved
     where = operating_at(test.points[:1], made.data.points)
     track = Track.of(
-        made.variants, made.model, made.bench, where, noise=NOISE,
+        made.variants,
+        made.model,
+        made.bench,
+        where,
+        noise=NOISE,
         random=np.random.default_rng(9),
-    )  # fmt: skip
+    )
     strain = track.measured([CATALOGUE[PLANTED].at(STRENGTH)], made.bench)[0]
     data = joined(made.data, measured(made.data, where, strain))
     suspects = [(CATALOGUE[r.name], r.strength) for r in test.trial.rivals]
@@ -251,9 +260,12 @@ def test_the_document_holds_the_contracts_keys_in_engineers_units() -> None:
 def test_repeats_of_the_plan_raise_what_stands_out_up_to_a_limit() -> None:
     made = case()
     trial = try_suspects(
-        made.data, made.base, [(CATALOGUE[PLANTED], np.array([0.02]))], noise=NOISE,
+        made.data,
+        made.base,
+        [(CATALOGUE[PLANTED], np.array([0.02]))],
+        noise=NOISE,
         with_nothing=True,
-    )  # fmt: skip
+    )
     gap = trial.rivals[0].cost - trial.rivals[1].cost
     by = gains(trial, Noise(random=3.0, staying=4.0))[PLANTED]
     assert gap > 0.0

@@ -92,8 +92,10 @@ def test_a_forecast_of_the_present_runs_leaves_no_more_than_the_fit_and_knows_no
     rival = trial.rivals[1]
     (told,) = forecasts(replace(here, rivals=(rival,)), made.data, made.data.points)
     metric = Metric(made.data, _whitening(made.data, made.base, trial.noise), trial.shapes.present)
-    left, plain = (metric.rest(wave) for wave in (
-        told.wave, rival.fitted.guess.solved(made.data, made.data.points).waveform))  # fmt: skip
+    left, plain = (
+        metric.rest(wave)
+        for wave in (told.wave, rival.fitted.guess.solved(made.data, made.data.points).waveform)
+    )
     # the cost holds the priors as well; the fit alone knows nothing of structure
     assert left @ left < rival.cost < plain @ plain
     # no way of structure is less known than before any run

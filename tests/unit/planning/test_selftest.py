@@ -16,9 +16,14 @@ from tirelib.planning.variants import Track, draw_variants
 @pytest.fixture(scope="module")
 def tested() -> SelfTest:
     return selftest(
-        runs(), values_of(TIRE), list(CATALOGUE.values()), only=("temperature", "rotary_inertia"),
-        ratios=(1.02, 1.5), repeats=4, members=16,
-    )  # fmt: skip
+        runs(),
+        values_of(TIRE),
+        list(CATALOGUE.values()),
+        only=("temperature", "rotary_inertia"),
+        ratios=(1.02, 1.5),
+        repeats=4,
+        members=16,
+    )
 
 
 def planting(tested: SelfTest, name: str, ratio: float) -> Planting:
@@ -71,9 +76,13 @@ def test_variants_repeat_with_their_seed_and_differ_with_another() -> None:
     for seed in (1, 1, 2):
         random = np.random.default_rng(seed)
         track = Track.of(
-            draw_variants(2, 0.3, random), made.base, made.data, made.data.points, noise=NOISE,
+            draw_variants(2, 0.3, random),
+            made.base,
+            made.data,
+            made.data.points,
+            noise=NOISE,
             random=random,
-        )  # fmt: skip
+        )
         waves.append(track.measured([], made.data))
     assert np.array_equal(waves[0], waves[1])
     assert np.abs(waves[0] - waves[2]).max() > 1e-5
@@ -83,9 +92,13 @@ def test_variants_repeat_with_their_seed_and_differ_with_another() -> None:
 def test_a_planted_effect_changes_only_what_its_law_changes() -> None:
     made, random = case(), np.random.default_rng(3)
     track = Track.of(
-        draw_variants(2, 0.0, random), made.base, made.data, made.data.points, noise=0.0,
+        draw_variants(2, 0.0, random),
+        made.base,
+        made.data,
+        made.data.points,
+        noise=0.0,
         random=random,
-    )  # fmt: skip
+    )
     plain = track.measured([], made.data)
     assert np.array_equal(track.measured([CATALOGUE["temperature"].at(0.0)], made.data), plain)
     assert np.abs(track.measured([CATALOGUE["temperature"].at(0.1)], made.data) - plain).max() > 0

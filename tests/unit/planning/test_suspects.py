@@ -15,9 +15,12 @@ from tirelib.planning.suspects import given_suspects, suspects_of
 
 def entry(name: str, level: str, twins: tuple[str, ...] = (), in_range: bool = True) -> Any:
     return {
-        "effect": name, "level": level, "in_range": in_range, "strength": 0.1,
+        "effect": name,
+        "level": level,
+        "in_range": in_range,
+        "strength": 0.1,
         "twins": [{"effect": twin, "angle_deg": 10.0} for twin in twins],
-    }  # fmt: skip
+    }
 
 
 def told(verdict: str, named: list[str], *entries: Any) -> dict[str, Any]:
@@ -26,9 +29,14 @@ def told(verdict: str, named: list[str], *entries: Any) -> dict[str, Any]:
 
 def test_indistinguishable_effects_are_the_suspects() -> None:
     found = suspects_of(
-        told("indistinguishable", ["low_pass", "angle_zero"], entry("low_pass", "alarm"),
-             entry("angle_zero", "alarm")), CATALOGUE,
-    )  # fmt: skip
+        told(
+            "indistinguishable",
+            ["low_pass", "angle_zero"],
+            entry("low_pass", "alarm"),
+            entry("angle_zero", "alarm"),
+        ),
+        CATALOGUE,
+    )
     assert found.names == ("low_pass", "angle_zero")
     assert not found.with_nothing
     assert found.effects[0][1] == pytest.approx([0.1])
@@ -36,11 +44,17 @@ def test_indistinguishable_effects_are_the_suspects() -> None:
 
 def test_a_named_effect_stands_beside_its_living_twins_and_the_others_stay() -> None:
     found = suspects_of(
-        told("named", ["camber", "low_pass"], entry("camber", "alarm"),
-             entry("low_pass", "alarm", ("angle_zero", "gage_drift", "tread_wear")),
-             entry("angle_zero", "hint"), entry("gage_drift", "quiet"),
-             entry("tread_wear", "hint", in_range=False)), CATALOGUE,
-    )  # fmt: skip
+        told(
+            "named",
+            ["camber", "low_pass"],
+            entry("camber", "alarm"),
+            entry("low_pass", "alarm", ("angle_zero", "gage_drift", "tread_wear")),
+            entry("angle_zero", "hint"),
+            entry("gage_drift", "quiet"),
+            entry("tread_wear", "hint", in_range=False),
+        ),
+        CATALOGUE,
+    )
     assert found.names == ("low_pass", "angle_zero")
     assert [effect.name for effect, _ in found.beside] == ["camber"]
 
@@ -55,10 +69,17 @@ def test_hints_stand_against_nothing() -> None:
 
 @pytest.mark.parametrize(
     "diagnosis",
-    [told("none", [], entry("low_pass", "quiet")), told("unknown", []),
-     told("named", ["low_pass"], entry("low_pass", "alarm", ("angle_zero",)),
-          entry("angle_zero", "quiet"))],
-)  # fmt: skip
+    [
+        told("none", [], entry("low_pass", "quiet")),
+        told("unknown", []),
+        told(
+            "named",
+            ["low_pass"],
+            entry("low_pass", "alarm", ("angle_zero",)),
+            entry("angle_zero", "quiet"),
+        ),
+    ],
+)
 def test_where_nothing_is_in_doubt_there_is_no_plan(diagnosis: dict[str, Any]) -> None:
     found = suspects_of(diagnosis, CATALOGUE)
     assert found.names == ()
@@ -76,11 +97,18 @@ def test_a_diagnosis_with_strange_effects_is_refused() -> None:
 def test_all_faults_of_given_names_are_told_at_once() -> None:
     with pytest.raises(ParameterError) as error:
         given_suspects(
-            ["oops", "gage_gain", "camber", "belt_extension"], ["camber"], CATALOGUE,
+            ["oops", "gage_gain", "camber", "belt_extension"],
+            ["camber"],
+            CATALOGUE,
             in_base={"belt_extension"},
-        )  # fmt: skip
-    for part in ("'oops' is not known", "cannot be tested", "has camber already",
-                 "fits belt_extension", "4 effects are given"):  # fmt: skip
+        )
+    for part in (
+        "'oops' is not known",
+        "cannot be tested",
+        "has camber already",
+        "fits belt_extension",
+        "4 effects are given",
+    ):
         assert part in str(error.value)
     with pytest.raises(ParameterError, match=r"'low_pas' is not known, did you mean low_pass\?"):
         given_suspects(["low_pas"], [], CATALOGUE)

@@ -39,8 +39,9 @@ def scattered() -> ForceCase:
     points = made.problem.bench.points
     time = np.random.default_rng(3).permutation(points.data.time)
     mixed = replace(points, data=replace(points.data, time=time))
-    return replace(made, problem=replace(
-        made.problem, bench=replace(made.problem.bench, points=mixed)))  # fmt: skip
+    return replace(
+        made, problem=replace(made.problem, bench=replace(made.problem.bench, points=mixed))
+    )
 
 
 @cache
@@ -74,8 +75,9 @@ def test_a_sweep_there_and_back_keeps_both_directions_and_their_rates() -> None:
     base = data.take(np.zeros(48, dtype=np.int64))
     time = np.concatenate([0.5 * np.arange(24), 40.0 + 0.5 * np.arange(24)])
     load = np.repeat([2e3, 4e3], 24)
-    swept = replace(base, slip_angle=np.tile(angle, 2), time=time, load=load,
-                    block=np.repeat([0, 1], 24))  # fmt: skip
+    swept = replace(
+        base, slip_angle=np.tile(angle, 2), time=time, load=load, block=np.repeat([0, 1], 24)
+    )
     found = campaign_sweep(force_points(swept), "slip_angle")
     assert found is not None
     # where it turns, both directions are one pass

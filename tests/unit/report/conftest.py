@@ -21,21 +21,26 @@ def camber_runs() -> list[Run]:
     points = [(c, a) for c in (-4.0, 0.0, 4.0) for a in (-10, -5, -3, -1, 0, 1, 3, 5, 10)]
     return [
         synthetic_run(
-            i, load=4500.0, slip_angle=float(np.deg2rad(a)), camber=float(np.deg2rad(c)),
+            i,
+            load=4500.0,
+            slip_angle=float(np.deg2rad(a)),
+            camber=float(np.deg2rad(c)),
             kind="camber",
         )
         for i, (c, a) in enumerate(points)
-    ]  # fmt: skip
+    ]
 
 
 def braking_runs() -> list[Run]:
     return [
         synthetic_run(
-            i, load=4500.0, slip_ratio=k,
+            i,
+            load=4500.0,
+            slip_ratio=k,
             kind="free" if k == 0.0 else "brake" if k < 0.0 else "drive",
         )
         for i, k in enumerate(SLIPS)
-    ]  # fmt: skip
+    ]
 
 
 def speed_runs() -> list[Run]:

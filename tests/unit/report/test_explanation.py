@@ -9,26 +9,51 @@ from tirelib.report.explanation import error_line, explained, held_out_line, unm
 
 def candidate(effect: str, **changes: Any) -> dict[str, Any]:
     return {
-        "effect": effect, "title": f"What {effect} does.", "score": 14.0, "threshold": 2.0,
-        "level": "alarm", "strength": 0.0812, "std": 0.0011, "unit": "1", "range": [0.0, 0.3],
+        "effect": effect,
+        "title": f"What {effect} does.",
+        "score": 14.0,
+        "threshold": 2.0,
+        "level": "alarm",
+        "strength": 0.0812,
+        "std": 0.0011,
+        "unit": "1",
+        "range": [0.0, 0.3],
         "in_range": True,
-    } | changes  # fmt: skip
+    } | changes
 
 
 def diagnosis(**changes: Any) -> dict[str, Any]:
     return {
-        "quantity": "strain", "verdict": "named", "named": ["damping"], "error_unit": "noise",
-        "error_before": 30.01, "error_refitted": 23.5, "error_after": 7.74, "floor": 7.1,
-        "residual_rms_before": 84.26, "residual_rms_after": 37.6, "residual_rms_unit": "ustrain",
-        "heldout_error_before": 25.9, "heldout_error_after": 9.9, "held_out": [],
+        "quantity": "strain",
+        "verdict": "named",
+        "named": ["damping"],
+        "error_unit": "noise",
+        "error_before": 30.01,
+        "error_refitted": 23.5,
+        "error_after": 7.74,
+        "floor": 7.1,
+        "residual_rms_before": 84.26,
+        "residual_rms_after": 37.6,
+        "residual_rms_unit": "ustrain",
+        "heldout_error_before": 25.9,
+        "heldout_error_after": 9.9,
+        "held_out": [],
         "candidates": [candidate("damping"), candidate("shear", level="quiet", score=0.2)],
-        "dead": [], "unexplained": {"where": None}, "next_test": {"what": "more levels of load"},
-    } | changes  # fmt: skip
+        "dead": [],
+        "unexplained": {"where": None},
+        "next_test": {"what": "more levels of load"},
+    } | changes
 
 
 def fold(condition: str, before: float, after: float) -> dict[str, Any]:
-    return {"condition": condition, "value": 7506.0, "unit": "N", "runs": 12,
-            "error_before": before, "error_after": after}  # fmt: skip
+    return {
+        "condition": condition,
+        "value": 7506.0,
+        "unit": "N",
+        "runs": 12,
+        "error_before": before,
+        "error_after": after,
+    }
 
 
 def test_what_is_named_is_told_with_its_size_its_fall_and_the_command_that_adds_it() -> None:
@@ -46,8 +71,11 @@ def test_what_is_named_is_told_with_its_size_its_fall_and_the_command_that_adds_
     )
     assert told.next.startswith("Add it: tirelib add damping --model M.toml --data DIR --out M2")
     assert [title for title, _ in told.lines] == [
-        "What is missing", "How sure", "The error", "What to do next",
-    ]  # fmt: skip
+        "What is missing",
+        "How sure",
+        "The error",
+        "What to do next",
+    ]
 
 
 def test_what_does_not_fall_on_what_was_held_out_is_said() -> None:
@@ -70,14 +98,24 @@ def test_what_does_not_fall_on_what_was_held_out_is_said() -> None:
     ("changes", "missing", "sure"),
     [
         ({"verdict": "none", "named": []}, "Nothing", "most conspicuous effect reaches 7 times"),
-        ({"verdict": "indistinguishable", "named": ["damping", "shear"]},
-         "cannot tell which: damping (what damping does) or shear", "equally well"),
-        ({"verdict": "unknown", "named": [], "unexplained": {"where": {"text": "in the contact"}}},
-         "no effect of the catalogue explains. It stands in the contact", "More is left"),
+        (
+            {"verdict": "indistinguishable", "named": ["damping", "shear"]},
+            "cannot tell which: damping (what damping does) or shear",
+            "equally well",
+        ),
+        (
+            {
+                "verdict": "unknown",
+                "named": [],
+                "unexplained": {"where": {"text": "in the contact"}},
+            },
+            "no effect of the catalogue explains. It stands in the contact",
+            "More is left",
+        ),
         ({"verdict": "form_inadequate"}, "a law is not right, or more is missing", "7 times"),
         ({"error_unit": "ustrain", "verdict": "none", "named": []}, "Nothing", "measured twice"),
     ],
-)  # fmt: skip
+)
 def test_every_verdict_has_its_words(changes: dict[str, Any], missing: str, sure: str) -> None:
     told = explained(diagnosis(**changes))
     assert missing in told.missing
@@ -97,9 +135,11 @@ def test_alternatives_and_doubts_are_named() -> None:
 
 
 def test_a_p_value_stands_in_the_place_of_a_score_where_there_is_one() -> None:
-    told = explained(diagnosis(
-        candidates=[candidate("damping", p=0.0021)], sets=[["damping"], ["shear", "drift"]]
-    ))  # fmt: skip
+    told = explained(
+        diagnosis(
+            candidates=[candidate("damping", p=0.0021)], sets=[["damping"], ["shear", "drift"]]
+        )
+    )
     assert "damping: p = 0.0021 if it were not there" in told.sure
     assert "Not ruled out: shear with drift." in told.sure
     assert "times as clear" not in told.sure

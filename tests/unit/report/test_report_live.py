@@ -82,8 +82,17 @@ def test_equal_documents_have_no_fault(
     compared = sum(t["Fz"] is not None for t in documents["direct"]["turns"])
     live = sum(t["Fz"] is not None for t in documents["live"]["turns"])
     assert row(table.rows, "vertical load Fz") == [
-        "vertical load Fz", "N", str(compared), "0", "0", str(live), "0", str(live), "0", "0",
-    ]  # fmt: skip
+        "vertical load Fz",
+        "N",
+        str(compared),
+        "0",
+        "0",
+        str(live),
+        "0",
+        str(live),
+        "0",
+        "0",
+    ]
 
 
 def test_the_table_tells_the_largest_difference_of_each_pair(

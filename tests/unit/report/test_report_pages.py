@@ -14,11 +14,25 @@ from tirelib.report.statistics import in_use_table, regression_tables
 
 HOSTILE = "<script>alert('tire')</script>"
 HELD_OUT = [
-    {"held_out": "load", "level": "1500 N", "quantity": "Fz", "unit": "N",
-     "dissertation": 123.4, "in_use": 56.78, "inside": False, "n": 7},
-    {"held_out": "slip_ratio", "level": HOSTILE, "quantity": "kappa", "unit": "1",
-     "dissertation": None, "in_use": 0.00123},
-]  # fmt: skip
+    {
+        "held_out": "load",
+        "level": "1500 N",
+        "quantity": "Fz",
+        "unit": "N",
+        "dissertation": 123.4,
+        "in_use": 56.78,
+        "inside": False,
+        "n": 7,
+    },
+    {
+        "held_out": "slip_ratio",
+        "level": HOSTILE,
+        "quantity": "kappa",
+        "unit": "1",
+        "dissertation": None,
+        "in_use": 0.00123,
+    },
+]
 
 
 @dataclass
@@ -192,8 +206,16 @@ def test_the_estimate_page_tells_accuracy_and_flags(hostile: World, estimate_pag
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(0.0, "0"), (-1234.5, "\N{MINUS SIGN}1234"), (1.5, "1.5"), (None, "\N{EN DASH}"),
-     (100.0, "100"), (0.00012, "0.00012"), (-3e-9, "\N{MINUS SIGN}3.000e-09"), (1e9, "1.000e+09")],
-)  # fmt: skip
+    [
+        (0.0, "0"),
+        (-1234.5, "\N{MINUS SIGN}1234"),
+        (1.5, "1.5"),
+        (None, "\N{EN DASH}"),
+        (100.0, "100"),
+        (0.00012, "0.00012"),
+        (-3e-9, "\N{MINUS SIGN}3.000e-09"),
+        (1e9, "1.000e+09"),
+    ],
+)
 def test_numbers_keep_their_digits(value: float | None, text: str) -> None:
     assert number(value) == text

@@ -34,11 +34,17 @@ def rolling() -> Simulation:
         (0.04, 59.0, 0.035, (-0.3144, 0.3070), 7946.1, 48534, 48549, -1.68),
         (0.04, 59.0, 0.045, (-0.3827, 0.3748), 11176.6, 56932, 56940, -1.86),
     ],
-)  # fmt: skip
+)
 def test_table_6_1_gives_the_anchors_of_an_independent_solver(
-    damping: float, turn_rate: float, deflection: float, edges: tuple[float, float], load: float,
-    middle: float, largest: float, centre: float,
-) -> None:  # fmt: skip
+    damping: float,
+    turn_rate: float,
+    deflection: float,
+    edges: tuple[float, float],
+    load: float,
+    middle: float,
+    largest: float,
+    centre: float,
+) -> None:
     """Tolerances: the last digit that is given."""
     tire = TIRE.changed(damping=damping)
     found = point_document(simulate(tire, deflection=deflection, turn_rate=turn_rate), 0)
@@ -71,8 +77,9 @@ def test_strain_rate_is_the_slope_of_strain_and_the_belt_keeps_its_length(contac
     # the rate has kinks, so it is summed up: by the trapezoidal rule, h^2/8 of each kink's bend
     step = done.phi[1] - done.phi[0]
     summed = np.cumsum(0.5 * step * (done.rate[0, 1:] + done.rate[0, :-1]))
-    np.testing.assert_allclose(summed, done.strain[0, 1:] - done.strain[0, 0],
-                               atol=3e-3 * np.ptp(done.strain))  # fmt: skip
+    np.testing.assert_allclose(
+        summed, done.strain[0, 1:] - done.strain[0, 0], atol=3e-3 * np.ptp(done.strain)
+    )
     stretch = done.u[0] + np.gradient(done.v[0], done.phi)
     np.testing.assert_allclose(stretch[1:-1], 0.0, atol=2e-3 * np.abs(done.u).max())
 
@@ -108,8 +115,15 @@ def test_the_belt_is_flattened_below_and_the_entry_lies_forward(rolling: Simulat
 
 def test_peaks_stand_in_their_order(rolling: Simulation) -> None:
     peaks = rolling.peaks
-    order = (peaks.cp1_angle, rolling.edges[:, 0], peaks.rate_lead_angle, peaks.tp_angle,
-             peaks.rate_trail_angle, rolling.edges[:, 1], peaks.cp2_angle)  # fmt: skip
+    order = (
+        peaks.cp1_angle,
+        rolling.edges[:, 0],
+        peaks.rate_lead_angle,
+        peaks.tp_angle,
+        peaks.rate_trail_angle,
+        rolling.edges[:, 1],
+        peaks.cp2_angle,
+    )
     assert (np.diff(np.stack(order), axis=0) > 0.0).all()
     assert (peaks.cp1 < 0.0).all()
     assert (peaks.tp > 0.0).all()
@@ -169,7 +183,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "heavy": ({"load": 1e5}, "100000 N"),
     "deep": ({"deflection": 0.29}, "290"),
     "lists": ({"load": [1.0, 2.0], "turn_rate": [1.0, 2.0, 3.0]}, "2 values beside 3"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", REFUSED)

@@ -114,9 +114,11 @@ def test_all_drawn_data_are_finite(drawn: dict[str, Figure], name: str) -> None:
 @pytest.mark.parametrize("name", LINES)
 def test_every_operating_point_has_its_curve(drawn: dict[str, Figure], name: str) -> None:
     named = [
-        line for axes in drawn[name].axes for line in axes.lines
+        line
+        for axes in drawn[name].axes
+        for line in axes.lines
         if not str(line.get_label()).startswith("_")
-    ]  # fmt: skip
+    ]
     assert len(named) == LINES[name]
 
 
@@ -193,6 +195,24 @@ def script() -> ModuleType:
 def test_the_script_draws_every_figure_that_was_asked_for() -> None:
     names = [drawing.name for make in script().CHAPTERS.values() for drawing in make()]
     assert len(set(names)) == len(names)
-    asked = {"5-10", "5-22", "5-24", "6-7", "6-9", "6-10", "6-12", "6-22", "6-23", "6-24", "6-26",
-             "6-28", "6-29", "6-33", "6-34", "6-35", "6-36", "6-40"}  # fmt: skip
+    asked = {
+        "5-10",
+        "5-22",
+        "5-24",
+        "6-7",
+        "6-9",
+        "6-10",
+        "6-12",
+        "6-22",
+        "6-23",
+        "6-24",
+        "6-26",
+        "6-28",
+        "6-29",
+        "6-33",
+        "6-34",
+        "6-35",
+        "6-36",
+        "6-40",
+    }
     assert asked <= set(names)

@@ -51,9 +51,15 @@ def seen(run: int) -> Shown:
     """Return what gages stand in, in a run of the plain rig."""
     state = plain().states[run]
     return Shown(
-        TIRE, CONDITIONS[run], state.omega, plain().traces[run], edges(state)[0],
-        state.stiffness, PLACES[run], ANGLE,
-    )  # fmt: skip
+        TIRE,
+        CONDITIONS[run],
+        state.omega,
+        plain().traces[run],
+        edges(state)[0],
+        state.stiffness,
+        PLACES[run],
+        ANGLE,
+    )
 
 
 @cache

@@ -135,19 +135,30 @@ def test_an_unknown_name_is_told() -> None:
 def ring(tire: RigTire, at: float) -> Tire:
     """Return the ring with the rig tire's constants."""
     return Tire(
-        ring_radius=tire.ring_radius, free_radius=tire.free_radius, belt_width=tire.belt_width,
-        tread_thickness=tire.tread_thickness, innerliner_offset=tire.innerliner_offset,
-        bending_stiffness=tire.bending, mass=tire.mass, pressure=at,
-        radial_stiffness=tire.radial_stiffness(at), radial_pressure_slope=tire.sidewall_radial,
+        ring_radius=tire.ring_radius,
+        free_radius=tire.free_radius,
+        belt_width=tire.belt_width,
+        tread_thickness=tire.tread_thickness,
+        innerliner_offset=tire.innerliner_offset,
+        bending_stiffness=tire.bending,
+        mass=tire.mass,
+        pressure=at,
+        radial_stiffness=tire.radial_stiffness(at),
+        radial_pressure_slope=tire.sidewall_radial,
         tangential_stiffness=tire.tangential_stiffness(at),
         tangential_pressure_slope=tire.sidewall_tangential,
-        tread_stiffness=tire.tread_normal * tire.belt_width, extension_stiffness=tire.extension,
-    )  # fmt: skip
+        tread_stiffness=tire.tread_normal * tire.belt_width,
+        extension_stiffness=tire.extension,
+    )
 
 
 def points() -> Operating:
-    columns = np.array([(c.load, c.pressure, s.omega, c.speed)
-                        for c, s in zip(CONDITIONS, plain().states, strict=True)]).T  # fmt: skip
+    columns = np.array(
+        [
+            (c.load, c.pressure, s.omega, c.speed)
+            for c, s in zip(CONDITIONS, plain().states, strict=True)
+        ]
+    ).T
     zero, none = np.zeros(3), np.full(3, np.nan)
     return Operating(*columns, zero, zero, zero, zero, zero, np.array(PLACES), none)
 

@@ -18,10 +18,22 @@ from tirelib.campaign import check_campaign, read_campaign
 from tirelib.errors import ParameterError
 
 EXACT = Chain(
-    gage_noise=0.0, gage_gain=0.0, gage_offset=0.0, gage_drift=0.0, gain_repeatability=0.0,
-    force_noise=0.0, angle_noise=0.0, slip_noise=0.0, speed_noise=0.0, omega_noise=0.0,
-    pressure_noise=0.0, radius_noise=0.0, run_out=0.0, load_setting=0.0, speed_setting=0.0,
-)  # fmt: skip
+    gage_noise=0.0,
+    gage_gain=0.0,
+    gage_offset=0.0,
+    gage_drift=0.0,
+    gain_repeatability=0.0,
+    force_noise=0.0,
+    angle_noise=0.0,
+    slip_noise=0.0,
+    speed_noise=0.0,
+    omega_noise=0.0,
+    pressure_noise=0.0,
+    radius_noise=0.0,
+    run_out=0.0,
+    load_setting=0.0,
+    speed_setting=0.0,
+)
 FAST = Condition(4000.0, 2.3e5, 24.0)
 SLOW = replace(FAST, speed=20.0)
 SECONDS = 0.5

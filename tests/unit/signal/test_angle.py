@@ -92,8 +92,9 @@ def test_features_of_a_wheel_that_brakes_are_those_of_steady_rolling(
 @given(turn=st.floats(300.0, 3000.0), middle=st.floats(1e3, 1e6))
 def test_a_steady_wheel_turns_evenly(turn: float, middle: float) -> None:
     still = Course(np.ones(1), 18.0, 0.0, known=False)
-    past = tuple((middle - (k + 0.5) * turn, np.nan, 1.0 / turn / 18.0, 1.0 / turn)
-                 for k in (4, 3, 2, 1))  # fmt: skip
+    past = tuple(
+        (middle - (k + 0.5) * turn, np.nan, 1.0 / turn / 18.0, 1.0 / turn) for k in (4, 3, 2, 1)
+    )
     law = angle_law(middle, turn, 0.1 * turn, {"speed": still}, past)
     samples = middle + np.linspace(-1.0, 0.1, 12) * turn
     np.testing.assert_allclose(law.at(samples), (samples - middle) * 2.0 * np.pi / turn, atol=1e-12)
@@ -108,8 +109,9 @@ def test_noise_of_a_source_moves_a_steady_wheel_less_than_the_noise_of_its_mean(
     rng = np.random.default_rng(seed)
     noise = np.repeat(rng.standard_normal((40, 1200 // held)), held, axis=1)
     found = [course(18.0 * (1.0 + 5e-3 * row), -1090.0, 1090.0) for row in noise]
-    ratio = np.array([c.shape[0] / (c.shape @ [1, -1 / 2, 1 / 3, -1 / 4][: c.shape.size])
-                      for c in found])  # fmt: skip
+    ratio = np.array(
+        [c.shape[0] / (c.shape @ [1, -1 / 2, 1 / 3, -1 / 4][: c.shape.size]) for c in found]
+    )
     told = min(1200 // held, 64)
     apart = 5e-3 * np.sqrt(min(held * 64 / 1200, 1.0) / told * 1.0)
     assert ratio.std() < 3.0 * apart

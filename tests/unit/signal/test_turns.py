@@ -244,9 +244,9 @@ def test_an_unsuitable_cut_off_is_flagged_and_gives_no_trace(cut_off: float) -> 
 
 
 @pytest.mark.parametrize(
-    ("speed", "flag"), [(np.nan, TurnFlag.NO_SPEED), (0.0, TurnFlag.NO_SPEED),
-                        (-18.0, TurnFlag.REVERSED)],
-)  # fmt: skip
+    ("speed", "flag"),
+    [(np.nan, TurnFlag.NO_SPEED), (0.0, TurnFlag.NO_SPEED), (-18.0, TurnFlag.REVERSED)],
+)
 def test_a_speed_that_says_nothing_is_flagged(speed: float, flag: TurnFlag) -> None:
     strain, _, _ = record()
     assert has(turns_of(strain, speed=speed), flag, 2)

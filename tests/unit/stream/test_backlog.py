@@ -41,8 +41,12 @@ def spoilt(kind: str) -> np.ndarray:
 
 def held(at: int) -> dict[str, Any]:
     """Conditions that change now and then."""
-    known = {"speed": live.SPEED + 0.01 * (at // 300), "pressure": live.PRESSURE,
-             "camber": 0.0 if at % 700 else 0.01, "friction": 0.5 + 0.1 * (at // 500)}  # fmt: skip
+    known = {
+        "speed": live.SPEED + 0.01 * (at // 300),
+        "pressure": live.PRESSURE,
+        "camber": 0.0 if at % 700 else 0.01,
+        "friction": 0.5 + 0.1 * (at // 500),
+    }
     return {name: known.get(name, math.nan) for name in HELD}
 
 

@@ -38,9 +38,12 @@ def assert_row(turn: TurnEstimate, features: Features, estimates: Estimates, row
     for field in fields(Features):
         if field.name != "lateral":
             np.testing.assert_allclose(
-                getattr(turn.features, field.name)[0], getattr(features, field.name)[row],
-                rtol=1e-9, atol=1e-12, err_msg=field.name,
-            )  # fmt: skip
+                getattr(turn.features, field.name)[0],
+                getattr(features, field.name)[row],
+                rtol=1e-9,
+                atol=1e-12,
+                err_msg=field.name,
+            )
     for field in fields(Estimates):
         given, wanted = getattr(turn.estimates, field.name), getattr(estimates, field.name)
         if isinstance(wanted, dict):
@@ -55,8 +58,12 @@ def assert_row(turn: TurnEstimate, features: Features, estimates: Estimates, row
 
 
 @settings(max_examples=12)
-@given(longest=st.sampled_from([1, 3, 10, 64, 700]), seed=st.integers(0, 99),
-       start=st.floats(-3.0, 3.0), dead=st.sampled_from([None, 0, 3]))  # fmt: skip
+@given(
+    longest=st.sampled_from([1, 3, 10, 64, 700]),
+    seed=st.integers(0, 99),
+    start=st.floats(-3.0, 3.0),
+    dead=st.sampled_from([None, 0, 3]),
+)
 def test_the_length_of_a_frame_does_not_matter(
     longest: int, seed: int, start: float, dead: int | None
 ) -> None:
@@ -65,16 +72,20 @@ def test_the_length_of_a_frame_does_not_matter(
         strain[dead] = 0.0
     strain[:, 1900:1904] = np.nan
     speed = live.SPEED * (1 + 1e-3 * np.sin(np.arange(strain.shape[1]) / 300.0))
-    turns = cut_turns(strain, live.RATE, LATERAL, speed=speed, pressure=live.PRESSURE, camber=0.0,
-                      trigger=trigger)  # fmt: skip
+    turns = cut_turns(
+        strain, live.RATE, LATERAL, speed=speed, pressure=live.PRESSURE, camber=0.0, trigger=trigger
+    )
     features = extract_features(turns)
     estimates = live.calibration().estimate(features)
     estimator, found = stream(), []
     for part in frames(strain.shape[1], longest, seed):
         found += estimator.push(
-            strain[:, part], speed=speed[part], pressure=live.PRESSURE, camber=0.0,
+            strain[:, part],
+            speed=speed[part],
+            pressure=live.PRESSURE,
+            camber=0.0,
             trigger=trigger[part],
-        )  # fmt: skip
+        )
     assert len(found) == len(features) >= 3
     for row, turn in enumerate(found):
         assert turn.turn == row + 1
@@ -89,9 +100,11 @@ def test_a_campaign_streams_to_the_numbers_of_the_batch() -> None:
         features, _ = measure_run(run, campaign.header, low_pass)
         estimates = calibration.estimate(features)
         estimator = StreamEstimator(
-            calibration, run.rate, lateral=campaign.header.gage_lateral,
+            calibration,
+            run.rate,
+            lateral=campaign.header.gage_lateral,
             tire=campaign.header.tire.name,
-        )  # fmt: skip
+        )
         assert run.strain is not None
         assert run.trigger is not None
         held = conditions_of(run, run.time())
@@ -99,9 +112,10 @@ def test_a_campaign_streams_to_the_numbers_of_the_batch() -> None:
         for first in range(0, run.strain.shape[1], 10):
             part = slice(first, first + 10)
             found += estimator.push(
-                run.strain[:, part], trigger=run.trigger[part],
+                run.strain[:, part],
+                trigger=run.trigger[part],
                 **{name: values[part] for name, values in held.items()},
-            )  # fmt: skip
+            )
         assert len(found) == len(features)
         for row, turn in enumerate(found):
             assert_row(turn, features, estimates, row)
@@ -207,8 +221,12 @@ def test_reversed_rolling_is_flagged_and_not_estimated() -> None:
 def test_the_watchdog_drops_validity_two_turns_after_the_last_contact(end: str, size: int) -> None:
     strain, _ = live.strain_of(4e3, 0.05, turns=3.0)
     last_value = strain[:, -1:]
-    tail = {"frozen": last_value, "missing": last_value * np.nan, "zero": 0 * last_value,
-            "offset": last_value + 1e-3}[end]  # fmt: skip
+    tail = {
+        "frozen": last_value,
+        "missing": last_value * np.nan,
+        "zero": 0 * last_value,
+        "offset": last_value + 1e-3,
+    }[end]
     estimator = stream()
     last = estimator.push(strain, **HELD)[-1]
     limit = int((last.time + 2 * last.features.period[0]) * live.RATE)

@@ -128,14 +128,22 @@ class _Conversion:
             return column
         reason = self.table.left_out.get(name)
         if reason is not None:
-            self.fault("left out", f"column {name!r} ({purpose})", f"it cannot be used: {reason}",
-                       "one number a row is needed", "map another column, or export it as "
-                       "numbers")  # fmt: skip
+            self.fault(
+                "left out",
+                f"column {name!r} ({purpose})",
+                f"it cannot be used: {reason}",
+                "one number a row is needed",
+                "map another column, or export it as numbers",
+            )
         else:
             known = [*self.table.columns, *self.table.left_out]
-            self.fault("missing", f"column {name!r} ({purpose})", "the file has no such column",
-                       did_you_mean(name, known), f"correct [channels] in {self.rules.file}, see "
-                       "`tirelib import FILE --list`")  # fmt: skip
+            self.fault(
+                "missing",
+                f"column {name!r} ({purpose})",
+                "the file has no such column",
+                did_you_mean(name, known),
+                f"correct [channels] in {self.rules.file}, see `tirelib import FILE --list`",
+            )
         return None
 
     def columns(self) -> dict[str, Column]:
@@ -163,12 +171,16 @@ class _Conversion:
             except UnitError as error:
                 given, allowed, _ = str(error).split("; ", 2)
                 given = f"the file's {given}" if column.unit else "map and file state no unit"
-                self.fault("unit", where, given, allowed,
-                           f"state unit in {self.rules.file}")  # fmt: skip
+                self.fault("unit", where, given, allowed, f"state unit in {self.rules.file}")
         elif not rule.converts and not _same_unit(column.unit, rule):
-            self.fault("unit", where, f"the file states {column.unit!r}, the map {rule.unit!r}",
-                       "both must agree", f"correct unit in {self.rules.file}, or say "
-                       "override_unit = true where the file is wrong")  # fmt: skip
+            self.fault(
+                "unit",
+                where,
+                f"the file states {column.unit!r}, the map {rule.unit!r}",
+                "both must agree",
+                f"correct unit in {self.rules.file}, or say "
+                "override_unit = true where the file is wrong",
+            )
 
     def times(
         self, columns: dict[str, Column], quantities: Sequence[str], clock: str
@@ -186,22 +198,34 @@ class _Conversion:
                 self.check_unit(rule, column)
         if rule is None:
             what = "the strain" if clock == GAGE_TIME else "the rig quantities"
-            given = f"{what} stand on {len(own)} clocks ({', '.join(own)})" if own else \
-                f"no time is mapped for {what}"  # fmt: skip
+            given = (
+                f"{what} stand on {len(own)} clocks ({', '.join(own)})"
+                if own
+                else f"no time is mapped for {what}"
+            )
             if not self.rules.sound:  # the map says what is wrong
                 return None
-            self.fault("time", "", given, "one clock is needed", f"add time to [channels] in "
-                       f"{self.rules.file}, or bring them to one rate")  # fmt: skip
+            self.fault(
+                "time",
+                "",
+                given,
+                "one clock is needed",
+                f"add time to [channels] in {self.rules.file}, or bring them to one rate",
+            )
             return None
         column = self.table.columns.get(rule.column)
         if rule.column and column is None:
             return None
-        count = column.values.size if column is not None else max(
-            (item.values.size for item in varying), default=0)  # fmt: skip
+        count = (
+            column.values.size
+            if column is not None
+            else max((item.values.size for item in varying), default=0)
+        )
         self.check_lengths(varying, count, rule.column)
         if count < 2:
-            self.fault("rows", "", f"{count} row(s) of data", "two are needed at least",
-                       "export it again")  # fmt: skip
+            self.fault(
+                "rows", "", f"{count} row(s) of data", "two are needed at least", "export it again"
+            )
         if column is None:
             return np.asarray(np.arange(count) / rule.rate, np.float64)
         return self.si("time", column, column.values, rule)
@@ -211,10 +235,13 @@ class _Conversion:
         against = f"the time column {clock!r}" if clock else "the longest"
         for column in columns:
             if column.values.size != count:
-                self.fault("length", f"column {column.name!r}",
-                           f"it has {column.values.size} rows, {against} has {count}",
-                           "every sample needs its time", "export both together; gages at a rate "
-                           "of their own need gage_time")  # fmt: skip
+                self.fault(
+                    "length",
+                    f"column {column.name!r}",
+                    f"it has {column.values.size} rows, {against} has {count}",
+                    "every sample needs its time",
+                    "export both together; gages at a rate of their own need gage_time",
+                )
 
     def si(
         self, quantity: str, column: Column, clock: FloatArray, rule: ChannelRule | None = None
@@ -237,25 +264,40 @@ class _Conversion:
         where = f"column {column.name!r} (run_column)"
         lengths = sorted({clock.size for clock in clocks} | {column.values.size})
         if len(lengths) > 1 and not column.constant:
-            self.fault("length", where, f"rows of {' and '.join(map(str, lengths))} samples",
-                       "run_column divides rows of one length",
-                       "give a file for each run")  # fmt: skip
+            self.fault(
+                "length",
+                where,
+                f"rows of {' and '.join(map(str, lengths))} samples",
+                "run_column divides rows of one length",
+                "give a file for each run",
+            )
             return []
         runs = column.rows(clocks[0].size)
         wrong = np.flatnonzero(~((runs >= 0) & (runs == np.floor(runs)) & np.isfinite(runs)))
         if wrong.size:
-            self.fault("run", where, f"{runs[wrong[0]]:g} in {row_list(wrong)}",
-                       "a whole number, 0 or more, is needed", "correct the column")  # fmt: skip
+            self.fault(
+                "run",
+                where,
+                f"{runs[wrong[0]]:g} in {row_list(wrong)}",
+                "a whole number, 0 or more, is needed",
+                "correct the column",
+            )
             return []
         edges = np.flatnonzero(np.diff(runs)) + 1
-        spans = [(int(runs[start]), slice(int(start), int(stop)))
-                 for start, stop in zip([0, *edges], [*edges, runs.size], strict=True)]  # fmt: skip
+        spans = [
+            (int(runs[start]), slice(int(start), int(stop)))
+            for start, stop in zip([0, *edges], [*edges, runs.size], strict=True)
+        ]
         seen: set[int] = set()
         for run, span in spans:
             if run in seen:
-                self.fault("run", where, f"run {run} comes again in row {span.start + 1}",
-                           "the rows of a run stand together", "sort the rows, or number the "
-                           "runs anew")  # fmt: skip
+                self.fault(
+                    "run",
+                    where,
+                    f"run {run} comes again in row {span.start + 1}",
+                    "the rows of a run stand together",
+                    "sort the rows, or number the runs anew",
+                )
             seen.add(run)
         return [item for item in spans if item[0] not in skipped]
 
@@ -272,11 +314,14 @@ class _Conversion:
                 kept[span] = True
             rows = np.flatnonzero(kept & ~np.isfinite(samples))
             if rows.size:
-                self.fault("finite", f"column {columns[quantity].name!r} ({quantity})",
-                           f"{rows.size} value(s) are NaN or infinite, in {row_list(rows)}",
-                           "finite numbers are needed",
-                           'drop these rows or fill them with missing = "drop" or '
-                           '"interpolate" in the map, or map another column')  # fmt: skip
+                self.fault(
+                    "finite",
+                    f"column {columns[quantity].name!r} ({quantity})",
+                    f"{rows.size} value(s) are NaN or infinite, in {row_list(rows)}",
+                    "finite numbers are needed",
+                    'drop these rows or fill them with missing = "drop" or '
+                    '"interpolate" in the map, or map another column',
+                )
 
     def look(self, columns: dict[str, Column], clocks: Sequence[FloatArray]) -> None:
         """Note what else is wrong in a file that cannot be imported as it stands."""
@@ -313,8 +358,9 @@ class _Conversion:
         gages = None if gage_time is None else gage_time[span]
         if gages is not None and len(self.found) == before:
             for problem in gage_time_problems(source, gages, self.rate(gages)):
-                told = replace(problem, allowed=problem.allowed.replace(
-                    "campaign.toml", self.rules.file))  # fmt: skip
+                told = replace(
+                    problem, allowed=problem.allowed.replace("campaign.toml", self.rules.file)
+                )
                 self.found.append(Finding("gage time", source, "", told))
         trigger = values.get("trigger")
         piece = Piece(
@@ -345,11 +391,17 @@ class _Conversion:
         steps = np.diff(inside)
         for wrong, given, choice in (
             (~np.isfinite(inside), "no finite time", 'missing = "drop"'),
-            (np.append(False, steps == 0.0), "the time of the row before stands again",
-             'repeated_time = "drop"'),
-            (np.append(False, steps < 0.0), "the time falls",
-             'backward_time = "drop" or, for segments on end, "join"'),
-        ):  # fmt: skip
+            (
+                np.append(False, steps == 0.0),
+                "the time of the row before stands again",
+                'repeated_time = "drop"',
+            ),
+            (
+                np.append(False, steps < 0.0),
+                "the time falls",
+                'backward_time = "drop" or, for segments on end, "join"',
+            ),
+        ):
             if wrong.any():
                 count = int(np.count_nonzero(wrong))
                 first = int(np.flatnonzero(wrong)[0])

@@ -91,11 +91,16 @@ def _on_clock(
     runs = group.get(run_column, np.zeros(size))
     keep = np.ones(size, dtype=np.bool_)
     notes = [
-        *_missing(group, keep, [n for n in (clock.name, *clock.mapped) if n in group],
-                  clock.name, defects.missing),
+        *_missing(
+            group,
+            keep,
+            [n for n in (clock.name, *clock.mapped) if n in group],
+            clock.name,
+            defects.missing,
+        ),
         *_backward(group[clock.name], keep, runs, defects.backward_time),
         *_repeated(group[clock.name], keep, runs, defects.repeated_time),
-    ]  # fmt: skip
+    ]
     changed = {
         name: replace(table.columns[name], values=values[keep]) for name, values in group.items()
     }
@@ -124,9 +129,14 @@ def _missing(
             continue
         group[name][holes] = np.interp(group[clock][holes], group[clock][sound], group[name][sound])
         longest = int(np.diff(np.flatnonzero(np.diff(np.r_[0, holes, 0]))).max(initial=0))
-        notes.append(_note("missing", choice, holes,
-                           f"numbers of column {name!r} were interpolated in time, up to {longest} "
-                           "on end"))  # fmt: skip
+        notes.append(
+            _note(
+                "missing",
+                choice,
+                holes,
+                f"numbers of column {name!r} were interpolated in time, up to {longest} on end",
+            )
+        )
     if lost[clock].any():
         notes.append(_note("missing", choice, lost[clock], "rows without a time were left out"))
     return notes
@@ -152,9 +162,14 @@ def _backward(times: FloatArray, keep: BoolArray, runs: FloatArray, choice: str)
         times[rows] += total
         at = np.zeros(times.size, dtype=np.bool_)
         at[rows[falls]] = True
-        return [_note("backward_time", choice, at,
-                      f"segments were joined to those before, {step:.6g} apart in the time's "
-                      "unit")]  # fmt: skip
+        return [
+            _note(
+                "backward_time",
+                choice,
+                at,
+                f"segments were joined to those before, {step:.6g} apart in the time's unit",
+            )
+        ]
     wrong = np.zeros(times.size, dtype=np.bool_)
     for run in np.unique(runs[rows]):
         inside = rows[runs[rows] == run]
@@ -173,8 +188,9 @@ def _repeated(times: FloatArray, keep: BoolArray, runs: FloatArray, choice: str)
     if not choice or not again.any():
         return []
     keep &= ~again
-    return [_note("repeated_time", choice, again,
-                  "rows with the time of the row before were left out")]  # fmt: skip
+    return [
+        _note("repeated_time", choice, again, "rows with the time of the row before were left out")
+    ]
 
 
 def _note(key: str, choice: str, rows: BoolArray, what: str) -> str:

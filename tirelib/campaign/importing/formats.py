@@ -68,9 +68,11 @@ def read_table(path: Path, options: CsvOptions | None = None) -> Table:
             "both must agree",
             "rename the file by its content, or export it again",
         )
-    table = _READERS[found](path) if found in _READERS else read_delimited(
-        path, options or CsvOptions()
-    )  # fmt: skip
+    table = (
+        _READERS[found](path)
+        if found in _READERS
+        else read_delimited(path, options or CsvOptions())
+    )
     if not any(column.values.size for column in table.columns.values()):
         why = "; ".join(f"{name}: {reason}" for name, reason in list(table.left_out.items())[:1])
         raise refusal(
@@ -95,15 +97,22 @@ def _content(path: Path) -> str:
         raise refusal(str(path), "the file is empty", "measured data are needed", "export it again")
     if head.startswith((MAGIC, MAGIC_73)):
         return "MATLAB"
-    for magic, form in ((b"PAR1", "Parquet"), (b"MDF     ", "MDF 4"), (b"UnFinMF ", "MDF 4"),
-                        (HDF5_MAGIC, "HDF5 without a MATLAB heading")):  # fmt: skip
+    for magic, form in (
+        (b"PAR1", "Parquet"),
+        (b"MDF     ", "MDF 4"),
+        (b"UnFinMF ", "MDF 4"),
+        (HDF5_MAGIC, "HDF5 without a MATLAB heading"),
+    ):
         if head.startswith(magic):
             return form
     lines = [line for line in head.splitlines() if line.strip() and not line.startswith(b"!")]
     if lines and lines[0].startswith(b"**"):
         return "TYDEX"
-    return "no known binary format" if b"\0" in head and head[:2] not in (
-        b"\xff\xfe", b"\xfe\xff") else "text table"  # fmt: skip
+    return (
+        "no known binary format"
+        if b"\0" in head and head[:2] not in (b"\xff\xfe", b"\xfe\xff")
+        else "text table"
+    )
 
 
 def _matlab(path: Path) -> Table:
@@ -129,8 +138,12 @@ def _parquet(path: Path) -> Table:
     left_out: dict[str, str] = {}
     for field, samples in zip(table.schema, table.columns, strict=True):
         types = pyarrow.types
-        if types.is_floating(field.type) or types.is_integer(field.type) or types.is_decimal(
-            field.type) or types.is_boolean(field.type):  # fmt: skip
+        if (
+            types.is_floating(field.type)
+            or types.is_integer(field.type)
+            or types.is_decimal(field.type)
+            or types.is_boolean(field.type)
+        ):
             values = samples.to_pandas().to_numpy(dtype=np.float64, na_value=np.nan)
             unit = (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
             columns[field.name] = Column(field.name, values, unit)

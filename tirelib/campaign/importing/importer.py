@@ -158,8 +158,10 @@ class _Import:
             problems += plan_problems(imported, self.rules)
         faults += [str(problem) for problem in problems]
         if not faults and not imported:
-            faults = [f"{self.rules.file}: every run is skipped; one at least is needed; take a "
-                      "skip out of [runs]"]  # fmt: skip
+            faults = [
+                f"{self.rules.file}: every run is skipped; one at least is needed; take a "
+                "skip out of [runs]"
+            ]
         if faults:
             raise FormatError(faults)
         return header, with_starts(imported) if self.rules.run_column else imported
@@ -172,8 +174,9 @@ class _Import:
         table = read_table(self.files[place], self.rules.csv)
         changes = [note for note in table.notes if note.startswith("text = ")]
         self.notes += [f"{table.file}: {note}" for note in table.notes]
-        table, done = mended(table, self.rules.defects, clocks_of(self.rules, table),
-                             self.rules.run_column)  # fmt: skip
+        table, done = mended(
+            table, self.rules.defects, clocks_of(self.rules, table), self.rules.run_column
+        )
         self.notes += [f"{table.file}: {note}" for note in done]
         self.changes += [f"{Path(table.file).name}: {note}" for note in (*changes, *done)]
         pieces, findings = convert(table, self.rules, place)
@@ -212,8 +215,15 @@ class _Import:
                 f"{piece.source}: the times of the gages lie up to {1e3 * off:.3g} ms off an even "
                 f"clock of {header.rate:g} Hz; the campaign has the even clock"
             )
-        return Run(plan, piece.strain, header.rate, start, piece.trigger, piece.rig,
-                   piece.rig_time if piece.rig else None)  # fmt: skip
+        return Run(
+            plan,
+            piece.strain,
+            header.rate,
+            start,
+            piece.trigger,
+            piece.rig,
+            piece.rig_time if piece.rig else None,
+        )
 
 
 def _has_strain(piece: Piece) -> bool:
@@ -239,12 +249,14 @@ def _checked(
     problems = [_translated(p, sources, rules.file) for p in check_campaign(written)]
     errors = errors_of(problems)
     if errors:
-        raise FormatError([
-            f"{folder}: not written, for `tirelib campaign check` would find {len(errors)} "
-            "error(s); a sound campaign is needed; correct what follows, or leave a run out "
-            "with skip = true",
-            *map(str, errors),
-        ])  # fmt: skip
+        raise FormatError(
+            [
+                f"{folder}: not written, for `tirelib campaign check` would find {len(errors)} "
+                "error(s); a sound campaign is needed; correct what follows, or leave a run out "
+                "with skip = true",
+                *map(str, errors),
+            ]
+        )
     return problems
 
 

@@ -26,8 +26,22 @@ from tirelib.units import QUANTITIES, dimension_of, to_si
 POINTS = tuple(column.name for column in SET_POINTS)
 """Names of the set points, as in ``runs.csv``."""
 
-_TOP = ("format", "axes", "name", "kind", "run_column", "tire", "gages", "tolerance", "rig",
-        "channels", "set_points", "runs", "csv", *CHOICES)  # fmt: skip
+_TOP = (
+    "format",
+    "axes",
+    "name",
+    "kind",
+    "run_column",
+    "tire",
+    "gages",
+    "tolerance",
+    "rig",
+    "channels",
+    "set_points",
+    "runs",
+    "csv",
+    *CHOICES,
+)
 _CHANNEL = ("column", "unit", "factor", "sign", "offset", "override_unit")
 _NAMES = (*(name for name in QUANTITIES if name != "load"), GAGE_TIME, "temperature")
 
@@ -180,8 +194,12 @@ def parse_map(path: str | Path, name: str) -> tuple[ImportMap, list[Problem]]:
     if reader.document.get("format") != FORMAT:
         given = reader.document.get("format")
         said = "the key is missing" if given is None else f"{given!r} is an unknown version"
-        reader.fault("format", said, f"{FORMAT!r} is what this version of tirelib reads",
-                     "state it, or use the tirelib that knows it")  # fmt: skip
+        reader.fault(
+            "format",
+            said,
+            f"{FORMAT!r} is what this version of tirelib reads",
+            "state it, or use the tirelib that knows it",
+        )
     reader.known("", reader.document, _TOP)
     channels, wrong = _channels(reader)
     kind = _kind(reader, "kind", reader.text("", reader.document, "kind") or "sweep")
@@ -197,15 +215,20 @@ def parse_map(path: str | Path, name: str) -> tuple[ImportMap, list[Problem]]:
     sound = header is not None and not errors
     header = header or CampaignHeader("", "iso", TireGeometry("", math.nan))
     right = {quantity: rule for quantity, rule in channels.items() if quantity not in wrong}
-    rules = ImportMap(file, header, kind, run_column, right, set_points, runs, options, defects,
-                      warnings, sound)  # fmt: skip
+    rules = ImportMap(
+        file, header, kind, run_column, right, set_points, runs, options, defects, warnings, sound
+    )
     return rules, problems
 
 
 def _kind(reader: MapReader, where: str, kind: str) -> str:
     if kind and kind not in KINDS:
-        reader.fault(where, f"{kind!r} is given", f"{', '.join(KINDS)} are allowed",
-                     did_you_mean(kind, KINDS))  # fmt: skip
+        reader.fault(
+            where,
+            f"{kind!r} is given",
+            f"{', '.join(KINDS)} are allowed",
+            did_you_mean(kind, KINDS),
+        )
     return kind
 
 
@@ -213,9 +236,12 @@ def _defects(reader: MapReader) -> Defects:
     chosen = {key: reader.text("", reader.document, key) for key in CHOICES}
     for key, choice in chosen.items():
         if choice and choice not in CHOICES[key]:
-            reader.fault(key, f"{choice!r} is given",
-                         f"{', '.join(map(repr, CHOICES[key]))} is allowed",
-                         did_you_mean(choice, CHOICES[key]))  # fmt: skip
+            reader.fault(
+                key,
+                f"{choice!r} is given",
+                f"{', '.join(map(repr, CHOICES[key]))} is allowed",
+                did_you_mean(choice, CHOICES[key]),
+            )
     return Defects(**chosen)
 
 
@@ -223,29 +249,43 @@ def _channels(reader: MapReader) -> tuple[dict[str, ChannelRule], set[str]]:
     """Return the rules, and the quantities whose rule has a fault."""
     given = reader.table("channels")
     if not given:
-        reader.fault("[channels]", "no channel is mapped", "at least one quantity is needed",
-                     'write for instance Fz = { column = "FZ", unit = "N" }')  # fmt: skip
+        reader.fault(
+            "[channels]",
+            "no channel is mapped",
+            "at least one quantity is needed",
+            'write for instance Fz = { column = "FZ", unit = "N" }',
+        )
     rules: dict[str, ChannelRule] = {}
     wrong: set[str] = set()
     for quantity, entry in given.items():
         before = len(reader.problems)
         where = f"[channels] {quantity}"
         if not _is_quantity(quantity):
-            reader.fault(where, "the quantity is unknown",
-                         "names of quantities such as Fz, slip_angle, strain_1, ..._temperature "
-                         "are allowed", did_you_mean(quantity, _NAMES))  # fmt: skip
+            reader.fault(
+                where,
+                "the quantity is unknown",
+                "names of quantities such as Fz, slip_angle, strain_1, ..._temperature are allowed",
+                did_you_mean(quantity, _NAMES),
+            )
         elif not isinstance(entry, dict):
-            reader.fault(where, f"{entry!r} is given", "a table is needed",
-                         'write { column = "...", unit = "..." }')  # fmt: skip
+            reader.fault(
+                where,
+                f"{entry!r} is given",
+                "a table is needed",
+                'write { column = "...", unit = "..." }',
+            )
         else:
             rules[quantity] = _channel(reader, where, quantity, entry)
         wrong |= {quantity} if len(reader.problems) > before else set()
     used: dict[str, str] = {}
     for quantity, rule in rules.items():
         if rule.column and rule.column in used:
-            reader.fault(f"[channels] {quantity}",
-                         f"column {rule.column!r} is that of {used[rule.column]} already",
-                         "each column is one quantity", "correct one of them")  # fmt: skip
+            reader.fault(
+                f"[channels] {quantity}",
+                f"column {rule.column!r} is that of {used[rule.column]} already",
+                "each column is one quantity",
+                "correct one of them",
+            )
         used.setdefault(rule.column, quantity)
     return rules, wrong
 
@@ -264,19 +304,27 @@ def _channel(reader: MapReader, where: str, quantity: str, entry: Mapping[str, A
     column = reader.text(where, entry, "column")
     rate = reader.number(where, entry, "rate_hz", math.nan) if clock else math.nan
     if not column and not ("rate_hz" in entry and clock):
-        reader.fault(where, "no column is named", "column = a name in the files",
-                     "name it, or rate_hz for a clock without a column" if clock
-                     else "name it")  # fmt: skip
+        reader.fault(
+            where,
+            "no column is named",
+            "column = a name in the files",
+            "name it, or rate_hz for a clock without a column" if clock else "name it",
+        )
     if "rate_hz" in entry and clock and (column or not rate > 0.0):
-        reader.fault(where, f"rate_hz = {rate:g}" + (" beside a column" if column else ""),
-                     "a rate above 0 instead of a column", "give one of them")  # fmt: skip
+        reader.fault(
+            where,
+            f"rate_hz = {rate:g}" + (" beside a column" if column else ""),
+            "a rate above 0 instead of a column",
+            "give one of them",
+        )
     unit = reader.text(where, entry, "unit")
     factor = reader.number(where, entry, "factor", 1.0)
     turn = reader.number(where, entry, "sign", 1.0)
     offset = reader.number(where, entry, "offset", 0.0)
     if turn not in (1.0, -1.0):
-        reader.fault(f"{where} sign", f"{turn:g} is given", "1 and -1 are allowed",
-                     "use factor for a scale")  # fmt: skip
+        reader.fault(
+            f"{where} sign", f"{turn:g} is given", "1 and -1 are allowed", "use factor for a scale"
+        )
     if factor == 0.0:
         reader.fault(f"{where} factor", "0 is given", "any other number is allowed", "correct it")
     override = entry.get("override_unit", False)
@@ -320,11 +368,19 @@ def _set_points(reader: MapReader, channels: Mapping[str, ChannelRule]) -> dict[
             step = reader.number(where, entry, "mean_to", 1.0)
             measured = "Fz" if column.quantity == "load" else column.quantity
             if not step > 0.0:
-                reader.fault(f"{where} mean_to", f"{step:g} is given", "a step above 0",
-                             f"write {{ mean_to = 50 }}, say, in {column.unit}")  # fmt: skip
+                reader.fault(
+                    f"{where} mean_to",
+                    f"{step:g} is given",
+                    "a step above 0",
+                    f"write {{ mean_to = 50 }}, say, in {column.unit}",
+                )
             if measured not in channels:
-                reader.fault(where, f"the mean of {measured} is asked for",
-                             f"[channels] {measured} is needed for that", "map it")  # fmt: skip
+                reader.fault(
+                    where,
+                    f"the mean of {measured} is asked for",
+                    f"[channels] {measured} is needed for that",
+                    "map it",
+                )
             rules[column.name] = SetPointRule(mean_to=step)
         else:
             reader.known(where, entry, ("column", "unit"))
@@ -332,8 +388,12 @@ def _set_points(reader: MapReader, channels: Mapping[str, ChannelRule]) -> dict[
             _check_unit(reader, where, unit, column.dimension)
             name = reader.text(where, entry, "column")
             if not name:
-                reader.fault(where, "no column is named", "a number, { column, unit } or "
-                             "{ mean_to } is allowed", "name it")  # fmt: skip
+                reader.fault(
+                    where,
+                    "no column is named",
+                    "a number, { column, unit } or { mean_to } is allowed",
+                    "name it",
+                )
             rules[column.name] = SetPointRule(column=name, unit=unit)
     return rules
 
@@ -343,8 +403,12 @@ def _runs(reader: MapReader) -> dict[int, RunEntry]:
     for key, values in reader.table("runs").items():
         where = f"[runs.{key}]"
         if not key.isdecimal() or not isinstance(values, dict):
-            reader.fault(where, f"{key!r} with {values!r}"[:60], "a table for a run number",
-                         "write for instance [runs.18]")  # fmt: skip
+            reader.fault(
+                where,
+                f"{key!r} with {values!r}"[:60],
+                "a table for a run number",
+                "write for instance [runs.18]",
+            )
             continue
         kind = _kind(reader, f"{where} kind", reader.text(where, values, "kind"))
         points = {n: reader.number(where, values, n, math.nan) for n in POINTS if n in values}
@@ -356,9 +420,12 @@ def _runs(reader: MapReader) -> dict[int, RunEntry]:
             if isinstance(value, str | int | float) and name not in ("run", "file"):
                 extra[name] = value if isinstance(value, str) else float(value)
             else:
-                reader.fault(f"{where} {name}", f"{value!r} is given",
-                             "a further condition is a number or a text, and run and file are "
-                             "taken", "correct it")  # fmt: skip
+                reader.fault(
+                    f"{where} {name}",
+                    f"{value!r} is given",
+                    "a further condition is a number or a text, and run and file are taken",
+                    "correct it",
+                )
         skip = values.get("skip", False)
         if not isinstance(skip, bool):
             reader.fault(f"{where} skip", f"{skip!r} is given", "true or false", "correct it")

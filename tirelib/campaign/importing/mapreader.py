@@ -39,26 +39,41 @@ class MapReader:
         for key in keys:
             if key not in allowed:
                 place = f"{where} {key}".strip()
-                self.fault(place, "the key is unknown", f"{', '.join(allowed)} are allowed",
-                           did_you_mean(key, allowed))  # fmt: skip
+                self.fault(
+                    place,
+                    "the key is unknown",
+                    f"{', '.join(allowed)} are allowed",
+                    did_you_mean(key, allowed),
+                )
 
     def text(self, where: str, values: Mapping[str, Any], key: str) -> str:
         """Return a text, empty when it is missing."""
         value = values.get(key, "")
         if isinstance(value, str):
             return value
-        self.fault(f"{where} {key}".strip(), f"{value!r} is given", "a text is needed",
-                   "write it in quotes")  # fmt: skip
+        self.fault(
+            f"{where} {key}".strip(),
+            f"{value!r} is given",
+            "a text is needed",
+            "write it in quotes",
+        )
         return ""
 
     def number(self, where: str, values: Mapping[str, Any], key: str, default: float) -> float:
         """Return a finite number."""
         value = values.get(key, default)
-        if isinstance(value, int | float) and not isinstance(value, bool) and (
-            math.isfinite(value) or key not in values):  # fmt: skip
+        if (
+            isinstance(value, int | float)
+            and not isinstance(value, bool)
+            and (math.isfinite(value) or key not in values)
+        ):
             return float(value)
-        self.fault(f"{where} {key}".strip(), f"{value!r} is given", "a finite number is needed",
-                   "write it without quotes")  # fmt: skip
+        self.fault(
+            f"{where} {key}".strip(),
+            f"{value!r} is given",
+            "a finite number is needed",
+            "write it without quotes",
+        )
         return default
 
 
@@ -89,23 +104,40 @@ def read_csv_options(reader: MapReader) -> CsvOptions:
     separator = reader.text("[csv]", given, "separator") or None
     decimal = reader.text("[csv]", given, "decimal") or None
     if separator is not None and (len(separator) != 1 or separator in ".\"'\r\n"):
-        reader.fault("[csv] separator", f"{separator!r} is given", "one character, such as ';'",
-                     "write it as the file has it")  # fmt: skip
+        reader.fault(
+            "[csv] separator",
+            f"{separator!r} is given",
+            "one character, such as ';'",
+            "write it as the file has it",
+        )
     if decimal not in (None, ".", ",") or (decimal is not None and decimal == separator):
-        reader.fault("[csv] decimal", f"{decimal!r} is given",
-                     "'.' and ',' are allowed, other than the separator", "correct it")  # fmt: skip
+        reader.fault(
+            "[csv] decimal",
+            f"{decimal!r} is given",
+            "'.' and ',' are allowed, other than the separator",
+            "correct it",
+        )
     lines = []
     for key in ("names_line", "units_line"):
         value = given.get(key)
-        if value is not None and (not isinstance(value, int) or isinstance(value, bool)
-                                  or value < 1):  # fmt: skip
-            reader.fault(f"[csv] {key}", f"{value!r} is given", "a line number from 1 on",
-                         "count the lines of the file")  # fmt: skip
+        if value is not None and (
+            not isinstance(value, int) or isinstance(value, bool) or value < 1
+        ):
+            reader.fault(
+                f"[csv] {key}",
+                f"{value!r} is given",
+                "a line number from 1 on",
+                "count the lines of the file",
+            )
             value = None
         lines.append(value)
     if lines[1] is not None and lines[0] is None:
-        reader.fault("[csv] units_line", "names_line is missing beside it", "both are needed",
-                     "add names_line")  # fmt: skip
+        reader.fault(
+            "[csv] units_line",
+            "names_line is missing beside it",
+            "both are needed",
+            "add names_line",
+        )
     if len(reader.problems) > before:
         return CsvOptions()
     return CsvOptions(separator, decimal, lines[0], lines[1])

@@ -20,16 +20,44 @@ from tirelib.campaign.importing.mapreader import FORMAT
 from tirelib.units import QUANTITIES, dimension_of, dimensions_of_unit
 
 KNOWN_NAMES: Mapping[str, str] = {
-    "ET": "time", "V": "speed", "N": "omega", "SA": "slip_angle", "IA": "camber",
-    "RL": "loaded_radius", "RE": "effective_radius", "P": "pressure", "FX": "Fx", "FY": "Fy",
-    "FZ": "Fz", "MX": "Mx", "MY": "My", "MZ": "Mz", "SL": "slip_ratio",
-    "RST": "road_temperature", "TSTI": "tread_inner_temperature", "TSTC": "tread_temperature",
-    "TSTO": "tread_outer_temperature", "AMBTMP": "ambient_temperature",
-    "RUNTIME": "time", "FXW": "Fx", "FYW": "Fy", "FZW": "Fz", "MXW": "Mx", "MYW": "My",
-    "MZW": "Mz", "SLIPANGL": "slip_angle", "INCLANGL": "camber", "LONGSLIP": "slip_ratio",
-    "INFLPRES": "pressure", "WHROTSPD": "omega", "TRAJVELW": "speed", "TRAJVELH": "speed",
-    "DSTGRWHC": "loaded_radius", "T": "time", "TIMESTAMP": "time",
-}  # fmt: skip
+    "ET": "time",
+    "V": "speed",
+    "N": "omega",
+    "SA": "slip_angle",
+    "IA": "camber",
+    "RL": "loaded_radius",
+    "RE": "effective_radius",
+    "P": "pressure",
+    "FX": "Fx",
+    "FY": "Fy",
+    "FZ": "Fz",
+    "MX": "Mx",
+    "MY": "My",
+    "MZ": "Mz",
+    "SL": "slip_ratio",
+    "RST": "road_temperature",
+    "TSTI": "tread_inner_temperature",
+    "TSTC": "tread_temperature",
+    "TSTO": "tread_outer_temperature",
+    "AMBTMP": "ambient_temperature",
+    "RUNTIME": "time",
+    "FXW": "Fx",
+    "FYW": "Fy",
+    "FZW": "Fz",
+    "MXW": "Mx",
+    "MYW": "My",
+    "MZW": "Mz",
+    "SLIPANGL": "slip_angle",
+    "INCLANGL": "camber",
+    "LONGSLIP": "slip_ratio",
+    "INFLPRES": "pressure",
+    "WHROTSPD": "omega",
+    "TRAJVELW": "speed",
+    "TRAJVELH": "speed",
+    "DSTGRWHC": "loaded_radius",
+    "T": "time",
+    "TIMESTAMP": "time",
+}
 """Column names of the field, in capitals, and their quantities."""
 
 
@@ -146,10 +174,15 @@ def suggest_map(path: str | Path, options: CsvOptions | None = None) -> str:
     if strains:
         lines += ["[gages]", f"# lateral_m = [...]  # required: {len(strains)} positions", ""]
     lines.append("[channels]")
-    lines += [_channel_line(quantity, item) for quantity, item in known.items()
-              if strains or not is_gage(quantity)]  # fmt: skip
-    lines += [f"# {_quoted(item.name)}: {item.low:g} .. {item.high:g} {item.unit}".rstrip()
-              for item in others]  # fmt: skip
+    lines += [
+        _channel_line(quantity, item)
+        for quantity, item in known.items()
+        if strains or not is_gage(quantity)
+    ]
+    lines += [
+        f"# {_quoted(item.name)}: {item.low:g} .. {item.high:g} {item.unit}".rstrip()
+        for item in others
+    ]
     return "\n".join([*lines, ""])
 
 

@@ -142,9 +142,11 @@ def _blocks(lines: list[str], parsed: _Parsed) -> dict[str, list[tuple[int, str]
             current.append((number, line.rstrip()))
     if not blocks:
         parsed.fault(
-            0, "not a TYDEX file (no line begins with **)", "blocks such as **HEADER are needed",
+            0,
+            "not a TYDEX file (no line begins with **)",
+            "blocks such as **HEADER are needed",
             "name the file by its format, or export it again",
-        )  # fmt: skip
+        )
         return blocks
     for name in ("MEASURCHANNELS", "MEASURDATA"):
         if name not in blocks:
@@ -153,9 +155,11 @@ def _blocks(lines: list[str], parsed: _Parsed) -> dict[str, list[tuple[int, str]
             )
     if "END" not in blocks:
         parsed.fault(
-            0, "**END is missing: the file is truncated", "a complete file is needed",
+            0,
+            "**END is missing: the file is truncated",
+            "a complete file is needed",
             "copy it again",
-        )  # fmt: skip
+        )
     return blocks
 
 
@@ -169,8 +173,10 @@ def _channels(lines: list[tuple[int, str]], parsed: _Parsed) -> tuple[TydexChann
     channels: list[TydexChannel] = []
     for number, line in lines:
         cells = [line[start : start + _WIDTH].strip() for start in (50, 60, 70)]
-        values = [default if not cell else _number(cell)
-                  for cell, default in zip(cells, (1.0, 0.0, 0.0), strict=True)]  # fmt: skip
+        values = [
+            default if not cell else _number(cell)
+            for cell, default in zip(cells, (1.0, 0.0, 0.0), strict=True)
+        ]
         numbers = [value for value in values if value is not None]
         straddles = len(line) > 50 and not {" "} & {line[49], line[50]}
         if len(numbers) < 3 or not line[_NAME].strip() or "\t" in line or straddles:
@@ -286,8 +292,9 @@ def _line(entry: TydexEntry | TydexChannel) -> str:
 def _channel_line(channel: TydexChannel) -> str:
     numbers = (channel.factor, channel.recorded_offset, channel.physical_offset)
     if not all(map(math.isfinite, numbers)):
-        raise ParameterError(f"channel {channel.name} has {numbers}; finite numbers are needed; "
-                             "correct them")  # fmt: skip
+        raise ParameterError(
+            f"channel {channel.name} has {numbers}; finite numbers are needed; correct them"
+        )
     return _line(channel) + "".join(f"{_short(value):>10}" for value in numbers)
 
 
@@ -308,5 +315,7 @@ def _short(value: float) -> str:
         for text in (plain, f"{mantissa}e{int(exponent)}"):
             if len(text) <= _WIDTH - 1:
                 return text
-    raise ParameterError(f"{value!r} does not fit in 9 characters; smaller numbers are needed; "
-                         "use the factor of the channel")  # fmt: skip
+    raise ParameterError(
+        f"{value!r} does not fit in 9 characters; smaller numbers are needed; "
+        "use the factor of the channel"
+    )

@@ -228,10 +228,17 @@ def assess_forces(
     progress : callable, optional
     """
     found = diagnose_force(
-        case.problem, case.model.values, catalogue, noise=case.noise, repeats=case.repeats,
-        effects=case.effects, strengths=case.strengths, members=members, seed=seed,
+        case.problem,
+        case.model.values,
+        catalogue,
+        noise=case.noise,
+        repeats=case.repeats,
+        effects=case.effects,
+        strengths=case.strengths,
+        members=members,
+        seed=seed,
         progress=progress,
-    )  # fmt: skip
+    )
     messages = list(case.messages)
     verdict, named, findings = found.verdict, found.named, found.findings
     share = found.final.error / float(np.sqrt(np.mean(case.problem.measured**2)))

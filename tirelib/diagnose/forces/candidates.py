@@ -22,12 +22,23 @@ LEAST_SIGNAL = 3.0
 """An effect at the end of its range that changes scaled forces by less is dead."""
 LEAST_OWN = 0.02
 """Share of a signature that the base must not be able to mimic."""
-SPANS = {"load": 0.1, "pressure": 0.03, "speed": 0.1, "slip_angle": np.deg2rad(1.0),
-         "slip_ratio": 0.01, "camber": np.deg2rad(0.5), "temperature": 5.0}  # fmt: skip
+SPANS = {
+    "load": 0.1,
+    "pressure": 0.03,
+    "speed": 0.1,
+    "slip_angle": np.deg2rad(1.0),
+    "slip_ratio": 0.01,
+    "camber": np.deg2rad(0.5),
+    "temperature": 5.0,
+}
 """Least range of a condition: relative for load, pressure and speed, else [rad], [-], [K]."""
 _RELATIVE = ("load", "pressure", "speed")
-_WORDS = {"slip_angle": "slip angle", "slip_ratio": "slip ratio",
-          "temperature": "tread temperature", "slip_rate": "rate of the slip angle"}  # fmt: skip
+_WORDS = {
+    "slip_angle": "slip angle",
+    "slip_ratio": "slip ratio",
+    "temperature": "tread temperature",
+    "slip_rate": "rate of the slip angle",
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

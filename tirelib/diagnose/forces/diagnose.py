@@ -135,9 +135,14 @@ def diagnose_force(
     ranking = ForceRanking(problem, base, first)
     scores = ranking.scores(problem.measured - base.predicted)
     ensemble = force_ensemble(
-        problem, base, ranking, noise=noise if np.isfinite(noise) else 0.0, members=members,
-        seed=seed, progress=progress,
-    )  # fmt: skip
+        problem,
+        base,
+        ranking,
+        noise=noise if np.isfinite(noise) else 0.0,
+        members=members,
+        seed=seed,
+        progress=progress,
+    )
     limits = dict(zip(first.names, ensemble.threshold, strict=True))
     search = Search(problem, catalogue, limits, base, first, scores)
     while search.rounds < ROUNDS and search.round(tell):
@@ -146,8 +151,11 @@ def diagnose_force(
     folds = force_folds(problem)
     tell("held-out points")
     held_before = errors_of(problem, base, folds)
-    alone = {name: _alone(problem, base, search.effect(name), folds) for name in first.names
-             if name in search.named or search.alarmed(name)}  # fmt: skip
+    alone = {
+        name: _alone(problem, base, search.effect(name), folds)
+        for name in first.names
+        if name in search.named or search.alarmed(name)
+    }
     doubts = _doubts(problem, search, first, scores)
     named, verdict = (
         _by_gain(search.named, alone, folds),
@@ -165,10 +173,25 @@ def diagnose_force(
     held_final = errors_of(problem, final, folds) if search.named else held_before
     findings = _findings(problem, base, search, scores, first, ensemble, named, alone, folds)
     return ForceDiagnosis(
-        problem, noise, repeats, verdict, tuple(named), findings, first.dead, base, final,
-        force_floor(problem, final if named else base, ensemble.rests, noise), search.now.after,
-        float(ensemble.after.max()), folds, held_before, held_final, steps, search.rounds, doubts,
-    )  # fmt: skip
+        problem,
+        noise,
+        repeats,
+        verdict,
+        tuple(named),
+        findings,
+        first.dead,
+        base,
+        final,
+        force_floor(problem, final if named else base, ensemble.rests, noise),
+        search.now.after,
+        float(ensemble.after.max()),
+        folds,
+        held_before,
+        held_final,
+        steps,
+        search.rounds,
+        doubts,
+    )
 
 
 def _alone(
@@ -267,12 +290,20 @@ def _findings(
             error = _to_first_order(candidate.effect, candidate.own, problem, base)
         rows.append(
             ForceFinding(
-                candidate.effect, float(scores.score[i]), float(limits[name]), level, strength,
-                std, bool(inside[i]) or name in named, float(scores.share[i]),
-                tuple(found.twins(i)), _power(candidate.signal, ensemble, i, problem), error,
+                candidate.effect,
+                float(scores.score[i]),
+                float(limits[name]),
+                level,
+                strength,
+                std,
+                bool(inside[i]) or name in named,
+                float(scores.share[i]),
+                tuple(found.twins(i)),
+                _power(candidate.signal, ensemble, i, problem),
+                error,
                 held or (float("nan"),) * len(folds),
             )
-        )  # fmt: skip
+        )
     order = {name: k for k, name in enumerate(named)}
     rows.sort(key=lambda f: (order.get(f.effect.name, len(order)), -f.score / f.threshold))
     return tuple(rows)

@@ -12,9 +12,13 @@ from tirelib.diagnose.forces.held_out import BLOCK, ForceFold, pooled
 from tirelib.units import from_si
 
 FORMAT = "tirelib-diagnosis/1"
-CONDITION_UNITS = {"load": ("N", "force"), "pressure": ("bar", "pressure"),
-                   "camber": ("deg", "angle"), "temperature": ("degC", "temperature"),
-                   "speed": ("km/h", "speed")}  # fmt: skip
+CONDITION_UNITS = {
+    "load": ("N", "force"),
+    "pressure": ("bar", "pressure"),
+    "camber": ("deg", "angle"),
+    "temperature": ("degC", "temperature"),
+    "speed": ("km/h", "speed"),
+}
 
 
 def force_diagnosis_document(told: ForceAssessment) -> dict[str, Any]:
@@ -71,9 +75,14 @@ def fold_entry(fold: ForceFold, before: float, after: float) -> dict[str, Any]:
     """Return a left-out part with its errors as they are told."""
     value, unit = fold_value(fold)
     return {
-        "condition": fold.name, "value": value, "unit": unit, "points": int(fold.out.sum()),
-        "counted": fold.main, "error_before": before, "error_after": after,
-    }  # fmt: skip
+        "condition": fold.name,
+        "value": value,
+        "unit": unit,
+        "points": int(fold.out.sum()),
+        "counted": fold.main,
+        "error_before": before,
+        "error_after": after,
+    }
 
 
 def fold_value(fold: ForceFold) -> tuple[float, str]:

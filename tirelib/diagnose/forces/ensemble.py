@@ -112,9 +112,11 @@ def force_ensemble(
             progress(f"variant {len(scores)}")
     n = len(ranking.found.living)
     return ForceEnsemble(
-        np.array(scores).reshape(len(scores), n), np.array(after), np.array(before),
+        np.array(scores).reshape(len(scores), n),
+        np.array(after),
+        np.array(before),
         np.array(rests).reshape(len(rests), len(problem)),
-    )  # fmt: skip
+    )
 
 
 def variant(

@@ -15,9 +15,15 @@ from tirelib.identify.brush_law import SPECS
 COORDINATES: Mapping[str, tuple[str, ...]] = {
     "Fy": ("lateral_stiffness", "friction", "load_power", "slip_angle_offset", "Fy_offset"),
     "Fx": ("longitudinal_stiffness", "friction", "load_power", "slip_ratio_offset", "Fx_offset"),
-    "Mz": ("lateral_stiffness", "friction", "half_length", "load_power", "slip_angle_offset",
-           "Mz_offset"),
-}  # fmt: skip
+    "Mz": (
+        "lateral_stiffness",
+        "friction",
+        "half_length",
+        "load_power",
+        "slip_angle_offset",
+        "Mz_offset",
+    ),
+}
 """Parameters that are fitted anew with each force; the others stay as the model has them."""
 OF_CONTACT = ("half_length", "load_power")
 """Parameters that have no part where a ring gives the contact's length."""
@@ -71,9 +77,12 @@ class Problem:
     def take(self, chosen: IntArray | BoolArray) -> "Problem":
         """Return the problem of some of the points, with the same scale."""
         return Problem(
-            self.bench.take(chosen), self.quantity, self.measured[chosen], self.scale,
+            self.bench.take(chosen),
+            self.quantity,
+            self.measured[chosen],
+            self.scale,
             self.block[chosen],
-        )  # fmt: skip
+        )
 
     def but(self, measured: FloatArray) -> "Problem":
         """Return the problem with another measurement."""
@@ -219,9 +228,15 @@ def fit_force(
         return np.concatenate([slopes(z).T / problem.scale, np.eye(z.size) / WIDTH])
 
     found = least_squares(
-        residual, start, jacobian, bounds=(low, high), xtol=1e-8, ftol=1e-9, gtol=1e-9,
+        residual,
+        start,
+        jacobian,
+        bounds=(low, high),
+        xtol=1e-8,
+        ftol=1e-9,
+        gtol=1e-9,
         max_nfev=MOST,
-    )  # fmt: skip
+    )
     if found.status == 0:
         raise ConvergenceError(
             f"brush with {', '.join(e.name for e in chosen) or 'no effect'}: the fit does not "
@@ -234,10 +249,15 @@ def fit_force(
     here, rows = predicted(z), slopes(z)
     rest = problem.measured - here
     return ForceFit(
-        moved(values, names, z[: len(names)]), chosen, split(z), here, rows,
+        moved(values, names, z[: len(names)]),
+        chosen,
+        split(z),
+        here,
+        rows,
         _covariance(rows / problem.scale, rest / problem.scale, problem.block),
-        float(np.sqrt(np.mean(rest**2))), names,
-    )  # fmt: skip
+        float(np.sqrt(np.mean(rest**2))),
+        names,
+    )
 
 
 def with_effect(problem: Problem, model: ForceFit, effect: Effect) -> ForceFit:

@@ -12,8 +12,11 @@ from tirelib.model.brush import BrushConditions
 
 FLAT = 0.2
 """Power of a condition below which the residual is said not to change with it."""
-BANDS = ((0.0, 1.0, "where most of the contact sticks"), (1.0, 3.0, "where sticking gives way"),
-         (3.0, np.inf, "where all of the contact slides"))  # fmt: skip
+BANDS = (
+    (0.0, 1.0, "where most of the contact sticks"),
+    (1.0, 3.0, "where sticking gives way"),
+    (3.0, np.inf, "where all of the contact slides"),
+)
 """Bands of C slip / (mu Fz): 3 is the slip from which all slides."""
 GUESS_GAIN = 0.1
 """Share of the left squares that a guessed law has to take away on held-out points."""
@@ -66,8 +69,10 @@ def left_of(problem: Problem, model: ForceFit) -> ForceLeft:
         residual,
         f"{first} ({100 * shares[first]:.0f} % of the squares)",
         " and ".join(moves) or "has the same size at all loads, pressures and speeds",
-        shares, powers, _guess(problem, model, residual),
-    )  # fmt: skip
+        shares,
+        powers,
+        _guess(problem, model, residual),
+    )
 
 
 def _slip(problem: Problem, model: ForceFit) -> FloatArray:
@@ -101,8 +106,12 @@ def _guess(problem: Problem, model: ForceFit, residual: FloatArray) -> str | Non
         return None
     at, x = problem.bench.conditions, _slip(problem, model)
     soft = x / (1.0 + np.abs(x))
-    slips = {"slip / (1 + |slip|)": soft, "slip |slip| / (1 + slip^2)": x * np.abs(x) / (1 + x**2),
-             "slip exp(-|slip|)": x * np.exp(-np.abs(x)), "1": np.ones_like(x)}  # fmt: skip
+    slips = {
+        "slip / (1 + |slip|)": soft,
+        "slip |slip| / (1 + slip^2)": x * np.abs(x) / (1 + x**2),
+        "slip exp(-|slip|)": x * np.exp(-np.abs(x)),
+        "1": np.ones_like(x),
+    }
     factors = {"1": np.ones_like(x), "order": at.order - 0.5}
     for name in ("load", "pressure", "speed"):
         if varies(at, name):

@@ -96,9 +96,14 @@ class ForceRanking:
             free = (own > self.low[slot] + _NEAR) & (own < self.high[slot] - _NEAR)
             inside.append(bool((free | (np.abs(own) <= _NEAR)).all()))
         return ForceScores(
-            np.array(score), np.array(share), tuple(strength), tuple(std),
-            np.array(inside, dtype=bool), float(np.sqrt(whole / n)), float(rms),
-        )  # fmt: skip
+            np.array(score),
+            np.array(share),
+            tuple(strength),
+            tuple(std),
+            np.array(inside, dtype=bool),
+            float(np.sqrt(whole / n)),
+            float(rms),
+        )
 
     def _fit(self, slope: FloatArray, whole: float, keep: BoolArray) -> tuple[FloatArray, float]:
         """Return weights within their bounds and the squares with ridge that they leave."""

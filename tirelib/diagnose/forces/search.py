@@ -67,9 +67,11 @@ class Search:
             start = inside(effect, self.now.strength[int(index)])
             try:
                 trial = fit_force(
-                    self.problem, self.model.values, [*self.model.effects, effect],
+                    self.problem,
+                    self.model.values,
+                    [*self.model.effects, effect],
                     [*self.model.strengths, start],
-                )  # fmt: skip
+                )
             except TirelibError:
                 continue
             if trial.error <= HELPS * self.model.error and self._beyond_law(effect.name, trial):
@@ -97,9 +99,11 @@ class Search:
         index = [effect.name for effect in self.model.effects].index(name)
         rest = [k for k in range(len(self.model.effects)) if k != index]
         return index, fit_force(
-            self.problem, self.model.values, [self.model.effects[k] for k in rest],
+            self.problem,
+            self.model.values,
+            [self.model.effects[k] for k in rest],
             [self.model.strengths[k] for k in rest],
-        )  # fmt: skip
+        )
 
     def take_out(self, name: str) -> None:
         """Take a named effect out of the model; what is left after the joint fit stays."""

@@ -50,9 +50,16 @@ def coordinates(
     total = by.hypot(u, w) + 1e-12
     bent = friction * by.tanh(total / friction) / total
     found = (
-        by.sqrt(load / LOAD), camber / 0.1, speed / SPEED, pressure / PRESSURE, u * bent, w * bent,
-        along / 0.1, alpha / 0.1, *rest,
-    )  # fmt: skip
+        by.sqrt(load / LOAD),
+        camber / 0.1,
+        speed / SPEED,
+        pressure / PRESSURE,
+        u * bent,
+        w * bent,
+        along / 0.1,
+        alpha / 0.1,
+        *rest,
+    )
     return [scale * value for scale, value in zip(scales, found, strict=True)]
 
 

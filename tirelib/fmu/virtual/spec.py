@@ -85,9 +85,7 @@ def virtual_tire(surface: str | Path, samples_per_step: int, sample_rate: float)
             "the gages"
         )
     known = read_surface(Path(surface))
-    table = [
-        *parameters(sample_rate), *inputs(known), *outputs(known, samples_per_step)
-    ]  # fmt: skip
+    table = [*parameters(sample_rate), *inputs(known), *outputs(known, samples_per_step)]
     reference = virtual_reference(known, sample_rate, samples_per_step)
     return SlaveSpec(
         model=MODEL,
@@ -163,9 +161,15 @@ def _page(surface: Surface, table: list[Any], samples: int, rate: float) -> str:
     return page(MODEL, lead, facts, table, sections)
 
 
-_SHOWN = {"Fz": (1e-3, "kN"), "alpha": (180.0 / math.pi, "deg"), "kappa": (100.0, "%"),
-          "camber": (180.0 / math.pi, "deg"), "speed": (3.6, "km/h"),
-          "pressure": (1e-5, "bar"), "friction": (1.0, "")}  # fmt: skip
+_SHOWN = {
+    "Fz": (1e-3, "kN"),
+    "alpha": (180.0 / math.pi, "deg"),
+    "kappa": (100.0, "%"),
+    "camber": (180.0 / math.pi, "deg"),
+    "speed": (3.6, "km/h"),
+    "pressure": (1e-5, "bar"),
+    "friction": (1.0, ""),
+}
 
 
 def _ranges(surface: Surface) -> str:
@@ -183,14 +187,21 @@ def _ranges(surface: Surface) -> str:
 def _errors(about: Mapping[str, Any]) -> str:
     rows = [
         (
-            name, f"{part['points']}", f"{part['strain_ustrain_rms']:.0f}",
+            name,
+            f"{part['points']}",
+            f"{part['strain_ustrain_rms']:.0f}",
             f"{part['strain_ustrain_median_of_largest']:.0f}",
             f"{part['strain_ustrain_largest']:.0f}",
         )
         for name, part in about.get("left_out", {}).items()
-    ]  # fmt: skip
-    head = ("part of the range", "points", "rms [ustrain]", "largest of a waveform, median",
-            "largest of all")  # fmt: skip
+    ]
+    head = (
+        "part of the range",
+        "points",
+        "rms [ustrain]",
+        "largest of a waveform, median",
+        "largest of all",
+    )
     spread = float(about.get("strain_spread_ustrain", math.nan))
     return (
         f"{html_table(head, rows)}\n<p>Against {about.get('solutions', 0)} solutions of the "

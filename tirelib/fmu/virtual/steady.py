@@ -39,9 +39,17 @@ class SteadyRun:
     """
 
     def __init__(
-        self, find: Callable[[FloatArray, int], FloatArray], inputs: list[float], omega: float,
-        rate: float, *, angle: float, due: float, count: int, time: float = 0.0,
-    ) -> None:  # fmt: skip
+        self,
+        find: Callable[[FloatArray, int], FloatArray],
+        inputs: list[float],
+        omega: float,
+        rate: float,
+        *,
+        angle: float,
+        due: float,
+        count: int,
+        time: float = 0.0,
+    ) -> None:
         self._find, self.inputs = find, inputs
         self._omega, self._rate = omega, rate
         self._angle, self._due, self._first, self.time = angle, due, count, time

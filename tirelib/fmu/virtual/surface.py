@@ -27,7 +27,7 @@ from tirelib.fmu.virtual.coordinates import (
     PRESSURE,
     SPEED,
     coordinates,
-)  # fmt: skip
+)
 from tirelib.fmu.virtual.waveform import Waveforms
 from tirelib.threads import one_thread
 
@@ -94,10 +94,14 @@ class Surface:
     def _interpolator(self) -> RBFInterpolator:
         n = len(self.points)
         mirror = self.edges[:, :, ::-1]
-        values = np.concatenate((
-            np.hstack((self.even, self.odd, self.edges.reshape(n, -1), self.forces)),
-            np.hstack((self.even, -self.odd, mirror.reshape(n, -1), self.forces * _FORCE_MIRROR)),
-        ))  # fmt: skip
+        values = np.concatenate(
+            (
+                np.hstack((self.even, self.odd, self.edges.reshape(n, -1), self.forces)),
+                np.hstack(
+                    (self.even, -self.odd, mirror.reshape(n, -1), self.forces * _FORCE_MIRROR)
+                ),
+            )
+        )
         places = self._places(np.concatenate((self.points, mirrored(self.points))))
         return RBFInterpolator(places, values, kernel=KERNEL, degree=DEGREE)
 
@@ -125,10 +129,13 @@ class Surface:
 
     def outside(self, inputs: Sequence[float] | FloatArray) -> tuple[str, ...]:
         """Return the names of the inputs that are out of range, or no numbers."""
-        return tuple([
-            name for (name, low, high), value in zip(self._limits, inputs, strict=True)
-            if not low <= value <= high
-        ])  # fmt: skip
+        return tuple(
+            [
+                name
+                for (name, low, high), value in zip(self._limits, inputs, strict=True)
+                if not low <= value <= high
+            ]
+        )
 
     def answers(self, inputs: FloatArray) -> FloatArray:
         """Return scores, edges and forces of conditions, shape (n, i), in one table with n rows.

@@ -44,9 +44,13 @@ class Waveforms:
         return np.asarray(self._spline[:, :, :-1] @ scores + self._spline[:, :, -1])
 
     def many(
-        self, scores: FloatArray, squares: FloatArray, middles: FloatArray, angle: FloatArray,
+        self,
+        scores: FloatArray,
+        squares: FloatArray,
+        middles: FloatArray,
+        angle: FloatArray,
         mixed: FloatArray | None = None,
-    ) -> FloatArray:  # fmt: skip
+    ) -> FloatArray:
         """Return strain, shape (n, g).
 
         Parameters

@@ -183,9 +183,7 @@ class VirtualWheel:
         found = speed * (1.0 + given[_KAPPA]) / self._radius
         return found if math.isfinite(found) else self._omega
 
-    def _lag_outside(
-        self, given: list[float], settled: bool, *times: float
-    ) -> tuple[str, ...]:  # fmt: skip
+    def _lag_outside(self, given: list[float], settled: bool, *times: float) -> tuple[str, ...]:
         """Return which of the relaxed inputs are still out of range; the ends of a step tell."""
         names: tuple[str, ...] = ()
         if settled:
@@ -267,9 +265,13 @@ class VirtualWheel:
         """Return the values of the Real outputs and of the others, in the table's order."""
         slip = self._slip.slip or [math.nan] * 2
         reals = [
-            *self._frame.ravel().tolist(), self._omega, self._angle, *slip, *self._force,
+            *self._frame.ravel().tolist(),
+            self._omega,
+            self._angle,
+            *slip,
+            *self._force,
             self._radius,
-        ]  # fmt: skip
+        ]
         return reals, (self._new, self._valid, self._omega != 0.0, self._status)
 
     def state(self) -> dict[str, Any]:

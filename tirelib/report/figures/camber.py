@@ -30,9 +30,13 @@ def figure_4_16(means: Means) -> Figure:
             rows = rows[np.argsort(means.slip_angle[rows])]
             for line, values in enumerate((means.contact_length, means.cp1)):
                 grid[line, column].plot(
-                    means.slip_angle[rows], values[rows, gage], marker=MARKERS[i % 10],
-                    color=CAMBERS[i % len(CAMBERS)], markersize=4.5, label=level.text,
-                )  # fmt: skip
+                    means.slip_angle[rows],
+                    values[rows, gage],
+                    marker=MARKERS[i % 10],
+                    color=CAMBERS[i % len(CAMBERS)],
+                    markersize=4.5,
+                    label=level.text,
+                )
         grid[1, column].set_xlabel(label("slip angle", "deg", signed=True))
     grid[0, 0].set_ylabel(label("contact length", "mm"))
     grid[1, 0].set_ylabel(label("CP1", "microstrain"))

@@ -15,10 +15,13 @@ from tirelib.report.figures.compare_plot import DIVERGING, Plot, limit_of, style
 from tirelib.report.figures.compare_trends import SYMBOLS
 from tirelib.report.style import BLUE, CATEGORIES, FAINT, RED
 
-_OVER = (("slip_angle", "slip angle [deg] (ISO 8855)", np.rad2deg(1.0)),
-         ("slip_ratio", "slip ratio [-] (ISO 8855)", 1.0),
-         ("camber", "camber [deg] (ISO 8855)", np.rad2deg(1.0)), ("load", "load [N]", 1.0),
-         ("pressure", "inflation pressure [bar]", 1e-5))  # fmt: skip
+_OVER = (
+    ("slip_angle", "slip angle [deg] (ISO 8855)", np.rad2deg(1.0)),
+    ("slip_ratio", "slip ratio [-] (ISO 8855)", 1.0),
+    ("camber", "camber [deg] (ISO 8855)", np.rad2deg(1.0)),
+    ("load", "load [N]", 1.0),
+    ("pressure", "inflation pressure [bar]", 1e-5),
+)
 
 
 def force_plots(found: ForceComparison) -> list[Plot]:
@@ -68,23 +71,35 @@ def _map(found: ForceComparison) -> Plot:
     labels = [told("load", 50.0 * round(float(v) / 50.0)) for v in y]
     figure = go.Figure(
         go.Heatmap(
-            z=np.round(z, 3), x=np.round(scale * x, 4), y=list(range(y.size)), zmin=-limit,
-            zmax=limit, colorscale=DIVERGING, hoverongaps=False,
+            z=np.round(z, 3),
+            x=np.round(scale * x, 4),
+            y=list(range(y.size)),
+            zmin=-limit,
+            zmax=limit,
+            colorscale=DIVERGING,
+            hoverongaps=False,
             hovertemplate="%{x:.3g}: %{z:.3g} " + unit + "<extra></extra>",
             colorbar={"title": {"text": f"model less<br>measured<br>[{unit}]"}},
         )
-    )  # fmt: skip
+    )
     figure.update_xaxes(title=label)
-    figure.update_yaxes(title={"text": "load", "standoff": 12}, tickvals=list(range(y.size)),
-                        ticktext=labels, showgrid=False)  # fmt: skip
+    figure.update_yaxes(
+        title={"text": "load", "standoff": 12},
+        tickvals=list(range(y.size)),
+        ticktext=labels,
+        showgrid=False,
+    )
     styled_figure(figure, 220 + 34 * y.size)
     rows = [[round(scale * float(x[j]), 5), *np.round(z[:, j], 4).tolist()] for j in range(x.size)]
     return Plot(
-        "force-map", f"{found.quantity}: model less measured over {label.split(' [')[0]} and load",
+        "force-map",
+        f"{found.quantity}: model less measured over {label.split(' [')[0]} and load",
         "Mean over the points of a bin. Red: the model is above the measurement with its sign; "
-        "blue: below.", figure,
-        [label, *(f"load {text}: [{unit}]" for text in labels)], rows,
-    )  # fmt: skip
+        "blue: below.",
+        figure,
+        [label, *(f"load {text}: [{unit}]" for text in labels)],
+        rows,
+    )
 
 
 def curve_plots(found: ForceComparison, curves: tuple[Curve, ...]) -> list[Plot]:
@@ -98,18 +113,47 @@ def _curve(found: ForceComparison, curve: Curve, place: str) -> Plot:
     k = curve.member
     x = scale * getattr(found.data, name)[k]
     measured, model, rest = found.measured[k], found.predicted[k], found.difference[k]
-    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, row_heights=[0.66, 0.34],
-                           vertical_spacing=0.07)  # fmt: skip
-    figure.add_scatter(x=x, y=measured, mode="markers", name="measured",
-                       marker={"color": BLUE, "size": 6}, row=1, col=1)  # fmt: skip
-    figure.add_scatter(x=x, y=model, mode="markers", name="model",
-                       marker={"color": RED, "size": 6, "symbol": "x"}, row=1, col=1)  # fmt: skip
-    figure.add_scatter(x=x, y=rest, mode="markers", name="model less measured",
-                       marker={"color": "#1c2530", "size": 5}, row=2, col=1)  # fmt: skip
+    figure = make_subplots(
+        rows=2, cols=1, shared_xaxes=True, row_heights=[0.66, 0.34], vertical_spacing=0.07
+    )
+    figure.add_scatter(
+        x=x,
+        y=measured,
+        mode="markers",
+        name="measured",
+        marker={"color": BLUE, "size": 6},
+        row=1,
+        col=1,
+    )
+    figure.add_scatter(
+        x=x,
+        y=model,
+        mode="markers",
+        name="model",
+        marker={"color": RED, "size": 6, "symbol": "x"},
+        row=1,
+        col=1,
+    )
+    figure.add_scatter(
+        x=x,
+        y=rest,
+        mode="markers",
+        name="model less measured",
+        marker={"color": "#1c2530", "size": 5},
+        row=2,
+        col=1,
+    )
     figure.add_hline(y=0.0, line={"color": FAINT, "width": 1}, row=2, col=1)
     if np.isfinite(found.noise):
-        figure.add_hrect(y0=-1.96 * found.noise, y1=1.96 * found.noise, line_width=0,
-                         fillcolor=FAINT, opacity=0.3, row=2, col=1)  # fmt: skip
+        figure.add_hrect(
+            y0=-1.96 * found.noise,
+            y1=1.96 * found.noise,
+            line_width=0,
+            fillcolor=FAINT,
+            opacity=0.3,
+            row=2,
+            col=1,
+        )
     figure.update_xaxes(title=label, row=2, col=1)
     figure.update_yaxes(title=_label(found), row=1, col=1)
     figure.update_yaxes(title=f"difference<br>[{unit}]", row=2, col=1)
@@ -117,11 +161,14 @@ def _curve(found: ForceComparison, curve: Curve, place: str) -> Plot:
     noise = f", {curve.rms / found.noise:.1f} noise" if np.isfinite(found.noise) else ""
     rows = np.round(np.stack([x, measured, model, rest], axis=1), 5).tolist()
     return Plot(
-        f"force-{place}", f"{place.capitalize()} curve: {curve.words}",
+        f"force-{place}",
+        f"{place.capitalize()} curve: {curve.words}",
         f"Difference {curve.rms:.3g} {unit} rms{noise}, {curve.points} points. The model is "
-        "computed at the conditions of each point. Grey: 95 % of the noise.", figure,
-        [label, f"measured [{unit}]", f"model [{unit}]", f"model less measured [{unit}]"], rows,
-    )  # fmt: skip
+        "computed at the conditions of each point. Grey: 95 % of the noise.",
+        figure,
+        [label, f"measured [{unit}]", f"model [{unit}]", f"model less measured [{unit}]"],
+        rows,
+    )
 
 
 def force_trends(found: ForceComparison) -> list[Plot]:
@@ -150,23 +197,31 @@ def _trend(found: ForceComparison, name: str, label: str, scale: float) -> Plot:
     figure.add_scatter(
         x=np.concatenate([x[known], x[known][::-1]]),
         y=np.concatenate([(centre + half)[known], (centre - half)[known][::-1]]),
-        fill="toself", mode="lines", fillcolor="rgba(0,114,178,0.22)", line={"width": 0},
-        hoverinfo="skip", name="95 % confidence",
-    )  # fmt: skip
-    figure.add_scatter(x=x, y=centre, mode="lines+markers", line={"color": BLUE},
-                       name="mean over the points")  # fmt: skip
+        fill="toself",
+        mode="lines",
+        fillcolor="rgba(0,114,178,0.22)",
+        line={"width": 0},
+        hoverinfo="skip",
+        name="95 % confidence",
+    )
+    figure.add_scatter(
+        x=x, y=centre, mode="lines+markers", line={"color": BLUE}, name="mean over the points"
+    )
     figure.add_hline(y=0.0, line={"color": FAINT, "width": 1})
     figure.update_xaxes(title=label)
     figure.update_yaxes(title=f"{what} [{unit}]")
     styled_figure(figure, 380, legend={"orientation": "h", "y": 1.12, "x": 0.0})
     rows = np.round(np.stack([x, count, centre, half], axis=1), 5).tolist()
     return Plot(
-        f"force-trend-{name.replace('_', '-')}", f"Mean difference by {label.split(' [')[0]}",
+        f"force-trend-{name.replace('_', '-')}",
+        f"Mean difference by {label.split(' [')[0]}",
         ("" if own else "Of the sizes, since both signs of the slip are in it. ")
         + "The band is the 95 % confidence interval of the bin's mean, from the scatter of its "
-        "points over the other conditions; bins of one point have none.", figure,
-        [label, "points", f"{what} [{unit}]", f"95 % half-width [{unit}]"], rows,
-    )  # fmt: skip
+        "points over the other conditions; bins of one point have none.",
+        figure,
+        [label, "points", f"{what} [{unit}]", f"95 % half-width [{unit}]"],
+        rows,
+    )
 
 
 def _over_slip(found: ForceComparison) -> Plot:
@@ -179,27 +234,49 @@ def _over_slip(found: ForceComparison) -> Plot:
         member = member[np.argsort(x[member])]
         color = CATEGORIES[k % len(CATEGORIES)]
         load = f"{found.data.load[member].mean():,.0f} N"
-        figure.add_scatter(x=x[member], y=found.measured[member], mode="markers",
-                           name=f"measured, {load}", marker={"color": color, "size": 7,
-                           "symbol": SYMBOLS[k % len(SYMBOLS)]})  # fmt: skip
-        figure.add_scatter(x=x[member], y=found.predicted[member], mode="lines",
-                           name=f"model, {load}",
-                           line={"color": color, "dash": "dash"})  # fmt: skip
+        figure.add_scatter(
+            x=x[member],
+            y=found.measured[member],
+            mode="markers",
+            name=f"measured, {load}",
+            marker={"color": color, "size": 7, "symbol": SYMBOLS[k % len(SYMBOLS)]},
+        )
+        figure.add_scatter(
+            x=x[member],
+            y=found.predicted[member],
+            mode="lines",
+            name=f"model, {load}",
+            line={"color": color, "dash": "dash"},
+        )
     figure.update_xaxes(title=label)
     figure.update_yaxes(title=_label(found))
     styled_figure(figure, 480, legend={"x": 1.02, "y": 1.0})
     rows = _rows(found)
-    return Plot("force-slip", f"{found.quantity} over {label.split(' [')[0]}",
-                "Points are means over a cell of conditions; lines join the model's points at the "
-                "same load.", figure, *rows)  # fmt: skip
+    return Plot(
+        "force-slip",
+        f"{found.quantity} over {label.split(' [')[0]}",
+        "Points are means over a cell of conditions; lines join the model's points at the "
+        "same load.",
+        figure,
+        *rows,
+    )
 
 
 def _rows(found: ForceComparison) -> tuple[list[str], list[list[float]]]:
     d, unit = found.data, UNITS[found.quantity]
     table = np.stack(
-        [d.load, d.pressure / 1e5, np.rad2deg(d.slip_angle), np.rad2deg(d.camber), d.slip_ratio,
-         found.measured, found.predicted, found.difference], axis=1,
-    )  # fmt: skip
+        [
+            d.load,
+            d.pressure / 1e5,
+            np.rad2deg(d.slip_angle),
+            np.rad2deg(d.camber),
+            d.slip_ratio,
+            found.measured,
+            found.predicted,
+            found.difference,
+        ],
+        axis=1,
+    )
     names = ["load [N]", "pressure [bar]", "slip angle [deg]", "camber [deg]", "slip ratio [-]"]
     names += [f"{what} [{unit}]" for what in ("measured", "model", "model less measured")]
     return names, np.round(table, 5).tolist()
@@ -207,12 +284,20 @@ def _rows(found: ForceComparison) -> tuple[list[str], list[list[float]]]:
 
 def _agreement(found: ForceComparison) -> Plot:
     figure = go.Figure()
-    ends = [float(min(found.measured.min(), found.predicted.min())),
-            float(max(found.measured.max(), found.predicted.max()))]  # fmt: skip
-    figure.add_scatter(x=ends, y=ends, mode="lines", name="model = measured",
-                       line={"color": FAINT, "width": 1})  # fmt: skip
-    figure.add_scatter(x=found.measured, y=found.predicted, mode="markers", name="points",
-                       marker={"color": BLUE, "size": 6})  # fmt: skip
+    ends = [
+        float(min(found.measured.min(), found.predicted.min())),
+        float(max(found.measured.max(), found.predicted.max())),
+    ]
+    figure.add_scatter(
+        x=ends, y=ends, mode="lines", name="model = measured", line={"color": FAINT, "width": 1}
+    )
+    figure.add_scatter(
+        x=found.measured,
+        y=found.predicted,
+        mode="markers",
+        name="points",
+        marker={"color": BLUE, "size": 6},
+    )
     figure.update_xaxes(title=f"measured {_label(found)}")
     figure.update_yaxes(title=f"model {_label(found)}")
     styled_figure(figure, 480, legend={"orientation": "h", "y": 1.1})
@@ -230,18 +315,35 @@ def _differences(found: ForceComparison) -> Plot:
     used = used or [_slip(found)]
     figure = make_subplots(rows=1, cols=len(used), shared_yaxes=True, horizontal_spacing=0.04)
     for k, (name, label, factor) in enumerate(used, start=1):
-        figure.add_scatter(x=factor * getattr(found.data, name), y=found.difference,
-                           mode="markers", marker={"color": BLUE, "size": 5}, showlegend=False,
-                           row=1, col=k)  # fmt: skip
+        figure.add_scatter(
+            x=factor * getattr(found.data, name),
+            y=found.difference,
+            mode="markers",
+            marker={"color": BLUE, "size": 5},
+            showlegend=False,
+            row=1,
+            col=k,
+        )
         figure.update_xaxes(title=label, row=1, col=k)
         figure.add_hline(y=0.0, line={"color": FAINT, "width": 1}, row=1, col=k)
         if np.isfinite(found.noise):
-            figure.add_hrect(y0=-1.96 * found.noise, y1=1.96 * found.noise, line_width=0,
-                             fillcolor=FAINT, opacity=0.3, row=1, col=k)  # fmt: skip
+            figure.add_hrect(
+                y0=-1.96 * found.noise,
+                y1=1.96 * found.noise,
+                line_width=0,
+                fillcolor=FAINT,
+                opacity=0.3,
+                row=1,
+                col=k,
+            )
     figure.update_yaxes(
         title=f"model less measured {found.quantity} [{UNITS[found.quantity]}]", row=1, col=1
     )
     styled_figure(figure, 420)
-    return Plot("force-differences", "Difference over the conditions",
-                "Grey: 95 % of the noise from repeats, where there are any.", figure,
-                *_rows(found))  # fmt: skip
+    return Plot(
+        "force-differences",
+        "Difference over the conditions",
+        "Grey: 95 % of the noise from repeats, where there are any.",
+        figure,
+        *_rows(found),
+    )

@@ -22,9 +22,14 @@ from tirelib.waveforms import GRID
 
 DEGREES = np.rad2deg(GRID)
 NAMES = {
-    "load": "load", "pressure": "inflation pressure", "speed": "speed",
-    "slip_angle": "slip angle", "camber": "camber", "slip_ratio": "slip ratio", "gage": "gage",
-}  # fmt: skip
+    "load": "load",
+    "pressure": "inflation pressure",
+    "speed": "speed",
+    "slip_angle": "slip angle",
+    "camber": "camber",
+    "slip_ratio": "slip ratio",
+    "gage": "gage",
+}
 SIGN = "Red: the model shows too much tension (too little compression); blue: too much compression."
 
 
@@ -73,32 +78,43 @@ def _runs(found: Comparison) -> Plot:
     data = factor * found.difference[order]
     labels = [
         f"run {found.run[i]}: {c['Fz'][i]:.0f} N, {c['pressure'][i] / 1e5:.2f} bar, "
-        f"{c['speed'][i] * 3.6:.0f} km/h" + _slip(c, i) for i in order
-    ]  # fmt: skip
+        f"{c['speed'][i] * 3.6:.0f} km/h" + _slip(c, i)
+        for i in order
+    ]
     figure = _heat(data, labels, unit, list(range(len(order))))
     ticks, texts = _load_ticks(found, order)
     figure.update_yaxes(
-        title={"text": "runs by load, pressure and speed", "standoff": 12}, tickvals=ticks,
-        ticktext=texts, showgrid=False, range=[-0.5, len(order) - 0.5],
-    )  # fmt: skip
+        title={"text": "runs by load, pressure and speed", "standoff": 12},
+        tickvals=ticks,
+        ticktext=texts,
+        showgrid=False,
+        range=[-0.5, len(order) - 0.5],
+    )
     edges = np.rad2deg(found.prediction.edges[order])
     first = int(found.chosen.straight.sum())
-    _edges(figure, np.insert(edges, first, np.nan, axis=0),
-           np.insert(np.arange(len(order)), first, first).tolist())  # fmt: skip
+    _edges(
+        figure,
+        np.insert(edges, first, np.nan, axis=0),
+        np.insert(np.arange(len(order)), first, first).tolist(),
+    )
     styled_figure(figure, 620, showlegend=True, legend=_LEGEND)
     return Plot(
-        "heat-runs", "Every run: model less measured",
+        "heat-runs",
+        "Every run: model less measured",
         f"In units of {'the noise of the repeats' if unit == 'noise' else 'microstrain'}; set "
         f"points taken out; colours end at the 99.5 % quantile. {SIGN} Lines: the model's contact.",
-        figure, *_table(labels, "run", data, unit),
-    )  # fmt: skip
+        figure,
+        *_table(labels, "run", data, unit),
+    )
 
 
 def _slip(c: Mapping[str, FloatArray], i: int) -> str:
     out = ""
-    for name, unit, factor in (("slip_angle", " deg slip angle", np.rad2deg(1.0)),
-                               ("camber", " deg camber", np.rad2deg(1.0)),
-                               ("slip_ratio", " slip ratio", 1.0)):  # fmt: skip
+    for name, unit, factor in (
+        ("slip_angle", " deg slip angle", np.rad2deg(1.0)),
+        ("camber", " deg camber", np.rad2deg(1.0)),
+        ("slip_ratio", " slip ratio", 1.0),
+    ):
         value = np.nan_to_num(c[name][i]) * factor
         if abs(value) > (0.25 if factor > 1 else 0.005):
             out += f", {value:+.3g}{unit}"
@@ -122,14 +138,24 @@ def _load_ticks(found: Comparison, order: IntArray) -> tuple[list[float], list[s
 
 
 def _map(
-    found: Comparison, data: FloatArray, rows: list[tuple[str, float]], count: list[int],
-    name: str, unit: str, *, signed: int,
-) -> Plot:  # fmt: skip
+    found: Comparison,
+    data: FloatArray,
+    rows: list[tuple[str, float]],
+    count: list[int],
+    name: str,
+    unit: str,
+    *,
+    signed: int,
+) -> Plot:
     factor, noise = unit_of(found)
     values = factor * data
     labels = [text for text, _ in rows]
-    figure = _heat(values, [f"{t} ({n} runs)" for t, n in zip(labels, count, strict=True)], noise,
-                   list(range(signed)))  # fmt: skip
+    figure = _heat(
+        values,
+        [f"{t} ({n} runs)" for t, n in zip(labels, count, strict=True)],
+        noise,
+        list(range(signed)),
+    )
     figure.update_yaxes(
         title={"text": NAMES[name], "standoff": 12},
         tickvals=list(range(signed)),
@@ -139,10 +165,12 @@ def _map(
     styled_figure(figure, 200 + 34 * signed)
     axes = " (ISO 8855)" if name in ("slip_angle", "camber", "slip_ratio", "gage") else ""
     return Plot(
-        f"heat-{name.replace('_', '-')}", f"By {NAMES[name]}{axes}",
-        f"Mean over the runs of each level. {SIGN}", figure,
+        f"heat-{name.replace('_', '-')}",
+        f"By {NAMES[name]}{axes}",
+        f"Mean over the runs of each level. {SIGN}",
+        figure,
         *_table(labels, f"{NAMES[name]}{f' [{unit}]' if unit else ''}", values, noise),
-    )  # fmt: skip
+    )
 
 
 _LEGEND = {"orientation": "h", "y": 1.08, "x": 0.0}
@@ -153,13 +181,20 @@ def _heat(data: FloatArray, labels: list[str], unit: str, y: list[int]) -> go.Fi
     text = np.broadcast_to(np.array(labels, dtype=object)[:, None], data.shape)
     figure = go.Figure(
         go.Heatmap(
-            z=np.round(data, 2), x=np.round(DEGREES, 3), y=y, zmin=-limit, zmax=limit,
-            colorscale=DIVERGING, customdata=None, text=None if len(y) > 12 else text,
+            z=np.round(data, 2),
+            x=np.round(DEGREES, 3),
+            y=y,
+            zmin=-limit,
+            zmax=limit,
+            colorscale=DIVERGING,
+            customdata=None,
+            text=None if len(y) > 12 else text,
             hovertemplate="%{x:.0f} deg: %{z:.3g} " + unit + "<extra></extra>"
-            if len(y) > 12 else "%{text}<br>%{x:.0f} deg: %{z:.3g} " + unit + "<extra></extra>",
+            if len(y) > 12
+            else "%{text}<br>%{x:.0f} deg: %{z:.3g} " + unit + "<extra></extra>",
             colorbar={"title": {"text": f"model less<br>measured<br>[{unit}]"}, "len": 1.0},
         )
-    )  # fmt: skip
+    )
     figure.update_xaxes(title=ANGLE_TITLE, range=[-180, 180], dtick=30)
     return figure
 
@@ -167,9 +202,13 @@ def _heat(data: FloatArray, labels: list[str], unit: str, y: list[int]) -> go.Fi
 def _edges(figure: go.Figure, edges: FloatArray, y: list[int]) -> None:
     for side, name in ((0, "entry of the contact (model)"), (1, "exit of the contact (model)")):
         figure.add_scatter(
-            x=np.round(edges[:, side], 2), y=y, mode="lines", name=name, hoverinfo="skip",
+            x=np.round(edges[:, side], 2),
+            y=y,
+            mode="lines",
+            name=name,
+            hoverinfo="skip",
             line={"color": "#1c2530", "width": 1.2, "dash": "solid" if side else "dot"},
-        )  # fmt: skip
+        )
 
 
 def _table(

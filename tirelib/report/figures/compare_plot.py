@@ -9,8 +9,13 @@ import plotly.graph_objects as go
 
 from tirelib.report.style import FAINT, INK, RULE
 
-DIVERGING = [[0.0, "#0b4f86"], [0.25, "#6ea6cd"], [0.5, "#f7f7f7"], [0.75, "#e59a6f"],
-             [1.0, "#9c3a04"]]  # fmt: skip
+DIVERGING = [
+    [0.0, "#0b4f86"],
+    [0.25, "#6ea6cd"],
+    [0.5, "#f7f7f7"],
+    [0.75, "#e59a6f"],
+    [1.0, "#9c3a04"],
+]
 """Blue: too much compression; red: too much tension."""
 ANGLE_TITLE = "wheel angle [deg], entry < 0 < exit"
 
@@ -40,10 +45,15 @@ class Plot:
 def styled_figure(figure: go.Figure, height: int, **layout: Any) -> go.Figure:
     """Return the figure in the common look."""
     figure.update_layout(
-        template="none", height=height, font={"color": INK, "size": 13},
-        paper_bgcolor="white", plot_bgcolor="white", hoverlabel={"font": {"size": 12}},
-        margin={"l": 75, "r": 25, "t": 45, "b": 60}, **layout,
-    )  # fmt: skip
+        template="none",
+        height=height,
+        font={"color": INK, "size": 13},
+        paper_bgcolor="white",
+        plot_bgcolor="white",
+        hoverlabel={"font": {"size": 12}},
+        margin={"l": 75, "r": 25, "t": 45, "b": 60},
+        **layout,
+    )
     rule = {"gridcolor": RULE, "linecolor": FAINT, "zerolinecolor": FAINT, "automargin": True}
     figure.update_xaxes(ticks="outside", title_standoff=10, **rule)
     figure.update_yaxes(ticks="outside", **rule)

@@ -54,9 +54,13 @@ def _trend(found: Comparison, factor: Factor) -> Plot:
     unit, _ = UNITS[factor.name]
     x = np.array([edge_value(factor.name, float(v)) for v in factor.values])
     figure = make_subplots(
-        rows=2, cols=3, subplot_titles=[s.capitalize() for s in SECTORS],
-        shared_xaxes=True, vertical_spacing=0.14, horizontal_spacing=0.07,
-    )  # fmt: skip
+        rows=2,
+        cols=3,
+        subplot_titles=[s.capitalize() for s in SECTORS],
+        shared_xaxes=True,
+        vertical_spacing=0.14,
+        horizontal_spacing=0.07,
+    )
     rows: list[list[object]] = []
     for number, name in enumerate(SECTORS):
         centre, half = _bands(means[:, number], factor)
@@ -84,7 +88,7 @@ def _trend(found: Comparison, factor: Factor) -> Plot:
         figure,
         ["sector", label, "model less measured [microstrain]", "95 % half-width [microstrain]"],
         rows,
-    )  # fmt: skip
+    )
 
 
 def _bands(values: FloatArray, factor: Factor) -> tuple[FloatArray, FloatArray]:
@@ -101,23 +105,44 @@ def _bands(values: FloatArray, factor: Factor) -> tuple[FloatArray, FloatArray]:
 
 
 def _band(
-    figure: go.Figure, x: FloatArray, centre: FloatArray, half: FloatArray, first: bool,
+    figure: go.Figure,
+    x: FloatArray,
+    centre: FloatArray,
+    half: FloatArray,
+    first: bool,
     where: dict[str, int],
-) -> None:  # fmt: skip
+) -> None:
     known = np.isfinite(half)
     if known.any():
         ends = np.concatenate([x[known], x[known][::-1]])
         band = np.concatenate([(centre + half)[known], (centre - half)[known][::-1]])
         figure.add_trace(
-            go.Scatter(x=ends, y=band, fill="toself", mode="lines",
-                       fillcolor="rgba(0,114,178,0.22)",
-                       line={"width": 0}, hoverinfo="skip", showlegend=first,
-                       name="95 % confidence", legendgroup="band"), **where,
-        )  # fmt: skip
+            go.Scatter(
+                x=ends,
+                y=band,
+                fill="toself",
+                mode="lines",
+                fillcolor="rgba(0,114,178,0.22)",
+                line={"width": 0},
+                hoverinfo="skip",
+                showlegend=first,
+                name="95 % confidence",
+                legendgroup="band",
+            ),
+            **where,
+        )
     figure.add_trace(
-        go.Scatter(x=x, y=np.round(centre, 2), mode="lines+markers", showlegend=first,
-                   line={"color": BLUE}, name="mean over the runs", legendgroup="mean"), **where,
-    )  # fmt: skip
+        go.Scatter(
+            x=x,
+            y=np.round(centre, 2),
+            mode="lines+markers",
+            showlegend=first,
+            line={"color": BLUE},
+            name="mean over the runs",
+            legendgroup="mean",
+        ),
+        **where,
+    )
 
 
 def track_plots(found: Comparison) -> list[Plot]:
@@ -142,21 +167,39 @@ def _track(found: Comparison, track: Track) -> Plot:
         )
         noise = 1.96 * track.scale * np.nan_to_num(track.noise)
         figure.add_scatter(
-            x=x, y=track.scale * track.measured[member], mode="markers", name=f"measured, {text}",
+            x=x,
+            y=track.scale * track.measured[member],
+            mode="markers",
+            name=f"measured, {text}",
             marker={"color": color, "symbol": symbol, "size": 7},
-            error_y={"type": "constant", "value": noise, **_BAR, "color": color}, row=1, col=1,
-            customdata=found.run[member], hovertemplate=_HOVER,
-        )  # fmt: skip
+            error_y={"type": "constant", "value": noise, **_BAR, "color": color},
+            row=1,
+            col=1,
+            customdata=found.run[member],
+            hovertemplate=_HOVER,
+        )
         figure.add_scatter(
-            x=x[order], y=model[order], mode="lines", name=f"model, {text}",
-            line={"color": color, "dash": "dash"}, hoverinfo="skip", row=1, col=1,
-        )  # fmt: skip
+            x=x[order],
+            y=model[order],
+            mode="lines",
+            name=f"model, {text}",
+            line={"color": color, "dash": "dash"},
+            hoverinfo="skip",
+            row=1,
+            col=1,
+        )
         figure.add_scatter(
-            x=x, y=track.scale * (track.model - track.measured)[member], mode="markers",
-            showlegend=False, marker={"color": color, "symbol": symbol, "size": 7},
+            x=x,
+            y=track.scale * (track.model - track.measured)[member],
+            mode="markers",
+            showlegend=False,
+            marker={"color": color, "symbol": symbol, "size": 7},
             error_y={"type": "data", "array": np.hypot(half, noise), **_BAR, "color": color},
-            customdata=found.run[member], hovertemplate=_HOVER, row=1, col=2,
-        )  # fmt: skip
+            customdata=found.run[member],
+            hovertemplate=_HOVER,
+            row=1,
+            col=2,
+        )
     figure.add_hline(y=0.0, line={"color": FAINT, "width": 1}, row=1, col=2)
     figure.update_xaxes(title="measured load [N]")
     figure.update_yaxes(title=f"{track.name} [{track.unit}]", row=1, col=1)
@@ -165,23 +208,32 @@ def _track(found: Comparison, track: Track) -> Plot:
     figure.update_layout(margin={"t": 85})
     noise_text = (
         f"Noise of the repeats {track.scale * track.noise:.2g} {track.unit}. "
-        if np.isfinite(track.noise) else ""
-    )  # fmt: skip
+        if np.isfinite(track.noise)
+        else ""
+    )
     how = _HOW[track.name]
     rows = [
         [int(found.run[i]), round(float(load[i]), 1)]
-        + [round(track.scale * float(v[i]), 4) for v in (track.measured, track.model,
-                                                         track.model_std)]
+        + [
+            round(track.scale * float(v[i]), 4)
+            for v in (track.measured, track.model, track.model_std)
+        ]
         for i in np.flatnonzero(shown)
-    ]  # fmt: skip
+    ]
     return Plot(
-        track.name.replace(" ", "-"), f"{track.name.capitalize()} of every run",
+        track.name.replace(" ", "-"),
+        f"{track.name.capitalize()} of every run",
         f"{how}. {noise_text}Bars: 95 % by noise (left), by noise and set-point tolerance (right).",
         figure,
-        ["run", "load [N]", f"measured [{track.unit}]", f"model [{track.unit}]",
-         f"model, std by set points [{track.unit}]"],
+        [
+            "run",
+            "load [N]",
+            f"measured [{track.unit}]",
+            f"model [{track.unit}]",
+            f"model, std by set points [{track.unit}]",
+        ],
         rows,
-    )  # fmt: skip
+    )
 
 
 def _pressures(found: Comparison, shown: BoolArray) -> list[tuple[str, BoolArray]]:
@@ -189,8 +241,9 @@ def _pressures(found: Comparison, shown: BoolArray) -> list[tuple[str, BoolArray
         if factor.name == "pressure":
             return [
                 (told("pressure", float(v)), shown & (factor.level == k))
-                for k, v in enumerate(factor.values) if (shown & (factor.level == k)).any()
-            ]  # fmt: skip
+                for k, v in enumerate(factor.values)
+                if (shown & (factor.level == k)).any()
+            ]
     return [("all runs", shown)]
 
 
@@ -202,26 +255,40 @@ def set_point_plot(found: Comparison) -> Plot:
     place = np.arange(1, len(order) + 1)
     for k, name in enumerate(NAMES):
         figure.add_scatter(
-            x=place, y=np.round(scaled[order, k], 3), mode="markers",
-            name="angle zero" if name == "angle" else name, customdata=found.run[order],
+            x=place,
+            y=np.round(scaled[order, k], 3),
+            mode="markers",
+            name="angle zero" if name == "angle" else name,
+            customdata=found.run[order],
             marker={"color": (BLUE, RED, BLACK, CATEGORIES[2])[k], "symbol": SYMBOLS[k], "size": 7},
             hovertemplate=_HOVER,
-        )  # fmt: skip
+        )
     for y in (-1.96, 1.96):
         figure.add_hline(y=y, line={"color": FAINT, "width": 1, "dash": "dot"})
     figure.update_xaxes(title="place of the run in the campaign")
     figure.update_yaxes(title="beside the recorded value [tolerance]")
     styled_figure(figure, 380, legend={"orientation": "h", "y": 1.12, "x": 0.0})
     rows = [
-        [int(found.run[i]), *np.round(scaled[i], 4).tolist(),
-         *np.round(found.points.value[i] * (100, 100, 100, 1000), 5).tolist()] for i in order
-    ]  # fmt: skip
+        [
+            int(found.run[i]),
+            *np.round(scaled[i], 4).tolist(),
+            *np.round(found.points.value[i] * (100, 100, 100, 1000), 5).tolist(),
+        ]
+        for i in order
+    ]
     return Plot(
-        "set-points", "What was taken out as set-point error",
+        "set-points",
+        "What was taken out as set-point error",
         "Best linear prediction per run; 95 % should lie between the dotted lines. Many beyond "
         "them, or a trend, is misfit that looks like a set-point error.",
         figure,
-        ["run", *(f"{name} [tolerance]" for name in NAMES), "load [%]", "pressure [%]", "gain [%]",
-         "angle zero [mrad]"],
+        [
+            "run",
+            *(f"{name} [tolerance]" for name in NAMES),
+            "load [%]",
+            "pressure [%]",
+            "gain [%]",
+            "angle zero [mrad]",
+        ],
         rows,
-    )  # fmt: skip
+    )

@@ -29,23 +29,49 @@ def _one(found: Comparison, i: int, name: str) -> Plot:
     measured = 1e6 * (found.chosen.strain[i] - found.points.shift[i])
     model = 1e6 * found.prediction.strain[i]
     difference = 1e6 * found.difference[i]
-    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, row_heights=[0.68, 0.32],
-                           vertical_spacing=0.06)  # fmt: skip
-    figure.add_scatter(x=DEGREES, y=measured, name="measured, set points taken out",
-                       line={"color": BLUE, "width": 2}, row=1, col=1)  # fmt: skip
-    figure.add_scatter(x=DEGREES, y=model, name="model",
-                       line={"color": RED, "width": 2, "dash": "dash"}, row=1, col=1)  # fmt: skip
+    figure = make_subplots(
+        rows=2, cols=1, shared_xaxes=True, row_heights=[0.68, 0.32], vertical_spacing=0.06
+    )
+    figure.add_scatter(
+        x=DEGREES,
+        y=measured,
+        name="measured, set points taken out",
+        line={"color": BLUE, "width": 2},
+        row=1,
+        col=1,
+    )
+    figure.add_scatter(
+        x=DEGREES,
+        y=model,
+        name="model",
+        line={"color": RED, "width": 2, "dash": "dash"},
+        row=1,
+        col=1,
+    )
     if found.noise.known:
         band = 1.96e6 * found.noise.std
         figure.add_trace(
             go.Scatter(
-                x=[DEGREES[0], DEGREES[-1], DEGREES[-1], DEGREES[0]], y=[band, band, -band, -band],
-                fill="toself", mode="lines", fillcolor="rgba(93,107,122,0.35)", line={"width": 0},
-                name="95 % of the noise", hoverinfo="skip",
-            ), row=2, col=1,
-        )  # fmt: skip
-    figure.add_scatter(x=DEGREES, y=difference, name="model less measured",
-                       line={"color": "#1c2530", "width": 1.5}, row=2, col=1)  # fmt: skip
+                x=[DEGREES[0], DEGREES[-1], DEGREES[-1], DEGREES[0]],
+                y=[band, band, -band, -band],
+                fill="toself",
+                mode="lines",
+                fillcolor="rgba(93,107,122,0.35)",
+                line={"width": 0},
+                name="95 % of the noise",
+                hoverinfo="skip",
+            ),
+            row=2,
+            col=1,
+        )
+    figure.add_scatter(
+        x=DEGREES,
+        y=difference,
+        name="model less measured",
+        line={"color": "#1c2530", "width": 1.5},
+        row=2,
+        col=1,
+    )
     for edge in np.rad2deg(found.prediction.edges[i]):
         figure.add_vline(x=float(edge), line={"color": FAINT, "width": 1, "dash": "dot"})
     figure.update_xaxes(range=[-HALF, HALF], dtick=20)
@@ -63,7 +89,11 @@ def _one(found: Comparison, i: int, name: str) -> Plot:
         f"Difference {rms:.0f} microstrain rms{noise}; strain without its mean over the turn, mean "
         "over the gages, tension positive. Dotted: edges of the model's contact.",
         figure,
-        ["wheel angle [deg]", "measured, set points taken out [microstrain]",
-         "model [microstrain]", "model less measured [microstrain]"],
+        [
+            "wheel angle [deg]",
+            "measured, set points taken out [microstrain]",
+            "model [microstrain]",
+            "model less measured [microstrain]",
+        ],
         rows,
-    )  # fmt: skip
+    )

@@ -127,9 +127,12 @@ def figure_4_3(means: Means) -> Figure:
         colour = CATEGORIES[place % len(CATEGORIES)]
         text = f"y = {millimetres(means.lateral[gage])}"
         left.plot(
-            means.slip_angle[level.rows][line], length[line], marker=MARKERS[place % 10],
-            color=colour, label=text,
-        )  # fmt: skip
+            means.slip_angle[level.rows][line],
+            length[line],
+            marker=MARKERS[place % 10],
+            color=colour,
+            label=text,
+        )
         share = 100.0 * float(np.std(length, ddof=1) / np.mean(length))
         bar = right.bar(place, share, color=colour, width=0.65)
         right.bar_label(bar, fmt="%.1f %%", padding=3)

@@ -51,9 +51,16 @@ def figure_4_20(means: Means, trend: CorneringTrend) -> Figure:
         near = int(np.argmin(np.abs(trend.load - level.value)))
         fitted = abs(trend.load[near] - level.value) < 0.1 * float(means.load.mean())
         axes.scatter(
-            angle, force, s=28, marker=MARKERS[i % 10], color=colour, edgecolors="white",
-            linewidths=0.4, zorder=3, label=f"measured, {level.text}",
-        )  # fmt: skip
+            angle,
+            force,
+            s=28,
+            marker=MARKERS[i % 10],
+            color=colour,
+            edgecolors="white",
+            linewidths=0.4,
+            zorder=3,
+            label=f"measured, {level.text}",
+        )
         if not fitted:
             continue
         stiffness, peak = float(trend.stiffness[near]), float(trend.peak[near])
@@ -95,19 +102,33 @@ def _trend(
     colours = sequence(value.size)
     grid = np.linspace(float(trend.contact_length.min()), float(trend.contact_length.max()), 100)
     axes.plot(
-        grid, np.polynomial.polynomial.polyval(grid, fit), color="#333333", zorder=2,
+        grid,
+        np.polynomial.polynomial.polyval(grid, fit),
+        color="#333333",
+        zorder=2,
         label="quadratic in the contact length",
-    )  # fmt: skip
+    )
     for i in np.flatnonzero(known):
         axes.errorbar(
-            trend.contact_length[i], value[i], 1.96 * std[i], fmt=MARKERS[i % 10],
-            color=colours[i], capsize=4, markersize=7, label=f"{round(trend.load[i], -2):.0f} N",
-        )  # fmt: skip
+            trend.contact_length[i],
+            value[i],
+            1.96 * std[i],
+            fmt=MARKERS[i % 10],
+            color=colours[i],
+            capsize=4,
+            markersize=7,
+            label=f"{round(trend.load[i], -2):.0f} N",
+        )
     if (~known).any():
         axes.plot(
-            trend.contact_length[~known], value[~known], "o", markerfacecolor="white",
-            markeredgecolor=FAINT, markersize=8, label="not reached by the data: no interval",
-        )  # fmt: skip
+            trend.contact_length[~known],
+            value[~known],
+            "o",
+            markerfacecolor="white",
+            markeredgecolor=FAINT,
+            markersize=8,
+            label="not reached by the data: no interval",
+        )
     axes.plot([], [], color=FAINT, marker="_", linestyle="none", label="bars: 95 % interval")
     axes.set_xlabel(label("contact length of the centre gage", "mm"))
     axes.set_ylim(bottom=0.0)

@@ -11,8 +11,12 @@ from tirelib.identify.error_bands import levels
 from tirelib.report.figures.compare_plot import DIVERGING, Plot, limit_of, styled_figure
 from tirelib.units import from_si
 
-CONDITIONS = (("load", "N", "force"), ("pressure", "bar", "pressure"), ("camber", "deg", "angle"),
-              ("speed", "km/h", "speed"))  # fmt: skip
+CONDITIONS = (
+    ("load", "N", "force"),
+    ("pressure", "bar", "pressure"),
+    ("camber", "deg", "angle"),
+    ("speed", "km/h", "speed"),
+)
 DIGITS = {"N": "z,.0f", "bar": "z.2f", "deg": "z.1f", "km/h": "z.0f"}
 _BINS = 24
 
@@ -31,12 +35,17 @@ def residual_map(told: ForceAssessment, model: ForceFit, name: str, title: str) 
     middle = 0.5 * (edges[1:] + edges[:-1])
     figure = go.Figure(
         go.Heatmap(
-            z=np.round(cells, 3), x=np.round(middle, 4), y=list(range(len(labels))), zmin=-limit,
-            zmax=limit, colorscale=DIVERGING, customdata=[[label] * _BINS for label in labels],
+            z=np.round(cells, 3),
+            x=np.round(middle, 4),
+            y=list(range(len(labels))),
+            zmin=-limit,
+            zmax=limit,
+            colorscale=DIVERGING,
+            customdata=[[label] * _BINS for label in labels],
             hovertemplate="%{customdata}, slip %{x}: %{z:.3g} " + unit + "<extra></extra>",
             colorbar={"title": {"text": f"model less<br>measured<br>[{unit}]"}},
         )
-    )  # fmt: skip
+    )
     words = "slip ratio" if case.quantity == "Fx" else "slip angle [deg]"
     figure.update_xaxes(title=words)
     marks = list(range(0, len(labels), max(1, len(labels) // 14)))
@@ -44,11 +53,14 @@ def residual_map(told: ForceAssessment, model: ForceFit, name: str, title: str) 
     styled_figure(figure, 220 + 14 * min(len(labels), 30))
     rows = [[labels[k], *np.round(row, 4).tolist()] for k, row in enumerate(cells)]
     return Plot(
-        f"residual-{name}", title,
+        f"residual-{name}",
+        title,
         "Mean of model less measured; one colour scale for both maps. White: none, or not "
         "measured.",
-        figure, ["set point", *[f"{x:.4g} {words}" for x in middle]], rows,
-    )  # fmt: skip
+        figure,
+        ["set point", *[f"{x:.4g} {words}" for x in middle]],
+        rows,
+    )
 
 
 def _rows(told: ForceAssessment) -> tuple[list[str], IntArray]:

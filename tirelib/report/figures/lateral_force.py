@@ -137,9 +137,14 @@ def figure_4_14(trained: Trained) -> Figure:
     parts = []
     for regression in tables:
         _column(
-            grid[0, 0], grid[1, 0], regression.measured, regression.fitted, cambers,
-            regression.rows, colours,
-        )  # fmt: skip
+            grid[0, 0],
+            grid[1, 0],
+            regression.measured,
+            regression.fitted,
+            cambers,
+            regression.rows,
+            colours,
+        )
         parts.append(regression.measured - regression.fitted)
     lowest = min(regression.r2 for regression in tables)
     held_out = max(regression.cross_validated for regression in tables)

@@ -77,9 +77,11 @@ def _draw_strain(axes: Axes, last: LastTurn) -> None:
     phi = np.rad2deg(last.phi)
     for place, gage in enumerate(np.argsort(last.lateral)):
         axes.plot(
-            phi, 1e6 * last.strain[gage], color=CATEGORIES[place % len(CATEGORIES)],
+            phi,
+            1e6 * last.strain[gage],
+            color=CATEGORIES[place % len(CATEGORIES)],
             label=f"gage at y = {millimetres(last.lateral[gage])}",
-        )  # fmt: skip
+        )
     known = phi[np.isfinite(last.strain).any(axis=0)]
     axes.set_xlim(known[0], known[-1])
     axes.set_title(f"Strain of the last turn, run {last.run}")
@@ -93,23 +95,38 @@ def _draw_quantity(left: Axes, right: Axes, strip: Strip, name: str) -> None:
     half = WIDTH * strip.std[name]
     for rows in _stretches(strip, name):
         time = strip.time[rows]
-        left.plot(time, truth[rows], color=BLACK, linewidth=3.2, alpha=0.45,
-                  solid_capstyle="butt", label="measured by the rig, mean of the run")  # fmt: skip
+        left.plot(
+            time,
+            truth[rows],
+            color=BLACK,
+            linewidth=3.2,
+            alpha=0.45,
+            solid_capstyle="butt",
+            label="measured by the rig, mean of the run",
+        )
         error = value[rows] - truth[rows]
         for axes, middle in ((left, value[rows]), (right, error)):
             axes.fill_between(
-                time, middle - half[rows], middle + half[rows], color=SKY, alpha=0.45, linewidth=0,
+                time,
+                middle - half[rows],
+                middle + half[rows],
+                color=SKY,
+                alpha=0.45,
+                linewidth=0,
                 label="95 % band",
-            )  # fmt: skip
+            )
             axes.plot(
                 time, middle, "o-", color=BLUE, markersize=3.8, linewidth=1.1, label="estimated"
             )
     for axes in (left, right):
         for change in np.flatnonzero(np.diff(strip.run)):
             axes.axvline(
-                0.5 * (strip.time[change] + strip.time[change + 1]), color=FAINT, linewidth=0.8,
-                linestyle=":", zorder=1.2,
-            )  # fmt: skip
+                0.5 * (strip.time[change] + strip.time[change + 1]),
+                color=FAINT,
+                linewidth=0.8,
+                linestyle=":",
+                zorder=1.2,
+            )
     zero_line(right)
     left.set_ylabel(_label(TITLE[name], name))
     right.set_ylabel(_label("difference", name))
@@ -138,7 +155,13 @@ def _name_runs(axes: Axes, strip: Strip) -> None:
     changes = [0, *(np.flatnonzero(np.diff(strip.run)) + 1), len(strip.run)]
     for first, stop in pairwise(changes):
         axes.annotate(
-            f"run {strip.run[first]}", (float(strip.time[first:stop].mean()), 1.0),
-            xycoords=("data", "axes fraction"), xytext=(0, 3), textcoords="offset points",
-            ha="center", va="bottom", color=FAINT, fontsize=9.0,
-        )  # fmt: skip
+            f"run {strip.run[first]}",
+            (float(strip.time[first:stop].mean()), 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, 3),
+            textcoords="offset points",
+            ha="center",
+            va="bottom",
+            color=FAINT,
+            fontsize=9.0,
+        )

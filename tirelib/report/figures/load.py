@@ -43,9 +43,11 @@ def figure_4_4(trained: Trained) -> Figure:
     panels = figure.subplots(1, 3 if held else 2)
     scatter_levels(panels[0], regression.regressor, regression.measured, levels, rows)
     curve(
-        panels[0], regression.regressor, lambda x: b[0] + b[1] * x + b[2] * x**2,
+        panels[0],
+        regression.regressor,
+        lambda x: b[0] + b[1] * x + b[2] * x**2,
         "quadratic, ordinary least squares",
-    )  # fmt: skip
+    )
     panels[0].set_title(
         f"Fz = {b[0]:.0f} {b[1]:+.2f} l {b[2]:+.4f} l\u00b2\nR\u00b2 = {regression.r2:.4f}"
     )

@@ -51,13 +51,25 @@ def _column(part: Compared, upper: Axes, lower: Axes) -> None:
     for i, (level, colour) in enumerate(zip(levels, sequence(len(levels)), strict=True)):
         x, marker = part.measured[level.rows], MARKERS[i % len(MARKERS)]
         upper.errorbar(
-            x, part.estimated[level.rows], WIDTH * part.std[level.rows], fmt=marker, color=colour,
-            markersize=3.6, elinewidth=0.8, label=level.text,
-        )  # fmt: skip
+            x,
+            part.estimated[level.rows],
+            WIDTH * part.std[level.rows],
+            fmt=marker,
+            color=colour,
+            markersize=3.6,
+            elinewidth=0.8,
+            label=level.text,
+        )
         lower.errorbar(
-            x, error[level.rows], WIDTH * part.std[level.rows], fmt=marker, color=colour,
-            markersize=3.0, elinewidth=0.7, alpha=0.75,
-        )  # fmt: skip
+            x,
+            error[level.rows],
+            WIDTH * part.std[level.rows],
+            fmt=marker,
+            color=colour,
+            markersize=3.0,
+            elinewidth=0.7,
+            alpha=0.75,
+        )
     diagonal(upper, part.measured, part.estimated)
     digits = {"N": 1, "deg": 3, "%": 3}[unit]
     fit = f"R\u00b2 {row.r2:.5f}" if np.isfinite(row.r2) else "not varied"

@@ -37,9 +37,16 @@ def scatter_levels(
         here = level.rows if rows is None else level.rows[rows]
         if here.any():
             axes.scatter(
-                x[here], y[here], s=26, marker=MARKERS[i % len(MARKERS)], color=colour,
-                edgecolors="white", linewidths=0.4, zorder=3, label=level.text,
-            )  # fmt: skip
+                x[here],
+                y[here],
+                s=26,
+                marker=MARKERS[i % len(MARKERS)],
+                color=colour,
+                edgecolors="white",
+                linewidths=0.4,
+                zorder=3,
+                label=level.text,
+            )
 
 
 def curve(axes: Axes, x: FloatArray, value: Callable[[FloatArray], FloatArray], text: str) -> None:

@@ -69,12 +69,16 @@ def standing(tire: Tire, loads: tuple[float, ...] = STATIC_LOADS) -> StaticRing:
     phi = np.linspace(-np.pi, np.pi, _ANGLES)
     u, bend = (
         pressed_shape(
-            phi, contact.angle, contact.pressure, ring_radius=tire.ring_radius,
-            bending_stiffness=tire.bending_stiffness, radial_stiffness=contact.radial_stiffness,
+            phi,
+            contact.angle,
+            contact.pressure,
+            ring_radius=tire.ring_radius,
+            bending_stiffness=tire.bending_stiffness,
+            radial_stiffness=contact.radial_stiffness,
             derivative=k,
         )
         for k in (0, 2)
-    )  # fmt: skip
+    )
     strain: FloatArray = -tire.innerliner_offset / tire.ring_radius**2 * (u + bend)
     return StaticRing(tire, contact, phi, u, strain)
 
@@ -89,17 +93,21 @@ def by_load(
 ) -> Simulation:
     """Return Fig. 6-22, 6-24, 6-26, 6-34, 6-36: three loads at the tire's inflation."""
     return simulate(
-        tire.changed(damping=damping), load=LOADS, turn_rate=speed / tire.ring_radius,
+        tire.changed(damping=damping),
+        load=LOADS,
+        turn_rate=speed / tire.ring_radius,
         contact=contact,
-    )  # fmt: skip
+    )
 
 
 def by_inflation(tire: Tire, damping: float = 0.0, speed: float = 0.0) -> Simulation:
     """Return Fig. 6-23, 6-28, 6-35: four inflation pressures at the reference load."""
     return simulate(
-        tire.changed(damping=damping), load=REFERENCE_LOAD, inflation=INFLATIONS,
+        tire.changed(damping=damping),
+        load=REFERENCE_LOAD,
+        inflation=INFLATIONS,
         turn_rate=speed / tire.ring_radius,
-    )  # fmt: skip
+    )
 
 
 def by_inflation_at_equal_deflection(tire: Tire) -> Simulation:

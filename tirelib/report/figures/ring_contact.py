@@ -35,12 +35,18 @@ def figure_6_7(deflections: Simulation, inflations: Simulation) -> Figure:
     figure = new_figure(11.0, 4.9)
     left, right = figure.subplots(1, 2)
     names = [f"deflection {text}" for text in deflection_labels(deflections)]
-    draw(left, deflections, PRESSURE, names, sequence(len(names)),
-         within=half_width(deflections))  # fmt: skip
+    draw(left, deflections, PRESSURE, names, sequence(len(names)), within=half_width(deflections))
     left.set_title(f"Deflections at {inflation_labels(deflections)[0]}")
     names = inflation_labels(inflations)
-    draw(right, inflations, PRESSURE, names, CATEGORIES[: len(names)],
-         within=half_width(inflations), edges=True)  # fmt: skip
+    draw(
+        right,
+        inflations,
+        PRESSURE,
+        names,
+        CATEGORIES[: len(names)],
+        within=half_width(inflations),
+        edges=True,
+    )
     right.set_title(
         f"Inflation at an equal deflection of {deflection_labels(inflations)[0]} (dotted: edges)"
     )
@@ -100,8 +106,9 @@ def figure_6_12(shear: Simulation, radial: Simulation) -> Figure:
         short = 1e3 * (done.contact_angle - _peak_to_peak(done))
         grid[0, column].set_title(
             f"({'ab'[column]}) {NAMES[done.contact]}\npeak to peak minus contact angle: "
-            + ", ".join(f"{-x:+.1f}" for x in short).replace("-", "\N{MINUS SIGN}") + " mrad"
-        )  # fmt: skip
+            + ", ".join(f"{-x:+.1f}" for x in short).replace("-", "\N{MINUS SIGN}")
+            + " mrad"
+        )
         grid[1, column].set_xlabel(ANGLE)
     legend_below(figure, [grid[1, 0]])
     return figure
@@ -120,9 +127,13 @@ def _rate_peaks(axes: Axes, done: Simulation) -> None:
         axes.plot(
             np.rad2deg(getattr(peaks, f"rate_{side}_angle")),
             PER_DEGREE * getattr(peaks, f"rate_{side}"),
-            marker, color=BLACK, markerfacecolor="white", markersize=6.0, zorder=5,
+            marker,
+            color=BLACK,
+            markerfacecolor="white",
+            markersize=6.0,
+            zorder=5,
             label=f"peak of the strain rate at the {text}",
-        )  # fmt: skip
+        )
 
 
 def _deflections(

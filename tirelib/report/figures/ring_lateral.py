@@ -78,8 +78,12 @@ def figure_6_40(done: Simulation) -> Figure:
         for text, colour, profile in kinds:
             force = [brush_forces(profile, brush, np.deg2rad(a)).Fy for a in angles]
             axes.plot(angles, 1e-3 * np.array(force), color=colour, label=text)
-        axes.axhline(-1e-3 * tire.friction * done.load[row], color=FAINT, linewidth=1.0,
-                     label="friction times load")  # fmt: skip
+        axes.axhline(
+            -1e-3 * tire.friction * done.load[row],
+            color=FAINT,
+            linewidth=1.0,
+            label="friction times load",
+        )
         axes.set_title(f"{load_labels(done)[row]}, lateral force")
         axes.set_ylabel(label("Fy", "kN", signed=True))
     for axes in grid[-1, :-1]:

@@ -84,8 +84,15 @@ def _pair(
     figure = new_figure(11.5, 5.0)
     panels = figure.subplots(1, 2)
     for axes, quantity in zip(panels, quantities, strict=True):
-        draw(axes, done, quantity, labels, sequence(len(labels)),
-             within=wider * half_width(done), edges=True)  # fmt: skip
+        draw(
+            axes,
+            done,
+            quantity,
+            labels,
+            sequence(len(labels)),
+            within=wider * half_width(done),
+            edges=True,
+        )
         axes.set_xlabel(ANGLE)
     figure.suptitle(
         f"{title[0].upper()}{title[1:]}, {NAMES[done.contact]}; dotted: edges of the contact",

@@ -29,10 +29,14 @@ def deformation_from_strain(ring: StaticRing) -> ContactDeformation:
         [np.interp(at, ring.phi, e) for at, e in zip(nodes, ring.strain, strict=True)]
     )
     return contact_deformation(
-        strain, -half, half, deflection=ring.contact.deflection,
-        ring_radius=ring.tire.ring_radius, free_radius=ring.tire.free_radius,
+        strain,
+        -half,
+        half,
+        deflection=ring.contact.deflection,
+        ring_radius=ring.tire.ring_radius,
+        free_radius=ring.tire.free_radius,
         liner_offset=ring.tire.innerliner_offset,
-    )  # fmt: skip
+    )
 
 
 @styled
@@ -55,9 +59,13 @@ def figure_5_10(ring: StaticRing) -> Figure:
             label=f"{text}, from strain",
         )
         axes.plot(
-            np.rad2deg(ring.phi[inside])[::12], 1e3 * ring.u[point, inside][::12], "o",
-            color=BLACK, markersize=3.0, label="the ring's own",
-        )  # fmt: skip
+            np.rad2deg(ring.phi[inside])[::12],
+            1e3 * ring.u[point, inside][::12],
+            "o",
+            color=BLACK,
+            markersize=3.0,
+            label="the ring's own",
+        )
     axes.set_title("Radial deformation between the edges of the contact, from strain")
     axes.set_xlabel(ANGLE)
     axes.set_ylabel(RADIAL.label)

@@ -63,9 +63,12 @@ def _draw(trained: Trained, regression: Regression, regressor: str, beside: bool
             own = np.polynomial.polynomial.polyfit(x[here], measured[here], len(b) - 1)
             ends = np.linspace(float(x[here].min()), float(x[here].max()), 60)
             panels[0].plot(
-                ends, np.polynomial.polynomial.polyval(ends, own), color=colour, linewidth=0.9,
+                ends,
+                np.polynomial.polynomial.polyval(ends, own),
+                color=colour,
+                linewidth=0.9,
                 zorder=2,
-            )  # fmt: skip
+            )
     alone = _alone(regression, reference_level(levels).rows[rows], len(b) - 1)
     panels[0].set_title(
         f"All loads R\u00b2 = {regression.r2:.3f}; {reference_level(levels).text} alone "
@@ -162,17 +165,28 @@ def figure_4_8(observations: Observations, estimates: Estimates) -> Figure:
         at = start + np.arange(rows.size)
         upper.step(at, measured[rows], where="mid", color=FAINT, linewidth=1.4, label="measured")
         upper.errorbar(
-            at, value[rows], WIDTH * std[rows], fmt="o", color=colour, markersize=3.2,
-            elinewidth=0.9, label=f"estimated, {level.text}",
-        )  # fmt: skip
+            at,
+            value[rows],
+            WIDTH * std[rows],
+            fmt="o",
+            color=colour,
+            markersize=3.2,
+            elinewidth=0.9,
+            label=f"estimated, {level.text}",
+        )
         error = measured[rows] - value[rows]
         lower.errorbar(
             at, error, WIDTH * std[rows], fmt="o", color=colour, markersize=3.2, elinewidth=0.9
         )
         upper.text(
-            start + 0.5 * rows.size, 1.02, f"{level.text}: rms {rms(error):.2f} deg",
-            transform=upper.get_xaxis_transform(), ha="center", va="bottom", fontsize=9.5,
-        )  # fmt: skip
+            start + 0.5 * rows.size,
+            1.02,
+            f"{level.text}: rms {rms(error):.2f} deg",
+            transform=upper.get_xaxis_transform(),
+            ha="center",
+            va="bottom",
+            fontsize=9.5,
+        )
         start += rows.size
         for axes in (upper, lower):
             axes.axvline(start - 0.5, color=BLACK, linewidth=0.6, alpha=0.5)

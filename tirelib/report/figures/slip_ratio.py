@@ -50,9 +50,16 @@ def figure_4_17(turns: TypicalTurns, observations: Observations, rolling: Rollin
         rows = good & (words == word)
         if rows.any():
             axes.scatter(
-                kappa[rows], traction[rows], s=24, color=colour, marker=marker, linewidths=0.3,
-                edgecolors="white", zorder=3, label=f"turn read as {word}",
-            )  # fmt: skip
+                kappa[rows],
+                traction[rows],
+                s=24,
+                color=colour,
+                marker=marker,
+                linewidths=0.3,
+                edgecolors="white",
+                zorder=3,
+                label=f"turn read as {word}",
+            )
     low, high = rolling.centre - rolling.threshold, rolling.centre + rolling.threshold
     axes.axhspan(low, high, color=ORANGE, alpha=0.18, linewidth=0, label="read as free rolling")
     axes.axvline(0.0, color=FAINT, linewidth=0.9, zorder=1.5)
@@ -87,13 +94,26 @@ def figure_4_18(observations: Observations, estimates: Estimates) -> Figure:
         if not here.any():
             continue
         left.scatter(
-            compared.measured[here], compared.estimated[here], s=24, color=colour, marker=marker,
-            edgecolors="white", linewidths=0.3, zorder=3, label=f"turn read as {word}",
-        )  # fmt: skip
+            compared.measured[here],
+            compared.estimated[here],
+            s=24,
+            color=colour,
+            marker=marker,
+            edgecolors="white",
+            linewidths=0.3,
+            zorder=3,
+            label=f"turn read as {word}",
+        )
         right.errorbar(
-            compared.measured[here], error[here], WIDTH * compared.std[here], fmt=marker,
-            color=colour, markersize=4.0, elinewidth=0.8, alpha=0.8,
-        )  # fmt: skip
+            compared.measured[here],
+            error[here],
+            WIDTH * compared.std[here],
+            fmt=marker,
+            color=colour,
+            markersize=4.0,
+            elinewidth=0.8,
+            alpha=0.8,
+        )
     diagonal(left, compared.measured, compared.estimated)
     left.set_title(f"Slip ratio from strain and speed: rms {row.rmse:.3f} % over {row.runs} runs")
     left.set_xlabel("measured " + SLIP)

@@ -30,9 +30,16 @@ PER_DEGREE = 1e6 * float(np.pi / 180.0)
 def mark(axes: Axes, angle: float, value: float, marker: str, text: str) -> None:
     """Mark a found peak; `angle` in rad, `value` as drawn."""
     axes.plot(
-        np.rad2deg(angle), value, marker, color=BLACK, markersize=6.5, markerfacecolor="white",
-        markeredgewidth=1.4, zorder=5, label=text,
-    )  # fmt: skip
+        np.rad2deg(angle),
+        value,
+        marker,
+        color=BLACK,
+        markersize=6.5,
+        markerfacecolor="white",
+        markeredgewidth=1.4,
+        zorder=5,
+        label=text,
+    )
 
 
 @styled
@@ -107,9 +114,13 @@ def figure_4_1(turns: TypicalTurns, row: int = 0) -> Figure:
     line = np.polyfit(lateral[near], PER_DEGREE * found.rate_lead[row, near], 1)
     ends = np.array([lateral[near].min(), lateral[near].max()])
     right.plot(
-        ends, np.polyval(line, ends), color=BLACK, linewidth=1.4, linestyle="--",
+        ends,
+        np.polyval(line, ends),
+        color=BLACK,
+        linewidth=1.4,
+        linestyle="--",
         label="line through the three middle gages",
-    )  # fmt: skip
+    )
     left.set_title(f"Strain, {turns.labels[row]}")
     middle.set_title("Strain rate with the edges found")
     right.set_title(f"Peak rate at the leading edge\nslope {line[0]:+.2f} microstrain/(deg mm)")

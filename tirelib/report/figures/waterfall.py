@@ -19,9 +19,12 @@ class Step(NamedTuple):
 
 
 def waterfall(
-    steps: Sequence[Step], unit: str, floor: float, name: str = "waterfall",
+    steps: Sequence[Step],
+    unit: str,
+    floor: float,
+    name: str = "waterfall",
     title: str = "The model's history",
-) -> Plot:  # fmt: skip
+) -> Plot:
     """Return bars of the error after each step.
 
     Parameters
@@ -36,17 +39,25 @@ def waterfall(
     labels = [f"{k}: {step.label}" if k else step.label for k, step in enumerate(steps)]
     figure = go.Figure()
     figure.add_bar(
-        x=labels, y=[step.error for step in steps], name="fitted", marker={"color": BLUE},
-        text=[f"{step.error:.3g}" for step in steps], textposition="outside", cliponaxis=False,
-    )  # fmt: skip
+        x=labels,
+        y=[step.error for step in steps],
+        name="fitted",
+        marker={"color": BLUE},
+        text=[f"{step.error:.3g}" for step in steps],
+        textposition="outside",
+        cliponaxis=False,
+    )
     held = np.array([step.held_out for step in steps])
     if np.isfinite(held).any():
         figure.add_bar(
-            x=labels, y=[float(h) if np.isfinite(h) else None for h in held], name="held out",
+            x=labels,
+            y=[float(h) if np.isfinite(h) else None for h in held],
+            name="held out",
             marker={"color": RED},
-            text=[f"{h:.3g}" if np.isfinite(h) else "" for h in held], textposition="outside",
+            text=[f"{h:.3g}" if np.isfinite(h) else "" for h in held],
+            textposition="outside",
             cliponaxis=False,
-        )  # fmt: skip
+        )
     if np.isfinite(floor):
         figure.add_hline(y=floor, line={"dash": "dot", "color": FAINT}, annotation_text="floor")
     figure.update_yaxes(title=f"error [{unit}]", rangemode="tozero")
@@ -54,11 +65,14 @@ def waterfall(
     styled_figure(figure, 380, barmode="group")
     rows = [[label, step.error, step.held_out] for label, step in zip(labels, steps, strict=True)]
     return Plot(
-        name, title,
+        name,
+        title,
         "Rms error after each step, fitted anew each time; held out: on points that took no part "
         "in the fit.",
-        figure, ["step", f"error [{unit}]", f"held-out error [{unit}]"], rows,
-    )  # fmt: skip
+        figure,
+        ["step", f"error [{unit}]", f"held-out error [{unit}]"],
+        rows,
+    )
 
 
 def waterfall_of(history: Sequence[Mapping[str, Any]], quantity: str) -> Plot | None:
@@ -77,18 +91,25 @@ def waterfall_of(history: Sequence[Mapping[str, Any]], quantity: str) -> Plot | 
     def value(entry: Mapping[str, Any], key: str) -> float:
         return float(entry.get(f"{key}{suffix}", np.nan))
 
-    first = Step("before", value(entries[0], "error_before"),
-                 value(entries[0], "heldout_error_before"))  # fmt: skip
+    first = Step(
+        "before", value(entries[0], "error_before"), value(entries[0], "heldout_error_before")
+    )
     steps = [
         Step(
             f"{'-' if e.get('action') == 'remove' else ''}{e.get('effect', '?')}",
-            value(e, "error_after"), value(e, "heldout_error_after"),
+            value(e, "error_after"),
+            value(e, "heldout_error_after"),
         )
         for e in entries
-    ]  # fmt: skip
+    ]
     told = {"ustrain": "microstrain"}.get(unit, unit)
-    return waterfall([first, *steps], told, value(entries[-1], "floor"), f"history-{quantity}",
-                     f"The model's history, {quantity}")  # fmt: skip
+    return waterfall(
+        [first, *steps],
+        told,
+        value(entries[-1], "floor"),
+        f"history-{quantity}",
+        f"The model's history, {quantity}",
+    )
 
 
 def _unit_of(entry: Mapping[str, Any]) -> str | None:
