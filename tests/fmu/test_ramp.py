@@ -68,10 +68,8 @@ def test_batch_stream_and_fmu_agree_while_braking(source: str) -> None:
         for column, unit in ((batch.value, ""), (batch.std, "_std")):
             wanted = column[name]
             of_stream = [turn.value(name) if not unit else turn.std(name) for turn in streamed]
-            np.testing.assert_allclose(of_stream, wanted, rtol=1e-9, atol=1e-12)
-            np.testing.assert_allclose(
-                [row[name + unit] for row in seen], wanted, rtol=1e-9, atol=1e-12
-            )
+            np.testing.assert_allclose(of_stream, wanted, rtol=1e-9)
+            np.testing.assert_allclose([row[name + unit] for row in seen], wanted, rtol=1e-9)
     assert [row["flags"] for row in seen] == [turn.flags for turn in streamed]
     assert [turn.flags for turn in streamed] == batch.flags.tolist()
     assert source == "turns" or np.isfinite(batch.value["Fz"][1:]).all()

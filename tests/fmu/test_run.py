@@ -21,7 +21,7 @@ from tirelib.fmu.run import LoadedFmu, play_campaign
 
 
 def assert_equal(given: Any, wanted: Any, where: str = "") -> None:
-    """All keys alike, all numbers within 1e-8: what no slip angle fits amplifies rounding."""
+    """All keys alike, all numbers within 1e-9."""
     if isinstance(wanted, dict):
         assert given.keys() == wanted.keys(), where
         for key in wanted:
@@ -31,7 +31,7 @@ def assert_equal(given: Any, wanted: Any, where: str = "") -> None:
         for number, (a, b) in enumerate(zip(given, wanted, strict=True)):
             assert_equal(a, b, f"{where}/{number}")
     elif isinstance(wanted, float):
-        np.testing.assert_allclose(given, wanted, rtol=1e-8, atol=1e-9, err_msg=where)
+        np.testing.assert_allclose(given, wanted, rtol=1e-9, atol=1e-9, err_msg=where)
     else:
         assert given == wanted, where
 

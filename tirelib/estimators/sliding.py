@@ -47,8 +47,8 @@ LEAST_SLOPE = 0.01
 """Floor of d alpha / d u of an earlier calibration, [rad]."""
 FREE = 0.02
 """Slip ratio up to which a wheel counts as freely rolling: there the trail is that of the curve."""
-HALVINGS = 26
-"""Steps in which a sliding share is found, to 1e-8."""
+NEWTON = 10
+"""Steps of Newton's method in which a sliding share is found, to rounding."""
 LEAST_ROLLING = 0.1
 """Floor of 1 + slip ratio: a wheel that hardly turns."""
 TINY = 1e-12
@@ -152,19 +152,24 @@ class SlidingCurve:
         load: FloatArray,
         along: FloatArray | float = 0.0,
     ) -> FloatArray:
-        """Return t at a lateral utilisation; 1 where the tread slides as a whole."""
+        """Return t at a lateral utilisation; 1 where the tread slides as a whole.
+
+        The slip along and the force across each ask for a share at least; from the larger of both,
+        Newton's method climbs to where they are met together: what is left falls, convexly.
+        """
         n, effective = self.sharpness, self.grip * np.asarray(friction)
-        rest = np.maximum(1.0 - used / effective, 0.0)
-        low = np.asarray(1.0 - rest ** (1.0 / n) + 0.0 * along, dtype=np.float64)
-        if not np.any(along):
-            return low
+        across = used / effective
         pull = np.abs(self.cornering(load) * along) / (n * effective)
-        high = np.ones_like(low)
-        for _ in range(HALVINGS):
-            t = 0.5 * (low + high)
-            needs = (pull / t) ** 2 + (used / effective / (1.0 - (1.0 - t) ** n)) ** 2
-            low, high = np.where(needs > 1.0, t, low), np.where(needs > 1.0, high, t)
-        return high
+        alone = 1.0 - np.maximum(1.0 - across, 0.0) ** (1.0 / n)
+        t = np.asarray(np.maximum(alone, np.minimum(pull, 1.0)), dtype=np.float64)
+        for _ in range(NEWTON):
+            at = np.maximum(t, TINY)
+            rest = (1.0 - at) ** (n - 1.0)
+            filled = np.maximum(1.0 - rest * (1.0 - at), TINY)
+            a, b = (pull / at) ** 2, (across / filled) ** 2
+            fall = 2.0 * (a / at + b * n * rest / filled)
+            t = np.minimum(t + np.maximum(a + b - 1.0, 0.0) / np.maximum(fall, TINY), 1.0)
+        return t
 
     def across(self, used: FloatArray, t: FloatArray, load: FloatArray) -> FloatArray:
         """Return s_y at a lateral utilisation and a sliding share, below full sliding."""

@@ -96,6 +96,29 @@ def test_the_direction_of_the_force_tells_the_slip_angle_of_a_braked_or_driven_w
     assert found.std[0] < 0.2 * angle + 0.35 * blind.std[0] + np.deg2rad(0.2)
 
 
+@given(
+    slip=st.one_of(st.just(0.0), st.floats(1e-6, 0.2)),
+    used=st.floats(1e-6, 1.2),
+    load=st.floats(500.0, 9000.0),
+)
+def test_a_sliding_share_meets_force_and_slip_whatever_turns_are_told_beside_it(
+    slip: float, used: float, load: float
+) -> None:
+    along = np.array([slip, 0.1, 0.0])
+    (t, *_), (alone,) = (
+        CURVE.share(np.full(x.shape, used), CURVE.friction, np.full(x.shape, load), x)
+        for x in (along, one(slip))
+    )
+    assert t == alone  # to the last bit
+    most, n = CURVE.grip * CURVE.friction, CURVE.sharpness
+    pull = float(CURVE.cornering(one(load))[0]) * slip / (n * most)
+    if np.hypot(pull, used / most) < 1.0 - 1e-9:
+        across = used / most / (1.0 - (1.0 - t) ** n)
+        assert np.hypot(pull / t, across) == pytest.approx(1.0, rel=1e-9)
+    elif np.hypot(pull, used / most) > 1.0 + 1e-9:
+        assert t == 1.0
+
+
 def test_without_a_reading_the_angle_is_that_of_the_calibrated_road_with_all_its_doubt() -> None:
     load, angle = np.full(3, 4000.0), np.deg2rad([1.0, 2.5, 4.0])
     for slip in (None, np.full(3, -0.03)):
