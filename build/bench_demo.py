@@ -33,8 +33,8 @@ from rich.rule import Rule
 from tirelib.threads import one_thread
 
 if TYPE_CHECKING:
-    from bench.rig.plans import Plan
     from tirelib.report.live import LiveFiles
+    from tirelib.rig.plans import Plan
 
 DAYS = {"calibrated": (11, 5.1), "played": (12, 15.1)}
 """Campaign: the day (seed), and turns of the wheel in each run."""
@@ -49,8 +49,8 @@ def plan(name: str) -> "Plan":
     The played day has every straight load twice: without repeats no noise is known, and
     `tirelib compare` would have nothing to say.
     """
-    from bench.rig.plans import BAR, DEG, KMH, REFERENCE_LOAD, Plan
-    from bench.rig.tire import Condition
+    from tirelib.rig.plans import BAR, DEG, KMH, REFERENCE_LOAD, Plan
+    from tirelib.rig.tire import Condition
 
     def at(percent: float, angle: float = 0.0, slip: float | None = None) -> Condition:
         load = REFERENCE_LOAD * percent / 100.0
@@ -69,9 +69,9 @@ def plan(name: str) -> "Plan":
 
 def measure(name: str, target: Path) -> None:
     """Let the rig measure one day."""
-    from bench.rig.campaign import run_plan
-    from bench.rig.measure import Chain
-    from bench.rig.tire import tire
+    from tirelib.rig.campaign import run_plan
+    from tirelib.rig.measure import Chain
+    from tirelib.rig.tire import tire
 
     (seed, turns), day, console = DAYS[name], plan(name), Console()
     with console.status("solving the rig") as status:

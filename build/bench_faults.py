@@ -20,7 +20,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from bench.damage import (
+from tirebench.damage import (
     CHANGED,
     KINDS,
     Outcome,
@@ -29,7 +29,7 @@ from bench.damage import (
     strike_serial,
     strike_slcan,
 )
-from bench.protocols.layouts import RAW12C, RAW16
+from tirebench.protocols.layouts import RAW12C, RAW16
 from tirelib.threads import one_thread
 
 OUT = Path(__file__).resolve().parent / "out" / "bench_faults.json"

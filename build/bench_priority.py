@@ -19,17 +19,17 @@ from pathlib import Path
 
 from bench_recording import READ, pieces, write
 
-from bench.conditions import Conditions
-from bench.deadline import Deadline
-from bench.links.opening import PortPlan
-from bench.live.chain import LiveChain, LivePlan
-from bench.live.priority import realtime
-from bench.live.reader import ReaderPlan
-from bench.protocols import SLCAN
-from bench.protocols.layouts import RAW16
-from bench.protocols.plan import ProtocolPlan
-from bench.recording_header import RecordingHeader
-from bench.source_plan import SourcePlan
+from tirebench.conditions import Conditions
+from tirebench.deadline import Deadline
+from tirebench.links.opening import PortPlan
+from tirebench.live.chain import LiveChain, LivePlan
+from tirebench.live.priority import realtime
+from tirebench.live.reader import ReaderPlan
+from tirebench.protocols import SLCAN
+from tirebench.protocols.layouts import RAW16
+from tirebench.protocols.plan import ProtocolPlan
+from tirebench.recording_header import RecordingHeader
+from tirebench.source_plan import SourcePlan
 from tirelib.threads import one_thread
 
 FIFO = 16 * 1024

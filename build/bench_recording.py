@@ -17,20 +17,20 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.chain import Turn
-from bench.conditions import Conditions
-from bench.device import Device
-from bench.document import line_document, turn_document, wheel_document
-from bench.emulator import Player, record_tape
-from bench.faults import Faults
-from bench.links import Read
-from bench.protocols import SERIAL, SLCAN
-from bench.protocols.layouts import RAW16
-from bench.protocols.plan import ProtocolPlan
-from bench.recorder import Recorder
-from bench.recording_header import RecordingHeader
-from bench.transmitter import transmitter
-from bench.wheels import Wheels
+from tirebench.chain import Turn
+from tirebench.conditions import Conditions
+from tirebench.device import Device
+from tirebench.document import line_document, turn_document, wheel_document
+from tirebench.emulator import Player, record_tape
+from tirebench.faults import Faults
+from tirebench.links import Read
+from tirebench.protocols import SERIAL, SLCAN
+from tirebench.protocols.layouts import RAW16
+from tirebench.protocols.plan import ProtocolPlan
+from tirebench.recorder import Recorder
+from tirebench.recording_header import RecordingHeader
+from tirebench.transmitter import transmitter
+from tirebench.wheels import Wheels
 from tirelib.campaign import read_campaign
 from tirelib.threads import one_thread
 

@@ -24,22 +24,22 @@ from bench_demo import ready_fmu
 from demo import ROOT, Steps
 from rich.console import Console
 
-from bench.chain import Turn
-from bench.conditions import Conditions
-from bench.deadline import Deadline
-from bench.device import Device
-from bench.document import line_document, wheel_document
-from bench.estimation import Estimation
-from bench.faults import Faults
-from bench.fmu_archive import read_fmu
-from bench.fmu_model import FmuFile, FmuModel
-from bench.frames import SAMPLES, TICK, encode, strain_frames
-from bench.links import Read
-from bench.protocols import SERIAL
-from bench.protocols.plan import ProtocolPlan
-from bench.recording import Recorder, Recording, RecordingHeader
-from bench.replay import ReplayChain
-from bench.wheels import Wheels
+from tirebench.chain import Turn
+from tirebench.conditions import Conditions
+from tirebench.deadline import Deadline
+from tirebench.device import Device
+from tirebench.document import line_document, wheel_document
+from tirebench.estimation import Estimation
+from tirebench.faults import Faults
+from tirebench.fmu_archive import read_fmu
+from tirebench.fmu_model import FmuFile, FmuModel
+from tirebench.frames import SAMPLES, TICK, encode, strain_frames
+from tirebench.links import Read
+from tirebench.protocols import SERIAL
+from tirebench.protocols.plan import ProtocolPlan
+from tirebench.recording import Recorder, Recording, RecordingHeader
+from tirebench.replay import ReplayChain
+from tirebench.wheels import Wheels
 from tirelib.campaign import Run, read_campaign
 from tirelib.threads import one_thread
 
@@ -108,7 +108,7 @@ def one_turn(run: Run) -> tuple[np.ndarray, float]:
 
 
 class Wire:
-    """The bytes of a wheel that rolls on; see `bench.links.Link`.
+    """The bytes of a wheel that rolls on; see `tirebench.links.Link`.
 
     Frames are struck read by read, so that what was done is never ahead of what was sent, and the
     last ones are sound, so that what was lost before them shows.

@@ -16,17 +16,17 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.conditions import Conditions
-from bench.decoder import SerialDecoder
-from bench.frames import encode, strain_frames
-from bench.links import Read
-from bench.live.exchange import FINISH, STOP, Exchange
-from bench.live.kept import CONTEXT, Kept
-from bench.live.recorder import record
-from bench.live.recording_state import Order, RecorderState, RecordingRule
-from bench.recorder import alarm_event
-from bench.recording_header import RecordingHeader
-from bench.wheels import Line, Wheels
+from tirebench.conditions import Conditions
+from tirebench.decoder import SerialDecoder
+from tirebench.frames import encode, strain_frames
+from tirebench.links import Read
+from tirebench.live.exchange import FINISH, STOP, Exchange
+from tirebench.live.kept import CONTEXT, Kept
+from tirebench.live.recorder import record
+from tirebench.live.recording_state import Order, RecorderState, RecordingRule
+from tirebench.recorder import alarm_event
+from tirebench.recording_header import RecordingHeader
+from tirebench.wheels import Line, Wheels
 from tirelib.threads import one_thread
 
 WHEELS, FRAMES, PERIOD_US, SAMPLES = 4, 5, 1600, 16

@@ -18,8 +18,6 @@ from cosim.vehicle import Controls, Vehicle
 from road_constants import times
 from road_coverage import measured, rows_of, tire_of
 
-from bench.rig.plans import Plan, plan
-from bench.rig.tire import TIRES, Condition
 from tirelib.arrays import FloatArray
 from tirelib.estimators import tilt
 from tirelib.estimators.calibration import Calibration
@@ -29,6 +27,8 @@ from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.train import train
 from tirelib.flags import TurnFlag
 from tirelib.observations import Observations
+from tirelib.rig.plans import Plan, plan
+from tirelib.rig.tire import TIRES, Condition
 from tirelib.threads import one_thread
 
 LOADS = (1700.0, 3200.0, 4800.0, 7000.0)

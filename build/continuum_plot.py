@@ -16,10 +16,10 @@ from continuum.observe import trace
 from continuum.solve import model, solve
 from continuum.tire import Condition, Tire
 
-from bench.rig.observe import trace as rig_trace
-from bench.rig.solve import solve as rig_solve
-from bench.rig.tire import Condition as RigCondition
-from bench.rig.tire import RigTire
+from tirelib.rig.observe import trace as rig_trace
+from tirelib.rig.solve import solve as rig_solve
+from tirelib.rig.tire import Condition as RigCondition
+from tirelib.rig.tire import RigTire
 from tirelib.threads import one_thread
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -40,8 +40,8 @@ from demo_live import (
 from tirelib.threads import one_thread
 
 if TYPE_CHECKING:
-    from bench.rig.plans import Plan
     from tirelib.report.live import LiveFiles
+    from tirelib.rig.plans import Plan
 
 __all__ = [
     "PATIENCE",
@@ -223,7 +223,7 @@ def _short(argument: str | Path) -> str:
 
 def measure(steps: Steps, folder: Path, fresh: bool) -> dict[str, Path]:
     """Let the rig measure every campaign that is not there yet."""
-    from bench.rig.plans import with_repeats
+    from tirelib.rig.plans import with_repeats
 
     jobs = []
     for name, (plan, seed, repeats) in PLANS.items():
@@ -260,7 +260,7 @@ def measure(steps: Steps, folder: Path, fresh: bool) -> dict[str, Path]:
 
 def planned(name: str) -> "Plan":
     """Return a plan of the rig with the slip angles that are asked for."""
-    from bench.rig.plans import Plan, plan
+    from tirelib.rig.plans import Plan, plan
 
     whole = plan(name)
     if name not in SHORTENED:
@@ -272,8 +272,8 @@ def planned(name: str) -> "Plan":
 
 def measure_shortened(name: str, target: Path) -> None:
     """Measure the runs of a plan whose slip angles are asked for."""
-    from bench.rig.campaign import run_plan
-    from bench.rig.tire import tire
+    from tirelib.rig.campaign import run_plan
+    from tirelib.rig.tire import tire
 
     plan, seed, repeats = PLANS[name]
     truths = run_plan(

@@ -134,7 +134,7 @@ def end_when_played(
 
 def write_device(file: Path, lateral: Sequence[float]) -> None:
     """Write a device file whose count is the rig's own step of strain, so that nothing is lost."""
-    from bench.rig.measure import Chain
+    from tirelib.rig.measure import Chain
 
     step = 2.0 * Chain().gage_range / 2 ** Chain().gage_bits
     file.write_text(

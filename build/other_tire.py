@@ -19,8 +19,6 @@ import numpy as np
 from road_constants import times
 from road_coverage import measured, silent, tire_of
 
-from bench.rig.plans import Plan, plan
-from bench.rig.tire import Condition
 from tirelib.campaign import read_campaign
 from tirelib.estimators import likeness
 from tirelib.estimators.calibration import Calibration
@@ -30,6 +28,8 @@ from tirelib.estimators.regressors import ODD, compute_regressors
 from tirelib.estimators.train import train
 from tirelib.flags import TurnFlag
 from tirelib.observations import Observations, observe
+from tirelib.rig.plans import Plan, plan
+from tirelib.rig.tire import Condition
 from tirelib.threads import one_thread
 
 PRESSURE, SPEED = 2.3e5, 65.0 / 3.6

@@ -15,9 +15,6 @@ from pathlib import Path
 import click
 import numpy as np
 
-from bench.rig.campaign import run_plan
-from bench.rig.plans import Plan, plan
-from bench.rig.tire import Condition, tire
 from tirelib.campaign import Campaign, Run, read_campaign
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.edge import EDGE_UNIT
@@ -25,6 +22,9 @@ from tirelib.estimators.result import TRUTH
 from tirelib.estimators.train import train
 from tirelib.estimators.unknowns import TWO_SIGMA
 from tirelib.observations import measure_run, observe
+from tirelib.rig.campaign import run_plan
+from tirelib.rig.plans import Plan, plan
+from tirelib.rig.tire import Condition, tire
 from tirelib.signal import LowPass
 from tirelib.threads import one_thread
 

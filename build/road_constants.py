@@ -18,8 +18,6 @@ import click
 import numpy as np
 from road_coverage import measured, rows_of, silent, tire_of
 
-from bench.rig.plans import Plan
-from bench.rig.tire import NEW_DEPTH, Condition
 from tirelib.campaign import read_campaign
 from tirelib.estimators import any_road, chain, sliding, unknowns
 from tirelib.estimators.calibration import Calibration
@@ -28,6 +26,8 @@ from tirelib.estimators.edge import EDGE_UNIT
 from tirelib.estimators.likeness import DRIFT
 from tirelib.estimators.regressors import ODD, compute_regressors
 from tirelib.observations import Observations, mean_by, observe
+from tirelib.rig.plans import Plan
+from tirelib.rig.tire import NEW_DEPTH, Condition
 from tirelib.threads import one_thread
 
 TRIED: tuple[tuple[ModuleType, str, str], ...] = (

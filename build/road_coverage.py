@@ -17,9 +17,6 @@ import click
 import numpy as np
 from proof.tires import tire as random_tire
 
-from bench.rig.campaign import run_plan
-from bench.rig.plans import Plan, plan
-from bench.rig.tire import NEW_DEPTH, TIRES, Condition, RigTire, tire
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration import Calibration, Estimates
@@ -30,6 +27,9 @@ from tirelib.estimators.train import train
 from tirelib.estimators.unknowns import DEPTH, FRICTION, TWO_SIGMA
 from tirelib.observations import ROAD, Observations, observe
 from tirelib.report.style import BLUE, ORANGE, new_figure, save, styled
+from tirelib.rig.campaign import run_plan
+from tirelib.rig.plans import Plan, plan
+from tirelib.rig.tire import NEW_DEPTH, TIRES, Condition, RigTire, tire
 from tirelib.threads import one_thread
 
 BANDS: Mapping[str, tuple[tuple[float, float], ...]] = {

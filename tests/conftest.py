@@ -14,6 +14,10 @@ settings.register_profile(
 )
 settings.load_profile("default")
 os.environ["TIRELIB_CACHE"] = "off"  # no ensemble of an earlier version, none left behind
+ROOT = Path(__file__).parents[1]
+os.environ["PYTHONPATH"] = os.pathsep.join(  # what tests start imports this checkout as well
+    [str(ROOT), str(ROOT / "bench"), *filter(None, [os.environ.get("PYTHONPATH")])]
+)
 if sys.dont_write_bytecode:  # programs that tests start would compile all of it, each time
     _BYTECODE = TemporaryDirectory(prefix="bytecode-")
     os.environ["PYTHONPYCACHEPREFIX"] = _BYTECODE.name

@@ -19,11 +19,11 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import qmc
 
-from bench.rig.campaign import TRUTH_FILE, run_plan
-from bench.rig.plans import Plan
-from bench.rig.tire import Condition, tire
 from tirelib.arrays import FloatArray
 from tirelib.cli.common import progress_bar
+from tirelib.rig.campaign import TRUTH_FILE, run_plan
+from tirelib.rig.plans import Plan
+from tirelib.rig.tire import Condition, tire
 from tirelib.threads import one_thread
 
 CALIBRATION = Path(__file__).with_name("calibration.toml")

@@ -23,7 +23,6 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from rich.console import Console
 
-from bench.rig.campaign import THREADS
 from cosim import (
     antilock,
     antilock_report,
@@ -43,6 +42,7 @@ from cosim.wheels import WHEELS, FourWheels
 from tirelib import __version__
 from tirelib.cli.common import progress_bar
 from tirelib.report.cosim import Series, write_cosim
+from tirelib.rig.campaign import THREADS
 from tirelib.threads import one_thread
 
 ROOT = Path(__file__).parents[2]

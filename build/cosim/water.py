@@ -1,8 +1,8 @@
 """What a wedge of water ahead of the contact does to the strain: solved on the numerical rig.
 
 The virtual tire's surface knows no water. So the rig is solved with its water wedge
-(`bench.rig.laws.WaterWedge`) and without, rolling freely straight ahead, and the difference of the
-waveforms is added to what the virtual tire shows. Speed acts by the dynamic pressure: the wedge
+(`tirelib.rig.laws.WaterWedge`) and without, rolling freely straight ahead, and the difference of
+the waveforms is added to what the virtual tire shows. Speed acts by the dynamic pressure: the wedge
 presses with s rho v^2 / 2, and nothing else of it depends on the speed.
 """
 
@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.rig.laws import WaterWedge
-from bench.rig.observe import contact, trace
-from bench.rig.solve import State, solve
-from bench.rig.tire import Condition, RigTire, tire
 from cosim.wheels import PRESSURE
 from tirelib.arrays import FloatArray
+from tirelib.rig.laws import WaterWedge
+from tirelib.rig.observe import contact, trace
+from tirelib.rig.solve import State, solve
+from tirelib.rig.tire import Condition, RigTire, tire
 
 DENSITY = 1000.0
 """Of water [kg/m^3]."""

@@ -17,8 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from bench.rig.hidden import HIDDEN
-from bench.rig.observe import Trace
 from hidden.measured import CACHE, Plain, Planted, blank, keep, plain, traces, waveforms
 from hidden.plan import day
 from tirelib.arrays import BoolArray, FloatArray
@@ -28,6 +26,8 @@ from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.identify import estimated, start_file
 from tirelib.identify.waveform_fit import Data
 from tirelib.model.base import values_of
+from tirelib.rig.hidden import HIDDEN
+from tirelib.rig.observe import Trace
 from tirelib.waveforms import Waveforms
 
 NONE = "none"
@@ -118,7 +118,7 @@ def make_case(
     ----------
     seed : int
     kind : str
-        none, a name of `bench.rig.hidden.HIDDEN`, or two of them joined by +.
+        none, a name of `tirelib.rig.hidden.HIDDEN`, or two of them joined by +.
     ratio : float
         Wanted error ratio, above 1; without meaning for none.
 

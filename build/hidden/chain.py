@@ -15,13 +15,13 @@ from click.testing import CliRunner
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from bench.rig.campaign import run_plan
-from bench.rig.plans import Plan
 from hidden.cases import NONE, Case, make_case
 from hidden.judge import fingerprint, outcome
 from hidden.measured import CACHE, keep
 from hidden.plan import HELD_OUT, REPEATS, day
 from tirelib.cli import program
+from tirelib.rig.campaign import run_plan
+from tirelib.rig.plans import Plan
 from tirelib.threads import one_thread
 
 

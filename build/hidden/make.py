@@ -11,10 +11,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from bench.rig.hidden import HIDDEN
 from hidden.cases import NONE, case_file, make_case
 from hidden.measured import CACHE
 from tirelib.errors import TirelibError
+from tirelib.rig.hidden import HIDDEN
 from tirelib.threads import one_thread
 
 

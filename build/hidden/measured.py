@@ -13,16 +13,16 @@ from zlib import crc32
 
 import numpy as np
 
-from bench.rig.hidden import HIDDEN
-from bench.rig.measure import gages
-from bench.rig.mesh import mesh
-from bench.rig.observe import Trace, edges, trace
-from bench.rig.shown import Shown
-from bench.rig.solve import State, solve
-from bench.rig.tire import N_STRIPS, Condition, RigTire
 from hidden.plan import Day, day
 from tirelib.arrays import FloatArray
 from tirelib.campaign import CampaignHeader, TireGeometry, Tolerance
+from tirelib.rig.hidden import HIDDEN
+from tirelib.rig.measure import gages
+from tirelib.rig.mesh import mesh
+from tirelib.rig.observe import Trace, edges, trace
+from tirelib.rig.shown import Shown
+from tirelib.rig.solve import State, solve
+from tirelib.rig.tire import N_STRIPS, Condition, RigTire
 from tirelib.signal import LowPass
 from tirelib.waveforms import CONDITIONS, N_PHI, Waveforms
 

@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.rig.measure import Chain, settle
-from bench.rig.plans import KMH
-from bench.rig.tire import Condition, RigTire
 from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.rig.measure import Chain, settle
+from tirelib.rig.plans import KMH
+from tirelib.rig.tire import Condition, RigTire
 
 LOADS = (2400.0, 3900.0, 5400.0, 6900.0)
 PRESSURES = (1.7e5, 2.1e5, 2.5e5)

@@ -1,6 +1,6 @@
 """Small campaigns on the numerical rig that leave two effects alike, and further runs of them.
 
-The rig shares no code with the ring and plants every effect by another law (`bench.rig.hidden`).
+The rig shares no code with the ring and plants every effect by another law (`tirelib.rig.hidden`).
 Its structural constants, noise, set-point errors and trigger delay are drawn anew for every seed.
 Plain states, campaigns and further runs are kept in build/out/next_test.
 """
@@ -18,14 +18,6 @@ from hidden.cases import base_fit
 from hidden.measured import MESH, Plain, _toward, keep, waveforms
 from hidden.plan import Day, day
 
-from bench.rig.hidden import HIDDEN
-from bench.rig.measure import settle
-from bench.rig.mesh import mesh
-from bench.rig.observe import Trace, edges, trace
-from bench.rig.plans import BAR, KMH
-from bench.rig.shown import Shown
-from bench.rig.solve import State, solve
-from bench.rig.tire import Condition
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.fitter import WIDTH
 from tirelib.diagnose.refit import Refit
@@ -33,6 +25,14 @@ from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.random_effects import whitening
 from tirelib.planning.rivals import Trial, repeated_noise, try_suspects
+from tirelib.rig.hidden import HIDDEN
+from tirelib.rig.measure import settle
+from tirelib.rig.mesh import mesh
+from tirelib.rig.observe import Trace, edges, trace
+from tirelib.rig.plans import BAR, KMH
+from tirelib.rig.shown import Shown
+from tirelib.rig.solve import State, solve
+from tirelib.rig.tire import Condition
 from tirelib.waveforms import Waveforms
 
 CACHE = Path(__file__).parents[1] / "out" / "next_test"

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from hidden.cases import base_fit
 
-from bench.rig.hidden import HIDDEN
 from next_test.pair import REFERENCE, Pair, PairCase, foretold, look_alikes, open_still
 from next_test.rig import ENVELOPE, PLANS, bare, campaign
 from tirelib.arrays import FloatArray
@@ -21,6 +20,7 @@ from tirelib.planning.envelope import Envelope
 from tirelib.planning.next_test import next_test
 from tirelib.planning.rivals import Trial, repeated_noise, try_suspects
 from tirelib.planning.structure import Shapes
+from tirelib.rig.hidden import HIDDEN
 from tirelib.waveforms import Waveforms
 
 LEVELS = {"load": 3, "pressure": 2, "speed": 3}

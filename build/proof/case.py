@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from bench.rig.tire import RigTire
 from proof.laboratory import CREEP, laboratory, press
 from proof.tires import CACHE, measured
 from tirelib.arrays import BoolArray, FloatArray
@@ -18,6 +17,7 @@ from tirelib.model.base import operating_points, values_of
 from tirelib.model.state import Operating
 from tirelib.model.whole import solve_whole
 from tirelib.parameters import Tire
+from tirelib.rig.tire import RigTire
 from tirelib.waveforms import Waveforms
 
 LOAD, PRESSURE = 4800.0, 2.1e5

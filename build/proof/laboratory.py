@@ -1,8 +1,8 @@
 """What a laboratory would measure on a rig tire, from the rig's own equations.
 
 Press, modal test, sidewall test, tread block and belt growth are done on the equations that the rig
-solves (`bench.rig.belt`, `bench.rig.tread`, `bench.rig.solve`); the tire's constants are only read
-to compare with.
+solves (`tirelib.rig.belt`, `tirelib.rig.tread`, `tirelib.rig.solve`); the tire's constants are only
+read to compare with.
 """
 
 from dataclasses import dataclass
@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg, optimize
 
-from bench.rig.belt import FIELDS, LATERAL, PSI, U, V, internal
-from bench.rig.solve import inflated, solve
-from bench.rig.tire import N_STRIPS, Array, Condition, RigTire
-from bench.rig.tread import pressure as tread_pressure
+from tirelib.rig.belt import FIELDS, LATERAL, PSI, U, V, internal
+from tirelib.rig.solve import inflated, solve
+from tirelib.rig.tire import N_STRIPS, Array, Condition, RigTire
+from tirelib.rig.tread import pressure as tread_pressure
 from tirelib.ring.compliance import compliance
 from tirelib.ring.frequencies import sidewall_stiffness
 from tirelib.ring.frequency_fit import fit_stiffness

@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import qmc
 
-from bench.rig.measure import slip_ratio
-from bench.rig.observe import edges, forces, trace
-from bench.rig.solve import SolverError, State, solve
-from bench.rig.tire import Condition, tire
+from tirelib.rig.measure import slip_ratio
+from tirelib.rig.observe import edges, forces, trace
+from tirelib.rig.solve import SolverError, State, solve
+from tirelib.rig.tire import Condition, tire
 from tirelib.threads import one_thread
 
 OUT = Path(__file__).parents[1] / "out" / "virtual_tire"

@@ -21,7 +21,6 @@ from design import OUT, OUT_FRICTION, limits
 from scipy.interpolate import CubicSpline, RBFInterpolator
 from scipy.optimize import minimize
 
-from bench.rig.tire import tire
 from tirelib import __version__
 from tirelib.fmu.virtual.coordinates import coordinates, half_angle, warped
 from tirelib.fmu.virtual.surface import (
@@ -32,6 +31,7 @@ from tirelib.fmu.virtual.surface import (
     radius_terms,
     write_surface,
 )
+from tirelib.rig.tire import tire
 from tirelib.threads import one_thread
 
 GRID = 720

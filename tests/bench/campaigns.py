@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.device import Device
 from tests.synthetic import synthetic_run, write
+from tirebench.device import Device
 from tirelib.campaign import Run
 
 

@@ -3,15 +3,15 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from bench.chain import Estimator, Turn
-from bench.conditions import Conditions
-from bench.deadline import Deadline
-from bench.decoder import SerialDecoder
-from bench.device import Device
-from bench.estimation import Estimation, News
-from bench.protocols import Decoder
-from bench.timeline import Timeline
-from bench.wheels import Wheels
+from tirebench.chain import Estimator, Turn
+from tirebench.conditions import Conditions
+from tirebench.deadline import Deadline
+from tirebench.decoder import SerialDecoder
+from tirebench.device import Device
+from tirebench.estimation import Estimation, News
+from tirebench.protocols import Decoder
+from tirebench.timeline import Timeline
+from tirebench.wheels import Wheels
 
 
 class InProcess:
@@ -42,7 +42,7 @@ class InProcess:
 
 
 class FakeSource:
-    """A line that was told what to say; see `bench.session.Source`."""
+    """A line that was told what to say; see `tirebench.session.Source`."""
 
     name, live, ended, message = "port", True, "", ""
     last_byte: float | None = None

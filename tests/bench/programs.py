@@ -29,7 +29,7 @@ class Program(subprocess.Popen[str]):
     def __init__(self, folder: Path, *arguments: object) -> None:
         self.out, self.err = folder / "out.txt", folder / "err.txt"
         with self.out.open("w") as out, self.err.open("w") as err:
-            command = [sys.executable, "-u", "-m", "bench", *map(str, arguments)]
+            command = [sys.executable, "-u", "-m", "tirebench", *map(str, arguments)]
             super().__init__(command, stdout=out, stderr=err, text=True)
 
     def says(self, pattern: str) -> "re.Match[str]":

@@ -15,21 +15,21 @@ import pytest
 from click.testing import CliRunner
 from rich.console import Console
 
-import bench.cli
+import tirebench.cli
 import tirelib.cli
-from bench.deadline import Deadline
-from bench.device import Device
-from bench.faults import Faults
-from bench.fmu_archive import read_fmu
-from bench.links import Read
-from bench.protocols.plan import ProtocolPlan
-from bench.rig.measure import Chain
-from bench.trust import remember
-from bench.wheels import Wheels
 from tests.bench.programs import PATIENCE, wait_until
 from tests.synthetic import cornering_runs, synthetic_run, write
+from tirebench.deadline import Deadline
+from tirebench.device import Device
+from tirebench.faults import Faults
+from tirebench.fmu_archive import read_fmu
+from tirebench.links import Read
+from tirebench.protocols.plan import ProtocolPlan
+from tirebench.trust import remember
+from tirebench.wheels import Wheels
 from tirelib.campaign import Run, check_campaign, read_campaign
 from tirelib.report.agreement import agreement, read_turns
+from tirelib.rig.measure import Chain
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +55,7 @@ def steps_here(demo: Any) -> Any:
             if program == "python":
                 demo.main(text[1:])
                 return
-            group = {"tirelib": tirelib.cli.program, "tirebench": bench.cli.program}[program]
+            group = {"tirelib": tirelib.cli.program, "tirebench": tirebench.cli.program}[program]
             outcome = CliRunner().invoke(group, text)
             assert outcome.exit_code == 0, (what, outcome.output, outcome.exception)
             if "build" in text:

@@ -9,12 +9,12 @@ import can
 import cantools
 import pytest
 
-from bench.bridges import CanSender, UdpSender, udp_target
-from bench.chain import Turn
-from bench.errors import DeviceError
-from bench.links.opening import PortPlan
-from bench.protocols.dbc import FILES
-from bench.protocols.estimates import estimate_frames
+from tirebench.bridges import CanSender, UdpSender, udp_target
+from tirebench.chain import Turn
+from tirebench.errors import DeviceError
+from tirebench.links.opening import PortPlan
+from tirebench.protocols.dbc import FILES
+from tirebench.protocols.estimates import estimate_frames
 
 OUTPUTS = {
     "Fz": 4321.5,

@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.chain import Outputs, Turn
-from bench.conditions import Condition, Conditions, condition
-from bench.device import Device
-from bench.document import document
-from bench.emulator import Script, write_script
-from bench.faults import Faults, parse_faults
-from bench.frames import SAMPLES
 from tests.bench.campaigns import tiny_runs
 from tests.bench.in_process import InProcess
 from tests.synthetic import frames as cuts
+from tirebench.chain import Outputs, Turn
+from tirebench.conditions import Condition, Conditions, condition
+from tirebench.device import Device
+from tirebench.document import document
+from tirebench.emulator import Script, write_script
+from tirebench.faults import Faults, parse_faults
+from tirebench.frames import SAMPLES
 from tirelib.arrays import FloatArray
 from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration import Calibration

@@ -7,8 +7,9 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from bench.can_batch import same_kind
-from bench.damage import (
+from tests.bench.test_slcan import Keep
+from tirebench.can_batch import same_kind
+from tirebench.damage import (
     BUS_KINDS,
     CHANGED,
     KINDS,
@@ -18,10 +19,9 @@ from bench.damage import (
     strike_serial,
     strike_slcan,
 )
-from bench.line_counts import LineCounts
-from bench.protocols.layouts import RAW12C, RAW16
-from bench.protocols.slcan import SlcanDecoder, encode
-from tests.bench.test_slcan import Keep
+from tirebench.line_counts import LineCounts
+from tirebench.protocols.layouts import RAW12C, RAW16
+from tirebench.protocols.slcan import SlcanDecoder, encode
 
 
 def test_twenty_thousand_frames_damaged_none_accepted_wrong() -> None:

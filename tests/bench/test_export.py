@@ -10,20 +10,20 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from bench.cli import program
-from bench.conditions import Conditions
-from bench.device import Device
-from bench.emulator import Player, record_tape
-from bench.errors import BenchError
-from bench.faults import Faults, parse_faults
-from bench.links import BACK, LOST, Read
-from bench.protocols import SERIAL, SLCAN
-from bench.protocols.layouts import RAW16
-from bench.protocols.plan import ProtocolPlan
-from bench.recording import Recorder, RecordingHeader
-from bench.transmitter import transmitter
 from tests.bench.campaigns import tiny_runs
 from tests.bench.disks import little_room
+from tirebench.cli import program
+from tirebench.conditions import Conditions
+from tirebench.device import Device
+from tirebench.emulator import Player, record_tape
+from tirebench.errors import BenchError
+from tirebench.faults import Faults, parse_faults
+from tirebench.links import BACK, LOST, Read
+from tirebench.protocols import SERIAL, SLCAN
+from tirebench.protocols.layouts import RAW16
+from tirebench.protocols.plan import ProtocolPlan
+from tirebench.recording import Recorder, RecordingHeader
+from tirebench.transmitter import transmitter
 from tirelib.campaign import check_campaign, read_campaign
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.result import estimate_document
@@ -181,7 +181,7 @@ def test_a_recording_without_campaign_needs_one_like_it(
 
 
 def reads_of(path: Path) -> Iterator[Read]:
-    from bench.recording import Recording
+    from tirebench.recording import Recording
 
     recording = Recording(path)
     yield from recording.reads()

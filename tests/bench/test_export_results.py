@@ -11,18 +11,18 @@ import pytest
 from asammdf import MDF
 from click.testing import CliRunner
 
-from bench.can_batch import joined, pack, same_kind
-from bench.cli import program
-from bench.conditions import Conditions
-from bench.document import turn_document
-from bench.links import Read
-from bench.protocols import CAN
-from bench.protocols.plan import ProtocolPlan
-from bench.protocols.user_map import parse_map
-from bench.recorder import Recorder
-from bench.recording_header import RecordingHeader
 from tests.bench.test_bridges import TURN
 from tests.bench.test_user_map import DBC, MAP, frames_of, physical
+from tirebench.can_batch import joined, pack, same_kind
+from tirebench.cli import program
+from tirebench.conditions import Conditions
+from tirebench.document import turn_document
+from tirebench.links import Read
+from tirebench.protocols import CAN
+from tirebench.protocols.plan import ProtocolPlan
+from tirebench.protocols.user_map import parse_map
+from tirebench.recorder import Recorder
+from tirebench.recording_header import RecordingHeader
 from tirelib.campaign import check_campaign, read_campaign
 
 TURNS = [replace(TURN, ready=0.02 * n, texts={"note": "restarted"} if n else {}) for n in range(3)]

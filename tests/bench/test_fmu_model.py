@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from bench.conditions import Conditions, condition
-from bench.device import Device
-from bench.emulator import write_script
-from bench.errors import FmuError
-from bench.faults import Faults
-from bench.fmu_archive import read_fmu
-from bench.fmu_model import FmuFile, FmuModel
 from tests.bench.campaigns import tiny_runs
 from tests.bench.in_process import InProcess
 from tests.fmu import live
+from tirebench.conditions import Conditions, condition
+from tirebench.device import Device
+from tirebench.emulator import write_script
+from tirebench.errors import FmuError
+from tirebench.faults import Faults
+from tirebench.fmu_archive import read_fmu
+from tirebench.fmu_model import FmuFile, FmuModel
 
 STEADY = Conditions.constant(18.0, 2.3e5, 0.0)
 

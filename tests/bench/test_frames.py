@@ -9,9 +9,9 @@ from cobs import cobs
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.decoder import SHORTEST_PERIOD, SerialDecoder
-from bench.frames import LONGEST_ON_WIRE, Frames, encode, strain_frames
 from tests.synthetic import frames as cuts
+from tirebench.decoder import SHORTEST_PERIOD, SerialDecoder
+from tirebench.frames import LONGEST_ON_WIRE, Frames, encode, strain_frames
 
 FIELDS = ("wheel", "seq", "t_us", "period", "flags", "rssi", "temperature")
 

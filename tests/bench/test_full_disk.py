@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bench.conditions import Conditions
-from bench.errors import RecordingError
-from bench.links import BACK, LOST, PASSED, RESUMED, Read
-from bench.live.exchange import Exchange
-from bench.live.kept import CONTEXT
-from bench.live.recorder import _Recorder
-from bench.live.recording_state import Order, RecorderState, RecordingRule
-from bench.mcap_log import McapLog
-from bench.recorder import Recorder
-from bench.recording import Recording
-from bench.recording_header import RecordingHeader
+from tirebench.conditions import Conditions
+from tirebench.errors import RecordingError
+from tirebench.links import BACK, LOST, PASSED, RESUMED, Read
+from tirebench.live.exchange import Exchange
+from tirebench.live.kept import CONTEXT
+from tirebench.live.recorder import _Recorder
+from tirebench.live.recording_state import Order, RecorderState, RecordingRule
+from tirebench.mcap_log import McapLog
+from tirebench.recorder import Recorder
+from tirebench.recording import Recording
+from tirebench.recording_header import RecordingHeader
 
 STEADY = Conditions.constant(18.0)
 PIECES = [bytes([number]) * 5000 for number in range(9)]
@@ -42,9 +42,9 @@ class Disk:
 
 @pytest.fixture
 def disk(monkeypatch: pytest.MonkeyPatch) -> Disk:
-    monkeypatch.setattr("bench.live.recorder.settled", lambda: None)
-    monkeypatch.setattr("bench.live.recorder.RETRY", 0.0)
-    monkeypatch.setattr("bench.live.recorder.CHUNK", -1.0)
+    monkeypatch.setattr("tirebench.live.recorder.settled", lambda: None)
+    monkeypatch.setattr("tirebench.live.recorder.RETRY", 0.0)
+    monkeypatch.setattr("tirebench.live.recorder.CHUNK", -1.0)
     return Disk(monkeypatch)
 
 
@@ -174,7 +174,7 @@ SECOND = 1_000_000_000
 def clock(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Give what the recorder takes for this moment, [ns]."""
     now = [0]
-    monkeypatch.setattr("bench.live.recorder.time.monotonic_ns", lambda: now[0])
+    monkeypatch.setattr("tirebench.live.recorder.time.monotonic_ns", lambda: now[0])
     return now
 
 
@@ -234,7 +234,7 @@ def test_a_long_time_before_a_trigger_is_written_piece_by_piece_and_the_queue_st
     disk: Disk, tmp_path: Path, clock: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What comes meanwhile stands behind it, also where the disk is full in the middle."""
-    monkeypatch.setattr("bench.live.recorder.CHUNK_BYTES", 9000)  # two pieces
+    monkeypatch.setattr("tirebench.live.recorder.CHUNK_BYTES", 9000)  # two pieces
     bench = Bench(tmp_path / "a.mcap", RecordingRule(around=(60.0, 0.0)))
     bench.step(*PIECES[:5])
     bench.order("event", {"event": "marker", "text": "kerb"})

@@ -11,23 +11,23 @@ from click.testing import CliRunner, Result
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.cli import program
-from bench.conditions import Conditions
-from bench.device import Device, parse_device, read_device
-from bench.emulator import write_script
-from bench.errors import DeviceError
-from bench.faults import Faults
-from bench.frames import encode, strain_frames
-from bench.gage_setup import apparent_strain, device_text, shunted, zeroed
-from bench.links import Read
-from bench.links.pseudo import PseudoTerminal
-from bench.page.commands import Command, CommandDesk, parse_command
-from bench.page.gages import GageSetup
-from bench.recorder import Recorder
-from bench.recording_header import RecordingHeader
-from bench.standing import Level
 from tests.bench.campaigns import tiny_runs
 from tests.bench.in_process import FakeSource
+from tirebench.cli import program
+from tirebench.conditions import Conditions
+from tirebench.device import Device, parse_device, read_device
+from tirebench.emulator import write_script
+from tirebench.errors import DeviceError
+from tirebench.faults import Faults
+from tirebench.frames import encode, strain_frames
+from tirebench.gage_setup import apparent_strain, device_text, shunted, zeroed
+from tirebench.links import Read
+from tirebench.links.pseudo import PseudoTerminal
+from tirebench.page.commands import Command, CommandDesk, parse_command
+from tirebench.page.gages import GageSetup
+from tirebench.recorder import Recorder
+from tirebench.recording_header import RecordingHeader
+from tirebench.standing import Level
 from tirelib.arrays import FloatArray
 
 OFFSET = np.array([120.0, -340.0, 5.0, 0.0, 1800.0])

@@ -15,15 +15,15 @@ from mcap.records import Chunk, Message
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
-from bench import records
-from bench.cli import program
-from bench.conditions import Conditions, RunMark, condition, conditions_document
-from bench.errors import BenchError, RecordingError
-from bench.protocols import CAN, SERIAL
-from bench.protocols.plan import ProtocolPlan
-from bench.recording import Recording
-from bench.recording_header import FORMER as FORMAT
-from bench.recording_topics import CONDITIONS, ESTIMATE, EVENTS
+from tirebench import records
+from tirebench.cli import program
+from tirebench.conditions import Conditions, RunMark, condition, conditions_document
+from tirebench.errors import BenchError, RecordingError
+from tirebench.protocols import CAN, SERIAL
+from tirebench.protocols.plan import ProtocolPlan
+from tirebench.recording import Recording
+from tirebench.recording_header import FORMER as FORMAT
+from tirebench.recording_topics import CONDITIONS, ESTIMATE, EVENTS
 
 NESTED = "[" * 100_000
 MARK = RunMark(1, 0, 0.0, {}, {"kind": "free", "load": 3000.0})
@@ -83,7 +83,7 @@ def made(
 
 
 def invoke(*words: object) -> tuple[int, str]:
-    """Return exit code and text as `bench.cli.main` gives them."""
+    """Return exit code and text as `tirebench.cli.main` gives them."""
     outcome = CliRunner().invoke(program, [str(word) for word in words])
     if outcome.exception is not None and not isinstance(outcome.exception, SystemExit):
         assert isinstance(outcome.exception, BenchError), repr(outcome.exception)

@@ -9,15 +9,15 @@ from typing import Any
 
 import pytest
 
-from bench.chain import Turn
-from bench.cli import program
-from bench.conditions import Conditions
-from bench.document import turn_document
-from bench.errors import RecordingError
-from bench.journal import Journal, completed
-from bench.recorder import Recorder
-from bench.recording_header import RecordingHeader
 from tests.bench.test_bridges import OUTPUTS
+from tirebench.chain import Turn
+from tirebench.cli import program
+from tirebench.conditions import Conditions
+from tirebench.document import turn_document
+from tirebench.errors import RecordingError
+from tirebench.journal import Journal, completed
+from tirebench.recorder import Recorder
+from tirebench.recording_header import RecordingHeader
 
 TURNS = [
     Turn(1, 0, number, number, number, OUTPUTS, {}, 0, (0,) * 5, arrival=number)

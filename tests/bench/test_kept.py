@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-from bench.deadline import Deadline
-from bench.errors import DeviceError
-from bench.live import kept as kept_module
-from bench.live.kept import CONTEXT, Kept
-from bench.live.priority import BELOW, PRIORITY, as_parent, below, realtime
 from tests.bench.programs import PATIENCE
+from tirebench.deadline import Deadline
+from tirebench.errors import DeviceError
+from tirebench.live import kept as kept_module
+from tirebench.live.kept import CONTEXT, Kept
+from tirebench.live.priority import BELOW, PRIORITY, as_parent, below, realtime
 
 
 def tell(news: Any, number: int) -> None:

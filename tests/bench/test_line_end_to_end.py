@@ -7,11 +7,11 @@ from typing import Any
 
 from click.testing import CliRunner
 
-from bench.cli import program
-from bench.links import BACK
-from bench.recording import Recording
 from tests.bench.conftest import Spawn
 from tests.bench.programs import PATIENCE, Line, wait_until
+from tirebench.cli import program
+from tirebench.links import BACK
+from tirebench.recording import Recording
 
 
 def result(path: Path) -> dict[str, Any]:

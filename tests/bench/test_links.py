@@ -12,21 +12,21 @@ import can
 import numpy as np
 import pytest
 
-from bench.can_batch import CanBatch, same_kind, unpack
-from bench.deadline import Deadline
-from bench.errors import DeviceError, LinkError, UnpluggedError
-from bench.line_counts import LineCounts
-from bench.links import BACK, LOST, Link, Read
-from bench.links.can_bus import CanLink, message_of
-from bench.links.opening import PortPlan
-from bench.links.pseudo import PseudoTerminal
-from bench.links.reconnecting import ReconnectingLink
-from bench.links.serial_port import MUCH, NAP, SerialLink
-from bench.links.slcan_port import SlcanLink
-from bench.protocols.slcan import SlcanDecoder, encode
 from tests.bench.clocks import Clock
 from tests.bench.programs import PATIENCE, wait_until
 from tests.bench.test_slcan import Keep, keys, some_frames
+from tirebench.can_batch import CanBatch, same_kind, unpack
+from tirebench.deadline import Deadline
+from tirebench.errors import DeviceError, LinkError, UnpluggedError
+from tirebench.line_counts import LineCounts
+from tirebench.links import BACK, LOST, Link, Read
+from tirebench.links.can_bus import CanLink, message_of
+from tirebench.links.opening import PortPlan
+from tirebench.links.pseudo import PseudoTerminal
+from tirebench.links.reconnecting import ReconnectingLink
+from tirebench.links.serial_port import MUCH, NAP, SerialLink
+from tirebench.links.slcan_port import SlcanLink
+from tirebench.protocols.slcan import SlcanDecoder, encode
 
 CANNOT = {
     "canalystii",
@@ -134,7 +134,7 @@ def test_few_bytes_are_waited_for_once_and_many_are_fetched_with_what_waits_behi
             super().sleep(seconds)
 
     clock = Asleep()
-    for module in ("bench.links.serial_port", "bench.deadline"):
+    for module in ("tirebench.links.serial_port", "tirebench.deadline"):
         monkeypatch.setattr(f"{module}.time", clock)
     for size, more in ((1, 0), (10, 0), (MUCH, 7)):  # nothing was read before the first
         waiting(terminal, link, size)
@@ -157,7 +157,7 @@ def test_a_port_that_goes_away_while_a_batch_is_gathered_loses_nothing_of_it(
     waiting(terminal, link, 1)
     assert link.receive(Deadline.after(5.0)) is not None
     waiting(terminal, link, 10)  # which may sleep
-    monkeypatch.setattr("bench.links.serial_port.time.sleep", lambda _: terminal.close())
+    monkeypatch.setattr("tirebench.links.serial_port.time.sleep", lambda _: terminal.close())
     read = link.receive(Deadline.after(5.0))
     assert read is not None
     assert read.data == bytes(10)
@@ -298,7 +298,7 @@ def test_whoever_stands_by_can_load_what_a_port_needs(
     port: str, kind: type, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     loaded: list[str] = []
-    monkeypatch.setattr("bench.links.opening.import_module", loaded.append)
+    monkeypatch.setattr("tirebench.links.opening.import_module", loaded.append)
     PortPlan(port).load()
     assert loaded == [kind.__module__]
 
@@ -317,7 +317,7 @@ def events_of(link: Link, seconds: float, until: str) -> tuple[list[str], bytes]
 def test_a_cable_that_is_plugged_in_again_is_tried_when_its_name_appears(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("bench.links.reconnecting.FIRST_WAIT", 10.0 * PATIENCE)
+    monkeypatch.setattr("tirebench.links.reconnecting.FIRST_WAIT", 10.0 * PATIENCE)
     name = tmp_path / "port"
     port = PseudoTerminal(name)
     link = ReconnectingLink(lambda: SerialLink(str(name)), PATIENCE)
@@ -372,7 +372,7 @@ class Failing:
 
 def test_attempts_lie_farther_and_farther_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = Clock()
-    for module in ("bench.links.reconnecting", "bench.deadline"):
+    for module in ("tirebench.links.reconnecting", "tirebench.deadline"):
         monkeypatch.setattr(f"{module}.time", clock)
     failing = Failing(6, clock)
     link = ReconnectingLink(failing.open, 60.0)

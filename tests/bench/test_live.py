@@ -8,13 +8,13 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
-from bench.cli import program
-from bench.errors import BenchError
-from bench.fmu_archive import read_fmu
-from bench.recording import Recording
-from bench.trust import remember
 from tests.bench.conftest import Spawn
 from tests.bench.programs import A_TURN, Line, port_of, wait_until
+from tirebench.cli import program
+from tirebench.errors import BenchError
+from tirebench.fmu_archive import read_fmu
+from tirebench.recording import Recording
+from tirebench.trust import remember
 from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import write_calibration

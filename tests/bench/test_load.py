@@ -9,11 +9,11 @@ from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.bus_load import LoadPlan, frame_bits, highest_rate, load_of, suggestions, worst_bits
-from bench.can_batch import same_kind
-from bench.cli import program
-from bench.errors import DeviceError
-from bench.protocols.layouts import RAW12, RAW12C, RAW16
+from tirebench.bus_load import LoadPlan, frame_bits, highest_rate, load_of, suggestions, worst_bits
+from tirebench.can_batch import same_kind
+from tirebench.cli import program
+from tirebench.errors import DeviceError
+from tirebench.protocols.layouts import RAW12, RAW12C, RAW16
 
 M = 1_000_000
 TABLE = [

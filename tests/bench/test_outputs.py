@@ -7,14 +7,14 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from bench.cli import VERBS, program
+from tirebench.cli import VERBS, program
 
 OUTPUTS = {"--json", "--out", "--record", "--truth", "--port-file", "--conditions"}
 INPUTS = {("run", "--conditions"), ("record", "--conditions"), ("run", "--port-file")}
 CASES = [
     (verb, option)
     for verb in VERBS
-    for parameter in getattr(import_module(f"bench.cli.{verb}"), verb).params
+    for parameter in getattr(import_module(f"tirebench.cli.{verb}"), verb).params
     for option in OUTPUTS & set(parameter.opts)
     if (verb, option) not in INPUTS
 ]
@@ -37,7 +37,7 @@ def test_every_verb_has_an_output() -> None:
 def test_an_output_below_a_file_is_refused(verb: str, option: str, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     place = tmp_path / "file" / "out"
-    command = getattr(import_module(f"bench.cli.{verb}"), verb)
+    command = getattr(import_module(f"tirebench.cli.{verb}"), verb)
     assert isinstance(command, click.Command)
     needed = [
         word

@@ -9,16 +9,16 @@ from pathlib import Path
 
 import pytest
 
-from bench.live.exchange import Exchange
-from bench.live.kept import CONTEXT
-from bench.owned import SHARED, prefix, sweep
+from tirebench.live.exchange import Exchange
+from tirebench.live.kept import CONTEXT
+from tirebench.owned import SHARED, prefix, sweep
 
 pytestmark = pytest.mark.skipif(not SHARED.is_dir(), reason="no /dev/shm on this system")
 OWNER = """
 import tempfile, time
-from bench.live.exchange import Exchange
-from bench.live.kept import CONTEXT
-from bench.owned import prefix
+from tirebench.live.exchange import Exchange
+from tirebench.live.kept import CONTEXT
+from tirebench.owned import prefix
 exchange, folder = Exchange.create(CONTEXT, 1), tempfile.mkdtemp(prefix=prefix())
 print(prefix(), flush=True)
 time.sleep(600)

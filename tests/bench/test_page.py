@@ -16,23 +16,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from bench.chain import Turn
-from bench.conditions import Conditions
-from bench.errors import DeviceError
-from bench.estimation import News, WheelEstimation
-from bench.live.recorder import RecorderState
-from bench.page.board import RINGS, Board, RingReader
-from bench.page.commands import Command, CommandDesk, parse_command
-from bench.page.feed import About, Feed
-from bench.page.history import COLUMNS, History, Viewer
-from bench.page.laps import GRID, Lap, Laps, band
-from bench.page.live import PageChoice
-from bench.page.quantities import UNITS
-from bench.page.recording_switch import RecordingSwitch
-from bench.page.terminal import numbers, picture
-from bench.timeline import Samples
-from bench.wheels import Block
 from tests.bench.in_process import FakeSource
+from tirebench.chain import Turn
+from tirebench.conditions import Conditions
+from tirebench.errors import DeviceError
+from tirebench.estimation import News, WheelEstimation
+from tirebench.live.recorder import RecorderState
+from tirebench.page.board import RINGS, Board, RingReader
+from tirebench.page.commands import Command, CommandDesk, parse_command
+from tirebench.page.feed import About, Feed
+from tirebench.page.history import COLUMNS, History, Viewer
+from tirebench.page.laps import GRID, Lap, Laps, band
+from tirebench.page.live import PageChoice
+from tirebench.page.quantities import UNITS
+from tirebench.page.recording_switch import RecordingSwitch
+from tirebench.page.terminal import numbers, picture
+from tirebench.timeline import Samples
+from tirebench.wheels import Block
 from tirelib.estimators.edge import EDGE_UNIT
 
 PERIOD = 1e-4

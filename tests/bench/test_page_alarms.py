@@ -11,33 +11,33 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.can_batch import pack, same_kind
-from bench.cli.live import counters
-from bench.conditions import Conditions, Measured
-from bench.device import Device
-from bench.errors import DeviceError
-from bench.estimation import News
-from bench.line_counts import NO_FRAME, NOTHING, LineCounts
-from bench.links.opening import PortPlan
-from bench.live.ports import PortState
-from bench.live.reader import LineState
-from bench.live.recording_state import RecorderState
-from bench.live.run_alarms import DECODED_AGAIN, RECORDED_AGAIN, TOO_BUSY, RunAlarms
-from bench.page.alarms import RULES, Alarms, Rule, event_of, read_alarms
-from bench.page.board import RINGS, Board
-from bench.page.condition_lines import in_use
-from bench.page.feed import About, Feed, vitals
-from bench.page.recent import SPAN, Recent
-from bench.page.terminal import alarms as alarm_lines
-from bench.page.terminal import in_use_line
-from bench.protocols import layouts
-from bench.protocols.frame_decoder import PackedDecoder
-from bench.protocols.layouts import Health
-from bench.protocols.wheel_can import WheelCan
-from bench.source_plan import SourcePlan, wheels_of
-from bench.wheels import Wheels
 from tests.bench.in_process import FakeSource
 from tests.bench.test_protocols import RAW16, some_raw
+from tirebench.can_batch import pack, same_kind
+from tirebench.cli.live import counters
+from tirebench.conditions import Conditions, Measured
+from tirebench.device import Device
+from tirebench.errors import DeviceError
+from tirebench.estimation import News
+from tirebench.line_counts import NO_FRAME, NOTHING, LineCounts
+from tirebench.links.opening import PortPlan
+from tirebench.live.ports import PortState
+from tirebench.live.reader import LineState
+from tirebench.live.recording_state import RecorderState
+from tirebench.live.run_alarms import DECODED_AGAIN, RECORDED_AGAIN, TOO_BUSY, RunAlarms
+from tirebench.page.alarms import RULES, Alarms, Rule, event_of, read_alarms
+from tirebench.page.board import RINGS, Board
+from tirebench.page.condition_lines import in_use
+from tirebench.page.feed import About, Feed, vitals
+from tirebench.page.recent import SPAN, Recent
+from tirebench.page.terminal import alarms as alarm_lines
+from tirebench.page.terminal import in_use_line
+from tirebench.protocols import layouts
+from tirebench.protocols.frame_decoder import PackedDecoder
+from tirebench.protocols.layouts import Health
+from tirebench.protocols.wheel_can import WheelCan
+from tirebench.source_plan import SourcePlan, wheels_of
+from tirebench.wheels import Wheels
 
 LOSS = Rule("samples lost", "%", high=1.0, hysteresis=0.5)
 

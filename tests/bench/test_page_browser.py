@@ -13,22 +13,22 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from bench.conditions import Conditions
-from bench.estimation import News
-from bench.page.feed import About
-from bench.page.history import COLUMNS
-from bench.page.laps import GRID
-from bench.page.live import LivePage, PageChoice
-from bench.page.quantities import UNITS
-from bench.recording import Recording
-from bench.recording_topics import EVENTS
-from bench.standing import Level
 from tests.bench.browser import chromium
 from tests.bench.conftest import Spawn, spawning
 from tests.bench.in_process import FakeSource
 from tests.bench.programs import PATIENCE, port_of, wait_until
 from tests.bench.test_live import result
 from tests.bench.test_page import turn as made_turn
+from tirebench.conditions import Conditions
+from tirebench.estimation import News
+from tirebench.page.feed import About
+from tirebench.page.history import COLUMNS
+from tirebench.page.laps import GRID
+from tirebench.page.live import LivePage, PageChoice
+from tirebench.page.quantities import UNITS
+from tirebench.recording import Recording
+from tirebench.recording_topics import EVENTS
+from tirebench.standing import Level
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.flags import TurnFlag

@@ -19,13 +19,13 @@ import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from bench.estimation import News
-from bench.page.connections import MOST_IDLE, Connection, least_needed
-from bench.page.feed import About
-from bench.page.live import LivePage, PageChoice
-from bench.page.server import MOST_VIEWERS, STATIC
 from tests.bench.in_process import FakeSource
 from tests.bench.programs import PATIENCE, wait_until
+from tirebench.estimation import News
+from tirebench.page.connections import MOST_IDLE, Connection, least_needed
+from tirebench.page.feed import About
+from tirebench.page.live import LivePage, PageChoice
+from tirebench.page.server import MOST_VIEWERS, STATIC
 
 Answer = tuple[int, dict[str, str], bytes]
 
@@ -352,8 +352,8 @@ def test_a_run_that_is_killed_leaves_no_page_behind() -> None:
 
 A_RUN = """
 import time
-from bench.page.feed import About
-from bench.page.live import LivePage, PageChoice
+from tirebench.page.feed import About
+from tirebench.page.live import LivePage, PageChoice
 from tests.bench.in_process import FakeSource
 with LivePage(PageChoice(), FakeSource(), About("port"), None) as page:
     print(page.process_id, flush=True)

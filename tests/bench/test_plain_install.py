@@ -28,7 +28,7 @@ def program(module: str, *words: str) -> subprocess.CompletedProcess[str]:
 
 
 def tirebench(*words: str) -> subprocess.CompletedProcess[str]:
-    return program("bench.cli", *words)
+    return program("tirebench.cli", *words)
 
 
 def test_an_export_without_its_package_says_what_to_install(tmp_path: Path) -> None:

@@ -7,24 +7,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.can_batch import pack
-from bench.conditions import conditions_document, parse_conditions
-from bench.device import Device
-from bench.emulator import Player, Tape, record_tape
-from bench.errors import DeviceError
-from bench.faults import Faults, parse_faults
-from bench.links.can_bus import packed
-from bench.manoeuvre import Motion, nodes, read_manoeuvre, waveform
-from bench.protocols import CAN, SERIAL, SLCAN
-from bench.protocols.layouts import RAW12, RAW12C, RAW16
-from bench.protocols.plan import ProtocolPlan
-from bench.rig.measure import Chain as MeasuringChain
-from bench.rig.measure import gages
-from bench.rig.ramp import Point
-from bench.rig.tire import Condition, tire
-from bench.timeline import Samples, Timeline
-from bench.transmitter import transmitter
 from tests.bench.campaigns import tiny_runs
+from tirebench.can_batch import pack
+from tirebench.conditions import conditions_document, parse_conditions
+from tirebench.device import Device
+from tirebench.emulator import Player, Tape, record_tape
+from tirebench.errors import DeviceError
+from tirebench.faults import Faults, parse_faults
+from tirebench.links.can_bus import packed
+from tirebench.manoeuvre import Motion, nodes, read_manoeuvre, waveform
+from tirebench.protocols import CAN, SERIAL, SLCAN
+from tirebench.protocols.layouts import RAW12, RAW12C, RAW16
+from tirebench.protocols.plan import ProtocolPlan
+from tirebench.timeline import Samples, Timeline
+from tirebench.transmitter import transmitter
+from tirelib.rig.measure import Chain as MeasuringChain
+from tirelib.rig.measure import gages
+from tirelib.rig.ramp import Point
+from tirelib.rig.tire import Condition, tire
 
 COUNT = Device().scale
 

@@ -14,38 +14,38 @@ from typing import Any, cast
 import pytest
 from mcap.reader import make_reader
 
-from bench.chain import RESTARTED, SKIPPED, Jump, Outputs, Place, Turn
-from bench.conditions import Condition, Conditions
-from bench.deadline import Deadline
-from bench.decoder import SerialDecoder
-from bench.device import Device
-from bench.document import flags, turn_document
-from bench.emulator import write_script
-from bench.errors import DeviceError, LinkTimeoutError
-from bench.estimation import Estimation, News
-from bench.faults import Faults
-from bench.fmu_archive import read_fmu
-from bench.fmu_model import FmuFile, FmuModel
-from bench.links import BACK, LOST, RESUMED, Read
-from bench.links.opening import PortPlan
-from bench.links.replay import ReplayLink
-from bench.live.chain import LiveChain, LivePlan
-from bench.live.estimator import EstimatorPlan, Report, _Estimator
-from bench.live.exchange import Address, Exchange
-from bench.live.kept import CONTEXT
-from bench.live.reader import ReaderPlan, load
-from bench.live.recorder import _Recorder
-from bench.live.recording_state import Order, RecorderState, RecordingRule
-from bench.live.run_alarms import RECORDED_AGAIN
-from bench.recording import Recorder, Recording, RecordingHeader, jump_event
-from bench.recording_header import parts_of
-from bench.replay import ReplayChain
-from bench.source_plan import SourcePlan
-from bench.wheels import Block, Wheels
 from tests.bench.campaigns import tiny_runs
 from tests.bench.clocks import Clock
 from tests.bench.conftest import Spawn
 from tests.bench.programs import A_TURN, PATIENCE, port_of, wait_until
+from tirebench.chain import RESTARTED, SKIPPED, Jump, Outputs, Place, Turn
+from tirebench.conditions import Condition, Conditions
+from tirebench.deadline import Deadline
+from tirebench.decoder import SerialDecoder
+from tirebench.device import Device
+from tirebench.document import flags, turn_document
+from tirebench.emulator import write_script
+from tirebench.errors import DeviceError, LinkTimeoutError
+from tirebench.estimation import Estimation, News
+from tirebench.faults import Faults
+from tirebench.fmu_archive import read_fmu
+from tirebench.fmu_model import FmuFile, FmuModel
+from tirebench.links import BACK, LOST, RESUMED, Read
+from tirebench.links.opening import PortPlan
+from tirebench.links.replay import ReplayLink
+from tirebench.live.chain import LiveChain, LivePlan
+from tirebench.live.estimator import EstimatorPlan, Report, _Estimator
+from tirebench.live.exchange import Address, Exchange
+from tirebench.live.kept import CONTEXT
+from tirebench.live.reader import ReaderPlan, load
+from tirebench.live.recorder import _Recorder
+from tirebench.live.recording_state import Order, RecorderState, RecordingRule
+from tirebench.live.run_alarms import RECORDED_AGAIN
+from tirebench.recording import Recorder, Recording, RecordingHeader, jump_event
+from tirebench.recording_header import parts_of
+from tirebench.replay import ReplayChain
+from tirebench.source_plan import SourcePlan
+from tirebench.wheels import Block, Wheels
 from tirelib.arrays import FloatArray
 
 STEADY = Conditions.constant(18.0, 2.3e5, 0.0)
@@ -94,7 +94,7 @@ def test_who_stands_by_has_its_port_loaded_and_its_garbage_collected(
 ) -> None:
     done: list[object] = []
     monkeypatch.setattr(PortPlan, "load", lambda port: done.append(port))
-    monkeypatch.setattr("bench.live.reader.settled", lambda: done.append("settled"))
+    monkeypatch.setattr("tirebench.live.reader.settled", lambda: done.append("settled"))
     plan = ReaderPlan((SourcePlan(PortPlan("p")),), 60.0)
     load(plan, Address("", 0, (), None, 0))
     assert done == [plan.sources[0].port, "settled"]
@@ -351,7 +351,7 @@ def test_a_read_that_is_on_disk_is_not_written_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A recorder that is killed when it has noted what it did, before it gave back the room."""
-    monkeypatch.setattr("bench.live.recorder.settled", lambda: None)
+    monkeypatch.setattr("tirebench.live.recorder.settled", lambda: None)
     exchange, header = Exchange.create(CONTEXT, 1), RecordingHeader({})
     first = Recorder(tmp_path / "a.mcap", header, STEADY)
     for number in range(2):
@@ -393,7 +393,7 @@ def test_a_recorder_is_waited_for_as_long_as_its_file_grows(
 ) -> None:
     """Minutes before a trigger take minutes to write; one that hangs is given up."""
     clock, said = Clock(), []
-    for module in ("bench.live.chain", "bench.deadline"):
+    for module in ("tirebench.live.chain", "tirebench.deadline"):
         monkeypatch.setattr(f"{module}.time", clock)
     chain = LiveChain(plan_of("p", None, tmp_path / "a.mcap"), said.append)
     state = RecorderState(tmp_path / "a.mcap")
@@ -416,8 +416,8 @@ def test_a_start_that_takes_long_says_what_is_awaited(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Nothing was started, so nothing gets ready."""
-    monkeypatch.setattr("bench.live.chain.SAY", 0.0)
-    monkeypatch.setattr("bench.live.chain.START", 0.0)
+    monkeypatch.setattr("tirebench.live.chain.SAY", 0.0)
+    monkeypatch.setattr("tirebench.live.chain.START", 0.0)
     said: list[str] = []
     chain = LiveChain(plan_of("p", None, tmp_path / "a.mcap"), said.append)
     chain._estimators.kept = dict.fromkeys(range(3), cast(Any, SimpleNamespace(starts=1, look=int)))

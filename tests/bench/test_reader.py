@@ -8,25 +8,25 @@ from typing import Any
 
 import pytest
 
-from bench.conditions import Conditions
-from bench.deadline import Deadline
-from bench.decoder import SerialDecoder
-from bench.device import Device
-from bench.emulator import write_script
-from bench.estimation import News
-from bench.faults import Faults
-from bench.links import DECODED, PASSED, RESUMED, Read
-from bench.links.opening import PortPlan
-from bench.links.replay import ReplayLink
-from bench.live.exchange import Exchange
-from bench.live.kept import CONTEXT
-from bench.live.reader import ReaderPlan, _Reader
-from bench.recorder import Recorder
-from bench.recording_header import RecordingHeader
-from bench.replay import ReplayChain
-from bench.source_plan import SourcePlan
-from bench.wheels import Block, Wheels
 from tests.bench.campaigns import tiny_runs
+from tirebench.conditions import Conditions
+from tirebench.deadline import Deadline
+from tirebench.decoder import SerialDecoder
+from tirebench.device import Device
+from tirebench.emulator import write_script
+from tirebench.estimation import News
+from tirebench.faults import Faults
+from tirebench.links import DECODED, PASSED, RESUMED, Read
+from tirebench.links.opening import PortPlan
+from tirebench.links.replay import ReplayLink
+from tirebench.live.exchange import Exchange
+from tirebench.live.kept import CONTEXT
+from tirebench.live.reader import ReaderPlan, _Reader
+from tirebench.recorder import Recorder
+from tirebench.recording_header import RecordingHeader
+from tirebench.replay import ReplayChain
+from tirebench.source_plan import SourcePlan
+from tirebench.wheels import Block, Wheels
 
 
 class KilledError(Exception):
@@ -152,7 +152,7 @@ def test_what_waits_too_long_is_recorded_and_a_replay_leaves_it_out_too(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = [0]
-    monkeypatch.setattr("bench.live.reader.time.monotonic_ns", lambda: now[0])
+    monkeypatch.setattr("tirebench.live.reader.time.monotonic_ns", lambda: now[0])
     exchange = Exchange.create(CONTEXT, 1, ports=1)
     reader = _Reader(ReaderPlan((SourcePlan(PortPlan("p")),), 60.0, apart=True), exchange)
     reader.publish()

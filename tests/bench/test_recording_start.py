@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from bench.cli.recording import at_start
-from bench.device import Device
-from bench.links.opening import PortPlan
-from bench.live.reader import ReaderPlan
-from bench.live.recording_state import RecordingRule
-from bench.protocols.plan import ProtocolPlan
-from bench.source_plan import SourcePlan
+from tirebench.cli.recording import at_start
+from tirebench.device import Device
+from tirebench.links.opening import PortPlan
+from tirebench.live.reader import ReaderPlan
+from tirebench.live.recording_state import RecordingRule
+from tirebench.protocols.plan import ProtocolPlan
+from tirebench.source_plan import SourcePlan
 
 
 def four(wheels: tuple[int | None, ...] = (0, 1, 2, 3)) -> ReaderPlan:
@@ -29,7 +29,7 @@ def four(wheels: tuple[int | None, ...] = (0, 1, 2, 3)) -> ReaderPlan:
 def test_the_room_is_for_all_wheels_that_are_read(
     monkeypatch: pytest.MonkeyPatch, wheels: tuple[int | None, ...], strain: bool, hours: str
 ) -> None:
-    monkeypatch.setattr("bench.cli.recording.free_at", lambda _: 30e9)
+    monkeypatch.setattr("tirebench.cli.recording.free_at", lambda _: 30e9)
     said = at_start(Path("a.mcap"), four(wheels), RecordingRule(strain), watched=True)
     assert said == f"room for the recording: 30.0 GB, about {hours} wheels at 10 kHz"
 

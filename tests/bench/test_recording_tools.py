@@ -13,25 +13,25 @@ import pytest
 from click.testing import CliRunner
 from mcap.reader import make_reader
 
-from bench.cli import program
-from bench.conditions import Conditions, Measured
-from bench.decoder import SerialDecoder
-from bench.device import Device
-from bench.document import line_document, turn_document, wheel_document
-from bench.emulator import write_script
-from bench.errors import RecordingError
-from bench.faults import Faults
-from bench.links import Read
-from bench.recorder import Recorder
-from bench.recording import Recording
-from bench.recording_header import RecordingHeader
-from bench.timeline import Samples
-from bench.wheels import Told, Wheels
 from tests.bench.campaigns import tiny_runs
 from tests.bench.disks import little_room
 from tests.bench.test_bridges import TURN
 from tests.bench.test_journal import DOCUMENTS, TURNS
 from tests.bench.test_recording import READS
+from tirebench.cli import program
+from tirebench.conditions import Conditions, Measured
+from tirebench.decoder import SerialDecoder
+from tirebench.device import Device
+from tirebench.document import line_document, turn_document, wheel_document
+from tirebench.emulator import write_script
+from tirebench.errors import RecordingError
+from tirebench.faults import Faults
+from tirebench.links import Read
+from tirebench.recorder import Recorder
+from tirebench.recording import Recording
+from tirebench.recording_header import RecordingHeader
+from tirebench.timeline import Samples
+from tirebench.wheels import Told, Wheels
 
 PERIOD = 100_000
 """Of the samples, [ns]."""
@@ -191,7 +191,7 @@ def _former(path: Path) -> None:
     """Write a recording of the former version, without its end."""
     from mcap.writer import Writer
 
-    from bench.conditions import conditions_document
+    from tirebench.conditions import conditions_document
 
     header = RecordingHeader({})
     with path.open("wb") as file:
@@ -218,7 +218,7 @@ def test_what_is_no_recording_cannot_be_repaired(tmp_path: Path) -> None:
 
 
 def test_the_json_of_a_killed_run_is_repaired(tmp_path: Path) -> None:
-    from bench.journal import Journal
+    from tirebench.journal import Journal
 
     journal = Journal(tmp_path / "r.json")
     journal.add(TURNS)

@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.errors import LinkError
-from bench.live.exchange import LEAST, SAMPLES, Exchange
-from bench.live.kept import CONTEXT
-from bench.page.board import SIZE
-from bench.rings import _CONTROL, ByteQueue, Cell, _stride, memory
+from tirebench.errors import LinkError
+from tirebench.live.exchange import LEAST, SAMPLES, Exchange
+from tirebench.live.kept import CONTEXT
+from tirebench.page.board import SIZE
+from tirebench.rings import _CONTROL, ByteQueue, Cell, _stride, memory
 
 ROOM = 256
 
@@ -121,7 +121,7 @@ def test_where_shared_memory_is_short_the_queues_of_samples_are(
 ) -> None:
     """The 64 MB of a container hold four wheels and their page."""
     for megabytes, beside, full in ((1000, SIZE, True), (64, SIZE, False), (40, 0, False)):
-        monkeypatch.setattr("bench.live.exchange.free", lambda n=megabytes: float(n * 2**20))
+        monkeypatch.setattr("tirebench.live.exchange.free", lambda n=megabytes: float(n * 2**20))
         exchange = Exchange.create(CONTEXT, 4, beside)
         size = exchange.address.samples
         assert (size == SAMPLES) == full
@@ -137,6 +137,6 @@ def test_where_shared_memory_is_short_the_queues_of_samples_are(
 def test_too_little_shared_memory_names_all_that_a_run_needs(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("bench.live.exchange.free", lambda: 40.0 * 2**20)
+    monkeypatch.setattr("tirebench.live.exchange.free", lambda: 40.0 * 2**20)
     with pytest.raises(LinkError, match=r"; 54 MB are needed; .*--shm-size.*--wheel.*--no-page"):
         Exchange.create(CONTEXT, 4, SIZE)

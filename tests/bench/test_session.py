@@ -5,18 +5,18 @@ from collections.abc import Sequence
 
 import pytest
 
-from bench.chain import Outputs, Turn
-from bench.conditions import Condition, Conditions
-from bench.deadline import Deadline
-from bench.device import Device
-from bench.emulator import write_script
-from bench.faults import Faults
-from bench.links import Read
-from bench.replay import ReplayChain
-from bench.session import Limits, Session
 from tests.bench.campaigns import tiny_runs
 from tests.bench.clocks import Clock
 from tests.bench.in_process import InProcess
+from tirebench.chain import Outputs, Turn
+from tirebench.conditions import Condition, Conditions
+from tirebench.deadline import Deadline
+from tirebench.device import Device
+from tirebench.emulator import write_script
+from tirebench.faults import Faults
+from tirebench.links import Read
+from tirebench.replay import ReplayChain
+from tirebench.session import Limits, Session
 from tirelib.arrays import FloatArray
 
 
@@ -64,7 +64,7 @@ class Scripted:
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     """Time that passes only where nothing comes any more."""
     made = Clock()
-    for module in ("bench.session", "bench.replay", "bench.deadline", __name__):
+    for module in ("tirebench.session", "tirebench.replay", "tirebench.deadline", __name__):
         monkeypatch.setattr(f"{module}.time", made)
     return made
 

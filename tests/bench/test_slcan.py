@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.can_batch import CanBatch, joined, same_kind
-from bench.frames import Frames
-from bench.line_counts import LineCounts
-from bench.protocols.slcan import LONGEST, SlcanDecoder, encode
 from tests.synthetic import frames as cuts
+from tirebench.can_batch import CanBatch, joined, same_kind
+from tirebench.frames import Frames
+from tirebench.line_counts import LineCounts
+from tirebench.protocols.slcan import LONGEST, SlcanDecoder, encode
 
 
 class Keep:

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import pytest
 
-from bench.deadline import Deadline
-from bench.errors import DeviceError, LinkError, UnpluggedError
-from bench.links.opening import PortPlan
-from bench.links.socket_port import SocketLink
 from tests.bench.programs import PATIENCE
 from tests.bench.servers import Server
+from tirebench.deadline import Deadline
+from tirebench.errors import DeviceError, LinkError, UnpluggedError
+from tirebench.links.opening import PortPlan
+from tirebench.links.socket_port import SocketLink
 
 
 def received(link: SocketLink, size: int) -> bytes:

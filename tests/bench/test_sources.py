@@ -18,46 +18,46 @@ import pytest
 from click.testing import CliRunner
 from rich.console import Console
 
-from bench.can_batch import same_kind
-from bench.chain import Turn
-from bench.cli import program
-from bench.cli.given import given_replayed
-from bench.conditions import Conditions
-from bench.deadline import Deadline
-from bench.decoder import SerialDecoder
-from bench.device import Device
-from bench.document import turn_document
-from bench.emulator import write_script
-from bench.errors import DeviceError, UnpluggedError
-from bench.estimation import Estimation, News
-from bench.faults import Faults
-from bench.fmu_archive import read_fmu
-from bench.fmu_model import FmuFile, FmuModel
-from bench.frames import encode, strain_frames
-from bench.links import Read
-from bench.links.opening import PortPlan
-from bench.links.replay import ReplayLink
-from bench.live.chain import LiveChain, LivePlan
-from bench.live.exchange import Exchange
-from bench.live.kept import CONTEXT
-from bench.live.ports import GatheredLink, PortState
-from bench.live.reader import ReaderPlan
-from bench.protocols import SLCAN, slcan
-from bench.protocols.plan import ProtocolPlan
-from bench.protocols.user_map import parse_map
-from bench.rate_check import JUDGED
-from bench.recording import Recorder, Recording, RecordingHeader
-from bench.replay import ReplayChain
-from bench.session import Session
-from bench.setup_file import check_sources, read_setup
-from bench.source_plan import SourcePlan, wheels_of
-from bench.sources import recording_pieces
-from bench.wheels import Line, Wheels
 from tests.bench.campaigns import tiny_runs
 from tests.bench.in_process import FakeSource
 from tests.bench.programs import PATIENCE
 from tests.bench.servers import Server
 from tests.bench.test_processes import Turns
+from tirebench.can_batch import same_kind
+from tirebench.chain import Turn
+from tirebench.cli import program
+from tirebench.cli.given import given_replayed
+from tirebench.conditions import Conditions
+from tirebench.deadline import Deadline
+from tirebench.decoder import SerialDecoder
+from tirebench.device import Device
+from tirebench.document import turn_document
+from tirebench.emulator import write_script
+from tirebench.errors import DeviceError, UnpluggedError
+from tirebench.estimation import Estimation, News
+from tirebench.faults import Faults
+from tirebench.fmu_archive import read_fmu
+from tirebench.fmu_model import FmuFile, FmuModel
+from tirebench.frames import encode, strain_frames
+from tirebench.links import Read
+from tirebench.links.opening import PortPlan
+from tirebench.links.replay import ReplayLink
+from tirebench.live.chain import LiveChain, LivePlan
+from tirebench.live.exchange import Exchange
+from tirebench.live.kept import CONTEXT
+from tirebench.live.ports import GatheredLink, PortState
+from tirebench.live.reader import ReaderPlan
+from tirebench.protocols import SLCAN, slcan
+from tirebench.protocols.plan import ProtocolPlan
+from tirebench.protocols.user_map import parse_map
+from tirebench.rate_check import JUDGED
+from tirebench.recording import Recorder, Recording, RecordingHeader
+from tirebench.replay import ReplayChain
+from tirebench.session import Session
+from tirebench.setup_file import check_sources, read_setup
+from tirebench.source_plan import SourcePlan, wheels_of
+from tirebench.sources import recording_pieces
+from tirebench.wheels import Line, Wheels
 
 VEHICLE = """
 format = "tirebench-map/1"

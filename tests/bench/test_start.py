@@ -9,22 +9,22 @@ import pytest
 from click.testing import CliRunner
 from rich.console import Console
 
-from bench.chain import Outputs
-from bench.cli import program
-from bench.cli.given import Given, conditions_of, port_of_file, say_missing
-from bench.conditions import TELLABLE, UNITS, Condition, Conditions
-from bench.deadline import Deadline
-from bench.errors import DeviceError, LinkError, UnpluggedError
-from bench.estimation import Estimation
-from bench.links import BACK, Link, Read
-from bench.links.opening import PortPlan
-from bench.links.reconnecting import ReconnectingLink
-from bench.source_plan import SourcePlan, wheels_of
 from tests.bench.clocks import Clock
 from tests.bench.conftest import Spawn
 from tests.bench.programs import A_TURN, PATIENCE
 from tests.bench.test_sources import serial, vehicle
 from tests.bench.test_user_line import THREE, plan_of
+from tirebench.chain import Outputs
+from tirebench.cli import program
+from tirebench.cli.given import Given, conditions_of, port_of_file, say_missing
+from tirebench.conditions import TELLABLE, UNITS, Condition, Conditions
+from tirebench.deadline import Deadline
+from tirebench.errors import DeviceError, LinkError, UnpluggedError
+from tirebench.estimation import Estimation
+from tirebench.links import BACK, Link, Read
+from tirebench.links.opening import PortPlan
+from tirebench.links.reconnecting import ReconnectingLink
+from tirebench.source_plan import SourcePlan, wheels_of
 from tirelib.arrays import FloatArray
 from tirelib.held import HELD
 from tirelib.units import to_si
@@ -87,7 +87,7 @@ def test_a_port_file_is_waited_for_and_so_is_its_port(
         next(steps, lambda: None)()
 
     with monkeypatch.context() as patch:
-        for module in ("bench.cli.given", "bench.deadline"):
+        for module in ("tirebench.cli.given", "tirebench.deadline"):
             patch.setattr(f"{module}.time", clock)
         patch.setattr(clock, "sleep", sleep)
         quiet = Console(quiet=True)
@@ -126,7 +126,7 @@ def test_a_port_that_is_not_there_yet_is_waited_for_and_its_coming_is_no_return(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     clock = Clock()
-    for module in ("bench.links.reconnecting", "bench.deadline"):
+    for module in ("tirebench.links.reconnecting", "tirebench.deadline"):
         monkeypatch.setattr(f"{module}.time", clock)
     port = Absent()
     link = ReconnectingLink(port.open, 5.0, "port", wait=60.0)
@@ -144,7 +144,7 @@ def test_a_port_that_does_not_come_is_told_with_what_was_wrong(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     clock = Clock()
-    for module in ("bench.links.reconnecting", "bench.deadline"):
+    for module in ("tirebench.links.reconnecting", "tirebench.deadline"):
         monkeypatch.setattr(f"{module}.time", clock)
 
     def nothing() -> Link:

@@ -9,17 +9,17 @@ from pathlib import Path
 import click
 import pytest
 
-from bench.cli.stop import STOPS, on_stop, start_in_order
-from bench.conditions import Conditions
-from bench.fmu_archive import read_fmu
-from bench.links.opening import PortPlan
-from bench.live.chain import LiveChain, LivePlan
-from bench.live.reader import ReaderPlan
-from bench.recording_header import RecordingHeader
-from bench.source_plan import SourcePlan
-from bench.trust import remember
 from tests.bench.conftest import TOY, Spawn, build_toy
 from tests.bench.programs import wait_until
+from tirebench.cli.stop import STOPS, on_stop, start_in_order
+from tirebench.conditions import Conditions
+from tirebench.fmu_archive import read_fmu
+from tirebench.links.opening import PortPlan
+from tirebench.live.chain import LiveChain, LivePlan
+from tirebench.live.reader import ReaderPlan
+from tirebench.recording_header import RecordingHeader
+from tirebench.source_plan import SourcePlan
+from tirebench.trust import remember
 
 BEGIN = "        super().__init__(**kwargs)\n"
 WAITS = "        while os.environ.get('TOY_WAITS'):\n            time.sleep(0.01)\n"
@@ -122,7 +122,7 @@ def test_a_terminal_that_closes_ends_a_run_in_order() -> None:
 ON_A_TERMINAL = """
 import fcntl, sys, termios, time
 from pathlib import Path
-from bench.cli.stop import on_stop
+from tirebench.cli.stop import on_stop
 fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 stopped = []
 with on_stop(lambda: stopped.append(1)):

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.decoder import SerialDecoder
-from bench.device import Device
-from bench.frames import FrameFlag, Frames, encode, select, strain_frames
-from bench.rate_check import JUDGED, LONGEST_WAIT
-from bench.timeline import LATE, Samples, Timeline
+from tirebench.decoder import SerialDecoder
+from tirebench.device import Device
+from tirebench.frames import FrameFlag, Frames, encode, select, strain_frames
+from tirebench.rate_check import JUDGED, LONGEST_WAIT
+from tirebench.timeline import LATE, Samples, Timeline
 
 PERIOD = 1000  # ticks: 10 kHz
 

@@ -11,23 +11,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pythonfmu import FmuBuilder
 
-from bench.cli.given import Given
-from bench.conditions import Conditions, Measured
-from bench.device import Device
-from bench.document import turn_document
-from bench.errors import DeviceError
-from bench.estimation import Estimation
-from bench.fmu_archive import read_fmu
-from bench.fmu_model import FmuFile, FmuModel
-from bench.frames import Frames
-from bench.links.opening import PortPlan
-from bench.protocols import LINE_MAP
-from bench.protocols.plan import ProtocolPlan
-from bench.protocols.user_map import parse_map
-from bench.source_plan import SourcePlan, protocol_of, wheels_of
-from bench.timeline import Samples
 from tests.bench.campaigns import tiny_runs
 from tests.bench.conftest import TOY
+from tirebench.cli.given import Given
+from tirebench.conditions import Conditions, Measured
+from tirebench.device import Device
+from tirebench.document import turn_document
+from tirebench.errors import DeviceError
+from tirebench.estimation import Estimation
+from tirebench.fmu_archive import read_fmu
+from tirebench.fmu_model import FmuFile, FmuModel
+from tirebench.frames import Frames
+from tirebench.links.opening import PortPlan
+from tirebench.protocols import LINE_MAP
+from tirebench.protocols.plan import ProtocolPlan
+from tirebench.protocols.user_map import parse_map
+from tirebench.source_plan import SourcePlan, protocol_of, wheels_of
+from tirebench.timeline import Samples
 
 BINARY = """
 format = "tirebench-map/1"

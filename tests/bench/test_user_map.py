@@ -6,17 +6,17 @@ import cantools
 import numpy as np
 import pytest
 
-from bench.can_batch import joined, pack, same_kind
-from bench.chain import Outputs
-from bench.conditions import Condition, Conditions, Held, Measured
-from bench.errors import DeviceError
-from bench.estimation import Estimation
-from bench.protocols import CAN
-from bench.protocols.plan import ProtocolPlan
-from bench.protocols.user_can import UserCan
-from bench.protocols.user_map import parse_map, read_map
-from bench.timeline import Timeline
-from bench.wheels import Wheels
+from tirebench.can_batch import joined, pack, same_kind
+from tirebench.chain import Outputs
+from tirebench.conditions import Condition, Conditions, Held, Measured
+from tirebench.errors import DeviceError
+from tirebench.estimation import Estimation
+from tirebench.protocols import CAN
+from tirebench.protocols.plan import ProtocolPlan
+from tirebench.protocols.user_can import UserCan
+from tirebench.protocols.user_map import parse_map, read_map
+from tirebench.timeline import Timeline
+from tirebench.wheels import Wheels
 from tirelib.arrays import FloatArray
 
 DBC = """VERSION ""

@@ -5,20 +5,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bench.chain import Outputs
-from bench.cli.live import counters
-from bench.clock import ClockFit
-from bench.conditions import Condition, Conditions
-from bench.device import Device
-from bench.document import document, wheel_document
-from bench.emulator import Player, record_tape
-from bench.faults import Faults, parse_faults
-from bench.protocols import SERIAL
-from bench.protocols.plan import ProtocolPlan
-from bench.transmitter import transmitter
-from bench.wheels import MOST, Wheels
 from tests.bench.campaigns import tiny_runs
 from tests.bench.in_process import InProcess
+from tirebench.chain import Outputs
+from tirebench.cli.live import counters
+from tirebench.clock import ClockFit
+from tirebench.conditions import Condition, Conditions
+from tirebench.device import Device
+from tirebench.document import document, wheel_document
+from tirebench.emulator import Player, record_tape
+from tirebench.faults import Faults, parse_faults
+from tirebench.protocols import SERIAL
+from tirebench.protocols.plan import ProtocolPlan
+from tirebench.transmitter import transmitter
+from tirebench.wheels import MOST, Wheels
 from tirelib.arrays import FloatArray
 
 

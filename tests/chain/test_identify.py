@@ -9,9 +9,6 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from bench.rig.campaign import run_plan
-from bench.rig.plans import Plan
-from bench.rig.tire import TIRES, Condition
 from tests.chain.test_command_line import run
 from tests.synthetic import synthetic_run, write
 from tirelib.arrays import FloatArray
@@ -19,6 +16,9 @@ from tirelib.campaign import read_campaign
 from tirelib.campaign.write import write_campaign
 from tirelib.cli import main, program
 from tirelib.parameters import read_tire
+from tirelib.rig.campaign import run_plan
+from tirelib.rig.plans import Plan
+from tirelib.rig.tire import TIRES, Condition
 
 TIRE = TIRES["reference"]
 CONDITIONS = ((3000.0, 1.7e5), (6500.0, 1.7e5), (3000.0, 2.5e5), (6500.0, 2.5e5))

@@ -10,15 +10,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bench.rig.campaign import run_plan
-from bench.rig.plans import Plan
-from bench.rig.tire import TIRES, Condition
 from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.result import estimate_document
 from tirelib.estimators.train import Trained, train
 from tirelib.flags import TurnFlag
 from tirelib.observations import Observations, observe
+from tirelib.rig.campaign import run_plan
+from tirelib.rig.plans import Plan
+from tirelib.rig.tire import TIRES, Condition
 
 LOADS = (1500.0, 3000.0, 4500.0, 6000.0, 7500.0)
 ANGLES = (-4.0, -1.5, 1.5, 4.0)

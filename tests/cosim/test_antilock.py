@@ -29,7 +29,7 @@ from cosim.vehicle14.model import ANGLES, Controls, Wheels
 from cosim.vehicle14.parameters import GRAVITY, VehicleParameters
 from cosim.wheels import Estimates
 
-from bench.rig.observe import trace
+from tirelib.rig.observe import trace
 
 RULES, CONTROL = AntiLock(), TractionController()
 BY_NAME = {road.name: road for road in ROADS}

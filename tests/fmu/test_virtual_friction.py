@@ -8,7 +8,6 @@ import pytest
 from click.testing import CliRunner
 from fmpy.validation import validate_fmu
 
-from bench.rig.tire import tire
 from tests.fmu.virtual_host import (
     TYPICAL,
     Host,
@@ -22,6 +21,7 @@ from tests.fmu.virtual_host import (
 from tirelib.cli.fmu import fmu as command
 from tirelib.fmu.check import check_fmu
 from tirelib.fmu.virtual.coordinates import FRICTION, INPUTS
+from tirelib.rig.tire import tire
 
 OWN = tire("reference").friction
 

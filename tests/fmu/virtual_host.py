@@ -11,9 +11,6 @@ import numpy as np
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
-from bench.rig.observe import Forces, forces, trace
-from bench.rig.solve import State, solve
-from bench.rig.tire import Condition, tire
 from tests.fmu import live
 from tirelib.campaign import CampaignHeader, Run, RunPlan, TireGeometry, write_campaign
 from tirelib.campaign.read import read_campaign
@@ -23,6 +20,9 @@ from tirelib.fmu.run import keeping
 from tirelib.fmu.virtual.spec import build_virtual, default_surface, friction_surface
 from tirelib.fmu.virtual.surface import Surface, mirrored, read_surface
 from tirelib.observations import observe
+from tirelib.rig.observe import Forces, forces, trace
+from tirelib.rig.solve import State, solve
+from tirelib.rig.tire import Condition, tire
 
 RATE = 1e4
 TYPICAL = {

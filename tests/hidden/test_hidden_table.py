@@ -5,7 +5,7 @@ from hidden.cases import NONE
 from hidden.run import FIRST, PAIRS, RATIOS, wanted
 from hidden.table import figures, markdown
 
-from bench.rig.hidden import HIDDEN
+from tirelib.rig.hidden import HIDDEN
 
 
 def row(kind: str, outcome: str, wanted_ratio: float = 1.5, **more: object) -> dict:

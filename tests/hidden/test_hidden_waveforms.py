@@ -7,12 +7,12 @@ import pytest
 from hidden.measured import Plain, traces, waveforms
 from hidden.plan import LOADS, PRESSURES, SPEEDS, Day, day, tire
 
-from bench.rig.campaign import run_plan
-from bench.rig.measure import Chain
-from bench.rig.plans import Plan
-from bench.rig.solve import solve
-from bench.rig.tire import Condition, RigTire
 from tirelib.campaign import read_campaign
+from tirelib.rig.campaign import run_plan
+from tirelib.rig.measure import Chain
+from tirelib.rig.plans import Plan
+from tirelib.rig.solve import solve
+from tirelib.rig.tire import Condition, RigTire
 from tirelib.waveforms import measure_waveforms
 
 EXACT = Chain(

@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.rig.observe import forces
-from bench.rig.observe import trace as rig_trace
-from bench.rig.solve import State, solve
-from bench.rig.tire import Condition, RigTire
 from tirelib.campaign import read_campaign
 from tirelib.contact.strips import RoadForces, StripContact, press_strips
 from tirelib.errors import ParameterError, ShapeError
 from tirelib.features.extract import Features, extract_features
 from tirelib.observations import measure_run
 from tirelib.parameters import Tire
+from tirelib.rig.observe import forces
+from tirelib.rig.observe import trace as rig_trace
+from tirelib.rig.solve import State, solve
+from tirelib.rig.tire import Condition, RigTire
 from tirelib.signal import LowPass
 from tirelib.signal.lowpass import smooth_to_angle
 from tirelib.signal.turns import Turns

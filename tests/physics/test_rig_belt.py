@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.rig.belt import (
+from tirelib.rig.belt import (
     FIELDS,
     LATERAL,
     PSI,
@@ -18,10 +18,10 @@ from bench.rig.belt import (
     internal,
     linear_part,
 )
-from bench.rig.mesh import mesh
-from bench.rig.observe import forces, trace
-from bench.rig.solve import State, solve
-from bench.rig.tire import Condition, RigTire
+from tirelib.rig.mesh import mesh
+from tirelib.rig.observe import forces, trace
+from tirelib.rig.solve import State, solve
+from tirelib.rig.tire import Condition, RigTire
 
 TIRE = RigTire()
 REST = Condition(4000.0, 1e-9, 1.0)

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.signal import find_peaks
 
-from bench.rig.belt import FIELDS, LATERAL, U, V
-from bench.rig.observe import contact, edges, forces, trace
-from bench.rig.solve import State, solve
-from bench.rig.system import fields_at_points
-from bench.rig.tire import Condition, RigTire
+from tirelib.rig.belt import FIELDS, LATERAL, U, V
+from tirelib.rig.observe import contact, edges, forces, trace
+from tirelib.rig.solve import State, solve
+from tirelib.rig.system import fields_at_points
+from tirelib.rig.tire import Condition, RigTire
 
 TIRE = RigTire()
 BASE = Condition(4800.0, 2.3e5, 65.0 / 3.6)

@@ -6,10 +6,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bench.rig.measure import slip_ratio
-from bench.rig.observe import Forces, contact, edges, forces, trace
-from bench.rig.solve import State, solve
-from bench.rig.tire import Condition, RigTire
+from tirelib.rig.measure import slip_ratio
+from tirelib.rig.observe import Forces, contact, edges, forces, trace
+from tirelib.rig.solve import State, solve
+from tirelib.rig.tire import Condition, RigTire
 
 TIRE = RigTire()
 BASE = Condition(4800.0, 2.3e5, 65.0 / 3.6)

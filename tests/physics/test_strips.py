@@ -6,9 +6,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bench.rig.observe import edges, forces
-from bench.rig.solve import State, solve
-from bench.rig.tire import Condition, RigTire
 from tirelib.contact.fourier import evaluate
 from tirelib.contact.load_transfer import roll_load, strip_deflection
 from tirelib.contact.radial import load
@@ -16,6 +13,9 @@ from tirelib.contact.strips import SHARED, Layout, RoadForces, StripContact, pre
 from tirelib.contact.tread import Tread
 from tirelib.errors import ParameterError
 from tirelib.parameters import Tire
+from tirelib.rig.observe import edges, forces
+from tirelib.rig.solve import State, solve
+from tirelib.rig.tire import Condition, RigTire
 from tirelib.ring.compliance import compliance
 from tirelib.ring.ring import Ring
 

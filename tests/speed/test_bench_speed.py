@@ -6,17 +6,17 @@ from pathlib import Path
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from bench.conditions import Conditions
-from bench.decoder import SerialDecoder
-from bench.device import Device
-from bench.emulator import write_script
-from bench.faults import Faults
-from bench.fmu_archive import read_fmu
-from bench.fmu_model import FmuFile, FmuModel
-from bench.timeline import Timeline
 from tests.bench.campaigns import quantised
 from tests.bench.in_process import InProcess
 from tests.synthetic import cornering_runs, synthetic_run, write
+from tirebench.conditions import Conditions
+from tirebench.decoder import SerialDecoder
+from tirebench.device import Device
+from tirebench.emulator import write_script
+from tirebench.faults import Faults
+from tirebench.fmu_archive import read_fmu
+from tirebench.fmu_model import FmuFile, FmuModel
+from tirebench.timeline import Timeline
 from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.estimators.train import train

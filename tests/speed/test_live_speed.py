@@ -13,21 +13,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bench.conditions import Conditions
-from bench.deadline import Deadline
-from bench.estimation import News
-from bench.fmu_archive import read_fmu
-from bench.fmu_model import FmuFile
-from bench.links import BACK, LOST
-from bench.links.opening import PortPlan
-from bench.live.chain import LiveChain, LivePlan
-from bench.live.reader import ReaderPlan
-from bench.protocols import SERIAL, SLCAN
-from bench.protocols.plan import ProtocolPlan
-from bench.recording import Recording, RecordingHeader
-from bench.source_plan import SourcePlan
 from tests.bench.campaigns import quantised
 from tests.synthetic import cornering_runs, synthetic_run, write
+from tirebench.conditions import Conditions
+from tirebench.deadline import Deadline
+from tirebench.estimation import News
+from tirebench.fmu_archive import read_fmu
+from tirebench.fmu_model import FmuFile
+from tirebench.links import BACK, LOST
+from tirebench.links.opening import PortPlan
+from tirebench.live.chain import LiveChain, LivePlan
+from tirebench.live.reader import ReaderPlan
+from tirebench.protocols import SERIAL, SLCAN
+from tirebench.protocols.plan import ProtocolPlan
+from tirebench.recording import Recording, RecordingHeader
+from tirebench.source_plan import SourcePlan
 from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.estimators.train import train
@@ -64,7 +64,7 @@ def emulate(folder: Path, tmp_path: Path) -> Iterator[Callable[..., str]]:
         command = ["emulate", "--campaign", folder / "long", "--loop", "--link", port, *more]
         started.append(
             subprocess.Popen(
-                [sys.executable, "-m", "bench", *map(str, command)], stdout=subprocess.DEVNULL
+                [sys.executable, "-m", "tirebench", *map(str, command)], stdout=subprocess.DEVNULL
             )
         )
         end = time.monotonic() + PATIENCE

@@ -8,14 +8,14 @@ import can
 import numpy as np
 import pytest
 
-from bench.can_batch import same_kind
-from bench.deadline import Deadline
-from bench.line_counts import LineCounts
-from bench.links.pseudo import PseudoTerminal
-from bench.links.slcan_port import SlcanLink
-from bench.protocols.slcan import SlcanDecoder, encode
-from bench.protocols.wheel_can import WheelCan
 from tests.bench.test_slcan import Keep
+from tirebench.can_batch import same_kind
+from tirebench.deadline import Deadline
+from tirebench.line_counts import LineCounts
+from tirebench.links.pseudo import PseudoTerminal
+from tirebench.links.slcan_port import SlcanLink
+from tirebench.protocols.slcan import SlcanDecoder, encode
+from tirebench.protocols.wheel_can import WheelCan
 
 pytestmark = pytest.mark.speed
 FRAMES = 3000

@@ -12,7 +12,6 @@ import pytest
 import scipy.linalg
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from bench.rig.solve import solve
 from tests.fmu import live, virtual_host
 from tirelib.campaign import read_campaign
 from tirelib.compare.compare import compare
@@ -29,6 +28,7 @@ from tirelib.observations import observe
 from tirelib.planning.next_test import next_test
 from tirelib.planning.selftest import selftest
 from tirelib.report.simulation import simulate
+from tirelib.rig.solve import solve
 from tirelib.threads import VARIABLES, one_thread
 
 ROOT = Path(__file__).parents[2]
@@ -154,8 +154,8 @@ sys.argv = ["x", "--version"]
     "start",
     [
         "from tirelib.cli import main; main()",
-        "from bench.cli import main; main()",
-        "import runpy; runpy.run_module('bench', run_name='__main__')",
+        "from tirebench.cli import main; main()",
+        "import runpy; runpy.run_module('tirebench', run_name='__main__')",
     ],
 )
 def test_a_program_has_one_thread_whatever_the_environment_says(start: str) -> None:

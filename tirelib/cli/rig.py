@@ -10,7 +10,7 @@ from rich.table import Table
 from tirelib.cli.common import NEW_FILE, NEW_FOLDER, output, progress_bar, write_json
 
 if TYPE_CHECKING:
-    from bench.rig.campaign import Truth
+    from tirelib.rig.campaign import Truth
 
 RIG_FORMAT = "tirelib-rig/1"
 
@@ -93,9 +93,9 @@ def rig(
         return
     if plan_name is None or out is None:
         raise click.UsageError("--plan and --out are needed; --list shows the plans")
-    from bench.rig.campaign import run_plan
-    from bench.rig.plans import on_one_road, plan, with_repeats
-    from bench.rig.tire import tire
+    from tirelib.rig.campaign import run_plan
+    from tirelib.rig.plans import on_one_road, plan, with_repeats
+    from tirelib.rig.tire import tire
 
     depth = None if tread_depth_mm is None else 1e-3 * tread_depth_mm
     chosen = on_one_road(plan(plan_name), friction, depth)
@@ -118,8 +118,8 @@ def rig(
 
 
 def _list(json_file: Path | None) -> None:
-    from bench.rig.plans import PLANS, with_repeats
-    from bench.rig.tire import TIRES
+    from tirelib.rig.plans import PLANS, with_repeats
+    from tirelib.rig.tire import TIRES
 
     table = Table("plan", "runs", "about", box=SIMPLE_HEAD)
     rows = []

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.device import Device
-from bench.emulator import record_tape
-from bench.faults import Faults
 from tests.synthetic import synthetic_run
+from tirebench.device import Device
+from tirebench.emulator import record_tape
+from tirebench.faults import Faults
 from tirelib.campaign import conditions_of
 from tirelib.campaign.conditions import changes_of
 from tirelib.held import HELD

@@ -5,9 +5,6 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from bench.rig.campaign import run_plan
-from bench.rig.plans import Plan
-from bench.rig.tire import Condition, RigTire
 from tests.unit.identify.route_campaign import (
     FIVE_LOADS,
     SERIES,
@@ -32,6 +29,9 @@ from tirelib.identify.dynamic_route_problem import DynamicOptions, pressure_leve
 from tirelib.identify.dynamic_route_validation import rim_checks, vertical_stiffness
 from tirelib.identify.identify import start_file
 from tirelib.model.base import operating_points, values_of
+from tirelib.rig.campaign import run_plan
+from tirelib.rig.plans import Plan
+from tirelib.rig.tire import Condition, RigTire
 from tirelib.ring.compliance import compliance
 from tirelib.ring.ring import Ring
 from tirelib.waveforms import measure_waveforms

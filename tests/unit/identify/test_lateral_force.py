@@ -7,9 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.rig.campaign import run_plan
-from bench.rig.plans import Plan
-from bench.rig.tire import Condition, RigTire
 from tirelib.brush.forces import brush_forces
 from tirelib.brush.parameters import BrushParameters
 from tirelib.campaign import read_campaign
@@ -20,6 +17,9 @@ from tirelib.identify.forces import _compared
 from tirelib.identify.lateral_force import KINDS, PressureBand, compare_pressures
 from tirelib.identify.ring_patch import profiles, ring_contact
 from tirelib.parameters import Tire, read_tire
+from tirelib.rig.campaign import run_plan
+from tirelib.rig.plans import Plan
+from tirelib.rig.tire import Condition, RigTire
 
 TIRE = read_tire("table-6-1").tire
 C, MU, OFFSET = 9e6, 0.9, 25.0

@@ -5,12 +5,12 @@ from functools import cache
 
 import numpy as np
 
-from bench.rig.hidden import HIDDEN
-from bench.rig.mesh import mesh
-from bench.rig.observe import Trace, edges, trace
-from bench.rig.shown import Shown
-from bench.rig.solve import State, solve
-from bench.rig.tire import Condition, RigTire
+from tirelib.rig.hidden import HIDDEN
+from tirelib.rig.mesh import mesh
+from tirelib.rig.observe import Trace, edges, trace
+from tirelib.rig.shown import Shown
+from tirelib.rig.solve import State, solve
+from tirelib.rig.tire import Condition, RigTire
 
 TIRE = RigTire(friction=0.0, sidewall_damping=0.0)
 CONDITIONS = (

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from bench.rig.campaign import run_plan
-from bench.rig.plans import Plan, on_one_road
-from bench.rig.tire import Condition, RigTire
 from tirelib.campaign import read_campaign
 from tirelib.cli.rig import rig
 from tirelib.errors import ParameterError
+from tirelib.rig.campaign import run_plan
+from tirelib.rig.plans import Plan, on_one_road
+from tirelib.rig.tire import Condition, RigTire
 
 PLAN = Plan(
     "tiny",

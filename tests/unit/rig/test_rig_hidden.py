@@ -5,12 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.rig.hidden import HIDDEN, hidden
-from bench.rig.mesh import mesh
-from bench.rig.observe import Trace, contact, edges, forces
-from bench.rig.solve import solve
-from bench.rig.tire import RigTire
-from bench.rig.tread import pressure
 from tests.unit.rig.hidden_cases import (
     CONDITIONS,
     ON_TIRE,
@@ -26,6 +20,12 @@ from tirelib.errors import ParameterError
 from tirelib.model.base import predict, values_of
 from tirelib.model.state import Operating
 from tirelib.parameters import Tire
+from tirelib.rig.hidden import HIDDEN, hidden
+from tirelib.rig.mesh import mesh
+from tirelib.rig.observe import Trace, contact, edges, forces
+from tirelib.rig.solve import solve
+from tirelib.rig.tire import RigTire
+from tirelib.rig.tread import pressure
 from tirelib.signal import LowPass
 from tirelib.waveforms import GRID
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from bench.rig.belt import FIELDS, PSI, U
-from bench.rig.mesh import mesh
-from bench.rig.system import Balance, balance
-from bench.rig.tire import Condition, RigTire
+from tirelib.rig.belt import FIELDS, PSI, U
+from tirelib.rig.mesh import mesh
+from tirelib.rig.system import Balance, balance
+from tirelib.rig.tire import Condition, RigTire
 
 
 def condensed(state: Balance, belt: int) -> np.ndarray:

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.rig.measure import Chain, Recording, Stage, gages, record, settle
-from bench.rig.mesh import mesh
-from bench.rig.observe import Forces, Trace
-from bench.rig.solve import State
-from bench.rig.tire import Condition, RigTire
+from tirelib.rig.measure import Chain, Recording, Stage, gages, record, settle
+from tirelib.rig.mesh import mesh
+from tirelib.rig.observe import Forces, Trace
+from tirelib.rig.solve import State
+from tirelib.rig.tire import Condition, RigTire
 
 CONDITION = Condition(4800.0, 2.3e5, 18.0)
 QUIET = Chain(gage_gain=0.0, gage_offset=0.0, gage_drift=0.0, gain_repeatability=0.0, run_out=0.0)

@@ -1,6 +1,6 @@
 import numpy as np
 
-from bench.rig.mesh import mesh
+from tirelib.rig.mesh import mesh
 
 
 def test_splines_add_up_to_one_and_their_slopes_to_zero() -> None:

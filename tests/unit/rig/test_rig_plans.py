@@ -1,8 +1,8 @@
 import pytest
 
-from bench.rig.plans import PLANS, kind, plan, with_repeats
-from bench.rig.tire import Condition
 from tirelib.errors import ParameterError
+from tirelib.rig.plans import PLANS, kind, plan, with_repeats
+from tirelib.rig.tire import Condition
 
 
 def test_plans_have_the_runs_of_the_tables() -> None:

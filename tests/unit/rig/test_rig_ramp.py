@@ -6,16 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.rig.campaign import run_plan
-from bench.rig.measure import Chain, Recording, Stage, record
-from bench.rig.mesh import mesh
-from bench.rig.observe import forces, trace
-from bench.rig.plans import Plan, kind, on_one_road, plan
-from bench.rig.ramp import Point, Ramp, changed, dense, points_of, set_point
-from bench.rig.solve import solve
-from bench.rig.tire import Condition, RigTire
 from tirelib.campaign import check_campaign, read_campaign
 from tirelib.errors import ParameterError
+from tirelib.rig.campaign import run_plan
+from tirelib.rig.measure import Chain, Recording, Stage, record
+from tirelib.rig.mesh import mesh
+from tirelib.rig.observe import forces, trace
+from tirelib.rig.plans import Plan, kind, on_one_road, plan
+from tirelib.rig.ramp import Point, Ramp, changed, dense, points_of, set_point
+from tirelib.rig.solve import solve
+from tirelib.rig.tire import Condition, RigTire
 
 EXACT = Chain(
     gage_noise=0.0,

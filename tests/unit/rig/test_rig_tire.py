@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.rig.observe import edges, forces
-from bench.rig.solve import solve
-from bench.rig.tire import NEW_DEPTH, TIRES, Condition, RigTire, on_road, tire
 from tirelib.errors import ParameterError
+from tirelib.rig.observe import edges, forces
+from tirelib.rig.solve import solve
+from tirelib.rig.tire import NEW_DEPTH, TIRES, Condition, RigTire, on_road, tire
 
 
 @pytest.mark.parametrize(

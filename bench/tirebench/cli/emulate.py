@@ -1,0 +1,356 @@
+"""``tirebench emulate``: wheels behind a pseudo-terminal or on a bus, as if plugged in."""
+
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, closing, suppress
+from dataclasses import replace
+from pathlib import Path
+
+import click
+
+from tirebench.cli.stop import on_stop
+from tirebench.conditions import Conditions, conditions_document
+from tirebench.deadline import Deadline
+from tirebench.device import Device, read_device
+from tirebench.emulator import Player, Script, Tally, Tape, play, record_tape
+from tirebench.errors import UnpluggedError
+from tirebench.faults import Faults, parse_faults
+from tirebench.protocols import CAN, SERIAL, SLCAN
+from tirebench.sinks import BusSink, TerminalSink, open_bus
+from tirebench.transmitter import FORMATS, transmitter
+from tirelib.campaign import read_campaign
+from tirelib.cli.common import FILE, NEW_FILE, write_json
+
+DRAIN = 600.0
+"""At the end, the reader gets this long to take what was sent, [s]."""
+LINGER = 10.0
+"""After that, the reader gets this long to close the port, [s]."""
+PLAYED = "played: the reader has taken all of it"
+LOOK = 0.02
+"""Time between two looks for a file that is waited for, [s]."""
+AHEAD = 60.0
+"""A first pass up to this is encoded before the port appears, [s of a wheel]."""
+
+_EXAMPLE = """\b
+Examples:
+  tirebench emulate --campaign build/out/set1 --run 3 --run 7 --port-file port --conditions c.json
+  tirebench run --port $(cat port) --conditions c.json --fmu StrainTire.fmu --silence 1
+  tirebench emulate --manoeuvre lane_change.toml --format RAW16 --wheel 0 --wheel 1 --truth t.csv
+  tirebench emulate --campaign build/out/set1 --link port --unplug 3 --replug 0.5 --loop
+  tirebench emulate --recording a.mcap --bus can:socketcan:vcan0
+
+\b
+It prints the port and waits until a reader opens it, and says `played` when the reader has taken
+all that was sent. Format serial is SERIAL v1 on a serial port; RAW16, RAW12 and RAW12C are CAN
+frames: on a bus with --bus, else as slcan on a serial port.
+A recording is played as it is, bad frames included.
+--fault NAME[=VALUE], several allowed: flips, cuts, inserts, lost, dup (rate per frame), nan (rate
+per sample), fades (per second), saturate, dead (number of a gage), hum (microstrain), drift (ppm),
+reset (s). A bus shows no flips, cuts and inserts: its frames have a checksum.
+Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
+"""
+
+
+@click.command(epilog=_EXAMPLE)
+@click.option(
+    "--campaign",
+    "folder",
+    metavar="DIR",
+    type=click.Path(path_type=Path),
+    help="Play runs of a campaign with strain.",
+)
+@click.option(
+    "--run",
+    "numbers",
+    metavar="N",
+    type=int,
+    multiple=True,
+    help="Run to play, several in the order given.  [default: the first]",
+)
+@click.option("--all", "everything", is_flag=True, help="Play all runs.")
+@click.option(
+    "--manoeuvre",
+    "manoeuvre_file",
+    metavar="M",
+    type=FILE,
+    help="Play a manoeuvre on the numerical rig (TOML or CSV).",
+)
+@click.option("--recording", metavar="R.mcap", type=FILE, help="Play a recording.")
+@click.option(
+    "--source",
+    "number",
+    metavar="N",
+    type=click.IntRange(min=0),
+    help="Which source of a recording that has several.",
+)
+@click.option(
+    "--rate",
+    default=10_000.0,
+    show_default=True,
+    metavar="HZ",
+    type=click.FloatRange(153.0, 50_000.0),
+    help="Of the gages in a manoeuvre.",
+)
+@click.option(
+    "--truth",
+    "truth_file",
+    metavar="T.csv",
+    type=NEW_FILE,
+    help="Write the rig's forces along a manoeuvre.",
+)
+@click.option(
+    "--format",
+    "kind",
+    default="serial",
+    show_default=True,
+    type=click.Choice(FORMATS),
+    help="What the wheel sends.",
+)
+@click.option("--bus", metavar="can:IF:CHANNEL", help="Send on a bus of python-can.")
+@click.option(
+    "--link",
+    metavar="PATH",
+    type=FILE,
+    help="Name for the port that stays when it is plugged in again.",
+)
+@click.option("--device", "device_file", metavar="D.toml", type=FILE, help="Scale and zero.")
+@click.option(
+    "--wheel",
+    "wheels",
+    multiple=True,
+    default=(0,),
+    show_default=True,
+    type=click.IntRange(0, 255),
+    help="Number of a wheel, up to four.",
+)
+@click.option(
+    "--port-file", metavar="F", type=NEW_FILE, help="Write the port's path into this file."
+)
+@click.option(
+    "--conditions",
+    "sidecar",
+    metavar="F.json",
+    type=NEW_FILE,
+    help="Write the conditions over time and the rig's truth.",
+)
+@click.option("--loop", is_flag=True, help="Begin again at the end, until Ctrl-C.")
+@click.option(
+    "--speedup",
+    default=1.0,
+    show_default=True,
+    type=click.FloatRange(0.01, 1000.0),
+    help="Faster than real time.",
+)
+@click.option("--fault", "fault_texts", metavar="NAME[=VALUE]", multiple=True, help="See below.")
+@click.option("--seed", default=0, show_default=True, help="Of the faults.")
+@click.option(
+    "--wait",
+    "patience",
+    default=60.0,
+    show_default=True,
+    metavar="S",
+    help="How long to wait for a reader.",
+)
+@click.option("--after", metavar="F", type=FILE, help="Send nothing before this file is there.")
+@click.option("--unplug", metavar="S", type=float, help="Pull the cable after this time.")
+@click.option(
+    "--replug",
+    metavar="S",
+    type=click.FloatRange(min=0.0),
+    help="Plug it in again after so long, and so on; with --link.",
+)
+@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write what was sent.")
+@click.pass_context
+def emulate(
+    context: click.Context,
+    folder: Path | None,
+    numbers: tuple[int, ...],
+    everything: bool,
+    manoeuvre_file: Path | None,
+    recording: Path | None,
+    number: int | None,
+    rate: float,
+    truth_file: Path | None,
+    kind: str,
+    bus: str | None,
+    link: Path | None,
+    device_file: Path | None,
+    wheels: tuple[int, ...],
+    port_file: Path | None,
+    sidecar: Path | None,
+    loop: bool,
+    speedup: float,
+    fault_texts: tuple[str, ...],
+    seed: int,
+    patience: float,
+    after: Path | None,
+    unplug: float | None,
+    replug: float | None,
+    json_file: Path | None,
+) -> None:
+    """Play a campaign, a manoeuvre or a recording as wheels that send, with faults on request."""
+    if [folder, manoeuvre_file, recording].count(None) != 2:
+        raise click.UsageError("just one of --campaign, --manoeuvre and --recording is needed")
+    if replug is not None and (link is None or unplug is None):
+        raise click.UsageError("--replug needs --unplug, and --link for a name that stays")
+    if bus is not None and kind == "serial" and recording is None:
+        raise click.UsageError("--bus carries CAN frames: --format RAW16, RAW12 or RAW12C")
+    if len(set(wheels)) != len(wheels) or len(wheels) > 4:
+        raise click.UsageError("--wheel: one to four different numbers are allowed")
+    faults = Faults(parse_faults(fault_texts), seed)
+    device = Device() if device_file is None else read_device(device_file)
+    tape: Tape | None = None
+    runs: list[int] = []
+    if folder is not None:
+        tape, runs = _campaign(folder, numbers, everything, device, faults, wheels)
+    elif manoeuvre_file is not None:
+        tape = _manoeuvre(manoeuvre_file, device, faults, wheels, rate, seed, truth_file)
+    elif recording is not None:
+        _check(recording, number)
+    line = CAN if bus is not None else SERIAL if kind == "serial" else SLCAN
+    sink: TerminalSink | BusSink
+    sink = TerminalSink(link, unplug, replug) if bus is None else open_bus(bus, fd=kind != "RAW12C")
+    tally, player = Tally(), Player(transmitter(kind), line, faults)
+    short = tape is not None and tape.duration * len(wheels) <= AHEAD
+    ready = list(player.pieces(tape)) if tape is not None and short else []
+    with closing(sink), ExitStack() as stack:
+        if sidecar is not None and tape is not None:
+            write_json(sidecar, _sidecar(tape, loop))
+        click.echo(sink.path)
+        if port_file is not None:
+            _announce(port_file, sink.path)
+            stack.callback(_withdraw, port_file, sink.path)
+        try:
+            with on_stop():
+                sink.wait_for_reader(Deadline.after(patience))
+                if after is not None:
+                    _wait_for(after)
+                start, turn = time.monotonic(), 0
+                while True:
+                    shift = 0.0
+                    pieces: Iterable[Script] = ready if not turn else ()
+                    if not pieces:
+                        pieces = player.pieces(tape, turn) if tape else _recorded(recording, number)
+                    for piece in pieces:
+                        play(piece, sink, tally, start=start, speedup=speedup)
+                        shift = piece.due[-1] if piece.due else shift
+                    turn += 1
+                    if not loop:
+                        break
+                    if tape is None:
+                        start += shift / speedup
+                if sink.drain(DRAIN):
+                    click.echo(PLAYED)
+                sink.end(LINGER)
+        except (KeyboardInterrupt, UnpluggedError) as error:
+            click.echo(str(error) or "stopped", err=True)
+    _summary(tally, len(runs), faults, sink)
+    if json_file is not None:
+        write_json(
+            json_file,
+            {
+                "format": "tirebench-emulation/1",
+                "runs": runs,
+                "frames": tally.sent,
+                "unheard": tally.unheard,
+                "late_s": tally.late,
+                "faults": dict(faults.done),
+                "unplugged": getattr(sink, "unplugged", 0),
+            },
+        )
+    context.exit(1 if tally.unheard and replug is None else 0)
+
+
+def _wait_for(file: Path) -> None:
+    """Wait until somebody makes a file, or stops the program."""
+    while not file.exists():
+        time.sleep(LOOK)
+
+
+def _campaign(
+    folder: Path,
+    numbers: tuple[int, ...],
+    everything: bool,
+    device: Device,
+    faults: Faults,
+    wheels: tuple[int, ...],
+) -> tuple[Tape, list[int]]:
+    from tirebench.sources import campaign_runs
+
+    campaign = read_campaign(folder)
+    device.check_layout(campaign.header.gage_lateral, str(folder))
+    runs = campaign_runs(campaign, numbers, everything)
+    tape = record_tape(runs, device, faults, wheels, campaign.header)
+    return tape, [run.plan.run for run in runs]
+
+
+def _manoeuvre(
+    file: Path,
+    device: Device,
+    faults: Faults,
+    wheels: tuple[int, ...],
+    rate: float,
+    seed: int,
+    truth_file: Path | None,
+) -> Tape:
+    from tirebench.manoeuvre import read_manoeuvre
+    from tirebench.sources import manoeuvre_tape, write_truth
+
+    manoeuvre = read_manoeuvre(file)
+    device.check_layout(manoeuvre.tire.lateral.tolist(), str(file))
+    click.echo("solving the rig along the manoeuvre ...", err=True)
+    tape, motions = manoeuvre_tape(manoeuvre, device, faults, wheels, rate=rate, seed=seed)
+    if truth_file is not None:
+        write_truth(truth_file, motions)
+    return tape
+
+
+def _check(recording: Path, source: int | None) -> None:
+    """Refuse a recording before anybody waits for it."""
+    from tirebench.recording import Recording
+    from tirebench.sources import chosen_source
+
+    with closing(Recording(recording)) as opened:
+        chosen_source(opened, source)
+
+
+def _recorded(recording: Path | None, source: int | None) -> Iterator[Script]:
+    from tirebench.recording import Recording
+    from tirebench.sources import recording_pieces
+
+    if recording is None:
+        return
+    with closing(Recording(recording)) as opened:
+        yield from recording_pieces(opened, source)
+
+
+def _summary(tally: Tally, runs: int, faults: Faults, sink: TerminalSink | BusSink) -> None:
+    click.echo(
+        f"{tally.sent} frames in {runs} runs, {tally.unheard} of them unheard, "
+        f"at most {1e3 * tally.late:.1f} ms late"
+    )
+    for name, count in faults.done.items():
+        click.echo(f"  {count:6d} {name}")
+    if isinstance(sink, TerminalSink) and sink.unplugged:
+        click.echo(f"  {sink.unplugged:6d} unplugged")
+
+
+def _sidecar(tape: Tape, loop: bool) -> dict[str, object]:
+    known: Conditions = tape.conditions
+    length = round(1e6 * tape.duration) if loop else 0
+    return conditions_document(replace(known, loop_us=length))
+
+
+def _announce(port_file: Path, path: str) -> None:
+    """Write the port's path in one go, so that whoever waits for the file reads all of it."""
+    port_file.parent.mkdir(parents=True, exist_ok=True)
+    part = port_file.with_name(port_file.name + ".part")
+    part.write_text(path + "\n", encoding="utf-8")
+    part.replace(port_file)
+
+
+def _withdraw(port_file: Path, path: str) -> None:
+    """Remove the file that names a port which is gone, unless it names another one by now."""
+    with suppress(OSError):
+        if port_file.read_text(encoding="utf-8").strip() == path:
+            port_file.unlink()

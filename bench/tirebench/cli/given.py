@@ -1,0 +1,272 @@
+"""What a run is told: its sources, and what is known beside the strain."""
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from rich.console import Console
+
+from tirebench.cli.options import devices_of_text, wheel_of
+from tirebench.conditions import QUANTITIES, Conditions, read_conditions
+from tirebench.deadline import Deadline
+from tirebench.device import Device
+from tirebench.errors import DeviceError, RecordingError
+from tirebench.links.opening import PortPlan
+from tirebench.links.replay import ReplayLink
+from tirebench.protocols.plan import ProtocolPlan
+from tirebench.recording_header import RecordingHeader
+from tirebench.setup_file import check_sources, read_setup
+from tirebench.source_plan import SourcePlan, protocol_of
+from tirelib.estimators.calibration import Calibration
+from tirelib.units import to_si
+
+LOOK = 0.05
+"""Time between two looks for a file that is waited for, [s]."""
+_OPTIONS = {"speed": "--speed KMH, ", "pressure": "--pressure BAR, ", "camber": "--camber DEG, "}
+_WITHOUT = {
+    "speed": "there will be no slip ratio",
+    "pressure": "standard deviations are wider by what pressure does",
+    "camber": "standard deviations of Fy and alpha are wider by what camber does, and "
+    "turns that owe most of theirs to it say camber_unknown",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """What is read, and what is known beside it.
+
+    Attributes
+    ----------
+    sources : tuple of SourcePlan
+    conditions : Conditions
+    wheels : tuple of int
+        That are looked at; empty: the first that are heard.
+    """
+
+    sources: tuple[SourcePlan, ...]
+    conditions: Conditions
+    wheels: tuple[int, ...]
+
+    def check_layout(self, lateral: Sequence[float], where: str) -> None:
+        """Refuse wheels with other gages than the calibration.
+
+        Raises
+        ------
+        DeviceError
+            Naming both.
+        """
+        for source in self.sources:
+            for device in (source.devices or {None: source.protocol.device}).values():
+                for gages in source.gages:
+                    device.check_layout(lateral, where, gages)
+
+    @property
+    def devices(self) -> list[Device]:
+        """What a count means, of all wheels."""
+        return [
+            device
+            for source in self.sources
+            for device in (source.devices or {None: source.protocol.device}).values()
+        ]
+
+
+def live_sources(
+    ports: Sequence[str], setup: Path | None, map_file: Path | None, usual: SourcePlan
+) -> tuple[SourcePlan, ...]:
+    """Return what is read live: ``[WHEEL=]PORT`` each, or the sources of a setup.
+
+    Raises
+    ------
+    DeviceError
+        With the faults of a file, or if there can be no such wheel.
+    """
+    if setup is not None:
+        return read_setup(setup, usual)
+    sources = []
+    for text in ports:
+        wheel, rest = wheel_of("--port", text)
+        port = replace(usual.port, port=rest)
+        protocol = protocol_of(port, usual.protocol.rate, map_file)
+        sources.append(replace(usual, port=port, protocol=protocol, wheel=wheel))
+    return tuple(sources)
+
+
+def port_of_file(file: Path, wait: float, console: Console) -> str:
+    """Return the port whose name stands in a file, once the file and the port are there.
+
+    Raises
+    ------
+    DeviceError
+        If they do not come in time.
+    """
+    deadline, told = Deadline.after(wait), False
+    while True:
+        try:
+            port = file.read_text(encoding="utf-8").strip()
+        except (OSError, UnicodeDecodeError):
+            port = ""
+        if port and (not port.startswith("/") or Path(port).exists()):
+            return port
+        if deadline.expired:
+            raise DeviceError(
+                f"--port-file {file}: {f'its port {port} is not there' if port else 'no port'}; "
+                "the file that `tirebench emulate --port-file` writes is needed; start that, or "
+                "wait for it with --wait"
+            )
+        if not told:
+            console.print(f"waiting for {file}", soft_wrap=True, markup=False)
+            told = True
+        time.sleep(LOOK)
+
+
+def conditions_of(
+    options: Mapping[str, float | None], named: Sequence[str], sidecar: Path | None
+) -> Conditions | None:
+    """Return conditions of the options; None when there are none.
+
+    Parameters
+    ----------
+    options : mapping of name to value
+        In the units of files; None: not given.
+    named : sequence of str
+        ``NAME=VALUE``, in the same units.
+    sidecar : Path or None
+
+    Raises
+    ------
+    DeviceError
+        If a condition is given twice, is unknown or no number; if a file is given beside values, or
+        has faults.
+    """
+    given = {name: value for name, value in options.items() if value is not None}
+    for text in named:
+        name, _, number = text.partition("=")
+        if name not in QUANTITIES or name in given or not _is_number(number):
+            units = ", ".join(f"{known} [{unit}]" for known, (unit, _) in QUANTITIES.items())
+            raise DeviceError(
+                f"--condition {text}: NAME=VALUE is needed, each name once; names are {units}; "
+                "write it so"
+            )
+        given[name] = float(number)
+    if sidecar is None:
+        si = {name: float(to_si(value, *QUANTITIES[name])) for name, value in given.items()}
+        return Conditions.constant(**si) if si else None
+    if given:
+        raise DeviceError(
+            f"{', '.join(given)} and --conditions {sidecar} are given; one or the other says "
+            "what holds; leave one out"
+        )
+    return read_conditions(sidecar)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
+
+
+def given_live(
+    sources: tuple[SourcePlan, ...], conditions: Conditions | None, wheels: tuple[int, ...]
+) -> Given:
+    """Return what a live run is told.
+
+    Raises
+    ------
+    DeviceError
+        If sources contradict each other or the conditions.
+    """
+    check_sources(sources, conditions)
+    return Given(sources, conditions or Conditions.constant(), wheels)
+
+
+def recorded_sources(
+    header: RecordingHeader, where: str, devices: Mapping[int | None, Device]
+) -> tuple[SourcePlan, ...]:
+    """Return the sources that a recording has; devices that are given replace its own.
+
+    Raises
+    ------
+    RecordingError
+        If the header is damaged.
+    """
+    sources = []
+    for number, source in enumerate(header.sources):
+        protocol = ProtocolPlan.of_header(source, where)
+        text = str(source.get("device", header.device))
+        own = devices_of_text(text, where)
+        port = PortPlan(str(source.get("name", f"source {number}")))
+        wheel = source.get("wheel")
+        if wheel is not None and wheel not in range(256):
+            raise RecordingError(
+                f"{where}: wheel = {str(wheel)[:40]} of source {number}; 0 .. 255 is allowed; "
+                "the header is damaged; take another recording"
+            )
+        sources.append(SourcePlan(port, protocol, devices or own, wheel, text))
+    return tuple(sources)
+
+
+def given_replayed(
+    link: ReplayLink,
+    conditions: Conditions | None,
+    devices: Mapping[int | None, Device],
+    wheels: tuple[int, ...],
+    console: Console,
+) -> Given:
+    """Return what a recording says; options that are given replace it, and that is said."""
+    header = link.recording.header
+    if devices or conditions is not None:
+        console.print("note: device file or conditions of the recording are replaced by options")
+    sources = recorded_sources(header, link.name, devices)
+    if not wheels:
+        wheels = tuple(header.settings.get("wheels") or ())
+    return Given(sources, conditions or link.recording.conditions, wheels)
+
+
+def missing(given: Given, calibration: Calibration) -> tuple[dict[str, str], dict[str, str]]:
+    """Return what is not known, by name and in words: needed by the calibration, and useful."""
+    told = [place for source in given.sources for place in source.told]
+    wheels = {*given.wheels, *(w for source in given.sources for w in source.known_wheels)}
+    words: dict[str, str] = {}
+    for name in {*calibration.needed, *_WITHOUT} - set(given.conditions.known):
+        places = [wheel for other, wheel in told if other == name]
+        without = sorted(wheels - set(places))
+        if not places:
+            words[name] = name
+        elif None not in places and without:
+            words[name] = f"{name} of wheel {', '.join(map(str, without))}"
+    needed = {name: words[name] for name in calibration.needed if name in words}
+    return needed, {name: words[name] for name in _WITHOUT if name in words.keys() - needed}
+
+
+def _option(name: str) -> str:
+    return _OPTIONS.get(name, f"--condition {name}=VALUE, ")
+
+
+def say_missing(given: Given, calibration: Calibration, console: Console) -> None:
+    """Say what is not known, and cannot be noticed, before the first turn shows it."""
+    needed, useful = missing(given, calibration)
+    for name, words in needed.items():
+        console.print(
+            f"WARNING: no {words}: this calibration needs it, and NO TURN WILL BE VALID; give "
+            f"{_option(name)}--conditions FILE, or a map with [{name}]",
+            style="bold red",
+            soft_wrap=True,
+            markup=False,
+        )
+    for name, words in useful.items():
+        console.print(
+            f"note: no {words}: {_WITHOUT[name]}; give {_option(name)}"
+            f"--conditions FILE, or a map with [{name}]",
+            soft_wrap=True,
+            markup=False,
+        )
+    if not calibration.knows_tire:
+        console.print(
+            "note: this calibration cannot notice another tire on the wheel (fewer than 17 "
+            "conditions, or an earlier version); calibrate on more",
+            soft_wrap=True,
+            markup=False,
+        )

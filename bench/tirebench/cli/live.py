@@ -1,0 +1,130 @@
+"""What `tirebench run` shows while it runs: a live table on a terminal, plain lines elsewhere."""
+
+import math
+import time
+from collections import deque
+from collections.abc import Sequence
+from types import TracebackType
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from tirebench.chain import Turn, quantity_valid
+from tirebench.document import QUANTITIES, flags, line_document
+from tirebench.estimation import News
+from tirebench.session import Source
+from tirebench.wheels import Wheels
+
+ROWS = 20
+"""Turns that the live table holds."""
+REFRESH = 0.25
+"""Time between two drawings, [s]."""
+FORMATS = {"Fz": (".0f", "N"), "alpha": (".2f", "deg"), "kappa": (".4f", ""), "Fy": (".0f", "N")}
+UNITS = [f"{name} [{unit}]" if unit else name for name, (_, unit) in FORMATS.items()]
+HEADINGS = ("wheel", "run", "t [s]", *UNITS, "valid", "flags")
+LOSSES = (
+    "crc_bad",
+    "framing_bad",
+    "lost_frames",
+    "duplicates",
+    "out_of_order",
+    "resets",
+    "unknown_type",
+    "other_wheel",
+    "unplaced_samples",
+    "overruns",
+    "reconnects",
+)
+
+
+class Screen:
+    """Show turns and the line's counters; a context manager.
+
+    Parameters
+    ----------
+    console : Console
+    source : Source
+        Whose counters are shown.
+    """
+
+    def __init__(self, console: Console, source: Source) -> None:
+        self._console = console
+        self._source = source
+        self._turns: deque[Turn] = deque(maxlen=ROWS)
+        self._live = Live(console=console, auto_refresh=False) if console.is_terminal else None
+        self._drawn = 0.0
+
+    def __enter__(self) -> "Screen":
+        if self._live is not None:
+            self._live.start()
+        else:
+            self._console.print(_plain_row(HEADINGS), soft_wrap=True, markup=False)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._live is not None:
+            self._live.update(self._table(), refresh=True)
+            self._live.stop()
+
+    def watch(self, news: News) -> None:
+        """Show what is new, also when nothing is; called again and again."""
+        for said in news.messages:
+            self._console.print(f"FMU: {said}", soft_wrap=True, markup=False)
+        for said in news.alarms:
+            self._console.print(f"ALARM: {said}", style="bold red", soft_wrap=True, markup=False)
+        self._turns.extend(news.turns)
+        if self._live is None:
+            rows = [_plain_row(_cells(turn)) for turn in news.turns]
+            if rows:
+                self._console.out("\n".join(rows), highlight=False)
+        elif time.monotonic() - self._drawn > REFRESH:
+            self._live.update(self._table(), refresh=True)
+            self._drawn = time.monotonic()
+
+    def _table(self) -> RenderableType:
+        table = Table(box=SIMPLE_HEAD, title=self._source.name)
+        for heading in HEADINGS:
+            table.add_column(Text(heading), justify="left" if heading == "flags" else "right")
+        for turn in self._turns:
+            table.add_row(*_cells(turn), style=None if turn.valid else "dim")
+        return Group(table, Text(counters(self._source.wheels)))
+
+
+def counters(wheels: Wheels) -> str:
+    """Return the state of the line in one line; what is zero is left out but for the frames.
+
+    Where no frame came of a line or of a wheel that is known beforehand, it says so.
+    """
+    counts = line_document(*wheels.counts)
+    parts = [f"{counts['frames']} frames"]
+    parts += [f"{counts[name]} {name}" for name in LOSSES if counts[name]]
+    saturated = {f"gage {i}": n for i, n in enumerate(counts["saturated_samples"], 1) if n}
+    parts += [f"{n} saturated samples of {gage}" for gage, n in saturated.items()]
+    hints = list(wheels.hints().values())
+    if counts["frames"]:
+        hints += [f"wheel {number}: no frame came" for number in wheels.missing]
+    return "; ".join([", ".join(parts), *hints])
+
+
+def _cells(turn: Turn) -> tuple[str, ...]:
+    cells = [str(turn.wheel), str(turn.run), f"{turn.ready if math.isnan(turn.t) else turn.t:.3f}"]
+    for name, (_, factor) in QUANTITIES.items():
+        value = turn.outputs[name] * factor
+        std = turn.outputs.get(f"{name}_std", math.nan) * factor
+        spec = FORMATS[name][0]
+        mark = "" if quantity_valid(turn, name) else "?"
+        cells.append("-" if math.isnan(value) else f"{value:{spec}} +-{std:{spec}}{mark}")
+    return (*cells, "yes" if turn.valid else "no", " ".join(flags(turn)))
+
+
+def _plain_row(cells: Sequence[str]) -> str:
+    widths = (5, 4, 9, 15, 15, 17, 15, 5, 0)
+    return "  ".join(f"{cell:>{width}}" for cell, width in zip(cells, widths, strict=True))

@@ -1,0 +1,150 @@
+"""Options that several verbs share: the port, the protocol, the wheels."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from tirebench.device import Device, read_device
+from tirebench.errors import DeviceError
+from tirebench.links.opening import BITRATE
+from tirebench.protocols.plan import RATE
+from tirelib.cli.common import FILE
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+WHEEL_MARK = "# wheel "
+PORTS = """\b
+Ports: /dev/ttyUSB0 or COM3, tcp://HOST:PORT, udp://[HOST]:PORT, rfc2217://HOST:PORT (SERIAL v1, or
+as a map says), slcan:/dev/ttyACM0 (CAN adapter with slcan, read in bulk), can:INTERFACE:CHANNEL
+(python-can: can:socketcan:can0, can:virtual:test, can:pcan:PCAN_USBBUS1).
+"""
+
+_PORT_OPTIONS = (
+    click.option(
+        "--baud",
+        default=2_000_000,
+        show_default=True,
+        type=click.IntRange(min=1200),
+        help="Of a serial port.",
+    ),
+    click.option(
+        "--bitrate",
+        default=BITRATE,
+        show_default=True,
+        type=click.IntRange(min=1000),
+        help="Of a CAN bus.",
+    ),
+    click.option(
+        "--data-bitrate",
+        type=click.IntRange(min=1000),
+        help="Of the data in CAN FD.  [default: classic CAN]",
+    ),
+    click.option(
+        "--bus-option",
+        "bus_options",
+        metavar="KEY=VALUE",
+        multiple=True,
+        help="More for python-can.",
+    ),
+    click.option(
+        "--rate",
+        default=RATE,
+        show_default=True,
+        metavar="HZ",
+        type=click.FloatRange(153.0, 200_000.0),
+        help="Sample rate of the gages on CAN; SERIAL v1 says its own.",
+    ),
+    click.option(
+        "--map",
+        "map_file",
+        metavar="M.toml",
+        type=FILE,
+        help="Another make's transmitter, on CAN or a serial line.",
+    ),
+    click.option(
+        "--reconnect",
+        default=60.0,
+        show_default=True,
+        metavar="S",
+        type=click.FloatRange(min=0.0),
+        help="How long a port may be away before the run ends.",
+    ),
+)
+
+
+def port_options(command: Command) -> Command:
+    """Add the options of a port to a command."""
+    for option in reversed(_PORT_OPTIONS):
+        command = option(command)
+    return command
+
+
+def wheel_of(option: str, text: str) -> tuple[int | None, str]:
+    """Return the wheel and the rest of ``[WHEEL=]REST``; None where no wheel is said.
+
+    Raises
+    ------
+    DeviceError
+        If there can be no such wheel.
+    """
+    number, _, rest = text.partition("=")
+    if not (rest and number.isdecimal()):
+        return None, text
+    if int(number) > 255:
+        raise DeviceError(
+            f"{option} {text}: wheel {number}; 0 .. 255 is allowed; correct the number"
+        )
+    return int(number), rest
+
+
+def devices_of(texts: Sequence[str]) -> tuple[dict[int | None, Device], str]:
+    """Return the device of each wheel from ``D.toml`` or ``WHEEL=D.toml``, and all texts as one.
+
+    The text has a line ``# wheel N`` before each file but that for all wheels.
+
+    Raises
+    ------
+    DeviceError
+        With the faults of a file.
+    """
+    devices: dict[int | None, Device] = {}
+    parts = []
+    for given in texts:
+        wheel, rest = wheel_of("--device", given)
+        path = Path(rest)
+        if wheel in devices:
+            raise DeviceError(
+                f"--device {given}: a device of {'all wheels' if wheel is None else wheel} is "
+                "there already; one a wheel is allowed; leave one out"
+            )
+        devices[wheel] = read_device(path)
+        text = path.read_text(encoding="utf-8")
+        parts.append(text if wheel is None else f"{WHEEL_MARK}{wheel}\n{text}")
+    return devices, "\0".join(parts)
+
+
+def devices_of_text(text: str, where: str) -> dict[int | None, Device]:
+    """Return the devices of a recording's header; the inverse of `devices_of`.
+
+    Raises
+    ------
+    DeviceError
+        With the faults of a file, or if a wheel has no number.
+    """
+    from tirebench.device import parse_device
+
+    devices: dict[int | None, Device] = {}
+    for part in text.split("\0") if text else []:
+        first, _, rest = part.partition("\n")
+        own = first.startswith(WHEEL_MARK)
+        number = first.removeprefix(WHEEL_MARK)
+        if own and not (number.isdecimal() and len(number) <= 3 and int(number) <= 255):
+            raise DeviceError(
+                f"{where}: device file of wheel {number[:40]!r}; 0 .. 255 is allowed; the header "
+                "is damaged; take another recording, or name files with --device"
+            )
+        wheel = int(number) if own else None
+        devices[wheel] = parse_device(rest if own else part, f"{where}: device file")
+    return devices

@@ -1,0 +1,163 @@
+"""Options of the live page, and what is said of it."""
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+from rich.console import Console
+
+from tirebench.conditions import Conditions
+from tirebench.device import Device
+from tirebench.estimation import News
+from tirebench.page.alarms import RULES, Rule
+from tirebench.page.commands import Switch
+from tirebench.page.feed import About
+from tirebench.page.live import LOOPBACK, LivePage, PageChoice
+from tirebench.session import Source
+from tirelib.cli.common import FILE
+from tirelib.estimators.calibration import Calibration
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+NEEDED = ("starlette", "uvicorn", "websockets")
+
+_OPTIONS = (
+    click.option(
+        "--page/--no-page",
+        default=None,
+        help="Live page in the browser.  [default: yes, but for a replay without --pace]",
+    ),
+    click.option(
+        "--host",
+        default=LOOPBACK,
+        show_default=True,
+        metavar="ADDRESS",
+        help="Address of the page.",
+    ),
+    click.option(
+        "--network",
+        is_flag=True,
+        help="Allow a --host that other machines can reach; not encrypted.",
+    ),
+    click.option(
+        "--page-port",
+        default=0,
+        type=click.IntRange(0, 65535),
+        metavar="N",
+        help="Port of the page.  [default: a free one]",
+    ),
+    click.option("--tui", is_flag=True, help="The same in this terminal."),
+    click.option(
+        "--alarms", "alarms", metavar="A.toml", type=FILE, help="Limits of the page's alarms."
+    ),
+)
+
+
+def page_options(command: Command) -> Command:
+    """Add the options of the page to a command."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+def page_choice(
+    page: bool | None, host: str, network: bool, page_port: int, tui: bool, *, paced: bool
+) -> PageChoice:
+    """Return what is to be shown.
+
+    Raises
+    ------
+    DeviceError
+        If the host is not allowed.
+    """
+    wanted = (paced and not tui) if page is None else page
+    return PageChoice(wanted, tui, host, page_port, network).checked()
+
+
+class Shown:
+    """The page of a run, or nothing when none is wanted; a context manager.
+
+    Parameters
+    ----------
+    choice : PageChoice
+    console : Console
+        Gets the address, and a warning when others can reach it.
+    rules : mapping of name to Rule
+        Limits of the alarms.
+    """
+
+    def __init__(
+        self, choice: PageChoice, console: Console, rules: Mapping[str, Rule] = RULES
+    ) -> None:
+        self._choice = choice
+        self._rules = rules
+        self._console = console
+        self._stack = ExitStack()
+        self._page: LivePage | None = None
+        self.quiet = choice.terminal and console.is_terminal
+        self.anything = choice.page or choice.terminal
+
+    def open(
+        self,
+        source: Source,
+        switch: Switch | None,
+        fmu: Path,
+        calibration: Calibration | None,
+        devices: Sequence[Device],
+        conditions: Conditions,
+        origin: str,
+        folder: Path,
+    ) -> None:
+        """Start what is to be shown and say where it is.
+
+        `conditions` are what is known beside a bus, `origin` says where they come from; device
+        files that the page asks for are written into `folder`.
+        """
+        choice, console = self._choice, self._console
+        missing = [name for name in NEEDED if find_spec(name) is None]
+        if choice.page and missing:
+            console.print(f"no live page: {', '.join(missing)} missing; pip install tirelib[bench]")
+            choice = PageChoice(False, choice.terminal)
+        if not (choice.page or choice.terminal):
+            return
+        lateral = next((d.lateral for d in devices if d.lateral), None)
+        about = About(source.name, fmu.name, conditions=conditions, origin=origin, folder=folder)
+        if calibration is not None:
+            about = replace(about, tire=calibration.tire, lateral=calibration.lateral)
+        elif lateral is not None:
+            about = replace(about, lateral=lateral)
+        page = LivePage(choice, source, about, switch, self._rules)
+        self._page = self._stack.enter_context(page)
+        if choice.open_to_others:
+            console.print(
+                f"warning: the page is open to the network at {choice.host}, not encrypted; "
+                "whoever has its address can record and set markers",
+                style="bold red",
+                soft_wrap=True,
+            )
+        if page.url:
+            console.print(f"live page: {page.url}", soft_wrap=True, markup=False, highlight=False)
+
+    def watch(self, news: News, unwritten: str = "") -> None:
+        """Show what is new, and why turns cannot be written; called again and again."""
+        if self._page is not None:
+            self._page.watch(news, unwritten)
+
+    def cpu_time(self) -> float:
+        """Return what the page's process has used, [s]."""
+        return 0.0 if self._page is None else self._page.cpu_time
+
+    def end(self, reason: str) -> None:
+        """Say that the run has ended."""
+        if self._page is not None:
+            self._page.end(reason)
+
+    def __enter__(self) -> "Shown":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()

@@ -1,0 +1,153 @@
+"""``tirebench record``: raw bytes of a port to a file, without an estimator."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from tirebench.cli.given import given_live, live_sources
+from tirebench.cli.live import counters
+from tirebench.cli.options import PORTS, devices_of, port_options
+from tirebench.cli.recording import at_start, recording_options
+from tirebench.cli.stop import start_in_order
+from tirebench.conditions import read_conditions
+from tirebench.document import line_document, wheel_document
+from tirebench.estimation import News
+from tirebench.links.opening import PortPlan
+from tirebench.live.chain import LiveChain, LivePlan
+from tirebench.live.priority import ordinary, realtime
+from tirebench.live.reader import ReaderPlan
+from tirebench.live.recording_state import RecordingRule
+from tirebench.new_file import keep_recordings
+from tirebench.protocols.plan import ProtocolPlan
+from tirebench.recording_header import RecordingHeader
+from tirebench.session import Limits, Session
+from tirebench.source_plan import SourcePlan
+from tirelib.cli.common import FILE, NEW_FILE, write_json
+
+_EXAMPLE = f"""\b
+Examples:
+  tirebench record --port /dev/ttyUSB0 --out a.mcap --duration 600
+  tirebench record --port can:socketcan:can0 --rate 5000 --out bus.mcap
+
+{PORTS}
+\b
+Every read is written as it came, bad frames included; decoding only counts.
+Exit code: 0 done, 1 the port went away or not one good frame came, 2 bad input.
+"""
+
+
+@click.command(epilog=_EXAMPLE)
+@click.option(
+    "--port",
+    "ports",
+    metavar="[WHEEL=]PORT",
+    multiple=True,
+    help="Port to read, several allowed; see below.",
+)
+@click.option(
+    "--setup",
+    metavar="S.toml",
+    type=FILE,
+    help="Several sources, each with its protocol, wheel and device file.",
+)
+@click.option("--out", metavar="FILE.mcap", type=NEW_FILE, required=True, help="A new file.")
+@recording_options
+@click.option(
+    "--conditions",
+    "sidecar",
+    metavar="F.json",
+    type=FILE,
+    help="Conditions over time, as `emulate --conditions` writes them.",
+)
+@click.option(
+    "--device",
+    "device_texts",
+    metavar="[WHEEL=]D.toml",
+    multiple=True,
+    help="Scale and zero of the gages, kept in the recording.",
+)
+@port_options
+@click.option("--duration", metavar="S", type=click.FloatRange(min=0.0), help="End after this.")
+@click.option(
+    "--silence",
+    metavar="S",
+    type=click.FloatRange(min=0.0),
+    help="End when nothing came for so long.",
+)
+@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the counters.")
+@click.pass_context
+def record(
+    context: click.Context,
+    ports: tuple[str, ...],
+    setup: Path | None,
+    out: Path,
+    rule: RecordingRule,
+    sidecar: Path | None,
+    device_texts: tuple[str, ...],
+    baud: int,
+    bitrate: int,
+    data_bitrate: int | None,
+    bus_options: tuple[str, ...],
+    rate: float,
+    map_file: Path | None,
+    reconnect: float,
+    duration: float | None,
+    silence: float | None,
+    json_file: Path | None,
+) -> None:
+    """Record the raw bytes of a port; Ctrl-C ends in good order."""
+    if bool(ports) == (setup is not None):
+        raise click.UsageError("just one of --port and --setup is needed")
+    keep_recordings(json_file, out)
+    devices, text = devices_of(device_texts)
+    plan = PortPlan("", baud, bitrate, data_bitrate, bus_options)
+    usual = SourcePlan(plan, ProtocolPlan(rate=rate), devices, None, text)
+    given = None if sidecar is None else read_conditions(sidecar)
+    known = given_live(live_sources(ports, setup, map_file, usual), given, ())
+    settings: dict[str, Any] = {
+        "ports": [source.port.port for source in known.sources],
+        "baud": baud,
+        "bitrate": bitrate,
+        "data_bitrate": data_bitrate,
+    }
+    first, *more = (source.as_header() for source in known.sources)
+    header = RecordingHeader(settings, text, "", first, tuple(more))
+    priority = realtime(None)
+    reader = ReaderPlan(
+        known.sources, reconnect, strain=rule.strain, apart=ordinary(priority), estimated=False
+    )
+    live = LivePlan(reader, None, known.conditions, header, out, rule=rule)
+    with start_in_order() as stop, LiveChain(live, click.echo) as chain:
+        session = Session(chain, limits=Limits(duration, silence), watch=_alarm)
+        stop.action = session.stop
+        click.echo(f"{chain.name} -> {out}")
+        click.echo(at_start(out, reader, rule, watched=False))
+        click.echo(f"priority: {priority}")
+        outcome = session.run()
+        wheels, recorded, counts = chain.wheels, chain.recorded.bytes, chain.counts()
+    if outcome.message:
+        click.echo(f"unplugged: {outcome.message}")
+    click.echo(f"ended: {outcome.reason}; {recorded} bytes; {counters(wheels)}")
+    if json_file is not None:
+        write_json(
+            json_file,
+            {
+                "format": "tirebench-record/1",
+                "ended": outcome.reason,
+                "bytes": recorded,
+                "line": line_document(*wheels.counts),
+                "chain": counts,
+                "wheels": {n: wheel_document(wheels, n) for n in wheels.heard},
+            },
+        )
+    failed = counts["recording"]["error"]
+    if failed:
+        click.secho(f"not everything is recorded: {failed}", fg="red")
+    good = wheels.counts[0].ok > 0 and outcome.reason != "unplugged" and not failed
+    context.exit(0 if good else 1)
+
+
+def _alarm(news: News) -> None:
+    for said in news.alarms:
+        click.secho(f"ALARM: {said}", fg="red", bold=True)

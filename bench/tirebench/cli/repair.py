@@ -1,0 +1,56 @@
+"""``tirebench repair``: a recording or JSON that breaks off, with its end."""
+
+import json
+from pathlib import Path
+
+import click
+
+from tirebench.errors import RecordingError
+from tirebench.journal import HEAD, completed
+from tirebench.new_file import whole
+from tirebench.repair import repair as repaired
+from tirelib.cli.common import FILE, NEW_FILE, plain
+
+_EXAMPLE = """\b
+Examples:
+  tirebench repair live.mcap --out whole.mcap     # of a run or a machine that was switched off
+  tirebench repair live.json --out whole.json
+
+\b
+Readers that need an index (Foxglove) open the new file; the old one stays as it is. Of JSON the
+turns are kept; a replay of the recording gives the summary too. Each part of a recording is a file
+of its own.
+Exit code: 0 done, also where the file was whole; 2 nothing can be read.
+"""
+
+
+@click.command(epilog=_EXAMPLE)
+@click.argument("file", metavar="FILE", type=FILE)
+@click.option("--out", metavar="FILE", type=NEW_FILE, required=True, help="A new file.")
+def repair(file: Path, out: Path) -> None:
+    """Give a recording, or the JSON of a run, that breaks off its end and its index."""
+    if out.exists():
+        raise RecordingError(f"{out}: it exists; nothing is overwritten; name another file")
+    if _is_json(file):
+        document = completed(file.read_text(encoding="utf-8", errors="replace"))
+        if document is None:
+            raise RecordingError(f"{file}: no turns stand in it; JSON of `tirebench run` is needed")
+        with whole(out) as new:
+            new.write_text(json.dumps(plain(document), indent=1, allow_nan=False) + "\n")
+        click.echo(f"{len(document['turns'])} turns in {out}")
+        return
+    found = repaired(file, out)
+    click.echo(f"{found.messages} messages of {len(found.topics)} topics in {out}")
+    if found.damage:
+        click.echo(f"note: {file} breaks off ({found.damage})")
+
+
+def _is_json(file: Path) -> bool:
+    try:
+        with file.open("rb") as opened:
+            return opened.read(len(HEAD)) == HEAD.encode()
+    except OSError as error:
+        raise RecordingError(
+            f"{file}: it cannot be read ({error.strerror}); a recording or JSON of `tirebench run` "
+            "is needed; check the path"
+        ) from None

@@ -1,0 +1,69 @@
+"""``tirebench replay``: a recording through the FMU file, at any pace."""
+
+from pathlib import Path
+
+import click
+
+from tirebench.cli.run import run
+from tirelib.cli.common import FILE, NEW_FILE
+
+_EXAMPLE = """\b
+Examples:
+  tirebench replay live.mcap --fmu StrainTire.fmu --json again.json
+  tirebench replay live.mcap --fmu StrainTire.fmu --pace 1
+
+\b
+The same as `tirebench run --replay`: the estimates are those of the run, to the bit, at any pace.
+To play a recording to another program, see `tirebench emulate --recording`.
+Exit code: as of `tirebench run`.
+"""
+
+
+@click.command(epilog=_EXAMPLE)
+@click.argument("recording", metavar="RECORDING", type=FILE)
+@click.option(
+    "--fmu",
+    "fmu_file",
+    metavar="X.fmu",
+    type=FILE,
+    required=True,
+    help="Made by `tirelib fmu build`.",
+)
+@click.option("--trust", is_flag=True, help="Run this FMU although it is unknown; remember it.")
+@click.option(
+    "--pace",
+    metavar="X",
+    type=click.FloatRange(0.001, 1000.0),
+    help="Times real time.  [default: as fast as possible]",
+)
+@click.option(
+    "--wheel",
+    "numbers",
+    multiple=True,
+    type=click.IntRange(0, 255),
+    help="Wheels to look at.  [default: as in the run]",
+)
+@click.option(
+    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write every turn as JSON."
+)
+@click.pass_context
+def replay(
+    context: click.Context,
+    recording: Path,
+    fmu_file: Path,
+    trust: bool,
+    pace: float | None,
+    numbers: tuple[int, ...],
+    json_file: Path | None,
+) -> None:
+    """Estimate from a recording what the run estimated."""
+    context.invoke(
+        run,
+        replay=recording,
+        fmu_file=fmu_file,
+        trust=trust,
+        pace=pace,
+        numbers=numbers,
+        json_file=json_file,
+        page=False,
+    )

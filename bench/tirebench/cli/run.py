@@ -1,0 +1,440 @@
+"""``tirebench run``: a port or a recording through the FMU file, live."""
+
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+import click
+import numpy as np
+from rich.console import Console
+
+from tirebench.chain import Estimator
+from tirebench.cli.bridges import Bridges, bridge_options
+from tirebench.cli.given import (
+    Given,
+    conditions_of,
+    given_live,
+    given_replayed,
+    live_sources,
+    port_of_file,
+    say_missing,
+)
+from tirebench.cli.live import Screen, counters
+from tirebench.cli.options import PORTS, devices_of, port_options
+from tirebench.cli.page import Shown, page_choice, page_options
+from tirebench.cli.recording import at_start, recording_options
+from tirebench.cli.stop import start_in_order
+from tirebench.document import document
+from tirebench.estimation import Estimation, News
+from tirebench.fmu_archive import read_fmu
+from tirebench.fmu_model import FmuFile, FmuModel
+from tirebench.journal import Journal
+from tirebench.links.opening import PortPlan
+from tirebench.links.replay import ReplayLink
+from tirebench.live.chain import LiveChain, LivePlan
+from tirebench.live.priority import ordinary, realtime
+from tirebench.live.reader import ReaderPlan
+from tirebench.live.recording_state import RecordingRule
+from tirebench.new_file import keep_recordings
+from tirebench.page.alarms import RULES, read_alarms
+from tirebench.page.recording_switch import RecordingSwitch
+from tirebench.protocols.plan import ProtocolPlan
+from tirebench.recording_header import RecordingHeader, parts_of
+from tirebench.replay import ReplayChain
+from tirebench.session import Limits, Outcome, Session, Source
+from tirebench.source_plan import SourcePlan, wheels_of
+from tirebench.trust import check_trust
+from tirelib.cli.common import FILE, NEW_FILE, output
+
+_EXAMPLE = f"""\b
+Examples:
+  tirebench run --port /dev/ttyUSB0 --fmu StrainTire.fmu --speed 65 --pressure 2.3 --record a.mcap
+  tirebench run --port slcan:/dev/ttyACM0 --bitrate 1000000 --data-bitrate 5000000 --fmu X.fmu
+  tirebench run --port 0=/dev/ttyUSB0 --port 1=/dev/ttyUSB1 --wait --fmu StrainTire.fmu
+  tirebench run --setup rig.toml --fmu StrainTire.fmu --record a.mcap
+  tirebench run --replay a.mcap --fmu StrainTire.fmu --json a.json --no-page
+
+{PORTS}
+\b
+Without --speed there is no slip ratio. A replay takes protocol, device files and conditions from
+the recording.
+JSON as of `tirelib estimate`: N, deg, ISO 8855 axes; plus what the line lost, for each wheel.
+An FMU is native code: its hash is shown, and an unknown one is refused without --trust.
+Exit code: 0 done, 1 unplugged or not one valid turn, 2 bad input. Ctrl-C ends in good order.
+"""
+
+
+@click.command(epilog=_EXAMPLE)
+@click.option(
+    "--port",
+    "ports",
+    metavar="[WHEEL=]PORT",
+    multiple=True,
+    help="Port to read, several allowed; see below and `tirebench ports`.",
+)
+@click.option(
+    "--setup",
+    metavar="S.toml",
+    type=FILE,
+    help="Several sources, each with its protocol, wheel and device file.",
+)
+@click.option(
+    "--port-file",
+    metavar="FILE",
+    type=FILE,
+    help="File that holds the port's name (`emulate --port-file`).",
+)
+@click.option(
+    "--wait",
+    metavar="[S]",
+    type=click.FloatRange(min=0.0),
+    default=0.0,
+    is_flag=False,
+    flag_value=60.0,
+    help="Wait for ports that are not there yet, 60 s unless said.",
+)
+@click.option("--replay", metavar="FILE", type=FILE, help="Recording to read instead.")
+@click.option(
+    "--pace",
+    metavar="X",
+    type=click.FloatRange(0.001, 1000.0),
+    help="Replay at X times real time.  [default: as fast as possible]",
+)
+@click.option(
+    "--fmu",
+    "fmu_file",
+    metavar="X.fmu",
+    type=FILE,
+    required=True,
+    help="Made by `tirelib fmu build`; one instance for each wheel.",
+)
+@click.option("--trust", is_flag=True, help="Run this FMU although it is unknown; remember it.")
+@click.option("--speed", metavar="KMH", type=float, help="Travel speed.")
+@click.option("--pressure", metavar="BAR", type=click.FloatRange(min=0.0), help="Gauge pressure.")
+@click.option("--camber", metavar="DEG", type=float, help="ISO 8855.")
+@click.option(
+    "--condition",
+    "named",
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="Any condition by its name: friction=0.8, tread_depth=5 (mm).",
+)
+@click.option(
+    "--conditions",
+    "sidecar",
+    metavar="F.json",
+    type=FILE,
+    help="Conditions over time, as `emulate --conditions` writes them.",
+)
+@click.option(
+    "--device",
+    "device_texts",
+    metavar="[WHEEL=]D.toml",
+    multiple=True,
+    help="Scale and zero of the gages; one for all wheels, or for each.",
+)
+@click.option(
+    "--wheel",
+    "numbers",
+    multiple=True,
+    type=click.IntRange(0, 255),
+    help="Wheels to look at.  [default: the first four that are heard]",
+)
+@port_options
+@click.option(
+    "--record",
+    metavar="FILE.mcap",
+    type=NEW_FILE,
+    help="Record raw bytes, strain, estimates and counters.",
+)
+@recording_options
+@click.option(
+    "--json",
+    "json_file",
+    metavar="FILE",
+    type=NEW_FILE,
+    help="Write every turn as JSON, as it comes.",
+)
+@click.option("--duration", metavar="S", type=click.FloatRange(min=0.0), help="End after this.")
+@click.option(
+    "--silence",
+    metavar="S",
+    type=click.FloatRange(min=0.0),
+    help="End when nothing came for so long.",
+)
+@click.option("--turns", metavar="N", type=click.IntRange(min=1), help="End after so many turns.")
+@click.option(
+    "--every-turn",
+    is_flag=True,
+    help="Skip none: the port waits.  [default: skip what is 3 s late]",
+)
+@click.option(
+    "--realtime/--no-realtime",
+    "asked",
+    default=None,
+    help="Go before all other programs.  [default: where this user may]",
+)
+@bridge_options
+@page_options
+@click.pass_context
+def run(
+    context: click.Context,
+    ports: tuple[str, ...],
+    setup: Path | None,
+    port_file: Path | None,
+    wait: float,
+    replay: Path | None,
+    pace: float | None,
+    fmu_file: Path,
+    trust: bool,
+    speed: float | None,
+    pressure: float | None,
+    camber: float | None,
+    named: tuple[str, ...],
+    sidecar: Path | None,
+    device_texts: tuple[str, ...],
+    numbers: tuple[int, ...],
+    baud: int,
+    bitrate: int,
+    data_bitrate: int | None,
+    bus_options: tuple[str, ...],
+    rate: float,
+    map_file: Path | None,
+    reconnect: float,
+    record: Path | None,
+    rule: RecordingRule,
+    json_file: Path | None,
+    duration: float | None,
+    silence: float | None,
+    turns: int | None,
+    every_turn: bool,
+    asked: bool | None,
+    estimates_out: str | None,
+    plotjuggler: str | None,
+    page: bool | None,
+    host: str,
+    network: bool,
+    page_port: int,
+    tui: bool,
+    alarms: Path | None,
+) -> None:
+    """Estimate Fz, alpha, kappa and Fy of each turn, live from a port or from a recording."""
+    if [bool(ports), setup is not None, port_file is not None, replay is not None].count(True) != 1:
+        raise click.UsageError("just one of --port, --setup, --port-file and --replay is needed")
+    if replay is not None and record is not None:
+        raise click.UsageError("--record goes with --port: a recording is there already")
+    keep_recordings(json_file, record, replay)
+    priority = realtime(asked) if replay is None else ""
+    paced = replay is None or pace is not None
+    rules = RULES if alarms is None else read_alarms(alarms)
+    choice = page_choice(page, host, network, page_port, tui, paced=paced)
+    archive = read_fmu(fmu_file)
+    devices, device_text = devices_of(device_texts)
+    plan = PortPlan("", baud, bitrate, data_bitrate, bus_options)
+    console = output()
+    if port_file is not None:
+        ports = (port_of_file(port_file, wait, console),)
+    elif wait and replay is None:
+        console.print(f"ports that are not there yet are waited for, {wait:g} s")
+    options = {"speed": speed, "pressure": pressure, "camber": camber}
+    conditions = conditions_of(options, named, sidecar)
+    console.print(f"FMU {fmu_file}, sha256 {archive.sha256}", soft_wrap=True)
+    console.print(f"FMU {check_trust(archive, trust=trust)}", soft_wrap=True)
+    with start_in_order() as stop, ExitStack() as stack:
+        file = stack.enter_context(FmuFile(archive))
+        link = None if replay is None else stack.enter_context(ReplayLink(replay, pace))
+        if link is None:
+            usual = SourcePlan(plan, ProtocolPlan(rate=rate), devices, None, device_text)
+            sources = live_sources(ports, setup, map_file, usual)
+            known = given_live(sources, conditions, numbers)
+        else:
+            known = given_replayed(link, conditions, devices, numbers, console)
+            recorded_with = link.recording.header.fmu
+            if recorded_with and recorded_with != archive.sha256:
+                console.print(f"note: recorded with another FMU ({recorded_with[:12]}...)")
+        calibration = file.calibration
+        if calibration is not None:
+            known.check_layout(calibration.lateral, str(fmu_file))
+            say_missing(known, calibration, console)
+        bridges = stack.enter_context(Bridges(estimates_out, plotjuggler, plan))
+        shown = Shown(choice, console, rules)
+        switch: RecordingSwitch | None = None
+        source: Source
+        if link is None:
+            settings = {
+                "ports": [source.port.port for source in known.sources],
+                "baud": baud,
+                "bitrate": bitrate,
+                "data_bitrate": data_bitrate,
+                "wheels": list(numbers),
+                "fmu": str(fmu_file),
+                "speed_kmh": speed,
+                "pressure_bar": pressure,
+                "camber_deg": camber,
+            }
+            first, *more = (source.as_header() for source in known.sources)
+            header = RecordingHeader(settings, device_text, archive.sha256, first, tuple(more))
+            recorded = record is not None or shown.anything
+            reader = ReaderPlan(
+                known.sources,
+                reconnect,
+                numbers,
+                recorded,
+                every_turn,
+                rule.strain,
+                wait,
+                ordinary(priority),
+            )
+            chain = stack.enter_context(
+                LiveChain(
+                    LivePlan(reader, file, known.conditions, header, record, shown.anything, rule),
+                    lambda text: console.print(text, soft_wrap=True, markup=False),
+                )
+            )
+            file_name = record or Path(time.strftime("tirebench-%Y%m%d-%H%M%S.mcap"))
+            switch = RecordingSwitch(chain, file_name, started=record is not None)
+            source = chain
+        else:
+            source = _in_process(link, file, known, stack, laps=shown.anything)
+        console.print(f"{source.name} -> {file.name}, {file.samples} samples a step")
+        if record is not None:
+            console.print(
+                at_start(record, reader, rule, watched=shown.anything), soft_wrap=True, markup=False
+            )
+        if priority:
+            console.print(f"priority: {priority}", soft_wrap=True, markup=False)
+        stack.enter_context(shown)
+        of_recording = link is not None and conditions is None
+        said_by = "recording" if of_recording else sidecar.name if sidecar else "option"
+        shown.open(
+            source,
+            switch,
+            fmu_file,
+            calibration,
+            known.devices,
+            known.conditions,
+            said_by,
+            Path() if record is None else record.parent,
+        )
+        journal = None if json_file is None else Journal(json_file)
+        if journal is not None:
+            stack.callback(journal.close)
+        limits = Limits(duration, silence, turns)
+        session = Session(source, limits=limits, keep=json_file is not None)
+        stop.action = session.stop
+        outcome, used = _session(session, source, console, bridges, shown, journal, switch)
+        _summary(console, outcome, source, used, link, switch)
+        if journal is not None:
+            origin = {
+                "link": source.name,
+                "fmu_sha256": archive.sha256,
+                "ended": outcome.reason,
+                "cpu_share": used if source.live else None,
+                "chain": source.counts(),
+            }
+            journal.finish(
+                document(outcome.turns, known.conditions.runs, source.wheels, origin, calibration)
+            )
+            console.print(f"written: {json_file}", soft_wrap=True)
+    if outcome.error is not None:
+        raise outcome.error
+    good = outcome.valid > 0 and outcome.reason != "unplugged"
+    context.exit(0 if good else 1)
+
+
+def _in_process(
+    link: ReplayLink, file: FmuFile, known: Given, stack: ExitStack, *, laps: bool
+) -> ReplayChain:
+    """Return a recording through an instance of the FMU for each wheel, in this process."""
+
+    def estimator(_: int) -> Estimator:
+        return stack.enter_context(FmuModel(file))
+
+    wheels = wheels_of(known.sources, known.wheels)
+    jumps = link.recording.jumps()
+    return ReplayChain(link, wheels, Estimation(estimator, known.conditions, jumps, laps=laps))
+
+
+def _session(
+    session: Session,
+    source: Source,
+    console: Console,
+    bridges: Bridges,
+    shown: Shown,
+    journal: Journal | None,
+    switch: RecordingSwitch | None,
+) -> tuple[Outcome, float]:
+    """Run until something ends it; return what came of it and the share of a core it took."""
+    with ExitStack() as stack:
+        screen = None if shown.quiet else stack.enter_context(Screen(console, source))
+
+        said = ""
+
+        def watch(news: News) -> None:
+            nonlocal said
+            if journal is not None:
+                journal.add(news.turns)
+                if journal.error != said:
+                    said = journal.error
+                    text = said or "every turn is in the file again"
+                    news.alarms.append(text)
+                    if switch is not None:
+                        switch.alarm("json", text, on=bool(said))
+            if screen is not None:
+                screen.watch(news)
+            bridges.send(news.turns)
+            shown.watch(news, said)
+
+        session.watch = watch
+        start = time.monotonic(), _cpu_time(source, shown)
+        outcome = session.run()
+        spent = _cpu_time(source, shown) - start[1]
+        used = spent / max(time.monotonic() - start[0], 1e-9)
+        shown.end(outcome.reason)
+    return outcome, used
+
+
+def _cpu_time(source: Source, shown: Shown) -> float:
+    """Return what all processes of the run have used, [s]."""
+    return time.process_time() + source.cpu_time() + shown.cpu_time()
+
+
+def _summary(
+    console: Console,
+    outcome: Outcome,
+    source: Source,
+    used: float,
+    link: ReplayLink | None,
+    switch: RecordingSwitch | None,
+) -> None:
+    """Say how it ended and what came of it."""
+    if outcome.message:
+        console.print(f"unplugged: {outcome.message}", soft_wrap=True, markup=False)
+    console.print(
+        f"ended: {outcome.reason}; {outcome.count} turns, {outcome.valid} valid (ISO 8855 axes); "
+        f"{counters(source.wheels)}",
+        soft_wrap=True,
+    )
+    if link is not None and link.recording.complete is False:
+        console.print(f"note: the recording breaks off ({link.recording.damage})", soft_wrap=True)
+    counts = source.counts()
+    for name, number in counts.get("restarts", {}).items():
+        if number:
+            console.print(f"note: the {name} was started again {number} times")
+    for wheel, mine in counts.get("wheels", {}).items():
+        if mine["skipped_samples"]:
+            console.print(f"note: wheel {wheel}: {mine['skipped_turns']} turns were skipped")
+    if counts and counts["raw"]["lost_bytes"]:
+        console.print(f"note: {counts['raw']['lost_bytes']} raw bytes were not recorded")
+    if source.live and outcome.latency:
+        middle, high = np.percentile(np.array(outcome.latency) * 1e3, (50, 99))
+        console.print(
+            f"byte in to estimate out: median {middle:.1f} ms, 99 % {high:.1f} ms; "
+            f"{100 * used:.0f} % of a core"
+        )
+    triggered = counts.get("recording", {}).get("recordings", 0)
+    if triggered > 1:
+        console.print(f"{triggered} recordings, numbered from the first")
+    for file in () if switch is None else switch.files:
+        for part in parts_of(file):
+            console.print(f"recorded: {part}", soft_wrap=True)

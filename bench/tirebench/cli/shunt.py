@@ -1,0 +1,111 @@
+"""``tirebench shunt``: the gain of each gage from a resistor of known size beside it."""
+
+from pathlib import Path
+
+import click
+
+from tirebench.cli.gathering import PORTS, asked, gathering_options
+from tirebench.gage_setup import apparent_strain, shunted, write_device
+from tirebench.links.opening import PortPlan
+from tirelib.cli.common import FILE
+
+_EXAMPLE = f"""\b
+Examples:
+  tirebench shunt --port /dev/ttyUSB0 --device wheel.toml --gage-resistance 350 --shunt 100000 \\
+      --gage-factor 2.1 --out wheel-shunted.toml
+  tirebench shunt --replay off.mcap on.mcap --gage-resistance 350 --shunt 100000 \\
+      --gage-factor 2.1 --gage 3 --out wheel.toml
+
+\b
+The wheel stands. It is read without the shunt, then with it: a resistor Rs beside a gage Rg looks
+like a strain of 4 x / (Ks (4 + 2 x)), x = - Rg / (Rg + Rs), in a quarter bridge, a compression.
+What the line shows instead gives the gain of each gage. With --positive the resistor is beside the
+next arm of the bridge, which looks like tension.
+{PORTS}
+\b
+Exit code: 0 done, 2 bad input, no such step included.
+"""
+
+
+@click.command(epilog=_EXAMPLE)
+@gathering_options
+@click.option(
+    "--replay",
+    nargs=2,
+    metavar="OFF.mcap ON.mcap",
+    type=FILE,
+    help="Recordings without and with the shunt instead.",
+)
+@click.option(
+    "--gage-resistance",
+    "gage_ohm",
+    required=True,
+    metavar="OHM",
+    type=click.FloatRange(1.0, 1e5),
+    help="Rg, 350 say.",
+)
+@click.option(
+    "--shunt",
+    "shunt_ohm",
+    required=True,
+    metavar="OHM",
+    type=click.FloatRange(10.0, 1e8),
+    help="Rs, 100000 say.",
+)
+@click.option(
+    "--gage-factor",
+    "factor",
+    required=True,
+    metavar="KS",
+    type=click.FloatRange(0.1, 300.0),
+    help="Ks of the gage.",
+)
+@click.option(
+    "--gage",
+    "gages",
+    type=click.IntRange(1),
+    multiple=True,
+    metavar="N",
+    help="Gage that is shunted, several allowed.  [default: all]",
+)
+@click.option("--positive", is_flag=True, help="The shunt looks like tension.")
+def shunt(
+    port: str | None,
+    device_texts: tuple[str, ...],
+    number: int | None,
+    seconds: float,
+    still: float,
+    out: Path,
+    baud: int,
+    bitrate: int,
+    data_bitrate: int | None,
+    bus_options: tuple[str, ...],
+    rate: float,
+    map_file: Path | None,
+    reconnect: float,
+    replay: tuple[Path, Path] | None,
+    gage_ohm: float,
+    shunt_ohm: float,
+    factor: float,
+    gages: tuple[int, ...],
+    positive: bool,
+) -> None:
+    """Find the gain of each gage with a shunt, on a standing wheel."""
+    if (port is None) == (replay is None):
+        raise click.UsageError("just one of --port and --replay is needed")
+    plan = PortPlan(port or "", baud, bitrate, data_bitrate, bus_options)
+    wanted = asked(port, device_texts, number, seconds, still, plan, rate, map_file)
+    apparent = apparent_strain(gage_ohm, shunt_ohm, factor) * (-1.0 if positive else 1.0)
+    if replay is not None:
+        (device, before), (_, after) = map(wanted.of_recording, replay)
+    else:
+        click.pause("Take the shunt off and press a key ...", err=True)
+        device, before = wanted.of_port()
+        click.pause("Put the shunt on and press a key ...", err=True)
+        _, after = wanted.of_port()
+    new = shunted(device, before, after, apparent, gages)
+    write_device(out, new, f"shunt {shunt_ohm:g} ohm beside {gage_ohm:g} ohm, Ks {factor:g}")
+    click.echo(f"the shunt is {1e6 * apparent:+.1f} microstrain")
+    for gage, (step, gain) in enumerate(zip(after - before, new.gain, strict=True), 1):
+        click.echo(f"gage {gage}: {1e6 * step:+.1f} microstrain, gain {gain:g}")
+    click.echo(f"written: {out}")

@@ -1,0 +1,39 @@
+"""Turns wait until the clock of their wheel has been held against the sample rate that was said."""
+
+from collections.abc import Sequence
+
+from tirebench.chain import Turn
+from tirebench.wheels import Wheels
+
+
+class JudgedTurns:
+    """Turns between the estimators and whoever shows or records them.
+
+    A turn of a wheel whose rate is not judged yet is kept back. These are few, because a judgement
+    takes `tirebench.rate_check.JUDGED` frames, and `LONGEST_WAIT` at most. A turn of a wheel whose
+    clock contradicts its rate is dropped.
+    """
+
+    def __init__(self) -> None:
+        self._waiting: list[Turn] = []
+
+    def take(self, turns: Sequence[Turn], wheels: Wheels, *, end: bool = False) -> list[Turn]:
+        """Take new turns and return those that may be told by now.
+
+        Parameters
+        ----------
+        turns : sequence of Turn
+        wheels : Wheels
+            As they are now.
+        end : bool
+            Whether nothing more will be judged.
+
+        Returns
+        -------
+        list of Turn
+        """
+        waiting = [*self._waiting, *turns]
+        wrong, judged = wheels.contradicted, wheels.judged
+        told = [end or turn.wheel in judged for turn in waiting]
+        self._waiting = [turn for turn, now in zip(waiting, told, strict=True) if not now]
+        return [t for t, now in zip(waiting, told, strict=True) if now and t.wheel not in wrong]

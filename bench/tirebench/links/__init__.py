@@ -1,0 +1,74 @@
+"""Where bytes come from: one protocol, a child for each kind of line.
+
+A reader asks for bytes with a deadline that is handed down; nothing below it waits longer. No link
+transmits unless it is asked to.
+"""
+
+from typing import NamedTuple, Protocol
+
+from tirebench.deadline import Deadline
+
+
+class Read(NamedTuple):
+    """What came.
+
+    Attributes
+    ----------
+    arrival : int, [ns]
+        Monotonic.
+    data : bytes
+        Empty if nothing came.
+    event : str
+        `LOST` or `BACK` when the port went away or came back, `RESUMED` when the process that
+        reads it was started again, `PASSED` or `DECODED`; else empty.
+    source : int
+        Which of the run's sources it is of.
+    """
+
+    arrival: int
+    data: bytes
+    event: str = ""
+    source: int = 0
+
+
+LOST, BACK, RESUMED = "lost", "back", "resumed"
+PASSED, DECODED = "not decoded from here", "decoded from here"
+"""Between the two bytes were recorded and not decoded, for want of processor."""
+
+
+class Link(Protocol):
+    """A source of bytes.
+
+    Attributes
+    ----------
+    name : str
+        For messages: the port or the file.
+    live : bool
+        Whether time passes at the other end. A replay is not live.
+    encoding : str
+        What the bytes are, see `tirebench.protocols`.
+    """
+
+    name: str
+    live: bool
+    encoding: str
+
+    def receive(self, deadline: Deadline) -> Read | None:
+        """Return what has come, empty at the deadline.
+
+        None means that nothing will come any more.
+
+        Raises
+        ------
+        UnpluggedError
+            If the port went away.
+        """
+
+    def close(self) -> None:
+        """Give the port back; calling twice does no harm."""
+
+    def overruns(self) -> int:
+        """Return how often a buffer below was full, as far as the system tells."""
+
+
+__all__ = ["BACK", "DECODED", "LOST", "PASSED", "RESUMED", "Link", "Read"]

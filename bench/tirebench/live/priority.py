@@ -1,0 +1,92 @@
+"""Who goes first where processors are short: reader, estimators and recorder before what shows."""
+
+import os
+
+from tirebench.errors import DeviceError
+
+PRIORITY = 5
+"""Real-time priority of a run."""
+RIGHT = (
+    f"the right to it is needed, such as a line '* - rtprio {PRIORITY}' in "
+    "/etc/security/limits.conf (then log in anew)"
+)
+BELOW = 5
+"""Niceness of what only shows."""
+
+
+def realtime(asked: bool | None) -> str:
+    """Ask for real-time priority. Processes that this one starts begin without (`as_parent`).
+
+    Parameters
+    ----------
+    asked : bool or None
+        None: where the system has it and this user may.
+
+    Returns
+    -------
+    What it is, in words.
+
+    Raises
+    ------
+    DeviceError
+        If it was asked for and is not to be had.
+    """
+    if asked is False:
+        return "ordinary, as asked for"
+    try:
+        _set()
+    except AttributeError:
+        if asked:
+            raise DeviceError(
+                "--realtime: this system has no real-time priority that a program may ask for; "
+                "Linux is needed; leave it out"
+            ) from None
+        return "ordinary; this system has no other that a program may ask for"
+    except PermissionError:
+        if asked:
+            raise DeviceError(
+                f"--realtime: this user may not have real-time priority; {RIGHT}; add it, or "
+                "leave --realtime out"
+            ) from None
+        return f"ordinary; for real-time {RIGHT}"
+    return f"real-time {PRIORITY}"
+
+
+def ordinary(said: str) -> bool:
+    """Tell whether a run has no other priority than all programs, from what `realtime` said."""
+    return said.startswith("ordinary")
+
+
+def as_parent() -> None:
+    """Take over real-time priority of the process that started this one, which has loaded by now.
+
+    To load takes a second of processor, and nothing should wait for that.
+    """
+    try:
+        if os.sched_getscheduler(os.getppid()) & ~os.SCHED_RESET_ON_FORK == os.SCHED_RR:
+            _set()
+    except (AttributeError, OSError):
+        return  # another system, a parent that is gone, no right to it: it goes on as it is
+
+
+def own_share() -> None:
+    """Give this process a share of the processor of its own, unless it goes before others anyway.
+
+    Linux shares the processor between sessions first (autogroup), so that a session of its own gets
+    as much as all jobs of another together.
+    """
+    try:
+        if os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK != os.SCHED_RR:
+            os.setsid()
+    except (AttributeError, OSError):
+        return  # another system, or it has a session already
+
+
+def _set() -> None:
+    os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(PRIORITY))
+
+
+def below() -> None:
+    """Let all others go first: this process only shows what they do."""
+    if hasattr(os, "nice"):
+        os.nice(BELOW)

@@ -1,0 +1,88 @@
+"""What is wrong with a live run, in words: told once when it begins, and once when it ends."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from tirebench.live.ports import PortState
+from tirebench.live.priority import RIGHT
+from tirebench.live.reader import LineState
+from tirebench.live.recording_state import RecorderState
+from tirebench.recorder import alarm_event
+
+RECORDED_AGAIN = "recording goes on"
+TOO_BUSY = (
+    "this machine is too busy to decode what comes: bytes are only recorded, and estimates pause; "
+    f"end other programs, or allow real-time priority ({RIGHT})"
+)
+DECODED_AGAIN = "estimates go on"
+
+
+class RunAlarms:
+    """A reader that is too late, wheels with a wrong rate, ports that are away, a full disk.
+
+    Parameters
+    ----------
+    ports : sequence of str
+        Names of the sources' ports.
+    estimated : bool
+        Whether there are estimators.
+    write : callable
+        Takes the event of an alarm for the recording.
+
+    Attributes
+    ----------
+    given_up : dict of source to str
+        Ports that were given up, and why; empty once they are back.
+    """
+
+    def __init__(
+        self, ports: Sequence[str], *, estimated: bool, write: Callable[[Mapping[str, Any]], None]
+    ) -> None:
+        self.given_up: dict[int, str] = {}
+        self._ports = tuple(ports)
+        self._estimated = estimated
+        self._write = write
+        self._passing = False
+        self._contradicted: set[int] = set()
+        self._unrecorded = ""
+
+    def look(
+        self, line: LineState, recorded: RecorderState, ports: Sequence[PortState | None]
+    ) -> list[str]:
+        """Return the alarms that begin or end with the present states, in words.
+
+        `ports` holds the state of each port that a process of its own reads, None before the first.
+        """
+        told = self._busy(line) + self._rates(line) + self._away(ports)
+        if recorded.error != self._unrecorded:  # there is no recording to write this into
+            self._unrecorded = recorded.error
+            told.append(recorded.error or RECORDED_AGAIN)
+        return told
+
+    def _busy(self, line: LineState) -> list[str]:
+        if line.passing == self._passing:
+            return []
+        self._passing = line.passing
+        said = TOO_BUSY if line.passing else DECODED_AGAIN
+        self._write(alarm_event("busy", said, on=line.passing))
+        return [said]
+
+    def _rates(self, line: LineState) -> list[str]:
+        told = []
+        for wheel, said in line.wheels.contradicted.items():
+            if wheel not in self._contradicted:
+                self._contradicted.add(wheel)
+                told.append(f"{said}; no turn of it is told" if self._estimated else said)
+                self._write(alarm_event("sample rate", told[-1], on=True))
+        return told
+
+    def _away(self, ports: Sequence[PortState | None]) -> list[str]:
+        told = []
+        for number, state in enumerate(ports):
+            gone = "" if state is None else state.gone
+            why = f"{gone}; the port is still tried" if gone else ""
+            if why != self.given_up.get(number, ""):
+                self.given_up[number] = why
+                told.append(why or f"{self._ports[number]}: it is back")
+                self._write(alarm_event(f"source {number}", told[-1], on=bool(gone)))
+        return told

@@ -1,0 +1,36 @@
+"""Which speed, pressure and camber are in use for a wheel, and where each comes from."""
+
+import math
+from typing import Any
+
+from tirebench.conditions import UNITS, Conditions
+from tirebench.wheels import Wheel
+from tirelib.held import HELD
+from tirelib.units import from_si
+
+ALWAYS = ("speed", "pressure", "camber")
+"""Shown also where they are not known."""
+
+
+def in_use(wheel: Wheel, conditions: Conditions, origin: str) -> dict[str, dict[str, Any]]:
+    """Return value, unit and source of each condition; null and "" where it is not known.
+
+    Parameters
+    ----------
+    wheel : Wheel
+    conditions : Conditions
+        Known beside what a bus tells.
+    origin : str
+        Where those come from, in words.
+    """
+    beside = conditions.at(wheel.newest_us)
+    found: dict[str, dict[str, Any]] = {}
+    for name, value in zip(HELD, beside, strict=True):
+        told = wheel.told.get(name, math.nan)
+        used, source = (told, "bus") if name in wheel.told else (value, origin)
+        if math.isfinite(used):
+            unit, dimension = UNITS[name]
+            found[name] = {"value": from_si(used, unit, dimension), "unit": unit, "source": source}
+        elif name in ALWAYS:
+            found[name] = {"value": None, "unit": UNITS[name][0], "source": ""}
+    return found

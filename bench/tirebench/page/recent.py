@@ -1,0 +1,80 @@
+"""The last seconds of a wheel's line: how much came of what was expected, what was lost."""
+
+import time
+from collections import deque
+from typing import Any, NamedTuple
+
+from tirebench.wheels import Wheel
+
+SPAN = 5.0
+"""What is said of the last seconds is said of so many, [s]."""
+SHORTEST = 1.0
+"""Before so much of it has passed, nothing is said, [s]."""
+
+
+class _Seen(NamedTuple):
+    moment: float
+    received: int
+    lost: int
+    saturated: int
+    turns: int
+    invalid: int
+    low_battery: int
+
+
+class Recent:
+    """Counters of one wheel over the last seconds; looked at some times a second."""
+
+    def __init__(self) -> None:
+        self._seen: deque[_Seen] = deque()
+
+    def look(
+        self, wheel: Wheel, turns: int, invalid: int, now: float | None = None
+    ) -> dict[str, Any]:
+        """Return what came and was lost in the last `SPAN`; null before anything can be said.
+
+        Parameters
+        ----------
+        wheel : Wheel
+        turns, invalid : int
+            Of the wheel so far.
+        now : float, optional, [s]
+            Monotonic.
+        """
+        counts = wheel.timeline.counts
+        now = time.monotonic() if now is None else now
+        seen = self._seen
+        seen.append(
+            _Seen(
+                now,
+                wheel.timeline.received,
+                counts.lost_samples,
+                sum(counts.saturated),
+                turns,
+                invalid,
+                counts.low_battery,
+            )
+        )
+        while len(seen) > 2 and now - seen[1].moment >= SPAN:
+            seen.popleft()
+        first, last = seen[0], seen[-1]
+        elapsed, expected = last.moment - first.moment, wheel.timeline.rate
+        came, lost, all_turns = (
+            last.received - first.received,
+            last.lost - first.lost,
+            last.turns - first.turns,
+        )
+        known = elapsed >= SHORTEST
+        return {
+            "rate_hz": came / elapsed if known else None,
+            "rate_expected_hz": expected or None,
+            "rate_percent": 100.0 * came / elapsed / expected if known and expected else None,
+            "loss_percent": 100.0 * lost / (came + lost) if known and came + lost else None,
+            "saturated_percent": 20.0 * (last.saturated - first.saturated) / came
+            if known and came
+            else None,
+            "invalid_percent": 100.0 * (last.invalid - first.invalid) / all_turns
+            if known and all_turns
+            else None,
+            "battery_is_low": last.low_battery > first.low_battery,
+        }

@@ -1,0 +1,53 @@
+"""What the frames of a CAN bus mean: one protocol, a child for each kind of transmitter."""
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+from tirebench.can_batch import CanBatch, unpack
+from tirebench.conditions import Measured
+from tirebench.frames import Frames
+from tirebench.line_counts import LineCounts
+from tirebench.protocols.layouts import Health
+
+
+class FrameDecoder(Protocol):
+    """CAN frames to strain frames: `tirebench.protocols.wheel_can`, or a user's own transmitter."""
+
+    @property
+    def health(self) -> Mapping[int, Health]:
+        """What each wheel said last of itself; nothing where there are no such frames."""
+        return {}
+
+    def push(self, batch: CanBatch, arrival: int) -> Sequence[Frames | Measured]:
+        """Return the strain frames of a batch, those of each wheel in order."""
+
+    def interrupt(self) -> None:
+        """Forget what waits for more: the line was broken here."""
+
+
+class PackedDecoder:
+    """Packed CAN frames to strain frames; see `tirebench.protocols.Decoder`."""
+
+    def __init__(self, frames: FrameDecoder, counts: LineCounts) -> None:
+        self.counts = counts
+        self._frames = frames
+
+    @property
+    def health(self) -> Mapping[int, Health]:
+        """What each wheel said last of itself."""
+        return self._frames.health
+
+    def push(self, data: bytes, arrival: int = 0) -> Sequence[Frames | Measured]:
+        """Return the frames of one packed batch; what is no batch is counted."""
+        if not data:
+            return []
+        self.counts.bytes += len(data)
+        batch = unpack(data)
+        if batch is None:
+            self.counts.framing += 1
+            return []
+        return self._frames.push(batch, arrival) if len(batch) else []
+
+    def interrupt(self) -> None:
+        """Forget what waits for more."""
+        self._frames.interrupt()

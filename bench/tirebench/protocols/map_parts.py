@@ -1,0 +1,108 @@
+"""What a map of another make's transmitter says: wheels, and what is told beside the strain."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from tirebench.conditions import TELLABLE, Measured
+from tirebench.device import Device
+from tirebench.frames import GAGES
+from tirebench.protocols.map_messages import Message
+from tirebench.protocols.signals import Signal
+from tirelib.units import to_si
+
+
+@dataclass(frozen=True, slots=True)
+class WheelMap:
+    """Where a wheel's strain is.
+
+    Attributes
+    ----------
+    wheel : int
+    message : Message
+    strain : tuple of Signal
+        Of the gages that are there, oldest sample first.
+    counter, time : Signal or None
+    tick : float, [s]
+        Step of `time`.
+    absent : tuple of bool, one a gage of the calibration
+        Gages that are not there.
+    """
+
+    wheel: int
+    message: Message
+    strain: tuple[Signal, ...]
+    counter: Signal | None
+    time: Signal | None
+    tick: float
+    absent: tuple[bool, ...] = (False,) * GAGES
+
+    @property
+    def samples(self) -> int:
+        """Samples in a frame."""
+        return len(self.strain) // self.absent.count(False)
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """Where a condition is.
+
+    Attributes
+    ----------
+    name : str
+        One of `tirebench.conditions.TELLABLE`.
+    message : Message
+    signal : Signal
+    unit : str
+        Of the signal's value.
+    wheel : int or None
+        For which it holds; None: for all.
+    """
+
+    name: str
+    message: Message
+    signal: Signal
+    unit: str
+    wheel: int | None = None
+
+    def measured(self, raw: float) -> Measured:
+        """Return what a raw value means."""
+        shown = self.signal.offset + self.signal.factor * raw
+        name, dimension = TELLABLE[self.name]
+        return Measured(name, float(to_si(shown, self.unit, dimension)), self.wheel)
+
+
+@dataclass(frozen=True, slots=True)
+class UserMap:
+    """What a map says.
+
+    Attributes
+    ----------
+    rate : float, [Hz]
+    wheels : tuple of WheelMap
+        None of a bus that only tells conditions.
+    device : Device
+        Scale and zero, where the map says a unit of strain; else those of counts.
+    quantities : tuple of Quantity
+    text : str
+        Of the file, DBC included, for the header of a recording.
+    messages : tuple of Message
+    """
+
+    rate: float
+    wheels: tuple[WheelMap, ...]
+    device: Device
+    quantities: tuple[Quantity, ...]
+    text: str
+    messages: tuple[Message, ...] = ()
+
+    @property
+    def of_line(self) -> bool:
+        """Whether it is of a serial line, not of a CAN bus."""
+        return any(message.cut is not None for message in self.messages)
+
+
+def clashes(place: tuple[str, int | None], places: Sequence[tuple[str, int | None]]) -> bool:
+    """Tell whether a condition of a wheel (None: of all) is told by more than one of the places."""
+    name, wheel = place
+    same = [w for n, w in places if n == name and (w is None or wheel is None or w == wheel)]
+    return len(same) > 1

@@ -1,0 +1,391 @@
+"""A transmitter of another make: a map of its signals (``tirebench-map/1``), no code.
+
+::
+
+    format  = "tirebench-map/1"
+    dbc     = "wheel.dbc"         # beside this file; or [[message]] tables, see below
+    rate_hz = 2000                # of the gages
+    strain_unit = "ustrain"       # of the signals; left out: counts, a device file says the rest
+
+    [[wheel]]
+    wheel     = 0
+    message   = "WHEEL_FL"
+    samples   = [["g1", "g2", "g3", "g4", "g5"]]   # oldest first; gages as in the calibration
+    counter   = "count"           # counts messages; this, or time, or both
+    time      = "stamp"           # device time of the first sample
+    time_unit = "us"              # of the signal's value
+
+    [speed]                       # optional: what the bus tells beside the strain
+    message = "ABS"
+    signal  = "v_ref"
+    unit    = "km/h"
+
+    [[pressure]]                  # of one wheel; also camber, omega, temperature
+    wheel   = 0
+    message = "TPMS"
+    signal  = "p_fl"
+    unit    = "bar"
+
+    [[message]]                   # without a DBC
+    name = "WHEEL_FL"
+    id   = 0x210                  # extended = true for 29 bits
+    length = 8
+    signals = [{ name = "g1", start = 4, length = 12, signed = true, order = "little" }, ...]
+    # a real number: float = true; multiplexed: multiplexer = "page", page = 1
+
+    [[message]]                   # on a serial line: a sync word, a struct, a checksum
+    name     = "WHEEL"
+    sync     = "AA55"
+    struct   = "<HI5h"            # of Python's struct
+    fields   = ["count", "stamp", "g1", "g2", "g3", "g4", "g5"]
+    checksum = "CRC-16/MODBUS"
+
+    [[message]]                   # on a serial line: columns of text
+    name    = "WHEEL"
+    columns = [{ name = "count", bits = 16 }, "g1", "g2", "g3", "g4", "g5"]
+"""
+
+import math
+import struct
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from tirebench.conditions import TELLABLE
+from tirebench.device import Device
+from tirebench.errors import DeviceError, cause
+from tirebench.frames import MOST_GAGES
+from tirebench.protocols.map_messages import Message, kind_of, listed, of_dbc
+from tirebench.protocols.map_parts import Quantity, UserMap, WheelMap, clashes
+from tirebench.protocols.signals import Signal
+from tirelib.errors import TirelibError
+from tirelib.units import to_si
+
+FORMAT = "tirebench-map/1"
+LONGEST_SIGNAL = 32
+SHORTEST_WRAP = 0.1
+"""A counter that wraps sooner needs a time beside it, or a gap could not be seen, [s]."""
+_WANTED = "name, id, length and signals of CAN; name, sync, struct and fields; or name and columns"
+_KEYS = {"format", "dbc", "rate_hz", "strain_unit", "wheel", "message", "name", *TELLABLE}
+
+
+def read_map(path: Path) -> UserMap:
+    """Read a map and its DBC.
+
+    Raises
+    ------
+    DeviceError
+        With every fault of the file.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        document = tomllib.loads(text)
+        dbc = ""
+        if "dbc" in document:
+            dbc = (path.parent / str(document["dbc"])).read_text(encoding="cp1252")
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise DeviceError(
+            f"{path}: it cannot be read ({cause(error)}); a map is TOML in UTF-8, its DBC stands "
+            "beside it; check path and line"
+        ) from None
+    return parse_map(text, dbc, str(path))
+
+
+def parse_map(text: str, dbc: str, where: str) -> UserMap:
+    """Return what the texts of a map and its DBC say; errors as `read_map`."""
+    try:
+        document = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise DeviceError(
+            f"{where}: the map is no TOML ({error}); a map is TOML; correct that line"
+        ) from None
+    if document.get("format") != FORMAT:
+        raise DeviceError(
+            f"{where}: format = {document.get('format')!r}; {FORMAT!r} is understood here; "
+            "correct it, or take a program of that version"
+        )
+    return _Reader(document, where).read(text if not dbc else f"{text}\0{dbc}", dbc)
+
+
+class _Reader:
+    """Collects every fault of a map before it raises."""
+
+    def __init__(self, document: dict[str, Any], where: str) -> None:
+        self.document = document
+        self.where = where
+        self.faults = [
+            f"{where}: {key} is not known; allowed are {', '.join(sorted(_KEYS))}; correct it"
+            for key in sorted(set(document) - _KEYS)
+        ]
+
+    def fault(self, what: str, given: object, allowed: str, remedy: str = "correct it") -> None:
+        self.faults.append(f"{self.where}: {what} = {given!r}; {allowed}; {remedy}")
+
+    def read(self, text: str, dbc: str) -> UserMap:
+        messages = self._of_dbc(dbc) if dbc else self._of_tables()
+        tables = self._tables("wheel")
+        rate = self.document.get("rate_hz", None if tables else 1e3)
+        if not isinstance(rate, int | float) or isinstance(rate, bool) or not 153 <= rate <= 2e5:
+            self.fault("rate_hz", rate, "153 .. 200000 Hz is needed")
+            rate = 1e3
+        wheels = [w for table in tables if (w := self._wheel(table, messages, float(rate)))]
+        told = [name for name in TELLABLE if name in self.document]
+        if not tables and not told:
+            self.fault(
+                "wheel",
+                tables,
+                "a table [[wheel]], or one of a condition such as [speed], is needed",
+                "write it",
+            )
+        if len({w.wheel for w in wheels}) < len(wheels):
+            self.fault("wheel", [w.wheel for w in wheels], "each number may come once")
+        device = self._device(wheels)
+        quantities = [q for name in told for q in self._quantities(name, messages)]
+        places = [(TELLABLE[q.name][0], q.wheel) for q in quantities]
+        if twice := {place for place in places if clashes(place, places)}:
+            self.fault(
+                "conditions",
+                sorted(twice, key=str),
+                "each may come once for a wheel, or once for all",
+            )
+        if self.faults:
+            raise DeviceError(self.faults)
+        return UserMap(
+            float(rate), tuple(wheels), device, tuple(quantities), text, tuple(messages.values())
+        )
+
+    def _tables(self, key: str) -> list[dict[str, Any]]:
+        """Return the tables of that name; whatever else has it is a fault."""
+        given = self.document.get(key, [])
+        found = [one for one in given if isinstance(one, dict)] if isinstance(given, list) else []
+        if not isinstance(given, list) or len(found) < len(given):
+            self.fault(key, given, f"tables [[{key}]] are needed")
+        return found
+
+    def _of_dbc(self, dbc: str) -> dict[str, Message]:
+        import cantools  # late: it takes a while, and few need it
+
+        try:
+            database: Any = cantools.database.load_string(dbc, "dbc")
+        except Exception as error:  # cantools raises its own, textparser's and bare ones
+            self.fault("dbc", str(error)[:200], "a sound DBC is needed")
+            return {}
+        return of_dbc(database)
+
+    def _of_tables(self) -> dict[str, Message]:
+        messages: dict[str, Message] = {}
+        tables = self._tables("message")
+        for number, table in enumerate(tables):
+            try:
+                message = listed(table, number)
+            except (KeyError, TypeError, ValueError, AttributeError, IndexError, struct.error) as e:
+                self.fault("message", table, f"{_WANTED} are needed ({_why(e)})")
+                continue
+            if message.name in messages:
+                self.fault("message", message.name, "each name may come once")
+            messages[message.name] = message
+        if len({kind_of(table) for table in tables}) > 1:
+            self.fault(
+                "message",
+                [t.get("name") for t in tables],
+                "all are frames of CAN, or all "
+                "have a sync, or all are columns: a line has one kind",
+            )
+        return messages
+
+    def _wheel(
+        self, table: dict[str, Any], messages: Mapping[str, Message], rate: float
+    ) -> WheelMap | None:
+        before = len(self.faults)
+        what = f"wheel {table.get('wheel')!r}"
+        message = self._message(f"{what}: message", table.get("message"), messages)
+        rows = table.get("samples", [])
+        if (
+            not isinstance(rows, list)
+            or not rows
+            or not all(isinstance(r, list) and len(r) == len(rows[0]) for r in rows)
+            or not 1 <= len(rows[0]) <= MOST_GAGES
+        ):
+            self.fault(
+                f"{what}: samples",
+                rows,
+                f"lists of 1 to {MOST_GAGES} signals are needed, a list a sample",
+            )
+            return None
+        if message is None:
+            return None
+        names = [name for row in rows for name in row if name != ""]
+        strain = [self._signal(what, name, message) for name in names]
+        absent = tuple(name == "" for name in rows[0])
+        if any(tuple(name == "" for name in row) != absent for row in rows) or all(absent):
+            self.fault(
+                f"{what}: samples",
+                rows,
+                'each sample needs the same gages, one at least; a gage that is not there is ""',
+            )
+        counter = self._optional(what, table, "counter", message)
+        time = self._optional(what, table, "time", message)
+        tick = 1.0
+        if time is not None:
+            tick = self._seconds(what, table.get("time_unit"), time)
+            self._integer(what, time)
+        elif counter is None:
+            self.fault(
+                what,
+                sorted(table),
+                "counter or time is needed: else no loss can be seen",
+                "name one",
+            )
+        elif (wrap := 2**counter.length * len(rows) / rate) < SHORTEST_WRAP:
+            self.fault(
+                f"{what}: counter",
+                counter.name,
+                f"it wraps after {1e3 * wrap:.0f} ms, "
+                f"{1e3 * SHORTEST_WRAP:.0f} ms are needed without a time, or a gap could "
+                "not be seen",
+                "name a time too",
+            )
+        if counter is not None:
+            self._integer(what, counter)
+        used = [s for s in (*strain, counter, time) if s is not None]
+        if len({(s.selector, s.selected) for s in used}) > 1:
+            self.fault(
+                f"{what}: samples",
+                [s.name for s in used],
+                "all signals of a wheel, "
+                "counter and time included, must stand in the same frames: one "
+                "multiplexer, one value",
+            )
+        number = table.get("wheel")
+        if not _is_wheel(number):
+            self.fault("wheel", number, "0 .. 255 is needed")
+        if len(self.faults) > before:
+            return None
+        known = tuple(signal for signal in strain if signal is not None)
+        return WheelMap(int(number or 0), message, known, counter, time, tick, absent)
+
+    def _message(self, what: str, name: Any, messages: Mapping[str, Message]) -> Message | None:
+        message = messages.get(str(name))
+        if message is None:
+            self.fault(what, name, f"known are {', '.join(sorted(messages)) or 'none'}")
+        return message
+
+    def _signal(self, what: str, name: Any, message: Message) -> Signal | None:
+        signal = message.signals.get(str(name))
+        if signal is None:
+            self.fault(
+                f"{what}: signal",
+                name,
+                f"{message.name} has the signals {', '.join(message.signals) or 'none'}",
+            )
+            return None
+        for part in (signal, signal.selector):
+            if part is not None and not _fits(part, message):
+                self.fault(
+                    f"{what}: signal",
+                    part.name,
+                    f"1 to {LONGEST_SIGNAL} bits, 32 or 64 of "
+                    f"a real one, inside the {message.length} bytes of {message.name} are "
+                    "allowed",
+                )
+                return None
+        if signal.selector is not None and signal.selector.selector is not None:
+            self.fault(
+                f"{what}: signal",
+                name,
+                "a multiplexer that is multiplexed itself is not read",
+                "name another",
+            )
+            return None
+        return signal
+
+    def _integer(self, what: str, signal: Signal) -> None:
+        if signal.real:
+            self.fault(
+                f"{what}: signal",
+                signal.name,
+                "counter and time must be integers: a real number does not say where it wraps",
+                "name another, or say the bits of the column",
+            )
+
+    def _optional(
+        self, what: str, table: dict[str, Any], key: str, message: Message
+    ) -> Signal | None:
+        return self._signal(what, table[key], message) if key in table else None
+
+    def _seconds(self, what: str, unit: Any, time: Signal) -> float:
+        try:
+            return time.factor * float(to_si(1.0, str(unit), "time"))
+        except TirelibError as error:
+            self.fault(f"{what}: time_unit", unit, f"a unit of time is needed ({error})")
+            return 1.0
+
+    def _device(self, wheels: list[WheelMap]) -> Device:
+        """Scale, zero and ends of the range, from the signals."""
+        strain = [signal for wheel in wheels for signal in wheel.strain]
+        kinds = {(s.length, s.signed, s.factor, s.real) for s in strain}
+        if len(kinds) > 1:
+            self.fault("samples", sorted(kinds), "all gages need one length, sign and factor")
+        if len(kinds) != 1:
+            return Device()
+        low: float
+        high: float
+        low, high = (-math.inf, math.inf) if strain[0].real else strain[0].bounds
+        unit = self.document.get("strain_unit")
+        if unit is None and strain[0].real:
+            self.fault("strain_unit", unit, "real numbers are no counts: their unit is needed")
+            return Device()
+        if unit is None:
+            return Device(lowest=low, highest=high)
+        try:
+            step = strain[0].factor * float(to_si(1.0, str(unit), "strain"))
+        except TirelibError as error:
+            self.fault("strain_unit", unit, f"a unit of strain is needed ({error})")
+            return Device()
+        offsets = iter(wheels[0].strain)
+        there = (None if absent else next(offsets) for absent in wheels[0].absent)
+        zero = tuple(0.0 if s is None else -s.offset / s.factor for s in there)
+        return Device("map", step, zero, lowest=low, highest=high)
+
+    def _quantities(self, name: str, messages: Mapping[str, Message]) -> list[Quantity]:
+        given = self.document[name]
+        tables = given if isinstance(given, list) else [given]
+        if not all(isinstance(table, dict) for table in tables):
+            self.fault(name, given, f"a table [{name}], or tables [[{name}]] of wheels, are needed")
+            return []
+        found = [self._quantity(name, table, messages) for table in tables]
+        return [quantity for quantity in found if quantity is not None]
+
+    def _quantity(
+        self, name: str, table: dict[str, Any], messages: Mapping[str, Message]
+    ) -> Quantity | None:
+        message = self._message(f"{name}: message", table.get("message"), messages)
+        if message is None:
+            return None
+        signal = self._signal(name, table.get("signal"), message)
+        unit, wheel = str(table.get("unit")), table.get("wheel")
+        dimension = TELLABLE[name][1]
+        try:
+            to_si(1.0, unit, dimension)
+        except TirelibError as error:
+            self.fault(f"{name}: unit", unit, f"a unit of {dimension} is needed ({error})")
+        if wheel is not None and not _is_wheel(wheel):
+            self.fault(f"{name}: wheel", wheel, "0 .. 255 is needed, or nothing for all wheels")
+        return None if signal is None else Quantity(name, message, signal, unit, wheel)
+
+
+def _is_wheel(number: object) -> bool:
+    return isinstance(number, int) and not isinstance(number, bool) and 0 <= number <= 255
+
+
+def _fits(signal: Signal, message: Message) -> bool:
+    """Whether a signal has a length that can be read and lies inside its message."""
+    places = signal.places
+    good = signal.length in (32, 64) if signal.real else 1 <= signal.length <= LONGEST_SIGNAL
+    return good and int(places.min()) >= 0 and int(places.max()) < 8 * message.length
+
+
+def _why(error: Exception) -> str:
+    """Return what an error says, and a missing key as one."""
+    return f"{error.args[0]} is missing" if isinstance(error, KeyError) else str(error)

@@ -1,0 +1,102 @@
+"""A recording without its end, or one that breaks off, as a whole file with an index."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from mcap.records import Channel, McapRecord, Message, Metadata, Schema
+from mcap.writer import CompressionType, Writer
+
+from tirebench.errors import RecordingError, cause
+from tirebench.new_file import whole
+from tirebench.records import records
+
+CHUNK = 2**20
+"""Of the repaired file, [bytes before compression]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Repaired:
+    """What was found.
+
+    Attributes
+    ----------
+    messages : int
+    topics : tuple of str
+    damage : str
+        Where the file breaks off; empty if it is whole.
+    """
+
+    messages: int
+    topics: tuple[str, ...]
+    damage: str
+
+
+def repair(path: Path, out: Path) -> Repaired:
+    """Write all that can be read of a recording into a new file, with its index.
+
+    Raises
+    ------
+    RecordingError
+        If nothing can be read, or the new file not be written.
+    """
+    with whole(out) as new:
+        return _repaired(path, new)
+
+
+def _repaired(path: Path, new: Path) -> Repaired:
+    try:
+        with path.open("rb") as file, new.open("xb") as target:
+            writer = Writer(target, CHUNK, CompressionType.ZSTD)
+            writer.start("", "tirebench")
+            found = _copied(records(file), writer)
+            finish: Callable[[], None] = writer.finish  # mcap has no annotation here
+            finish()
+    except OSError as error:
+        raise RecordingError(
+            f"{path}: it cannot be read, or its whole copy cannot be written ({cause(error)}); "
+            "nothing of the copy is left; a recording and room on the disk are needed; check both"
+        ) from None
+    if not found.topics:
+        raise RecordingError(
+            f"{path}: nothing can be read of it ({found.damage}); a file of `tirebench run "
+            "--record` or its JSON is needed; name one"
+        )
+    return found
+
+
+def _copied(found: Iterator[McapRecord], writer: Writer) -> Repaired:
+    """Copy records up to the end, or up to the first that is broken."""
+    schemas: dict[int, int] = {0: 0}
+    channels: dict[int, int] = {}
+    topics: dict[str, None] = {}
+    count, damage = 0, ""
+    try:
+        for record in found:
+            if isinstance(record, Schema) and record.id not in schemas:
+                number = writer.register_schema(record.name, record.encoding, record.data)
+                schemas[record.id] = number
+            elif isinstance(record, Channel) and record.id not in channels:
+                topics[record.topic] = None
+                channels[record.id] = writer.register_channel(
+                    record.topic,
+                    record.message_encoding,
+                    schemas[record.schema_id],
+                    record.metadata,
+                )
+            elif isinstance(record, Message):
+                count += 1
+                writer.add_message(
+                    channels[record.channel_id],
+                    record.log_time,
+                    record.data,
+                    record.publish_time,
+                    record.sequence,
+                )
+            elif isinstance(record, Metadata):
+                writer.add_metadata(record.name, record.metadata)
+    except OSError:
+        raise
+    except Exception as error:  # whatever a damaged file provokes in mcap
+        damage = str(error) or type(error).__name__
+    return Repaired(count, tuple(topics), damage)

@@ -1,0 +1,110 @@
+"""How much strain each gage shows while the wheel stands: means and ranges of short blocks."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirebench.errors import DeviceError
+from tirebench.timeline import Samples
+from tirelib.arrays import FloatArray
+
+EVERY = 0.25
+"""Length of a block, [s]."""
+SHORTEST = 1.0
+"""A mean is taken over at least so much, [s]."""
+STILL = 100e-6
+"""Within a block the strain of a standing wheel stays within this: noise of 14 microstrain (3.5
+standard deviations either way in 2,500 samples); half of it refuses noise of 7, twice of it 28. A
+turning tire shows thousands. `--still` sets another."""
+CREEP = 0.2
+"""The means of blocks stay within this part of it: a wheel that creeps drifts from one to the next.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """Strain of a block; arrays of shape (n_gages,), NaN where a gage showed nothing.
+
+    Attributes
+    ----------
+    wheel : int
+    seconds : float, [s]
+    mean, low, high : array
+    missing : array
+        Share of samples that are lost or saturated.
+    """
+
+    wheel: int
+    seconds: float
+    mean: FloatArray
+    low: FloatArray
+    high: FloatArray
+    missing: FloatArray
+
+
+class Levels:
+    """Cuts the samples of a wheel into blocks."""
+
+    def __init__(self, wheel: int) -> None:
+        self._wheel = wheel
+        self._waiting: list[FloatArray] = []
+        self._count = 0
+
+    def take(self, samples: Samples) -> list[Level]:
+        """Take samples; return the block that they fill, if they do."""
+        if samples.reset:
+            self._waiting, self._count = [], 0
+        self._waiting.append(samples.strain)
+        self._count += len(samples.strain)
+        if self._count * samples.period < EVERY:
+            return []
+        strain = np.concatenate(self._waiting)
+        self._waiting, self._count = [], 0
+        known = np.isfinite(strain)
+        missing = 1.0 - known.mean(axis=0)
+        whole = np.where(known.any(axis=0), strain, 0.0)
+        mean = np.nanmean(whole, axis=0)
+        low, high = np.nanmin(whole, axis=0), np.nanmax(whole, axis=0)
+        for row in (mean, low, high):
+            row[~known.any(axis=0)] = np.nan
+        return [Level(self._wheel, len(strain) * samples.period, mean, low, high, missing)]
+
+
+def standing_mean(levels: Sequence[Level], still: float = STILL) -> FloatArray:
+    """Return the mean strain of each gage, shape (n_gages,); NaN where it showed nothing.
+
+    Raises
+    ------
+    DeviceError
+        If the wheel turned, a gage was saturated now and then, or there is too little.
+    """
+    seconds = sum(level.seconds for level in levels)
+    if seconds < SHORTEST:
+        raise DeviceError(
+            f"{seconds:.1f} s of samples; {SHORTEST:.0f} s at least are needed; wait, then try "
+            "again"
+        )
+    means = np.array([level.mean for level in levels])
+    there = ~np.all([level.missing == 1.0 for level in levels], axis=0)
+    missing = np.max([level.missing for level in levels], axis=0)
+    spread = np.max([level.high - level.low for level in levels], axis=0)
+    drift = np.ptp(means, axis=0)
+    faults = []
+    for gage in np.flatnonzero(there).tolist():
+        if missing[gage] > 0.01:
+            faults.append(
+                f"gage {gage + 1}: {100.0 * missing[gage]:.0f} % of its samples are lost "
+                "or saturated; all are needed; mend the line or the bridge"
+            )
+        elif spread[gage] > still or drift[gage] > CREEP * still:
+            faults.append(
+                f"gage {gage + 1}: its strain moves by {1e6 * spread[gage]:.0f} microstrain and "
+                f"drifts by {1e6 * drift[gage]:.0f}; a standing wheel moves by up to "
+                f"{1e6 * still:.0f} and drifts by {1e6 * CREEP * still:.0f}; stop the wheel"
+            )
+    if not there.any():
+        faults.append("no gage shows a number; one at least is needed; look at the link")
+    if faults:
+        raise DeviceError(faults)
+    return np.asarray(means.mean(axis=0))
