@@ -1,3 +1,109 @@
-"""A tire as a sensor: innerliner strain to load, slip angle, slip ratio and lateral force."""
+"""A tire as a sensor: innerliner strain to load, slip angle, slip ratio and lateral force.
+
+The names that a user needs are here. Each is imported when it is first used, so ``import tirelib``
+is quick:
+
+=====================================================  ==========================================
+`read_campaign`, `check_campaign`, `import_campaign`   measurements
+`observe`, `train`                                     strain to features, features to a calibration
+`read_calibration`, `write_calibration`                calibrations
+`StreamEstimator`                                      estimates from a live signal
+`read_tire`, `write_tire`                              tires and models
+`identify`, `compare`, `diagnose`, `add`, `simulate`   what a model holds, lacks, gains and predicts
+`build_fmu`, `check_fmu`                               the estimator as an FMU
+=====================================================  ==========================================
+"""
+
+import sys
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tirelib.campaign import check_campaign, read_campaign
+    from tirelib.campaign.importing.importer import import_campaign
+    from tirelib.estimators.calibration_file import read_calibration, write_calibration
+    from tirelib.estimators.train import train
+    from tirelib.fmu.build import build_fmu
+    from tirelib.fmu.check import check_fmu
+    from tirelib.journey import add, compare, diagnose, identify, simulate
+    from tirelib.observations import observe
+    from tirelib.parameters import read_tire, write_tire
+    from tirelib.stream import StreamEstimator
 
 __version__ = "0.1.0"
+__all__ = [
+    "StreamEstimator",
+    "add",
+    "build_fmu",
+    "check_campaign",
+    "check_fmu",
+    "compare",
+    "diagnose",
+    "identify",
+    "import_campaign",
+    "observe",
+    "read_calibration",
+    "read_campaign",
+    "read_tire",
+    "simulate",
+    "train",
+    "write_calibration",
+    "write_tire",
+]
+_JOURNEY = "tirelib.journey"
+_HOMES = {
+    "StreamEstimator": "tirelib.stream",
+    "add": _JOURNEY,
+    "build_fmu": "tirelib.fmu.build",
+    "check_campaign": "tirelib.campaign",
+    "check_fmu": "tirelib.fmu.check",
+    "compare": "tirelib.compare",
+    "diagnose": "tirelib.diagnose",
+    "identify": "tirelib.identify",
+    "import_campaign": "tirelib.campaign.importing.importer",
+    "observe": "tirelib.observations",
+    "read_calibration": "tirelib.estimators.calibration_file",
+    "read_campaign": "tirelib.campaign",
+    "read_tire": "tirelib.parameters",
+    "simulate": _JOURNEY,
+    "train": "tirelib.estimators.train",
+    "write_calibration": "tirelib.estimators.calibration_file",
+    "write_tire": "tirelib.parameters",
+}
+"""The module of each name; three names are those of a package, see `_Verb`."""
+
+
+class _Verb(ModuleType):
+    """A package that bears the name of a verb: called, it does what `tirelib.journey` does.
+
+    A package becomes an attribute of `tirelib` as soon as any of its modules is imported, so the
+    function of the same name could not stand there in every order of imports.
+    """
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        return getattr(import_module(_JOURNEY), self.__name__.rpartition(".")[2])(*args, **kwargs)
+
+
+class _Tirelib(ModuleType):
+    def __setattr__(self, name: str, value: Any) -> None:
+        if isinstance(value, ModuleType) and _HOMES.get(name) == value.__name__:
+            value.__class__ = _Verb
+        super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Tirelib
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    home = import_module(_HOMES[name])
+    if _HOMES[name] == f"{__name__}.{name}":
+        return home
+    globals()[name] = value = getattr(home, name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -10,26 +10,29 @@ from tirelib import __version__
 from tirelib.errors import TirelibError
 from tirelib.threads import bound_process
 
-VERBS = (
-    "campaign",
-    "import",
-    "features",
-    "calibrate",
-    "estimate",
-    "identify",
-    "compare",
-    "diagnose",
-    "explain",
-    "effects",
-    "next-test",
-    "add",
-    "selftest",
-    "simulate",
-    "fmu",
-    "rig",
-)
-"""Verbs; each is the command of that name in the module of that name (`import_` for import, `_` in
-place of `-`)."""
+VERBS = {
+    "campaign": "Validate a folder of measurements, or show what is in it.",
+    "import": "Make a campaign from measured files: MATLAB, CSV, Parquet, TYDEX, loose MDF 4.",
+    "features": "Read contact edges, peaks and integrals of every turn and gage of DIR.",
+    "calibrate": "Fit the estimators of Fz, alpha, kappa and Fy on the campaigns in DIR...",
+    "estimate": "Estimate every turn of DIR, and compare with the rig where it measured.",
+    "identify": "Fit the base model, ring and brush, to DIR.",
+    "compare": "Hold a model against CAMPAIGN and say where it fails.",
+    "diagnose": "Tell which physical effect the model lacks in CAMPAIGN.",
+    "explain": "Find what a model of CAMPAIGN lacks, add it, and show before and after.",
+    "effects": "List the effects of the catalogue, or register effects of your own.",
+    "next-test": "Tell which further run would separate the suspects of CAMPAIGN best.",
+    "add": "Add EFFECT to a model, fit it to CAMPAIGN and show what the error does.",
+    "selftest": "Plant each effect at the plan and noise of CAMPAIGN and tell the chance of "
+    "finding it.",
+    "simulate": "Press the rolling ring onto the road: shape, pressure, shear, strain and strain "
+    "rate.",
+    "fmu": "Export the estimator or the virtual tire as an FMU, check it, and run it.",
+    "rig": "Measure a virtual tire on the numerical rig and write a campaign.",
+}
+"""Verbs in the order of the journey, each with the first sentence of its help, so that the list of
+verbs needs no verb's module. A verb is the command of that name in the module of that name
+(`import_` for import, `_` in place of `-`)."""
 
 OPTIONAL = {"pythonfmu": "fmu", "fmpy": "fmu"}
 """Packages that a plain install lacks, and the extra that brings each."""
@@ -62,6 +65,11 @@ class Verbs(click.Group):
         name = f"{cmd_name}_" if iskeyword(cmd_name) else cmd_name.replace("-", "_")
         command = getattr(import_module(f"tirelib.cli.{name}"), name)
         return command if isinstance(command, click.Command) else None
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the list of verbs."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(VERBS.items()))
 
 
 @click.group(cls=Verbs, epilog=_EXAMPLE)

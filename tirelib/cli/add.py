@@ -16,8 +16,8 @@ from tirelib.cli.common import (
     progress_bar,
     write_json,
 )
-from tirelib.cli.diagnose import QUANTITIES
 from tirelib.errors import ParameterError
+from tirelib.journey import QUANTITIES
 
 if TYPE_CHECKING:
     from tirelib.campaign import Campaign

@@ -20,7 +20,8 @@ from tirelib.cli.common import (
     progress_bar,
     write_json,
 )
-from tirelib.errors import CalibrationError, ParameterError, TirelibError
+from tirelib.errors import TirelibError
+from tirelib.journey import explains_forces
 
 if TYPE_CHECKING:
     from tirelib.effects import Effect
@@ -42,7 +43,6 @@ once on.
 Exit code: 0 whatever the verdict, 2 bad input.
 """
 SHOWN = 8
-QUANTITIES = ("strain", "Fy", "Fx", "Mz")
 
 
 @click.command(epilog=_EXAMPLE)
@@ -126,40 +126,6 @@ def diagnose(
     for path in targets:
         write_json(path, document)
         console.print(f"written: {path}")
-
-
-def explains_forces(quantity: str | None, campaign: Campaign, file: "TireFile") -> bool:
-    """Return whether a force is to be explained, and not strain.
-
-    Strain comes first, where there is strain and the model has a ring.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such quantity.
-    CalibrationError
-        If strain is asked for and not measured, or is all that the campaign tells and the model has
-        no ring.
-    """
-    from tirelib.compare.compare import needs_ring
-    from tirelib.identify.strain_notes import is_straight
-
-    header = campaign.header
-    if quantity is not None and quantity not in QUANTITIES:
-        raise ParameterError(
-            f"--quantity {quantity}: allowed are {', '.join(QUANTITIES)}; correct the name"
-        )
-    if quantity == "strain" and not header.gage_lateral:
-        raise CalibrationError(
-            f"{header.name}: it has no strain gages; look at its forces: --quantity "
-            f"{', '.join(QUANTITIES[1:])}"
-        )
-    on_strain = quantity in ("strain", None) and bool(header.gage_lateral) and bool(file.missing)
-    if on_strain and (quantity == "strain" or all(map(is_straight, campaign.plans))):
-        needs_ring(campaign, file)
-    if quantity is None:
-        return not header.gage_lateral or bool(file.missing)
-    return quantity != "strain"
 
 
 def _of_strain(

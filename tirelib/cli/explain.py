@@ -19,8 +19,8 @@ from tirelib.cli.common import (
     output,
     write_json,
 )
-from tirelib.cli.diagnose import QUANTITIES, explains_forces
 from tirelib.errors import CalibrationError, ParameterError, TirelibError
+from tirelib.journey import QUANTITIES, explains_forces
 
 if TYPE_CHECKING:
     from tirelib.report.journey import Journey

@@ -15,7 +15,6 @@ from tirelib.cli.common import (
     write_json,
 )
 from tirelib.errors import FormatError
-from tirelib.features.table import feature_frame, units
 from tirelib.flags import TurnFlag
 from tirelib.observations import Observations, observe
 from tirelib.signal import LowPass
@@ -48,6 +47,8 @@ def features(
     folder: Path, target: Path, order: float | None, cut_off: float | None, json_file: Path | None
 ) -> None:
     """Read contact edges, peaks and integrals of every turn and gage of DIR."""
+    from tirelib.features.table import feature_frame, units  # with pandas
+
     if target.suffix not in (".parquet", ".csv"):
         raise FormatError(f"{target}: ends in {target.suffix!r}; allowed are .parquet and .csv")
     campaign = read_campaign(folder)

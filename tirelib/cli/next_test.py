@@ -20,8 +20,9 @@ from tirelib.cli.common import (
     progress_bar,
     write_json,
 )
-from tirelib.cli.diagnose import explains_forces, of_forces
+from tirelib.cli.diagnose import of_forces
 from tirelib.errors import FormatError, ParameterError
+from tirelib.journey import explains_forces
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -1,0 +1,119 @@
+"""What is imported before a user asks for anything: as little as possible."""
+
+import ast
+import json
+import subprocess
+import sys
+from importlib import import_module
+from keyword import iskeyword
+from pathlib import Path
+
+import pytest
+
+import tirelib
+from tirelib.cli import VERBS
+
+HEAVY = {
+    "asammdf",
+    "h5py",
+    "jinja2",
+    "matplotlib",
+    "numpy",
+    "pandas",
+    "plotly",
+    "pyarrow",
+    "rich",
+    "scipy",
+    "sklearn",
+    "statsmodels",
+}
+LIST = "import json, sys; sys.stderr.write(json.dumps(sorted(sys.modules)))"
+
+
+def imported(code: str) -> set[str]:
+    done = subprocess.run(
+        [sys.executable, "-c", f"{code}\n{LIST}"], capture_output=True, text=True, check=True
+    )
+    return set(json.loads(done.stderr))
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import tirelib",
+        "from tirelib.cli import program\nprogram(['--help'], standalone_mode=False)",
+        "from tirelib.cli import program\nprogram(['--version'], standalone_mode=False)",
+    ],
+    ids=["import tirelib", "tirelib --help", "tirelib --version"],
+)
+def test_nothing_heavy_is_imported(code: str) -> None:
+    modules = imported(code)
+    assert not modules & HEAVY
+    assert not [name for name in modules if name.startswith("tirelib.cli.")]
+
+
+def test_the_list_of_verbs_says_what_each_verb_says_of_itself() -> None:
+    for verb, sentence in VERBS.items():
+        name = f"{verb}_" if iskeyword(verb) else verb.replace("-", "_")
+        command = getattr(import_module(f"tirelib.cli.{name}"), name)
+        assert " ".join(command.help.split()).startswith(sentence), verb
+
+
+def test_every_name_is_typed_listed_documented_and_there() -> None:
+    tree = ast.parse(Path(tirelib.__file__).read_text())
+    (typed,) = [
+        node
+        for node in tree.body
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+    ]
+    names = sorted(a.name for line in typed.body for a in line.names)  # type: ignore[attr-defined]
+    assert names == sorted(tirelib.__all__)
+    for name in names:
+        assert f"`{name}`" in (tirelib.__doc__ or "")
+        assert callable(getattr(tirelib, name))
+        assert name in dir(tirelib)
+
+
+def test_an_unknown_name_is_refused() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'tyre'"):
+        _ = tirelib.tyre  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    "first", ["", "import tirelib.compare.model, tirelib.identify.whole, tirelib.diagnose.refit"]
+)
+def test_a_verb_may_be_called_whatever_was_imported_before(first: str) -> None:
+    code = f"""{first}
+import tirelib
+for verb in (tirelib.identify, tirelib.compare, tirelib.diagnose):
+    try:
+        verb()
+    except TypeError as error:
+        assert "missing" in str(error) and "'campaign'" in str(error), error
+    else:
+        raise AssertionError(verb)
+from tirelib import compare
+import tirelib.compare.model as module
+assert module.__name__ == "tirelib.compare.model" and callable(compare)
+"""
+    imported(code)
+
+
+def test_a_user_s_call_and_the_command_line_agree(tmp_path: Path) -> None:
+    from click.testing import CliRunner
+
+    from tirelib.cli import program
+
+    words = [
+        "simulate",
+        "--model",
+        "table-6-1",
+        "--load",
+        "4000",
+        "--json",
+        str(tmp_path / "s.json"),
+    ]
+    assert CliRunner().invoke(program, words).exit_code == 0
+    point = json.loads((tmp_path / "s.json").read_text())
+    done = tirelib.simulate(tirelib.read_tire("table-6-1"), load=4000.0)
+    assert 1e3 * float(done.deflection[0]) == pytest.approx(point["deflection_mm"], rel=1e-9)

@@ -1,0 +1,313 @@
+"""The verbs of the command line as functions: a campaign and a model go in, a result comes out.
+
+They are offered as `tirelib.identify`, `tirelib.compare`, `tirelib.diagnose`, `tirelib.add` and
+`tirelib.simulate`. Each imports what it needs when it is called. A model is a `TireFile`, as
+`read_tire` returns it.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from tirelib.errors import CalibrationError, ParameterError
+
+if TYPE_CHECKING:
+    from tirelib.arrays import FloatArray
+    from tirelib.campaign import Campaign
+    from tirelib.compare import Comparison, ForceComparison
+    from tirelib.diagnose.document import Assessment
+    from tirelib.diagnose.forces.assess import ForceAssessment
+    from tirelib.effects import Effect
+    from tirelib.identify.whole import Whole
+    from tirelib.parameters import TireFile
+    from tirelib.report.simulation import Simulation
+
+QUANTITIES = ("strain", "Fy", "Fx", "Mz")
+"""Measured quantities that a model explains."""
+Progress = Callable[[str], None]
+
+
+def identify(
+    campaign: "Campaign",
+    start: "TireFile | None" = None,
+    *,
+    base: str = "plain",
+    progress: Progress | None = None,
+) -> "Whole":
+    """Fit the base model, ring and brush, to a campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    start : TireFile, optional
+        Start and priors of the fit.
+    base : str
+        plain, or dissertation.
+    progress : callable, optional
+        Called with a label at each step.
+
+    Returns
+    -------
+    Whole
+        Its `file` is the model that the other verbs take.
+
+    Raises
+    ------
+    CalibrationError
+        If the campaign informs neither ring nor brush.
+    ParameterError
+        If the geometry of `start` contradicts that of the campaign.
+    """
+    from tirelib.identify.whole import identify_whole
+
+    return identify_whole(campaign, start, base=base, progress=progress)
+
+
+def compare(
+    campaign: "Campaign",
+    model: "TireFile",
+    quantity: str | None = None,
+    *,
+    effects: "Mapping[str, Effect] | None" = None,
+    progress: Progress | None = None,
+) -> "Comparison | ForceComparison":
+    """Hold a model against one measured quantity of a campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    model : TireFile
+    quantity : str, optional
+        One of `QUANTITIES`; by default strain where it was measured, else the force that fits
+        worst.
+    effects : mapping, optional
+        Effects by name; the default is the catalogue.
+    progress : callable, optional
+        Called with a label at each step.
+
+    Raises
+    ------
+    ParameterError
+        If the quantity is unknown.
+    CalibrationError
+        If the campaign does not hold the quantity, or the model does not predict it.
+    """
+    from tirelib.compare import compare as compare_model
+
+    catalogue = _catalogue(effects)
+    return compare_model(campaign, model, quantity, effects=catalogue, progress=progress)
+
+
+def diagnose(
+    campaign: "Campaign",
+    model: "TireFile",
+    quantity: str | None = None,
+    *,
+    effects: "Mapping[str, Effect] | None" = None,
+    members: int = 100,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> "Assessment | ForceAssessment":
+    """Find the physical effect that a model lacks.
+
+    Parameters
+    ----------
+    campaign, model, quantity, effects, progress
+        As of `compare`.
+    members : int
+        Number of variants of the model that the threshold is taken from.
+    seed : int
+        Seed of these variants.
+
+    Raises
+    ------
+    ParameterError, CalibrationError
+        As from `compare`.
+    """
+    catalogue = _catalogue(effects)
+    effects_of = list(catalogue.values())
+    if explains_forces(quantity, campaign, model):
+        from tirelib.diagnose.forces.assess import assess_forces, force_case
+
+        case = force_case(campaign, model, catalogue, quantity)
+        return assess_forces(case, effects_of, members=members, seed=seed, progress=progress)
+    import numpy as np
+
+    from tirelib.compare.model import model_of
+    from tirelib.diagnose.diagnose import diagnose as diagnose_strain
+    from tirelib.diagnose.document import assess
+    from tirelib.identify.campaign_data import straight_runs
+    from tirelib.waveforms import measure_waveforms
+
+    given = model_of(model, catalogue)
+    used = [each for each in given.used if each.effect.hook != "brush"]
+    found = diagnose_strain(
+        straight_runs(measure_waveforms(campaign, progress=progress)),
+        given.values,
+        effects_of,
+        effects=[each.effect for each in used],
+        strengths=[np.atleast_1d(np.asarray(each.strength, dtype=float)) for each in used],
+        members=members,
+        seed=seed,
+        progress=progress,
+    )
+    return assess(found, given, progress=progress)
+
+
+def add(
+    effect: "str | Effect",
+    model: "TireFile",
+    campaign: "Campaign",
+    quantity: str | None = None,
+    *,
+    effects: "Mapping[str, Effect] | None" = None,
+    progress: Progress | None = None,
+) -> "tuple[TireFile, dict[str, Any]]":
+    """Add an effect to a model and fit the model anew.
+
+    Parameters
+    ----------
+    effect : str or Effect
+        An effect, or its name in `effects`.
+    model, campaign, effects, progress
+        As of `compare`.
+    quantity : str, optional
+        Measured quantity to fit; by default strain, for an effect of the brush the force that it
+        helps most.
+
+    Returns
+    -------
+    model : TireFile
+        With the effect, its strength and the step in its history.
+    document : dict
+        What ``tirelib add --json`` writes: errors before and after, on what was fitted and on what
+        was left out.
+
+    Raises
+    ------
+    ParameterError
+        If the effect or the quantity is unknown, or the model has the effect.
+    CalibrationError
+        If the campaign cannot inform the effect.
+    """
+    from tirelib.extend.extension import known_effect
+
+    _check_quantity(quantity)
+    catalogue = _catalogue(effects)
+    chosen = known_effect(effect, catalogue) if isinstance(effect, str) else effect
+    if quantity not in (None, "strain") or (quantity is None and chosen.hook == "brush"):
+        from tirelib.diagnose.forces.assess import force_cases
+        from tirelib.extend.force_document import force_extended_file, force_extension_document
+        from tirelib.extend.force_extension import add_brush_effect, case_for
+
+        case = case_for(force_cases(campaign, model, catalogue, quantity), chosen)
+        step = add_brush_effect(case, chosen, progress=progress)
+        new = force_extended_file(model, step, campaign.content_hash())
+        return new, force_extension_document(step, new)
+    from tirelib.compare.model import model_of
+    from tirelib.extend.document import extension_document
+    from tirelib.extend.extension import add_effect
+    from tirelib.extend.model_file import extended_file
+    from tirelib.identify.campaign_data import straight_runs
+    from tirelib.waveforms import measure_waveforms
+
+    runs = straight_runs(measure_waveforms(campaign, progress=progress))
+    done = add_effect(runs, model_of(model, catalogue), chosen, progress=progress)
+    extended = extended_file(model, done, campaign.content_hash())
+    return extended, extension_document(done, extended)
+
+
+def simulate(
+    model: "TireFile",
+    *,
+    load: "float | FloatArray | None" = None,
+    deflection: "float | FloatArray | None" = None,
+    inflation: "float | FloatArray | None" = None,
+    turn_rate: "float | FloatArray" = 0.0,
+    effects: "Mapping[str, Effect] | None" = None,
+) -> "Simulation":
+    """Press a model with its effects onto the road, at one or many operating points.
+
+    Parameters
+    ----------
+    model : TireFile
+        A model, or a tire, which is a model without effects.
+    load, deflection : scalar or shape (n_points,), [N], [m]
+        One of the two.
+    inflation : scalar or shape (n_points,), [Pa]
+        By default the tire's own pressure.
+    turn_rate : scalar or shape (n_points,), [rad/s]
+    effects : mapping, optional
+        Effects by name; the default is the catalogue.
+
+    Raises
+    ------
+    ParameterError
+        If not exactly one of load and deflection is given, or a value is outside the model's range.
+    ConvergenceError
+        If the contact does not settle.
+    """
+    import numpy as np
+
+    from tirelib.compare.model import model_of
+    from tirelib.report.simulation import simulate as simulate_tire
+    from tirelib.report.simulation_model import simulate_file
+
+    if (load is None) == (deflection is None):
+        given = "neither load nor deflection" if load is None else "both load and deflection"
+        raise ParameterError(
+            f"simulate: {given}; give exactly one, the other one follows from the model"
+        )
+    if not ("model" in model.extra or model.extra.get("effects")):
+        return simulate_tire(
+            model.tire, load=load, deflection=deflection, inflation=inflation, turn_rate=turn_rate
+        )
+    points = {
+        name: None if value is None else np.atleast_1d(np.asarray(value, dtype=float))
+        for name, value in (("load", load), ("deflection", deflection), ("inflation", inflation))
+    }
+    rate = np.atleast_1d(np.asarray(turn_rate, dtype=float))
+    return simulate_file(model_of(model, _catalogue(effects)), model.tire, turn_rate=rate, **points)
+
+
+def explains_forces(quantity: str | None, campaign: "Campaign", model: "TireFile") -> bool:
+    """Return whether a force is to be explained, and not strain.
+
+    Strain comes first, where there is strain and the model has a ring.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such quantity.
+    CalibrationError
+        If strain is asked for and not measured, or is all that the campaign tells and the model has
+        no ring.
+    """
+    from tirelib.compare.compare import needs_ring
+    from tirelib.identify.strain_notes import is_straight
+
+    header = campaign.header
+    _check_quantity(quantity)
+    if quantity == "strain" and not header.gage_lateral:
+        raise CalibrationError(
+            f"{header.name}: it has no strain gages; look at its forces: --quantity "
+            f"{', '.join(QUANTITIES[1:])}"
+        )
+    on_strain = quantity in ("strain", None) and bool(header.gage_lateral) and bool(model.missing)
+    if on_strain and (quantity == "strain" or all(map(is_straight, campaign.plans))):
+        needs_ring(campaign, model)
+    if quantity is None:
+        return not header.gage_lateral or bool(model.missing)
+    return quantity != "strain"
+
+
+def _check_quantity(quantity: str | None) -> None:
+    if quantity is not None and quantity not in QUANTITIES:
+        raise ParameterError(
+            f"--quantity {quantity}: allowed are {', '.join(QUANTITIES)}; correct the name"
+        )
+
+
+def _catalogue(effects: "Mapping[str, Effect] | None") -> "Mapping[str, Effect]":
+    from tirelib.effects import CATALOGUE
+
+    return CATALOGUE if effects is None else effects
