@@ -1,21 +1,21 @@
-"""Family of the numerical rig: `bench.rig` with every constant redrawn by up to a half."""
+"""Family of the numerical rig: `tirelib.rig` with every constant redrawn by up to a half."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from bench.rig.hidden import HIDDEN
-from bench.rig.laws import SectionInertia
-from bench.rig.mesh import mesh
-from bench.rig.observe import Trace, edges, trace
-from bench.rig.shown import Shown as Seen
-from bench.rig.solve import State, solve
-from bench.rig.tire import Condition, RigTire
 
 from structure.family import PHI, POINTS, Array, Frame, Hidden, Setting
 from structure.gages import GAGES
 from tirelib.campaign import TireGeometry
+from tirelib.rig.hidden import HIDDEN
+from tirelib.rig.laws import SectionInertia
+from tirelib.rig.mesh import mesh
+from tirelib.rig.observe import Trace, edges, trace
+from tirelib.rig.shown import Shown as Seen
+from tirelib.rig.solve import State, solve
+from tirelib.rig.tire import Condition, RigTire
 
 MESH = (0.015, 0.15)
 """Coarser than the rig's own: the filtered waveforms differ by less than half a microstrain."""
