@@ -4,19 +4,28 @@ The virtual tire's surface knows no water. So the rig is solved with its water w
 (`tirelib.rig.laws.WaterWedge`) and without, rolling freely straight ahead, and the difference of
 the waveforms is added to what the virtual tire shows. Speed acts by the dynamic pressure: the wedge
 presses with s rho v^2 / 2, and nothing else of it depends on the speed.
+
+    cd build && python -m cosim.water      # what the calibration makes of the load on water
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import click
 import numpy as np
 
+from cosim.calibrate import CALIBRATION
 from cosim.wheels import PRESSURE
 from tirelib.arrays import FloatArray
+from tirelib.estimators.calibration import Calibration, Estimates
+from tirelib.estimators.calibration_file import read_calibration
+from tirelib.features.extract import extract_features
 from tirelib.rig.laws import WaterWedge
 from tirelib.rig.observe import contact, trace
 from tirelib.rig.solve import State, solve
-from tirelib.rig.tire import Condition, RigTire, tire
+from tirelib.rig.tire import NEW_DEPTH, Condition, RigTire, tire
+from tirelib.signal import LowPass, cut_turns
+from tirelib.threads import one_thread
 
 DENSITY = 1000.0
 """Of water [kg/m^3]."""
@@ -27,6 +36,8 @@ SPEED = 22.0
 """At which they are [m/s]."""
 POINTS = 1440
 """Wheel angles of a waveform."""
+TURNS, RATE = 4, 1e4
+"""Turns that are played to the calibration, at a sample rate [Hz]."""
 _WEDGE = WaterWedge(1.0)
 SPREAD = 0.5 * (_WEDGE.length + _WEDGE.fade) * RigTire().belt_width
 """Lift per pressure of the wedge [m^2]: a triangle ahead of the contact and one into it."""
@@ -101,3 +112,49 @@ def water_table(loads: Sequence[float] = LOADS, wedges: Sequence[float] = WEDGES
         waves = np.array([trace(state, POINTS).strain for state in states])
         change.append(waves - waves[0])
     return WaterTable(np.array(loads), np.array(wedges), np.array(change))
+
+
+def told_of(state: State, calibration: Calibration) -> Estimates:
+    """Return what a calibration tells of turns of a state."""
+    wave, omega = trace(state, POINTS).strain, SPEED / RigTire().ring_radius
+    samples = int(TURNS * 2.0 * np.pi / omega * RATE)
+    angle = omega * np.arange(samples) / RATE - np.pi
+    grid = 2.0 * np.pi * np.arange(POINTS) / POINTS - np.pi
+    strain = np.array([np.interp(angle, grid, gage, period=2.0 * np.pi) for gage in wave.T])
+    low_pass = LowPass(calibration.order, calibration.cut_off)
+    turns = cut_turns(
+        strain,
+        RATE,
+        calibration.lateral,
+        low_pass=low_pass,
+        speed=SPEED,
+        omega=omega,
+        pressure=PRESSURE,
+        camber=0.0,
+        tread_depth=NEW_DEPTH,
+    )
+    return calibration.estimate(extract_features(turns))
+
+
+def main() -> None:
+    """Print what the load and its standard deviation are on a wedge of water."""
+    calibration = read_calibration(CALIBRATION)
+    click.echo(
+        "load [N]   on the water [%]   told / load   std / told   valid   (std / told) / share"
+    )
+    for load in LOADS:
+        state = solved(load, 0.0)
+        for wedge in (0.0, 4e4, 8e4, 1.2e5, 1.6e5):
+            state = solved(load, wedge, start=state)
+            found, share = told_of(state, calibration), lift_of(state) / load
+            told, std, valid = found.value["Fz"][-1], found.std["Fz"][-1], found.valid["Fz"][-1]
+            ratio = std / told / share if share else np.nan
+            click.echo(
+                f"{load:8.0f} {100 * share:18.1f} {told / load:13.3f} {std / told:12.3f} "
+                f"{valid!s:>7} {ratio:23.2f}"
+            )
+
+
+if __name__ == "__main__":
+    with one_thread():
+        main()

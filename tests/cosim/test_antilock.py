@@ -21,12 +21,12 @@ from cosim.antilock import (
     stop,
 )
 from cosim.closed_loop_sources import STEP, Known, Perfect
-from cosim.hydroplaning import Approach, Loads
+from cosim.hydroplaning import Approach
 from cosim.today import AntiLock, Phase, Sensors, SpeedEstimator, TodaysBrakes
 from cosim.traction import TractionController
 from cosim.vehicle14.files import make_vehicle
 from cosim.vehicle14.model import ANGLES, Controls, Wheels
-from cosim.vehicle14.parameters import GRAVITY, VehicleParameters
+from cosim.vehicle14.parameters import GRAVITY
 from cosim.wheels import Estimates
 
 from tirelib.rig.observe import trace
@@ -255,16 +255,16 @@ def test_water_carries_its_pressure_times_the_wedge_and_the_belt_shows_it() -> N
     np.testing.assert_allclose(change, change[:, ::-1], atol=2e-6)  # both sides see the same
 
 
-def test_loads_that_seem_too_large_let_suspect_water() -> None:
-    """Twice the share by which the loads of an axle grow; what braking moves is no water."""
-    loads, dry = Loads(), np.array([4000.0, 4000.0, 3000.0, 3000.0])
-    assert math.isnan(loads.share(Estimates(), 0.0, learns=True))
-    assert loads.share(Estimates(Fz=dry), 0.0, learns=True) == 0.0
-    wet = dry * np.array([1.1, 1.1, 1.0, 1.0])
-    assert loads.share(Estimates(Fz=wet), 0.0, learns=False) == pytest.approx(0.05)
-    p = VehicleParameters
-    moved = 14e3 / GRAVITY * 3.0 * p.height / (p.front + p.rear) * np.array([0.5, 0.5, -0.5, -0.5])
-    assert loads.share(Estimates(Fz=dry + moved), -3.0, learns=False) == pytest.approx(0.0)
+def test_a_load_that_both_wheels_of_an_axle_doubt_lets_suspect_water() -> None:
+    load, sure = np.array([4000.0, 4000.0, 3000.0, 3000.0]), np.full(4, 40.0)
+    assert math.isnan(hydroplaning.suspected(Estimates()))
+    dry = hydroplaning.suspected(Estimates(Fz=load, Fz_std=sure))
+    wet = np.array([40.0, 40.0, 600.0, 600.0])
+    assert dry < 0.01
+    found = hydroplaning.suspected(Estimates(Fz=load, Fz_std=wet))
+    assert found == pytest.approx(0.2 / hydroplaning.SHOWS)
+    wet[3] = 40.0
+    assert hydroplaning.suspected(Estimates(Fz=load, Fz_std=wet)) < 0.6 * found
 
 
 def test_the_drive_into_water_is_a_document_a_table_and_a_figure() -> None:

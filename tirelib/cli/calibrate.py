@@ -108,7 +108,7 @@ def calibrate(
     _print(console, trained, document)
     for odd in document["other_tire"]:
         console.print(
-            f"another tire? {odd['turns']} of {odd['judged']} turns of {odd['name']} show strain "
+            f"another tire? {odd['unlike']} of {odd['judged']} runs of {odd['name']} show strain "
             f"that the tire of {odd['of']} does not (one in a thousand would by chance); look "
             "whether both are of one tire in one state, else calibrate them apart"
         )

@@ -155,7 +155,7 @@ def calibrate_chain(
     load, mean_load = _fit_load(links, laws, say)
     radius = _or_refused(links, "kappa", lambda: _fit_radius(links, say))
     force = _or_refused(links, "Fy", lambda: _fit_force(links, say))
-    sliding = fit_sliding_of(links)
+    sliding = fit_sliding_of(truth, values)
     moment = _fit_moment(links, force is not None, sliding, say)
     drag = _fit_drag(links, sliding, say)
     angle = _or_refused(links, "alpha", lambda: _fit_angle(links, force is not None, sliding, say))
@@ -423,9 +423,10 @@ def _fit_drag(
         return None
 
 
-def fit_sliding_of(links: Links) -> SlidingCurve | None:
+def fit_sliding_of(
+    truth: dict[str, FloatArray], values: dict[str, FloatArray]
+) -> SlidingCurve | None:
     """Fit the cornering curve on roads of other friction; None where slip was not varied."""
-    truth = links.truth
     needed = (truth["slip_angle"], truth["Fz"], truth["Fy"])
     if not all(np.isfinite(x).all() for x in needed) or np.ptp(needed[0]) < LEAST_ANGLE:
         return None
@@ -434,9 +435,9 @@ def fit_sliding_of(links: Links) -> SlidingCurve | None:
             *needed,
             truth["Fx"],
             truth["Mz"],
-            links.values["camber"],
+            values["camber"],
             truth["slip_ratio"],
-            links.values["friction"],
+            values["friction"],
         )
     )
 

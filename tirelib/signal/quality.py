@@ -13,8 +13,10 @@ LONGEST_BRIDGE = 2
 """Samples in a row that a straight line may replace."""
 SPIKE_SHARE = 0.05
 """A sample is a spike when it departs from its neighbours' median by this share of the swing."""
-DEAD_SHARE = 0.2
-"""A gage is dead when it swings less than this share of the median gage."""
+DEAD_SHARE = 0.15
+"""A gage shows no contact when its flanks have less than this share of the median gage's steepness.
+The belt bulges over a shoulder that is lifted off the road, so a strain that only swings is no
+contact. ``python build/cosim/lifted_shoulder.py`` has half and double."""
 FLAT_ANGLE = 0.04
 """A gage is saturated when it stands still at its extreme over this wheel angle, [rad]..."""
 FLAT_SAMPLES = 6
@@ -57,8 +59,6 @@ def inspect(window: FloatArray, step: float) -> tuple[FloatArray, IntArray]:
         low = np.fmin.reduce(known, axis=1)
         high = np.fmax.reduce(known, axis=1)
     swing = np.nan_to_num(high - low)
-    flags[swing < DEAD_SHARE * np.median(swing)] |= int(TurnFlag.DEAD_GAGE)
-    flags[(swing == 0.0)] |= int(TurnFlag.DEAD_GAGE)
     needed = max(FLAT_SAMPLES, int(FLAT_ANGLE / step))
     for extreme in (high, low):
         same = known == extreme[:, None]
@@ -77,6 +77,18 @@ def inspect(window: FloatArray, step: float) -> tuple[FloatArray, IntArray]:
     if missing.any():
         window = _bridge(window, missing)
     return window, flags
+
+
+def without_contact(rate: FloatArray) -> BoolArray:
+    """Tell which gages show no contact while most do, shape (n_gages,).
+
+    Parameters
+    ----------
+    rate : array, shape (n_gages, n), [1/rad]
+        Smoothed strain rate over a contact.
+    """
+    steep = np.ptp(rate, axis=1)
+    return np.asarray(steep < DEAD_SHARE * np.median(steep), dtype=np.bool_)
 
 
 def _has_corner(samples: FloatArray, extreme: float, jump: float, step: float) -> bool:

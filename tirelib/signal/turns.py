@@ -29,7 +29,7 @@ from tirelib.signal.angle import SOURCES, AngleLaw, Past, angle_law, minmod
 from tirelib.signal.contacts import Contact, ContactFinder
 from tirelib.signal.course import course
 from tirelib.signal.lowpass import LowPass, half_width, smooth_to_angle
-from tirelib.signal.quality import UNUSABLE, inspect
+from tirelib.signal.quality import UNUSABLE, inspect, without_contact
 from tirelib.signal.slip import unseen_change
 from tirelib.signal.turn import PHI, Turn, Turns, stack_turns
 
@@ -387,6 +387,7 @@ class TurnCutter:
         mended, gage_flags = inspect(raw, law.step)
         angle = law.at(np.arange(first, stop))
         strain[:, seen], rate[:, seen] = smooth_to_angle(mended, angle, PHI[seen], sigma)
+        gage_flags[without_contact(rate[:, seen])] |= int(TurnFlag.DEAD_GAGE)
         return strain, rate, gage_flags
 
     def _mean(

@@ -18,7 +18,7 @@ from tirelib.estimators.likeness import DRIFT, ROAD_DRIFT
 from tirelib.estimators.mixed import strangers
 from tirelib.estimators.regressors import ODD, compute_regressors
 from tirelib.estimators.result import estimate_document
-from tirelib.estimators.train import Trained
+from tirelib.estimators.train import Trained, take
 from tirelib.features import Features
 from tirelib.flags import TurnFlag
 from tirelib.observations import Observations, measure_run, observe, same_tire
@@ -136,7 +136,6 @@ def test_an_uncertain_wheel_angle_is_no_other_tire(trained: Trained) -> None:
 
 def test_too_few_conditions_say_nothing_of_the_tire(observed: Observations) -> None:
     from tirelib.estimators.calibrate import calibrate_chain
-    from tirelib.estimators.train import take
 
     few = take(observed, observed.group < 10)
     assert calibrate_chain(few, range(5))[0].likeness is None
@@ -153,7 +152,40 @@ def test_a_calibration_of_two_tires_says_so(cornering: Campaign, another_day: Ca
         rate_trail=np.where(second[:, None], strange.rate_trail, both.features.rate_trail),
     )
     (found,) = strangers(replace(both, features=features))
-    assert found.turns > 0.5 * found.judged
+    assert found.unlike > 0.5 * found.judged
+
+
+def test_two_odd_runs_are_not_two_tires_and_many_turns_of_one_run_are_no_more_than_one(
+    cornering: Campaign, another_day: Campaign
+) -> None:
+    both = observe([cornering, another_day])
+    first_runs = np.unique(both.run[both.campaign == 1])[:20]
+    both = take(both, (both.campaign == 0) | np.isin(both.run, first_runs))
+    few = (both.campaign == 1) & np.isin(both.run, first_runs[8:10])
+    strange = other(both.features)
+    features = replace(
+        both.features,
+        rate_lead=np.where(few[:, None], strange.rate_lead, both.features.rate_lead),
+        rate_trail=np.where(few[:, None], strange.rate_trail, both.features.rate_trail),
+    )
+    assert few.sum() >= 5
+    assert strangers(replace(both, features=features)) == ()
+
+
+def test_a_road_of_other_friction_is_no_other_tire(
+    cornering: Campaign, another_day: Campaign
+) -> None:
+    """A tread that slides more shifts the strain as `ROAD_DRIFT` says; the campaigns know why."""
+    both = observe([cornering, another_day])
+    second, slip = both.campaign == 1, both.truth["slip_angle"]
+    side = second * np.sign(slip) * (np.abs(slip) > np.deg2rad(1.0))
+    shift = 0.7 * ROAD_DRIFT["angle_slope"][1] * both.features.lateral / 0.06
+    features = replace(both.features, trail=both.features.trail + side[:, None] * shift)
+    unknown = replace(both, features=features)
+    friction = np.where(second, 0.3, 1.0)
+    known = replace(both, features=replace(features, friction=friction))
+    assert strangers(unknown) != ()
+    assert strangers(known) == ()
 
 
 @pytest.mark.parametrize("share", [0.65, 1.2])

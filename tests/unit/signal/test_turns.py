@@ -224,6 +224,18 @@ def test_a_dead_gage_is_flagged(level: float) -> None:
     assert all(has(turns, TurnFlag.REDUCED_GAGES, turn) for turn in range(1, len(turns)))
 
 
+def test_a_gage_over_a_lifted_shoulder_shows_no_contact() -> None:
+    """The belt bulges where the shoulder is off the road: the strain swings, without an edge."""
+    strain, _, _ = record(noise=4e-6)
+    lifted = strain.copy()
+    phi = 2.0 * np.pi * np.arange(strain.shape[1]) * 18.0 / (2.0 * np.pi * 0.305 * 1e4) - np.pi
+    lifted[4] = 1.5e-3 * np.cos(phi) + 4e-6 * np.random.default_rng(1).normal(size=phi.size)
+    assert np.ptp(lifted[4]) > 0.25 * np.ptp(strain[4])
+    turns = turns_of(lifted)
+    assert all(has(turns, TurnFlag.DEAD_GAGE, turn, 4) for turn in range(1, len(turns)))
+    assert all(has(turns, TurnFlag.REDUCED_GAGES, turn) for turn in range(1, len(turns)))
+
+
 def test_drift_within_a_turn_is_flagged() -> None:
     strain, _, _ = record()
     n = strain.shape[1]
