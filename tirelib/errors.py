@@ -1,14 +1,49 @@
 """Errors of the library.
 
 Each class is also the builtin that it resembles. A message says where, what was given,
-what is allowed and what to do.
+what is allowed and what to do. An error that is raised with a `Fault` carries these four parts as
+fields, so that whoever catches it may state them at another place.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """What is wrong, in four parts.
+
+    Attributes
+    ----------
+    where : str
+        File, line or channel, and sample or time where that helps; empty where only the caller
+        knows the place.
+    given, allowed, remedy : str
+        Parts of a sentence, without a full stop.
+    """
+
+    where: str
+    given: str
+    allowed: str
+    remedy: str
+
+    def __str__(self) -> str:
+        place = f"{self.where}: " if self.where else ""
+        return f"{place}{self.given}; {self.allowed}; {self.remedy}"
 
 
 class TirelibError(Exception):
-    """Base of every error that the library raises on purpose."""
+    """Base of every error that the library raises on purpose.
+
+    Attributes
+    ----------
+    faults : tuple of Fault
+        The faults among the arguments; empty where an error was raised with a text alone.
+    """
+
+    def __init__(self, *said: object) -> None:
+        self.faults = tuple(each for each in said if isinstance(each, Fault))
+        super().__init__(*map(str, said))
 
 
 class ParameterError(TirelibError, ValueError):
@@ -32,9 +67,11 @@ class FormatError(TirelibError, ValueError):
         Every fault that was found, in reading order.
     """
 
-    def __init__(self, problems: str | Sequence[str]) -> None:
-        self.problems = (problems,) if isinstance(problems, str) else tuple(problems)
+    def __init__(self, problems: str | Fault | Sequence[str | Fault]) -> None:
+        found = (problems,) if isinstance(problems, str | Fault) else tuple(problems)
+        self.problems = tuple(map(str, found))
         super().__init__("\n".join(self.problems))
+        self.faults = tuple(each for each in found if isinstance(each, Fault))
 
 
 class CalibrationError(TirelibError, ValueError):

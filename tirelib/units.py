@@ -11,7 +11,7 @@ from typing import NamedTuple, overload
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.errors import UnitError
+from tirelib.errors import Fault, UnitError
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -192,7 +192,12 @@ def units_of(dimension: str) -> tuple[str, ...]:
     units = tuple(row.unit for row in TABLE if row.dimension == dimension)
     if not units:
         raise UnitError(
-            f"dimension {dimension!r} is unknown; allowed are {', '.join(DIMENSIONS)}; name one"
+            Fault(
+                "",
+                f"dimension {dimension!r} is unknown",
+                f"allowed are {', '.join(DIMENSIONS)}",
+                "name one",
+            )
         )
     return units
 
@@ -262,10 +267,16 @@ def _row(unit: str, dimension: str) -> UnitRow:
         return row
     allowed = ", ".join(units_of(dimension))
     if not unit.strip():
-        raise UnitError(f"no unit is given for a {dimension}; allowed are {allowed}; add it")
+        raise UnitError(
+            Fault("", f"no unit is given for a {dimension}", f"allowed are {allowed}", "add it")
+        )
     others = dimensions_of_unit(unit)
     given = f"a unit of {' or '.join(others)}" if others else "not a unit that is known here"
     raise UnitError(
-        f"unit {unit!r} is {given}; allowed for {dimension} are {allowed}; "
-        "correct it at the source of the data"
+        Fault(
+            "",
+            f"unit {unit!r} is {given}",
+            f"allowed for {dimension} are {allowed}",
+            "correct it at the source of the data",
+        )
     )

@@ -79,8 +79,7 @@ def _legible(folder: Path, plans: tuple[RunPlan, ...], progress: Progress | None
         try:
             read_mdf(folder / plan.file)
         except FormatError as error:
-            given, allowed, remedy = str(error).rsplit("; ", 2)
-            problems.append(Problem(plan.file, given, allowed, remedy))
+            problems += [Problem.at(plan.file, fault) for fault in error.faults]
         if progress is not None:
             progress(done, len(plans))
     if plans:

@@ -12,10 +12,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.errors import FormatError
+from tirelib.errors import Fault, FormatError
 
 _MAGIC = b"MDF     "
 _UNFINISHED = b"UnFinMF "
+_WHOLE = (
+    "a complete file is needed",
+    "copy it again from the logger or take the run out of runs.csv",
+)
 _HEADER_END = 168  # identification block 64 bytes, header block 104 bytes
 _BLOCK_HEAD = 24  # of any block: 4 bytes name, 4 spare, 8 length, 8 number of links
 
@@ -81,9 +85,12 @@ def read_mdf(path: Path) -> list[Group]:
         zlib.error,
     ) as error:
         raise FormatError(
-            f"truncated or damaged MDF 4 file of {len(content)} bytes (reader: "
-            f"{str(error)[:80] or type(error).__name__}); a complete file is needed; "
-            "copy it again from the logger or take the run out of runs.csv"
+            Fault(
+                "",
+                f"truncated or damaged MDF 4 file of {len(content)} bytes (reader: "
+                f"{str(error)[:80] or type(error).__name__})",
+                *_WHOLE,
+            )
         ) from error
 
 
@@ -93,30 +100,48 @@ def _checked_content(path: Path) -> bytes:
         content = path.read_bytes()
     except OSError as error:
         raise FormatError(
-            f"the run file cannot be read ({error.strerror}); every file of runs.csv must be "
-            "there; restore it or take its row out of runs.csv"
+            Fault(
+                "",
+                f"the run file cannot be read ({error.strerror})",
+                "every file of runs.csv must be there",
+                "restore it or take its row out of runs.csv",
+            )
         ) from None
     if content.startswith(_UNFINISHED):
         raise FormatError(
-            "the recording was never finished (UnFinMF); a finished MDF 4 file is needed; "
-            "finish it with the logger's own tool"
+            Fault(
+                "",
+                "the recording was never finished (UnFinMF)",
+                "a finished MDF 4 file is needed",
+                "finish it with the logger's own tool",
+            )
         )
     if not content.startswith(_MAGIC):
         raise FormatError(
-            f"not an MDF file (begins with {content[:8]!r}); ASAM MDF 4 is needed; "
-            "convert it with `tirelib import`"
+            Fault(
+                "",
+                f"not an MDF file (begins with {content[:8]!r})",
+                "ASAM MDF 4 is needed",
+                "convert it with `tirelib import`",
+            )
         )
     if content[8:9] != b"4":
         version = content[8:16].decode("ascii", "replace").strip(" \0")
         raise FormatError(
-            f"MDF version {version or 'unknown'}; version 4 is needed; "
-            "convert it with the logger's own tool"
+            Fault(
+                "",
+                f"MDF version {version or 'unknown'}",
+                "version 4 is needed",
+                "convert it with the logger's own tool",
+            )
         )
     if not _has_header(content):
         raise FormatError(
-            f"truncated or damaged MDF 4 file of {len(content)} bytes (no whole header); "
-            "a complete file is needed; copy it again from the logger or take the run out of "
-            "runs.csv"
+            Fault(
+                "",
+                f"truncated or damaged MDF 4 file of {len(content)} bytes (no whole header)",
+                *_WHOLE,
+            )
         )
     return content
 

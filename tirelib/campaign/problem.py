@@ -1,36 +1,30 @@
-"""One fault of a campaign, in the four parts that every error of the library has."""
+"""One fault of a campaign: an error or a warning."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
-from tirelib.errors import FormatError
+from tirelib.errors import Fault, FormatError
 
 Severity = Literal["error", "warning"]
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
-    """A fault: where it is, what was given, what is allowed, what to do.
+class Problem(Fault):
+    """A fault with its severity.
 
     Attributes
     ----------
-    where : str
-        File, line or channel, and sample or time where that helps.
-    given, allowed, remedy : str
-        Halves of a sentence, without a full stop.
     severity : str
         ``error`` (the data cannot be used as they stand) or ``warning``.
     """
 
-    where: str
-    given: str
-    allowed: str
-    remedy: str
     severity: Severity = "error"
 
-    def __str__(self) -> str:
-        return f"{self.where}: {self.given}; {self.allowed}; {self.remedy}"
+    @classmethod
+    def at(cls, where: str, fault: Fault) -> "Problem":
+        """Return a fault that was found at a place which its finder did not know."""
+        return cls(where, fault.given, fault.allowed, fault.remedy)
 
 
 def errors_of(problems: Iterable[Problem]) -> list[Problem]:
@@ -40,6 +34,6 @@ def errors_of(problems: Iterable[Problem]) -> list[Problem]:
 
 def raise_errors(problems: Iterable[Problem], prefix: str = "") -> None:
     """Raise one FormatError that holds every error among `problems`; warnings pass."""
-    errors = [f"{prefix}{problem}" for problem in errors_of(problems)]
+    errors = [replace(problem, where=f"{prefix}{problem.where}") for problem in errors_of(problems)]
     if errors:
         raise FormatError(errors)

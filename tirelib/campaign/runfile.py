@@ -48,8 +48,7 @@ def inspect_run(
     try:
         groups = read_mdf(folder / plan.file)
     except FormatError as error:
-        given, allowed, remedy = str(error).rsplit("; ", 2)
-        return None, [Problem(plan.file, given, allowed, remedy)]
+        return None, [Problem.at(plan.file, fault) for fault in error.faults]
     file = _RunFile(plan, header)
     strain_group, rig_group = file.split(groups)
     strain = file.strain(strain_group) if strain_group else None
@@ -254,8 +253,8 @@ class _RunFile:
         try:
             return to_si(channel.samples.astype(np.float64), channel.unit, dimension)
         except UnitError as error:
-            given, allowed, remedy = str(error).split("; ", 2)
-            self.fault(channel.name, given, allowed, remedy)
+            for fault in error.faults:
+                self.fault(channel.name, fault.given, fault.allowed, fault.remedy)
             return None
 
     def fault(self, channel: str, given: str, allowed: str, remedy: str) -> None:

@@ -169,9 +169,9 @@ class _Conversion:
             try:
                 to_si(1.0, column.unit, rule.dimension)
             except UnitError as error:
-                given, allowed, _ = str(error).split("; ", 2)
-                given = f"the file's {given}" if column.unit else "map and file state no unit"
-                self.fault("unit", where, given, allowed, f"state unit in {self.rules.file}")
+                (fault,) = error.faults
+                given = f"the file's {fault.given}" if column.unit else "map and file state no unit"
+                self.fault("unit", where, given, fault.allowed, f"state unit in {self.rules.file}")
         elif not rule.converts and not _same_unit(column.unit, rule):
             self.fault(
                 "unit",

@@ -182,9 +182,12 @@ def _mdf(path: Path) -> Table:
     try:
         groups = [group for group in read_mdf(path) if group.channels]
     except FormatError as error:
-        given = str(error).rsplit("; ", 2)[0]
+        (fault,) = error.faults
         raise refusal(
-            str(path), given, "a complete MDF 4 file is needed", "copy it again from the logger"
+            str(path),
+            fault.given,
+            "a complete MDF 4 file is needed",
+            "copy it again from the logger",
         ) from error
     names = [name for group in groups for name in _names(group)]
     twice = {name for name in names if names.count(name) > 1}

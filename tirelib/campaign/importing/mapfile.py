@@ -346,8 +346,9 @@ def _check_unit(reader: MapReader, where: str, unit: str, dimension: str) -> Non
         if unit:
             to_si(1.0, unit, dimension)
     except UnitError as error:
-        given, allowed, _ = str(error).split("; ", 2)
-        reader.fault(f"{where} unit", given, allowed, "write the unit of the column")
+        for fault in error.faults:
+            remedy = "write the unit of the column"
+            reader.fault(f"{where} unit", fault.given, fault.allowed, remedy)
 
 
 def _set_points(reader: MapReader, channels: Mapping[str, ChannelRule]) -> dict[str, SetPointRule]:
