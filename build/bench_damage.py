@@ -17,10 +17,7 @@ from typing import Protocol
 
 import numpy as np
 
-from tirebench.can_batch import CanBatch, pack, same_kind
-from tirebench.decoder import SerialDecoder
-from tirebench.frames import Frames, encode
-from tirebench.line_counts import LineCounts
+from tirebench.protocols.decoder import SerialDecoder
 from tirebench.protocols.frame_decoder import PackedDecoder
 from tirebench.protocols.layouts import (
     LAYOUTS,
@@ -36,6 +33,9 @@ from tirebench.protocols.slcan import SlcanDecoder
 from tirebench.protocols.slcan import encode as slcan_lines
 from tirebench.protocols.user_line import Binary
 from tirebench.protocols.wheel_can import WheelCan
+from tirebench.wire.can_batch import CanBatch, pack, same_kind
+from tirebench.wire.frames import Frames, encode
+from tirebench.wire.line_counts import LineCounts
 
 KINDS = ("flip", "cut", "insertion", "splice", "random bytes")
 CHANGED = ("flip", "splice", "random bytes")

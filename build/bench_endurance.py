@@ -27,7 +27,7 @@ from bench_processes import Listener, Meter, alive, end, roles
 from demo import PROGRAMS, ROOT, Steps
 from rich.console import Console
 
-from tirebench.recording import Recording
+from tirebench.recording.recording import Recording
 from tirelib.threads import one_thread
 
 OUT = ROOT / "build/out/bench-endurance"

@@ -17,10 +17,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-from rich.table import Table
-
-from tirebench.damage import (
+from bench_damage import (
     CHANGED,
     KINDS,
     Outcome,
@@ -29,6 +26,9 @@ from tirebench.damage import (
     strike_serial,
     strike_slcan,
 )
+from rich.console import Console
+from rich.table import Table
+
 from tirebench.protocols.layouts import RAW12C, RAW16
 from tirelib.threads import one_thread
 

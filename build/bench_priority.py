@@ -19,7 +19,6 @@ from pathlib import Path
 
 from bench_recording import READ, pieces, write
 
-from tirebench.conditions import Conditions
 from tirebench.deadline import Deadline
 from tirebench.links.opening import PortPlan
 from tirebench.live.chain import LiveChain, LivePlan
@@ -28,8 +27,9 @@ from tirebench.live.reader import ReaderPlan
 from tirebench.protocols import SLCAN
 from tirebench.protocols.layouts import RAW16
 from tirebench.protocols.plan import ProtocolPlan
-from tirebench.recording_header import RecordingHeader
-from tirebench.source_plan import SourcePlan
+from tirebench.recording.header import RecordingHeader
+from tirebench.setup.source_plan import SourcePlan
+from tirebench.wire.conditions import Conditions
 from tirelib.threads import one_thread
 
 FIFO = 16 * 1024

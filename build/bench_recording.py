@@ -17,20 +17,20 @@ from pathlib import Path
 
 import numpy as np
 
-from tirebench.chain import Turn
-from tirebench.conditions import Conditions
-from tirebench.device import Device
-from tirebench.document import line_document, turn_document, wheel_document
-from tirebench.emulator import Player, record_tape
-from tirebench.faults import Faults
+from tirebench.emulator.emulator import Player, record_tape
+from tirebench.emulator.faults import Faults
+from tirebench.estimator.chain import Turn
+from tirebench.estimator.wheels import Wheels
 from tirebench.links import Read
 from tirebench.protocols import SERIAL, SLCAN
 from tirebench.protocols.layouts import RAW16
 from tirebench.protocols.plan import ProtocolPlan
-from tirebench.recorder import Recorder
-from tirebench.recording_header import RecordingHeader
-from tirebench.transmitter import transmitter
-from tirebench.wheels import Wheels
+from tirebench.protocols.transmitter import transmitter
+from tirebench.recording.document import line_document, turn_document, wheel_document
+from tirebench.recording.header import RecordingHeader
+from tirebench.recording.recorder import Recorder
+from tirebench.wire.conditions import Conditions
+from tirebench.wire.device import Device
 from tirelib.campaign import read_campaign
 from tirelib.threads import one_thread
 

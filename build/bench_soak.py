@@ -24,22 +24,22 @@ from bench_demo import ready_fmu
 from demo import ROOT, Steps
 from rich.console import Console
 
-from tirebench.chain import Turn
-from tirebench.conditions import Conditions
 from tirebench.deadline import Deadline
-from tirebench.device import Device
-from tirebench.document import line_document, wheel_document
-from tirebench.estimation import Estimation
-from tirebench.faults import Faults
-from tirebench.fmu_archive import read_fmu
-from tirebench.fmu_model import FmuFile, FmuModel
-from tirebench.frames import SAMPLES, TICK, encode, strain_frames
+from tirebench.emulator.faults import Faults
+from tirebench.estimator.chain import Turn
+from tirebench.estimator.estimation import Estimation
+from tirebench.estimator.fmu_archive import read_fmu
+from tirebench.estimator.fmu_model import FmuFile, FmuModel
+from tirebench.estimator.wheels import Wheels
 from tirebench.links import Read
 from tirebench.protocols import SERIAL
 from tirebench.protocols.plan import ProtocolPlan
-from tirebench.recording import Recorder, Recording, RecordingHeader
-from tirebench.replay import ReplayChain
-from tirebench.wheels import Wheels
+from tirebench.recording.document import line_document, wheel_document
+from tirebench.recording.recording import Recorder, Recording, RecordingHeader
+from tirebench.recording.replay import ReplayChain
+from tirebench.wire.conditions import Conditions
+from tirebench.wire.device import Device
+from tirebench.wire.frames import SAMPLES, TICK, encode, strain_frames
 from tirelib.campaign import Run, read_campaign
 from tirelib.threads import one_thread
 

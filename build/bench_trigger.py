@@ -16,17 +16,17 @@ from pathlib import Path
 
 import numpy as np
 
-from tirebench.conditions import Conditions
-from tirebench.decoder import SerialDecoder
-from tirebench.frames import encode, strain_frames
+from tirebench.estimator.wheels import Line, Wheels
 from tirebench.links import Read
 from tirebench.live.exchange import FINISH, STOP, Exchange
 from tirebench.live.kept import CONTEXT, Kept
 from tirebench.live.recorder import record
 from tirebench.live.recording_state import Order, RecorderState, RecordingRule
-from tirebench.recorder import alarm_event
-from tirebench.recording_header import RecordingHeader
-from tirebench.wheels import Line, Wheels
+from tirebench.protocols.decoder import SerialDecoder
+from tirebench.recording.header import RecordingHeader
+from tirebench.recording.recorder import alarm_event
+from tirebench.wire.conditions import Conditions
+from tirebench.wire.frames import encode, strain_frames
 from tirelib.threads import one_thread
 
 WHEELS, FRAMES, PERIOD_US, SAMPLES = 4, 5, 1600, 16

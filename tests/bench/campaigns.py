@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.synthetic import synthetic_run, write
-from tirebench.device import Device
+from tirebench.wire.device import Device
 from tirelib.campaign import Run
 
 

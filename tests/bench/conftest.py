@@ -11,8 +11,8 @@ from pythonfmu import FmuBuilder
 from tests.bench.campaigns import write_tiny_campaign
 from tests.bench.programs import Program
 from tests.synthetic import cornering_runs, write
-from tirebench.fmu_archive import read_fmu
-from tirebench.trust import remember
+from tirebench.estimator.fmu_archive import read_fmu
+from tirebench.estimator.trust import remember
 from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.train import train

@@ -3,15 +3,15 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from tirebench.chain import Estimator, Turn
-from tirebench.conditions import Conditions
 from tirebench.deadline import Deadline
-from tirebench.decoder import SerialDecoder
-from tirebench.device import Device
-from tirebench.estimation import Estimation, News
+from tirebench.estimator.chain import Estimator, Turn
+from tirebench.estimator.estimation import Estimation, News
+from tirebench.estimator.wheels import Wheels
 from tirebench.protocols import Decoder
-from tirebench.timeline import Timeline
-from tirebench.wheels import Wheels
+from tirebench.protocols.decoder import SerialDecoder
+from tirebench.wire.conditions import Conditions
+from tirebench.wire.device import Device
+from tirebench.wire.timeline import Timeline
 
 
 class InProcess:
@@ -42,7 +42,7 @@ class InProcess:
 
 
 class FakeSource:
-    """A line that was told what to say; see `tirebench.session.Source`."""
+    """A line that was told what to say; see `tirebench.estimator.session.Source`."""
 
     name, live, ended, message = "port", True, "", ""
     last_byte: float | None = None

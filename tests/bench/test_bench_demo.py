@@ -20,13 +20,13 @@ import tirelib.cli
 from tests.bench.programs import PATIENCE, wait_until
 from tests.synthetic import cornering_runs, synthetic_run, write
 from tirebench.deadline import Deadline
-from tirebench.device import Device
-from tirebench.faults import Faults
-from tirebench.fmu_archive import read_fmu
+from tirebench.emulator.faults import Faults
+from tirebench.estimator.fmu_archive import read_fmu
+from tirebench.estimator.trust import remember
+from tirebench.estimator.wheels import Wheels
 from tirebench.links import Read
 from tirebench.protocols.plan import ProtocolPlan
-from tirebench.trust import remember
-from tirebench.wheels import Wheels
+from tirebench.wire.device import Device
 from tirelib.campaign import Run, check_campaign, read_campaign
 from tirelib.report.agreement import agreement, read_turns
 from tirelib.rig.measure import Chain

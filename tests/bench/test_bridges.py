@@ -9,12 +9,12 @@ import can
 import cantools
 import pytest
 
-from tirebench.bridges import CanSender, UdpSender, udp_target
-from tirebench.chain import Turn
 from tirebench.errors import DeviceError
+from tirebench.estimator.chain import Turn
 from tirebench.links.opening import PortPlan
+from tirebench.live.bridges import CanSender, UdpSender, udp_target
+from tirebench.live.estimate_frames import estimate_frames
 from tirebench.protocols.dbc import FILES
-from tirebench.protocols.estimates import estimate_frames
 
 OUTPUTS = {
     "Fz": 4321.5,

@@ -10,13 +10,13 @@ import pytest
 from tests.bench.campaigns import tiny_runs
 from tests.bench.in_process import InProcess
 from tests.synthetic import frames as cuts
-from tirebench.chain import Outputs, Turn
-from tirebench.conditions import Condition, Conditions, condition
-from tirebench.device import Device
-from tirebench.document import document
-from tirebench.emulator import Script, write_script
-from tirebench.faults import Faults, parse_faults
-from tirebench.frames import SAMPLES
+from tirebench.emulator.emulator import Script, write_script
+from tirebench.emulator.faults import Faults, parse_faults
+from tirebench.estimator.chain import Outputs, Turn
+from tirebench.recording.document import document
+from tirebench.wire.conditions import Condition, Conditions, condition
+from tirebench.wire.device import Device
+from tirebench.wire.frames import SAMPLES
 from tirelib.arrays import FloatArray
 from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration import Calibration

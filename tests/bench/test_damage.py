@@ -7,9 +7,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from tests.bench.test_slcan import Keep
-from tirebench.can_batch import same_kind
-from tirebench.damage import (
+from build.bench_damage import (
     BUS_KINDS,
     CHANGED,
     KINDS,
@@ -19,9 +17,11 @@ from tirebench.damage import (
     strike_serial,
     strike_slcan,
 )
-from tirebench.line_counts import LineCounts
+from tests.bench.test_slcan import Keep
 from tirebench.protocols.layouts import RAW12C, RAW16
 from tirebench.protocols.slcan import SlcanDecoder, encode
+from tirebench.wire.can_batch import same_kind
+from tirebench.wire.line_counts import LineCounts
 
 
 def test_twenty_thousand_frames_damaged_none_accepted_wrong() -> None:

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tirebench.device import Device, parse_device, read_device
 from tirebench.errors import BenchError, DeviceError
-from tirebench.frames import GAGES
+from tirebench.wire.device import Device, parse_device, read_device
+from tirebench.wire.frames import GAGES
 
 GOOD = """
 format = "tirebench-device/1"

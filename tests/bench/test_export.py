@@ -13,17 +13,17 @@ from click.testing import CliRunner
 from tests.bench.campaigns import tiny_runs
 from tests.bench.disks import little_room
 from tirebench.cli import program
-from tirebench.conditions import Conditions
-from tirebench.device import Device
-from tirebench.emulator import Player, record_tape
+from tirebench.emulator.emulator import Player, record_tape
+from tirebench.emulator.faults import Faults, parse_faults
 from tirebench.errors import BenchError
-from tirebench.faults import Faults, parse_faults
 from tirebench.links import BACK, LOST, Read
 from tirebench.protocols import SERIAL, SLCAN
 from tirebench.protocols.layouts import RAW16
 from tirebench.protocols.plan import ProtocolPlan
-from tirebench.recording import Recorder, RecordingHeader
-from tirebench.transmitter import transmitter
+from tirebench.protocols.transmitter import transmitter
+from tirebench.recording.recording import Recorder, RecordingHeader
+from tirebench.wire.conditions import Conditions
+from tirebench.wire.device import Device
 from tirelib.campaign import check_campaign, read_campaign
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.result import estimate_document
@@ -181,7 +181,7 @@ def test_a_recording_without_campaign_needs_one_like_it(
 
 
 def reads_of(path: Path) -> Iterator[Read]:
-    from tirebench.recording import Recording
+    from tirebench.recording.recording import Recording
 
     recording = Recording(path)
     yield from recording.reads()

@@ -13,16 +13,16 @@ from click.testing import CliRunner
 
 from tests.bench.test_bridges import TURN
 from tests.bench.test_user_map import DBC, MAP, frames_of, physical
-from tirebench.can_batch import joined, pack, same_kind
 from tirebench.cli import program
-from tirebench.conditions import Conditions
-from tirebench.document import turn_document
 from tirebench.links import Read
 from tirebench.protocols import CAN
 from tirebench.protocols.plan import ProtocolPlan
 from tirebench.protocols.user_map import parse_map
-from tirebench.recorder import Recorder
-from tirebench.recording_header import RecordingHeader
+from tirebench.recording.document import turn_document
+from tirebench.recording.header import RecordingHeader
+from tirebench.recording.recorder import Recorder
+from tirebench.wire.can_batch import joined, pack, same_kind
+from tirebench.wire.conditions import Conditions
 from tirelib.campaign import check_campaign, read_campaign
 
 TURNS = [replace(TURN, ready=0.02 * n, texts={"note": "restarted"} if n else {}) for n in range(3)]

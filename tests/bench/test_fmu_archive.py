@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from tirebench import fmu_archive
 from tirebench.errors import FmuError
-from tirebench.fmu_archive import read_fmu
+from tirebench.estimator import fmu_archive
+from tirebench.estimator.fmu_archive import read_fmu
 
 XML = "modelDescription.xml"
 

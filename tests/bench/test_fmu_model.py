@@ -12,13 +12,13 @@ from fmpy.fmi1 import FMICallException
 from tests.bench.campaigns import tiny_runs
 from tests.bench.in_process import InProcess
 from tests.fmu import live
-from tirebench.conditions import Conditions, condition
-from tirebench.device import Device
-from tirebench.emulator import write_script
+from tirebench.emulator.emulator import write_script
+from tirebench.emulator.faults import Faults
 from tirebench.errors import FmuError
-from tirebench.faults import Faults
-from tirebench.fmu_archive import read_fmu
-from tirebench.fmu_model import FmuFile, FmuModel
+from tirebench.estimator.fmu_archive import read_fmu
+from tirebench.estimator.fmu_model import FmuFile, FmuModel
+from tirebench.wire.conditions import Conditions, condition
+from tirebench.wire.device import Device
 
 STEADY = Conditions.constant(18.0, 2.3e5, 0.0)
 

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.synthetic import frames as cuts
-from tirebench.decoder import SHORTEST_PERIOD, SerialDecoder
-from tirebench.frames import LONGEST_ON_WIRE, Frames, encode, strain_frames
+from tirebench.protocols.decoder import SHORTEST_PERIOD, SerialDecoder
+from tirebench.wire.frames import LONGEST_ON_WIRE, Frames, encode, strain_frames
 
 FIELDS = ("wheel", "seq", "t_us", "period", "flags", "rssi", "temperature")
 

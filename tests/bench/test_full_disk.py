@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tirebench.conditions import Conditions
 from tirebench.errors import RecordingError
 from tirebench.links import BACK, LOST, PASSED, RESUMED, Read
 from tirebench.live.exchange import Exchange
 from tirebench.live.kept import CONTEXT
 from tirebench.live.recorder import _Recorder
 from tirebench.live.recording_state import Order, RecorderState, RecordingRule
-from tirebench.mcap_log import McapLog
-from tirebench.recorder import Recorder
-from tirebench.recording import Recording
-from tirebench.recording_header import RecordingHeader
+from tirebench.recording.header import RecordingHeader
+from tirebench.recording.mcap_log import McapLog
+from tirebench.recording.recorder import Recorder
+from tirebench.recording.recording import Recording
+from tirebench.wire.conditions import Conditions
 
 STEADY = Conditions.constant(18.0)
 PIECES = [bytes([number]) * 5000 for number in range(9)]

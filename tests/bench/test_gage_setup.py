@@ -14,20 +14,20 @@ from hypothesis import strategies as st
 from tests.bench.campaigns import tiny_runs
 from tests.bench.in_process import FakeSource
 from tirebench.cli import program
-from tirebench.conditions import Conditions
-from tirebench.device import Device, parse_device, read_device
-from tirebench.emulator import write_script
+from tirebench.emulator.emulator import write_script
+from tirebench.emulator.faults import Faults
 from tirebench.errors import DeviceError
-from tirebench.faults import Faults
-from tirebench.frames import encode, strain_frames
-from tirebench.gage_setup import apparent_strain, device_text, shunted, zeroed
+from tirebench.estimator.standing import Level
 from tirebench.links import Read
 from tirebench.links.pseudo import PseudoTerminal
 from tirebench.page.commands import Command, CommandDesk, parse_command
 from tirebench.page.gages import GageSetup
-from tirebench.recorder import Recorder
-from tirebench.recording_header import RecordingHeader
-from tirebench.standing import Level
+from tirebench.recording.header import RecordingHeader
+from tirebench.recording.recorder import Recorder
+from tirebench.wire.conditions import Conditions
+from tirebench.wire.device import Device, parse_device, read_device
+from tirebench.wire.frames import encode, strain_frames
+from tirebench.wire.gage_setup import apparent_strain, device_text, shunted, zeroed
 from tirelib.arrays import FloatArray
 
 OFFSET = np.array([120.0, -340.0, 5.0, 0.0, 1800.0])

@@ -15,15 +15,15 @@ from mcap.records import Chunk, Message
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
-from tirebench import records
 from tirebench.cli import program
-from tirebench.conditions import Conditions, RunMark, condition, conditions_document
 from tirebench.errors import BenchError, RecordingError
 from tirebench.protocols import CAN, SERIAL
 from tirebench.protocols.plan import ProtocolPlan
-from tirebench.recording import Recording
-from tirebench.recording_header import FORMER as FORMAT
-from tirebench.recording_topics import CONDITIONS, ESTIMATE, EVENTS
+from tirebench.recording import records
+from tirebench.recording.header import FORMER as FORMAT
+from tirebench.recording.recording import Recording
+from tirebench.recording.topics import CONDITIONS, ESTIMATE, EVENTS
+from tirebench.wire.conditions import Conditions, RunMark, condition, conditions_document
 
 NESTED = "[" * 100_000
 MARK = RunMark(1, 0, 0.0, {}, {"kind": "free", "load": 3000.0})

@@ -10,14 +10,14 @@ from typing import Any
 import pytest
 
 from tests.bench.test_bridges import OUTPUTS
-from tirebench.chain import Turn
 from tirebench.cli import program
-from tirebench.conditions import Conditions
-from tirebench.document import turn_document
 from tirebench.errors import RecordingError
-from tirebench.journal import Journal, completed
-from tirebench.recorder import Recorder
-from tirebench.recording_header import RecordingHeader
+from tirebench.estimator.chain import Turn
+from tirebench.recording.document import turn_document
+from tirebench.recording.header import RecordingHeader
+from tirebench.recording.journal import Journal, completed
+from tirebench.recording.recorder import Recorder
+from tirebench.wire.conditions import Conditions
 
 TURNS = [
     Turn(1, 0, number, number, number, OUTPUTS, {}, 0, (0,) * 5, arrival=number)

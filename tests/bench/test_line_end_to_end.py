@@ -11,7 +11,7 @@ from tests.bench.conftest import Spawn
 from tests.bench.programs import PATIENCE, Line, wait_until
 from tirebench.cli import program
 from tirebench.links import BACK
-from tirebench.recording import Recording
+from tirebench.recording.recording import Recording
 
 
 def result(path: Path) -> dict[str, Any]:

@@ -15,10 +15,8 @@ import pytest
 from tests.bench.clocks import Clock
 from tests.bench.programs import PATIENCE, wait_until
 from tests.bench.test_slcan import Keep, keys, some_frames
-from tirebench.can_batch import CanBatch, same_kind, unpack
 from tirebench.deadline import Deadline
 from tirebench.errors import DeviceError, LinkError, UnpluggedError
-from tirebench.line_counts import LineCounts
 from tirebench.links import BACK, LOST, Link, Read
 from tirebench.links.can_bus import CanLink, message_of
 from tirebench.links.opening import PortPlan
@@ -27,6 +25,8 @@ from tirebench.links.reconnecting import ReconnectingLink
 from tirebench.links.serial_port import MUCH, NAP, SerialLink
 from tirebench.links.slcan_port import SlcanLink
 from tirebench.protocols.slcan import SlcanDecoder, encode
+from tirebench.wire.can_batch import CanBatch, same_kind, unpack
+from tirebench.wire.line_counts import LineCounts
 
 CANNOT = {
     "canalystii",

@@ -12,9 +12,9 @@ from tests.bench.conftest import Spawn
 from tests.bench.programs import A_TURN, Line, port_of, wait_until
 from tirebench.cli import program
 from tirebench.errors import BenchError
-from tirebench.fmu_archive import read_fmu
-from tirebench.recording import Recording
-from tirebench.trust import remember
+from tirebench.estimator.fmu_archive import read_fmu
+from tirebench.estimator.trust import remember
+from tirebench.recording.recording import Recording
 from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import write_calibration

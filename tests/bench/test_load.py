@@ -9,11 +9,18 @@ from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tirebench.bus_load import LoadPlan, frame_bits, highest_rate, load_of, suggestions, worst_bits
-from tirebench.can_batch import same_kind
 from tirebench.cli import program
 from tirebench.errors import DeviceError
+from tirebench.protocols.bus_load import (
+    LoadPlan,
+    frame_bits,
+    highest_rate,
+    load_of,
+    suggestions,
+    worst_bits,
+)
 from tirebench.protocols.layouts import RAW12, RAW12C, RAW16
+from tirebench.wire.can_batch import same_kind
 
 M = 1_000_000
 TABLE = [

@@ -17,22 +17,22 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from tests.bench.in_process import FakeSource
-from tirebench.chain import Turn
-from tirebench.conditions import Conditions
 from tirebench.errors import DeviceError
-from tirebench.estimation import News, WheelEstimation
+from tirebench.estimator.chain import Turn
+from tirebench.estimator.estimation import News, WheelEstimation
+from tirebench.estimator.laps import GRID, Lap, Laps, band
+from tirebench.estimator.wheels import Block
+from tirebench.live.board import RINGS, Board, RingReader
 from tirebench.live.recorder import RecorderState
-from tirebench.page.board import RINGS, Board, RingReader
 from tirebench.page.commands import Command, CommandDesk, parse_command
 from tirebench.page.feed import About, Feed
 from tirebench.page.history import COLUMNS, History, Viewer
-from tirebench.page.laps import GRID, Lap, Laps, band
 from tirebench.page.live import PageChoice
 from tirebench.page.quantities import UNITS
 from tirebench.page.recording_switch import RecordingSwitch
 from tirebench.page.terminal import numbers, picture
-from tirebench.timeline import Samples
-from tirebench.wheels import Block
+from tirebench.wire.conditions import Conditions
+from tirebench.wire.timeline import Samples
 from tirelib.estimators.edge import EDGE_UNIT
 
 PERIOD = 1e-4

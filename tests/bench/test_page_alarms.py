@@ -13,20 +13,17 @@ from hypothesis import strategies as st
 
 from tests.bench.in_process import FakeSource
 from tests.bench.test_protocols import RAW16, some_raw
-from tirebench.can_batch import pack, same_kind
 from tirebench.cli.live import counters
-from tirebench.conditions import Conditions, Measured
-from tirebench.device import Device
 from tirebench.errors import DeviceError
-from tirebench.estimation import News
-from tirebench.line_counts import NO_FRAME, NOTHING, LineCounts
+from tirebench.estimator.estimation import News
+from tirebench.estimator.wheels import Wheels
 from tirebench.links.opening import PortPlan
+from tirebench.live.board import RINGS, Board
 from tirebench.live.ports import PortState
 from tirebench.live.reader import LineState
 from tirebench.live.recording_state import RecorderState
 from tirebench.live.run_alarms import DECODED_AGAIN, RECORDED_AGAIN, TOO_BUSY, RunAlarms
 from tirebench.page.alarms import RULES, Alarms, Rule, event_of, read_alarms
-from tirebench.page.board import RINGS, Board
 from tirebench.page.condition_lines import in_use
 from tirebench.page.feed import About, Feed, vitals
 from tirebench.page.recent import SPAN, Recent
@@ -36,8 +33,11 @@ from tirebench.protocols import layouts
 from tirebench.protocols.frame_decoder import PackedDecoder
 from tirebench.protocols.layouts import Health
 from tirebench.protocols.wheel_can import WheelCan
-from tirebench.source_plan import SourcePlan, wheels_of
-from tirebench.wheels import Wheels
+from tirebench.setup.source_plan import SourcePlan, wheels_of
+from tirebench.wire.can_batch import pack, same_kind
+from tirebench.wire.conditions import Conditions, Measured
+from tirebench.wire.device import Device
+from tirebench.wire.line_counts import NO_FRAME, NOTHING, LineCounts
 
 LOSS = Rule("samples lost", "%", high=1.0, hysteresis=0.5)
 

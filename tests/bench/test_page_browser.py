@@ -19,16 +19,16 @@ from tests.bench.in_process import FakeSource
 from tests.bench.programs import PATIENCE, port_of, wait_until
 from tests.bench.test_live import result
 from tests.bench.test_page import turn as made_turn
-from tirebench.conditions import Conditions
-from tirebench.estimation import News
+from tirebench.estimator.estimation import News
+from tirebench.estimator.laps import GRID
+from tirebench.estimator.standing import Level
 from tirebench.page.feed import About
 from tirebench.page.history import COLUMNS
-from tirebench.page.laps import GRID
 from tirebench.page.live import LivePage, PageChoice
 from tirebench.page.quantities import UNITS
-from tirebench.recording import Recording
-from tirebench.recording_topics import EVENTS
-from tirebench.standing import Level
+from tirebench.recording.recording import Recording
+from tirebench.recording.topics import EVENTS
+from tirebench.wire.conditions import Conditions
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.flags import TurnFlag

@@ -21,7 +21,7 @@ from websockets.sync.client import connect
 
 from tests.bench.in_process import FakeSource
 from tests.bench.programs import PATIENCE, wait_until
-from tirebench.estimation import News
+from tirebench.estimator.estimation import News
 from tirebench.page.connections import MOST_IDLE, Connection, least_needed
 from tirebench.page.feed import About
 from tirebench.page.live import LivePage, PageChoice

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 from tests.bench.campaigns import tiny_runs
-from tirebench.can_batch import pack
-from tirebench.conditions import conditions_document, parse_conditions
-from tirebench.device import Device
-from tirebench.emulator import Player, Tape, record_tape
+from tirebench.emulator.emulator import Player, Tape, record_tape
+from tirebench.emulator.faults import Faults, parse_faults
+from tirebench.emulator.manoeuvre import Motion, nodes, read_manoeuvre, waveform
 from tirebench.errors import DeviceError
-from tirebench.faults import Faults, parse_faults
 from tirebench.links.can_bus import packed
-from tirebench.manoeuvre import Motion, nodes, read_manoeuvre, waveform
 from tirebench.protocols import CAN, SERIAL, SLCAN
 from tirebench.protocols.layouts import RAW12, RAW12C, RAW16
 from tirebench.protocols.plan import ProtocolPlan
-from tirebench.timeline import Samples, Timeline
-from tirebench.transmitter import transmitter
+from tirebench.protocols.transmitter import transmitter
+from tirebench.wire.can_batch import pack
+from tirebench.wire.conditions import conditions_document, parse_conditions
+from tirebench.wire.device import Device
+from tirebench.wire.timeline import Samples, Timeline
 from tirelib.rig.measure import Chain as MeasuringChain
 from tirelib.rig.measure import gages
 from tirelib.rig.ramp import Point

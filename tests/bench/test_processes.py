@@ -18,21 +18,17 @@ from tests.bench.campaigns import tiny_runs
 from tests.bench.clocks import Clock
 from tests.bench.conftest import Spawn
 from tests.bench.programs import A_TURN, PATIENCE, port_of, wait_until
-from tirebench.chain import RESTARTED, SKIPPED, Jump, Outputs, Place, Turn
-from tirebench.conditions import Condition, Conditions
 from tirebench.deadline import Deadline
-from tirebench.decoder import SerialDecoder
-from tirebench.device import Device
-from tirebench.document import flags, turn_document
-from tirebench.emulator import write_script
+from tirebench.emulator.emulator import write_script
+from tirebench.emulator.faults import Faults
 from tirebench.errors import DeviceError, LinkTimeoutError
-from tirebench.estimation import Estimation, News
-from tirebench.faults import Faults
-from tirebench.fmu_archive import read_fmu
-from tirebench.fmu_model import FmuFile, FmuModel
+from tirebench.estimator.chain import RESTARTED, SKIPPED, Jump, Outputs, Place, Turn
+from tirebench.estimator.estimation import Estimation, News
+from tirebench.estimator.fmu_archive import read_fmu
+from tirebench.estimator.fmu_model import FmuFile, FmuModel
+from tirebench.estimator.wheels import Block, Wheels
 from tirebench.links import BACK, LOST, RESUMED, Read
 from tirebench.links.opening import PortPlan
-from tirebench.links.replay import ReplayLink
 from tirebench.live.chain import LiveChain, LivePlan
 from tirebench.live.estimator import EstimatorPlan, Report, _Estimator
 from tirebench.live.exchange import Address, Exchange
@@ -41,11 +37,15 @@ from tirebench.live.reader import ReaderPlan, load
 from tirebench.live.recorder import _Recorder
 from tirebench.live.recording_state import Order, RecorderState, RecordingRule
 from tirebench.live.run_alarms import RECORDED_AGAIN
-from tirebench.recording import Recorder, Recording, RecordingHeader, jump_event
-from tirebench.recording_header import parts_of
-from tirebench.replay import ReplayChain
-from tirebench.source_plan import SourcePlan
-from tirebench.wheels import Block, Wheels
+from tirebench.protocols.decoder import SerialDecoder
+from tirebench.recording.document import flags, turn_document
+from tirebench.recording.header import parts_of
+from tirebench.recording.link import ReplayLink
+from tirebench.recording.recording import Recorder, Recording, RecordingHeader, jump_event
+from tirebench.recording.replay import ReplayChain
+from tirebench.setup.source_plan import SourcePlan
+from tirebench.wire.conditions import Condition, Conditions
+from tirebench.wire.device import Device
 from tirelib.arrays import FloatArray
 
 STEADY = Conditions.constant(18.0, 2.3e5, 0.0)

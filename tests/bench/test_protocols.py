@@ -9,19 +9,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tirebench.can_batch import CanBatch, joined, pack, same_kind, unpack
-from tirebench.device import Device
-from tirebench.frames import FrameFlag, Frames
-from tirebench.line_counts import LineCounts
 from tirebench.protocols import CAN, layouts
 from tirebench.protocols.dbc import FILES, database, signals
 from tirebench.protocols.layouts import LAYOUTS, RAW12, RAW12C, RAW16, Health, Raw
 from tirebench.protocols.plan import ProtocolPlan
 from tirebench.protocols.signals import Signal, raw_values
+from tirebench.protocols.transmitter import CanTransmitter, Record
 from tirebench.protocols.wheel_can import WheelCan
 from tirebench.protocols.widening import Widener
-from tirebench.timeline import Timeline
-from tirebench.transmitter import CanTransmitter, Record
+from tirebench.wire.can_batch import CanBatch, joined, pack, same_kind, unpack
+from tirebench.wire.device import Device
+from tirebench.wire.frames import FrameFlag, Frames
+from tirebench.wire.line_counts import LineCounts
+from tirebench.wire.timeline import Timeline
 
 FD_FILE, CLASSIC_FILE = FILES
 ENCODE = {RAW16: layouts.encode_raw16, RAW12: layouts.encode_raw12}
@@ -169,7 +169,7 @@ def strain_of(frames: list[Frames], timeline: Timeline) -> np.ndarray:
 @pytest.mark.parametrize("kind", [RAW16, RAW12, RAW12C])
 @pytest.mark.parametrize("pieces", [1, 7, 500])
 def test_what_a_wheel_sends_is_what_its_gages_showed(kind: str, pieces: int) -> None:
-    from tirebench.device import Device
+    from tirebench.wire.device import Device
 
     record = record_of(4800)
     sent = CanTransmitter(kind).send(record, 0, 4800).frames
@@ -185,7 +185,7 @@ def test_what_a_wheel_sends_is_what_its_gages_showed(kind: str, pieces: int) -> 
 
 def test_sixteen_lost_single_samples_are_seen() -> None:
     """The counter alone shows nothing: it is the SYNC that tells."""
-    from tirebench.device import Device
+    from tirebench.wire.device import Device
 
     record = record_of(4800, period=2000)
     sent = CanTransmitter(RAW12C).send(record, 0, 4800).frames

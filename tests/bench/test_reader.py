@@ -9,24 +9,24 @@ from typing import Any
 import pytest
 
 from tests.bench.campaigns import tiny_runs
-from tirebench.conditions import Conditions
 from tirebench.deadline import Deadline
-from tirebench.decoder import SerialDecoder
-from tirebench.device import Device
-from tirebench.emulator import write_script
-from tirebench.estimation import News
-from tirebench.faults import Faults
+from tirebench.emulator.emulator import write_script
+from tirebench.emulator.faults import Faults
+from tirebench.estimator.estimation import News
+from tirebench.estimator.wheels import Block, Wheels
 from tirebench.links import DECODED, PASSED, RESUMED, Read
 from tirebench.links.opening import PortPlan
-from tirebench.links.replay import ReplayLink
 from tirebench.live.exchange import Exchange
 from tirebench.live.kept import CONTEXT
 from tirebench.live.reader import ReaderPlan, _Reader
-from tirebench.recorder import Recorder
-from tirebench.recording_header import RecordingHeader
-from tirebench.replay import ReplayChain
-from tirebench.source_plan import SourcePlan
-from tirebench.wheels import Block, Wheels
+from tirebench.protocols.decoder import SerialDecoder
+from tirebench.recording.header import RecordingHeader
+from tirebench.recording.link import ReplayLink
+from tirebench.recording.recorder import Recorder
+from tirebench.recording.replay import ReplayChain
+from tirebench.setup.source_plan import SourcePlan
+from tirebench.wire.conditions import Conditions
+from tirebench.wire.device import Device
 
 
 class KilledError(Exception):

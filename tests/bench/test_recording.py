@@ -10,7 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 
-from tirebench.conditions import (
+from tirebench.deadline import Deadline
+from tirebench.errors import DeviceError, RecordingError
+from tirebench.links import Read
+from tirebench.recording.link import ReplayLink
+from tirebench.recording.recording import Recorder, Recording, RecordingHeader
+from tirebench.wire.conditions import (
     Conditions,
     RunMark,
     condition,
@@ -18,11 +23,6 @@ from tirebench.conditions import (
     parse_conditions,
     read_conditions,
 )
-from tirebench.deadline import Deadline
-from tirebench.errors import DeviceError, RecordingError
-from tirebench.links import Read
-from tirebench.links.replay import ReplayLink
-from tirebench.recording import Recorder, Recording, RecordingHeader
 
 CONDITIONS = Conditions(
     (0, 10_000, 20_000),
@@ -123,7 +123,7 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
 
 
 def test_an_unknown_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tirebench.recording_header.FORMAT", "tirebench-recording/9")
+    monkeypatch.setattr("tirebench.recording.header.FORMAT", "tirebench-recording/9")
     write(tmp_path / "a.mcap")
     monkeypatch.undo()
     with pytest.raises(RecordingError, match=r"'tirebench-recording/9'; 'tirebench-recording/2'"):

@@ -5,12 +5,12 @@ from pathlib import Path
 import pytest
 
 from tirebench.cli.recording import at_start
-from tirebench.device import Device
 from tirebench.links.opening import PortPlan
 from tirebench.live.reader import ReaderPlan
 from tirebench.live.recording_state import RecordingRule
 from tirebench.protocols.plan import ProtocolPlan
-from tirebench.source_plan import SourcePlan
+from tirebench.setup.source_plan import SourcePlan
+from tirebench.wire.device import Device
 
 
 def four(wheels: tuple[int | None, ...] = (0, 1, 2, 3)) -> ReaderPlan:

@@ -19,19 +19,19 @@ from tests.bench.test_bridges import TURN
 from tests.bench.test_journal import DOCUMENTS, TURNS
 from tests.bench.test_recording import READS
 from tirebench.cli import program
-from tirebench.conditions import Conditions, Measured
-from tirebench.decoder import SerialDecoder
-from tirebench.device import Device
-from tirebench.document import line_document, turn_document, wheel_document
-from tirebench.emulator import write_script
+from tirebench.emulator.emulator import write_script
+from tirebench.emulator.faults import Faults
 from tirebench.errors import RecordingError
-from tirebench.faults import Faults
+from tirebench.estimator.wheels import Told, Wheels
 from tirebench.links import Read
-from tirebench.recorder import Recorder
-from tirebench.recording import Recording
-from tirebench.recording_header import RecordingHeader
-from tirebench.timeline import Samples
-from tirebench.wheels import Told, Wheels
+from tirebench.protocols.decoder import SerialDecoder
+from tirebench.recording.document import line_document, turn_document, wheel_document
+from tirebench.recording.header import RecordingHeader
+from tirebench.recording.recorder import Recorder
+from tirebench.recording.recording import Recording
+from tirebench.wire.conditions import Conditions, Measured
+from tirebench.wire.device import Device
+from tirebench.wire.timeline import Samples
 
 PERIOD = 100_000
 """Of the samples, [ns]."""
@@ -191,7 +191,7 @@ def _former(path: Path) -> None:
     """Write a recording of the former version, without its end."""
     from mcap.writer import Writer
 
-    from tirebench.conditions import conditions_document
+    from tirebench.wire.conditions import conditions_document
 
     header = RecordingHeader({})
     with path.open("wb") as file:
@@ -218,7 +218,7 @@ def test_what_is_no_recording_cannot_be_repaired(tmp_path: Path) -> None:
 
 
 def test_the_json_of_a_killed_run_is_repaired(tmp_path: Path) -> None:
-    from tirebench.journal import Journal
+    from tirebench.recording.journal import Journal
 
     journal = Journal(tmp_path / "r.json")
     journal.add(TURNS)

@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tirebench.errors import LinkError
+from tirebench.live.board import SIZE
 from tirebench.live.exchange import LEAST, SAMPLES, Exchange
 from tirebench.live.kept import CONTEXT
-from tirebench.page.board import SIZE
-from tirebench.rings import _CONTROL, ByteQueue, Cell, _stride, memory
+from tirebench.live.rings import _CONTROL, ByteQueue, Cell, _stride, memory
 
 ROOM = 256
 

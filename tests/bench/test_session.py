@@ -8,15 +8,15 @@ import pytest
 from tests.bench.campaigns import tiny_runs
 from tests.bench.clocks import Clock
 from tests.bench.in_process import InProcess
-from tirebench.chain import Outputs, Turn
-from tirebench.conditions import Condition, Conditions
 from tirebench.deadline import Deadline
-from tirebench.device import Device
-from tirebench.emulator import write_script
-from tirebench.faults import Faults
+from tirebench.emulator.emulator import write_script
+from tirebench.emulator.faults import Faults
+from tirebench.estimator.chain import Outputs, Turn
+from tirebench.estimator.session import Limits, Session
 from tirebench.links import Read
-from tirebench.replay import ReplayChain
-from tirebench.session import Limits, Session
+from tirebench.recording.replay import ReplayChain
+from tirebench.wire.conditions import Condition, Conditions
+from tirebench.wire.device import Device
 from tirelib.arrays import FloatArray
 
 
@@ -64,7 +64,12 @@ class Scripted:
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     """Time that passes only where nothing comes any more."""
     made = Clock()
-    for module in ("tirebench.session", "tirebench.replay", "tirebench.deadline", __name__):
+    for module in (
+        "tirebench.estimator.session",
+        "tirebench.recording.replay",
+        "tirebench.deadline",
+        __name__,
+    ):
         monkeypatch.setattr(f"{module}.time", made)
     return made
 

@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.synthetic import frames as cuts
-from tirebench.can_batch import CanBatch, joined, same_kind
-from tirebench.frames import Frames
-from tirebench.line_counts import LineCounts
 from tirebench.protocols.slcan import LONGEST, SlcanDecoder, encode
+from tirebench.wire.can_batch import CanBatch, joined, same_kind
+from tirebench.wire.frames import Frames
+from tirebench.wire.line_counts import LineCounts
 
 
 class Keep:

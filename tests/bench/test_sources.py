@@ -23,41 +23,41 @@ from tests.bench.in_process import FakeSource
 from tests.bench.programs import PATIENCE
 from tests.bench.servers import Server
 from tests.bench.test_processes import Turns
-from tirebench.can_batch import same_kind
-from tirebench.chain import Turn
 from tirebench.cli import program
 from tirebench.cli.given import given_replayed
-from tirebench.conditions import Conditions
 from tirebench.deadline import Deadline
-from tirebench.decoder import SerialDecoder
-from tirebench.device import Device
-from tirebench.document import turn_document
-from tirebench.emulator import write_script
+from tirebench.emulator.emulator import write_script
+from tirebench.emulator.faults import Faults
+from tirebench.emulator.sources import recording_pieces
 from tirebench.errors import DeviceError, UnpluggedError
-from tirebench.estimation import Estimation, News
-from tirebench.faults import Faults
-from tirebench.fmu_archive import read_fmu
-from tirebench.fmu_model import FmuFile, FmuModel
-from tirebench.frames import encode, strain_frames
+from tirebench.estimator.chain import Turn
+from tirebench.estimator.estimation import Estimation, News
+from tirebench.estimator.fmu_archive import read_fmu
+from tirebench.estimator.fmu_model import FmuFile, FmuModel
+from tirebench.estimator.session import Session
+from tirebench.estimator.wheels import Line, Wheels
 from tirebench.links import Read
 from tirebench.links.opening import PortPlan
-from tirebench.links.replay import ReplayLink
 from tirebench.live.chain import LiveChain, LivePlan
 from tirebench.live.exchange import Exchange
 from tirebench.live.kept import CONTEXT
 from tirebench.live.ports import GatheredLink, PortState
 from tirebench.live.reader import ReaderPlan
 from tirebench.protocols import SLCAN, slcan
+from tirebench.protocols.decoder import SerialDecoder
 from tirebench.protocols.plan import ProtocolPlan
 from tirebench.protocols.user_map import parse_map
-from tirebench.rate_check import JUDGED
-from tirebench.recording import Recorder, Recording, RecordingHeader
-from tirebench.replay import ReplayChain
-from tirebench.session import Session
-from tirebench.setup_file import check_sources, read_setup
-from tirebench.source_plan import SourcePlan, wheels_of
-from tirebench.sources import recording_pieces
-from tirebench.wheels import Line, Wheels
+from tirebench.recording.document import turn_document
+from tirebench.recording.link import ReplayLink
+from tirebench.recording.recording import Recorder, Recording, RecordingHeader
+from tirebench.recording.replay import ReplayChain
+from tirebench.setup.setup_file import check_sources, read_setup
+from tirebench.setup.source_plan import SourcePlan, wheels_of
+from tirebench.wire.can_batch import same_kind
+from tirebench.wire.conditions import Conditions
+from tirebench.wire.device import Device
+from tirebench.wire.frames import encode, strain_frames
+from tirebench.wire.rate_check import JUDGED
 
 VEHICLE = """
 format = "tirebench-map/1"

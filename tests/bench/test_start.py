@@ -14,17 +14,17 @@ from tests.bench.conftest import Spawn
 from tests.bench.programs import A_TURN, PATIENCE
 from tests.bench.test_sources import serial, vehicle
 from tests.bench.test_user_line import THREE, plan_of
-from tirebench.chain import Outputs
 from tirebench.cli import program
 from tirebench.cli.given import Given, conditions_of, port_of_file, say_missing
-from tirebench.conditions import TELLABLE, UNITS, Condition, Conditions
 from tirebench.deadline import Deadline
 from tirebench.errors import DeviceError, LinkError, UnpluggedError
-from tirebench.estimation import Estimation
+from tirebench.estimator.chain import Outputs
+from tirebench.estimator.estimation import Estimation
 from tirebench.links import BACK, Link, Read
 from tirebench.links.opening import PortPlan
 from tirebench.links.reconnecting import ReconnectingLink
-from tirebench.source_plan import SourcePlan, wheels_of
+from tirebench.setup.source_plan import SourcePlan, wheels_of
+from tirebench.wire.conditions import TELLABLE, UNITS, Condition, Conditions
 from tirelib.arrays import FloatArray
 from tirelib.held import HELD
 from tirelib.units import to_si

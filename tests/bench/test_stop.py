@@ -12,14 +12,14 @@ import pytest
 from tests.bench.conftest import TOY, Spawn, build_toy
 from tests.bench.programs import wait_until
 from tirebench.cli.stop import STOPS, on_stop, start_in_order
-from tirebench.conditions import Conditions
-from tirebench.fmu_archive import read_fmu
+from tirebench.estimator.fmu_archive import read_fmu
+from tirebench.estimator.trust import remember
 from tirebench.links.opening import PortPlan
 from tirebench.live.chain import LiveChain, LivePlan
 from tirebench.live.reader import ReaderPlan
-from tirebench.recording_header import RecordingHeader
-from tirebench.source_plan import SourcePlan
-from tirebench.trust import remember
+from tirebench.recording.header import RecordingHeader
+from tirebench.setup.source_plan import SourcePlan
+from tirebench.wire.conditions import Conditions
 
 BEGIN = "        super().__init__(**kwargs)\n"
 WAITS = "        while os.environ.get('TOY_WAITS'):\n            time.sleep(0.01)\n"

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tirebench.decoder import SerialDecoder
-from tirebench.device import Device
-from tirebench.frames import FrameFlag, Frames, encode, select, strain_frames
-from tirebench.rate_check import JUDGED, LONGEST_WAIT
-from tirebench.timeline import LATE, Samples, Timeline
+from tirebench.protocols.decoder import SerialDecoder
+from tirebench.wire.device import Device
+from tirebench.wire.frames import FrameFlag, Frames, encode, select, strain_frames
+from tirebench.wire.rate_check import JUDGED, LONGEST_WAIT
+from tirebench.wire.timeline import LATE, Samples, Timeline
 
 PERIOD = 1000  # ticks: 10 kHz
 

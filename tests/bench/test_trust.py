@@ -10,8 +10,8 @@ from click.testing import CliRunner
 from tests.bench.conftest import build_toy
 from tirebench.cli import program
 from tirebench.errors import FmuError
-from tirebench.fmu_archive import read_fmu
-from tirebench.trust import check_trust, how_known, trust_list
+from tirebench.estimator.fmu_archive import read_fmu
+from tirebench.estimator.trust import check_trust, how_known, trust_list
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.fmu.build import build_fmu

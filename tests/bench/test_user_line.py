@@ -14,20 +14,20 @@ from pythonfmu import FmuBuilder
 from tests.bench.campaigns import tiny_runs
 from tests.bench.conftest import TOY
 from tirebench.cli.given import Given
-from tirebench.conditions import Conditions, Measured
-from tirebench.device import Device
-from tirebench.document import turn_document
 from tirebench.errors import DeviceError
-from tirebench.estimation import Estimation
-from tirebench.fmu_archive import read_fmu
-from tirebench.fmu_model import FmuFile, FmuModel
-from tirebench.frames import Frames
+from tirebench.estimator.estimation import Estimation
+from tirebench.estimator.fmu_archive import read_fmu
+from tirebench.estimator.fmu_model import FmuFile, FmuModel
 from tirebench.links.opening import PortPlan
 from tirebench.protocols import LINE_MAP
 from tirebench.protocols.plan import ProtocolPlan
 from tirebench.protocols.user_map import parse_map
-from tirebench.source_plan import SourcePlan, protocol_of, wheels_of
-from tirebench.timeline import Samples
+from tirebench.recording.document import turn_document
+from tirebench.setup.source_plan import SourcePlan, protocol_of, wheels_of
+from tirebench.wire.conditions import Conditions, Measured
+from tirebench.wire.device import Device
+from tirebench.wire.frames import Frames
+from tirebench.wire.timeline import Samples
 
 BINARY = """
 format = "tirebench-map/1"

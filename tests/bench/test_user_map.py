@@ -6,17 +6,17 @@ import cantools
 import numpy as np
 import pytest
 
-from tirebench.can_batch import joined, pack, same_kind
-from tirebench.chain import Outputs
-from tirebench.conditions import Condition, Conditions, Held, Measured
 from tirebench.errors import DeviceError
-from tirebench.estimation import Estimation
+from tirebench.estimator.chain import Outputs
+from tirebench.estimator.estimation import Estimation
+from tirebench.estimator.wheels import Wheels
 from tirebench.protocols import CAN
 from tirebench.protocols.plan import ProtocolPlan
 from tirebench.protocols.user_can import UserCan
 from tirebench.protocols.user_map import parse_map, read_map
-from tirebench.timeline import Timeline
-from tirebench.wheels import Wheels
+from tirebench.wire.can_batch import joined, pack, same_kind
+from tirebench.wire.conditions import Condition, Conditions, Held, Measured
+from tirebench.wire.timeline import Timeline
 from tirelib.arrays import FloatArray
 
 DBC = """VERSION ""

@@ -7,18 +7,18 @@ from hypothesis import strategies as st
 
 from tests.bench.campaigns import tiny_runs
 from tests.bench.in_process import InProcess
-from tirebench.chain import Outputs
 from tirebench.cli.live import counters
-from tirebench.clock import ClockFit
-from tirebench.conditions import Condition, Conditions
-from tirebench.device import Device
-from tirebench.document import document, wheel_document
-from tirebench.emulator import Player, record_tape
-from tirebench.faults import Faults, parse_faults
+from tirebench.emulator.emulator import Player, record_tape
+from tirebench.emulator.faults import Faults, parse_faults
+from tirebench.estimator.chain import Outputs
+from tirebench.estimator.wheels import MOST, Wheels
 from tirebench.protocols import SERIAL
 from tirebench.protocols.plan import ProtocolPlan
-from tirebench.transmitter import transmitter
-from tirebench.wheels import MOST, Wheels
+from tirebench.protocols.transmitter import transmitter
+from tirebench.recording.document import document, wheel_document
+from tirebench.wire.clock import ClockFit
+from tirebench.wire.conditions import Condition, Conditions
+from tirebench.wire.device import Device
 from tirelib.arrays import FloatArray
 
 

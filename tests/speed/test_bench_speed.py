@@ -9,14 +9,14 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from tests.bench.campaigns import quantised
 from tests.bench.in_process import InProcess
 from tests.synthetic import cornering_runs, synthetic_run, write
-from tirebench.conditions import Conditions
-from tirebench.decoder import SerialDecoder
-from tirebench.device import Device
-from tirebench.emulator import write_script
-from tirebench.faults import Faults
-from tirebench.fmu_archive import read_fmu
-from tirebench.fmu_model import FmuFile, FmuModel
-from tirebench.timeline import Timeline
+from tirebench.emulator.emulator import write_script
+from tirebench.emulator.faults import Faults
+from tirebench.estimator.fmu_archive import read_fmu
+from tirebench.estimator.fmu_model import FmuFile, FmuModel
+from tirebench.protocols.decoder import SerialDecoder
+from tirebench.wire.conditions import Conditions
+from tirebench.wire.device import Device
+from tirebench.wire.timeline import Timeline
 from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.estimators.train import train

@@ -15,19 +15,19 @@ import pytest
 
 from tests.bench.campaigns import quantised
 from tests.synthetic import cornering_runs, synthetic_run, write
-from tirebench.conditions import Conditions
 from tirebench.deadline import Deadline
-from tirebench.estimation import News
-from tirebench.fmu_archive import read_fmu
-from tirebench.fmu_model import FmuFile
+from tirebench.estimator.estimation import News
+from tirebench.estimator.fmu_archive import read_fmu
+from tirebench.estimator.fmu_model import FmuFile
 from tirebench.links import BACK, LOST
 from tirebench.links.opening import PortPlan
 from tirebench.live.chain import LiveChain, LivePlan
 from tirebench.live.reader import ReaderPlan
 from tirebench.protocols import SERIAL, SLCAN
 from tirebench.protocols.plan import ProtocolPlan
-from tirebench.recording import Recording, RecordingHeader
-from tirebench.source_plan import SourcePlan
+from tirebench.recording.recording import Recording, RecordingHeader
+from tirebench.setup.source_plan import SourcePlan
+from tirebench.wire.conditions import Conditions
 from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.estimators.train import train

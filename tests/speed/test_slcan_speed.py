@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from tests.bench.test_slcan import Keep
-from tirebench.can_batch import same_kind
 from tirebench.deadline import Deadline
-from tirebench.line_counts import LineCounts
 from tirebench.links.pseudo import PseudoTerminal
 from tirebench.links.slcan_port import SlcanLink
 from tirebench.protocols.slcan import SlcanDecoder, encode
 from tirebench.protocols.wheel_can import WheelCan
+from tirebench.wire.can_batch import same_kind
+from tirebench.wire.line_counts import LineCounts
 
 pytestmark = pytest.mark.speed
 FRAMES = 3000

@@ -1,6 +1,5 @@
 """What several verbs share: progress bars, JSON files, tables."""
 
-import json
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,11 +9,11 @@ from tempfile import TemporaryFile
 from typing import Any
 
 import click
-import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from tirelib.errors import FormatError
+from tirelib.documents import plain as plain
+from tirelib.documents import write_json as write_json
 
 
 class NewPath(click.Path):
@@ -78,40 +77,6 @@ def progress_bar(what: str, total: int | None = None) -> Iterator[Callable[[str]
             bar.update(task, advance=1, label=label)
 
         yield advance
-
-
-def write_json(path: Path, document: dict[str, Any]) -> None:
-    """Write JSON; NaN and infinity become null.
-
-    Raises
-    ------
-    FormatError
-        If the file cannot be written.
-    """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(plain(document), indent=1, allow_nan=False) + "\n")
-    except OSError as error:
-        raise FormatError(
-            f"{path}: cannot be written ({error.strerror}); choose another file"
-        ) from None
-
-
-def plain(value: Any) -> Any:
-    """Return numbers and containers as JSON knows them."""
-    if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, np.ndarray):
-        return [plain(item) for item in value.tolist()]
-    if isinstance(value, np.bool_):
-        return bool(value)
-    if isinstance(value, np.integer):
-        return int(value)
-    if isinstance(value, float | np.floating):
-        return float(value) if np.isfinite(value) else None
-    return value
 
 
 def low_pass_options(function: Callable[..., None]) -> Callable[..., None]:

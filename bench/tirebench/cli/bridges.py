@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 import click
 
-from tirebench.chain import Turn
+from tirebench.estimator.chain import Turn
 from tirebench.links.opening import PortPlan
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -40,15 +40,15 @@ class Bridges:
     Parameters
     ----------
     estimates_out : str or None
-        A port for CAN frames; see `tirebench.bridges.CanSender`.
+        A port for CAN frames; see `tirebench.live.bridges.CanSender`.
     plotjuggler : str or None
-        ``PORT`` or ``HOST:PORT``; see `tirebench.bridges.UdpSender`.
+        ``PORT`` or ``HOST:PORT``; see `tirebench.live.bridges.UdpSender`.
     plan : PortPlan
         Whose bit rates hold for `estimates_out` too.
     """
 
     def __init__(self, estimates_out: str | None, plotjuggler: str | None, plan: PortPlan) -> None:
-        from tirebench.bridges import CanSender, Sender, UdpSender, udp_target
+        from tirebench.live.bridges import CanSender, Sender, UdpSender, udp_target
 
         self._senders: list[Sender] = []
         if plotjuggler is not None:

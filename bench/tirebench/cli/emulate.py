@@ -9,15 +9,15 @@ from pathlib import Path
 import click
 
 from tirebench.cli.stop import on_stop
-from tirebench.conditions import Conditions, conditions_document
 from tirebench.deadline import Deadline
-from tirebench.device import Device, read_device
-from tirebench.emulator import Player, Script, Tally, Tape, play, record_tape
+from tirebench.emulator.emulator import Player, Script, Tally, Tape, play, record_tape
+from tirebench.emulator.faults import Faults, parse_faults
+from tirebench.emulator.sinks import BusSink, TerminalSink, open_bus
 from tirebench.errors import UnpluggedError
-from tirebench.faults import Faults, parse_faults
 from tirebench.protocols import CAN, SERIAL, SLCAN
-from tirebench.sinks import BusSink, TerminalSink, open_bus
-from tirebench.transmitter import FORMATS, transmitter
+from tirebench.protocols.transmitter import FORMATS, transmitter
+from tirebench.wire.conditions import Conditions, conditions_document
+from tirebench.wire.device import Device, read_device
 from tirelib.campaign import read_campaign
 from tirelib.cli.common import FILE, NEW_FILE, write_json
 
@@ -275,7 +275,7 @@ def _campaign(
     faults: Faults,
     wheels: tuple[int, ...],
 ) -> tuple[Tape, list[int]]:
-    from tirebench.sources import campaign_runs
+    from tirebench.emulator.sources import campaign_runs
 
     campaign = read_campaign(folder)
     device.check_layout(campaign.header.gage_lateral, str(folder))
@@ -293,8 +293,8 @@ def _manoeuvre(
     seed: int,
     truth_file: Path | None,
 ) -> Tape:
-    from tirebench.manoeuvre import read_manoeuvre
-    from tirebench.sources import manoeuvre_tape, write_truth
+    from tirebench.emulator.manoeuvre import read_manoeuvre
+    from tirebench.emulator.sources import manoeuvre_tape, write_truth
 
     manoeuvre = read_manoeuvre(file)
     device.check_layout(manoeuvre.tire.lateral.tolist(), str(file))
@@ -307,16 +307,16 @@ def _manoeuvre(
 
 def _check(recording: Path, source: int | None) -> None:
     """Refuse a recording before anybody waits for it."""
-    from tirebench.recording import Recording
-    from tirebench.sources import chosen_source
+    from tirebench.emulator.sources import chosen_source
+    from tirebench.recording.recording import Recording
 
     with closing(Recording(recording)) as opened:
         chosen_source(opened, source)
 
 
 def _recorded(recording: Path | None, source: int | None) -> Iterator[Script]:
-    from tirebench.recording import Recording
-    from tirebench.sources import recording_pieces
+    from tirebench.emulator.sources import recording_pieces
+    from tirebench.recording.recording import Recording
 
     if recording is None:
         return

@@ -10,17 +10,17 @@ import tomli_w
 from tirebench.cli.given import recorded_sources
 from tirebench.cli.options import devices_of
 from tirebench.errors import RecordingError
-from tirebench.export import (
+from tirebench.recording.export import (
     CAN_LOGS,
     left_out,
     write_campaign_of,
     write_can_log,
     write_table,
 )
-from tirebench.export_results import write_mdf, write_results
-from tirebench.new_file import keep_recordings, whole
-from tirebench.recording import Recording
-from tirebench.segments import Segment, segments
+from tirebench.recording.export_results import write_mdf, write_results
+from tirebench.recording.new_file import keep_recordings, whole
+from tirebench.recording.recording import Recording
+from tirebench.recording.segments import Segment, segments
 from tirelib.campaign import CampaignHeader
 from tirelib.campaign.header import parse_header
 from tirelib.cli.common import FILE, NEW_FILE, NewPath, write_json

@@ -11,16 +11,16 @@ import click
 from tirebench.cli.given import given_replayed, live_sources
 from tirebench.cli.options import PORTS, devices_of, port_options
 from tirebench.deadline import Deadline
-from tirebench.device import Device
 from tirebench.errors import DeviceError
+from tirebench.estimator.standing import STILL, Level, Levels, standing_mean
+from tirebench.estimator.wheels import Wheels
 from tirebench.links import Link
 from tirebench.links.opening import PortPlan
-from tirebench.links.replay import ReplayLink
 from tirebench.protocols.plan import ProtocolPlan
-from tirebench.source_plan import SourcePlan, wheels_of
-from tirebench.standing import STILL, Level, Levels, standing_mean
-from tirebench.timeline import Samples
-from tirebench.wheels import Wheels
+from tirebench.recording.link import ReplayLink
+from tirebench.setup.source_plan import SourcePlan, wheels_of
+from tirebench.wire.device import Device
+from tirebench.wire.timeline import Samples
 from tirelib.arrays import FloatArray
 from tirelib.cli.common import NEW_FILE, output
 

@@ -9,16 +9,16 @@ from pathlib import Path
 from rich.console import Console
 
 from tirebench.cli.options import devices_of_text, wheel_of
-from tirebench.conditions import QUANTITIES, Conditions, read_conditions
 from tirebench.deadline import Deadline
-from tirebench.device import Device
 from tirebench.errors import DeviceError, RecordingError
 from tirebench.links.opening import PortPlan
-from tirebench.links.replay import ReplayLink
 from tirebench.protocols.plan import ProtocolPlan
-from tirebench.recording_header import RecordingHeader
-from tirebench.setup_file import check_sources, read_setup
-from tirebench.source_plan import SourcePlan, protocol_of
+from tirebench.recording.header import RecordingHeader
+from tirebench.recording.link import ReplayLink
+from tirebench.setup.setup_file import check_sources, read_setup
+from tirebench.setup.source_plan import SourcePlan, protocol_of
+from tirebench.wire.conditions import QUANTITIES, Conditions, read_conditions
+from tirebench.wire.device import Device
 from tirelib.estimators.calibration import Calibration
 from tirelib.units import to_si
 

@@ -12,11 +12,11 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from tirebench.chain import Turn, quantity_valid
-from tirebench.document import QUANTITIES, flags, line_document
-from tirebench.estimation import News
-from tirebench.session import Source
-from tirebench.wheels import Wheels
+from tirebench.estimator.chain import Turn, quantity_valid
+from tirebench.estimator.estimation import News
+from tirebench.estimator.session import Source
+from tirebench.estimator.wheels import Wheels
+from tirebench.recording.document import QUANTITIES, flags, line_document
 
 ROWS = 20
 """Turns that the live table holds."""

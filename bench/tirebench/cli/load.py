@@ -4,10 +4,10 @@ from pathlib import Path
 
 import click
 
-from tirebench.bus_load import HIGHEST_MEAN, LoadPlan, highest_rate, load_of, suggestions
 from tirebench.errors import DeviceError
+from tirebench.protocols.bus_load import HIGHEST_MEAN, LoadPlan, highest_rate, load_of, suggestions
 from tirebench.protocols.layouts import RAW12, RAW12C, RAW16
-from tirebench.transmitter import SERIAL
+from tirebench.protocols.transmitter import SERIAL
 from tirelib.cli.common import NEW_FILE, write_json
 
 _EXAMPLE = f"""\b

@@ -6,10 +6,10 @@ from typing import Any, TypeVar
 
 import click
 
-from tirebench.device import Device, read_device
 from tirebench.errors import DeviceError
 from tirebench.links.opening import BITRATE
 from tirebench.protocols.plan import RATE
+from tirebench.wire.device import Device, read_device
 from tirelib.cli.common import FILE
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -133,7 +133,7 @@ def devices_of_text(text: str, where: str) -> dict[int | None, Device]:
     DeviceError
         With the faults of a file, or if a wheel has no number.
     """
-    from tirebench.device import parse_device
+    from tirebench.wire.device import parse_device
 
     devices: dict[int | None, Device] = {}
     for part in text.split("\0") if text else []:

@@ -10,14 +10,14 @@ from typing import Any, TypeVar
 import click
 from rich.console import Console
 
-from tirebench.conditions import Conditions
-from tirebench.device import Device
-from tirebench.estimation import News
+from tirebench.estimator.estimation import News
+from tirebench.estimator.session import Source
 from tirebench.page.alarms import RULES, Rule
 from tirebench.page.commands import Switch
 from tirebench.page.feed import About
 from tirebench.page.live import LOOPBACK, LivePage, PageChoice
-from tirebench.session import Source
+from tirebench.wire.conditions import Conditions
+from tirebench.wire.device import Device
 from tirelib.cli.common import FILE
 from tirelib.estimators.calibration import Calibration
 

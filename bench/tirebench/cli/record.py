@@ -10,19 +10,19 @@ from tirebench.cli.live import counters
 from tirebench.cli.options import PORTS, devices_of, port_options
 from tirebench.cli.recording import at_start, recording_options
 from tirebench.cli.stop import start_in_order
-from tirebench.conditions import read_conditions
-from tirebench.document import line_document, wheel_document
-from tirebench.estimation import News
+from tirebench.estimator.estimation import News
+from tirebench.estimator.session import Limits, Session
 from tirebench.links.opening import PortPlan
 from tirebench.live.chain import LiveChain, LivePlan
 from tirebench.live.priority import ordinary, realtime
 from tirebench.live.reader import ReaderPlan
 from tirebench.live.recording_state import RecordingRule
-from tirebench.new_file import keep_recordings
 from tirebench.protocols.plan import ProtocolPlan
-from tirebench.recording_header import RecordingHeader
-from tirebench.session import Limits, Session
-from tirebench.source_plan import SourcePlan
+from tirebench.recording.document import line_document, wheel_document
+from tirebench.recording.header import RecordingHeader
+from tirebench.recording.new_file import keep_recordings
+from tirebench.setup.source_plan import SourcePlan
+from tirebench.wire.conditions import read_conditions
 from tirelib.cli.common import FILE, NEW_FILE, write_json
 
 _EXAMPLE = f"""\b

@@ -6,9 +6,9 @@ from pathlib import Path
 import click
 
 from tirebench.errors import RecordingError
-from tirebench.journal import HEAD, completed
-from tirebench.new_file import whole
-from tirebench.repair import repair as repaired
+from tirebench.recording.journal import HEAD, completed
+from tirebench.recording.new_file import whole
+from tirebench.recording.repair import repair as repaired
 from tirelib.cli.common import FILE, NEW_FILE, plain
 
 _EXAMPLE = """\b

@@ -8,7 +8,6 @@ import click
 import numpy as np
 from rich.console import Console
 
-from tirebench.chain import Estimator
 from tirebench.cli.bridges import Bridges, bridge_options
 from tirebench.cli.given import (
     Given,
@@ -24,26 +23,27 @@ from tirebench.cli.options import PORTS, devices_of, port_options
 from tirebench.cli.page import Shown, page_choice, page_options
 from tirebench.cli.recording import at_start, recording_options
 from tirebench.cli.stop import start_in_order
-from tirebench.document import document
-from tirebench.estimation import Estimation, News
-from tirebench.fmu_archive import read_fmu
-from tirebench.fmu_model import FmuFile, FmuModel
-from tirebench.journal import Journal
+from tirebench.estimator.chain import Estimator
+from tirebench.estimator.estimation import Estimation, News
+from tirebench.estimator.fmu_archive import read_fmu
+from tirebench.estimator.fmu_model import FmuFile, FmuModel
+from tirebench.estimator.session import Limits, Outcome, Session, Source
+from tirebench.estimator.trust import check_trust
 from tirebench.links.opening import PortPlan
-from tirebench.links.replay import ReplayLink
 from tirebench.live.chain import LiveChain, LivePlan
 from tirebench.live.priority import ordinary, realtime
 from tirebench.live.reader import ReaderPlan
 from tirebench.live.recording_state import RecordingRule
-from tirebench.new_file import keep_recordings
 from tirebench.page.alarms import RULES, read_alarms
 from tirebench.page.recording_switch import RecordingSwitch
 from tirebench.protocols.plan import ProtocolPlan
-from tirebench.recording_header import RecordingHeader, parts_of
-from tirebench.replay import ReplayChain
-from tirebench.session import Limits, Outcome, Session, Source
-from tirebench.source_plan import SourcePlan, wheels_of
-from tirebench.trust import check_trust
+from tirebench.recording.document import document
+from tirebench.recording.header import RecordingHeader, parts_of
+from tirebench.recording.journal import Journal
+from tirebench.recording.link import ReplayLink
+from tirebench.recording.new_file import keep_recordings
+from tirebench.recording.replay import ReplayChain
+from tirebench.setup.source_plan import SourcePlan, wheels_of
 from tirelib.cli.common import FILE, NEW_FILE, output
 
 _EXAMPLE = f"""\b

@@ -5,8 +5,8 @@ from pathlib import Path
 import click
 
 from tirebench.cli.gathering import PORTS, asked, gathering_options
-from tirebench.gage_setup import apparent_strain, shunted, write_device
 from tirebench.links.opening import PortPlan
+from tirebench.wire.gage_setup import apparent_strain, shunted, write_device
 from tirelib.cli.common import FILE
 
 _EXAMPLE = f"""\b

@@ -6,8 +6,8 @@ import click
 import numpy as np
 
 from tirebench.cli.gathering import PORTS, asked, gathering_options
-from tirebench.gage_setup import write_device, zeroed
 from tirebench.links.opening import PortPlan
+from tirebench.wire.gage_setup import write_device, zeroed
 from tirelib.cli.common import FILE
 
 _EXAMPLE = f"""\b

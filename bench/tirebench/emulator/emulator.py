@@ -13,15 +13,22 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from tirebench.can_batch import CanBatch
-from tirebench.conditions import Condition, Conditions, RunMark
-from tirebench.device import Device
+from tirebench.emulator.faults import Faults
 from tirebench.errors import DeviceError
-from tirebench.faults import Faults
-from tirebench.frames import GAGES, SAMPLES, TICK
 from tirebench.protocols import CAN, SERIAL, SLCAN
 from tirebench.protocols.slcan import encode as slcan_lines
-from tirebench.transmitter import ANNOUNCED, WHOLE, Record, Sent, SerialTransmitter, Transmitter
+from tirebench.protocols.transmitter import (
+    ANNOUNCED,
+    WHOLE,
+    Record,
+    Sent,
+    SerialTransmitter,
+    Transmitter,
+)
+from tirebench.wire.can_batch import CanBatch
+from tirebench.wire.conditions import Condition, Conditions, RunMark
+from tirebench.wire.device import Device
+from tirebench.wire.frames import GAGES, SAMPLES, TICK
 from tirelib.campaign import CampaignHeader, Run
 from tirelib.campaign.conditions import changes_of, conditions_of
 from tirelib.campaign.header import header_document

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from tirebench.errors import DeviceError
-from tirebench.frames import GAGES, HIGHEST, LOWEST, Int16Array
+from tirebench.wire.frames import GAGES, HIGHEST, LOWEST, Int16Array
 from tirelib.arrays import FloatArray
 
 RATES = {"flips": 0.01, "cuts": 0.01, "inserts": 0.01, "lost": 0.01, "dup": 0.01, "nan": 0.001}

@@ -6,18 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from tirebench.can_batch import unpack
-from tirebench.conditions import Conditions, RunMark, condition
-from tirebench.device import Device
-from tirebench.emulator import Script, Tape
+from tirebench.emulator.emulator import Script, Tape
+from tirebench.emulator.faults import Faults
+from tirebench.emulator.manoeuvre import Manoeuvre, Motion, Rig, nodes, waveform
 from tirebench.errors import DeviceError
-from tirebench.faults import Faults
-from tirebench.frames import GAGES, TICK
-from tirebench.manoeuvre import Manoeuvre, Motion, Rig, nodes, waveform
 from tirebench.protocols import CAN
-from tirebench.recording import Recording
-from tirebench.recording_header import encoding_of
-from tirebench.transmitter import Record
+from tirebench.protocols.transmitter import Record
+from tirebench.recording.header import encoding_of
+from tirebench.recording.recording import Recording
+from tirebench.wire.can_batch import unpack
+from tirebench.wire.conditions import Conditions, RunMark, condition
+from tirebench.wire.device import Device
+from tirebench.wire.frames import GAGES, TICK
 from tirelib.campaign import Campaign, Run
 
 CONDITION_STEP = 0.01

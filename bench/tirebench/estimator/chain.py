@@ -12,9 +12,9 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from tirebench.conditions import ROUNDING, UNKNOWN, Condition, Conditions, Held
-from tirebench.timeline import Samples
-from tirebench.wheels import Block
+from tirebench.estimator.wheels import Block
+from tirebench.wire.conditions import ROUNDING, UNKNOWN, Condition, Conditions, Held
+from tirebench.wire.timeline import Samples
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.flags import TurnFlag
 
@@ -46,7 +46,7 @@ class Turn:
     run : int
         Of the campaign, where a sidecar says; else 0.
     segment : int
-        Stretch of the line's samples, see `tirebench.timeline`.
+        Stretch of the line's samples, see `tirebench.wire.timeline`.
     t, ready : float, [s]
         Middle of the contact, and when its last sample was taken: on the run's clock where a
         sidecar gives it, else since the first sample. `t` is NaN if the estimator does not say.

@@ -4,12 +4,12 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from tirebench.chain import RESTARTED, Chain, Estimator, Jump, Place, Turn
-from tirebench.conditions import Conditions
-from tirebench.page.laps import Laps
-from tirebench.standing import Level, Levels
-from tirebench.timeline import Samples
-from tirebench.wheels import Block
+from tirebench.estimator.chain import RESTARTED, Chain, Estimator, Jump, Place, Turn
+from tirebench.estimator.laps import Laps
+from tirebench.estimator.standing import Level, Levels
+from tirebench.estimator.wheels import Block
+from tirebench.wire.conditions import Conditions
+from tirebench.wire.timeline import Samples
 
 LATE = 1.0
 """When samples have waited longer than this, laps are left out, [s]."""
@@ -23,7 +23,7 @@ class News:
     ----------
     turns : list of Turn
     laps : list of bytes
-        See `tirebench.page.laps.Lap.pack`.
+        See `tirebench.estimator.laps.Lap.pack`.
     messages : list of str
         What an estimator said.
     alarms : list of str

@@ -22,11 +22,11 @@ from fmpy.fmi2 import (
     fmi2ValueReference,
 )
 
-from tirebench.chain import Outputs
-from tirebench.conditions import Condition
 from tirebench.errors import FmuError
-from tirebench.fmu_archive import FmuArchive
-from tirebench.frames import GAGES, MOST_GAGES
+from tirebench.estimator.chain import Outputs
+from tirebench.estimator.fmu_archive import FmuArchive
+from tirebench.wire.conditions import Condition
+from tirebench.wire.frames import GAGES, MOST_GAGES
 from tirelib.arrays import FloatArray
 from tirelib.errors import FormatError
 from tirelib.held import HELD
@@ -80,7 +80,7 @@ class FmuFile:
     Parameters
     ----------
     archive : FmuArchive
-        Checked by `tirebench.fmu_archive.read_fmu`.
+        Checked by `tirebench.estimator.fmu_archive.read_fmu`.
 
     Attributes
     ----------

@@ -2,16 +2,16 @@
 
 from collections.abc import Sequence
 
-from tirebench.chain import Turn
-from tirebench.wheels import Wheels
+from tirebench.estimator.chain import Turn
+from tirebench.estimator.wheels import Wheels
 
 
 class JudgedTurns:
     """Turns between the estimators and whoever shows or records them.
 
     A turn of a wheel whose rate is not judged yet is kept back. These are few, because a judgement
-    takes `tirebench.rate_check.JUDGED` frames, and `LONGEST_WAIT` at most. A turn of a wheel whose
-    clock contradicts its rate is dropped.
+    takes `tirebench.wire.rate_check.JUDGED` frames, and `LONGEST_WAIT` at most. A turn of a wheel
+    whose clock contradicts its rate is dropped.
     """
 
     def __init__(self) -> None:

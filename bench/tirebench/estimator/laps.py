@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from tirebench.frames import GAGES
+from tirebench.wire.frames import GAGES
 
 if TYPE_CHECKING:
-    from tirebench.chain import Turn
-    from tirebench.timeline import Samples
+    from tirebench.estimator.chain import Turn
+    from tirebench.wire.timeline import Samples
 
 Float32Array = npt.NDArray[np.float32]
 

@@ -6,11 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from tirebench.chain import Turn
 from tirebench.deadline import Deadline
 from tirebench.errors import BenchError
-from tirebench.estimation import News
-from tirebench.wheels import Wheels
+from tirebench.estimator.chain import Turn
+from tirebench.estimator.estimation import News
+from tirebench.estimator.wheels import Wheels
 
 WAIT = 0.2
 """The longest wait for news before the screen is looked after, [s]."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirebench.errors import DeviceError
-from tirebench.timeline import Samples
+from tirebench.wire.timeline import Samples
 from tirelib.arrays import FloatArray
 
 EVERY = 0.25

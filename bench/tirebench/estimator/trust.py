@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from tirebench.errors import FmuError
-from tirebench.fmu_archive import FmuArchive, read_fmu
+from tirebench.estimator.fmu_archive import FmuArchive, read_fmu
 from tirebench.owned import prefix
 from tirelib.errors import TirelibError
 

@@ -8,16 +8,16 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from tirebench.clock import ClockFit
-from tirebench.conditions import Measured
-from tirebench.device import Device
 from tirebench.errors import DeviceError
-from tirebench.frames import Frames, select
-from tirebench.line_counts import LineCounts
 from tirebench.protocols import Decoder
 from tirebench.protocols.layouts import Health
-from tirebench.rate_check import PERIOD
-from tirebench.timeline import Samples, Timeline, TimelineCounts
+from tirebench.wire.clock import ClockFit
+from tirebench.wire.conditions import Measured
+from tirebench.wire.device import Device
+from tirebench.wire.frames import Frames, select
+from tirebench.wire.line_counts import LineCounts
+from tirebench.wire.rate_check import PERIOD
+from tirebench.wire.timeline import Samples, Timeline, TimelineCounts
 
 MOST = 4
 """Wheels that are looked at unless others are named; each costs an estimator."""

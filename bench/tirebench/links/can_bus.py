@@ -8,11 +8,11 @@ from typing import Any
 import can
 import numpy as np
 
-from tirebench.can_batch import FD_SIZE, CanBatch, pack
 from tirebench.deadline import Deadline
 from tirebench.errors import DeviceError, LinkError, UnpluggedError
 from tirebench.links import Read
 from tirebench.protocols import CAN
+from tirebench.wire.can_batch import FD_SIZE, CanBatch, pack
 
 LARGEST_BATCH = 4096
 """Frames that one read brings at most."""

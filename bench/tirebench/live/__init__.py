@@ -7,6 +7,6 @@
            --samples-->    estimator of wheel 2
     estimators --turns-->  run (screen, page, JSON), which starts all of them, and starts them again
 
-Only data passes between them: what the bytes mean and what is made of them are `tirebench.wheels`
-and `tirebench.estimation`, in a replay as well.
+Only data passes between them: what the bytes mean and what is made of them are
+`tirebench.estimator.wheels` and `tirebench.estimator.estimation`, in a replay as well.
 """

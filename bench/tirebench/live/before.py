@@ -64,7 +64,7 @@ class Before:
         return bool(found), lost
 
     def write(self, recorder: Any, most: int) -> None:
-        """Write what is kept, until so many bytes wait for the disk; see `tirebench.recorder`.
+        """Write what is kept, until so many bytes wait for the disk.
 
         Raises
         ------

@@ -11,7 +11,7 @@ import zlib
 from dataclasses import dataclass
 from multiprocessing.shared_memory import SharedMemory
 
-from tirebench.rings import memory
+from tirebench.live.rings import memory
 
 _HEAD = struct.Struct("<Q")
 _SLOT = struct.Struct("<QII")

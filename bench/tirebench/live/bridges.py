@@ -10,13 +10,13 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-from tirebench.chain import Turn
-from tirebench.document import turn_document
 from tirebench.errors import DeviceError, LinkError
+from tirebench.estimator.chain import Turn
 from tirebench.links.opening import PortPlan
+from tirebench.live.estimate_frames import estimate_frames
 from tirebench.protocols import CAN, SERIAL
-from tirebench.protocols.estimates import estimate_frames
 from tirebench.protocols.slcan import encode
+from tirebench.recording.document import turn_document
 
 
 class Sender(Protocol):

@@ -11,14 +11,14 @@ from types import TracebackType
 from typing import Any
 
 from tirebench import errors
-from tirebench.chain import Jump
-from tirebench.conditions import Conditions
 from tirebench.deadline import Deadline
-from tirebench.document import turn_document
 from tirebench.errors import LinkTimeoutError, RecordingError
-from tirebench.estimation import News, skipped
-from tirebench.fmu_model import FmuFile
-from tirebench.judged import JudgedTurns
+from tirebench.estimator.chain import Jump
+from tirebench.estimator.estimation import News, skipped
+from tirebench.estimator.fmu_model import FmuFile
+from tirebench.estimator.judged import JudgedTurns
+from tirebench.estimator.wheels import MOST, Wheels
+from tirebench.live.board import SIZE
 from tirebench.live.estimators import Estimators
 from tirebench.live.exchange import FINISH, STOP, Exchange, woken
 from tirebench.live.kept import CONTEXT, Kept
@@ -27,10 +27,10 @@ from tirebench.live.reader import LineState, ReaderPlan, load, read_port
 from tirebench.live.recorder import record
 from tirebench.live.recording_state import Order, RecorderState, RecordingRule
 from tirebench.live.run_alarms import TOO_BUSY, RunAlarms
-from tirebench.page.board import SIZE
-from tirebench.recorder import jump_event
-from tirebench.recording_header import RecordingHeader, part_path
-from tirebench.wheels import MOST, Wheels
+from tirebench.recording.document import turn_document
+from tirebench.recording.header import RecordingHeader, part_path
+from tirebench.recording.recorder import jump_event
+from tirebench.wire.conditions import Conditions
 
 START = 300.0
 """Processes that are not ready after so long do not start, even on a busy machine, [s]."""
@@ -74,7 +74,7 @@ class LivePlan:
 
 
 class LiveChain:
-    """The processes of a run; see `tirebench.session.Source`. A context manager that ends them.
+    """The processes of a run, a `session.Source`. A context manager that ends them.
 
     Parameters
     ----------

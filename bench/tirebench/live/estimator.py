@@ -4,15 +4,15 @@ import pickle
 import time
 from dataclasses import dataclass, field
 
-from tirebench.chain import RESTARTED, SKIPPED, Jump, Place
-from tirebench.conditions import Conditions
 from tirebench.errors import FmuError
-from tirebench.estimation import News, WheelEstimation
-from tirebench.fmu_model import FmuFile, FmuModel
+from tirebench.estimator.chain import RESTARTED, SKIPPED, Jump, Place
+from tirebench.estimator.estimation import News, WheelEstimation
+from tirebench.estimator.fmu_model import FmuFile, FmuModel
+from tirebench.estimator.wheels import Block
 from tirebench.live.exchange import FINISH, Address, Exchange, woken
 from tirebench.live.kept import orphaned, settled
-from tirebench.timeline import Samples
-from tirebench.wheels import Block
+from tirebench.wire.conditions import Conditions
+from tirebench.wire.timeline import Samples
 
 BACKLOG = 3.0
 """When samples have waited longer than this, whole turns are skipped, [s]."""

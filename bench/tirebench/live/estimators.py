@@ -6,14 +6,14 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from tirebench.chain import Jump
-from tirebench.conditions import Conditions
 from tirebench.errors import FmuError
-from tirebench.estimation import News
-from tirebench.fmu_model import FmuFile
+from tirebench.estimator.chain import Jump
+from tirebench.estimator.estimation import News
+from tirebench.estimator.fmu_model import FmuFile
 from tirebench.live.estimator import EstimatorPlan, Report, estimate
 from tirebench.live.exchange import Exchange
 from tirebench.live.kept import Kept
+from tirebench.wire.conditions import Conditions
 
 TRIES = 3
 """So often the FMU may crash when it is loaded."""

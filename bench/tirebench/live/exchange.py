@@ -5,8 +5,8 @@ from multiprocessing.context import SpawnContext
 from multiprocessing.shared_memory import SharedMemory
 from typing import Any
 
+from tirebench.live.rings import ByteQueue, Cell, free, memory, too_little
 from tirebench.owned import name_semaphores, sweep
-from tirebench.rings import ByteQueue, Cell, free, memory, too_little
 
 RAW = 8 * 2**20
 """Reads that wait for the recorder, [bytes]: a minute of one wheel, 9 s of four on CAN FD."""

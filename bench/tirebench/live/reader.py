@@ -10,15 +10,15 @@ from dataclasses import dataclass, field
 
 from tirebench.deadline import Deadline
 from tirebench.errors import BenchError, UnpluggedError
+from tirebench.estimator.wheels import MOST, Wheels
 from tirebench.links import BACK, DECODED, LOST, PASSED, RESUMED, Link, Read
 from tirebench.links.reconnecting import ReconnectingLink
 from tirebench.live.exchange import RAW, STOP, Address, Exchange
 from tirebench.live.kept import orphaned, settled
 from tirebench.live.ports import GatheredLink
 from tirebench.live.priority import own_share
-from tirebench.rings import ByteQueue
-from tirebench.source_plan import SourcePlan, wheels_of
-from tirebench.wheels import MOST, Wheels
+from tirebench.live.rings import ByteQueue
+from tirebench.setup.source_plan import SourcePlan, wheels_of
 
 WAIT = 0.1
 """The longest wait for bytes before it is looked whether the run goes on, [s]."""
@@ -43,7 +43,7 @@ class ReaderPlan:
     patience : float, [s]
         How long a port may be away.
     wheels : tuple of int
-        See `tirebench.wheels.Wheels`.
+        See `tirebench.estimator.wheels.Wheels`.
     recorded : bool
         Whether there is a recorder.
     every_turn : bool

@@ -13,8 +13,6 @@ from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
-from tirebench.conditions import Conditions
-from tirebench.document import line_document, wheel_document
 from tirebench.errors import RecordingError
 from tirebench.links import LOST
 from tirebench.live.before import Before
@@ -23,8 +21,10 @@ from tirebench.live.kept import orphaned, settled
 from tirebench.live.recording_state import Order, RecorderState, RecordingRule, triggers
 from tirebench.live.space import Space
 from tirebench.live.unfinished import Unfinished
-from tirebench.recorder import Recorder
-from tirebench.recording_header import RecordingHeader, numbered, part_path
+from tirebench.recording.document import line_document, wheel_document
+from tirebench.recording.header import RecordingHeader, numbered, part_path
+from tirebench.recording.recorder import Recorder
+from tirebench.wire.conditions import Conditions
 
 LOOK = 0.05
 """Time between two looks into the queue, [s]; until then the bytes are safe in shared memory."""

@@ -7,7 +7,7 @@ from tirebench.live.ports import PortState
 from tirebench.live.priority import RIGHT
 from tirebench.live.reader import LineState
 from tirebench.live.recording_state import RecorderState
-from tirebench.recorder import alarm_event
+from tirebench.recording.recorder import alarm_event
 
 RECORDED_AGAIN = "recording goes on"
 TOO_BUSY = (

@@ -4,7 +4,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from tirebench.errors import RecordingError
-from tirebench.recorder import finish
+from tirebench.recording.recorder import finish
 
 
 class Unfinished:

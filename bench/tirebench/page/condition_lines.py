@@ -3,8 +3,8 @@
 import math
 from typing import Any
 
-from tirebench.conditions import UNITS, Conditions
-from tirebench.wheels import Wheel
+from tirebench.estimator.wheels import Wheel
+from tirebench.wire.conditions import UNITS, Conditions
 from tirelib.held import HELD
 from tirelib.units import from_si
 

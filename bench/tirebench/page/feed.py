@@ -14,17 +14,17 @@ from typing import Any
 
 import numpy as np
 
-from tirebench.chain import Turn
-from tirebench.conditions import UNKNOWN, Conditions
-from tirebench.document import turn_document, wheel_document
-from tirebench.estimation import News
+from tirebench.estimator.chain import Turn
+from tirebench.estimator.estimation import News
+from tirebench.estimator.session import Source
+from tirebench.estimator.wheels import Wheels
+from tirebench.live.board import Board
 from tirebench.page.alarms import RULES, Alarm, Alarms, Rule, event_of
-from tirebench.page.board import Board
 from tirebench.page.condition_lines import in_use
 from tirebench.page.quantities import UNITS
 from tirebench.page.recent import Recent
-from tirebench.session import Source
-from tirebench.wheels import Wheels
+from tirebench.recording.document import turn_document, wheel_document
+from tirebench.wire.conditions import UNKNOWN, Conditions
 
 STATE_EVERY = 0.25
 """Time between two states, [s]."""

@@ -11,11 +11,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from tirebench.device import Device
 from tirebench.errors import DeviceError
-from tirebench.gage_setup import apparent_strain, shunted, write_device, zeroed
-from tirebench.session import Source
-from tirebench.standing import EVERY, Level, standing_mean
+from tirebench.estimator.session import Source
+from tirebench.estimator.standing import EVERY, Level, standing_mean
+from tirebench.wire.device import Device
+from tirebench.wire.gage_setup import apparent_strain, shunted, write_device, zeroed
 from tirelib.arrays import FloatArray
 
 SPAN = 3.0

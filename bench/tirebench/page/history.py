@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tirebench.page.board import Board, RingReader
-from tirebench.page.laps import BAND_LAPS, Float32Array, Lap, band
+from tirebench.estimator.laps import BAND_LAPS, Float32Array, Lap, band
+from tirebench.live.board import Board, RingReader
 from tirebench.page.quantities import NORMAL_95, UNITS
 
 REMEMBERED = 6000

@@ -11,16 +11,16 @@ from types import TracebackType
 from typing import Any
 
 from tirebench.errors import DeviceError
-from tirebench.estimation import News
+from tirebench.estimator.estimation import News
+from tirebench.estimator.session import Source
+from tirebench.live.board import Board
 from tirebench.live.kept import CONTEXT, Kept
 from tirebench.page.address import listener, new_token
 from tirebench.page.alarms import RULES, Rule
-from tirebench.page.board import Board
 from tirebench.page.commands import CommandDesk, Switch
 from tirebench.page.feed import About, Feed
 from tirebench.page.gages import GageSetup
 from tirebench.page.guard import bracketed
-from tirebench.session import Source
 
 LOOPBACK = "127.0.0.1"
 HANGS = 60.0

@@ -4,7 +4,7 @@ import time
 from collections import deque
 from typing import Any, NamedTuple
 
-from tirebench.wheels import Wheel
+from tirebench.estimator.wheels import Wheel
 
 SPAN = 5.0
 """What is said of the last seconds is said of so many, [s]."""

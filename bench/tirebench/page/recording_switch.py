@@ -7,8 +7,8 @@ from typing import Any
 from tirebench.deadline import Deadline
 from tirebench.errors import RecordingError
 from tirebench.live.chain import LiveChain
-from tirebench.recorder import alarm_event
-from tirebench.recording_header import numbered
+from tirebench.recording.header import numbered
+from tirebench.recording.recorder import alarm_event
 
 PATIENCE = 5.0
 """How long the recorder may take to answer, [s]."""

@@ -25,8 +25,8 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from tirebench.errors import DeviceError
+from tirebench.live.board import Board
 from tirebench.live.priority import below
-from tirebench.page.board import Board
 from tirebench.page.commands import parse_command
 from tirebench.page.connections import Connection as HttpConnection
 from tirebench.page.guard import LONGEST_BODY, Guard

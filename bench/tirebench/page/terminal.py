@@ -16,8 +16,8 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
+from tirebench.live.board import Board
 from tirebench.live.priority import below
-from tirebench.page.board import Board
 from tirebench.page.history import History, WheelHistory
 from tirebench.page.quantities import DIGITS, NORMAL_95, UNITS
 

@@ -1,11 +1,11 @@
-"""What bytes mean: decoders from what a link brings to `tirebench.frames.Frames`.
+"""What bytes mean: decoders from what a link brings to `tirebench.wire.frames.Frames`.
 
 ======================  =====================================================================
 encoding                bytes of a read
 ======================  =====================================================================
 ``serial-v1``           a serial line with SERIAL v1 frames
 ``slcan``               text lines of a CAN adapter on a serial line
-``can``                 packed CAN frames, see `tirebench.can_batch`
+``can``                 packed CAN frames, see `tirebench.wire.can_batch`
 ``line-map``            a serial line of another make, as a map says
 ======================  =====================================================================
 
@@ -15,9 +15,9 @@ What comes out depends on the bytes and their arrival alone, never on how they a
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol
 
-from tirebench.conditions import Measured
-from tirebench.frames import Frames
-from tirebench.line_counts import LineCounts
+from tirebench.wire.conditions import Measured
+from tirebench.wire.frames import Frames
+from tirebench.wire.line_counts import LineCounts
 
 if TYPE_CHECKING:
     from tirebench.protocols.layouts import Health

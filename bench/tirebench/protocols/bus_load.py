@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from tirebench.can_batch import FD_LENGTHS, CanBatch
 from tirebench.errors import DeviceError
-from tirebench.frames import GAGES, SAMPLES, frame_size
 from tirebench.protocols.layouts import LAYOUTS, RAW12, RAW12C, RAW16
-from tirebench.transmitter import SERIAL, CanTransmitter, Record
+from tirebench.protocols.transmitter import SERIAL, CanTransmitter, Record
+from tirebench.wire.can_batch import FD_LENGTHS, CanBatch
+from tirebench.wire.frames import GAGES, SAMPLES, frame_size
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 
 HIGHEST_MEAN = 0.8

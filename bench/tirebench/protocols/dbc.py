@@ -1,4 +1,4 @@
-"""The published CAN database, made from one table of signals: ``bench/tirebench/tirelib.dbc``.
+"""The published CAN database, ``tirelib.dbc`` beside this file, made from one table of signals.
 
 RAW16 and RAW12C share an identifier (they never share a bus), and a database holds an identifier
 once. So there are two files: `tirelib.dbc` for CAN FD and ``tirelib_classic.dbc`` for classic CAN.
@@ -7,7 +7,6 @@ once. So there are two files: `tirelib.dbc` for CAN FD and ``tirelib_classic.dbc
 from collections.abc import Iterator
 from pathlib import Path
 
-from tirebench.frames import GAGES
 from tirebench.protocols.estimates import ESTIMATE_BASES, estimate_signals
 from tirebench.protocols.layouts import (
     BATTERY_STEP,
@@ -21,9 +20,10 @@ from tirebench.protocols.layouts import (
     SYNC,
 )
 from tirebench.protocols.signals import Signal
+from tirebench.wire.frames import GAGES
 
 PUBLISHED_WHEELS = 4
-FOLDER = Path(__file__).parent.parent
+FOLDER = Path(__file__).parent
 FILES = {
     FOLDER / "tirelib.dbc": (RAW16, RAW12, HEALTH),
     FOLDER / "tirelib_classic.dbc": (RAW12C, SYNC, HEALTH),

@@ -13,7 +13,8 @@ from types import MappingProxyType
 import numpy as np
 from cobs import cobs
 
-from tirebench.frames import (
+from tirebench.protocols.layouts import Health
+from tirebench.wire.frames import (
     GAGES,
     HEADER,
     LONGEST_ON_WIRE,
@@ -22,8 +23,7 @@ from tirebench.frames import (
     frame_size,
     layout,
 )
-from tirebench.line_counts import LineCounts
-from tirebench.protocols.layouts import Health
+from tirebench.wire.line_counts import LineCounts
 
 _COUNT_AT = 10  # offset of `n` in the header
 _PERIOD_AT = 8  # offset of `period` in the header

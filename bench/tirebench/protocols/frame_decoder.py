@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from tirebench.can_batch import CanBatch, unpack
-from tirebench.conditions import Measured
-from tirebench.frames import Frames
-from tirebench.line_counts import LineCounts
 from tirebench.protocols.layouts import Health
+from tirebench.wire.can_batch import CanBatch, unpack
+from tirebench.wire.conditions import Measured
+from tirebench.wire.frames import Frames
+from tirebench.wire.line_counts import LineCounts
 
 
 class FrameDecoder(Protocol):

@@ -23,8 +23,8 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from tirebench.can_batch import ByteArray
-from tirebench.frames import GAGES, HIGHEST, Int16Array, IntArray
+from tirebench.wire.can_batch import ByteArray
+from tirebench.wire.frames import GAGES, HIGHEST, Int16Array, IntArray
 
 WHEELS = 8
 """Wheels that the identifiers can tell apart."""
@@ -105,7 +105,7 @@ class Health:
     pressure : float, [Pa]
         Gauge; 0.02 bar a step.
     flags : int
-        As in SERIAL v1: bits of `tirebench.frames.FrameFlag`.
+        As in SERIAL v1: bits of `tirebench.wire.frames.FrameFlag`.
     """
 
     radio_lost: int = 0

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tirebench.conditions import TELLABLE, Measured
-from tirebench.device import Device
-from tirebench.frames import GAGES
 from tirebench.protocols.map_messages import Message
 from tirebench.protocols.signals import Signal
+from tirebench.wire.conditions import TELLABLE, Measured
+from tirebench.wire.device import Device
+from tirebench.wire.frames import GAGES
 from tirelib.units import to_si
 
 
@@ -49,7 +49,7 @@ class Quantity:
     Attributes
     ----------
     name : str
-        One of `tirebench.conditions.TELLABLE`.
+        One of `tirebench.wire.conditions.TELLABLE`.
     message : Message
     signal : Signal
     unit : str

@@ -4,12 +4,10 @@ import hashlib
 from dataclasses import dataclass
 from typing import Any
 
-from tirebench.decoder import SerialDecoder
-from tirebench.device import Device
 from tirebench.errors import RecordingError
-from tirebench.line_counts import LineCounts
 from tirebench.protocols import ENCODINGS, LINE_MAP, SERIAL, SLCAN, Decoder
 from tirebench.protocols.dbc import FILES, database
+from tirebench.protocols.decoder import SerialDecoder
 from tirebench.protocols.frame_decoder import FrameDecoder, PackedDecoder
 from tirebench.protocols.map_parts import UserMap
 from tirebench.protocols.slcan import SlcanDecoder
@@ -17,7 +15,9 @@ from tirebench.protocols.user_can import UserCan
 from tirebench.protocols.user_line import UserLine
 from tirebench.protocols.user_map import parse_map
 from tirebench.protocols.wheel_can import WheelCan
-from tirebench.rate_check import PERIOD
+from tirebench.wire.device import Device
+from tirebench.wire.line_counts import LineCounts
+from tirebench.wire.rate_check import PERIOD
 
 RATE = 10_000.0
 """Default sample rate, [Hz]; frames of SERIAL v1 say their own."""

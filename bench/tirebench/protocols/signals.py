@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirebench.can_batch import ByteArray
-from tirebench.frames import IntArray
+from tirebench.wire.can_batch import ByteArray
+from tirebench.wire.frames import IntArray
 from tirelib.arrays import FloatArray
 
 _ANYBODY = "Vector__XXX"

@@ -8,10 +8,10 @@ dropped and counted, because nobody can say when they were taken.
 
 import numpy as np
 
-from tirebench.can_batch import ByteArray
-from tirebench.frames import Frames, Int16Array, IntArray
-from tirebench.line_counts import LineCounts
 from tirebench.protocols.layouts import COUNTER_RANGE, decode_raw12c, decode_sync
+from tirebench.wire.can_batch import ByteArray
+from tirebench.wire.frames import Frames, Int16Array, IntArray
+from tirebench.wire.line_counts import LineCounts
 from tirelib.arrays import BoolArray
 
 LONGEST_WAIT = 2**16

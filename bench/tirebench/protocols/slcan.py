@@ -13,12 +13,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from tirebench.can_batch import FD_LENGTHS, CanBatch, joined
-from tirebench.conditions import Measured
-from tirebench.frames import Frames
-from tirebench.line_counts import LineCounts
 from tirebench.protocols.frame_decoder import FrameDecoder
 from tirebench.protocols.layouts import Health
+from tirebench.wire.can_batch import FD_LENGTHS, CanBatch, joined
+from tirebench.wire.conditions import Measured
+from tirebench.wire.frames import Frames
+from tirebench.wire.line_counts import LineCounts
 
 LONGEST = 1 + 8 + 1 + 128 + 4
 """Characters of the longest line."""
@@ -152,7 +152,7 @@ def encode(batch: CanBatch) -> list[bytes]:
 
     Examples
     --------
-    >>> from tirebench.can_batch import same_kind
+    >>> from tirebench.wire.can_batch import same_kind
     >>> encode(same_kind(0x123, np.array([[0, 255]], np.uint8), fd=False))
     [b't123200FF\r']
     """

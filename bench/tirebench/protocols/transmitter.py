@@ -11,9 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from tirebench.can_batch import CanBatch, joined, same_kind
 from tirebench.errors import DeviceError
-from tirebench.frames import GAGES, SAMPLES, FrameFlag, Int16Array, IntArray, encode, strain_frames
 from tirebench.protocols.layouts import (
     HEALTH,
     LAYOUTS,
@@ -29,6 +27,16 @@ from tirebench.protocols.layouts import (
     encode_raw12c,
     encode_raw16,
     encode_sync,
+)
+from tirebench.wire.can_batch import CanBatch, joined, same_kind
+from tirebench.wire.frames import (
+    GAGES,
+    SAMPLES,
+    FrameFlag,
+    Int16Array,
+    IntArray,
+    encode,
+    strain_frames,
 )
 from tirelib.arrays import FloatArray
 

@@ -6,16 +6,16 @@ from types import MappingProxyType
 
 import numpy as np
 
-from tirebench.can_batch import CanBatch
-from tirebench.conditions import Measured
-from tirebench.frames import CountArray, Frames
-from tirebench.line_counts import LineCounts
 from tirebench.protocols.layouts import Health
 from tirebench.protocols.map_messages import Message
 from tirebench.protocols.map_parts import UserMap, WheelMap
 from tirebench.protocols.signals import Signal, raw_values, real_values
 from tirebench.protocols.wheel_can import period_of
 from tirebench.protocols.widening import Widener
+from tirebench.wire.can_batch import CanBatch
+from tirebench.wire.conditions import Measured
+from tirebench.wire.frames import CountArray, Frames
+from tirebench.wire.line_counts import LineCounts
 from tirelib.arrays import BoolArray
 
 

@@ -11,16 +11,16 @@ from typing import Protocol
 
 import numpy as np
 
-from tirebench.can_batch import CanBatch
-from tirebench.conditions import Measured
-from tirebench.frames import Frames
-from tirebench.line_counts import LineCounts
 from tirebench.protocols.checksums import CHECKSUMS
 from tirebench.protocols.layouts import Health
 from tirebench.protocols.map_messages import LONGEST_FRAME, BinaryCut, Message, TextCut
 from tirebench.protocols.map_parts import UserMap
 from tirebench.protocols.signals import Signal
 from tirebench.protocols.user_can import UserCan
+from tirebench.wire.can_batch import CanBatch
+from tirebench.wire.conditions import Measured
+from tirebench.wire.frames import Frames
+from tirebench.wire.line_counts import LineCounts
 
 Found = list[tuple[int, bytes]]
 """Number of the message, and its data."""

@@ -52,13 +52,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from tirebench.conditions import TELLABLE
-from tirebench.device import Device
 from tirebench.errors import DeviceError, cause
-from tirebench.frames import MOST_GAGES
 from tirebench.protocols.map_messages import Message, kind_of, listed, of_dbc
 from tirebench.protocols.map_parts import Quantity, UserMap, WheelMap, clashes
 from tirebench.protocols.signals import Signal
+from tirebench.wire.conditions import TELLABLE
+from tirebench.wire.device import Device
+from tirebench.wire.frames import MOST_GAGES
 from tirelib.errors import TirelibError
 from tirelib.units import to_si
 

@@ -3,14 +3,14 @@
 import numpy as np
 import numpy.typing as npt
 
-from tirebench.can_batch import CanBatch
 from tirebench.errors import DeviceError
-from tirebench.frames import TICK, FrameFlag, Frames, IntArray
-from tirebench.line_counts import LineCounts
 from tirebench.protocols import layouts
 from tirebench.protocols.layouts import HEALTH, LAYOUTS, RAW12, RAW12C, RAW16, SYNC, WHEELS, Health
 from tirebench.protocols.single_samples import SingleSamples
 from tirebench.protocols.widening import Widener
+from tirebench.wire.can_batch import CanBatch
+from tirebench.wire.frames import TICK, FrameFlag, Frames, IntArray
+from tirebench.wire.line_counts import LineCounts
 from tirelib.arrays import BoolArray
 
 _DECODE = {RAW16: layouts.decode_raw16, RAW12: layouts.decode_raw12}

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirebench.frames import IntArray
+from tirebench.wire.frames import IntArray
 from tirelib.arrays import FloatArray
 
 

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tirebench.chain import Turn, quantity_valid
-from tirebench.conditions import RunMark
-from tirebench.line_counts import LineCounts
-from tirebench.timeline import TimelineCounts
-from tirebench.wheels import Wheels
+from tirebench.estimator.chain import Turn, quantity_valid
+from tirebench.estimator.wheels import Wheels
+from tirebench.wire.conditions import RunMark
+from tirebench.wire.line_counts import LineCounts
+from tirebench.wire.timeline import TimelineCounts
 from tirelib.estimators.edge import EDGE_UNIT, FORMAT, VARIED
 from tirelib.flags import flag_names
 

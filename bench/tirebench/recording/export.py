@@ -12,15 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from tirebench.can_batch import CanBatch, unpack
-from tirebench.conditions import QUANTITIES, ROUNDING, Condition, Conditions, RunMark
 from tirebench.errors import RecordingError
-from tirebench.line_counts import LineCounts
 from tirebench.protocols import CAN, SLCAN
 from tirebench.protocols.frame_decoder import FrameDecoder
 from tirebench.protocols.slcan import SlcanDecoder
-from tirebench.recording import Recording
-from tirebench.segments import Segment
+from tirebench.recording.recording import Recording
+from tirebench.recording.segments import Segment
+from tirebench.wire.can_batch import CanBatch, unpack
+from tirebench.wire.conditions import QUANTITIES, ROUNDING, Condition, Conditions, RunMark
+from tirebench.wire.line_counts import LineCounts
 from tirelib.arrays import FloatArray
 from tirelib.campaign import CampaignHeader, Run, RunPlan, write_campaign
 from tirelib.held import HELD

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from tirebench.document import QUANTITIES
 from tirebench.errors import RecordingError
-from tirebench.new_file import whole
-from tirebench.recording import Recording
-from tirebench.recording_topics import ESTIMATE, EVENTS
-from tirebench.segments import Segment
+from tirebench.recording.document import QUANTITIES
+from tirebench.recording.new_file import whole
+from tirebench.recording.recording import Recording
+from tirebench.recording.segments import Segment
+from tirebench.recording.topics import ESTIMATE, EVENTS
 from tirelib.units import from_si
 
 Rows = dict[str, list[Any]]
@@ -113,7 +113,7 @@ def write_mdf(path: Path, found: Sequence[Segment], known: Any, out: Path) -> in
     """
     from asammdf import MDF, Signal
 
-    from tirebench.conditions import QUANTITIES as CONDITIONS
+    from tirebench.wire.conditions import QUANTITIES as CONDITIONS
 
     count = 0
     with MDF(version="4.10") as mdf:

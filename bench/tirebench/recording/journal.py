@@ -1,8 +1,8 @@
 """The estimates of a run as a document that grows while the run goes on.
 
-The file begins like the document of `tirebench.document` and gets a line for each turn as it comes,
-so that what was estimated can be read whatever happens next. In the end the whole document takes
-its place in one step. A file without its end is completed by `completed`.
+The file begins like the document of `tirebench.recording.document` and gets a line for each turn as
+it comes, so that what was estimated can be read whatever happens next. In the end the whole
+document takes its place in one step. A file without its end is completed by `completed`.
 """
 
 import json
@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from tirebench.chain import Turn
-from tirebench.document import QUANTITIES, empty_summary, turn_document
 from tirebench.errors import RecordingError, cause
-from tirebench.new_file import keep_recordings
-from tirelib.cli.common import plain
+from tirebench.estimator.chain import Turn
+from tirebench.recording.document import QUANTITIES, empty_summary, turn_document
+from tirebench.recording.new_file import keep_recordings
+from tirelib.documents import plain
 from tirelib.estimators.edge import FORMAT
 
 HEAD = f'{{"format": "{FORMAT}", "axes": "iso", "turns": [\n'

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tirebench.deadline import Deadline
 from tirebench.links import Read
-from tirebench.recording import Recording
+from tirebench.recording.recording import Recording
 
 
 class ReplayLink:

@@ -9,7 +9,7 @@ from pathlib import Path
 from mcap.writer import MCAP0_MAGIC
 
 from tirebench.errors import RecordingError, cause
-from tirebench.recording_header import part_path
+from tirebench.recording.header import part_path
 
 
 def keep_recordings(file: Path | None, *recordings: Path | None) -> None:

@@ -1,4 +1,4 @@
-"""Write a recording (``tirebench-recording/2``, see `tirebench.recording`)."""
+"""Write a recording (``tirebench-recording/2``, see `tirebench.recording.recording`)."""
 
 import json
 import time
@@ -7,13 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from tirebench.chain import Jump
-from tirebench.conditions import Conditions, conditions_document
 from tirebench.errors import RecordingError
+from tirebench.estimator.chain import Jump
+from tirebench.estimator.wheels import Block
 from tirebench.links import Read
-from tirebench.mcap_log import McapLog
-from tirebench.recording_header import RecordingHeader, encoding_of
-from tirebench.recording_topics import (
+from tirebench.recording.header import RecordingHeader, encoding_of
+from tirebench.recording.mcap_log import McapLog
+from tirebench.recording.topics import (
     CONDITIONS,
     CONDITIONS_SCHEMA,
     ESTIMATE,
@@ -31,8 +31,8 @@ from tirebench.recording_topics import (
     strain_messages,
     told_message,
 )
-from tirebench.timeline import Samples
-from tirebench.wheels import Block
+from tirebench.wire.conditions import Conditions, conditions_document
+from tirebench.wire.timeline import Samples
 
 DRIFT = 500e-6
 """A wheel's clock may be so much slower than the host's: a quartz has 50 ppm, an RC clock more."""

@@ -1,7 +1,7 @@
 """Recording of a live run (``tirebench-recording/2``, MCAP): raw bytes as they came, bad ones too.
 
 Beside the bytes stands what the run made of them, so that other programs list and plot it (schemas:
-`tirebench.recording_topics`). Messages stand in chunks that are closed several times a second: what
+`tirebench.recording.topics`). Messages stand in chunks that are closed several times a second: what
 was closed can be read whatever happens next, also in a file without its end. A recorder that is
 started again goes on in the same file, where it is known to be whole.
 
@@ -32,12 +32,10 @@ from typing import Any, BinaryIO
 from mcap.exceptions import McapError
 from mcap.records import Channel, Message, Metadata
 
-from tirebench.chain import Jump, Place
-from tirebench.conditions import Conditions, parse_conditions
 from tirebench.errors import DeviceError, RecordingError
+from tirebench.estimator.chain import Jump, Place
 from tirebench.links import BACK, DECODED, LOST, PASSED, RESUMED, Read
-from tirebench.recorder import Recorder, jump_event
-from tirebench.recording_header import (
+from tirebench.recording.header import (
     FORMER,
     RecordingHeader,
     header_of,
@@ -45,8 +43,10 @@ from tirebench.recording_header import (
     moment,
     part_path,
 )
-from tirebench.recording_topics import CONDITIONS, EVENTS, RAW
-from tirebench.records import records
+from tirebench.recording.recorder import Recorder, jump_event
+from tirebench.recording.records import records
+from tirebench.recording.topics import CONDITIONS, EVENTS, RAW
+from tirebench.wire.conditions import Conditions, parse_conditions
 
 _FORMER_RAW = ("/serial", "/slcan", "/can")
 

@@ -8,8 +8,8 @@ from mcap.records import Channel, McapRecord, Message, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
 from tirebench.errors import RecordingError, cause
-from tirebench.new_file import whole
-from tirebench.records import records
+from tirebench.recording.new_file import whole
+from tirebench.recording.records import records
 
 CHUNK = 2**20
 """Of the repaired file, [bytes before compression]."""

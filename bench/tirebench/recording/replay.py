@@ -4,14 +4,14 @@ import time
 from typing import Any
 
 from tirebench.deadline import Deadline
-from tirebench.estimation import Estimation, News, skipped
-from tirebench.judged import JudgedTurns
+from tirebench.estimator.estimation import Estimation, News, skipped
+from tirebench.estimator.judged import JudgedTurns
+from tirebench.estimator.wheels import Wheels
 from tirebench.links import BACK, DECODED, PASSED, RESUMED, Link
-from tirebench.wheels import Wheels
 
 
 class ReplayChain:
-    """Reads of a link to news, one after the other; see `tirebench.session.Source`.
+    """Reads of a link to news, one after the other; see `tirebench.estimator.session.Source`.
 
     Parameters
     ----------

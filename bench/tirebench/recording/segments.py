@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tirebench.conditions import QUANTITIES, Conditions
 from tirebench.links import BACK, RESUMED
-from tirebench.recording import Recording
-from tirebench.source_plan import SourcePlan, wheels_of
-from tirebench.timeline import Samples
+from tirebench.recording.recording import Recording
+from tirebench.setup.source_plan import SourcePlan, wheels_of
+from tirebench.wire.conditions import QUANTITIES, Conditions
+from tirebench.wire.timeline import Samples
 from tirelib.arrays import BoolArray, FloatArray
 
 EVERY_WHEEL = tuple(range(256))

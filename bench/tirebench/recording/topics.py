@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import orjson
 
-from tirebench.conditions import QUANTITIES as CONDITION_UNITS
-from tirebench.conditions import Measured
-from tirebench.document import QUANTITIES
-from tirebench.frames import GAGES
-from tirebench.timeline import Samples
+from tirebench.recording.document import QUANTITIES
+from tirebench.wire.conditions import QUANTITIES as CONDITION_UNITS
+from tirebench.wire.conditions import Measured
+from tirebench.wire.frames import GAGES
+from tirebench.wire.timeline import Samples
 from tirelib.units import from_si
 
 RAW, EVENTS, CONDITIONS, LINE = "/raw/{}", "/events", "/conditions", "/line"

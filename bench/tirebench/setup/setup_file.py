@@ -24,12 +24,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from tirebench.conditions import Conditions
-from tirebench.device import read_device
 from tirebench.errors import DeviceError, cause
 from tirebench.links.opening import PortPlan
 from tirebench.protocols.map_parts import clashes
-from tirebench.source_plan import SourcePlan, protocol_of
+from tirebench.setup.source_plan import SourcePlan, protocol_of
+from tirebench.wire.conditions import Conditions
+from tirebench.wire.device import read_device
 
 FORMAT = "tirebench-setup/1"
 _KEYS: dict[str, type | tuple[type, ...]] = {

@@ -5,15 +5,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tirebench.conditions import TELLABLE
-from tirebench.device import Device
 from tirebench.errors import DeviceError
-from tirebench.frames import GAGES
+from tirebench.estimator.wheels import Line, Wheels
 from tirebench.links.opening import PortPlan
 from tirebench.protocols import LINE_MAP, SERIAL
 from tirebench.protocols.plan import ProtocolPlan
 from tirebench.protocols.user_map import read_map
-from tirebench.wheels import Line, Wheels
+from tirebench.wire.conditions import TELLABLE
+from tirebench.wire.device import Device
+from tirebench.wire.frames import GAGES
 
 
 @dataclass(frozen=True, slots=True)

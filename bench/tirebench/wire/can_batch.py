@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from tirebench.frames import IntArray
+from tirebench.wire.frames import IntArray
 from tirelib.arrays import BoolArray
 
 ByteArray = npt.NDArray[np.uint8]

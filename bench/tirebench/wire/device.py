@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from tirebench.errors import DeviceError, cause
-from tirebench.frames import (
+from tirebench.wire.frames import (
     GAGES,
     HIGHEST,
     LOWEST,

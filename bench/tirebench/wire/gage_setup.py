@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tirebench.device import FORMAT, GAIN_RANGE, Device
 from tirebench.errors import DeviceError, cause
-from tirebench.frames import HIGHEST, LOWEST
+from tirebench.wire.device import FORMAT, GAIN_RANGE, Device
+from tirebench.wire.frames import HIGHEST, LOWEST
 from tirelib.arrays import FloatArray
 
 

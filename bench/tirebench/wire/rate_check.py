@@ -6,7 +6,7 @@ can be wrong, and every time and slip ratio with it, so the clock that the frame
 
 from array import array
 
-from tirebench.frames import TICK, Frames
+from tirebench.wire.frames import TICK, Frames
 
 BASELINE = 32
 """Each frame's time is compared with that of the frame so many before it: a clock that tells whole

@@ -12,9 +12,9 @@ from itertools import zip_longest
 import numpy as np
 import numpy.typing as npt
 
-from tirebench.device import Device
-from tirebench.frames import GAGES, TICK, FrameFlag, Frames, select
-from tirebench.rate_check import PERIOD, RateCheck
+from tirebench.wire.device import Device
+from tirebench.wire.frames import GAGES, TICK, FrameFlag, Frames, select
+from tirebench.wire.rate_check import PERIOD, RateCheck
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 
 LONGEST_FILL = 1.0

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.synthetic import synthetic_run
-from tirebench.device import Device
-from tirebench.emulator import record_tape
-from tirebench.faults import Faults
+from tirebench.emulator.emulator import record_tape
+from tirebench.emulator.faults import Faults
+from tirebench.wire.device import Device
 from tirelib.campaign import conditions_of
 from tirelib.campaign.conditions import changes_of
 from tirelib.held import HELD

@@ -1,0 +1,1 @@
+"""Samples to estimates: the wheels of a run, the FMU that estimates, and the laps of its turns."""

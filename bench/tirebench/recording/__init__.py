@@ -1,0 +1,1 @@
+"""Recordings of a line: written first, read again, repaired, replayed and exported."""

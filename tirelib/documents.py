@@ -1,0 +1,43 @@
+"""Results as JSON documents."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tirelib.errors import FormatError
+
+
+def write_json(path: Path, document: dict[str, Any]) -> None:
+    """Write JSON; NaN and infinity become null.
+
+    Raises
+    ------
+    FormatError
+        If the file cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(plain(document), indent=1, allow_nan=False) + "\n")
+    except OSError as error:
+        raise FormatError(
+            f"{path}: cannot be written ({error.strerror}); choose another file"
+        ) from None
+
+
+def plain(value: Any) -> Any:
+    """Return numbers and containers as JSON knows them."""
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return [plain(item) for item in value.tolist()]
+    if isinstance(value, np.bool_):
+        return bool(value)
+    if isinstance(value, np.integer):
+        return int(value)
+    if isinstance(value, float | np.floating):
+        return float(value) if np.isfinite(value) else None
+    return value
