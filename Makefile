@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
 .PHONY: all demo test lint docs bench figures fem proof hidden next-test cosim cosim-all bench-demo faults endurance soak \
-	clean
+	package clean
 
 all: $(STAMP)
 
@@ -82,6 +82,10 @@ soak: $(STAMP)
 # A million damaged frames on a serial line: none may pass, few good ones may be lost.
 faults: $(STAMP)
 	$(BIN)/python build/bench_faults.py
+
+# The wheel in an empty environment and an empty folder: every verb of the core, then the bench's extra.
+package: $(STAMP)
+	$(BIN)/python build/package.py
 
 clean:
 	rm -rf build/out .pytest_cache .mypy_cache .ruff_cache

@@ -5,6 +5,7 @@ from importlib import import_module
 from keyword import iskeyword
 
 import click
+from click.shell_completion import CompletionItem
 
 from tirelib import __version__
 from tirelib.errors import TirelibError
@@ -70,6 +71,12 @@ class Verbs(click.Group):
         """Write the list of verbs."""
         with formatter.section("Commands"):
             formatter.write_dl(list(VERBS.items()))
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Return the verbs that begin so, and the options of the program."""
+        verbs = [(verb, said) for verb, said in VERBS.items() if verb.startswith(incomplete)]
+        options = click.Command.shell_complete(self, ctx, incomplete)
+        return [*(CompletionItem(verb, help=said) for verb, said in verbs), *options]
 
 
 @click.group(cls=Verbs, epilog=_EXAMPLE)

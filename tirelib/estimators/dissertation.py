@@ -9,11 +9,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-import statsmodels.api as sm
-from sklearn.model_selection import LeaveOneGroupOut
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.errors import CalibrationError
+from tirelib.estimators.folds import held_out_folds
+from tirelib.estimators.least_squares import least_squares
 from tirelib.features.extract import Features
 from tirelib.features.table import rate_slope
 
@@ -250,15 +250,19 @@ def _fit(
                 f"regressor {column} is {values.mean():.4g} in every run; "
                 "a regression needs variation"
             )
-    design = sm.add_constant(x, has_constant="add")
-    result = sm.OLS(y, design).fit()
+    design = np.column_stack((np.ones(y.size), x))
+    result = least_squares(design, y)
     held_out = np.empty_like(y)
-    for train, test in LeaveOneGroupOut().split(x, y, groups):
-        held_out[test] = design[test] @ sm.OLS(y[train], design[train]).fit().params
+    for test in held_out_folds(groups):
+        held_out[test] = design[test] @ (np.linalg.pinv(design[~test]) @ y[~test])
     terms = tuple(
         TermStatistics(term, float(b), float(e), float(p))
         for term, b, e, p in zip(
-            ["constant", *columns], result.params, result.bse, result.pvalues, strict=True
+            ["constant", *columns],
+            result.coefficients,
+            result.std_errors,
+            result.p_values,
+            strict=True,
         )
     )
     return Regression(
@@ -267,11 +271,11 @@ def _fit(
         quantity=quantity,
         unit=unit,
         terms=terms,
-        r2=float(result.rsquared),
-        rmse=float(np.sqrt(np.mean(result.resid**2))),
+        r2=result.r2,
+        rmse=float(np.sqrt(np.mean((y - result.fitted) ** 2))),
         cross_validated=float(np.sqrt(np.mean((y - held_out) ** 2))),
         measured=y,
-        fitted=np.asarray(result.fittedvalues, dtype=np.float64),
+        fitted=result.fitted,
         regressor=x[:, 0],
         rows=use,
     )

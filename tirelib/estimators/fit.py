@@ -10,13 +10,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from sklearn.model_selection import GroupKFold, LeaveOneGroupOut
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.errors import CalibrationError
 from tirelib.estimators.basis import Powers
 from tirelib.estimators.border import Border
 from tirelib.estimators.ends import FAR, End, growth, left_out, near
+from tirelib.estimators.folds import held_out_folds
 from tirelib.estimators.polynomial import Polynomial, Variable, design, leverage
 from tirelib.estimators.ridge import ridge_fit, ridge_fits
 
@@ -170,10 +170,8 @@ def _cross_validate(
     x: FloatArray, y: FloatArray, groups: IntArray, weights: FloatArray, centre: bool
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return held-out predictions, their variance and leverage (share of the squared noise)."""
-    count = np.unique(groups).size
-    splitter = LeaveOneGroupOut() if count <= MOST_FOLDS else GroupKFold(MOST_FOLDS)
     predicted, variance, far = np.empty_like(y), np.empty_like(y), np.empty_like(y)
-    left_out = [np.isin(np.arange(y.size), test) for _, test in splitter.split(x, y, groups)]
+    left_out = list(held_out_folds(groups, MOST_FOLDS))
     fits = ridge_fits(x, y, weights, centre, (~test for test in left_out))
     for test, fit in zip(left_out, fits, strict=True):
         predicted[test] = x[test] @ fit.coefficients

@@ -46,7 +46,6 @@ def fit_likeness(
         Measurement of each turn, and whether it counts.
     """
     from scipy.stats import f
-    from sklearn.covariance import LedoitWolf
 
     names = tuple(name for name in DRIFT if np.isfinite(values[name]).all())
     conditions = np.unique(groups).size
@@ -62,7 +61,7 @@ def fit_likeness(
         use = ~evens if name in ODD else evens
         share[use, column], held_out[:, column] = _left_out(x[:, use], values[name], groups)
     size = held_out.std(axis=0) + np.finfo(np.float64).tiny
-    between = LedoitWolf(assume_centered=True).fit(held_out / size).covariance_
+    between = shrunk_covariance(held_out / size)
     known = Likeness(variables, terms, names, share, between * np.outer(size, size), 0.0)
     single = known.rest(turns)[rows]
     single -= _mean_of(single, unit[rows])
@@ -71,6 +70,26 @@ def fit_likeness(
     limit = f.isf(FALSE_ALARM, len(names), freedom) * (conditions - 1) / freedom
     limit = max(float(limit), float(seen.max()))
     return Likeness(variables, terms, names, share, covariance, limit)
+
+
+def shrunk_covariance(errors: FloatArray) -> FloatArray:
+    """Return the covariance of few errors about zero, drawn to a multiple of the identity.
+
+    The share that is drawn makes the expected squared error least (Ledoit and Wolf, *A
+    well-conditioned estimator for large-dimensional covariance matrices*, J. Multivariate Analysis
+    88, 2004, Eq. 14).
+
+    Parameters
+    ----------
+    errors : array, shape (n, k)
+    """
+    n, k = errors.shape
+    sample = errors.T @ errors / n
+    target = np.trace(sample) / k * np.eye(k)
+    distance = float(np.sum((sample - target) ** 2))
+    scatter = float(np.sum(np.sum(errors**2, axis=1) ** 2) / n - np.sum(sample**2)) / n
+    share = min(scatter, distance) / distance if distance > 0.0 else 0.0
+    return np.asarray(share * target + (1.0 - share) * sample, dtype=np.float64)
 
 
 def _with_side(values: Mapping[str, FloatArray], varying: set[str]) -> set[str]:

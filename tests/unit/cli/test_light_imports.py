@@ -117,3 +117,21 @@ def test_a_user_s_call_and_the_command_line_agree(tmp_path: Path) -> None:
     point = json.loads((tmp_path / "s.json").read_text())
     done = tirelib.simulate(tirelib.read_tire("table-6-1"), load=4000.0)
     assert 1e3 * float(done.deflection[0]) == pytest.approx(point["deflection_mm"], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"), [("ca", ["campaign", "calibrate"]), ("", list(VERBS)), ("x", [])]
+)
+def test_the_shell_completes_verbs_without_importing_any(typed: str, offered: list[str]) -> None:
+    code = f"""
+import click
+from tirelib.cli import program
+context = click.Context(program, info_name="tirelib")
+assert [item.value for item in program.shell_complete(context, {typed!r})] == {offered!r}
+"""
+    assert not [name for name in imported(code) if name.startswith("tirelib.cli.")]
+
+
+def test_the_citation_names_this_version() -> None:
+    citation = (Path(__file__).parents[3] / "CITATION.cff").read_text()
+    assert f"\nversion: {tirelib.__version__}\n" in citation
