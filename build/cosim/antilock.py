@@ -21,17 +21,27 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
+from cosim.antilock_brakes import (
+    APART,
+    PEDAL,
+    Brakes,
+    Given,
+    Today,
+    TractionBrakes,
+    actuated,
+    axle_rules,
+)
+from cosim.antilock_roads import FALLING, ROADS, STARTS_OF_SPLIT, Road, falling
 from cosim.closed_loop import HOLDING, STARTS, YAW, YAW_RATE
 from cosim.closed_loop_command import run_study
 from cosim.closed_loop_sources import STEP, Known, Perfect, Strain
-from cosim.today import Sensors, SpeedEstimator, TodaysBrakes
-from cosim.traction import TractionController
+from cosim.today import Sensors, SpeedEstimator
 from cosim.vehicle14.files import make_vehicle
-from cosim.vehicle14.model import SIDE_SLIP, Controls, Wheels
+from cosim.vehicle14.model import SIDE_SLIP, Controls
 from cosim.vehicle14.run import Drive
 from cosim.wheels import FourWheels
 from tirelib.arrays import FloatArray
@@ -42,239 +52,15 @@ SPEED, END_SPEED = 80.0 / 3.6, 25.0 / 3.6
 """The way is counted between these [m/s]."""
 LONGEST = 12.0
 """A run that has not ended by then never will [s]."""
-FALLING = 0.1
-"""Share of the friction that 10 m/s of sliding take: mu exp(-s v_s / (10 m/s)), the law of
-`tirelib.effects.friction_speed` (Savkoor 1966)."""
-PEDAL = np.array([1800.0, 1800.0, 780.0, 780.0])
-"""What the driver asks of each brake: a stop of 1.07 g [N m]."""
-LAG, BUILD, RELEASE = 0.01, 8e3, 2e4
-"""Brake actuators, the same for all: first-order lag [s], largest rates [N m / s]."""
-APART, PARTING = 300.0, 1200.0
-"""Torques of the front brakes may differ by so much [N m], and by so much more a second [N m / s]
-after one of them is let off: the yaw moment builds up no faster than a driver steers."""
 PITCH = 0.039
 """Share of the deceleration that this vehicle's pitch adds to its accelerometer: with 0 the
 reference speed ends 2.2 km/h too low on a dry road, with this 0.1."""
-REAR_MOST = math.radians(2.0)
-"""Slip angle of the rear axle at which the brakes of an axle may differ no more."""
-
-
-@dataclass(frozen=True)
-class Road:
-    """A road to stop on.
-
-    Attributes
-    ----------
-    name, title : str
-    patches : sequence of (start, left, right)
-        From a way [m] since the brakes were put on: factor of the friction on either side.
-    steer : float, [rad]
-        Of the front wheels before the brakes.
-    rolling : float, [s]
-        Time before the brakes: two turns of every wheel, and a turn settles.
-    """
-
-    name: str
-    title: str
-    patches: tuple[tuple[float, float, float], ...]
-    steer: float = 0.0
-    rolling: float = 0.3
-
-    def friction(self, way: float) -> FloatArray:
-        """Return the factor under each wheel, shape (4,); the rear axle comes 2.7 m later."""
-
-        def sides(at: float) -> tuple[float, float]:
-            past = [patch for patch in self.patches if patch[0] <= at] or [self.patches[0]]
-            return past[-1][1:]
-
-        return np.array([*sides(way), *sides(way - 2.7)])
-
-
-def _split(side: str, start: str) -> Road:
-    low, even = (LOW, 1.0) if side == "left" else (1.0, LOW), (1.0, 1.0)
-    first, then = (low, even) if start == "leaving" else (even, low)
-    words = {
-        "entering": "comes under the {} wheels after {} m",
-        "leaving": "under the {} wheels ends after {} m",
-    }[start]
-    title = f"friction {LOW:g} " + words.format(side, f"{CHANGE:g}")
-    return Road(f"split_{side}_{start}", title, ((-math.inf, *first), (CHANGE, *then)))
-
-
-SPARE = 0.1
-"""Traction by which a controller may ask for more than the rules of the axles leave."""
-LOW, CHANGE = 0.4, 12.0
-"""Factor of the slippery side of a split road, and where it begins or ends [m]."""
-ROADS = (
-    Road("low", "friction 0.4, not known", ((-math.inf, 0.4, 0.4),)),
-    Road(
-        "changing",
-        "friction 0.9, from 10 m on 0.4, from 25 m on 0.7",
-        ((-math.inf, 0.9, 0.9), (10.0, 0.4, 0.4), (25.0, 0.7, 0.7)),
-    ),
-    Road(
-        "turn",
-        "turn of 2 m/s\N{SUPERSCRIPT TWO}, friction 0.5, not known",
-        ((-math.inf, 0.5, 0.5),),
-        0.0135,
-        1.2,
-    ),
-    *(_split(side, start) for side in ("left", "right") for start in ("entering", "leaving")),
-)
-"""Two even roads, a turn; four starts of a split one: either side is the slippery one, and the stop
-begins on even ground and enters the split, or begins on the split and leaves it."""
-STARTS_OF_SPLIT = 4
 AT_ONCE = {"relaxation_length": 0.0, "relaxation_length_kappa": 0.0}
 """Parameters of the virtual tires: the vehicle's own tires relax the slip angle already, and the
 slip ratio's 0.1 m are 5 ms. Conditions that hold over a step cost a tenth."""
 LOCKED = 0.9
 """Slip that counts as a standing wheel."""
 KINDS = ("perfect", "strain", "today")
-
-
-@dataclass(frozen=True)
-class Given:
-    """What a brake controller is given at a step.
-
-    `felt` is `wheels` with the slip angle that the tires feel, after relaxation.
-    """
-
-    time: float
-    since: float
-    wheels: Wheels
-    felt: Wheels
-    sensors: Sensors
-    speed: float
-    rims: FloatArray
-
-
-class Brakes(Protocol):
-    """A brake controller with its knowledge.
-
-    `reserve` is the share of the rear axle's slip angle that is left, None where nobody knows.
-    """
-
-    @property
-    def reserve(self) -> float | None:
-        """See above."""
-
-    def begin(self, given: Given) -> None:
-        """Start with the first state."""
-
-    def step(self, given: Given) -> FloatArray:
-        """Return the brake torques asked for [N m], shape (4,); none before `since` is 0."""
-
-    def held(self, torque: FloatArray, actual: FloatArray) -> None:
-        """Hear what the rules of the axles left of it, and what the actuators have [N m]."""
-
-
-class Today:
-    """The classical control cycle."""
-
-    reserve = None
-
-    def __init__(self) -> None:
-        self._brakes = TodaysBrakes()
-
-    def begin(self, given: Given) -> None:
-        """Nothing to do."""
-
-    def step(self, given: Given) -> FloatArray:
-        """Return what the control cycle asks for."""
-        if given.since < 0.0:
-            return np.zeros(4)
-        return self._brakes.step(given.rims, given.speed, PEDAL, STEP)
-
-    def held(self, torque: FloatArray, actual: FloatArray) -> None:
-        """Let the pressures be what the rules of the axles left."""
-        self._brakes.torque = torque.copy()
-
-
-class TractionBrakes:
-    """`TractionController` with the truth, or with strain tires beside today's sensors.
-
-    Parameters
-    ----------
-    source : Perfect or Strain
-    fused : bool
-        Whether the slip ratio is that of wheel speeds against the reference speed, which comes at
-        every step; load and slip angle are the source's.
-    """
-
-    def __init__(self, source: Perfect | Strain, *, fused: bool) -> None:
-        self.source, self.fused = source, fused
-        self.control = TractionController()
-        self.believed = np.full(4, self.control.first)
-        self.wanted, self.torque = np.zeros(4), np.zeros(4)
-        self.omega: FloatArray | None = None
-        self.known = Known(*np.full((3, 4), np.nan))
-
-    @property
-    def reserve(self) -> float:
-        """Share of the rear axle's slip angle that is left, 0 .. 1; 0 where none is known."""
-        used = abs(float(np.mean(self.known.alpha[2:]))) / REAR_MOST
-        return max(1.0 - used, 0.0) if math.isfinite(used) else 0.0
-
-    def begin(self, given: Given) -> None:
-        """Start the source."""
-        self.source.begin(given.felt, given.sensors.omega)
-
-    def step(self, given: Given) -> FloatArray:
-        """Return what the controller asks for."""
-        omega, speed = given.sensors.omega, given.speed
-        if isinstance(self.source, Strain):
-            known = self.source.step(given.time, given.felt, omega, speed)
-        else:
-            known = self.source.step(given.time, given.wheels, omega)
-        if self.fused:
-            known = dataclasses.replace(known, kappa=given.rims / speed - 1.0)
-        before, self.omega, self.known = self.omega, omega, known
-        if given.since < 0.0 or before is None:
-            return np.zeros(4)
-        slowing = (before - omega) / STEP * self.control.radius
-        self.believed, self.wanted = self.control.step(
-            self.believed, known, (self.torque, slowing), speed, given.since
-        )
-        return self.wanted.copy()
-
-    def held(self, torque: FloatArray, actual: FloatArray) -> None:
-        """Believe in no more traction than the rules leave, so that it does not wind up."""
-        self.torque = actual
-        cut = torque < self.wanted - 1.0
-        load = np.where(self.known.load > 0.0, self.known.load, np.inf)
-        left = np.maximum(torque / (self.control.radius * load), 0.05)
-        self.believed = np.where(cut, np.minimum(self.believed, left + SPARE), self.believed)
-
-
-def axle_rules(asked: FloatArray, parted: float | None, reserve: float | None) -> FloatArray:
-    """Return torques [N m] within the pedal and the rules of the axles, shape (4,).
-
-    Who knows no slip angle of the rear axle lets the rear brakes take the lower of their torques,
-    and the front ones differ by `APART`, and by `PARTING` times the time since they first did. Who
-    knows it lets the brakes of an axle differ as far as the rear axle has slip angle in reserve.
-
-    Parameters
-    ----------
-    asked : array, shape (4,), [N m]
-    parted : float or None, [s]
-        Since when the front brakes have wanted to differ; None: they do not.
-    reserve : float or None
-        See `TractionBrakes.reserve`; None: nobody knows.
-    """
-    torque = np.minimum(asked, PEDAL)
-    if reserve is None:
-        front, rear = APART + PARTING * (parted or 0.0), 0.0
-    else:
-        front, rear = APART + reserve * PEDAL[0], reserve * PEDAL[2]
-    torque[:2] = np.minimum(torque[:2], torque[:2].min() + front)
-    torque[2:] = np.minimum(torque[2:], torque[2:].min() + rear)
-    return torque
-
-
-def actuated(torque: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Return the torques of the brakes [N m] a step after they were `torque`."""
-    change = (wanted - torque) * STEP / (LAG + STEP)
-    return torque + np.clip(change, -RELEASE * STEP, BUILD * STEP)
 
 
 @dataclass(frozen=True)
@@ -323,13 +109,6 @@ class StopRun:
             "steering_deg": math.degrees(float(np.abs(np.diff(self.steer)).sum())),
             "largest_speed_error_kmh": 3.6 * float(np.abs(self.told_speed - self.speed).max()),
         }
-
-
-def falling(factor: FloatArray, wheels: Wheels) -> FloatArray:
-    """Return the factor of the friction at the wheels' speed of sliding, shape (4,)."""
-    kappa = np.where(np.isfinite(wheels.kappa), wheels.kappa, 0.0)
-    sliding = wheels.speed * np.hypot(kappa, np.tan(wheels.alpha))
-    return np.asarray(factor * np.exp(-FALLING * sliding / 10.0))
 
 
 @dataclass

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from plotly.subplots import make_subplots
 
-from cosim.antilock import END_SPEED, KINDS, SPEED, AntiLockStudy, Road
+from cosim.antilock import END_SPEED, KINDS, SPEED, AntiLockStudy
+from cosim.antilock_roads import Road
 from tirelib.report.comparison import Part
 from tirelib.report.figures.compare_plot import Plot, styled_figure
 from tirelib.report.page import Table, number

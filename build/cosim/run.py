@@ -26,6 +26,7 @@ from rich.console import Console
 from cosim import (
     antilock,
     antilock_report,
+    antilock_roads,
     closed_loop,
     closed_loop_report,
     closed_loop_stability,
@@ -48,7 +49,7 @@ from tirelib.threads import one_thread
 ROOT = Path(__file__).parents[2]
 DRILL, STABILITY, WATER = "range", "stability", "hydroplaning"
 BRAKING = {f"closed_loop_{road.name}": road for road in closed_loop.SHOWN_ROADS}
-ANTILOCK = {f"antilock_{road.name}": road for road in antilock.ROADS}
+ANTILOCK = {f"antilock_{road.name}": road for road in antilock_roads.ROADS}
 LOOPS = (*BRAKING, STABILITY, *ANTILOCK, WATER)
 LONG = "closed_loop_split"
 """Half of the work: on a split road the way to a stop is long, and every source goes it."""

@@ -6,20 +6,19 @@ import math
 import numpy as np
 import pytest
 from cosim import antilock, antilock_report, hydroplaning, hydroplaning_report, water
-from cosim.antilock import (
+from cosim.antilock import AntiLockStudy, StopRun, stop
+from cosim.antilock_brakes import (
     APART,
+    BUILD,
     PARTING,
     PEDAL,
-    ROADS,
-    AntiLockStudy,
-    StopRun,
+    RELEASE,
     Today,
     TractionBrakes,
     actuated,
     axle_rules,
-    falling,
-    stop,
 )
+from cosim.antilock_roads import CHANGE, FALLING, ROADS, falling
 from cosim.closed_loop_sources import STEP, Known, Perfect
 from cosim.hydroplaning import Approach
 from cosim.today import AntiLock, Phase, Sensors, SpeedEstimator, TodaysBrakes
@@ -119,7 +118,7 @@ def test_who_knows_no_slip_angle_brakes_the_rear_axle_by_its_worse_wheel() -> No
 
 def test_actuators_have_a_lag_and_largest_rates() -> None:
     torque = actuated(np.array([0.0, 1000.0, 500.0, 0.0]), np.array([2000.0, 0.0, 501.2, 0.0]))
-    expected = [antilock.BUILD * STEP, 1000.0 - antilock.RELEASE * STEP, 500.2, 0.0]
+    expected = [BUILD * STEP, 1000.0 - RELEASE * STEP, 500.2, 0.0]
     np.testing.assert_allclose(torque, expected)
 
 
@@ -131,7 +130,7 @@ def wheels(**values: float) -> Wheels:
 def test_friction_falls_with_the_speed_of_sliding() -> None:
     factor = np.array([1.0, 0.5, 0.4, 0.8])
     locked = falling(factor, wheels(speed=10.0, kappa=-1.0))
-    np.testing.assert_allclose(locked, factor * math.exp(-antilock.FALLING))
+    np.testing.assert_allclose(locked, factor * math.exp(-FALLING))
     np.testing.assert_allclose(falling(factor, wheels(speed=10.0)), factor)
 
 
@@ -139,8 +138,8 @@ def test_a_split_road_has_four_starts() -> None:
     for start, first, then in (("entering", 1.0, 0.4), ("leaving", 0.4, 1.0)):
         left, right = BY_NAME[f"split_left_{start}"], BY_NAME[f"split_right_{start}"]
         np.testing.assert_allclose(left.friction(0.0), [first, 1.0, first, 1.0])
-        np.testing.assert_allclose(left.friction(antilock.CHANGE + 1.0), [then, 1.0, first, 1.0])
-        np.testing.assert_allclose(left.friction(antilock.CHANGE + 3.0), [then, 1.0, then, 1.0])
+        np.testing.assert_allclose(left.friction(CHANGE + 1.0), [then, 1.0, first, 1.0])
+        np.testing.assert_allclose(left.friction(CHANGE + 3.0), [then, 1.0, then, 1.0])
         for way in (0.0, 13.0, 20.0):
             np.testing.assert_allclose(right.friction(way), left.friction(way)[[1, 0, 3, 2]])
 
