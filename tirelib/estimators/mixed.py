@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
-from tirelib.estimators.calibrate import VARIES, fit_sliding_of, laws_of, varying_of
+from tirelib.estimators.calibrate import fit_sliding_of, laws_of
 from tirelib.estimators.likeness import SHARE_UNLIKE
 from tirelib.estimators.likeness_fit import fit_likeness
+from tirelib.estimators.links import VARIES, varying_of
 from tirelib.estimators.regressors import EVEN, ODD, compute_regressors
 from tirelib.estimators.sliding import SlidingCurve
 from tirelib.observations import Observations, mean_by

@@ -7,10 +7,11 @@ import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.errors import CalibrationError
-from tirelib.estimators.calibrate import Links, calibrate_chain, measured
+from tirelib.estimators.calibrate import calibrate_chain, measured
 from tirelib.estimators.calibration import Calibration, Rolling
 from tirelib.estimators.cornering import CorneringTrend, cornering_trend
 from tirelib.estimators.dissertation import Means, Regression, fit_all, means_for_tables
+from tirelib.estimators.links import Links
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.observations import Observations, geometry_of, mean_by
 from tirelib.signal import LowPass

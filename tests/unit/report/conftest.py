@@ -8,9 +8,10 @@ import pytest
 
 from tests.synthetic import cornering_runs, synthetic_run, write
 from tirelib.campaign import Campaign, Run, read_campaign
-from tirelib.estimators.calibrate import Links, calibrate_chain
+from tirelib.estimators.calibrate import calibrate_chain
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.chain import Chain
+from tirelib.estimators.links import Links
 from tirelib.estimators.train import Trained, train
 from tirelib.observations import Observations, observe
 
