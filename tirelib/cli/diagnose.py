@@ -73,7 +73,7 @@ SHOWN = 8
     type=click.IntRange(min=4),
     default=100,
     show_default=True,
-    help="Variants of the model that the threshold is from.",
+    help="Number of variants of the model from which the threshold is taken.",
 )
 @click.option(
     "--seed",
@@ -81,7 +81,7 @@ SHOWN = 8
     type=click.IntRange(min=0),
     default=0,
     show_default=True,
-    help="Of the variants.",
+    help="Seed of the variants.",
 )
 @click.option(
     "--out",
@@ -103,7 +103,7 @@ def diagnose(
     out: Path | None,
     json_file: Path | None,
 ) -> None:
-    """Tell which physical effect the model lacks in CAMPAIGN."""
+    """Find the physical effect that the model lacks in CAMPAIGN."""
     from tirelib.model.registration import registered_effects
     from tirelib.parameters import read_tire
     from tirelib.report.explanation import explained

@@ -54,7 +54,7 @@ class LoadPlan:
     wheels : int
         On this one line.
     rate : float, [Hz]
-        Of the gages.
+        Sample rate of the gages.
     """
 
     kind: str
