@@ -161,7 +161,7 @@ def test_a_campaign_that_cannot_be_written_is_named(campaign: Any, tmp_path: Pat
     path = made(tmp_path / "a.mcap", SOUND | {"campaign": campaign})
     code, text = invoke("export", path, "--out", tmp_path / "out")
     assert code == 2
-    assert "its entry on tire and gages is damaged" in text
+    assert "what it says of tire and gages is damaged" in text
 
 
 @pytest.mark.parametrize("ending", ["blf", "asc", "log"])
@@ -233,10 +233,10 @@ ZSTD, LZ4 = CompressionType.ZSTD, CompressionType.LZ4
     ("count", "packed", "change", "said"),
     [
         (1, ZSTD, told(2**62), "a chunk unpacks to 4611686018427387904 bytes; 1048576 are allowed"),
-        (1, ZSTD, told(100), "unpacks to 262205 bytes or more; its header states 100"),
-        (1, LZ4, told(100), "unpacks to 262205 bytes or more; its header states 100"),
+        (1, ZSTD, told(100), "unpacks to 262205 bytes or more; it says 100"),
+        (1, LZ4, told(100), "unpacks to 262205 bytes or more; it says 100"),
         (1, ZSTD, packed_by("brotli"), "packed by 'brotli'; zstd and lz4 are allowed"),
-        (1, ZSTD, nested, "a chunk lies within a chunk"),
+        (1, ZSTD, nested, "a chunk stands within a chunk"),
     ],
 )
 def test_a_chunk_that_lies_is_refused(

@@ -121,7 +121,7 @@ def refused(*_: object) -> None:
 
 def test_real_time_priority_is_taken_where_it_may_be_had(monkeypatch: pytest.MonkeyPatch) -> None:
     system = System(monkeypatch)
-    assert realtime(False) == "ordinary, as requested"
+    assert realtime(False) == "ordinary, as asked for"
     assert system.policy == 0
     assert realtime(None) == f"real-time {PRIORITY}"
     assert (system.policy, system.priority) == (0x4000_0002, PRIORITY)

@@ -190,7 +190,7 @@ def test_transmission_must_be_asked_for(
     assert os.read(terminal._master, 100) == opening
     link.close()
     bus = CanLink("virtual", "silent")
-    with pytest.raises(LinkError, match=r"it was opened for listening"):
+    with pytest.raises(LinkError, match=r"it was opened to listen"):
         bus.send(fd_frames(1))
     bus.close()
 

@@ -247,10 +247,10 @@ def test_bad_input_ends_with_code_2_and_a_message(
     (tmp_path / "x.fmu").write_bytes(b"no zip")
     fmu = toy_fmus[16]
     cases = {
-        "exactly one of --port, --setup, --port-file and --replay is needed": ("run", "--fmu", fmu),
+        "just one of --port, --setup, --port-file and --replay is needed": ("run", "--fmu", fmu),
         "the port cannot be opened": ("run", "--port", tmp_path / "none", "--fmu", fmu),
         "it is no FMU": ("run", "--port", "p", "--fmu", tmp_path / "x.fmu"),
-        "exactly one of [scale] and [bridge]": (
+        "just one of [scale] and [bridge]": (
             "run",
             "--port",
             "p",

@@ -221,7 +221,7 @@ def test_a_wheel_with_a_wrong_rate_is_recorded_to_the_end_and_exported(tmp_path:
         chain.finish("stopped")
         news.add(chain.poll(Deadline.after(0.0)))
     server.close()
-    assert [said for said in news.alarms if "9709 samples a second, 10000 are stated" in said]
+    assert [said for said in news.alarms if "9709 samples a second, 10000 were said" in said]
     with closing(Recording(tmp_path / "a.mcap")) as recording:
         assert b"".join(read.data for read in recording.reads()) == b"".join(frames)
     arguments = ["export", str(tmp_path / "a.mcap"), "--out", str(tmp_path / "a.csv")]
@@ -467,7 +467,7 @@ def test_a_source_of_one_wheel_refuses_a_second() -> None:
     ]
     wheels.push(frames[0], 1)
     assert list(wheels.heard) == [5]
-    with pytest.raises(DeviceError, match="left: wheels 1, 2 send; one is allowed"):
+    with pytest.raises(DeviceError, match="left: wheels 1, 2 are heard; one is allowed"):
         wheels.push(frames[0] + frames[1], 2)
 
 
@@ -483,7 +483,7 @@ def serial(port: str, wheel: int | None = None) -> SourcePlan:
         (
             (vehicle("a"), vehicle("b")),
             None,
-            "stated twice: speed from slcan:a, pressure of wheel 3 fr",
+            "told twice: speed from slcan:a, pressure of wheel 3 fr",
         ),
         (
             (serial("a"), vehicle("b")),
@@ -529,7 +529,7 @@ def test_a_setup_lists_sources_and_the_options_fill_in(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (("tirebench-setup/1", "x/1"), "'x/1'; 'tirebench-setup/1' is read by this version"),
+        (("tirebench-setup/1", "x/1"), "'x/1'; 'tirebench-setup/1' is understood"),
         (("wheel = 0", "wheel = 300"), "source 1: wheel = 300; 0 .. 255"),
         (("bitrate = 1000000", 'bitrate = "fast"'), "source 2: bitrate = 'fast'; .* type int"),
         (("wheel = 0", "weel = 0"), "source 1: weel is not known; allowed are port"),

@@ -55,8 +55,8 @@ def test_what_only_makes_it_worse_is_a_note() -> None:
 
 def test_a_camber_that_nobody_gives_is_said_with_what_it_costs() -> None:
     text = said(Given((serial("a", 0),), Conditions.constant(18.0, pressure=2e5), ()))
-    assert text.startswith("note: no camber: standard deviations of Fy and alpha are larger,")
-    assert "are flagged camber_unknown; give --camber DEG" in text
+    assert text.startswith("note: no camber: standard deviations of Fy and alpha are wider by what")
+    assert "turns that owe most of theirs to it say camber_unknown; give --camber DEG" in text
     assert text.count("\n") == 1
 
 

@@ -186,7 +186,7 @@ def test_multiplexed_and_real_signals_are_read_as_cantools_wrote_them() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (('counter = "count"', 'counter = "other"'), "must be in the same frames"),
+        (('counter = "count"', 'counter = "other"'), "must stand in the same frames"),
         (('strain_unit = "ustrain"', ""), "real numbers are no counts"),
         (('"g5"]]', '"count"]]'), "all gages need one length, sign and factor"),
         (('counter = "count"', 'counter = "g1"'), "counter and time must be integers"),
@@ -251,7 +251,7 @@ def test_what_is_held_is_bounded_and_the_newest_counts() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (('"tirebench-map/1"', '"x/1"'), "'x/1'; 'tirebench-map/1' is read by this version"),
+        (('"tirebench-map/1"', '"x/1"'), "'x/1'; 'tirebench-map/1' is understood"),
         (("rate_hz = 1000", "rate_hz = 1"), "rate_hz = 1; 153 .. 200000 Hz"),
         (('"g5"', '"g9"'), "signal = 'g9'; WHEEL_FL has the signals g1"),
         (('"WHEEL_FL"', '"FR"'), "message = 'FR'; known are ABS, WHEEL_FL"),

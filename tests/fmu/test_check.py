@@ -245,7 +245,7 @@ def test_a_foreign_fmu_is_validated_and_run_and_compared_where_it_can_be(tmp_pat
 def test_an_fmu_that_kills_its_process_is_a_result(tmp_path: Path) -> None:
     document = check_fmu(foreign(tmp_path, "ctypes.string_at(0)"))
     assert not document["passed"]
-    assert parts(document)["run"] == (False, "its process was ended by signal 11")
+    assert parts(document)["run"] == (False, "its process died of signal 11")
 
 
 def test_an_fmu_that_never_ends_is_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

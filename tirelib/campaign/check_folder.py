@@ -62,7 +62,7 @@ def repeat_problems(plans: Sequence[RunPlan]) -> list[Problem]:
         Problem(
             plan_file.FILE,
             f"none of the {len(points)} set points was measured twice",
-            "a few repeats show the noise",
+            "a few repeats tell the noise",
             "repeat some runs; without them no noise is known and diagnosis gives hints only",
             "warning",
         )

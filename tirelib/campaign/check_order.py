@@ -268,7 +268,7 @@ def _unchecked(held: str) -> Problem:
     return Problem(
         "campaign.toml, [gages] lateral_m",
         f"the order of the gages was not checked: the campaign holds {held}",
-        "the sign of the lateral force distinguishes the sides, in four runs or more",
+        "lateral force tells the sides apart, by its sign in four runs or more",
         "add runs with slip angles to both sides, or make sure of the wiring",
         "warning",
     )

@@ -240,7 +240,7 @@ def _gages(
     if outside:
         reader.fault(
             "[gages] lateral_m",
-            f"{outside} lie outside the belt, which is {width:g} m wide",
+            f"{outside} lie beside the belt, which is {width:g} m wide",
             "positions on the belt are allowed, middle = 0",
             "correct the list or belt_width_m",
         )

@@ -16,15 +16,15 @@ VERBS = {
     "import": "Make a campaign from measured files: MATLAB, CSV, Parquet, TYDEX, loose MDF 4.",
     "features": "Read contact edges, peaks and integrals of every turn and gage of DIR.",
     "calibrate": "Fit the estimators of Fz, alpha, kappa and Fy on the campaigns in DIR...",
-    "estimate": "Estimate every turn of DIR, and compare with the rig where the rig measured.",
+    "estimate": "Estimate every turn of DIR, and compare with the rig where it measured.",
     "identify": "Fit the base model, ring and brush, to DIR.",
-    "compare": "Compare a model with CAMPAIGN and show where it fails.",
-    "diagnose": "Find the physical effect that the model lacks in CAMPAIGN.",
+    "compare": "Hold a model against CAMPAIGN and say where it fails.",
+    "diagnose": "Tell which physical effect the model lacks in CAMPAIGN.",
     "explain": "Find what a model of CAMPAIGN lacks, add it, and show before and after.",
     "effects": "List the effects of the catalogue, or register effects of your own.",
-    "next-test": "Find the further run that would separate the suspects of CAMPAIGN best.",
-    "add": "Add EFFECT to a model, fit the model to CAMPAIGN and show how the error changes.",
-    "selftest": "Plant each effect at the plan and noise of CAMPAIGN and compute the chance of "
+    "next-test": "Tell which further run would separate the suspects of CAMPAIGN best.",
+    "add": "Add EFFECT to a model, fit it to CAMPAIGN and show what the error does.",
+    "selftest": "Plant each effect at the plan and noise of CAMPAIGN and tell the chance of "
     "finding it.",
     "simulate": "Press the rolling ring onto the road: shape, pressure, shear, strain and strain "
     "rate.",

@@ -109,8 +109,8 @@ def calibrate(
     for odd in document["other_tire"]:
         console.print(
             f"another tire? {odd['unlike']} of {odd['judged']} runs of {odd['name']} show strain "
-            f"that the tire of {odd['of']} does not (one in a thousand would by chance); check "
-            "that both are of one tire in one state; if not, calibrate them separately"
+            f"that the tire of {odd['of']} does not (one in a thousand would by chance); look "
+            "whether both are of one tire in one state, else calibrate them apart"
         )
     for sentence in (not_given(document["not_given"]), *not_checked(trained.calibration)):
         if sentence:

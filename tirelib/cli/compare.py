@@ -67,7 +67,7 @@ def compare(
     out: Path | None,
     json_file: Path | None,
 ) -> None:
-    """Compare a model with CAMPAIGN and show where it fails."""
+    """Hold a model against CAMPAIGN and say where it fails."""
     from tirelib.compare import compare as compare_model
     from tirelib.compare.document import comparison_document
     from tirelib.model.registration import registered_effects

@@ -73,7 +73,7 @@ SHOWN = 8
     type=click.IntRange(min=4),
     default=100,
     show_default=True,
-    help="Number of variants of the model from which the threshold is taken.",
+    help="Variants of the model that the threshold is from.",
 )
 @click.option(
     "--seed",
@@ -81,7 +81,7 @@ SHOWN = 8
     type=click.IntRange(min=0),
     default=0,
     show_default=True,
-    help="Seed of the variants.",
+    help="Of the variants.",
 )
 @click.option(
     "--out",
@@ -103,7 +103,7 @@ def diagnose(
     out: Path | None,
     json_file: Path | None,
 ) -> None:
-    """Find the physical effect that the model lacks in CAMPAIGN."""
+    """Tell which physical effect the model lacks in CAMPAIGN."""
     from tirelib.model.registration import registered_effects
     from tirelib.parameters import read_tire
     from tirelib.report.explanation import explained

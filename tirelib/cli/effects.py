@@ -59,7 +59,7 @@ def effects(effect_files: tuple[Path, ...]) -> None:
         effect, console = report.effect, output()
         console.print(f"{effect.name}: {effect.title}")
         if effect.untestable:
-            console.print(f"  no campaign can reveal it: {effect.untestable}")
+            console.print(f"  no campaign can show it: {effect.untestable}")
             continue
         console.print(
             f"  {report.planted:.4g} {effect.unit} planted, {report.recovered:.4g} found; the "

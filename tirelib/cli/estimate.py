@@ -62,7 +62,7 @@ def estimate(
     report: Path | None,
     json_file: Path | None,
 ) -> None:
-    """Estimate every turn of DIR, and compare with the rig where the rig measured."""
+    """Estimate every turn of DIR, and compare with the rig where it measured."""
     calibration = read_calibration(calibration_file)
     campaign = read_campaign(folder)
     header = campaign.header
@@ -71,8 +71,7 @@ def estimate(
     )
     if not campaign.header.gage_lateral:
         raise CalibrationError(
-            f"{folder}: the campaign holds no strain; strain is needed for estimates; choose a "
-            "campaign with strain"
+            f"{folder}: the campaign holds no strain; there is nothing to estimate from"
         )
     low_pass = LowPass(calibration.order, calibration.cut_off)
     with progress_bar("reading", len(campaign.plans)) as progress:
@@ -118,8 +117,7 @@ def print_document(name: str, document: dict[str, Any], calibration: Calibration
         console.print(
             f"another tire? {other['turns']} of {other['judged']} turns in range show strain that "
             f"the calibrated {document['tire']!r} does not (one in a thousand would by chance); "
-            "check whether this tire is on the wheel, and whether it is worn or soft; if it is "
-            "another one, calibrate anew"
+            "look whether this tire is on the wheel, worn or soft; else calibrate anew"
         )
     for sentence in (not_given(document["not_given"]), *not_checked(calibration)):
         if sentence:

@@ -73,7 +73,7 @@ be run one by one. Exit code: 0 whatever the verdict, 2 bad input or no model co
     type=click.IntRange(min=4),
     default=100,
     show_default=True,
-    help="Number of variants of the model by which diagnose judges.",
+    help="Variants of the model that diagnose judges by.",
 )
 @click.option(
     "--out",

@@ -105,7 +105,7 @@ fmu.add_command(virtual)
     type=float,
     default=math.nan,
     show_default="NaN",
-    help="Value of an output that has no valid value; see the documentation.",
+    help="What outputs show where there is no value; see docs.",
 )
 def build(
     calibration: Path,

@@ -90,13 +90,13 @@ DIAGNOSIS = "tirelib-diagnosis/1"
     "diagnosis_file",
     metavar="D.json",
     type=FILE,
-    help="JSON of `tirelib diagnose` on this campaign and model.",
+    help="Of `tirelib diagnose` on this campaign and model.",
 )
 @click.option(
     "--suspects",
     "names",
     metavar="A,B",
-    help="Effects to separate; a single one is separated from the model without it.",
+    help="Effects to tell apart; one alone stands against nothing.",
 )
 @range_options
 @click.option(
@@ -129,7 +129,7 @@ DIAGNOSIS = "tirelib-diagnosis/1"
     type=click.IntRange(min=4),
     default=100,
     show_default=True,
-    help="Number of variants of the model, where this verb diagnoses.",
+    help="Variants of the model, if diagnosed here.",
 )
 @click.option(
     "--seed",
@@ -137,7 +137,7 @@ DIAGNOSIS = "tirelib-diagnosis/1"
     type=click.IntRange(min=0),
     default=0,
     show_default=True,
-    help="Seed of the variants.",
+    help="Of the variants.",
 )
 @click.option(
     "--out",
@@ -164,7 +164,7 @@ def next_test(
     json_file: Path | None,
     **ranges: tuple[float, float] | None,
 ) -> None:
-    """Find the further run that would separate the suspects of CAMPAIGN best."""
+    """Tell which further run would separate the suspects of CAMPAIGN best."""
     from tirelib.compare.error import error_of
     from tirelib.compare.model import model_of
     from tirelib.diagnose.candidates import in_base

@@ -33,7 +33,7 @@ in SI and ISO signs.
     default=0,
     show_default=True,
     type=click.IntRange(min=0),
-    help="Seed of noise and set-point errors, like another day with the same tire and gages.",
+    help="The day: other noise and set-point errors, same tire and gages.",
 )
 @click.option(
     "--repeats",

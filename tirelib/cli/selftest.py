@@ -84,7 +84,7 @@ Exit code: 0 done, 2 bad input.
     type=click.IntRange(min=0),
     default=0,
     show_default=True,
-    help="Seed of the variants.",
+    help="Of the variants.",
 )
 @click.option(
     "--out",
@@ -108,7 +108,7 @@ def selftest(
     out: Path | None,
     json_file: Path | None,
 ) -> None:
-    """Plant each effect at the plan and noise of CAMPAIGN and compute the chance of finding it."""
+    """Plant each effect at the plan and noise of CAMPAIGN and tell the chance of finding it."""
     from tirelib.compare.error import error_of
     from tirelib.compare.model import model_of
     from tirelib.identify.campaign_data import straight_runs

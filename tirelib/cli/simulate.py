@@ -96,17 +96,12 @@ def _numbers(
     type=click.Choice(tuple(RINGS)),
     help="Default: the model file's; linear for a tire file.",
 )
-@click.option(
-    "--camber",
-    metavar="DEG",
-    callback=_numbers,
-    help="Camber angle, for effects that depend on it; default 0.",
-)
+@click.option("--camber", metavar="DEG", callback=_numbers, help="For effects of it; default 0.")
 @click.option(
     "--temperature",
     metavar="DEGC",
     callback=_numbers,
-    help="Tread temperature, for effects that depend on it; unknown by default.",
+    help="Of the tread, for effects of it; unknown by default.",
 )
 @click.option(
     "--effects",
@@ -291,8 +286,7 @@ def _notes(file: TireFile, done: Simulation, chosen: Model | None) -> list[str]:
     slopes = tire.radial_pressure_slope, tire.tangential_pressure_slope
     if not any(slopes) and not np.allclose(done.inflation, tire.pressure, rtol=1e-9):
         notes.append(
-            "the tire file does not state how the sidewall stiffens with inflation (slopes of "
-            "k_u and k_v "
+            "the tire does not say how its sidewall stiffens with inflation (slopes of k_u and k_v "
             "are 0): inflation acts through the tension of the belt only"
         )
     if chosen is None and wanted_modes(tire, done.inflation) > MOST_MODES:
@@ -315,7 +309,7 @@ def _overload(done: Simulation) -> list[str]:
     note = (
         f"{done.load[point]:.0f} N press this tire by {1e3 * done.deflection[point]:.0f} mm, more "
         f"than {100 * LARGEST_DEFLECTION:.0f} % of its free radius ({1e3 * largest:.0f} mm): "
-        "a load that the tire is unlikely to carry"
+        "hardly a load that it would carry"
     )
     try:
         bearable = simulate_tire(

@@ -191,7 +191,7 @@ def _pythonfmu() -> str:
         return metadata.version("pythonfmu")
     except metadata.PackageNotFoundError:
         raise FormatError(
-            "fmu build: pythonfmu is not installed; it writes the FMU; `pip install 'tirelib[fmu]'`"
+            "fmu build: pythonfmu is not installed; it writes the FMU; `pip install tirelib[fmu]`"
         ) from None
 
 

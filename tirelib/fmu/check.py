@@ -67,7 +67,7 @@ def check_fmu(
     names = _archive(path)
     if importlib.util.find_spec("fmpy") is None:
         raise FormatError(
-            "fmu check: fmpy is not installed; it runs the FMU; `pip install 'tirelib[fmu]'`"
+            "fmu check: fmpy is not installed; it runs the FMU; `pip install tirelib[fmu]`"
         )
     own = "resources/settings.json" in names and "resources/slavemodule.txt" in names
     document: dict[str, Any] = {
@@ -206,10 +206,10 @@ def _try(path: Path, folder: Path, document: dict[str, Any]) -> None:
             env=environment,
         )
         if told.returncode < 0:
-            end = f"its process was ended by signal {-told.returncode}"
+            end = f"its process died of signal {-told.returncode}"
         elif told.returncode:
             last = told.stderr.decode("utf-8", "replace").strip().splitlines()[-1:]
-            end = f"its process ended with exit code {told.returncode}: {' '.join(last)}"
+            end = f"its process ended with code {told.returncode}: {' '.join(last)}"
     except subprocess.TimeoutExpired:
         end = f"it did not end within {TIME_LIMIT:g} s"
     found: dict[str, Any] = {}

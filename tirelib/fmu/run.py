@@ -63,7 +63,7 @@ class LoadedFmu:
         except ModuleNotFoundError as error:
             raise FormatError(
                 f"fmu run: {error.name} is not installed; it steps the FMU; "
-                "`pip install 'tirelib[fmu]'`"
+                "`pip install tirelib[fmu]`"
             ) from None
         self.path = Path(path)
         self.calibration = embedded_calibration(path)

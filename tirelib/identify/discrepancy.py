@@ -64,10 +64,10 @@ class Discrepancy:
         shape (n_columns, n_runs, n_phi)
         """
         scaled = phi[None, :] / half_angle[:, None]
-        bumps = _bumps(scaled, self.knots, self.reach)
+        knots = bumps(scaled, self.knots, self.reach)
         share = self.outside + (self.inside - self.outside) * np.exp(-((scaled / 1.5) ** 4))
         size = share * np.sqrt(np.mean(waveform**2, axis=1))[:, None]
-        base = bumps * size[None]
+        base = knots * size[None]
         base = base - base.mean(axis=2, keepdims=True)
         load = np.log(points.load / REFERENCE_LOAD)[None, :, None]
         pressure = (points.pressure / REFERENCE_PRESSURE - 1.0)[None, :, None]
@@ -82,12 +82,12 @@ COARSE = Discrepancy(inside=0.08, outside=0.01)
 """Of the dissertation's ring, whose belt does not shear."""
 
 
-def _bumps(scaled: FloatArray, knots: int, reach: float) -> FloatArray:
+def bumps(scaled: FloatArray, knots: int, reach: float) -> FloatArray:
     """Return overlapping Gaussian bumps with unit sum of squares, (knots, n_runs, n_phi)."""
     # denser near the patch: equal steps of arcsinh
     centre = np.sinh(np.linspace(-np.arcsinh(reach), np.arcsinh(reach), knots))
     width = np.gradient(centre)
-    bumps = np.exp(-0.5 * ((scaled[None] - centre[:, None, None]) / width[:, None, None]) ** 2)
-    total = np.sqrt(np.sum(bumps**2, axis=0, keepdims=True))
-    peak: FloatArray = bumps / np.maximum(total, 1.0)
+    peaks = np.exp(-0.5 * ((scaled[None] - centre[:, None, None]) / width[:, None, None]) ** 2)
+    total = np.sqrt(np.sum(peaks**2, axis=0, keepdims=True))
+    peak: FloatArray = peaks / np.maximum(total, 1.0)
     return peak

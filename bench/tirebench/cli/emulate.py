@@ -81,7 +81,7 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
     "number",
     metavar="N",
     type=click.IntRange(min=0),
-    help="Source to play, where a recording has several.",
+    help="Which source of a recording that has several.",
 )
 @click.option(
     "--rate",
@@ -89,7 +89,7 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
     show_default=True,
     metavar="HZ",
     type=click.FloatRange(153.0, 50_000.0),
-    help="Sample rate of the gages in a manoeuvre.",
+    help="Of the gages in a manoeuvre.",
 )
 @click.option(
     "--truth",
@@ -142,30 +142,24 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
     help="Faster than real time.",
 )
 @click.option("--fault", "fault_texts", metavar="NAME[=VALUE]", multiple=True, help="See below.")
-@click.option("--seed", default=0, show_default=True, help="Seed of the random faults.")
+@click.option("--seed", default=0, show_default=True, help="Of the faults.")
 @click.option(
     "--wait",
     "patience",
     default=60.0,
     show_default=True,
     metavar="S",
-    help="Time to wait for a reader.",
+    help="How long to wait for a reader.",
 )
-@click.option("--after", metavar="F", type=FILE, help="Begin to send when this file exists.")
+@click.option("--after", metavar="F", type=FILE, help="Send nothing before this file is there.")
 @click.option("--unplug", metavar="S", type=float, help="Pull the cable after this time.")
 @click.option(
     "--replug",
     metavar="S",
     type=click.FloatRange(min=0.0),
-    help="Plug it in again after this time, and repeat; needs --link.",
+    help="Plug it in again after so long, and so on; with --link.",
 )
-@click.option(
-    "--json",
-    "json_file",
-    metavar="FILE",
-    type=NEW_FILE,
-    help="Write a summary of what was sent, as JSON.",
-)
+@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write what was sent.")
 @click.pass_context
 def emulate(
     context: click.Context,
@@ -196,7 +190,7 @@ def emulate(
 ) -> None:
     """Play a campaign, a manoeuvre or a recording as wheels that send, with faults on request."""
     if [folder, manoeuvre_file, recording].count(None) != 2:
-        raise click.UsageError("exactly one of --campaign, --manoeuvre and --recording is needed")
+        raise click.UsageError("just one of --campaign, --manoeuvre and --recording is needed")
     if replug is not None and (link is None or unplug is None):
         raise click.UsageError("--replug needs --unplug, and --link for a name that stays")
     if bus is not None and kind == "serial" and recording is None:

@@ -58,9 +58,9 @@ input.
     "--like",
     metavar="DIR",
     type=click.Path(path_type=Path),
-    help="Campaign to take tire and gages from.",
+    help="Campaign whose tire and gages hold here.",
 )
-@click.option("--wheel", type=click.IntRange(0, 255), help="[default: the first that sends]")
+@click.option("--wheel", type=click.IntRange(0, 255), help="[default: the first that was heard]")
 @click.option(
     "--device",
     "device_texts",
@@ -68,7 +68,7 @@ input.
     multiple=True,
     help="Instead of the recording's device file.",
 )
-@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write a summary as JSON.")
+@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write what was written.")
 @click.pass_context
 def export(
     context: click.Context,
@@ -113,13 +113,11 @@ def export(
             beside = write_results(recording, out, ".csv", chosen)
             left = sum(left_out(segment, opened.conditions) for segment in mine)
             if left:
-                click.echo(
-                    f"note: {left} samples before the first conditions from the bus are left out"
-                )
+                click.echo(f"note: {left} samples before the bus told what it tells are left out")
         damage = getattr(opened, "damage", "") if opened.complete is False else ""
     click.echo(f"{count} {what} in {out}")
     for file in beside:
-        click.echo(f"also written: {file}")
+        click.echo(f"beside it: {file}")
     if damage:
         click.echo(f"note: the recording breaks off ({damage})")
     if json_file is not None:
@@ -144,7 +142,7 @@ def _header(recording: Recording, like: Path | None) -> CampaignHeader:
     campaign = recording.conditions.campaign
     if like is None and campaign is None:
         raise RecordingError(
-            f"{recording.path}: it does not name tire and gages; a campaign that names them is "
+            f"{recording.path}: it does not say tire and gages; a campaign that has them is "
             "needed; name it with --like DIR"
         )
     if like is not None:
@@ -156,7 +154,7 @@ def _header(recording: Recording, like: Path | None) -> CampaignHeader:
                 (Path(name) / "campaign.toml").write_text(text, encoding="utf-8")
             except (TypeError, ValueError, RecursionError) as error:
                 raise RecordingError(
-                    f"{recording.path}: its entry on tire and gages is damaged ({error}); name "
+                    f"{recording.path}: what it says of tire and gages is damaged ({error}); name "
                     "a campaign that has them with --like DIR"
                 ) from None
             header, problems = parse_header(Path(name))

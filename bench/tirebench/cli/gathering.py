@@ -35,21 +35,21 @@ _OPTIONS = (
         "device_texts",
         metavar="D.toml",
         multiple=True,
-        help="Device file to start from.  [default: the usual scale]",
+        help="Device file that is to be made better.  [default: the usual scale]",
     ),
     click.option(
         "--wheel",
         "number",
         type=click.IntRange(0, 255),
         metavar="N",
-        help="Number of the wheel, where several send.",
+        help="Which wheel, where several send.",
     ),
     click.option(
         "--seconds",
         default=3.0,
         show_default=True,
         type=click.FloatRange(1.0, 600.0),
-        help="Duration of the mean.",
+        help="How long the mean is taken.",
     ),
     click.option(
         "--still",
@@ -57,7 +57,7 @@ _OPTIONS = (
         show_default=True,
         metavar="MICROSTRAIN",
         type=click.FloatRange(min=0.0, min_open=True),
-        help="Movement of the strain above which the wheel is taken to be turning.",
+        help="A wheel whose strain moves by more turns.",
     ),
     click.option(
         "--out",
@@ -111,8 +111,8 @@ class Asked:
         if len(found) != 1:
             heard = ", ".join(map(str, found)) or "none"
             raise DeviceError(
-                f"{link.name}: wheels that send: {heard}; one is needed; choose it with --wheel, "
-                "or check the link"
+                f"{link.name}: wheels that are heard: {heard}; one is needed; choose it with "
+                "--wheel, or look at the link"
             )
         ((number, levels),) = found.items()
         if number in wheels.contradicted:

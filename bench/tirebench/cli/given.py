@@ -27,9 +27,9 @@ LOOK = 0.05
 _OPTIONS = {"speed": "--speed KMH, ", "pressure": "--pressure BAR, ", "camber": "--camber DEG, "}
 _WITHOUT = {
     "speed": "there will be no slip ratio",
-    "pressure": "standard deviations are larger, because the pressure is unknown",
-    "camber": "standard deviations of Fy and alpha are larger, because the camber is unknown; "
-    "turns for which that is the largest part are flagged camber_unknown",
+    "pressure": "standard deviations are wider by what pressure does",
+    "camber": "standard deviations of Fy and alpha are wider by what camber does, and "
+    "turns that owe most of theirs to it say camber_unknown",
 }
 
 
@@ -147,7 +147,7 @@ def conditions_of(
             units = ", ".join(f"{known} [{unit}]" for known, (unit, _) in QUANTITIES.items())
             raise DeviceError(
                 f"--condition {text}: NAME=VALUE is needed, each name once; names are {units}; "
-                "correct it"
+                "write it so"
             )
         given[name] = float(number)
     if sidecar is None:
@@ -155,8 +155,8 @@ def conditions_of(
         return Conditions.constant(**si) if si else None
     if given:
         raise DeviceError(
-            f"{', '.join(given)} and --conditions {sidecar} are given; both state conditions, "
-            "and one of the two is allowed; leave one out"
+            f"{', '.join(given)} and --conditions {sidecar} are given; one or the other says "
+            "what holds; leave one out"
         )
     return read_conditions(sidecar)
 

@@ -29,7 +29,7 @@ Exit code: 0 it fits, 1 it does not (and what would is said), 2 bad input.
 @click.option(
     "--data-bitrate",
     type=click.IntRange(min=1000),
-    help="Bit rate of the data phase in CAN FD.  [default: 2000000]",
+    help="Of the data in CAN FD.  [default: 2000000]",
 )
 @click.option("--baud", default=2_000_000, show_default=True, type=click.IntRange(min=1200))
 @click.option(
@@ -45,7 +45,7 @@ Exit code: 0 it fits, 1 it does not (and what would is said), 2 bad input.
     show_default=True,
     metavar="HZ",
     type=click.FloatRange(153.0, 200_000.0),
-    help="Sample rate of the gages.",
+    help="Of the gages.",
 )
 @click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers.")
 @click.pass_context
@@ -88,7 +88,7 @@ def load(
         for text in others:
             click.echo(f"  {text}")
         if not others:
-            click.echo("  no plan fits on one line; use several lines")
+            click.echo("  nothing on one line; take several")
     if json_file is not None:
         write_json(
             json_file,

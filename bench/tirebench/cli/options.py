@@ -27,26 +27,26 @@ _PORT_OPTIONS = (
         default=2_000_000,
         show_default=True,
         type=click.IntRange(min=1200),
-        help="Baud rate of a serial port.",
+        help="Of a serial port.",
     ),
     click.option(
         "--bitrate",
         default=BITRATE,
         show_default=True,
         type=click.IntRange(min=1000),
-        help="Bit rate of a CAN bus.",
+        help="Of a CAN bus.",
     ),
     click.option(
         "--data-bitrate",
         type=click.IntRange(min=1000),
-        help="Bit rate of the data phase in CAN FD.  [default: classic CAN]",
+        help="Of the data in CAN FD.  [default: classic CAN]",
     ),
     click.option(
         "--bus-option",
         "bus_options",
         metavar="KEY=VALUE",
         multiple=True,
-        help="Further option for python-can; may be given again.",
+        help="More for python-can.",
     ),
     click.option(
         "--rate",
@@ -54,7 +54,7 @@ _PORT_OPTIONS = (
         show_default=True,
         metavar="HZ",
         type=click.FloatRange(153.0, 200_000.0),
-        help="Sample rate of the gages on CAN; SERIAL v1 transmits its own.",
+        help="Sample rate of the gages on CAN; SERIAL v1 says its own.",
     ),
     click.option(
         "--map",
@@ -69,7 +69,7 @@ _PORT_OPTIONS = (
         show_default=True,
         metavar="S",
         type=click.FloatRange(min=0.0),
-        help="Time for which a port may be lost before the run ends.",
+        help="How long a port may be away before the run ends.",
     ),
 )
 

@@ -50,7 +50,7 @@ _OPTIONS = (
         metavar="N",
         help="Port of the page.  [default: a free one]",
     ),
-    click.option("--tui", is_flag=True, help="Live view in this terminal."),
+    click.option("--tui", is_flag=True, help="The same in this terminal."),
     click.option(
         "--alarms", "alarms", metavar="A.toml", type=FILE, help="Limits of the page's alarms."
     ),
@@ -120,10 +120,7 @@ class Shown:
         choice, console = self._choice, self._console
         missing = [name for name in NEEDED if find_spec(name) is None]
         if choice.page and missing:
-            console.print(
-                f"the live page cannot start: {', '.join(missing)} missing; pip install "
-                "'tirelib[bench]'"
-            )
+            console.print(f"no live page: {', '.join(missing)} missing; pip install tirelib[bench]")
             choice = PageChoice(False, choice.terminal)
         if not (choice.page or choice.terminal):
             return
@@ -138,7 +135,7 @@ class Shown:
         if choice.open_to_others:
             console.print(
                 f"warning: the page is open to the network at {choice.host}, not encrypted; "
-                "anyone who knows its address can record and set markers",
+                "whoever has its address can record and set markers",
                 style="bold red",
                 soft_wrap=True,
             )

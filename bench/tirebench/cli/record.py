@@ -68,14 +68,12 @@ Exit code: 0 done, 1 the port went away or not one good frame came, 2 bad input.
     help="Scale and zero of the gages, kept in the recording.",
 )
 @port_options
-@click.option(
-    "--duration", metavar="S", type=click.FloatRange(min=0.0), help="End after this time."
-)
+@click.option("--duration", metavar="S", type=click.FloatRange(min=0.0), help="End after this.")
 @click.option(
     "--silence",
     metavar="S",
     type=click.FloatRange(min=0.0),
-    help="End when nothing was received for this time.",
+    help="End when nothing came for so long.",
 )
 @click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the counters.")
 @click.pass_context
@@ -100,7 +98,7 @@ def record(
 ) -> None:
     """Record the raw bytes of a port; Ctrl-C ends in good order."""
     if bool(ports) == (setup is not None):
-        raise click.UsageError("exactly one of --port and --setup is needed")
+        raise click.UsageError("just one of --port and --setup is needed")
     keep_recordings(json_file, out)
     devices, text = devices_of(device_texts)
     plan = PortPlan("", baud, bitrate, data_bitrate, bus_options)

@@ -28,18 +28,18 @@ _OPTIONS = (
         "--split-minutes",
         metavar="MIN",
         type=click.FloatRange(min=0.01),
-        help="Begin a new part of the recording after this time.",
+        help="Begin a new part of the recording after so long.",
     ),
     click.option(
         "--split-mb",
         metavar="MB",
         type=click.FloatRange(min=0.1),
-        help="Begin a new part of the recording at this size.",
+        help="Begin a new part of the recording when one is so long.",
     ),
     click.option(
         "--strain/--no-strain",
         default=True,
-        help="Record decoded strain in addition to the raw bytes, for other programs.",
+        help="Record decoded strain beside the raw bytes, for other programs.",
     ),
     click.option(
         "--trigger",
@@ -95,8 +95,7 @@ def at_start(path: Path, reader: ReaderPlan, rule: RecordingRule, *, watched: bo
         )
     if rule.around is not None and not watched:
         said += (
-            "\n--trigger: a lost port triggers, and so does an alarm of the program itself; "
-            "markers and "
+            "\n--trigger: a lost port triggers, and an alarm of the program itself; markers and "
             "the limits of alarms need `tirebench run` with its page or with --tui"
         )
     return said
@@ -106,13 +105,13 @@ def room(path: Path, wheels: int, *, strain: bool = True) -> str:
     """Return what is to be said of the room where a recording of so many wheels will be."""
     free = free_at(path)
     if free != free:
-        return "room for the recording: unknown on this system"
+        return "room for the recording: the system does not tell"
     hours = free / ((HOURLY if strain else HOURLY_RAW) * wheels)
     said = f"room for the recording: {free / 1e9:.1f} GB, about {hours:.0f} h"
     if hours < 1.0:
         said = f"room for the recording: {free / 1e6:.0f} MB, about {60.0 * hours:.0f} min"
     said += f" of {wheels} wheels at 10 kHz" if wheels > 1 else " of a wheel at 10 kHz"
-    return f"warning: {said}; free disk space, or choose another disk" if free < LITTLE else said
+    return f"warning: {said}; free some or name another place" if free < LITTLE else said
 
 
 def _around(text: str | None) -> tuple[float, float] | None:
@@ -126,6 +125,6 @@ def _around(text: str | None) -> tuple[float, float] | None:
     if not (0.0 <= before <= 600.0 and 0.0 <= after <= 86_400.0):
         raise click.BadParameter(
             f"{text!r}; two times in seconds are needed, up to 600 before and 86400 after, such as "
-            "10,20; correct it"
+            "10,20; write it so"
         )
     return before, after

@@ -17,9 +17,9 @@ Examples:
   tirebench repair live.json --out whole.json
 
 \b
-Readers that need an index (Foxglove) open the new file; the old one stays as it is. From JSON the
-turns are kept; a replay of the recording gives the summary as well. Each part of a recording is a
-file of its own.
+Readers that need an index (Foxglove) open the new file; the old one stays as it is. Of JSON the
+turns are kept; a replay of the recording gives the summary too. Each part of a recording is a file
+of its own.
 Exit code: 0 done, also where the file was whole; 2 nothing can be read.
 """
 
@@ -28,13 +28,13 @@ Exit code: 0 done, also where the file was whole; 2 nothing can be read.
 @click.argument("file", metavar="FILE", type=FILE)
 @click.option("--out", metavar="FILE", type=NEW_FILE, required=True, help="A new file.")
 def repair(file: Path, out: Path) -> None:
-    """Complete a recording, or the JSON of a run, that was cut off: write its end and its index."""
+    """Give a recording, or the JSON of a run, that breaks off its end and its index."""
     if out.exists():
         raise RecordingError(f"{out}: it exists; nothing is overwritten; name another file")
     if _is_json(file):
         document = completed(file.read_text(encoding="utf-8", errors="replace"))
         if document is None:
-            raise RecordingError(f"{file}: it holds no turns; JSON of `tirebench run` is needed")
+            raise RecordingError(f"{file}: no turns stand in it; JSON of `tirebench run` is needed")
         with whole(out) as new:
             new.write_text(json.dumps(plain(document), indent=1, allow_nan=False) + "\n")
         click.echo(f"{len(document['turns'])} turns in {out}")

@@ -29,21 +29,19 @@ Exit code: as of `tirebench run`.
     required=True,
     help="Made by `tirelib fmu build`.",
 )
-@click.option(
-    "--trust", is_flag=True, help="Run this FMU although it is unknown, and trust it from now on."
-)
+@click.option("--trust", is_flag=True, help="Run this FMU although it is unknown; remember it.")
 @click.option(
     "--pace",
     metavar="X",
     type=click.FloatRange(0.001, 1000.0),
-    help="Multiple of real time.  [default: as fast as possible]",
+    help="Times real time.  [default: as fast as possible]",
 )
 @click.option(
     "--wheel",
     "numbers",
     multiple=True,
     type=click.IntRange(0, 255),
-    help="Wheels to estimate.  [default: as in the run]",
+    help="Wheels to look at.  [default: as in the run]",
 )
 @click.option(
     "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write every turn as JSON."
@@ -58,7 +56,7 @@ def replay(
     numbers: tuple[int, ...],
     json_file: Path | None,
 ) -> None:
-    """Estimate from a recording again what the run estimated."""
+    """Estimate from a recording what the run estimated."""
     context.invoke(
         run,
         replay=recording,

@@ -91,9 +91,9 @@ Exit code: 0 done, 1 unplugged or not one valid turn, 2 bad input. Ctrl-C ends i
     default=0.0,
     is_flag=False,
     flag_value=60.0,
-    help="Wait for ports that do not exist yet; 60 s by default.",
+    help="Wait for ports that are not there yet, 60 s unless said.",
 )
-@click.option("--replay", metavar="FILE", type=FILE, help="Recording to read instead of a port.")
+@click.option("--replay", metavar="FILE", type=FILE, help="Recording to read instead.")
 @click.option(
     "--pace",
     metavar="X",
@@ -108,9 +108,7 @@ Exit code: 0 done, 1 unplugged or not one valid turn, 2 bad input. Ctrl-C ends i
     required=True,
     help="Made by `tirelib fmu build`; one instance for each wheel.",
 )
-@click.option(
-    "--trust", is_flag=True, help="Run this FMU although it is unknown, and trust it from now on."
-)
+@click.option("--trust", is_flag=True, help="Run this FMU although it is unknown; remember it.")
 @click.option("--speed", metavar="KMH", type=float, help="Travel speed.")
 @click.option("--pressure", metavar="BAR", type=click.FloatRange(min=0.0), help="Gauge pressure.")
 @click.option("--camber", metavar="DEG", type=float, help="ISO 8855.")
@@ -140,7 +138,7 @@ Exit code: 0 done, 1 unplugged or not one valid turn, 2 bad input. Ctrl-C ends i
     "numbers",
     multiple=True,
     type=click.IntRange(0, 255),
-    help="Wheels to estimate.  [default: the first four that send]",
+    help="Wheels to look at.  [default: the first four that are heard]",
 )
 @port_options
 @click.option(
@@ -157,28 +155,24 @@ Exit code: 0 done, 1 unplugged or not one valid turn, 2 bad input. Ctrl-C ends i
     type=NEW_FILE,
     help="Write every turn as JSON, as it comes.",
 )
-@click.option(
-    "--duration", metavar="S", type=click.FloatRange(min=0.0), help="End after this time."
-)
+@click.option("--duration", metavar="S", type=click.FloatRange(min=0.0), help="End after this.")
 @click.option(
     "--silence",
     metavar="S",
     type=click.FloatRange(min=0.0),
-    help="End when nothing was received for this time.",
+    help="End when nothing came for so long.",
 )
-@click.option(
-    "--turns", metavar="N", type=click.IntRange(min=1), help="End after this number of turns."
-)
+@click.option("--turns", metavar="N", type=click.IntRange(min=1), help="End after so many turns.")
 @click.option(
     "--every-turn",
     is_flag=True,
-    help="Skip no samples; the port waits.  [default: skip samples that are 3 s late]",
+    help="Skip none: the port waits.  [default: skip what is 3 s late]",
 )
 @click.option(
     "--realtime/--no-realtime",
     "asked",
     default=None,
-    help="Run with real-time priority.  [default: where this user may]",
+    help="Go before all other programs.  [default: where this user may]",
 )
 @bridge_options
 @page_options
@@ -226,7 +220,7 @@ def run(
 ) -> None:
     """Estimate Fz, alpha, kappa and Fy of each turn, live from a port or from a recording."""
     if [bool(ports), setup is not None, port_file is not None, replay is not None].count(True) != 1:
-        raise click.UsageError("exactly one of --port, --setup, --port-file and --replay is needed")
+        raise click.UsageError("just one of --port, --setup, --port-file and --replay is needed")
     if replay is not None and record is not None:
         raise click.UsageError("--record goes with --port: a recording is there already")
     keep_recordings(json_file, record, replay)
@@ -241,7 +235,7 @@ def run(
     if port_file is not None:
         ports = (port_of_file(port_file, wait, console),)
     elif wait and replay is None:
-        console.print(f"waiting for ports that do not exist yet, up to {wait:g} s")
+        console.print(f"ports that are not there yet are waited for, {wait:g} s")
     options = {"speed": speed, "pressure": pressure, "camber": camber}
     conditions = conditions_of(options, named, sidecar)
     console.print(f"FMU {fmu_file}, sha256 {archive.sha256}", soft_wrap=True)
@@ -382,7 +376,7 @@ def _session(
                 journal.add(news.turns)
                 if journal.error != said:
                     said = journal.error
-                    text = said or "the file holds every turn again"
+                    text = said or "every turn is in the file again"
                     news.alarms.append(text)
                     if switch is not None:
                         switch.alarm("json", text, on=bool(said))
@@ -440,7 +434,7 @@ def _summary(
         )
     triggered = counts.get("recording", {}).get("recordings", 0)
     if triggered > 1:
-        console.print(f"{triggered} recordings, numbered in the file names")
+        console.print(f"{triggered} recordings, numbered from the first")
     for file in () if switch is None else switch.files:
         for part in parts_of(file):
             console.print(f"recorded: {part}", soft_wrap=True)

@@ -34,7 +34,7 @@ Exit code: 0 done, 2 bad input, no such step included.
     nargs=2,
     metavar="OFF.mcap ON.mcap",
     type=FILE,
-    help="Recordings without and with the shunt, instead of a port.",
+    help="Recordings without and with the shunt instead.",
 )
 @click.option(
     "--gage-resistance",
@@ -50,7 +50,7 @@ Exit code: 0 done, 2 bad input, no such step included.
     required=True,
     metavar="OHM",
     type=click.FloatRange(10.0, 1e8),
-    help="Shunt resistance Rs, for example 100000.",
+    help="Rs, 100000 say.",
 )
 @click.option(
     "--gage-factor",
@@ -58,7 +58,7 @@ Exit code: 0 done, 2 bad input, no such step included.
     required=True,
     metavar="KS",
     type=click.FloatRange(0.1, 300.0),
-    help="Gage factor Ks.",
+    help="Ks of the gage.",
 )
 @click.option(
     "--gage",
@@ -68,7 +68,7 @@ Exit code: 0 done, 2 bad input, no such step included.
     metavar="N",
     help="Gage that is shunted, several allowed.  [default: all]",
 )
-@click.option("--positive", is_flag=True, help="The shunt causes a signal like that of tension.")
+@click.option("--positive", is_flag=True, help="The shunt looks like tension.")
 def shunt(
     port: str | None,
     device_texts: tuple[str, ...],
@@ -92,7 +92,7 @@ def shunt(
 ) -> None:
     """Find the gain of each gage with a shunt, on a standing wheel."""
     if (port is None) == (replay is None):
-        raise click.UsageError("exactly one of --port and --replay is needed")
+        raise click.UsageError("just one of --port and --replay is needed")
     plan = PortPlan(port or "", baud, bitrate, data_bitrate, bus_options)
     wanted = asked(port, device_texts, number, seconds, still, plan, rate, map_file)
     apparent = apparent_strain(gage_ohm, shunt_ohm, factor) * (-1.0 if positive else 1.0)

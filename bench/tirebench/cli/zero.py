@@ -26,9 +26,7 @@ Exit code: 0 done, 2 bad input, a wheel that turns included.
 
 @click.command(epilog=_EXAMPLE)
 @gathering_options
-@click.option(
-    "--replay", metavar="FILE.mcap", type=FILE, help="Recording to read instead of a port."
-)
+@click.option("--replay", metavar="FILE.mcap", type=FILE, help="Recording to read instead.")
 def zero(
     port: str | None,
     device_texts: tuple[str, ...],
@@ -47,7 +45,7 @@ def zero(
 ) -> None:
     """Take the mean strain of a standing, unloaded wheel as the zero of its gages."""
     if (port is None) == (replay is None):
-        raise click.UsageError("exactly one of --port and --replay is needed")
+        raise click.UsageError("just one of --port and --replay is needed")
     plan = PortPlan(port or "", baud, bitrate, data_bitrate, bus_options)
     wanted = asked(port, device_texts, number, seconds, still, plan, rate, map_file)
     device, mean = wanted.of_port() if replay is None else wanted.of_recording(replay)
@@ -56,6 +54,6 @@ def zero(
     for gage, (offset, before, after) in enumerate(
         zip(mean, device.zero_of(len(mean)), new.zero, strict=True), 1
     ):
-        said = "no signal, kept" if np.isnan(offset) else f"{1e6 * offset:+.1f} microstrain"
+        said = "shows nothing, kept" if np.isnan(offset) else f"{1e6 * offset:+.1f} microstrain"
         click.echo(f"gage {gage}: {said}, zero {before:g} -> {after:g} counts")
     click.echo(f"written: {out}")

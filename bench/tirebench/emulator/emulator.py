@@ -278,8 +278,8 @@ def _period(run: Run) -> int:
     period = round(1.0 / (run.rate * TICK))
     if not 1 <= period < 2**16 or abs(period * TICK * run.rate - 1.0) > 1e-6:
         raise DeviceError(
-            f"{where}: {run.rate:g} Hz has a period of {1e6 / run.rate:g} us; a frame states it "
-            "in steps of 0.1 us up to 6553.5 us; resample the run"
+            f"{where}: {run.rate:g} Hz has a period of {1e6 / run.rate:g} us; a frame says it in "
+            "steps of 0.1 us up to 6553.5 us; resample the run"
         )
     return period
 

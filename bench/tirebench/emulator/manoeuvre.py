@@ -118,8 +118,7 @@ def read_manoeuvre(path: Path) -> Manoeuvre:
             document = tomllib.loads(text)
             if document.get("format") != FORMAT:
                 raise DeviceError(
-                    f"{path}: format = {document.get('format')!r}; {FORMAT!r} is read by this "
-                    "version; "
+                    f"{path}: format = {document.get('format')!r}; {FORMAT!r} is understood here; "
                     "correct it"
                 )
             rows, tire = list(document.get("point", [])), str(document.get("tire", "reference"))

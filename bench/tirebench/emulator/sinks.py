@@ -84,7 +84,7 @@ class TerminalSink:
         self._port.close()
         self.unplugged += 1
         if self._away_for is None:
-            raise UnpluggedError(f"{self.path}: the cable was pulled, as --unplug asks")
+            raise UnpluggedError(f"{self.path}: the cable was pulled, as asked for")
         self._away, self._change = True, Deadline.after(self._away_for)
 
     def _plan(self) -> None:
@@ -158,7 +158,7 @@ def open_bus(text: str, *, fd: bool) -> BusSink:
     if kind != "can" or not interface or not channel:
         raise LinkError(
             f"--bus {text}: can:INTERFACE:CHANNEL is needed, such as can:virtual:test or "
-            "can:socketcan:vcan0; correct it"
+            "can:socketcan:vcan0; write it so"
         )
     arguments: dict[str, Any] = {"fd": True} if fd else {}
     if interface == "virtual":

@@ -104,7 +104,7 @@ def standing_mean(levels: Sequence[Level], still: float = STILL) -> FloatArray:
                 f"{1e6 * still:.0f} and drifts by {1e6 * CREEP * still:.0f}; stop the wheel"
             )
     if not there.any():
-        faults.append("no gage shows a number; one at least is needed; check the link")
+        faults.append("no gage shows a number; one at least is needed; look at the link")
     if faults:
         raise DeviceError(faults)
     return np.asarray(means.mean(axis=0))

@@ -60,7 +60,7 @@ def check_trust(archive: FmuArchive, *, trust: bool) -> str:
         raise FmuError(
             f"{archive.path}: sha256 {archive.sha256} is unknown; an FMU is native code and runs "
             "with your rights; FMUs that this tirelib builds and those trusted before are allowed; "
-            "build it with `tirelib fmu build`, or, if you trust its source, give --trust once"
+            "build it with `tirelib fmu build`, or, if you trust its source, say --trust once"
         )
     remember(archive)
     return "trusted from now on, by --trust"

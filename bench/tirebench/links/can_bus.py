@@ -125,8 +125,7 @@ class CanLink:
         """
         if not self._transmit:
             raise LinkError(
-                f"{self.name}: it was opened for listening only; a bus that sends must be opened "
-                "for transmission; open it so"
+                f"{self.name}: it was opened to listen; transmission must be asked for; open it so"
             )
         try:
             for row in range(len(batch)):

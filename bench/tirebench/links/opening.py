@@ -39,7 +39,7 @@ class PortPlan:
     baud : int
         Of a serial line.
     bitrate : int
-        Bit rate of a CAN bus.
+        Of a CAN bus.
     data_bitrate : int or None
         None for classic CAN.
     options : tuple of str
@@ -87,12 +87,12 @@ class PortPlan:
         if self.encoding == SLCAN and not rest:
             raise DeviceError(
                 f"--port {self.port}: no serial port; slcan:PORT is needed, such as "
-                "slcan:/dev/ttyACM0; correct it, see `tirebench ports`"
+                "slcan:/dev/ttyACM0; write it so, see `tirebench ports`"
             )
         if self.encoding == CAN and not all(rest.partition(":")):
             raise DeviceError(
                 f"--port {self.port}: no channel; can:INTERFACE:CHANNEL is needed, such as "
-                "can:socketcan:can0; correct it"
+                "can:socketcan:can0; write it so"
             )
         bus_options(self.options)
 
@@ -147,7 +147,7 @@ def bus_options(texts: Sequence[str]) -> dict[str, Any]:
     {'host': '127.0.0.1', 'port': 29536}
     """
     faults = [
-        f"--bus-option {text}: there is no '='; KEY=VALUE is needed; correct it"
+        f"--bus-option {text}: there is no '='; KEY=VALUE is needed; write it so"
         for text in texts
         if "=" not in text
     ]

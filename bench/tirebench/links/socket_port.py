@@ -151,6 +151,6 @@ def address(url: str) -> tuple[str, str, int]:
     if not url.startswith(SOCKETS) or not number or parts.path or nobody:
         raise DeviceError(
             f"--port {url}: it is no address; tcp://HOST:PORT or udp://[HOST]:PORT is needed, such "
-            "as tcp://192.168.1.20:4001 or udp://:5005; correct it"
+            "as tcp://192.168.1.20:4001 or udp://:5005; write it so"
         )
     return parts.scheme, parts.hostname or "", number

@@ -113,6 +113,6 @@ def udp_target(text: str) -> tuple[str, int]:
     if not 0 < number < 65536:
         raise DeviceError(
             f"--plotjuggler {text}: PORT or ADDRESS:PORT is needed, such as 9870 or "
-            "192.0.2.7:9870; correct it"
+            "192.0.2.7:9870; write it so"
         )
     return host, number

@@ -32,7 +32,7 @@ def realtime(asked: bool | None) -> str:
         If it was asked for and is not to be had.
     """
     if asked is False:
-        return "ordinary, as requested"
+        return "ordinary, as asked for"
     try:
         _set()
     except AttributeError:

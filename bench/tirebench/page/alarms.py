@@ -100,7 +100,7 @@ def read_alarms(path: Path) -> dict[str, Rule]:
         ) from None
     if document.pop("format", None) != FORMAT:
         raise DeviceError(
-            f"--alarms {path}: format is not {FORMAT!r}, which is read by this version; write it"
+            f"--alarms {path}: format is not {FORMAT!r}, which is understood here; write it"
         )
     rules, faults = dict(RULES), []
     for name, table in document.items():

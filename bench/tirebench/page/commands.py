@@ -187,7 +187,7 @@ class CommandDesk:
 
     def _set_up(self, command: Command) -> None:
         if self._gages is None:
-            self._say(False, "gages can be set up only while a wheel sends, and this is a replay")
+            self._say(False, "gages are set up while a wheel sends: this is a replay")
             return
         if command.kind == "zero":
             said = self._gages.zero(command.wheel)

@@ -88,10 +88,10 @@ class GageSetup:
         device, mean = self._now(wheel)
         if not on:
             self._without[wheel] = mean
-            return f"wheel {wheel}: measured without the shunt; put the shunt on, wait {SPAN:.0f} s"
+            return f"wheel {wheel}: taken without the shunt; put it on, wait {SPAN:.0f} s"
         if wheel not in self._without:
             raise DeviceError(
-                f"wheel {wheel}: the measurement without the shunt is missing; make it first"
+                f"wheel {wheel}: nothing was taken without the shunt; take that first"
             )
         try:
             gage, resistor, factor = map(float, text.split())
@@ -110,9 +110,7 @@ class GageSetup:
         """Return the device of a wheel and what its gages show at this moment."""
         kept, heard = self._levels.get(wheel), self._source.wheels.heard.get(wheel)
         if not kept or heard is None or time.monotonic() - kept[-1][0] > OLDEST:
-            raise DeviceError(
-                f"wheel {wheel}: no strain is received at this moment; check the link"
-            )
+            raise DeviceError(f"wheel {wheel}: it shows nothing at this moment; look at the link")
         return heard.timeline.device, standing_mean([level for _, level in kept])
 
     def _written(self, wheel: int, device: Device, what: str) -> str:

@@ -135,7 +135,7 @@ class Page:
         try:
             self._pipe.send_bytes(command.pack())
         except OSError:
-            return JSONResponse({"error": "the run has ended and takes no commands"}, 503)
+            return JSONResponse({"error": "the run takes no commands any more"}, 503)
         return JSONResponse({"accepted": command.kind}, 202)
 
     async def _stream(self, socket: WebSocket) -> None:

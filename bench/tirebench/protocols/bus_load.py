@@ -54,7 +54,7 @@ class LoadPlan:
     wheels : int
         On this one line.
     rate : float, [Hz]
-        Sample rate of the gages.
+        Of the gages.
     """
 
     kind: str

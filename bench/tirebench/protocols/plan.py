@@ -91,8 +91,8 @@ class ProtocolPlan:
         encoding = header.get("encoding", SERIAL)
         if encoding not in ENCODINGS:
             raise RecordingError(
-                f"{where}: its bytes are {encoding!r}; {', '.join(ENCODINGS)} are read by this "
-                "version; use a newer version"
+                f"{where}: its bytes are {encoding!r}; {', '.join(ENCODINGS)} are understood here; "
+                "take a newer program"
             )
         rate = header.get("rate_hz", RATE)
         if isinstance(rate, bool) or not isinstance(rate, int | float) or not 153 <= rate <= 2e5:

@@ -179,7 +179,7 @@ class CanTransmitter:
         """Return strain frames with SYNC and HEALTH between them."""
         if not 0 <= record.wheel < WHEELS:
             raise DeviceError(
-                f"wheel {record.wheel}; 0 .. {WHEELS - 1} can be distinguished on CAN; choose one"
+                f"wheel {record.wheel}; 0 .. {WHEELS - 1} can be told apart on CAN; choose one"
             )
         n = LAYOUTS[self._kind].samples
         frames = (last - first) // n

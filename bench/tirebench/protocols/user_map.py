@@ -86,8 +86,8 @@ def read_map(path: Path) -> UserMap:
             dbc = (path.parent / str(document["dbc"])).read_text(encoding="cp1252")
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise DeviceError(
-            f"{path}: it cannot be read ({cause(error)}); a map is TOML in UTF-8, its DBC is in "
-            "the same folder; check path and line"
+            f"{path}: it cannot be read ({cause(error)}); a map is TOML in UTF-8, its DBC stands "
+            "beside it; check path and line"
         ) from None
     return parse_map(text, dbc, str(path))
 
@@ -102,8 +102,8 @@ def parse_map(text: str, dbc: str, where: str) -> UserMap:
         ) from None
     if document.get("format") != FORMAT:
         raise DeviceError(
-            f"{where}: format = {document.get('format')!r}; {FORMAT!r} is read by this version; "
-            "correct it, or use a version that reads it"
+            f"{where}: format = {document.get('format')!r}; {FORMAT!r} is understood here; "
+            "correct it, or take a program of that version"
         )
     return _Reader(document, where).read(text if not dbc else f"{text}\0{dbc}", dbc)
 
@@ -210,7 +210,7 @@ class _Reader:
             self.fault(
                 f"{what}: samples",
                 rows,
-                f"lists of 1 to {MOST_GAGES} signals are needed, one list for each sample",
+                f"lists of 1 to {MOST_GAGES} signals are needed, a list a sample",
             )
             return None
         if message is None:
@@ -222,7 +222,7 @@ class _Reader:
             self.fault(
                 f"{what}: samples",
                 rows,
-                'each sample needs the same gages, one at least; a missing gage is ""',
+                'each sample needs the same gages, one at least; a gage that is not there is ""',
             )
         counter = self._optional(what, table, "counter", message)
         time = self._optional(what, table, "time", message)
@@ -254,7 +254,7 @@ class _Reader:
                 f"{what}: samples",
                 [s.name for s in used],
                 "all signals of a wheel, "
-                "counter and time included, must be in the same frames: one "
+                "counter and time included, must stand in the same frames: one "
                 "multiplexer, one value",
             )
         number = table.get("wheel")
@@ -305,9 +305,8 @@ class _Reader:
             self.fault(
                 f"{what}: signal",
                 signal.name,
-                "counter and time must be integers: a real number has no defined point where it "
-                "wraps",
-                "name another, or state the bits of the column",
+                "counter and time must be integers: a real number does not say where it wraps",
+                "name another, or say the bits of the column",
             )
 
     def _optional(

@@ -99,8 +99,8 @@ def header_of(text: Mapping[str, str], where: str) -> RecordingHeader:
     """
     if text.get("format") not in (FORMAT, FORMER):
         raise RecordingError(
-            f"{where}: format = {text.get('format')!r}; {FORMAT!r} and {FORMER!r} are read by "
-            "this version; use a version that reads it"
+            f"{where}: format = {text.get('format')!r}; {FORMAT!r} and {FORMER!r} are understood "
+            "here; take a program of that version"
         )
     try:
         if text["format"] == FORMER:

@@ -100,8 +100,8 @@ class Journal:
             if target != self._path:
                 target.unlink(missing_ok=True)
             raise RecordingError(
-                f"{self._name}: the document cannot be written ({cause(error)}); the turns in "
-                "the file are kept; free space and complete it with `tirebench repair`"
+                f"{self._name}: the document cannot be written ({cause(error)}); the turns that "
+                "stand in the file are kept; free space and complete it with `tirebench repair`"
             ) from None
 
     def close(self) -> None:

@@ -68,11 +68,10 @@ def _unpacked(chunk: Chunk) -> bytes:
         )
     if len(content) != chunk.uncompressed_size:
         raise RecordingError(
-            f"a chunk unpacks to {len(content)} bytes or more; its header states "
-            f"{chunk.uncompressed_size}"
+            f"a chunk unpacks to {len(content)} bytes or more; it says {chunk.uncompressed_size}"
         )
     if chunk.uncompressed_crc and zlib.crc32(content) != chunk.uncompressed_crc:
-        raise RecordingError("a chunk is damaged: its content does not match its checksum")
+        raise RecordingError("a chunk is damaged: what it holds is not what its checksum says")
     return content
 
 
@@ -84,5 +83,5 @@ def _within(content: bytes) -> Iterator[McapRecord]:
     while stream.tell() < len(content):
         record = next(found)
         if isinstance(record, Chunk):
-            raise RecordingError("a chunk lies within a chunk; only messages are allowed there")
+            raise RecordingError("a chunk stands within a chunk; messages are allowed there")
         yield record

@@ -89,7 +89,7 @@ LINK_SCHEMA = _schema(
 )
 TOLD_SCHEMA = _schema(
     "tirebench.Told",
-    "Conditions that a bus reported, when they changed.",
+    "What a bus told of the conditions, when it changed.",
     {field_of(name): _number(unit) for name, (unit, _) in CONDITION_UNITS.items()},
 )
 

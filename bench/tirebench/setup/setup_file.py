@@ -68,9 +68,8 @@ def read_setup(path: Path, usual: SourcePlan) -> tuple[SourcePlan, ...]:
         ) from None
     if document.get("format") != FORMAT:
         raise DeviceError(
-            f"{path}: format = {document.get('format')!r}; {FORMAT!r} is read by this version; "
-            "correct "
-            "it, or use a version that reads it"
+            f"{path}: format = {document.get('format')!r}; {FORMAT!r} is understood here; correct "
+            "it, or take a program of that version"
         )
     tables = document.get("source")
     faults = [
@@ -161,7 +160,7 @@ def check_sources(sources: Sequence[SourcePlan], conditions: Conditions | None) 
     if clash := [(place, port) for place, port in told if clashes(place, places)]:
         names = ", ".join(f"{_words(place)} from {port}" for place, port in clash)
         faults.append(
-            f"a condition is stated twice: {names}; each may come from one source, for a "
+            f"a condition is told twice: {names}; each may come from one source, for a "
             "wheel or for all; leave one out of its map"
         )
     known = () if conditions is None else conditions.known
@@ -169,7 +168,7 @@ def check_sources(sources: Sequence[SourcePlan], conditions: Conditions | None) 
         if (name := place[0]) in known:
             faults.append(
                 f"{_words(place)} comes from {port}, and from --{name} or "
-                "--conditions; only one of them may state it; leave one out"
+                "--conditions; one of them may say it; leave one out"
             )
     if faults:
         raise DeviceError(faults)

@@ -256,7 +256,7 @@ def parse_conditions(document: Any, where: str) -> Conditions:
     if given not in (*EARLIER_FORMATS, FORMAT):
         known = ", ".join((*EARLIER_FORMATS, FORMAT))
         raise DeviceError(
-            f"{where}: format = {given!r}; {known} are read by this version; "
+            f"{where}: format = {given!r}; {known} are understood here; "
             "take the file that `tirebench emulate --conditions` wrote"
         )
     try:

@@ -182,8 +182,8 @@ def parse_device(text: str, where: str) -> Device:
         ) from None
     if document.get("format") != FORMAT:
         raise DeviceError(
-            f"{where}: format = {document.get('format')!r}; {FORMAT!r} is read by this version; "
-            "correct it, or use a version that reads it"
+            f"{where}: format = {document.get('format')!r}; {FORMAT!r} is understood here; "
+            "correct it, or take a program of that version"
         )
     faults = _unknown_keys(document, where)
     scale = _scale(document, where, faults)
@@ -232,7 +232,7 @@ def _scale(document: dict[str, Any], where: str, faults: list[str]) -> float:
     if len(given) != 1:
         faults.append(
             f"{where}: {' and '.join(f'[{name}]' for name in given) or 'neither table'} is given; "
-            "exactly one of [scale] and [bridge] defines the value of a count; write one of them"
+            "just one of [scale] and [bridge] says what a count is; write one of them"
         )
         return math.nan
     table = document[given[0]] if isinstance(document[given[0]], dict) else {}

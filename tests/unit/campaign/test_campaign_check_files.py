@@ -39,7 +39,7 @@ HEADER_FAULTS = {
     "lateral in mm": ("0.03,", "30.0,", "[gages] lateral_m[1]: -30 m is not plausible"),
     "positive offset": ("-0.0033", "0.0033", "its sign looks wrong: write -0.0033"),
     "ring outside": ("ring_radius_m = 0.305", "ring_radius_m = 0.33", "does not fit the free"),
-    "gage beside the belt": ("belt_width_m = 0.165", "belt_width_m = 0.08", "lie outside the belt"),
+    "gage beside the belt": ("belt_width_m = 0.165", "belt_width_m = 0.08", "lie beside the belt"),
     "one place twice": ("0.03,", "0.06,", "holds one position twice"),
     "no strain unit": (
         'unit = "ustrain"',

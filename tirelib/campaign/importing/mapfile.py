@@ -332,7 +332,7 @@ def _channel(reader: MapReader, where: str, quantity: str, entry: Mapping[str, A
         reader.fault(
             f"{where} override_unit",
             f"{override!r} is given" + ("" if unit else " without a unit"),
-            "true or false, together with a unit",
+            "true or false, beside a unit",
             "correct it",
         )
     rule = ChannelRule(quantity, column, unit, turn * factor, offset, rate, override is True)

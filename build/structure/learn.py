@@ -1,0 +1,138 @@
+"""Learn what plain tires show beside their model, and how false alarms come out on left-out tires.
+
+    python build/structure/learn.py                      fits, table and P-P figures
+    python build/structure/learn.py --families rig,ring  of two families only
+
+Reads the campaigns that `build/structure/make.py` made, identifies and fits each plain one (kept in
+build/out/structure/fits), and writes plain_tires.npz and plain_tires.json there: what the families
+show, and the p-value of every plain tire, judged by the families other than its own.
+"""
+
+import argparse
+import hashlib
+import json
+import pickle
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from structure.cases import load_case
+from tirelib.effects import CATALOGUE
+from tirelib.errors import TirelibError
+from tirelib.identify.campaign_data import straight_runs
+from tirelib.identify.identify import estimated
+from tirelib.infer.normal import Normal
+from tirelib.infer.plain import Family, learn, save
+from tirelib.infer.posterior import Posterior, posterior
+from tirelib.infer.select import judged
+from tirelib.infer.strain import StrainProblem
+from tirelib.threads import one_thread
+
+ROOT = Path(__file__).parents[2]
+OUT = ROOT / "build" / "out" / "structure"
+FAMILIES = ("rig", "continuum", "ring")
+FIRST = {"effect": 0.02**2, "shape": 0.005**2}
+"""Variances of the fit from which the learning starts."""
+SIZES = (0.0005, 0.001, 0.002, 0.004)
+"""Sizes of a run's own misfit among which the likelihood chooses."""
+
+Fit = tuple[StrainProblem, Posterior]
+
+
+def main() -> None:
+    """Fit, learn, judge, write."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--families", default=",".join(FAMILIES))
+    parser.add_argument("--out", type=Path, default=OUT)
+    parser.add_argument("--most", type=int, default=60, help="tires of each family")
+    options = parser.parse_args()
+    names = options.families.split(",")
+    with one_thread():
+        fits = {name: fits_of(options.out, name, options.most) for name in names}
+        families = [family_of(name, list(fits[name].values())) for name in names]
+        table = options.out / "plain_tires.npz"
+        save(table, families, provenance(fits))
+        document: dict[str, Any] = {
+            "families": {},
+            "sha256": hashlib.sha256(table.read_bytes()).hexdigest(),
+        }
+        for name in names:
+            others = [family for family in families if family.name != name]
+            found = {
+                seed: judged(problem, fit, others, 0.05, own_effects=0).p
+                for seed, (problem, fit) in fits[name].items()
+            }
+            document["families"][name] = {str(seed): round(p, 4) for seed, p in found.items()}
+            share = np.mean([p <= 0.05 for p in found.values()])
+            say(f"{name}: {len(found)} plain tires by the other families, {share:.1%} alarms")
+        (options.out / "plain_tires.json").write_text(json.dumps(document, indent=1) + "\n")
+
+
+def say(text: str) -> None:
+    """Print a line at once."""
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
+
+
+def fits_of(out: Path, name: str, most: int) -> dict[int, Fit]:
+    """Return the fits of a family's plain tires by seed; those that fail are left out."""
+    folder = out / "fits"
+    folder.mkdir(parents=True, exist_ok=True)
+    found = {}
+    files = sorted((out / name).glob("*-none.npz"), key=lambda f: int(f.stem.split("-")[0]))
+    for file in files[:most]:
+        kept = folder / f"{name}-{file.stem}.pkl"
+        if not kept.exists():
+            kept.write_bytes(pickle.dumps(fit_of(file)))
+            say(f"{name} {file.stem}")
+        fit = pickle.loads(kept.read_bytes())
+        if fit is not None:
+            found[int(file.stem.split("-")[0])] = fit
+    return found
+
+
+def fit_of(file: Path) -> Fit | None:
+    """Return the fitted model of a plain tire, or None if there is none."""
+    runs = straight_runs(load_case(file).waves)
+    try:
+        _, identified, _ = estimated(runs)
+        problem = StrainProblem(runs, identified.values, list(CATALOGUE.values()))
+        spread = {effect.name: FIRST["effect"] for effect in problem.living}
+        groups = problem.remainder(problem.start, problem.solve(problem.start))
+        spread |= dict.fromkeys(groups, FIRST["shape"])
+        fit = posterior(problem, (), spread, SIZES[1])
+    except TirelibError as error:
+        say(f"{file.name}: {error}")
+        return None
+    problem.living = ()  # laws cannot be kept in a file, and are needed no more
+    return problem, fit
+
+
+def family_of(name: str, fits: Sequence[Fit]) -> Family:
+    """Return what a family's tires show, with the most likely size of a run's own misfit."""
+    found: list[tuple[float, Family]] = []
+    for own in SIZES:
+        cases = [Normal.of(fit.rows, fit.solved.rest, p.whitener(own)) for p, fit in fits]
+        family, likelihood = learn(name, own, cases, fits[0][0].widths)
+        likelihood += sum(p.whitener(own).log_volume for p, _ in fits)
+        say(f"{name}: {len(fits)} tires, own {own:g}: log likelihood {likelihood:.0f}")
+        found.append((likelihood, family))
+    return max(found, key=lambda pair: pair[0])[1]
+
+
+def provenance(fits: dict[str, dict[int, Fit]]) -> dict[str, Any]:
+    """Return seeds and counts."""
+    return {
+        "made by": "build/structure/make.py and build/structure/learn.py",
+        "seeds": {name: sorted(of) for name, of in fits.items()},
+        "counts": {name: len(of) for name, of in fits.items()},
+    }
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,97 @@
+"""The problem of strain: its slopes are those of its model, its whitening that of its noise."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hidden.cases import load_case
+
+from tirelib.effects import CATALOGUE
+from tirelib.identify.campaign_data import straight_runs
+from tirelib.identify.identify import estimated
+from tirelib.identify.random_effects import scales, tangents
+from tirelib.infer.posterior import posterior
+from tirelib.infer.problem import Point
+from tirelib.infer.strain import StrainProblem
+from tirelib.infer.whiten import Whitener
+from tirelib.signal import LowPass
+from tirelib.waveforms import GRID
+
+CASE = Path(__file__).parent / "data" / "1001-none.npz"
+OWN = 0.001
+
+
+@pytest.fixture(scope="module")
+def problem() -> StrainProblem:
+    case = load_case(CASE)
+    runs = straight_runs(case.waves.take(~case.held_out))
+    return StrainProblem(runs, estimated(runs)[1].values, list(CATALOGUE.values()))
+
+
+def test_slopes_are_those_of_the_model(problem: StrainProblem) -> None:
+    effect = CATALOGUE["temperature"]
+    here = Point(np.zeros(len(problem.free) + 1), (effect,), (np.array([0.1]),))
+    solved = problem.solve(here)
+    slopes = problem.slopes(here, solved)
+    step = 1e-3
+    for k in range(len(slopes)):
+        base, strength = here.base.copy(), here.strengths[0].copy()
+        if k < base.size:
+            base[k] += step
+        else:
+            strength += step * effect.scale
+        moved = problem.solve(Point(base, (effect,), (strength,)), solved)
+        difference = (solved.rest - moved.rest) / step
+        error = np.linalg.norm(difference - slopes[k]) / np.linalg.norm(slopes[k])
+        assert error < 0.03, k
+
+
+def test_a_planted_strength_comes_back(problem: StrainProblem) -> None:
+    effect = CATALOGUE["temperature"]
+    zero = np.zeros(len(problem.free) + 1)
+    with_it = problem.solve(Point(zero, (effect,), (np.array([0.15]),)))
+    made = StrainProblem.__new__(StrainProblem)
+    made.__dict__.update(problem.__dict__)
+    made.data = problem.data.__class__(
+        **{
+            name: getattr(problem.data, name) for name in problem.data.__slots__ if name != "strain"
+        },
+        strain=with_it.waveform,
+    )
+    fit = posterior(made, (effect,), {}, OWN)
+    assert fit.point.strengths[0] == pytest.approx([0.15], rel=0.03)
+    # the priors of a strength and of the base leave it short by no more than its deviation
+    assert abs(fit.point.strengths[0][0] - 0.15) < fit.std(0)[0]
+
+
+def test_effects_that_this_plan_cannot_show_say_why(problem: StrainProblem) -> None:
+    assert "slip angle" in problem.dead["traction"] or "slip" in problem.dead["traction"]
+    names = {effect.name for effect in problem.living}
+    assert "temperature" in names
+    assert not names & {"belt_shear", "belt_extension", "rotary_inertia"}
+
+
+def test_whitening_is_the_inverse_of_noise_and_set_points(problem: StrainProblem) -> None:
+    random = np.random.default_rng(0)
+    wave = problem.reference.waveform[:2]
+    points = problem.data.points.take(np.arange(2))
+    slope = np.stack([wave, 0.3 * wave], axis=2)
+    tangent = tangents(wave, slope[..., 0], slope[..., 1])
+    scale = scales(problem.data.tolerance, problem.data.angle_std[:2])
+    noise, low_pass = 2e-6, LowPass()
+    whiten = Whitener.of(
+        wave, tangent, scale, problem.half_angle[:2], points, low_pass, noise=noise, own=0.0
+    )
+    count = 3000
+    # white before the filter, as the noise of a transmitter is
+    order = np.fft.rfftfreq(GRID.size, 1.0 / GRID.size)
+    sigma = low_pass.sigma(float(points.omega[0]) / (2.0 * np.pi))
+    gain = np.exp(-0.5 * (sigma * order) ** 2) * (order > 0)
+    white = np.fft.irfft(np.fft.rfft(random.standard_normal((count, 2, GRID.size))) * gain)
+    white *= noise / np.sqrt(np.mean(white**2))
+    off = scale * random.standard_normal((count, 2, 4))
+    rows = whiten(white + np.einsum("rnk,crk->crn", tangent, off))
+    covariance = np.cov(rows.T)
+    kept = np.abs(covariance - np.eye(len(covariance)))
+    assert np.abs(np.diag(covariance) - 1.0).max() < 0.25
+    assert kept.mean() < 0.03

@@ -1,0 +1,96 @@
+"""A linear problem without any tire: what a model leaves is known exactly."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.effects import Effect, effect
+from tirelib.infer.plain import Family
+from tirelib.infer.problem import Point
+
+N, SHAPES = 300, 6
+PLAIN = {"swell": 0.05, "bend": 0.002, "twist": 0.002, "smooth, all": 0.3}
+"""Standard deviations of what the toy's plain tires show."""
+
+
+def _law(name: str, low: float = -2.0, high: float = 2.0) -> Effect:
+    def law(state: Any, strength: float) -> Any:
+        return state
+
+    law.__doc__ = f"The {name}."
+    return effect(name, stage="gage", unit="1", low=low, high=high, source="toy")(law)
+
+
+EFFECTS = {
+    name: _law(name, *ends)
+    for name, ends in {"swell": (-2.0, 2.0), "bend": (-2.0, 2.0), "twist": (0.0, 2.0)}.items()
+}
+
+
+@dataclass(frozen=True)
+class Solved:
+    rest: FloatArray
+
+
+class Toy:
+    """Measured numbers that are linear in everything."""
+
+    def __init__(self, measured: FloatArray, *, alike: bool = False, seed: int = 7) -> None:
+        random = np.random.default_rng(seed)
+        self.measured = measured
+        self.base = random.standard_normal((3, N))
+        self.shapes = random.standard_normal((SHAPES, N)) / 5.0
+        self.by = {name: random.standard_normal((1, N)) for name in EFFECTS}
+        if alike:
+            self.by["bend"] = self.by["twist"] + 1e-6 * self.by["bend"]
+        self.start = Point(np.zeros(3))
+        self.widths = np.full(3, 10.0)
+        self.dead: Mapping[str, str] = {}
+        self.living = tuple(EFFECTS.values())
+
+    def whitener(self, own: float) -> Any:
+        return lambda rows: rows
+
+    def solve(self, point: Point, near: Any = None) -> Solved:
+        model = point.base @ self.base
+        for each, strength in zip(point.effects, point.strengths, strict=True):
+            model = model + (strength / each.scale) @ self.by[each.name]
+        return Solved(self.measured - model)
+
+    def slopes(self, point: Point, solved: Any) -> FloatArray:
+        return np.concatenate([self.base, *(self.by[e.name] for e in point.effects)])
+
+    def signatures(self, point: Point, solved: Any) -> dict[str, FloatArray]:
+        has = {e.name for e in point.effects}
+        return {name: rows for name, rows in self.by.items() if name not in has}
+
+    def remainder(self, point: Point, solved: Any) -> dict[str, FloatArray]:
+        return {"smooth, all": self.shapes}
+
+    def roughly(self, rows: FloatArray) -> FloatArray:
+        return rows * np.sin(np.arange(N) / 10.0)
+
+
+def drawn(random: np.random.Generator, **planted: float) -> FloatArray:
+    """Return what a plain toy tire shows, with effects planted, in ranges."""
+    toy = Toy(np.zeros(N))
+    rest = random.standard_normal(N) + random.standard_normal(3) @ toy.base
+    for name, rows in toy.by.items():
+        strength = PLAIN[name] * random.standard_normal() + planted.get(name, 0.0)
+        rest = rest + strength * rows[0]
+    return np.asarray(rest + PLAIN["smooth, all"] * random.standard_normal(SHAPES) @ toy.shapes)
+
+
+def family(count: int, seed: int = 1, name: str = "toys") -> Family:
+    """Return a family whose tires are as `PLAIN` says."""
+    random = np.random.default_rng(seed)
+    blocks = {**dict.fromkeys(EFFECTS, 1), "smooth, all": SHAPES}
+    sizes = np.concatenate([np.full(rows, PLAIN[block]) for block, rows in blocks.items()])
+    draws = sizes * random.standard_normal((count, sizes.size))
+    squares = np.stack(
+        [*(draws[:, k] ** 2 for k in range(3)), np.mean(draws[:, 3:] ** 2, axis=1)], axis=1
+    )
+    return Family(name, 0.001, blocks, draws, squares)

@@ -1,0 +1,69 @@
+"""The confidence set on a linear problem whose truth is known."""
+
+import numpy as np
+import pytest
+
+from tests.unit.infer.linear_problem import N, Toy, drawn, family
+from tirelib.infer.posterior import posterior
+from tirelib.infer.select import judged, select
+
+FAMILIES = (family(80, 1, "first"), family(80, 2, "second"))
+
+
+def test_plain_tires_are_seldom_said_to_lack_something() -> None:
+    random = np.random.default_rng(5)
+    kinds = [select(Toy(drawn(random)), FAMILIES).kind for _ in range(100)]
+    # 5 % wanted; 10 of 100 is the upper 98 % bound of a binomial
+    assert sum(kind != "none" for kind in kinds) <= 10
+
+
+def test_p_values_of_plain_tires_lie_under_the_diagonal() -> None:
+    random = np.random.default_rng(6)
+    spread = FAMILIES[0].spread()
+    p = []
+    for _ in range(120):
+        toy = Toy(drawn(random))
+        fit = posterior(toy, (), spread, 0.001)
+        p.append(judged(toy, fit, FAMILIES, 0.05, own_effects=0).p)
+    for level in (0.05, 0.1, 0.2, 0.5):
+        share = np.mean(np.array(p) <= level)
+        assert share <= level + 2.5 * np.sqrt(level * (1.0 - level) / len(p))
+
+
+@pytest.mark.parametrize("name", ["swell", "bend", "twist"])
+def test_what_is_hidden_is_named_with_its_strength(name: str) -> None:
+    random = np.random.default_rng(8)
+    right = 0
+    for _ in range(10):
+        found = select(Toy(drawn(random, **{name: 0.6})), FAMILIES)
+        right += found.sets == ((name,),)
+        if found.sets == ((name,),):
+            strength = found.best.fit.point.strengths[0] / 2.0
+            assert strength == pytest.approx(0.6, abs=0.3)
+    assert right >= 9
+
+
+def test_two_are_found_together() -> None:
+    found = select(Toy(drawn(np.random.default_rng(2), bend=0.6, twist=0.6)), FAMILIES)
+    assert {frozenset(names) for names in found.sets} == {frozenset(("bend", "twist"))}
+
+
+def test_what_looks_alike_is_a_set() -> None:
+    measured = drawn(np.random.default_rng(4))
+    toy = Toy(measured, alike=True)
+    toy.measured = measured + 0.6 * toy.by["twist"][0]
+    found = select(toy, FAMILIES)
+    assert found.kind == "indistinguishable"
+    assert {"bend", "twist"} <= {name for names in found.sets for name in names}
+
+
+def test_what_no_effect_explains_is_unknown() -> None:
+    random = np.random.default_rng(9)
+    strange = Toy(np.zeros(N)).shapes[2] * 6.0
+    assert select(Toy(drawn(random) + strange), FAMILIES).kind == "unknown"
+
+
+def test_a_strength_outside_its_range_is_not_named() -> None:
+    found = select(Toy(drawn(np.random.default_rng(3), twist=-0.6)), FAMILIES)
+    assert ("twist",) not in found.sets
+    assert found.kind == "unknown"

@@ -1,0 +1,1 @@
+"""The one inference of the library: likelihood, posterior, what plain tires show, and a verdict."""

@@ -1,0 +1,177 @@
+"""What plain tires show beside their model: learned from tires in which nothing is hidden.
+
+A model is not a tire. What a fitted model leaves of a tire without any of the catalogue's effects
+looks to some extent like them, and to some extent like nothing known. Both are learned, from plain
+tires of families that share no code: for every family the variance of each effect's apparent
+strength, in ranges, that of each group of smooth shapes, and the size of what each run has for
+itself (expectation and maximisation of the likelihood; Dempster, Laird and Rubin 1977). The tires
+themselves are kept as well, each as one draw of all coefficients from its posterior. Put into a
+user's plan they show how large a statistic gets where nothing is hidden.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tirelib.arrays import FloatArray, IntArray
+from tirelib.infer.normal import Normal, Weighed
+
+FOLDS = 5
+"""Parts of a family's tires; each part is judged by what the others show."""
+ROUNDS = 60
+SETTLED = 0.01
+"""Relative change of all variances below which they are learned."""
+START = 0.02**2
+LEAST = 1e-4**2
+"""Least variance of an effect's apparent strength or of a shape."""
+BASE, ROUGHLY = "base", "roughly "
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Family:
+    """Plain tires of one family.
+
+    Attributes
+    ----------
+    name : str
+    own : float
+        Size of each run's own misfit, over its rms strain.
+    blocks : mapping of name to number of rows
+    draws : shape (n_tires, n_rows)
+        Coefficients of all blocks, one draw of the posterior a tire; NaN where its plan did not
+        show the block.
+    squares : shape (n_tires, n_blocks)
+        Expected mean squares of each block's coefficients; NaN likewise.
+    """
+
+    name: str
+    own: float
+    blocks: Mapping[str, int]
+    draws: FloatArray
+    squares: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.draws)
+
+    @property
+    def fold(self) -> IntArray:
+        """Part that each tire belongs to, shape (n_tires,)."""
+        return np.arange(len(self)) % FOLDS
+
+    def spread(self, without: int | None = None) -> dict[str, float]:
+        """Return the variances by block, of all tires or without those of one part."""
+        kept = np.ones(len(self), dtype=bool) if without is None else self.fold != without
+        known = np.isfinite(self.squares[kept])
+        total = np.where(known, self.squares[kept], 0.0).sum(axis=0)
+        count = known.sum(axis=0)
+        mean = np.where(count > 0, total / np.maximum(count, 1), START)
+        return dict(zip(self.blocks, np.maximum(mean, LEAST).tolist(), strict=True))
+
+    def on(self, normal: Normal) -> FloatArray:
+        """Return the tires' coefficients for rows of a user's plan, (n_tires, n_rows).
+
+        A block that a tire did not show, or the family does not know, is zero.
+        """
+        out = np.zeros((len(self), len(normal.right)))
+        first = 0
+        for name, rows in self.blocks.items():
+            block = normal.blocks.get(name)
+            if block is not None:
+                out[:, block] = self.draws[:, first : first + rows]
+            first += rows
+        return np.nan_to_num(out)
+
+
+def learn(
+    name: str, own: float, cases: Sequence[Normal], widths: FloatArray, *, seed: int = 0
+) -> tuple[Family, float]:
+    """Return a family from the normal equations of its plain tires, and their log likelihood.
+
+    Parameters
+    ----------
+    name : str
+    own : float
+        At which the rows were whitened.
+    cases : sequence of Normal
+        About fitted models without effects.
+    widths : shape (n_base,)
+        Prior standard deviations of the base.
+    seed : int
+        Of the draws.
+    """
+    blocks: dict[str, int] = {}
+    for case in cases:
+        for block, where in case.blocks.items():
+            if block != BASE:
+                blocks.setdefault(block, where.stop - where.start)
+    spread = dict.fromkeys(blocks, START)
+    squares = np.zeros((len(cases), len(blocks)))
+    likelihood = -np.inf
+    for _ in range(ROUNDS):
+        likelihood = 0.0
+        for square, case in zip(squares, cases, strict=True):
+            weighed = Weighed(case, case.spread({**spread, BASE: widths**2}))
+            likelihood += weighed.log_likelihood()
+            mean, variance = weighed.mean(case.right), np.diag(weighed.covariance)
+            for k, block in enumerate(blocks):
+                rows = case.blocks.get(block)
+                square[k] = (
+                    np.nan if rows is None else float(np.mean(mean[rows] ** 2 + variance[rows]))
+                )
+        new = np.maximum(np.nanmean(squares, axis=0), LEAST)
+        old = np.array(list(spread.values()))
+        spread = dict(zip(blocks, new.tolist(), strict=True))
+        if float(np.abs(np.log(new / old)).max()) < SETTLED:
+            break
+    random = np.random.default_rng(seed)
+    draws = np.full((len(cases), sum(blocks.values())), np.nan)
+    for draw, case in zip(draws, cases, strict=True):
+        weighed = Weighed(case, case.spread({**spread, BASE: widths**2}))
+        drawn, first = weighed.draw(random), 0
+        for block, size in blocks.items():
+            rows = case.blocks.get(block)
+            if rows is not None:
+                draw[first : first + size] = drawn[rows]
+            first += size
+    return Family(name, own, blocks, draws, squares), likelihood
+
+
+def save(path: Path, families: Sequence[Family], provenance: Mapping[str, object]) -> None:
+    """Write families and where they come from."""
+    arrays: dict[str, FloatArray] = {}
+    about = {}
+    for family in families:
+        arrays[f"{family.name}/draws"] = family.draws.astype(np.float32)
+        arrays[f"{family.name}/squares"] = family.squares.astype(np.float32)
+        about[family.name] = {"own": family.own, "blocks": dict(family.blocks)}
+    text = json.dumps({"families": about, "provenance": dict(provenance)}, indent=1)
+    np.savez_compressed(path, about=np.array(text), **arrays)  # type: ignore[arg-type]
+
+
+def load(path: Path) -> tuple[tuple[Family, ...], dict[str, object]]:
+    """Return what `save` wrote."""
+    with np.load(path, allow_pickle=False) as file:
+        about = json.loads(str(file["about"]))
+        families = tuple(
+            Family(
+                name,
+                float(each["own"]),
+                dict(each["blocks"]),
+                file[f"{name}/draws"].astype(float),
+                file[f"{name}/squares"].astype(float),
+            )
+            for name, each in about["families"].items()
+        )
+        return families, about["provenance"]
+
+
+def pooled(families: Sequence[Family]) -> dict[str, float]:
+    """Return variances by block over families that count the same: the metric of a fit."""
+    each = [family.spread() for family in families]
+    names = dict.fromkeys(name for spread in each for name in spread)
+    return {
+        name: float(np.mean([spread[name] for spread in each if name in spread])) for name in names
+    }

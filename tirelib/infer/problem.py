@@ -1,0 +1,81 @@
+"""What a measurement has to say of itself to be reasoned about: strain and forces alike.
+
+A problem holds measured numbers and a model of them. About any point of the model it gives the
+residual and everything that may explain it as rows of the same shape, and the whitening by what
+differs from run to run without anybody's will (noise, set points). The rest of this package knows
+nothing else of tires.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from tirelib.arrays import FloatArray
+from tirelib.effects import Effect
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A point of the model: the base's coordinates, and effects at strengths.
+
+    Attributes
+    ----------
+    base : shape (n_base,)
+        Moves of the base's numbers and of nuisance parameters from where the problem starts.
+    effects : tuple of Effect
+    strengths : tuple of shape (components,)
+        In the effects' units.
+    """
+
+    base: FloatArray
+    effects: tuple[Effect, ...] = ()
+    strengths: tuple[FloatArray, ...] = ()
+
+
+class Solved(Protocol):
+    """The model at a point."""
+
+    @property
+    def rest(self) -> FloatArray:
+        """Residual, measured less model, of any shape (...)."""
+
+
+class Problem(Protocol):
+    """Measured numbers with a model of them."""
+
+    @property
+    def start(self) -> Point:
+        """The model as the user has it."""
+
+    @property
+    def widths(self) -> FloatArray:
+        """Prior standard deviations of the base's coordinates, shape (n_base,)."""
+
+    @property
+    def dead(self) -> Mapping[str, str]:
+        """Effects that this plan cannot show, with the reason."""
+
+    @property
+    def living(self) -> Sequence[Effect]:
+        """Effects that it may show and the model has not."""
+
+    def whitener(self, own: float) -> Callable[[FloatArray], FloatArray]:
+        """Return what turns rows (k, ...) into whitened ones (k, n).
+
+        `own` is the size of the misfit that each run has for itself.
+        """
+
+    def solve(self, point: Point, near: Any = None) -> Solved:
+        """Return the model at a point; raises TirelibError where it has none."""
+
+    def slopes(self, point: Point, solved: Any) -> FloatArray:
+        """Return slopes by the base, then by strengths in ranges, (n_coordinates, ...)."""
+
+    def signatures(self, point: Point, solved: Any) -> Mapping[str, FloatArray]:
+        """Return, for each living effect that the point has not, rows (components, ...) a range."""
+
+    def remainder(self, point: Point, solved: Any) -> Mapping[str, FloatArray]:
+        """Return groups of smooth shapes that no law describes, rows (k, ...) each."""
+
+    def roughly(self, rows: FloatArray) -> FloatArray:
+        """Return how rows (components, ...) would look if their law were roughly right."""

@@ -1,0 +1,364 @@
+"""A confidence set of hypotheses: which effects, if any, may be missing.
+
+A hypothesis is a set of effects. It is held against everything else that might be there: each
+further effect, and more of each group of smooth shapes than plain tires have. The statistic is the
+largest log evidence of any of these beside the hypothesis,
+
+    T(H) = max over a of log p(r | H and a) - log p(r | H),
+
+and its p-value is the rank of T among plain tires with the hypothesis planted in the user's plan:
+for each family of tires by itself, judged by what its other tires show; the largest p over the
+families counts, so that a tire that is like any one of them is covered. Every hypothesis with
+p > alpha is in the set. Its smallest members are what the data say (Ferrari and Yang 2015): none in
+it, nothing is missing; one smallest member, that is what is missing; several, they cannot be told
+apart; none at all, something unknown is there.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.effects import Effect
+from tirelib.errors import TirelibError
+from tirelib.infer.normal import Normal, Weighed, evidence
+from tirelib.infer.plain import BASE, FOLDS, ROUGHLY, Family, pooled
+from tirelib.infer.posterior import Posterior, posterior
+from tirelib.infer.problem import Problem
+
+PRIOR = 0.5
+"""Standard deviation of a further effect's strength, in ranges."""
+MORE = 8.0
+"""Variance of a group of shapes beyond that of plain tires, over theirs."""
+LAW = 0.15
+"""Relative standard deviation by which a law is off as conditions change."""
+SINGLES, PARTNERS, LEADERS = 6, 3, 3
+"""Hypotheses that are fitted exactly: single effects, partners of each leader, and leaders."""
+MOST = 3
+"""Effects of a hypothesis at most."""
+SLACK = 2.0
+"""Standard deviations by which a strength may leave its range."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hypothesis:
+    """A set of effects with its test.
+
+    Attributes
+    ----------
+    fit : Posterior
+    statistic : float
+        T, [nats].
+    against : str
+        Which effect or shape it is of.
+    p, p_std : float
+    free_p : float
+        The same, with laws that may be off by as much as themselves.
+    plausible : bool
+        Whether the strengths lie in their ranges.
+    evidence : mapping of name to float
+        Log evidence of every further effect beside it, [nats].
+    limit : float
+        T that plain tires exceed with the false-alarm probability.
+    """
+
+    fit: Posterior
+    statistic: float
+    against: str
+    p: float
+    p_std: float
+    free_p: float
+    plausible: bool
+    evidence: dict[str, float]
+    limit: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the effects."""
+        return self.fit.names
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Verdict:
+    """What the confidence set says.
+
+    Attributes
+    ----------
+    kind : str
+        none, named, indistinguishable, form_inadequate or unknown.
+    sets : tuple of tuple of str
+        Smallest members, best first; empty for none and unknown.
+    best : Hypothesis
+        That the verdict's model is made of.
+    base : Hypothesis
+        No further effect.
+    tried : tuple of Hypothesis
+        All that were fitted exactly.
+    alpha : float
+    """
+
+    kind: str
+    sets: tuple[tuple[str, ...], ...]
+    best: Hypothesis
+    base: Hypothesis
+    tried: tuple[Hypothesis, ...]
+    alpha: float
+
+
+class Null:
+    """A fitted hypothesis among the plain tires of one family.
+
+    Parameters
+    ----------
+    normal : Normal
+        About the fit, in the family's whitening.
+    family : Family
+    allowed : mapping of block to variance
+        What the hypothesis leaves open beside what plain tires show.
+    """
+
+    def __init__(
+        self, normal: Normal, family: Family, allowed: Mapping[str, float | FloatArray]
+    ) -> None:
+        self.normal, self.family, self.allowed = normal, family, allowed
+        self.names = [
+            name
+            for name in normal.blocks
+            if name != BASE and not name.startswith(ROUGHLY) and name not in allowed
+        ]
+        self.blocks = [normal.blocks[name] for name in self.names]
+        random = np.random.default_rng(len(family))
+        planted = family.on(normal)
+        for name, variance in allowed.items():
+            if name.startswith(ROUGHLY):
+                block = normal.blocks[name]
+                size = (len(family), block.stop - block.start)
+                planted[:, block] = np.sqrt(variance) * random.standard_normal(size)
+        values, vectors = np.linalg.eigh(normal.gram)
+        noise = random.standard_normal(planted.shape) * np.sqrt(np.clip(values, 0.0, None))
+        self.right = normal.gram @ planted.T + vectors @ noise.T
+
+    def statistics(
+        self, weighed: Weighed, spread: FloatArray, right: FloatArray, names: Sequence[str]
+    ) -> FloatArray:
+        """Return the log evidence of effects or shapes for right-hand sides, (n_names, k)."""
+        blocks = [self.normal.blocks[name] for name in names]
+        more = [
+            MORE * spread[block] if "," in name else np.full(block.stop - block.start, PRIOR**2)
+            for name, block in zip(names, blocks, strict=True)
+        ]
+        return evidence(weighed, weighed.right(right), blocks, more)
+
+    def _of(self, without: int | None, right: FloatArray, names: Sequence[str]) -> FloatArray:
+        spread = self.normal.spread({**self.family.spread(without), **self.allowed})
+        return self.statistics(Weighed(self.normal, spread), spread, right, names)
+
+    def seen(self) -> FloatArray:
+        """Return the log evidence of every effect and shape beside the hypothesis, (n_names,)."""
+        return self._of(None, self.normal.right[:, None], self.names)[:, 0]
+
+    def largest(self) -> FloatArray:
+        """Return the largest log evidence of each plain tire by the others, (n_tires,)."""
+        out = np.zeros(len(self.family))
+        for fold in range(FOLDS):
+            part = self.family.fold == fold
+            if part.any():
+                out[part] = self._of(fold, self.right[:, part], self.names).max(axis=0)
+        return out
+
+
+def judged(
+    problem: Problem,
+    fit: Posterior,
+    families: Sequence[Family],
+    alpha: float,
+    *,
+    own_effects: int,
+) -> Hypothesis:
+    """Return a fitted hypothesis with its statistic and p-value.
+
+    Parameters
+    ----------
+    own_effects : int
+        How many of the fit's effects the model had already: they are part of it.
+    """
+    nulls = [_null(problem, fit, family, 1.0) for family in families]
+    seen = [null.seen() for null in nulls]
+    largest = [null.largest() for null in nulls]
+    each = [_rank(float(s.max()), t) for s, t in zip(seen, largest, strict=True)]
+    best = int(np.argmax(each))
+    free = each[best]
+    if fit.point.effects and free <= alpha:
+        for family in families:
+            null = _null(problem, fit, family, 1.0 / LAW)
+            free = max(free, _rank(float(null.seen().max()), null.largest()))
+    top = int(np.argmax(seen[best]))
+    return Hypothesis(
+        fit,
+        float(seen[best][top]),
+        nulls[best].names[top],
+        each[best],
+        _std(each[best], len(families[best])),
+        free,
+        plausible(fit, own_effects),
+        dict(zip(nulls[best].names, seen[best].tolist(), strict=True)),
+        float(np.quantile(largest[best], 1.0 - alpha)),
+    )
+
+
+def _null(
+    problem: Problem,
+    fit: Posterior,
+    family: Family,
+    looser: float,
+    more: Mapping[str, float] | None = None,
+) -> Null:
+    allowed: dict[str, float | FloatArray] = {
+        BASE: fit.widths**2,
+        **_law_errors(fit, looser),
+        **(more or {}),
+    }
+    return Null(fit.normal(problem, family.own), family, allowed)
+
+
+def _rank(seen: float, largest: FloatArray) -> float:
+    """Return the share of plain tires, this one among them, that have as much."""
+    return float((1 + np.sum(largest >= seen)) / (len(largest) + 1))
+
+
+def _std(p: float, count: int) -> float:
+    """Return the standard deviation of a p-value from so many tires."""
+    return max(float(np.sqrt(p * (1.0 - p) / count)), 1.0 / (count + 1))
+
+
+def _law_errors(fit: Posterior, looser: float) -> dict[str, float]:
+    """Return variances of the blocks of laws that are but roughly right."""
+    out = {}
+    for effect, strength in zip(fit.point.effects, fit.point.strengths, strict=True):
+        size = float(np.linalg.norm(strength)) / effect.scale
+        out[ROUGHLY + effect.name] = (looser * LAW * size) ** 2
+    return out
+
+
+def plausible(fit: Posterior, own_effects: int) -> bool:
+    """Return whether the strengths of the further effects lie in their ranges."""
+    for k, effect in enumerate(fit.point.effects):
+        slack = SLACK * fit.std(k)
+        low, high = effect.low - slack, effect.high + slack
+        inside = (fit.point.strengths[k] >= low) & (fit.point.strengths[k] <= high)
+        if k >= own_effects and not inside.all():
+            return False
+    return True
+
+
+def select(
+    problem: Problem,
+    families: Sequence[Family],
+    *,
+    false_alarm: float = 0.05,
+    progress: Callable[[str], None] | None = None,
+) -> Verdict:
+    """Return which effects, if any, a model lacks.
+
+    Parameters
+    ----------
+    problem : Problem
+    families : sequence of Family
+        Plain tires.
+    false_alarm : float
+        Probability with which a plain tire of any of the families is said to lack something.
+    progress : callable, optional
+    """
+    spread, own = pooled(families), max(family.own for family in families)
+    had = problem.start.effects
+    effects = {effect.name: effect for effect in problem.living}
+    tried: dict[frozenset[str], Hypothesis | None] = {}
+
+    def at(names: Sequence[str], near: Hypothesis | None) -> Hypothesis | None:
+        key = frozenset(names)
+        if key not in tried:
+            more = [effects[name] for name in names]
+            try:
+                fit = posterior(
+                    problem, [*had, *more], spread, own,
+                    near=None if near is None else near.fit,
+                    strengths=_start(problem, near, more, own, spread),
+                    progress=progress,
+                )  # fmt: skip
+                tried[key] = judged(problem, fit, families, false_alarm, own_effects=len(had))
+            except TirelibError:
+                tried[key] = None
+        return tried[key]
+
+    base = at((), None)
+    if base is None:
+        fit = posterior(problem, had, spread, own, strengths=problem.start.strengths)
+        base = judged(problem, fit, families, false_alarm, own_effects=len(had))
+
+    def done(kind: str, members: Sequence[Hypothesis]) -> Verdict:
+        best = members[0] if members else base
+        sets = tuple(_added(member, len(had)) for member in members) if members else ()
+        every = tuple(each for each in tried.values() if each is not None)
+        return Verdict(kind, sets, best, base, every, false_alarm)
+
+    if base.p > false_alarm:
+        return done("none", ())
+    level = [at((name,), base) for name in _leading(base, effects)[:SINGLES]]
+    for size in range(1, MOST + 1):
+        fitted = sorted((h for h in level if h is not None), key=lambda h: h.fit.cost)
+        members = [h for h in fitted if h.plausible and h.p > false_alarm]
+        if members:
+            return done("named" if len(members) == 1 else "indistinguishable", members)
+        if size == MOST:
+            break
+        level = []
+        for leader in [h for h in fitted if h.plausible][: LEADERS if size == 1 else 1]:
+            added = _added(leader, len(had))
+            for partner in [n for n in _leading(leader, effects) if n not in added][:PARTNERS]:
+                level.append(at((*added, partner), leader))
+    free = [h for h in tried.values() if h is not None and h.fit.names[len(had) :]]
+    free = [h for h in free if h.plausible and h.free_p > false_alarm]
+    if free:
+        fewest = min(len(h.names) for h in free)
+        return done(
+            "form_inadequate",
+            sorted((h for h in free if len(h.names) == fewest), key=lambda h: h.fit.cost)[:1],
+        )
+    return done("unknown", ())
+
+
+def _added(hypothesis: Hypothesis, had: int) -> tuple[str, ...]:
+    return hypothesis.names[had:]
+
+
+def _leading(hypothesis: Hypothesis, effects: dict[str, Effect]) -> list[str]:
+    """Return effects by their evidence beside a hypothesis, best first."""
+    found = {name: value for name, value in hypothesis.evidence.items() if name in effects}
+    return sorted(found, key=lambda name: -found[name])
+
+
+def _start(
+    problem: Problem,
+    near: Hypothesis | None,
+    more: Sequence[Effect],
+    own: float,
+    spread: dict[str, float],
+) -> list[FloatArray]:
+    """Return strengths to start from: those of the fit nearby, first order for what is new."""
+    had = [*problem.start.strengths]
+    if near is None:
+        return [*had, *(np.zeros(e.components) for e in more)]
+    known = dict(zip(near.names, near.fit.point.strengths, strict=True))
+    normal = near.fit.normal(problem, own)
+    wide = {e.name: 1.0 for e in more if e.name not in known}
+    diagonal = normal.spread({**spread, BASE: near.fit.widths**2, **wide})
+    mean = Weighed(normal, diagonal).mean(normal.right)
+    out = list(near.fit.point.strengths[: len(had)])
+    for effect in more:
+        if effect.name in known:
+            out.append(known[effect.name])
+        else:
+            first = mean[normal.blocks[effect.name]] * effect.scale
+            out.append(np.clip(first, 0.9 * effect.low, 0.9 * effect.high))
+    return out

@@ -1,0 +1,117 @@
+"""What differs from run to run without anybody's will, as a covariance of each run's waveform.
+
+    C_i = N + T_i S T_i' + rho^2 a_i a_i' * K_i
+
+N is the noise of a mean waveform: white before the low-pass, so that its power falls with the
+filter's gain. T_i are the slopes by load, pressure, gain and angle zero, S the rig's tolerances.
+The last part is a misfit of this run alone, in proportion to the run's strain and correlated over
+the wheel angle in units of the half contact angle (Matern's function of order 3/2, whose spectrum
+falls slowly: the ends of a contact are sharp): what no two runs share cannot be learned from
+them, and without it thousands of samples would be certain of some tens of numbers.
+
+Rows are taken to the harmonics of the turn up to where the filter leaves nothing, and whitened by
+the Cholesky factor there.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.model.state import Operating
+from tirelib.signal import LowPass
+from tirelib.waveforms import GRID
+
+GAIN = 0.1
+"""Gain of the low-pass, in power, below which a harmonic holds nothing."""
+LENGTH = 0.25
+"""Length over which a run's own misfit is correlated, in arcsinh of half contact angles."""
+INSIDE = 1.5
+"""Half contact angles up to which tread and road have to do with the misfit."""
+OUTSIDE = 0.15
+"""Its size away from the contact, over that within."""
+FLOOR = 1e-3
+"""Least power of the noise at a harmonic, over the largest: rounding of counts, angle steps."""
+
+
+@dataclass(frozen=True, slots=True)
+class Whitener:
+    """Turns waveforms (..., n_runs, n_phi) into rows (..., n) of unit covariance.
+
+    Attributes
+    ----------
+    harmonics : shape (n_phi, n_harmonics)
+        Orthonormal cosines and sines.
+    inverse : shape (n_runs, n_harmonics, n_harmonics)
+        Inverse Cholesky factors.
+    log_volume : float
+        Logarithm of the determinant of all of them together.
+    """
+
+    harmonics: FloatArray
+    inverse: FloatArray
+    log_volume: float
+
+    @classmethod
+    def of(
+        cls,
+        waveform: FloatArray,
+        tangent: FloatArray,
+        scale: FloatArray,
+        half_angle: FloatArray,
+        points: Operating,
+        low_pass: LowPass,
+        *,
+        noise: float,
+        own: float,
+    ) -> "Whitener":
+        """Return the whitening about a model.
+
+        Parameters
+        ----------
+        waveform : shape (n_runs, n_phi), [-]
+        tangent : shape (n_runs, n_phi, 4)
+            Slopes by relative load, relative pressure, gain and angle.
+        scale : shape (n_runs, 4)
+            Their standard deviations.
+        half_angle : shape (n_runs,), [rad]
+            Of the contact.
+        points : Operating
+        low_pass : LowPass
+        noise : float, [-]
+            Standard deviation of a sample of a run's mean waveform.
+        own : float, [-]
+            rho, relative to the run's rms strain.
+        """
+        rates = points.omega / (2.0 * np.pi)
+        sigma = np.array([low_pass.sigma(float(rate)) for rate in rates])
+        last = int(np.sqrt(-np.log(GAIN)) / float(sigma.min()))
+        order = np.arange(1, min(last, GRID.size // 2 - 1) + 1)
+        turn = np.outer(GRID, order)
+        harmonics = np.concatenate([np.cos(turn), np.sin(turn)], axis=1) * np.sqrt(2.0 / GRID.size)
+        gain = np.exp(-((sigma[:, None] * order) ** 2))
+        power = gain / np.sum(gain, axis=1, keepdims=True) * 0.5 * GRID.size * noise**2
+        power = np.maximum(power, FLOOR * power.max(axis=1, keepdims=True))
+        scaled = np.arcsinh(GRID / half_angle[:, None])
+        size = np.sqrt(np.mean(waveform**2, axis=1))
+        share = OUTSIDE + (1.0 - OUTSIDE) * np.exp(-((GRID / half_angle[:, None] / INSIDE) ** 4))
+        amount = own * size[:, None] * share
+        covariance = np.zeros((len(points), 2 * order.size, 2 * order.size))
+        for run, (place, much) in enumerate(zip(scaled, amount, strict=True)):
+            near = np.sqrt(3.0) * np.abs(place[:, None] - place) / LENGTH
+            half = much[:, None] * harmonics
+            covariance[run] = half.T @ ((1.0 + near) * np.exp(-near)) @ half
+        moved = harmonics.T @ (tangent * scale[:, None, :])
+        covariance += moved @ moved.swapaxes(1, 2)
+        diagonal = np.arange(2 * order.size)
+        covariance[:, diagonal, diagonal] += np.tile(power, 2)
+        lower = np.linalg.cholesky(covariance)
+        volume = -float(np.sum(np.log(lower[:, diagonal, diagonal])))
+        return cls(harmonics, np.linalg.inv(lower), volume)
+
+    def __call__(self, waves: FloatArray) -> FloatArray:
+        """Return whitened rows (..., n)."""
+        found = np.asarray(waves @ self.harmonics)
+        by_run = np.moveaxis(found.reshape(-1, *found.shape[-2:]), 0, 2)
+        white = np.moveaxis(self.inverse @ by_run, 2, 0)
+        return np.ascontiguousarray(white).reshape(*waves.shape[:-2], -1)
