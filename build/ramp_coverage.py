@@ -4,7 +4,9 @@
 
 Calibrates on steady runs of the rig (plan `set1`, three loads at five speeds and at seven slip
 ratios) and judges on another day's plan `ramps`, with the turn rate that the rig measured and
-without it. Campaigns are kept in the folder; with none there, the rig takes some minutes.
+without it. The truth is the rig's own at the middle of the contact: a mean over a turn is another
+number where a slip ratio turns round. Campaigns are kept in the folder; with none there, the rig
+takes some minutes.
 ``coverage.md`` is written.
 """
 
@@ -14,15 +16,15 @@ from pathlib import Path
 
 import click
 import numpy as np
+import pandas as pd
 
 from tirelib.campaign import Campaign, Run, read_campaign
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.edge import EDGE_UNIT
-from tirelib.estimators.result import TRUTH
 from tirelib.estimators.train import train
 from tirelib.estimators.unknowns import TWO_SIGMA
 from tirelib.observations import measure_run, observe
-from tirelib.rig.campaign import run_plan
+from tirelib.rig.campaign import TRUTH_FILE, run_plan
 from tirelib.rig.plans import Plan, plan
 from tirelib.rig.tire import Condition, tire
 from tirelib.signal import LowPass
@@ -57,6 +59,14 @@ COLUMNS = (
     ("kappa", DENSE),
 )
 
+TRUE = {
+    "Fz": "Fz_N",
+    "alpha": "slip_angle_rad",
+    "Fy": "Fy_N",
+    "kappa": "slip_ratio_1",
+}
+"""Columns of the rig's truth."""
+
 Judged = dict[tuple[str, str], list[tuple[float, float]]]
 """By quantity and source: error and standard deviation of each valid turn."""
 
@@ -84,19 +94,21 @@ def told_by(run: Run, source: str) -> Run:
 def judged(calibration: Calibration, ramps: Campaign) -> tuple[dict[str, Judged], dict[str, str]]:
     """Return the valid turns of each kind of ramp, and how many these are of all."""
     low_pass = LowPass(calibration.order, calibration.cut_off)
+    truth = pd.read_csv(ramps.path / TRUTH_FILE).set_index("run")
     out: dict[str, Judged] = {}
     valid: dict[str, list[bool]] = {}
     for run in ramps.runs():
         kind = str(run.plan.extra["ramp"])
-        turns = out.setdefault(kind, {})
+        turns, points = out.setdefault(kind, {}), truth.loc[[run.plan.run]]
         for source in (OMEGA, SPEED, DENSE):
-            features, truth = measure_run(told_by(run, source), ramps.header, low_pass)
+            features, _ = measure_run(told_by(run, source), ramps.header, low_pass)
             told = calibration.estimate(features)
             good = told.turn_valid
             if source == OMEGA:
                 valid.setdefault(kind, []).extend(good)
-            for quantity in EDGE_UNIT:
-                error = (told.value[quantity] - truth[TRUTH[quantity]])[good]
+            for quantity, column in TRUE.items():
+                true = np.interp(features.time, points["time_s"], points[column])
+                error = (told.value[quantity] - true)[good]
                 rows = zip(error, told.std[quantity][good], strict=True)
                 turns.setdefault((quantity, source), []).extend(rows)
     return out, {kind: f"{sum(good)} of {len(good)}" for kind, good in valid.items()}

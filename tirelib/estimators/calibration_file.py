@@ -293,6 +293,7 @@ def _polynomial_table(model: Polynomial, unit: str) -> dict[str, Any]:
         "unit": unit,
         "residual": model.residual,
         "floor": model.floor,
+        **({"pulled": model.pulled} if model.pulled else {}),
         **({} if border is None else {"border": asdict(border)}),
         "variable": _variables_table(model.variables),
         "term": [
@@ -324,6 +325,7 @@ def _polynomial(table: Mapping[str, Any]) -> Polynomial:
         covariance=covariance,
         residual=float(table["residual"]),
         floor=float(table["floor"]),
+        pulled=float(table.get("pulled", 0.0)),
         border=Border(**{name: float(table["border"][name]) for name in BORDER})
         if "border" in table  # files of before say nothing of it
         else None,

@@ -1,6 +1,7 @@
 """Fit load, rolling radius, lateral force, aligning moment and drag to the links of a chain."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +13,8 @@ from tirelib.estimators.fit import Fit, fit_best
 from tirelib.estimators.grow import grow
 from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.links import VARIES, Links, frozen_with_slip, keep, varying_of
-from tirelib.estimators.polynomial import Polynomial
+from tirelib.estimators.polynomial import Polynomial, leverage
+from tirelib.estimators.pulled import parted
 from tirelib.estimators.regressors import ODD
 from tirelib.estimators.sliding import SlidingCurve
 
@@ -73,7 +75,18 @@ def fit_load(
         return None, mean
     keep(links, "Fz", fit, fit.held_out + correction)
     links.values["load"] = fit.held_out + correction
-    return fit.model, mean
+    return _with_pull(fit.model, values, truth - correction - fit.held_out), mean
+
+
+def _with_pull(
+    model: Polynomial, values: Mapping[str, FloatArray], error: FloatArray
+) -> Polynomial:
+    """Return the model with a standard deviation for free rolling and one for traction."""
+    uncertain = leverage(model.design(values), model.covariance)
+    found = parted(error, uncertain, values["traction"])
+    if found is None:
+        return model
+    return replace(model, residual=found[0], pulled=found[1])
 
 
 def fit_radius(links: Links, say: Callable[[str], None]) -> Polynomial | None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.estimators.border import Border
+from tirelib.estimators.pulled import pull_share
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,6 +141,8 @@ class Polynomial:
         Standard deviation of one turn about the mean of its run, unit of y.
     border : Border or None
         Where the data end; None: not known.
+    pulled : float
+        Further standard deviation of a wheel that is braked or driven, unit of y.
     """
 
     variables: tuple[Variable, ...]
@@ -149,6 +152,7 @@ class Polynomial:
     residual: float
     floor: float
     border: Border | None = None
+    pulled: float = 0.0
 
     def design(self, values: Mapping[str, FloatArray]) -> FloatArray:
         """Return the terms' values, shape (n, k)."""
@@ -160,6 +164,8 @@ class Polynomial:
         uncertain = leverage(x, self.covariance)
         if self.border is not None:
             uncertain = self.border.grown(uncertain)
+        if self.pulled:
+            uncertain = uncertain + self.pulled**2 * pull_share(values["traction"])
         std = np.sqrt(self.residual**2 + self.floor**2 + uncertain)
         return x @ self.coefficients, std
 
