@@ -13,7 +13,7 @@ LONGEST_BRIDGE = 2
 """Samples in a row that a straight line may replace."""
 SPIKE_SHARE = 0.05
 """A sample is a spike when it departs from its neighbours' median by this share of the swing."""
-DEAD_SHARE = 0.15
+DEAD_SHARE = 0.25
 """A gage shows no contact when its flanks have less than this share of the median gage's steepness.
 The belt bulges over a shoulder that is lifted off the road, so a strain that only swings is no
 contact. ``python build/cosim/lifted_shoulder.py`` has half and double."""
