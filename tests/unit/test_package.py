@@ -1,0 +1,50 @@
+"""What the package needs is what it declares, and it installs no name that others may bear."""
+
+import ast
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+NAMES = {"can": "python-can", "serial": "pyserial", "tomli_w": "tomli-w"}
+"""Packages whose module has another name."""
+
+
+def declared(*extras: str) -> set[str]:
+    project = PROJECT["project"]
+    lists = [project["dependencies"], *(project["optional-dependencies"][name] for name in extras)]
+    return {line.split(">")[0].split("=")[0].split("[")[0] for each in lists for line in each}
+
+
+def imported(folder: Path) -> set[str]:
+    found: set[str] = set()
+    for file in folder.rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.Import):
+                found |= {name.name.partition(".")[0] for name in node.names}
+            elif isinstance(node, ast.ImportFrom) and not node.level:
+                found.add(str(node.module).partition(".")[0])
+    return {NAMES.get(name, name) for name in found - set(sys.stdlib_module_names)}
+
+
+@pytest.mark.parametrize(
+    ("folder", "extras", "own"),
+    [("tirelib", ("fmu",), {"tirelib"}), ("bench/tirebench", ("bench",), {"tirelib", "tirebench"})],
+)
+def test_everything_that_is_imported_is_declared(
+    folder: str, extras: tuple[str, ...], own: set[str]
+) -> None:
+    assert imported(ROOT / folder) - own <= declared(*extras)
+
+
+def test_the_core_declares_nothing_that_the_library_does_not_import() -> None:
+    assert declared() <= imported(ROOT / "tirelib") | {"pyarrow"}  # pandas writes Parquet with it
+
+
+def test_the_wheel_installs_two_packages_with_their_types() -> None:
+    packages = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]
+    assert packages == ["tirelib", "bench/tirebench"]
+    assert all((ROOT / package / "py.typed").is_file() for package in packages)
