@@ -306,7 +306,9 @@ def select(
         return done("none", ())
     level = [at((name,), base) for name in _leading(base, effects)[:SINGLES]]
     for size in range(1, MOST + 1):
-        fitted = sorted((h for h in level if h is not None), key=lambda h: h.fit.cost)
+        # two leaders may lead to one and the same set
+        fitted = list(dict.fromkeys(h for h in level if h is not None))
+        fitted.sort(key=lambda h: h.fit.cost)
         members = [h for h in fitted if h.plausible and h.p > false_alarm]
         if members:
             return done("named" if len(members) == 1 else "indistinguishable", members)

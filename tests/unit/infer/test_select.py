@@ -67,3 +67,8 @@ def test_a_strength_outside_its_range_is_not_named() -> None:
     found = select(Toy(drawn(np.random.default_rng(3), twist=-0.6)), FAMILIES)
     assert ("twist",) not in found.sets
     assert found.kind == "unknown"
+
+
+def test_a_set_is_listed_once_whichever_effect_led_to_it() -> None:
+    found = select(Toy(drawn(np.random.default_rng(2), bend=0.6, twist=0.6)), FAMILIES)
+    assert len(found.sets) == len({frozenset(names) for names in found.sets})
