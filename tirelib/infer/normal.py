@@ -102,10 +102,15 @@ class Weighed:
         out: FloatArray = self.mean(self.normal.right) + vectors @ noise
         return out
 
+    def gain(self, right: FloatArray) -> FloatArray:
+        """Return the log density of residuals over that of unit noise alone, for (m, k)."""
+        explained = 0.5 * np.sum(right * self.mean(right), axis=0)
+        return np.asarray(explained - np.sum(np.log(np.diag(self.lower))))
+
     def log_likelihood(self) -> float:
         """Return the log density of the residual, up to a constant of the samples' number."""
-        explained = self.normal.right @ self.mean(self.normal.right)
-        return float(-0.5 * (self.normal.square - explained) - np.sum(np.log(np.diag(self.lower))))
+        gain = self.gain(self.normal.right[:, None])[0]
+        return float(gain - 0.5 * self.normal.square)
 
 
 def evidence(

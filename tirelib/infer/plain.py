@@ -25,8 +25,13 @@ ROUNDS = 60
 SETTLED = 0.01
 """Relative change of all variances below which they are learned."""
 START = 0.02**2
-LEAST = 1e-4**2
-"""Least variance of an effect's apparent strength or of a shape."""
+LEAST = 0.003**2
+"""Least variance of an effect's apparent strength."""
+FLOOR = 0.3
+"""Least size of a group of shapes over that of the largest: what twenty tires of one family hardly
+show, those of another may."""
+TINY = 1e-8
+"""Least variance while they are learned."""
 BASE, ROUGHLY = "base", "roughly "
 
 
@@ -68,7 +73,10 @@ class Family:
         total = np.where(known, self.squares[kept], 0.0).sum(axis=0)
         count = known.sum(axis=0)
         mean = np.where(count > 0, total / np.maximum(count, 1), START)
-        return dict(zip(self.blocks, np.maximum(mean, LEAST).tolist(), strict=True))
+        shapes = np.array(["," in name for name in self.blocks])
+        floor = FLOOR**2 * float(np.max(mean, where=shapes, initial=0.0))
+        least = np.where(shapes, floor, LEAST)
+        return dict(zip(self.blocks, np.maximum(mean, least).tolist(), strict=True))
 
     def on(self, normal: Normal) -> FloatArray:
         """Return the tires' coefficients for rows of a user's plan, (n_tires, n_rows).
@@ -121,7 +129,7 @@ def learn(
                 square[k] = (
                     np.nan if rows is None else float(np.mean(mean[rows] ** 2 + variance[rows]))
                 )
-        new = np.maximum(np.nanmean(squares, axis=0), LEAST)
+        new = np.maximum(np.nanmean(squares, axis=0), TINY)
         old = np.array(list(spread.values()))
         spread = dict(zip(blocks, new.tolist(), strict=True))
         if float(np.abs(np.log(new / old)).max()) < SETTLED:

@@ -31,6 +31,12 @@ PRIOR = 0.5
 """Standard deviation of a further effect's strength, in ranges."""
 MORE = 8.0
 """Variance of a group of shapes beyond that of plain tires, over theirs."""
+SIZES = 2.0 ** np.arange(-2, 2)
+"""Sizes of what one tire shows over what its family shows, among which its likelihood chooses. A
+tire that leaves little shows a weak effect; one that leaves far more than its family has something
+unknown, so that twice as much is the most that is excused."""
+SIZE_STD = 1.5
+"""Standard deviation of the logarithm of this size."""
 LAW = 0.15
 """Relative standard deviation by which a law is off as conditions change."""
 SINGLES, PARTNERS, LEADERS = 6, 3, 3
@@ -139,20 +145,31 @@ class Null:
         noise = random.standard_normal(planted.shape) * np.sqrt(np.clip(values, 0.0, None))
         self.right = normal.gram @ planted.T + vectors @ noise.T
 
-    def statistics(
-        self, weighed: Weighed, spread: FloatArray, right: FloatArray, names: Sequence[str]
-    ) -> FloatArray:
-        """Return the log evidence of effects or shapes for right-hand sides, (n_names, k)."""
-        blocks = [self.normal.blocks[name] for name in names]
-        more = [
-            MORE * spread[block] if "," in name else np.full(block.stop - block.start, PRIOR**2)
-            for name, block in zip(names, blocks, strict=True)
-        ]
-        return evidence(weighed, weighed.right(right), blocks, more)
-
     def _of(self, without: int | None, right: FloatArray, names: Sequence[str]) -> FloatArray:
-        spread = self.normal.spread({**self.family.spread(without), **self.allowed})
-        return self.statistics(Weighed(self.normal, spread), spread, right, names)
+        """Return the log evidence of effects or shapes for right-hand sides, (n_names, k).
+
+        Each right-hand side is one tire's, and is judged at its own most likely size of what plain
+        tires show: some leave much of everything, some little.
+        """
+        blocks = [self.normal.blocks[name] for name in names]
+        typical = self.family.spread(without)
+        highest = np.full(right.shape[1], -np.inf)
+        out = np.zeros((len(names), right.shape[1]))
+        for size in SIZES:
+            spread = {name: size**2 * variance for name, variance in typical.items()}
+            diagonal = self.normal.spread({**spread, **self.allowed})
+            weighed = Weighed(self.normal, diagonal)
+            likelihood = weighed.gain(right) - 0.5 * (np.log(size) / SIZE_STD) ** 2
+            more = [
+                MORE * diagonal[block]
+                if "," in name
+                else np.full(block.stop - block.start, PRIOR**2)
+                for name, block in zip(names, blocks, strict=True)
+            ]
+            found = evidence(weighed, weighed.right(right), blocks, more)
+            better = likelihood > highest
+            highest[better], out[:, better] = likelihood[better], found[:, better]
+        return out
 
     def seen(self) -> FloatArray:
         """Return the log evidence of every effect and shape beside the hypothesis, (n_names,)."""

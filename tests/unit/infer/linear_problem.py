@@ -12,7 +12,7 @@ from tirelib.infer.plain import Family
 from tirelib.infer.problem import Point
 
 N, SHAPES = 300, 6
-PLAIN = {"swell": 0.05, "bend": 0.002, "twist": 0.002, "smooth, all": 0.3}
+PLAIN = {"swell": 0.05, "bend": 0.002, "twist": 0.002, "smooth, all": 0.3, "smooth, there": 0.05}
 """Standard deviations of what the toy's plain tires show."""
 
 
@@ -43,6 +43,7 @@ class Toy:
         self.measured = measured
         self.base = random.standard_normal((3, N))
         self.shapes = random.standard_normal((SHAPES, N)) / 5.0
+        self.there = random.standard_normal((SHAPES, N)) / 5.0
         self.by = {name: random.standard_normal((1, N)) for name in EFFECTS}
         if alike:
             self.by["bend"] = self.by["twist"] + 1e-6 * self.by["bend"]
@@ -68,29 +69,30 @@ class Toy:
         return {name: rows for name, rows in self.by.items() if name not in has}
 
     def remainder(self, point: Point, solved: Any) -> dict[str, FloatArray]:
-        return {"smooth, all": self.shapes}
+        return {"smooth, all": self.shapes, "smooth, there": self.there}
 
     def roughly(self, rows: FloatArray) -> FloatArray:
         return rows * np.sin(np.arange(N) / 10.0)
 
 
-def drawn(random: np.random.Generator, **planted: float) -> FloatArray:
+def drawn(random: np.random.Generator, *, size: float = 1.0, **planted: float) -> FloatArray:
     """Return what a plain toy tire shows, with effects planted, in ranges."""
     toy = Toy(np.zeros(N))
     rest = random.standard_normal(N) + random.standard_normal(3) @ toy.base
     for name, rows in toy.by.items():
-        strength = PLAIN[name] * random.standard_normal() + planted.get(name, 0.0)
+        strength = size * PLAIN[name] * random.standard_normal() + planted.get(name, 0.0)
         rest = rest + strength * rows[0]
-    return np.asarray(rest + PLAIN["smooth, all"] * random.standard_normal(SHAPES) @ toy.shapes)
+    for name, rows in toy.remainder(toy.start, None).items():
+        rest = rest + size * PLAIN[name] * random.standard_normal(SHAPES) @ rows
+    return np.asarray(rest)
 
 
 def family(count: int, seed: int = 1, name: str = "toys") -> Family:
     """Return a family whose tires are as `PLAIN` says."""
     random = np.random.default_rng(seed)
-    blocks = {**dict.fromkeys(EFFECTS, 1), "smooth, all": SHAPES}
+    blocks = {**dict.fromkeys(EFFECTS, 1), "smooth, all": SHAPES, "smooth, there": SHAPES}
     sizes = np.concatenate([np.full(rows, PLAIN[block]) for block, rows in blocks.items()])
     draws = sizes * random.standard_normal((count, sizes.size))
-    squares = np.stack(
-        [*(draws[:, k] ** 2 for k in range(3)), np.mean(draws[:, 3:] ** 2, axis=1)], axis=1
-    )
+    parts = np.split(draws**2, [1, 2, 3, 3 + SHAPES], axis=1)
+    squares = np.stack([part.mean(axis=1) for part in parts], axis=1)
     return Family(name, 0.001, blocks, draws, squares)
