@@ -67,7 +67,7 @@ def estimate(made: dict[str, np.ndarray], *told: str) -> Any:
     return features, CALIBRATION.estimate(features)
 
 
-def even(middle: float, turn: float, *_: Any) -> Any:
+def even(middle: float, turn: float, *_: Any, **__: Any) -> Any:
     """Return the law of a wheel that turns evenly."""
     return angle_law(middle, turn, 0.0, {}, ())
 

@@ -27,6 +27,7 @@ holds them against any tire; `docs/estimators.md` shows half and double of each.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -115,18 +116,18 @@ class Road:
         depth = self.said(values, "tread_depth")
         lost = -beyond(depth, self.depth)
         known = np.isfinite(lost)
-        unknown = spread(beyond(np.linspace(*DEPTH, 81), self.depth))
+        unknown = _unknown_wear(self.depth, DEPTH)
         return np.where(known, lost, 0.0), np.where(known, 0.0, unknown)
 
     def hardened(self, values: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
         """Return L, how much stiffer the tread is than calibrated, and its standard deviation."""
         depth, low_high = self.said(values, "tread_depth"), self.depth
-        wear = -_log_height(depth, low_high)
+        wear = -_log_height(depth, low_high, UNDER_GROOVES)
         known = np.isfinite(wear)
-        std = np.where(known, 0.0, spread(_log_height(np.linspace(*DEPTH, 81), low_high)))
+        std = np.where(known, 0.0, _unknown_height(low_high, DEPTH, UNDER_GROOVES))
         warmer = beyond(self.said(values, "tread_temperature"), self.tread_temperature)
         given = np.isfinite(warmer)
-        unknown = SOFTENING * spread(np.linspace(-TEMPERATURE, TEMPERATURE, 81))
+        unknown = SOFTENING * _unknown_warmth(TEMPERATURE)
         value = np.where(known, wear, 0.0) - np.where(given, SOFTENING * warmer, 0.0)
         return value, np.hypot(std, np.where(given, 0.0, unknown))
 
@@ -141,6 +142,20 @@ def spread(departure: FloatArray) -> float:
     return float(np.quantile(np.abs(departure), 0.95)) / TWO_SIGMA
 
 
-def _log_height(depth: FloatArray, low_high: Pair) -> FloatArray:
-    inside = np.clip(depth, *low_high)
-    return np.asarray(np.log((depth + UNDER_GROOVES) / (inside + UNDER_GROOVES)))
+def _log_height(depth: FloatArray, low_high: Pair, under: float) -> FloatArray:
+    return np.asarray(np.log((depth + under) / (np.clip(depth, *low_high) + under)))
+
+
+@lru_cache(maxsize=64)
+def _unknown_wear(calibrated: Pair, depth: Pair) -> float:
+    return spread(beyond(np.linspace(*depth, 81), calibrated))
+
+
+@lru_cache(maxsize=64)
+def _unknown_height(calibrated: Pair, depth: Pair, under: float) -> float:
+    return spread(_log_height(np.linspace(*depth, 81), calibrated, under))
+
+
+@lru_cache(maxsize=64)
+def _unknown_warmth(within: float) -> float:
+    return spread(np.linspace(-within, within, 81))
