@@ -17,6 +17,7 @@ from tirelib.model.base import operating_points, values_of
 from tirelib.model.state import Operating
 from tirelib.model.whole import solve_whole
 from tirelib.parameters import Tire
+from tirelib.rig.solve import inflated
 from tirelib.rig.tire import RigTire
 from tirelib.waveforms import Waveforms
 
@@ -134,9 +135,16 @@ def definition(tire: RigTire, pressure: float) -> dict[str, float]:
         "extension_stiffness": tire.extension,
         "shear_stiffness": tire.shear,
         "rotary_inertia": 0.0,
+        "section_pull": grown_pull(tire, pressure),
         "tread_shear_stiffness": tire.tread_shear_x * tire.belt_width * (tire.friction > 0.0),
         "tread_hardening": tire.tread_hardening,
     }
+
+
+def grown_pull(tire: RigTire, pressure: float) -> float:
+    """Return the share of p b that the sidewalls of the grown belt take, pulled along by it."""
+    grown = inflated(tire, pressure, 0.0)
+    return tire.radial_stiffness(pressure) * grown / (pressure * tire.belt_width)
 
 
 def vertical_stiffness(tire: Tire) -> float:

@@ -30,6 +30,7 @@ TYPICAL = {
     "radial_pressure_slope": 1.0,
     "tangential_pressure_slope": 0.35,
     "tread_hardening": 1.0,
+    "section_pull": 0.03,
 }
 """Size to which errors are related of what may be zero: slopes [m], as in `tirelib.identify`."""
 

@@ -37,6 +37,8 @@ class Yard:
     slopes : shape (n_free, n_runs, n_phi)
         By the base's coordinates and the delay, each for one standard deviation of its prior.
     whiten : Whitening
+        By set points and by a fit's noise, a share of misfit in it: one run's gain is a few numbers
+        of 360, which noise alone would hide among the others.
     """
 
     gages: tuple[int, ...]
@@ -61,7 +63,7 @@ class Yard:
             runs.strain,
             runs.strain - wave,
             np.concatenate([by.waveform[:k] * fit.prior_std[:, None, None], late]),
-            whitening_of(tangent, scales(runs.tolerance, waves.angle_std), runs.noise.std),
+            whitening_of(tangent, scales(runs.tolerance, waves.angle_std), data.noise),
         )
 
     def change(self, waves: Waveforms) -> Array:

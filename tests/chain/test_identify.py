@@ -18,6 +18,7 @@ from tirelib.cli import main, program
 from tirelib.parameters import read_tire
 from tirelib.rig.campaign import run_plan
 from tirelib.rig.plans import Plan
+from tirelib.rig.solve import inflated
 from tirelib.rig.tire import TIRES, Condition
 
 TIRE = TIRES["reference"]
@@ -75,6 +76,7 @@ def document(files: dict[str, Path]) -> dict[str, Any]:
 def true() -> dict[str, float]:
     """The rig tire's constants at the mean pressure, in the units of the document."""
     mean = float(np.mean([pressure for _, pressure in CONDITIONS]))
+    grown = inflated(TIRE, mean, 0.0)
     return {
         "bending_stiffness": TIRE.bending,
         "radial_stiffness": TIRE.radial_stiffness(mean),
@@ -88,6 +90,7 @@ def true() -> dict[str, float]:
         "rotary_inertia": 0.0,
         "tread_shear_stiffness": TIRE.tread_shear_x * TIRE.belt_width,
         "tread_hardening": TIRE.tread_hardening,
+        "section_pull": TIRE.radial_stiffness(mean) * grown / (mean * TIRE.belt_width),
     }
 
 
@@ -133,7 +136,7 @@ def test_the_document_says_what_was_done(document: dict[str, Any], campaign: Pat
     assert document["gages"] == [1, 2, 3, 4, 5]
     assert document["noise_ustrain"] is None, "nothing was repeated"
     matrix = np.array(document["correlation"])
-    assert matrix.shape == (12, 12)
+    assert matrix.shape == (13, 13)
     assert np.diag(matrix) == pytest.approx(1.0)
     assert document["provenance"]["data_sha256"] == read_campaign(campaign).content_hash()
     keys = {"name", "meaning", "value", "std", "low", "high", "fit_std", "unit", "flags", "helps"}

@@ -12,6 +12,7 @@ from tirelib.contact.exact import load_exact
 from tirelib.contact.tread import Tread
 from tirelib.errors import ConvergenceError, ParameterError
 from tirelib.ring.ring import Ring
+from tirelib.rolling import belt
 from tirelib.rolling.assemble import Unknowns, matrix, residual
 from tirelib.rolling.constants import Constants
 from tirelib.rolling.mesh import mesh
@@ -54,6 +55,7 @@ WHOLE = {
     "dashpots": 0.05,
     "omega": 70.0,
     "crown": 0.5,
+    "tension": -500.0,
 }
 
 
@@ -126,6 +128,23 @@ def test_without_shear_and_friction_it_is_the_exact_ring_of_harmonics() -> None:
     # its fibres have the length R + y, those of the other ring R
     other = smooth(exact.strain(-0.003, phi) * 0.303 / 0.300)
     assert rms(strain(found) - other) < 3e-3 * rms(other)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.02])
+def test_sidewalls_that_pull_leave_the_belt_round_and_keep_their_direction(
+    turn: float,
+) -> None:
+    """A belt that turns carries the ends of the pull S = -T / R with it: S R^2 sin turns it on."""
+    pull, radius = 1200.0, BARE["radius"]
+    z = np.zeros((6, 3, 1))
+    z[belt.U], z[belt.V] = radius * (np.cos(turn) - 1.0), radius * np.sin(turn)
+    z[belt.PSI] = -turn
+    pulled = belt.forces(z, ring(tension=-pull * radius)) - belt.forces(z, ring())
+    outward = pulled[belt.U] * np.cos(turn) + pulled[belt.V] * np.sin(turn)
+    np.testing.assert_allclose(outward, pull * radius * (np.cos(turn) - 1.0), atol=1e-9)
+    virtual = -pulled[belt.U] * np.sin(turn) + pulled[belt.V] * np.cos(turn)
+    moment = virtual * radius - pulled[belt.PSI]
+    np.testing.assert_allclose(moment, -pull * radius**2 * np.sin(turn), atol=1e-9)
 
 
 def test_the_road_carries_the_load_and_no_torque() -> None:

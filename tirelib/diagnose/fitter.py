@@ -40,6 +40,7 @@ WIDTH = {
     "rotary_inertia": 1.0,
     "tread_shear_stiffness": 1.0,
     "tread_hardening": 0.7,
+    "section_pull": 1.5,
 }
 """Prior standard deviation of the free coordinates: wide, since the campaign has informed them."""
 STRENGTH_WIDTH = 1.0

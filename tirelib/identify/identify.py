@@ -42,6 +42,7 @@ _PLAIN: Mapping[str, tuple[float, float, str]] = {
     ),
     "tread_shear_stiffness": (2.5e7, 1.0, "k_t / 3, for rubber keeps its volume"),
     "tread_hardening": (1.0, 0.7, "assumed: blocks bulge into their grooves"),
+    "section_pull": (0.03, 1.5, "assumed: growth of the belt and ply arches, 1 to 7 %"),
 }
 """Value, relative standard deviation and source of what no campaign header holds."""
 BASES = ("plain", "dissertation")

@@ -26,6 +26,7 @@ STRUCTURE_STD: Mapping[str, float] = MappingProxyType(
         "rotary_inertia": 1.0,
         "tread_shear_stiffness": 0.3,
         "tread_hardening": 0.6,
+        "section_pull": 0.5,
     }
 )
 """Relative standard deviation by parameter, in units of the value (slopes: of a typical slope)."""

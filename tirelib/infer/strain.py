@@ -46,6 +46,7 @@ WIDTH = {
     "rotary_inertia": 1.0,
     "tread_shear_stiffness": 1.0,
     "tread_hardening": 0.7,
+    "section_pull": 1.5,
 }
 """Prior standard deviations of the base's coordinates: wide, the campaign informs them."""
 IN_BASE = {

@@ -64,6 +64,7 @@ PLAIN: tuple[Coordinate, ...] = (
     Coordinate("rotary_inertia"),
     Coordinate("tread_shear_stiffness"),
     Coordinate("tread_hardening"),
+    Coordinate("section_pull", 0.03),
 )
 """Those of the plain tire: every belt shears and has section inertia, every tread sticks to the
 road and hardens when it is pressed."""

@@ -56,7 +56,7 @@ def made_of(values: Values, points: Operating) -> Made:
         mass=v["mass"],
         rotary_inertia=v["rotary_inertia"],
         inflation=points.pressure * width,
-        tension=0.0,
+        tension=-v["section_pull"] * points.pressure * width * v["ring_radius"],
         k_u=v["radial_stiffness"] + v["radial_pressure_slope"] * above,
         k_v=v["tangential_stiffness"] + v["tangential_pressure_slope"] * above,
         dashpots=0.0,

@@ -45,6 +45,9 @@ FIELDS: Mapping[str, Field] = MappingProxyType(
             "belt", "N", "force", 1e3, _ANY, "GA; inf is the Bernoulli-Euler belt"
         ),
         "rotary_inertia": Field("belt", "kg m", "rotary_inertia", 0.0, 1.0, "rho I"),
+        "section_pull": Field(
+            "sidewall", "1", "ratio", -0.3, 0.5, "share of p b that the sidewalls take inward"
+        ),
         "pressure": Field(
             "inflation", "bar", "pressure", 0.0, 2e6, "reference pressure of the sidewall values"
         ),
@@ -138,6 +141,7 @@ class Tire:
     extension_stiffness: float = math.inf
     shear_stiffness: float = math.inf
     rotary_inertia: float = 0.0
+    section_pull: float = 0.0
     radial_pressure_slope: float = 0.0
     radial_deflection_rate: float = 0.0
     tangential_pressure_slope: float = 0.0

@@ -7,7 +7,9 @@ are its displacement and psi the turn of its cross-section. With a = R + u + v' 
 .. math:: R(1 + \Gamma_1) = a\cos\psi + c\sin\psi,\quad R\,\Gamma_2 = c\cos\psi - a\sin\psi,
           \quad \kappa = \psi' / R,
 
-N = p b R + EA Gamma_1 along the section's normal, Q = GA Gamma_2 across it and M = EI kappa.
+N = p b R + T + EA Gamma_1 along the section's normal, Q = GA Gamma_2 across it and M = EI kappa.
+What the tension T has beside p b R is held by a radial force T / R of the sidewalls, which keeps
+its direction: where plies pull inward, T is negative.
 Material streams through the steady shape with Omega; its acceleration is Omega^2 r'', which holds
 centrifugal and Coriolis terms. The pressure follows the deformed belt. The sidewall's springs and
 dashpots act between belt and rim, both in the turning frame.
@@ -42,7 +44,8 @@ def forces(z: FloatArray, k: Constants) -> FloatArray:
     by_c = belt.N * belt.sin + belt.Q * belt.cos - spin * belt.c
     radius, omega = c["radius"], c["omega"]
     damp_u, damp_v = _dashpots(c)
-    out[U] = by_a - c["inflation"] * belt.a + radius * (c["k_u"] * z[U] + damp_u * z[DU])
+    push = c["inflation"] * belt.a + c["tension"]
+    out[U] = by_a - push + radius * (c["k_u"] * z[U] + damp_u * z[DU])
     out[V] = -by_c + c["inflation"] * belt.c + radius * (c["k_v"] * z[V] + damp_v * z[DV])
     out[DU], out[DV] = by_c, by_a
     out[PSI] = belt.N * belt.across - belt.Q * belt.along

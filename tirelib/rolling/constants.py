@@ -29,7 +29,7 @@ class Constants:
     inflation : [N/m]
         p b: pressure times the width that carries it.
     tension : [N]
-        Of the belt beside p b R.
+        Of the belt beside p b R; a radial force of the sidewalls holds it (`tirelib.rolling.belt`).
     k_u, k_v : [N/m^2]
         Sidewall, radial and tangential.
     dashpots : [-]

@@ -28,6 +28,7 @@ GRIPPING = {
     "rotary_inertia": 8e-5,
     "tread_shear_stiffness": 2e7,
     "tread_hardening": 1.0,
+    "section_pull": 0.03,
 }
 CASES: dict[str, tuple[Mapping[str, float | FloatArray], Changes]] = {
     "plain": (VALUES, ()),
