@@ -49,8 +49,8 @@ ALLOWED, GENTLE = 0.08, 3.0
 """Share of the load that the water may carry; deceleration while it carries more [m/s^2]."""
 SHOWS = 2.5
 """Standard deviation of a strain tire's load, as a share of the load, over the share that water
-carries: 2.1 to 3.0 at 2.7 to 4.5 kN and up to 12 % of the load (``python -m cosim.water`` solves
-the rig and prints it), less beyond. ``docs/vehicle.md`` has half and double."""
+carries: 1.9 to 2.5 at 2.7 to 4.7 kN and up to 10 % of the load (``python -m cosim.water``), less
+beyond; the upper end, so that a dry road is not taken for a wet one."""
 NOTICED = 4.5
 """Way in the water within which it is to be noticed [m]: two turns and the output's delay."""
 KINDS = ("perfect", "strain", "today")
