@@ -65,6 +65,8 @@ LEAST_SIGNAL = 3.0
 LEAST_STEP = 1e-3
 NEAR = 0.2
 """Move of a strength, in ranges, within which what it adds to the slopes is kept."""
+NEAR_BASE = 0.1
+"""The same of the base's coordinates."""
 UNKNOWN_NOISE = 0.005
 """Noise over the rms strain where there are no repeats."""
 
@@ -94,10 +96,15 @@ class _Changed:
     def serves(self, point: Point) -> bool:
         """Return whether a point is so near that these slopes do."""
         same = self.point.effects == point.effects
-        return same and all(
-            float(np.abs(a - b).max()) < NEAR * effect.scale
-            for effect, a, b in zip(
-                point.effects, self.point.strengths, point.strengths, strict=True
+        near = float(np.abs(self.point.base - point.base).max()) < NEAR_BASE
+        return (
+            same
+            and near
+            and all(
+                float(np.abs(a - b).max()) < NEAR * effect.scale
+                for effect, a, b in zip(
+                    point.effects, self.point.strengths, point.strengths, strict=True
+                )
             )
         )
 
