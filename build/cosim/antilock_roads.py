@@ -25,7 +25,7 @@ class Road:
     patches : sequence of (start, left, right)
         From a way [m] since the brakes were put on: factor of the friction on either side.
     steer : float, [rad]
-        Of the front wheels before the brakes.
+        Steer angle of the front wheels before the brakes are put on.
     rolling : float, [s]
         Time before the brakes: two turns of every wheel, and a turn settles.
     """

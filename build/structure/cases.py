@@ -30,13 +30,13 @@ class Case:
     family : str
         rig, continuum or ring.
     seed : int
-        Of tire, plan and day; the family's own.
+        Seed of the tire, the plan and the day, counted within the family.
     kind : str
         none, an effect's name, or two joined by +.
     wanted : float
         Error ratio that was asked for; 1 of a plain tire.
     waves, floor_waves : Waveforms
-        With what is hidden and without it: same tire, set points, noise.
+        Waveforms with the hidden effect and without it: same tire, set points and noise.
     strength : mapping of effect to float
     known : bool
         Whether the catalogue has all that is hidden.

@@ -298,11 +298,14 @@ def select(
             more = [effects[name] for name in names]
             try:
                 fit = posterior(
-                    problem, [*had, *more], spread, own,
+                    problem,
+                    [*had, *more],
+                    spread,
+                    own,
                     near=None if near is None else near.fit,
                     strengths=_start(problem, near, more, own, spread),
                     progress=progress,
-                )  # fmt: skip
+                )
                 tried[key] = judged(problem, fit, families, false_alarm, own_effects=len(had))
             except TirelibError:
                 tried[key] = None

@@ -105,7 +105,7 @@ class Health:
     pressure : float, [Pa]
         Gauge; 0.02 bar a step.
     flags : int
-        As in SERIAL v1: bits of `tirebench.wire.frames.FrameFlag`.
+        Flags of the frame as in SERIAL v1, bits of `tirebench.wire.frames.FrameFlag`.
     """
 
     radio_lost: int = 0

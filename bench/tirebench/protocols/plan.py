@@ -30,7 +30,7 @@ class ProtocolPlan:
     Attributes
     ----------
     encoding : str
-        Of the bytes, see `tirebench.protocols`.
+        Name of the byte layout (`tirebench.protocols`).
     rate : float, [Hz]
         Of the gages, where the frames do not say it.
     user_map : UserMap or None
