@@ -36,9 +36,9 @@ class Day:
     group : shape (n_runs,)
         Equal for equal set points.
     delay : float
-        Of the gages against the trigger [s].
+        Delay of the gages against the trigger [s].
     angle : float
-        Of a mark on the tire [rad].
+        Wheel angle of a mark on the tire [rad].
     """
 
     lab: Laboratory

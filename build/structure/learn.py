@@ -1,4 +1,4 @@
-"""Learn what plain tires show beside their model, and how false alarms come out on left-out tires.
+"""Learn what plain tires leave of a fitted model; count false alarms on a family left out.
 
     python build/structure/learn.py                      fits, table and P-P figures
     python build/structure/learn.py --families rig,ring  of two families only

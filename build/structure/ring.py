@@ -14,7 +14,7 @@ from structure.gages import GAGES
 from structure.rig import shown_by_gages
 from tirelib.campaign import TireGeometry
 from tirelib.rolling.constants import Constants
-from tirelib.rolling.solve import Rolling, solve
+from tirelib.rolling.solve import solve
 
 BAR = 1e5
 NUDGE = 10.0
@@ -149,11 +149,11 @@ class Ring:
         load = np.array([s.load for s in settings])
         speed = np.array([s.speed for s in settings])
         omega, depth = speed / (0.97 * tire.free_radius), np.full(load.size, 0.02)
-        found: Rolling | None = None
-        for _ in range(WAYS):
-            found = solve(_constants(tire, settings, load, omega, depth), start=found)
+        found = solve(_constants(tire, settings, load, omega, depth))
+        for _ in range(WAYS - 1):
             omega, depth = speed / found.rolling_radius, found.deflection
-        assert found is not None  # noqa: S101 - the loop ran
+            found = solve(_constants(tire, settings, load, omega, depth), start=found)
+        omega, depth = speed / found.rolling_radius, found.deflection
         # the sidewall follows the deflection in the slope as well
         more = found
         for _ in range(WAYS):

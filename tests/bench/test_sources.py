@@ -483,7 +483,7 @@ def serial(port: str, wheel: int | None = None) -> SourcePlan:
         (
             (vehicle("a"), vehicle("b")),
             None,
-            "told twice: speed from slcan:a, pressure of wheel 3 fr",
+            "the same condition: speed from slcan:a, pressure of wheel 3 fr",
         ),
         (
             (serial("a"), vehicle("b")),

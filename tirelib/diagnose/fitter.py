@@ -14,6 +14,7 @@ from tirelib.errors import TirelibError
 from tirelib.identify.delay import STD, UNIT, by_delay, late
 from tirelib.identify.random_effects import whitening
 from tirelib.identify.waveform_fit import Data
+from tirelib.infer.strain import WIDTH
 from tirelib.model.base import (
     Coordinate,
     Correction,
@@ -27,22 +28,6 @@ from tirelib.model.chain import Changes
 from tirelib.model.state import State
 from tirelib.model.whole import with_slopes
 
-WIDTH = {
-    "bending_stiffness": 0.7,
-    "radial_stiffness": 0.7,
-    "radial_pressure_slope": 1.5,
-    "tangential_stiffness": 1.0,
-    "tangential_pressure_slope": 1.5,
-    "tread_stiffness": 0.9,
-    "innerliner_offset": 0.15,
-    "extension_stiffness": 0.7,
-    "shear_stiffness": 0.7,
-    "rotary_inertia": 1.0,
-    "tread_shear_stiffness": 1.0,
-    "tread_hardening": 0.7,
-    "section_pull": 1.5,
-}
-"""Prior standard deviation of the free coordinates: wide, since the campaign has informed them."""
 STRENGTH_WIDTH = 1.0
 """Prior standard deviation of a strength, relative to its range."""
 LONGEST = 0.4

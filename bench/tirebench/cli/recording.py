@@ -39,7 +39,7 @@ _OPTIONS = (
     click.option(
         "--strain/--no-strain",
         default=True,
-        help="Record decoded strain beside the raw bytes, for other programs.",
+        help="Record the decoded strain as well as the raw bytes, for other programs.",
     ),
     click.option(
         "--trigger",

@@ -160,7 +160,7 @@ def check_sources(sources: Sequence[SourcePlan], conditions: Conditions | None) 
     if clash := [(place, port) for place, port in told if clashes(place, places)]:
         names = ", ".join(f"{_words(place)} from {port}" for place, port in clash)
         faults.append(
-            f"a condition is told twice: {names}; each may come from one source, for a "
+            f"two sources give the same condition: {names}; each may come from one source, for a "
             "wheel or for all; leave one out of its map"
         )
     known = () if conditions is None else conditions.known
