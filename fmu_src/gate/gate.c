@@ -2,14 +2,17 @@
  *
  * pythonfmu 0.7.0 takes the place of the resources as it is written in the URI, so that a percent
  * sign in it ends the importer, gives every text to the importer as a printf format, looks neither
- * at the GUID nor at the kind of FMU, tells of a missing package only with debug logging, and lets
- * one discarded step count as a wish to end the simulation for ever. The gate
+ * at the GUID nor at the kind of FMU, tells of a missing package only with debug logging, lets
+ * one discarded step count as a wish to end the simulation for ever, and at the process's exit
+ * releases its interpreter a second time after it was freed, which now and then ends in an abort.
+ * The gate
  *
  * - decodes the URI, and refuses resources that are not there,
  * - refuses another GUID than that in guid.txt, and model exchange,
  * - doubles percent signs in every text, and passes errors on whether logging is on or not,
  * - answers fmi2Error where pythonfmu says fatal or discard: the instance lives, can be asked why,
- *   stepped again, reset and freed; and never wants to end the simulation.
+ *   stepped again, reset and freed; and never wants to end the simulation,
+ * - releases the interpreter once, at exit, before pythonfmu's own static objects are destroyed.
  *
  * The library that it hands on to is resources/binaries/linux64/pythonfmu.so.
  * `build/fmu_gate.py` compiles this file.
@@ -96,11 +99,9 @@ typedef struct {
 
 static const char *const CATEGORIES[] = {"logAll", "logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal", "logAll"};
 static const char TWICE[] = "Fatal py exception encountered"; /* the slave told its cause before */
-static void *kept; /* keeps pythonfmu's library, and the interpreter in it, while the gate is loaded */
 
-__attribute__((destructor)) static void leave(void) {
-    if (kept) dlclose(kept);
-}
+/* A function to call at exit. It stands in the C++ binary interface; `library` NULL: also where the gate is unloaded before. */
+int __cxa_atexit(void (*called)(void *), void *argument, void *library);
 
 /* Give a text to the importer as a printf format that shows it as it is. */
 static void tell(const Gate *g, fmi2Status status, fmi2String category, const char *text) {
@@ -179,7 +180,8 @@ static int line_of(const char *folder, const char *name, char line[256]) {
 }
 
 static int load(Gate *g, const char *folder, char *path) {
-    g->library = dlopen(strcat(strcpy(path, folder), "/binaries/linux64/pythonfmu.so"), RTLD_NOW | RTLD_LOCAL);
+    static void *arranged; /* the library whose interpreter is released at exit */
+    g->library = dlopen(strcat(strcpy(path, folder), "/binaries/linux64/pythonfmu.so"), RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
     if (!g->library) return 0;
     int found = 1;
 #define FOUND(name, parameters, arguments) found &= (*(void **)&g->name = dlsym(g->library, "fmi2" #name)) != NULL;
@@ -187,8 +189,10 @@ static int load(Gate *g, const char *folder, char *path) {
     FOUND(FreeInstance, , )
     HANDED_ON(FOUND)
     ASKED(FOUND)
-    if (found && !kept) kept = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-    return found;
+    void (*release)(void *);
+    *(void **)&release = dlsym(g->library, "finalizePythonInterpreter");
+    if (release && arranged != g->library && !__cxa_atexit(release, NULL, NULL)) arranged = g->library;
+    return found && release;
 }
 
 const char *fmi2GetTypesPlatform(void) { return "default"; }

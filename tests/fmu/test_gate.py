@@ -1,6 +1,7 @@
 """What stands before pythonfmu's library: places, texts, identity, and what a refusal ends."""
 
 import hashlib
+import os
 import subprocess
 import sys
 import zipfile
@@ -216,6 +217,36 @@ def test_outputs_stand_still_while_inputs_are_set(file: Any, tmp_path: Path) -> 
         slave.setReal([v.valueReference for v in given], middle)
         np.testing.assert_array_equal(slave.getReal(taken), before)
     slave.freeInstance()
+
+
+REUSED = """
+#include <stdlib.h>
+/* Takes over what exit handlers freed and fills it with shared pointers that have one owner and no
+   table of functions. Registered before all libraries' handlers, so it is called after them. */
+static void take(void) {
+    for (int n = 0; n < 64; n++)
+        for (size_t size = 24; size <= 4096; size += 16) {
+            long *block = malloc(size);
+            for (size_t i = 0; i < size / 8; i++) block[i] = i % 2 ? 0x100000001L : 0;
+        }
+}
+__attribute__((constructor)) static void early(void) { atexit(take); }
+"""
+
+
+def test_an_importer_ends_in_order_whatever_becomes_of_freed_memory(tmp_path: Path) -> None:
+    source, library = tmp_path / "reused.c", tmp_path / "reused.so"
+    source.write_text(REUSED)
+    subprocess.run(["gcc", "-shared", "-fPIC", "-o", library, source], check=True)
+    folder = unpacked(live.fmu_file(10), tmp_path / "fmu")
+    code = HOST + "slave, _ = instance(Path(sys.argv[1])); slave.freeInstance(); print('freed')"
+    done = subprocess.run(
+        [sys.executable, "-c", code, folder],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"LD_PRELOAD": str(library)},
+    )
+    assert (done.returncode, done.stdout) == (0, "freed\n"), done.stderr
 
 
 def test_the_gate_was_compiled_from_its_source() -> None:
