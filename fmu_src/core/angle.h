@@ -1,0 +1,42 @@
+/* Wheel angle over time within a turn. Reference: tirelib.signal.angle, tirelib.signal.slip. */
+#ifndef TIRE_ANGLE_H
+#define TIRE_ANGLE_H
+
+#include "course.h"
+
+enum { REMEMBERED = 4 };
+enum { PAST_TIME, PAST_OMEGA, PAST_SPEED, PAST_NONE, PAST_COLUMNS };
+enum { ANGLE_TERMS = COURSE_TERMS + 2 };
+
+/* For each of the last turns: its middle in time [samples], and q for each source and without. */
+typedef struct {
+    int n;
+    double row[REMEMBERED][PAST_COLUMNS];
+} Past;
+
+/* AngleLaw of the reference. */
+typedef struct {
+    double middle, turn;
+    int terms;
+    double angle[ANGLE_TERMS];
+    double step, std, speed, slip_std, late;
+    Past past;
+} AngleLaw;
+
+/* Return the law of one turn; the courses are of the measured turn rate and of the speed.
+ * Reference: angle_law; test: test_native_angle. */
+AngleLaw angle_law(double middle, double turn, double ahead, const Course *omega,
+                   const Course *speed, const Past *past, double unknown);
+
+/* Wheel angle [rad] at a sample number, and back. Reference: AngleLaw.at, AngleLaw.sample. */
+double law_at(const AngleLaw *law, double sample);
+double law_sample(const AngleLaw *law, double phi);
+
+/* Reference: minmod. */
+double minmod(double a, double b);
+
+/* By how much the slip ratio at the contact may differ from the turn's.
+ * Reference: tirelib.signal.slip.unseen_change. */
+double unseen_change(const Course *speed, double seconds, double here, double before);
+
+#endif

@@ -1,0 +1,166 @@
+#include "contacts.h"
+
+static const double RISE = 0.7, FALL = 0.62, JUMP = 2.5, GAP_REACH = 0.1, PATIENCE = 2.5;
+static const double SMALLEST_SWING = 5e-4;
+
+double contact_middle(const Contact *contact) { return 0.5 * (contact->rise + contact->fall); }
+
+/* ContactFinder._restart */
+static void restart(ContactFinder *f) {
+    f->levels = f->pulse = f->middles = f->periods = 0;
+    f->armed = 1;
+    f->level = f->low_level = f->swing = NAN;
+    f->lowest = INFINITY;
+    f->highest = -INFINITY;
+    f->since = f->count;
+}
+
+void finder_start(ContactFinder *f, int64_t longest_turn, int centre) {
+    f->longest_turn = longest_turn;
+    f->centre = centre;
+    f->count = 0;
+    f->seen = 0;
+    f->tail[0] = f->tail[1] = f->held = NAN;
+    f->pulse_start = 0;
+    f->last_middle = f->last_period = NAN;
+    f->last_rise = -1.0;
+    restart(f);
+}
+
+/* ContactFinder._median_of_three, of samples of which none is NaN. */
+static double median_of_three(double a, double b, double c) {
+    double low = a < b ? a : b, high = a < b ? b : a;
+    if (c < high) high = c;
+    return low > high ? low : high;
+}
+
+/* ContactFinder._room */
+static int64_t room(const ContactFinder *f) {
+    int64_t patience = f->longest_turn;
+    if (f->periods && (int64_t)(PATIENCE * f->last_period) < patience)
+        patience = (int64_t)(PATIENCE * f->last_period);
+    int64_t left = f->since + patience - f->count;
+    return left > 1 ? left : 1;
+}
+
+/* ContactFinder._extreme_hidden: missing samples are those of the ring since the last rise. */
+static int extreme_hidden(const ContactFinder *f, const Ring *ring) {
+    int64_t first = (int64_t)floor(f->last_rise) + 1, base = ring_base(ring);
+    double reach = GAP_REACH * f->last_period;
+    for (int64_t i = first > base ? first : base; i < f->count; i++) {
+        if (isfinite(ring_row(ring, i)[f->centre])) continue;
+        if (!f->periods) return 1;
+        if ((double)i < (double)f->since + reach || (double)i > (double)f->pulse_start - reach)
+            return 1;
+    }
+    return 0;
+}
+
+/* ContactFinder._finish */
+static int finished(ContactFinder *f, const Ring *ring, double last, Contact *found) {
+    int start_up = !f->levels, fresh = start_up || !f->middles, column = ring_search(ring);
+    double swing = f->highest - f->lowest, own_level = f->lowest + RISE * swing;
+    double level = start_up ? own_level : f->level;
+    int64_t size = f->count - f->pulse_start, i = 0, j = 0;
+    f->pulse = 0;
+    for (int64_t k = 0, any = 0; k < size; k++)
+        if (ring_row(ring, f->pulse_start + k)[column] > level) {
+            if (!any) i = k;
+            any = 1;
+            j = k;
+        }
+    int64_t seen = f->pulse_start + i - f->since;
+    if (i == 0 || j == size - 1 || (start_up && seen < j - i)) {
+        if (!start_up) restart(f);
+        return 0; /* too little has been seen of what lies before it */
+    }
+    if (start_up || !extreme_hidden(f, ring)) {
+        f->levels = 1;
+        f->level = own_level;
+        f->low_level = f->lowest + FALL * swing;
+        f->swing = swing;
+    }
+    f->armed = 0; /* the new levels may lie below the strain just reached */
+    f->lowest = f->highest = last;
+    double before = ring_row(ring, f->pulse_start + i - 1)[column];
+    double at_rise = ring_row(ring, f->pulse_start + i)[column];
+    double at_fall = ring_row(ring, f->pulse_start + j)[column];
+    double after = ring_row(ring, f->pulse_start + j + 1)[column];
+    double rise = (double)(i - 1) + (level - before) / (at_rise - before);
+    double fall = (double)j + (at_fall - level) / (at_fall - after);
+    double shift = (double)(f->pulse_start + 1); /* the median of three lags by one sample */
+    found->rise = rise + shift;
+    found->fall = fall + shift;
+    found->fresh = fresh;
+    found->damaged = 0;
+    double middle = contact_middle(found);
+    f->last_rise = found->rise;
+    f->since = f->count;
+    f->periods = !fresh;
+    f->last_period = middle - f->last_middle;
+    f->last_middle = middle;
+    f->middles = 1;
+    return 1;
+}
+
+/* ContactFinder._until_jump: the swing outgrows the levels. */
+static void look_for_jump(ContactFinder *f, double y) {
+    double low = y < f->lowest ? y : f->lowest, high = y > f->highest ? y : f->highest;
+    if (!f->levels || high - low <= JUMP * f->swing) return;
+    f->levels = f->middles = f->periods = 0;
+    f->armed = 1;
+}
+
+/* ContactFinder._advance, of one sample */
+static int advance(ContactFinder *f, const Ring *ring, double y, Contact *found) {
+    int above, below;
+    if (isnan(y)) { /* nothing finite seen yet */
+        f->since = ++f->count;
+        return 0;
+    }
+    look_for_jump(f, y);
+    if (y < f->lowest) f->lowest = y;
+    if (y > f->highest) f->highest = y;
+    if (f->levels) {
+        above = y > f->level;
+        below = y < f->low_level;
+    } else {
+        double swing = f->highest - f->lowest;
+        int known = swing > SMALLEST_SWING;
+        above = known && y > f->lowest + RISE * swing;
+        below = !known || y < f->lowest + FALL * swing;
+    }
+    int arming = !f->pulse && !f->armed, expired = room(f) <= 1;
+    int event = f->pulse || arming ? below : above, ended = event && f->pulse;
+    if (event && !f->pulse && !expired) {
+        if (arming) {
+            f->armed = 1;
+        } else {
+            f->pulse = 1;
+            f->pulse_start = f->count - 1;
+        }
+    }
+    f->count++;
+    if (expired) {
+        restart(f);
+        return 0;
+    }
+    return ended ? finished(f, ring, y, found) : 0;
+}
+
+int finder_take(ContactFinder *f, const Ring *ring, Contact *found) {
+    double x = ring_row(ring, ring->total - 1)[f->centre], y = NAN;
+    if (isfinite(x)) f->held = x; /* ContactFinder._without_gaps */
+    x = f->held;
+    int whole = f->seen == 2;
+    if (whole && !isnan(f->tail[0]) && !isnan(f->tail[1]))
+        y = median_of_three(f->tail[0], f->tail[1], x);
+    f->tail[0] = f->tail[1];
+    f->tail[1] = x;
+    if (!whole) {
+        f->seen++;
+        return 0;
+    }
+    ring_row(ring, f->count)[ring_search(ring)] = y;
+    return advance(f, ring, y, found);
+}

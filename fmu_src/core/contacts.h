@@ -1,0 +1,38 @@
+/* The passages of the centre gage through the contact, found sample by sample.
+ *
+ * Reference: tirelib.signal.contacts. That code takes whole frames at once; taken one sample at a
+ * time it says the same.
+ */
+#ifndef TIRE_CONTACTS_H
+#define TIRE_CONTACTS_H
+
+#include "ring.h"
+
+/* Where the strain crosses the level, [samples since the start]; Contact of the reference. */
+typedef struct {
+    double rise, fall;
+    int fresh;   /* no valid turn precedes it */
+    int damaged; /* samples are missing where it begins or ends */
+} Contact;
+
+typedef struct {
+    int64_t longest_turn, count; /* count: samples taken, after the median of three */
+    int centre;                  /* column of the centre gage */
+    double tail[2], held;        /* last samples without gaps */
+    int seen;                    /* how many of the tail there are */
+    int levels, armed, pulse;    /* levels: not start-up; pulse: within one */
+    double level, low_level, swing, lowest, highest;
+    int64_t pulse_start, since;
+    int middles, periods; /* whether the last middle, the last period are known */
+    double last_middle, last_period, last_rise;
+} ContactFinder;
+
+void finder_start(ContactFinder *finder, int64_t longest_turn, int centre);
+
+/* Look at the newest sample of the ring; return 1 if a contact ended. Reference:
+ * ContactFinder.push; test: test_native_contacts. */
+int finder_take(ContactFinder *finder, const Ring *ring, Contact *found);
+
+double contact_middle(const Contact *contact);
+
+#endif
