@@ -67,7 +67,7 @@ def test_estimates_go_out_on_a_bus() -> None:
         seen = [listener.recv(2.0) for _ in range(3)]
         assert [m.arbitration_id for m in seen if m] == [0x142, 0x14A, 0x152]
     sender.close()
-    with pytest.raises(DeviceError, match=r"it is no CAN bus"):
+    with pytest.raises(DeviceError, match=r"not a CAN bus"):
         CanSender(PortPlan("/dev/ttyUSB0"))
 
 

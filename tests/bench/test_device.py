@@ -62,15 +62,31 @@ def test_what_cannot_be_sent_is_marked() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("device/1", "device/2", r"format = 'tirebench-device/2'; 'tirebench-device/1' is"),
+        (
+            "device/1",
+            "device/2",
+            r"format = 'tirebench-device/2'; this program reads 'tirebench-device/1'",
+        ),
         ("gage_factor = 2.0", "", r"bridge.gage_factor is missing; a number is needed"),
-        ("gage_factor = 2.0", "gage_factor = 2e6", r"gage_factor = 2e\+06; 0.1 .. 300 is allowed"),
-        ("gage_factor = 2.0", "gage_factor = nan", r"gage_factor = nan; 0.1 .. 300 is allowed"),
-        ("-0.06]", "-60]", r"lateral_m of gage 5 = -60; -0.5 .. 0.5 is allowed; check the unit"),
-        ("-0.03, -0.06]", "-0.06]", r"zero_counts has 5 numbers, lateral_m 4; one a gage"),
-        ("[gages]", "[gage]", r"gage is not known; allowed are bridge, format"),
+        (
+            "gage_factor = 2.0",
+            "gage_factor = 2e6",
+            r"gage_factor = 2e\+06; a magnitude of 0.1 .. 300 is allowed",
+        ),
+        (
+            "gage_factor = 2.0",
+            "gage_factor = nan",
+            r"gage_factor = nan; a magnitude of 0.1 .. 300 is allowed",
+        ),
+        ("-0.06]", "-60]", r"lateral_m of gage 5 = -60; -0.5 .. 0.5 is allowed; check its unit"),
+        (
+            "-0.03, -0.06]",
+            "-0.06]",
+            r"zero_counts has 5 numbers, but lateral_m has 4; one number per gage",
+        ),
+        ("[gages]", "[gage]", r"gage is an unknown key; allowed keys are bridge, format"),
         ("[bridge]", "[scale]\nstrain_per_count = 1e-6\n[bridge]", r"\[scale\] and \[bridge\] is"),
-        ("[bridge]", "[bridge", r"it is no TOML"),
+        ("[bridge]", "[bridge", r"not valid TOML"),
     ],
 )
 def test_a_wrong_device_file_says_what_is_wrong(old: str, new: str, message: str) -> None:
@@ -87,12 +103,12 @@ def test_all_faults_of_a_device_file_are_told_at_once() -> None:
 
 
 def test_a_file_that_is_not_there_is_a_bench_error(tmp_path: Path) -> None:
-    with pytest.raises(BenchError, match=r"nowhere.toml: it cannot be read"):
+    with pytest.raises(BenchError, match=r"nowhere.toml: cannot be read"):
         read_device(tmp_path / "nowhere.toml")
 
 
 def test_another_layout_is_refused() -> None:
     device = parse_device(GOOD, "w.toml")
     device.check_layout((0.06, 0.03, 0.0, -0.03, -0.06), "here")
-    with pytest.raises(DeviceError, match=r"here: gages lie at -60, -30, \+0, \+30, \+60 mm"):
+    with pytest.raises(DeviceError, match=r"here: its gages are at -60, -30, \+0, \+30, \+60 mm"):
         device.check_layout((-0.06, -0.03, 0.0, 0.03, 0.06), "here")

@@ -35,7 +35,7 @@ def test_a_good_archive_is_unpacked_where_it_belongs(tmp_path: Path) -> None:
     "name", ["../evil", "a/../../evil", "/etc/evil", "C:/evil", "a\\..\\evil", "..", "C:evil"]
 )
 def test_a_name_that_leads_out_is_refused(tmp_path: Path, name: str) -> None:
-    with pytest.raises(FmuError, match=r"a.fmu: .*(leads out|no relative path).*; do not use"):
+    with pytest.raises(FmuError, match=r"a.fmu: .*(leads out|not a relative path).*; do not use"):
         read_fmu(write(tmp_path / "a.fmu", (name, b"x")))
     assert not (tmp_path.parent / "evil").exists()
 
@@ -66,18 +66,18 @@ def test_size_and_number_are_limited(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")
 def test_names_that_come_twice_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(FmuError, match="comes twice"):
+    with pytest.raises(FmuError, match="occurs twice"):
         read_fmu(write(tmp_path / "a.fmu", ("a", b"x"), ("a", b"y")))
 
 
 def test_an_archive_without_description_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(FmuError, match=r"there is no modelDescription.xml"):
+    with pytest.raises(FmuError, match=r"modelDescription.xml is missing"):
         read_fmu(write(tmp_path / "a.fmu", ("a", b"x"), description=False))
 
 
 def test_what_is_no_archive_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.fmu").write_bytes(b"MZ" * 100)
-    with pytest.raises(FmuError, match=r"it is no FMU"):
+    with pytest.raises(FmuError, match=r"not an FMU"):
         read_fmu(tmp_path / "a.fmu")
     with pytest.raises(FmuError, match=r"cannot be read"):
         read_fmu(tmp_path / "b.fmu")
@@ -110,7 +110,7 @@ def test_an_archive_of_a_later_format_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FmuError, match=r"cannot be unpacked .*compression"):
         read_fmu(path).unpack()
     changed(path, b"PK\1\2", 6, 250)  # the version that is needed to read it
-    with pytest.raises(FmuError, match=r"it is no FMU .*version"):
+    with pytest.raises(FmuError, match=r"not an FMU .*version"):
         read_fmu(path)
 
 

@@ -92,7 +92,7 @@ def test_what_a_full_disk_did_not_take_stands_in_the_next_part(disk: Disk, tmp_p
     assert bench.step(*PIECES[:3]).error == ""
     disk.full = True
     failed = bench.step(*PIECES[3:5])
-    assert "a.mcap: it cannot be written (No space left on device)" in failed.error
+    assert "a.mcap: cannot be written (No space left on device)" in failed.error
     assert failed.as_document(0)["failures"] == 1
     bench.order("event", {"event": "marker", "text": "while it was full"})
     assert bench.step(PIECES[5]).error
@@ -163,7 +163,10 @@ def test_a_recording_in_parts_is_read_as_one(
 def test_a_name_whose_second_part_is_there_is_refused(disk: Disk, tmp_path: Path) -> None:
     (tmp_path / "a.part2.mcap").touch()
     bench = Bench(tmp_path / "a.mcap")
-    assert "a.part2.mcap: it exists and is of another recording" in bench.recorder._state.answer
+    assert (
+        "a.part2.mcap: already exists and belongs to another recording"
+        in bench.recorder._state.answer
+    )
     bench.close()
 
 

@@ -102,7 +102,7 @@ def invoke(*words: object) -> tuple[int, str]:
         ({"protocol": {"rate_hz": float("nan")}}, "rate_hz = nan; 153 .. 200000 Hz is allowed"),
         ({"protocol": {"rate_hz": 0}}, "rate_hz = 0; 153"),
         ({"protocol": {"rate_hz": [1e4]}}, "rate_hz = [10000.0]; 153"),
-        ({"protocol": {"map": "no TOML"}}, "the map is no TOML"),
+        ({"protocol": {"map": "not valid TOML"}}, "the map is not valid TOML"),
         ({"wall_ns": str(2**70)}, "the header is damaged (a time of 1180591620717411303424 ns"),
         ({"device": "# wheel x\n"}, "device file of wheel 'x'; 0 .. 255 is allowed"),
         ({"device": "# wheel " + "9" * 5000}, "0 .. 255 is allowed"),
@@ -139,12 +139,12 @@ def test_an_event_that_says_nothing_is_passed_over(event: Any, tmp_path: Path) -
 @pytest.mark.parametrize(
     ("parts", "said"),
     [
-        ({"event": {"event": [1]}}, "event = '[1]'; a text is needed"),
-        ({"event": {"event": "marker", "text": "\ud800"}}, "a text is needed"),
+        ({"event": {"event": [1]}}, "event = '[1]'; a string is needed"),
+        ({"event": {"event": "marker", "text": "\ud800"}}, "a string is needed"),
         ({"event": {"event": "marker", "wheel": {}}}, "wheel = '{}'; a number or null is needed"),
         ({"estimate": {"Fz": "much"}}, "Fz = 'much'; a number or null is needed"),
         ({"estimate": {"turn": 1, "segment": 2**70}}, "a number or null is needed"),
-        ({"estimate": {"flags": 5}}, "flags = '5'; a list of texts is needed"),
+        ({"estimate": {"flags": 5}}, "flags = '5'; a list of strings is needed"),
     ],
 )
 def test_an_estimate_or_event_that_no_table_can_hold_is_named(
@@ -161,7 +161,7 @@ def test_a_campaign_that_cannot_be_written_is_named(campaign: Any, tmp_path: Pat
     path = made(tmp_path / "a.mcap", SOUND | {"campaign": campaign})
     code, text = invoke("export", path, "--out", tmp_path / "out")
     assert code == 2
-    assert "what it says of tire and gages is damaged" in text
+    assert "its tire and gage data are damaged" in text
 
 
 @pytest.mark.parametrize("ending", ["blf", "asc", "log"])
@@ -170,7 +170,7 @@ def test_a_recording_breaks_off_at_a_time_that_is_none(ending: str, tmp_path: Pa
     code, text = invoke("export", path, "--out", tmp_path / f"a.{ending}")
     assert code == 1
     assert "1 frames in" in text
-    assert "breaks off (a time of 18446744073709551615 ns; 0 .. 2^63 is allowed)" in text
+    assert "is incomplete (a time of 18446744073709551615 ns; 0 .. 2^63 is allowed)" in text
 
 
 @pytest.mark.parametrize("packed", [CompressionType.ZSTD, CompressionType.LZ4])
@@ -233,10 +233,10 @@ ZSTD, LZ4 = CompressionType.ZSTD, CompressionType.LZ4
     ("count", "packed", "change", "said"),
     [
         (1, ZSTD, told(2**62), "a chunk unpacks to 4611686018427387904 bytes; 1048576 are allowed"),
-        (1, ZSTD, told(100), "unpacks to 262205 bytes or more; it says 100"),
-        (1, LZ4, told(100), "unpacks to 262205 bytes or more; it says 100"),
-        (1, ZSTD, packed_by("brotli"), "packed by 'brotli'; zstd and lz4 are allowed"),
-        (1, ZSTD, nested, "a chunk stands within a chunk"),
+        (1, ZSTD, told(100), "unpacks to 262205 bytes or more, but states 100"),
+        (1, LZ4, told(100), "unpacks to 262205 bytes or more, but states 100"),
+        (1, ZSTD, packed_by("brotli"), "compressed with 'brotli'; zstd and lz4 are allowed"),
+        (1, ZSTD, nested, "a chunk contains a chunk"),
     ],
 )
 def test_a_chunk_that_lies_is_refused(
@@ -261,5 +261,5 @@ def test_chunks_that_unpack_to_much_more_than_the_file_are_refused(
     few, many = chunks(3, ZSTD, same), chunks(8, ZSTD, same)
     with pytest.raises(EndOfFile):  # they have no footer
         list(records.records(few))
-    with pytest.raises(RecordingError, match="100 times is allowed"):
+    with pytest.raises(RecordingError, match="a factor of 100 is allowed"):
         list(records.records(many))

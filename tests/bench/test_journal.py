@@ -78,7 +78,9 @@ def test_turns_wait_while_the_disk_is_full(tmp_path: Path, monkeypatch: pytest.M
 
     monkeypatch.setattr(journal, "_file", FullDisk(file))
     journal.add(TURNS[2:3])
-    assert journal.error.endswith("turns cannot be written (No space left on device); they wait")
+    assert journal.error.endswith(
+        "turns cannot be written (No space left on device); they are kept in memory until they can"
+    )
     assert path.read_bytes() == whole
     monkeypatch.setattr(journal, "_file", file)
     journal.add(TURNS[3:])
@@ -116,7 +118,7 @@ def test_no_json_takes_the_place_of_a_recording(tmp_path: Path, name: str) -> No
     records = ["record", "--port", "tcp://127.0.0.1:9", "--out", recording]
     for command in (runs, records):
         said = refused(*command, "--json", tmp_path / name)
-        assert "a recording is never overwritten" in said
+        assert "is never overwritten" in said
         assert not recording.exists()
     Recorder(recording, RecordingHeader({}), Conditions.constant()).close("closed")
     shutil.copy(recording, tmp_path / "a.part2.mcap")
@@ -126,7 +128,7 @@ def test_no_json_takes_the_place_of_a_recording(tmp_path: Path, name: str) -> No
     exports = ["export", recording, "--out", tmp_path / "a.csv"]
     for command in (replays, exports):
         for file in (tmp_path / name, tmp_path / "another.mcap"):
-            assert "a recording is never overwritten" in refused(*command, "--json", file)
+            assert "is never overwritten" in refused(*command, "--json", file)
     with pytest.raises(RecordingError, match="never overwritten"):
         Journal(tmp_path / "another.mcap")
     assert {path: path.read_bytes() for path in tmp_path.glob("*.mcap")} == before
@@ -143,7 +145,7 @@ def test_a_path_that_cannot_be_written_is_refused_and_a_pipe_gets_the_document_a
     tmp_path: Path,
 ) -> None:
     (tmp_path / "file").touch()
-    with pytest.raises(RecordingError, match="it cannot be written"):
+    with pytest.raises(RecordingError, match="cannot be written"):
         Journal(tmp_path / "file" / "r.json")
     journal = Journal(Path(os.devnull))
     journal.add(TURNS)

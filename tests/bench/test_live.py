@@ -218,7 +218,7 @@ def test_an_unplugged_cable_is_told_and_the_recording_kept(
     emulator.terminate()  # it pulls the cable
     code, out, _ = live.finish()
     assert code == 1
-    assert f"unplugged: {port}: the port went away" in out
+    assert f"unplugged: {port}: the port was lost" in out
     assert emulator.finish()[0] == 0
     data, complete = recorded(tmp_path / "a.mcap")
     assert complete
@@ -257,10 +257,10 @@ def test_bad_input_ends_with_code_2_and_a_message(
     (tmp_path / "x.fmu").write_bytes(b"no zip")
     fmu = toy_fmus[16]
     cases = {
-        "just one of --port, --setup, --port-file and --replay is needed": ("run", "--fmu", fmu),
+        "give exactly one of --port, --setup, --port-file and --replay": ("run", "--fmu", fmu),
         "the port cannot be opened": ("run", "--port", tmp_path / "none", "--fmu", fmu),
-        "it is no FMU": ("run", "--port", "p", "--fmu", tmp_path / "x.fmu"),
-        "just one of [scale] and [bridge]": (
+        "not an FMU": ("run", "--port", "p", "--fmu", tmp_path / "x.fmu"),
+        "exactly one of [scale] and [bridge]": (
             "run",
             "--port",
             "p",
@@ -269,12 +269,12 @@ def test_bad_input_ends_with_code_2_and_a_message(
             "--device",
             tmp_path / "d.toml",
         ),
-        "it cannot be read": ("run", "--replay", tmp_path / "none.mcap", "--fmu", fmu),
+        "cannot be read": ("run", "--replay", tmp_path / "none.mcap", "--fmu", fmu),
         "run 9; its runs are 1, 2, 3": ("emulate", "--campaign", campaign, "--run", 9),
-        "'rust' is not known": ("emulate", "--campaign", campaign, "--fault", "rust"),
-        "no such command 'rnu'; there are ports, load, emulate, run": ("rnu",),
+        "unknown fault 'rust'": ("emulate", "--campaign", campaign, "--fault", "rust"),
+        "no such command 'rnu'; the commands are ports, load, emulate, run": ("rnu",),
         "did you mean 'replay'?": ("repaly",),
-        "nobody opened the port in time": ("emulate", "--campaign", campaign, "--wait", 0.1),
+        "no program opened the port in time": ("emulate", "--campaign", campaign, "--wait", 0.1),
     }
     for message, arguments in cases.items():
         outcome = CliRunner().invoke(program, [str(argument) for argument in arguments])
@@ -289,7 +289,7 @@ def test_bad_input_ends_with_code_2_and_a_message(
     assert not record.exists()  # a run that did not begin leaves the name of its recording free
     record.touch()
     outcome = CliRunner().invoke(program, [str(word) for word in words])
-    assert "a recording is never overwritten" in str(outcome.exception)
+    assert "is never overwritten" in str(outcome.exception)
     assert record.exists()
 
 

@@ -102,7 +102,7 @@ def test_the_highest_rate_fits_and_a_little_more_does_not() -> None:
         assert load_of(LoadPlan(plan.kind, plan.bitrate, plan.data_bitrate, plan.wheels, rate)).fits
         more = LoadPlan(plan.kind, plan.bitrate, plan.data_bitrate, plan.wheels, rate + 200.0)
         assert not load_of(more).fits
-        assert suggestions(plan)[0] == f"{rate / 1e3:g} kHz on the same line"
+        assert suggestions(plan)[0] == f"{rate / 1e3:g} kHz sample rate on the same line"
 
 
 def test_the_program_refuses_what_does_not_fit(tmp_path: Path) -> None:
@@ -117,5 +117,7 @@ def test_the_program_refuses_what_does_not_fit(tmp_path: Path) -> None:
 
 
 def test_a_format_of_the_other_kind_of_bus_is_refused() -> None:
-    with pytest.raises(DeviceError, match=r"RAW16: the bus is of the other kind; CAN FD"):
+    with pytest.raises(
+        DeviceError, match=r"RAW16: the bus cannot carry this format; it needs CAN FD"
+    ):
         load_of(LoadPlan(RAW16, M, None, 1, 1e4))

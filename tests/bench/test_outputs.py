@@ -48,5 +48,5 @@ def test_an_output_below_a_file_is_refused(verb: str, option: str, tmp_path: Pat
     ]
     outcome = CliRunner().invoke(program, [verb, *needed, option, str(place)])
     assert outcome.exit_code == 2, outcome.output
-    assert f"{place}: it cannot be written" in " ".join(outcome.output.split())
+    assert f"{place}: cannot be written" in " ".join(outcome.output.split())
     assert [path.name for path in tmp_path.iterdir()] == ["file"]

@@ -361,11 +361,11 @@ def test_recordings_are_turned_on_and_off_and_markers_land_in_them(tmp_path: Pat
     assert not desk.state()["recording"]["on"]
     assert say(command="record", on=True)["text"] == "recording a-2.mcap"
     assert say(command="record", on=False)["good"]
-    chain.recorded.answer = "a-3.mcap: it cannot be written"
+    chain.recorded.answer = "a-3.mcap: cannot be written"
     assert say(command="record", on=True) == {
         "number": 7,
         "good": False,
-        "text": "a-3.mcap: it cannot be written",
+        "text": "a-3.mcap: cannot be written",
     }
     assert not desk.state()["recording"]["on"]
     writing.close()  # the page's process has died

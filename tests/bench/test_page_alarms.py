@@ -97,7 +97,12 @@ def test_limits_come_from_a_file_and_its_faults_are_told_together(tmp_path: Path
     with pytest.raises(DeviceError) as refused:
         read_alarms(file)
     said = str(refused.value)
-    for part in ("[los] is not known", "[rate] low = 'x'", "[Fz] low = 10, high = 20", "[signal]"):
+    for part in (
+        "[los] is an unknown alarm",
+        "[rate] low = 'x'",
+        "[Fz] low = 10, high = 20",
+        "[signal]",
+    ):
         assert part in said
     file.write_text("[loss]\n")
     with pytest.raises(DeviceError, match="tirebench-alarms/1"):
@@ -154,7 +159,7 @@ def test_the_page_says_which_conditions_are_in_use_and_where_they_come_from() ->
     found = in_use(wheel, known, "option")
     assert found["speed"] == {"value": pytest.approx(36.0), "unit": "km/h", "source": "bus"}
     assert found["pressure"]["source"] == "option"
-    assert "camber not known" in in_use_line(found)
+    assert "camber unknown" in in_use_line(found)
     assert "speed 36.00 km/h (bus)" in in_use_line(found)
 
 
@@ -201,7 +206,10 @@ def test_what_is_wrong_with_the_run_is_an_alarm_and_the_transmitter_is_not_blame
         state = feed.state()
         assert alarm_lines(state) == ["too busy", "a.json: the disk is full"]
         assert [event["state"] for event in noted] == ["on", "off"]  # of the silence
-        raw["alarm"], given_up[1] = "", "/dev/b: away for 5 s; the port is still tried"
+        raw["alarm"], given_up[1] = (
+            "",
+            "/dev/b: away for 5 s; reconnecting is tried until the port is back",
+        )
         assert given_up[1] in alarm_lines(feed.state())
         given_up[1] = ""
         assert "/dev/b" not in str(alarm_lines(feed.state()))
@@ -225,17 +233,20 @@ def test_what_is_wrong_with_a_run_is_told_once_and_recorded_when_it_begins_and_e
 
     assert told(None, PortState("/dev/b")) == []
     line.passing, away = True, PortState("/dev/b", gone="/dev/b: away for 5 s")
-    assert told(None, away) == [TOO_BUSY, f"{away.gone}; the port is still tried"]
-    assert alarms.given_up == {1: f"{away.gone}; the port is still tried"}
+    assert told(None, away) == [
+        TOO_BUSY,
+        f"{away.gone}; reconnecting is tried until the port is back",
+    ]
+    assert alarms.given_up == {1: f"{away.gone}; reconnecting is tried until the port is back"}
     line.passing, recorded.error = False, "the disk is full"
     assert told(None, PortState("/dev/b")) == [
         DECODED_AGAIN,
-        "/dev/b: it is back",
+        "/dev/b: the port is back",
         "the disk is full",
     ]
     line.wheels.heard[0].timeline._rate.contradiction = "wheel 0: another rate"
     recorded.error = ""
-    assert told() == ["wheel 0: another rate; no turn of it is told", RECORDED_AGAIN]
+    assert told() == ["wheel 0: another rate; its turns are not reported", RECORDED_AGAIN]
     assert [(event["name"], event["state"]) for event in written] == [
         ("busy", "on"),
         ("source 1", "on"),

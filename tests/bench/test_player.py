@@ -167,23 +167,27 @@ def test_a_manoeuvre_is_solved_where_it_moves(tmp_path: Path) -> None:
     ("old", "new", "message"),
     [
         ("load_N = 4000", "", "point 1: load_N is missing"),
-        ("load_N = 4000", "load_kN = 4", "load_kN is not known; .*; give load_N, in its unit"),
+        ("load_N = 4000", "load_kN = 4", "unknown column load_kN; .*; write load_N, in that unit"),
         ("load_N = 4000", "load_N = 4.0", "point 1: load_N = 4.0; a number from 200 to 12000"),
         (
             "_deg = 1.0",
             "_deg = -40",
             "point 2: slip_angle_deg = -40; a number from -22.9183 to 22.9",
         ),
-        ("_deg = 1.0", "_degree = 1.0", "slip_angle_degree is not known; .*; give slip_angle_deg"),
+        (
+            "_deg = 1.0",
+            "_degree = 1.0",
+            "unknown column slip_angle_degree; .*; write slip_angle_deg",
+        ),
         ("_deg = 1.0", "_deg = nan", "point 2: slip_angle_deg = nan; a number from"),
         ("_deg = 1.0", "_deg = 1.0\nwheel = 0.5", "wheel = 0.5; a whole number is needed"),
-        ("t_s = 0.5", "t_s = inf", "t_s = inf; seconds are needed"),
+        ("t_s = 0.5", "t_s = inf", "t_s = inf; a time in seconds is needed"),
         (
             "[[point]]\nt_s = 0.0\nload_N = 4000\nspeed_kmh = 60\n[[point]]",
             "[point]",
-            r"point 1: 't_s'; a table is needed; begin each with \[\[point",
+            r"point 1: 't_s'; a table is needed; begin each point with \[\[point",
         ),
-        ("t_s = 0.5", "t_s = 0.0", "growing from 0"),
+        ("t_s = 0.5", "t_s = 0.0", "increasing from 0"),
         ("slip_angle_deg = 1.0", "slip_ratio = 0.1", "slip_ratio is given at some"),
         ('"tirebench-manoeuvre/1"', '"x"', "format = 'x'"),
         ("load_N = 5000", 'load_N = "much"', "point 2: .*much"),
@@ -204,9 +208,9 @@ def test_each_fault_of_a_manoeuvre_is_told_once_and_nothing_that_is_right(tmp_pa
         read_manoeuvre(tmp_path / "m.csv")
     told = [line.partition("m.csv: ")[2] for line in str(caught.value).splitlines()]
     assert [line.partition(";")[0] for line in told] == [
-        "point 1: load_kN is not known",
+        "point 1: unknown column load_kN",
         "point 1: load_N is missing",
-        "point 2: more values than columns",
+        "point 2: the line has more values than the table has columns",
         "point 2: load_N is missing",
         "point 3: load_N is missing",
         "point 3: speed_kmh = fast",

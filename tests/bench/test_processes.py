@@ -85,7 +85,7 @@ def plan_of(port: str, file: FmuFile | None, record: Path) -> LivePlan:
 
 
 def test_a_port_that_is_none_is_told_before_anything_is_started(tmp_path: Path) -> None:
-    with pytest.raises(DeviceError, match=r"--port can:virtual: no channel"):
+    with pytest.raises(DeviceError, match=r"--port can:virtual: the channel is missing"):
         LiveChain(plan_of("can:virtual", None, tmp_path / "a.mcap"))
 
 
@@ -162,7 +162,7 @@ def test_a_file_that_may_not_grow_ends_nothing_and_nothing_is_lost(
         gathered(chain, news, lambda: not chain.recorded.error)
         news.add(chain.finish("stopped"))
         counts = chain.counts()
-    assert "a.mcap: it cannot be written (File too large)" in news.alarms[0]
+    assert "a.mcap: cannot be written (File too large)" in news.alarms[0]
     assert news.alarms[-1] == RECORDED_AGAIN
     assert counts["restarts"] == {"reader": 0, "recorder": 0, "estimator 0": 0}
     assert counts["raw"]["lost_bytes"] == 0
@@ -427,7 +427,7 @@ def test_a_start_that_takes_long_says_what_is_awaited(
         (chain._opening, "the reader to open p"),
         (loading, "estimator 0, estimator 2 to load "),
     ):
-        with pytest.raises(LinkTimeoutError, match=f"waited 0 s for: {text}"):
+        with pytest.raises(LinkTimeoutError, match=f"waited 0 s in vain for: {text}"):
             chain._wait(lambda: False, awaited)
         assert said.pop().startswith(f"waiting for: {text}")
     chain._estimators.kept = {}

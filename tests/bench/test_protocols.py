@@ -218,7 +218,7 @@ def test_a_wrong_sample_rate_is_found_with_the_right_one(kind: str) -> None:
     frames = WheelCan(1e4, LineCounts()).push(sent, 0)
     timeline = Timeline(Device(), rate_said_by=ProtocolPlan(CAN, 1e4).rate_said_by)
     deque(map(timeline.push, frames), 0)
-    assert "5000 samples a second, 10000 were said" in timeline.contradiction
+    assert "5000 samples a second, but 10000 were configured" in timeline.contradiction
     assert timeline.contradiction.endswith("correct --rate")
 
 

@@ -110,13 +110,13 @@ def test_a_recording_cut_or_damaged_anywhere_gives_what_is_left(
 
 def test_a_recording_is_never_overwritten(tmp_path: Path) -> None:
     write(tmp_path / "a.mcap")
-    with pytest.raises(RecordingError, match=r"a.mcap: it exists; a recording is never"):
+    with pytest.raises(RecordingError, match=r"a.mcap: already exists; a recording is never"):
         write(tmp_path / "a.mcap")
 
 
 def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.mcap").write_bytes(b"nonsense" * 100)
-    with pytest.raises(RecordingError, match=r"it has no header of a recording"):
+    with pytest.raises(RecordingError, match=r"the header of a recording is missing"):
         Recording(tmp_path / "a.mcap")
     with pytest.raises(RecordingError, match=r"cannot be read"):
         Recording(tmp_path / "b.mcap")
@@ -126,7 +126,9 @@ def test_an_unknown_version_is_refused(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr("tirebench.recording.header.FORMAT", "tirebench-recording/9")
     write(tmp_path / "a.mcap")
     monkeypatch.undo()
-    with pytest.raises(RecordingError, match=r"'tirebench-recording/9'; 'tirebench-recording/2'"):
+    with pytest.raises(
+        RecordingError, match=r"'tirebench-recording/9'; this program reads 'tirebench-recording/2'"
+    ):
         Recording(tmp_path / "a.mcap")
 
 
@@ -170,7 +172,7 @@ def test_a_wrong_sidecar_says_what_is_wrong(tmp_path: Path, text: str, message: 
 def test_a_sidecar_of_another_make_is_refused(change: dict[str, Any]) -> None:
     sound = conditions_document(Conditions.constant(18.0))
     assert parse_conditions(sound, "c.json").t_us == (0,)
-    with pytest.raises(DeviceError, match=r"c\.json: .* lists of one length"):
+    with pytest.raises(DeviceError, match=r"c\.json: .* lists of the same length"):
         parse_conditions(sound | change, "c.json")
 
 

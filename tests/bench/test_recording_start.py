@@ -38,5 +38,7 @@ def test_the_room_is_for_all_wheels_that_are_read(
 @pytest.mark.parametrize("around", [None, (10.0, 20.0)])
 def test_what_cannot_trigger_is_said(watched: bool, around: tuple[float, float] | None) -> None:
     said = at_start(Path("a.mcap"), four(), RecordingRule(around=around), watched=watched)
-    assert ("a lost port triggers" in said) == (around is not None and not watched)
-    assert ("the 10 s before take up to 40 MB of memory" in said) == (around is not None)
+    assert ("only a lost port and alarms" in said) == (around is not None and not watched)
+    assert ("keeping the 10 s before an event takes up to 40 MB of memory" in said) == (
+        around is not None
+    )

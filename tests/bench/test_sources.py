@@ -221,7 +221,9 @@ def test_a_wheel_with_a_wrong_rate_is_recorded_to_the_end_and_exported(tmp_path:
         chain.finish("stopped")
         news.add(chain.poll(Deadline.after(0.0)))
     server.close()
-    assert [said for said in news.alarms if "9709 samples a second, 10000 were said" in said]
+    assert [
+        said for said in news.alarms if "9709 samples a second, but 10000 were configured" in said
+    ]
     with closing(Recording(tmp_path / "a.mcap")) as recording:
         assert b"".join(read.data for read in recording.reads()) == b"".join(frames)
     arguments = ["export", str(tmp_path / "a.mcap"), "--out", str(tmp_path / "a.csv")]
@@ -446,7 +448,7 @@ def test_an_emulator_plays_one_source_of_several(tmp_path: Path) -> None:
     for wrong in (None, 2):
         with closing(Recording(tmp_path / "a.mcap")) as recording:
             pieces = recording_pieces(recording, wrong)
-            with pytest.raises(DeviceError, match=r"its sources are 0 left, 1 right; .* --source"):
+            with pytest.raises(DeviceError, match=r"has the sources 0 left, 1 right, .* --source"):
                 next(pieces)
     outcome = CliRunner().invoke(program, ["emulate", "--recording", str(tmp_path / "a.mcap")])
     assert "choose with --source" in str(outcome.exception) + outcome.output  # before it waits
@@ -467,7 +469,7 @@ def test_a_source_of_one_wheel_refuses_a_second() -> None:
     ]
     wheels.push(frames[0], 1)
     assert list(wheels.heard) == [5]
-    with pytest.raises(DeviceError, match="left: wheels 1, 2 are heard; one is allowed"):
+    with pytest.raises(DeviceError, match="left: frames came from wheels 1, 2; a source with"):
         wheels.push(frames[0] + frames[1], 2)
 
 
@@ -478,7 +480,7 @@ def serial(port: str, wheel: int | None = None) -> SourcePlan:
 @pytest.mark.parametrize(
     ("sources", "conditions", "message"),
     [
-        ((serial("a"), serial("a")), None, "--port a: it comes twice"),
+        ((serial("a"), serial("a")), None, "--port a: given twice"),
         ((serial("a", 1), serial("b", 1)), None, "wheel 1 comes from a and b"),
         (
             (vehicle("a"), vehicle("b")),
@@ -529,13 +531,13 @@ def test_a_setup_lists_sources_and_the_options_fill_in(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (("tirebench-setup/1", "x/1"), "'x/1'; 'tirebench-setup/1' is understood"),
+        (("tirebench-setup/1", "x/1"), "'x/1'; this program reads 'tirebench-setup/1'"),
         (("wheel = 0", "wheel = 300"), "source 1: wheel = 300; 0 .. 255"),
         (("bitrate = 1000000", 'bitrate = "fast"'), "source 2: bitrate = 'fast'; .* type int"),
-        (("wheel = 0", "weel = 0"), "source 1: weel is not known; allowed are port"),
+        (("wheel = 0", "weel = 0"), "source 1: unknown key weel; allowed keys are port"),
         (('port = "/dev/ttyUSB0"', ""), "source 1: port is missing"),
-        (("[[source]]", "[[sources]]"), "sources is not known"),
-        (('map = "vehicle.toml"', 'map = "none.toml"'), "source 2: .*none.toml: it cannot be read"),
+        (("[[source]]", "[[sources]]"), "unknown key sources"),
+        (('map = "vehicle.toml"', 'map = "none.toml"'), "source 2: .*none.toml: cannot be read"),
         (('"vehicle.toml"', '"left.toml"'), "s.toml: source 2: .*left.toml: .*'tirebench-map/1'"),
         (
             ('"left.toml"', '"vehicle.toml"'),

@@ -41,7 +41,7 @@ def said(given: Given, *needed: str, knows_tire: bool = True) -> str:
 def test_a_condition_that_the_calibration_needs_is_missed_before_the_first_turn() -> None:
     sources: tuple[SourcePlan, ...] = (serial("a", 0),)
     text = said(Given(sources, Conditions.constant(18.0), ()), "pressure", "camber")
-    assert "WARNING: no camber: this calibration needs it, and NO TURN WILL BE VALID" in text
+    assert "WARNING: no camber: the calibration needs it, so NO TURN WILL BE VALID" in text
     assert "give --camber DEG, --conditions FILE, or a map with [camber]" in text
     assert "WARNING: no pressure" in text
     assert "speed" not in text
@@ -49,14 +49,14 @@ def test_a_condition_that_the_calibration_needs_is_missed_before_the_first_turn(
 
 def test_what_only_makes_it_worse_is_a_note() -> None:
     text = said(Given((serial("a", 0),), Conditions.constant(pressure=2e5, camber=0.0), ()))
-    assert text.startswith("note: no speed: there will be no slip ratio; give --speed KMH")
+    assert text.startswith("note: no speed: the slip ratio cannot be estimated; give --speed KMH")
     assert text.count("\n") == 1
 
 
 def test_a_camber_that_nobody_gives_is_said_with_what_it_costs() -> None:
     text = said(Given((serial("a", 0),), Conditions.constant(18.0, pressure=2e5), ()))
-    assert text.startswith("note: no camber: standard deviations of Fy and alpha are wider by what")
-    assert "turns that owe most of theirs to it say camber_unknown; give --camber DEG" in text
+    assert text.startswith("note: no camber: standard deviations of Fy and alpha grow by the")
+    assert "turns where camber dominates carry the flag camber_unknown; give --camber DEG" in text
     assert text.count("\n") == 1
 
 
@@ -65,13 +65,13 @@ def test_a_calibration_that_cannot_notice_another_tire_is_said() -> None:
     given = Given((serial("a", 0),), everything, ())
     assert said(given) == ""
     text = said(given, knows_tire=False)
-    assert text.startswith("note: this calibration cannot notice another tire on the wheel")
+    assert text.startswith("note: this calibration cannot detect that another tire is on the wheel")
 
 
 def test_what_a_bus_tells_is_not_missed_but_for_the_wheels_it_leaves_out() -> None:
     sources = (serial("a", 0), serial("b", 3), vehicle("c"))  # pressure of wheel 3, speed of all
     text = said(Given(sources, Conditions.constant(camber=0.0), ()), "pressure")
-    assert "WARNING: no pressure of wheel 0: this calibration" in text
+    assert "WARNING: no pressure of wheel 0: the calibration" in text
     assert "speed" not in text
     assert said(Given(sources[1:], Conditions.constant(camber=0.0), ()), "pressure") == ""
 
@@ -199,7 +199,7 @@ def test_without_a_wait_a_port_that_is_not_there_is_refused(
 ) -> None:
     arguments = ("run", "--port-file", tmp_path / "port", "--fmu", toy_fmus[16], "--no-page")
     outcome = CliRunner().invoke(program, [str(argument) for argument in arguments])
-    assert "no port; the file that `tirebench emulate --port-file` writes" in (
+    assert "no port; it must be the file that `tirebench emulate --port-file` writes" in (
         str(outcome.exception) + outcome.output
     )
 

@@ -62,7 +62,7 @@ def test_a_run_that_is_stopped_while_it_starts_leaves_nothing(
     assert list(temporary.glob(f"tirebench-*-{run.pid}-*"))  # the FMU
     run.send_signal(signal.SIGHUP)
     code, _, said = run.finish()
-    assert (code, "stopped while it started" in said) == (1, True)
+    assert (code, "stopped during the start" in said) == (1, True)
     assert not file.exists()
     assert not list(Path("/dev/shm").glob(f"*tirebench-*-{run.pid}-*"))
     assert not list(temporary.glob("tirebench-*"))
@@ -87,7 +87,7 @@ def test_each_signal_interrupts_a_program_that_starts_and_it_says_so(
 ) -> None:
     with pytest.raises(click.exceptions.Exit), start_in_order():
         os.kill(os.getpid(), number)
-    assert "stopped while it started" in capsys.readouterr().err
+    assert "stopped during the start" in capsys.readouterr().err
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="this system has no SIGHUP")

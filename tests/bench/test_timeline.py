@@ -175,7 +175,7 @@ def test_a_clock_that_contradicts_the_period_is_found(
     timeline = Timeline(Device())
     deque(map(timeline.push, frames), 0)
     said = timeline.contradiction
-    assert f"{1e4 / (1.0 + error):.0f} samples a second, 10000 were said" in said
+    assert f"{1e4 / (1.0 + error):.0f} samples a second, but 10000 were configured" in said
     assert "correct `period` in the transmitter's SERIAL v1 frames" in said
 
 

@@ -25,7 +25,7 @@ def ours(calibration: Calibration, tmp_path_factory: pytest.TempPathFactory) -> 
 
 
 def test_what_this_tirelib_builds_is_known(ours: Path) -> None:
-    assert how_known(read_fmu(ours)) == "as this tirelib builds it"
+    assert how_known(read_fmu(ours)) == "identical to what this version of tirelib builds"
 
 
 def altered(fmu: Path, out: Path, name: str, data: bytes) -> Path:
@@ -51,7 +51,7 @@ def altered(fmu: Path, out: Path, name: str, data: bytes) -> Path:
 )
 def test_a_changed_copy_of_ours_is_unknown(ours: Path, tmp_path: Path, name: str) -> None:
     copy = altered(ours, tmp_path / "y.fmu", name, b"{}")
-    with pytest.raises(FmuError, match=r"sha256 [0-9a-f]{64} is unknown; .*--trust once"):
+    with pytest.raises(FmuError, match=r"sha256 [0-9a-f]{64} is unknown, .*--trust once"):
         check_trust(read_fmu(copy), trust=False)
 
 
@@ -65,6 +65,6 @@ def test_a_foreign_fmu_runs_only_when_trusted_and_is_then_remembered(
     assert isinstance(refused.exception, FmuError)
     assert "is unknown" in str(refused.exception)
     archive = read_fmu(toy)
-    assert check_trust(archive, trust=True) == "trusted from now on, by --trust"
+    assert check_trust(archive, trust=True) == "added to the list of trusted FMUs by --trust"
     assert how_known(read_fmu(shutil.copy(toy, tmp_path / "z.fmu"))) is not None
     assert archive.sha256 in trust_list().read_text()

@@ -237,21 +237,21 @@ def test_a_gage_that_is_not_there_is_unknown() -> None:
 @pytest.mark.parametrize(
     ("map_text", "change", "message"),
     [
-        (BINARY, ('"AA55"', '"AA5"'), "sync, struct and fields; or .* are needed"),
-        (BINARY, ('"<HxI5hB"', '"HxI5hB"'), "struct begins with < or >"),
-        (BINARY, ('"<HxI5hB"', '"<HxI5h4sB"'), "struct knows x b B"),
-        (BINARY, ('"<HxI5hB"', '"<HxI5h"'), "struct has 7 values, fields has more"),
-        (BINARY, ("CRC-16/MODBUS", "CRC-17"), "checksum = 'CRC-17' is not known; SUM-8"),
-        (BINARY, ('"AA55"', '"AA55"\nlength = 3'), "length: not known"),
-        (TEXT, ("bits = 16", "bits = 40"), "bits is 1 .. 32"),
+        (BINARY, ('"AA55"', '"AA5"'), "sync, struct and fields .* are needed"),
+        (BINARY, ('"<HxI5hB"', '"HxI5hB"'), "struct must begin with < or >"),
+        (BINARY, ('"<HxI5hB"', '"<HxI5h4sB"'), "struct may use x b B"),
+        (BINARY, ('"<HxI5hB"', '"<HxI5h"'), "struct has 7 values, but fields has more"),
+        (BINARY, ("CRC-16/MODBUS", "CRC-17"), "checksum = 'CRC-17' is unknown; SUM-8"),
+        (BINARY, ('"AA55"', '"AA55"\nlength = 3'), "unknown key length"),
+        (TEXT, ("bits = 16", "bits = 40"), "bits must be 1 .. 32"),
         (
             TEXT,
             ('{ name = "count", bits = 16 }', '"count"'),
-            "must be integers.*bits of the column",
+            "must be integers.*the column's bits",
         ),
-        (TEXT, ('separator = ";"', 'separator = "; "'), "separator is one character"),
-        (TEXT, ('starts = "$V"', "id = 3"), "id: not known"),
-        (BINARY, ('["g1", "g2", "g3", "g4", "g5"]', '["", "", "", "", ""]'), "one at least"),
+        (TEXT, ('separator = ";"', 'separator = "; "'), "separator must be one ASCII character"),
+        (TEXT, ('starts = "$V"', "id = 3"), "unknown key id"),
+        (BINARY, ('["g1", "g2", "g3", "g4", "g5"]', '["", "", "", "", ""]'), "at least one"),
     ],
 )
 def test_a_wrong_map_of_a_line_says_what_is_wrong(
@@ -265,7 +265,10 @@ def test_a_wrong_map_of_a_line_says_what_is_wrong(
 
 def test_a_map_fits_its_kind_of_port_and_comes_back_from_a_header(tmp_path: Path) -> None:
     (tmp_path / "m.toml").write_text(BINARY)
-    with pytest.raises(DeviceError, match="this map is for a serial line; PORT, tcp:// or udp://"):
+    with pytest.raises(
+        DeviceError,
+        match="this map describes a serial line, which needs a port PORT, tcp:// or udp://",
+    ):
         protocol_of(PortPlan("can:socketcan:can0"), 1e3, tmp_path / "m.toml")
     plan = protocol_of(PortPlan("tcp://a:1"), 1e3, tmp_path / "m.toml")
     assert plan.encoding == LINE_MAP
@@ -325,11 +328,13 @@ def test_three_gages_where_the_estimator_has_three(toy_of_three: Path) -> None:
 def test_wheels_with_other_gages_than_the_calibration_are_refused() -> None:
     given = Given((SourcePlan(PortPlan("p"), plan_of(THREE)),), Conditions.constant(), ())
     given.check_layout((0.03, 0.0, -0.03), "X.fmu")
-    with pytest.raises(DeviceError, match=r"X.fmu: gages lie at .*, the device 'map' has 3 of"):
+    with pytest.raises(
+        DeviceError, match=r"X.fmu: its gages are at .*, but the device 'map' has 3 of"
+    ):
         given.check_layout((0.06, 0.03, 0.0, -0.03, -0.06), "X.fmu")
     device = Device("wheel 1", zero=(1.0, 2.0, 3.0))
     with pytest.raises(
-        DeviceError, match="'wheel 1' has zeros or gains of 3 gages, its wheel sends 5"
+        DeviceError, match="'wheel 1' has zeros or gains for 3 gages, but the wheel sends 5"
     ):
         device.strain(np.zeros((1, 2, 5), np.int16), np.zeros(1, np.int64))
 

@@ -186,9 +186,9 @@ def test_multiplexed_and_real_signals_are_read_as_cantools_wrote_them() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (('counter = "count"', 'counter = "other"'), "must stand in the same frames"),
-        (('strain_unit = "ustrain"', ""), "real numbers are no counts"),
-        (('"g5"]]', '"count"]]'), "all gages need one length, sign and factor"),
+        (('counter = "count"', 'counter = "other"'), "must be in the same frames"),
+        (('strain_unit = "ustrain"', ""), "strain that is sent as float"),
+        (('"g5"]]', '"count"]]'), "all gages must have the same length, sign and factor"),
         (('counter = "count"', 'counter = "g1"'), "counter and time must be integers"),
     ],
 )
@@ -251,25 +251,25 @@ def test_what_is_held_is_bounded_and_the_newest_counts() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (('"tirebench-map/1"', '"x/1"'), "'x/1'; 'tirebench-map/1' is understood"),
-        (("rate_hz = 1000", "rate_hz = 1"), "rate_hz = 1; 153 .. 200000 Hz"),
+        (('"tirebench-map/1"', '"x/1"'), "'x/1'; this program reads 'tirebench-map/1'"),
+        (("rate_hz = 1000", "rate_hz = 1"), "rate_hz = 1; a rate of 153 .. 200000 Hz"),
         (('"g5"', '"g9"'), "signal = 'g9'; WHEEL_FL has the signals g1"),
-        (('"WHEEL_FL"', '"FR"'), "message = 'FR'; known are ABS, WHEEL_FL"),
+        (('"WHEEL_FL"', '"FR"'), "message = 'FR'; the known messages are ABS, WHEEL_FL"),
         (('time = "stamp"', ""), "time_unit|wraps after 256"),
         (('"ms"', '"bar"'), "time_unit = 'bar'; a unit of time is needed"),
         (('strain_unit = "ustrain"', 'strain_unit = "N"'), "a unit of strain is needed"),
         (('unit = "km/h"', 'unit = "N"'), "a unit of speed is needed"),
-        (("[speed]", "[sped]"), "sped is not known"),
+        (("[speed]", "[sped]"), "unknown key sped"),
         (("[speed]", "[[speed]]\nwheel = 300"), r"speed: wheel = 300; 0 \.\. 255 is needed"),
         (("rate_hz = 1000", "rate_hz = 1000\ncamber = 5"), r"camber = 5; a table \[camber\]"),
         (("[[wheel]]", "wheel = [1, 2]\n[other]"), r"wheel = \[1, 2\]; tables \[\[wheel\]\]"),
-        (('[["g1", "g2", "g3", "g4", "g5"]]', "1.5"), r"samples = 1.5; lists of 1 to 16 signals"),
+        (('[["g1", "g2", "g3", "g4", "g5"]]', "1.5"), r"samples = 1.5; one list per sample"),
     ],
 )
 def test_a_wrong_map_says_what_is_wrong(change: tuple[str, str], message: str) -> None:
     if change[0] == 'time = "stamp"':
         text = MAP.replace('counter = "count"', "").replace('time = "stamp"', "")
-        message = "counter or time is needed"
+        message = "a counter or time signal is needed"
     else:
         text = MAP.replace(*change)
     with pytest.raises(DeviceError, match=message):
@@ -277,5 +277,7 @@ def test_a_wrong_map_says_what_is_wrong(change: tuple[str, str], message: str) -
 
 
 def test_a_counter_that_wraps_too_soon_needs_a_time() -> None:
-    with pytest.raises(DeviceError, match=r"it wraps after 8 ms, 100 ms are needed"):
+    with pytest.raises(
+        DeviceError, match=r"it wraps after 8 ms; without a time signal at least 100 ms are needed"
+    ):
         parse_map(LISTED.replace("length = 12", "length = 4"), "", "m.toml")

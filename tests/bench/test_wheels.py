@@ -60,7 +60,7 @@ def played(
 def test_a_line_without_a_frame_says_what_to_look_at() -> None:
     wheels = Wheels.of_one(ProtocolPlan().decoder(), {None: Device()})
     assert counters(wheels).endswith(
-        "0 frames; no byte came: is the transmitter on, and is this its port?"
+        "0 frames; no byte was received: check that the transmitter is on and that this is its port"
     )
     wheels.push(b"temperature 23.1\r\n" * 9)  # text: not even a bad frame
     assert "--baud" in counters(wheels)

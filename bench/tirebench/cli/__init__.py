@@ -21,7 +21,7 @@ Examples:
   tirebench run --replay live.mcap --fmu build/out/StrainTire.fmu --json live.json
 
 \b
-Exit code: 0 done, 1 ran but the answer is negative, 2 bad input.
+Exit code: 0 done, 1 the command ran and its answer is negative, 2 bad input.
 """
 
 
@@ -49,7 +49,7 @@ class Verbs(click.Group):
         if args and args[0] not in VERBS and not args[0].startswith("-"):
             near = get_close_matches(args[0], VERBS, 1, 0.5)
             meant = f"; did you mean '{near[0]}'?" if near else ""
-            ctx.fail(f"no such command '{args[0]}'; there are {', '.join(VERBS)}{meant}")
+            ctx.fail(f"no such command '{args[0]}'; the commands are {', '.join(VERBS)}{meant}")
         return super().resolve_command(ctx, args)
 
 

@@ -15,14 +15,15 @@ _OPTIONS = (
     click.option(
         "--estimates-out",
         metavar="PORT",
-        help="Send estimates on this CAN bus (can:... or slcan:...), see tirelib.dbc.",
+        help="Send the estimates on this CAN bus (can:... or slcan:...), in the messages of "
+        "tirelib.dbc.",
     ),
     click.option(
         "--plotjuggler",
         metavar="[HOST:]PORT",
         is_flag=False,
         flag_value="9870",
-        help="Send estimates as JSON over UDP.  [HOST: 127.0.0.1]",
+        help="Send the estimates as JSON over UDP, for PlotJuggler.  [HOST: 127.0.0.1]",
     ),
 )
 

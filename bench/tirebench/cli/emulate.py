@@ -40,7 +40,7 @@ Examples:
   tirebench emulate --recording a.mcap --bus can:socketcan:vcan0
 
 \b
-It prints the port and waits until a reader opens it, and says `played` when the reader has taken
+It prints the port, waits until a reader opens it, and prints `played` when the reader has taken
 all that was sent. Format serial is SERIAL v1 on a serial port; RAW16, RAW12 and RAW12C are CAN
 frames: on a bus with --bus, else as slcan on a serial port.
 A recording is played as it is, bad frames included.
@@ -57,7 +57,7 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
     "folder",
     metavar="DIR",
     type=click.Path(path_type=Path),
-    help="Play runs of a campaign with strain.",
+    help="Play runs of this campaign; it must contain strain.",
 )
 @click.option(
     "--run",
@@ -65,23 +65,24 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
     metavar="N",
     type=int,
     multiple=True,
-    help="Run to play, several in the order given.  [default: the first]",
+    help="Number of a run to play; may be given several times, in the order of play.  [default: "
+    "the first]",
 )
-@click.option("--all", "everything", is_flag=True, help="Play all runs.")
+@click.option("--all", "everything", is_flag=True, help="Play all runs of the campaign.")
 @click.option(
     "--manoeuvre",
     "manoeuvre_file",
     metavar="M",
     type=FILE,
-    help="Play a manoeuvre on the numerical rig (TOML or CSV).",
+    help="Play a manoeuvre (TOML or CSV) that the numerical rig solves.",
 )
-@click.option("--recording", metavar="R.mcap", type=FILE, help="Play a recording.")
+@click.option("--recording", metavar="R.mcap", type=FILE, help="Play the raw bytes of a recording.")
 @click.option(
     "--source",
     "number",
     metavar="N",
     type=click.IntRange(min=0),
-    help="Which source of a recording that has several.",
+    help="Number of the source to play, where the recording has several.",
 )
 @click.option(
     "--rate",
@@ -89,14 +90,14 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
     show_default=True,
     metavar="HZ",
     type=click.FloatRange(153.0, 50_000.0),
-    help="Of the gages in a manoeuvre.",
+    help="Sample rate of the gages in a manoeuvre.",
 )
 @click.option(
     "--truth",
     "truth_file",
     metavar="T.csv",
     type=NEW_FILE,
-    help="Write the rig's forces along a manoeuvre.",
+    help="Write the rig's forces over time along a manoeuvre (CSV).",
 )
 @click.option(
     "--format",
@@ -104,14 +105,19 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
     default="serial",
     show_default=True,
     type=click.Choice(FORMATS),
-    help="What the wheel sends.",
+    help="Frame format that the emulated transmitter sends.",
 )
-@click.option("--bus", metavar="can:IF:CHANNEL", help="Send on a bus of python-can.")
+@click.option(
+    "--bus",
+    metavar="can:IF:CHANNEL",
+    help="Send on this python-can bus instead of a pseudo-terminal.",
+)
 @click.option(
     "--link",
     metavar="PATH",
     type=FILE,
-    help="Name for the port that stays when it is plugged in again.",
+    help="Path of a symbolic link to the port, which stays the same when the port is plugged in "
+    "again.",
 )
 @click.option("--device", "device_file", metavar="D.toml", type=FILE, help="Scale and zero.")
 @click.option(
@@ -121,45 +127,51 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
     default=(0,),
     show_default=True,
     type=click.IntRange(0, 255),
-    help="Number of a wheel, up to four.",
+    help="Number of an emulated wheel; may be given up to four times.",
 )
 @click.option(
-    "--port-file", metavar="F", type=NEW_FILE, help="Write the port's path into this file."
+    "--port-file", metavar="F", type=NEW_FILE, help="Write the path of the port into this file."
 )
 @click.option(
     "--conditions",
     "sidecar",
     metavar="F.json",
     type=NEW_FILE,
-    help="Write the conditions over time and the rig's truth.",
+    help="Write the conditions over time and the rig's true values (JSON).",
 )
-@click.option("--loop", is_flag=True, help="Begin again at the end, until Ctrl-C.")
+@click.option("--loop", is_flag=True, help="Start again at the end, until Ctrl-C.")
 @click.option(
     "--speedup",
     default=1.0,
     show_default=True,
     type=click.FloatRange(0.01, 1000.0),
-    help="Faster than real time.",
+    help="Play faster than real time by this factor.",
 )
 @click.option("--fault", "fault_texts", metavar="NAME[=VALUE]", multiple=True, help="See below.")
-@click.option("--seed", default=0, show_default=True, help="Of the faults.")
+@click.option("--seed", default=0, show_default=True, help="Seed of the random faults.")
 @click.option(
     "--wait",
     "patience",
     default=60.0,
     show_default=True,
     metavar="S",
-    help="How long to wait for a reader.",
+    help="How long to wait until a reader opens the port.",
 )
-@click.option("--after", metavar="F", type=FILE, help="Send nothing before this file is there.")
-@click.option("--unplug", metavar="S", type=float, help="Pull the cable after this time.")
+@click.option("--after", metavar="F", type=FILE, help="Send nothing until this file exists.")
+@click.option("--unplug", metavar="S", type=float, help="Emulate a pulled cable after this time.")
 @click.option(
     "--replug",
     metavar="S",
     type=click.FloatRange(min=0.0),
-    help="Plug it in again after so long, and so on; with --link.",
+    help="Plug the cable in again after this time, and repeat; needs --link.",
 )
-@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write what was sent.")
+@click.option(
+    "--json",
+    "json_file",
+    metavar="FILE",
+    type=NEW_FILE,
+    help="Write counters of what was sent (JSON).",
+)
 @click.pass_context
 def emulate(
     context: click.Context,
@@ -190,13 +202,15 @@ def emulate(
 ) -> None:
     """Play a campaign, a manoeuvre or a recording as wheels that send, with faults on request."""
     if [folder, manoeuvre_file, recording].count(None) != 2:
-        raise click.UsageError("just one of --campaign, --manoeuvre and --recording is needed")
+        raise click.UsageError("give exactly one of --campaign, --manoeuvre and --recording")
     if replug is not None and (link is None or unplug is None):
-        raise click.UsageError("--replug needs --unplug, and --link for a name that stays")
+        raise click.UsageError(
+            "--replug needs --unplug, and --link for a path that does not change"
+        )
     if bus is not None and kind == "serial" and recording is None:
-        raise click.UsageError("--bus carries CAN frames: --format RAW16, RAW12 or RAW12C")
+        raise click.UsageError("--bus carries CAN frames only: add --format RAW16, RAW12 or RAW12C")
     if len(set(wheels)) != len(wheels) or len(wheels) > 4:
-        raise click.UsageError("--wheel: one to four different numbers are allowed")
+        raise click.UsageError("--wheel: give one to four different numbers")
     faults = Faults(parse_faults(fault_texts), seed)
     device = Device() if device_file is None else read_device(device_file)
     tape: Tape | None = None
@@ -326,8 +340,8 @@ def _recorded(recording: Path | None, source: int | None) -> Iterator[Script]:
 
 def _summary(tally: Tally, runs: int, faults: Faults, sink: TerminalSink | BusSink) -> None:
     click.echo(
-        f"{tally.sent} frames in {runs} runs, {tally.unheard} of them unheard, "
-        f"at most {1e3 * tally.late:.1f} ms late"
+        f"{tally.sent} frames in {runs} runs, {tally.unheard} of them sent while no reader "
+        f"listened, at most {1e3 * tally.late:.1f} ms late"
     )
     for name, count in faults.done.items():
         click.echo(f"  {count:6d} {name}")

@@ -36,12 +36,12 @@ Examples:
   tirebench export bus.mcap --out bus.blf                     # or .asc, .log
 
 \b
-What a bus told of the conditions is in all of them. Estimates of the run, events and
+Conditions that a bus sent are in all of them. Estimates of the run, events and
 markers are in .mf4, else in tables beside it (live.estimates.csv, live.events.csv).
 A campaign holds one wheel. Tire and gages come from the recording where a campaign was played, else
-from the campaign that --like names. Without told set points its runs are sweeps.
-Exit code: 0 done, 1 the recording breaks off (what is there is written) or has nothing of it, 2 bad
-input.
+from the campaign that --like names. Its runs are sweeps where no set points are known.
+Exit code: 0 done, 1 the recording is incomplete (its sound part is written) or holds nothing to
+export, 2 bad input.
 """
 
 
@@ -52,23 +52,33 @@ input.
     metavar="DIR|FILE",
     required=True,
     type=NewPath(path_type=Path),
-    help="A new folder for a campaign; a file by its ending.",
+    help="New folder for a campaign, or new file whose ending chooses the format.",
 )
 @click.option(
     "--like",
     metavar="DIR",
     type=click.Path(path_type=Path),
-    help="Campaign whose tire and gages hold here.",
+    help="Campaign whose tire and gages apply to this recording.",
 )
-@click.option("--wheel", type=click.IntRange(0, 255), help="[default: the first that was heard]")
+@click.option(
+    "--wheel",
+    type=click.IntRange(0, 255),
+    help="Number of the wheel to export.  [default: the first that sent frames]",
+)
 @click.option(
     "--device",
     "device_texts",
     metavar="[WHEEL=]D.toml",
     multiple=True,
-    help="Instead of the recording's device file.",
+    help="Device file to use instead of the one in the recording.",
 )
-@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write what was written.")
+@click.option(
+    "--json",
+    "json_file",
+    metavar="FILE",
+    type=NEW_FILE,
+    help="Write a list of the files that were written.",
+)
 @click.pass_context
 def export(
     context: click.Context,
@@ -83,11 +93,13 @@ def export(
     suffix = out.suffix.lower()
     if suffix and suffix not in (*TABLES, MDF, *CAN_LOGS):
         raise click.UsageError(
-            f"--out {out}: {', '.join((*TABLES, MDF, *CAN_LOGS))} are known, and a folder without "
-            "ending for a campaign"
+            f"--out {out}: {', '.join((*TABLES, MDF, *CAN_LOGS))} are the known file endings; a "
+            "name without ending makes a campaign folder"
         )
     if out.exists():
-        raise RecordingError(f"{out}: it exists; nothing is overwritten; name another place")
+        raise RecordingError(
+            f"{out}: already exists; export never overwrites; give another name to --out"
+        )
     keep_recordings(json_file, recording)
     beside: list[Path] = []
     with closing(Recording(recording)) as opened:
@@ -113,13 +125,16 @@ def export(
             beside = write_results(recording, out, ".csv", chosen)
             left = sum(left_out(segment, opened.conditions) for segment in mine)
             if left:
-                click.echo(f"note: {left} samples before the bus told what it tells are left out")
+                click.echo(
+                    f"note: the first {left} samples are left out: the bus had not yet sent "
+                    "the conditions"
+                )
         damage = getattr(opened, "damage", "") if opened.complete is False else ""
     click.echo(f"{count} {what} in {out}")
     for file in beside:
-        click.echo(f"beside it: {file}")
+        click.echo(f"also written: {file}")
     if damage:
-        click.echo(f"note: the recording breaks off ({damage})")
+        click.echo(f"note: the recording is incomplete ({damage})")
     if json_file is not None:
         write_json(
             json_file,
@@ -129,7 +144,10 @@ def export(
 
 
 def _note(said: str) -> None:
-    click.echo(f"note: {said}; samples are as they were sent, their times follow the rate said")
+    click.echo(
+        f"note: {said}; the samples are as they were sent, and their times follow the rate "
+        "in the header"
+    )
 
 
 def _of_one_wheel(found: list[Segment]) -> list[Segment]:
@@ -142,8 +160,8 @@ def _header(recording: Recording, like: Path | None) -> CampaignHeader:
     campaign = recording.conditions.campaign
     if like is None and campaign is None:
         raise RecordingError(
-            f"{recording.path}: it does not say tire and gages; a campaign that has them is "
-            "needed; name it with --like DIR"
+            f"{recording.path}: it holds no tire and gage data; these are needed for a campaign; "
+            "name a campaign that has them with --like DIR"
         )
     if like is not None:
         header, problems = parse_header(like)
@@ -154,8 +172,8 @@ def _header(recording: Recording, like: Path | None) -> CampaignHeader:
                 (Path(name) / "campaign.toml").write_text(text, encoding="utf-8")
             except (TypeError, ValueError, RecursionError) as error:
                 raise RecordingError(
-                    f"{recording.path}: what it says of tire and gages is damaged ({error}); name "
-                    "a campaign that has them with --like DIR"
+                    f"{recording.path}: its tire and gage data are damaged ({error}); sound ones "
+                    "are needed for a campaign; name a campaign that has them with --like DIR"
                 ) from None
             header, problems = parse_header(Path(name))
     if header is None:

@@ -29,27 +29,27 @@ NOBODY = 30.0
 """A line that brings no sample for so long is given up, [s]."""
 
 _OPTIONS = (
-    click.option("--port", metavar="PORT", help="Port to read; see below."),
+    click.option("--port", metavar="PORT", help="Port to read; the forms are listed below."),
     click.option(
         "--device",
         "device_texts",
         metavar="D.toml",
         multiple=True,
-        help="Device file that is to be made better.  [default: the usual scale]",
+        help="Device file to start from.  [default: the standard scale]",
     ),
     click.option(
         "--wheel",
         "number",
         type=click.IntRange(0, 255),
         metavar="N",
-        help="Which wheel, where several send.",
+        help="Number of the wheel, where several send.",
     ),
     click.option(
         "--seconds",
         default=3.0,
         show_default=True,
         type=click.FloatRange(1.0, 600.0),
-        help="How long the mean is taken.",
+        help="Duration of the mean.",
     ),
     click.option(
         "--still",
@@ -57,14 +57,14 @@ _OPTIONS = (
         show_default=True,
         metavar="MICROSTRAIN",
         type=click.FloatRange(min=0.0, min_open=True),
-        help="A wheel whose strain moves by more turns.",
+        help="A wheel whose strain varies by more than this counts as turning.",
     ),
     click.option(
         "--out",
         required=True,
         type=NEW_FILE,
         metavar="NEW.toml",
-        help="Device file to write; a new one.",
+        help="New device file to write.",
     ),
 )
 
@@ -111,14 +111,14 @@ class Asked:
         if len(found) != 1:
             heard = ", ".join(map(str, found)) or "none"
             raise DeviceError(
-                f"{link.name}: wheels that are heard: {heard}; one is needed; choose it with "
-                "--wheel, or look at the link"
+                f"{link.name}: frames came from these wheels: {heard}; exactly one wheel is "
+                "needed; choose it with --wheel, or check the link"
             )
         ((number, levels),) = found.items()
         if number in wheels.contradicted:
             click.secho(
-                f"WARNING: {wheels.contradicted[number]}; a standing wheel's mean strain "
-                "does not depend on it, estimates do",
+                f"WARNING: {wheels.contradicted[number]}; the mean strain of a standing wheel does "
+                "not depend on the sample rate, but estimates do",
                 fg="red",
                 err=True,
             )

@@ -26,10 +26,10 @@ LOOK = 0.05
 """Time between two looks for a file that is waited for, [s]."""
 _OPTIONS = {"speed": "--speed KMH, ", "pressure": "--pressure BAR, ", "camber": "--camber DEG, "}
 _WITHOUT = {
-    "speed": "there will be no slip ratio",
-    "pressure": "standard deviations are wider by what pressure does",
-    "camber": "standard deviations of Fy and alpha are wider by what camber does, and "
-    "turns that owe most of theirs to it say camber_unknown",
+    "speed": "the slip ratio cannot be estimated",
+    "pressure": "standard deviations grow by the possible effect of the pressure",
+    "camber": "standard deviations of Fy and alpha grow by the possible effect of camber, and "
+    "turns where camber dominates carry the flag camber_unknown",
 }
 
 
@@ -111,9 +111,9 @@ def port_of_file(file: Path, wait: float, console: Console) -> str:
             return port
         if deadline.expired:
             raise DeviceError(
-                f"--port-file {file}: {f'its port {port} is not there' if port else 'no port'}; "
-                "the file that `tirebench emulate --port-file` writes is needed; start that, or "
-                "wait for it with --wait"
+                f"--port-file {file}: {f'its port {port} is not there' if port else 'no port'}; it "
+                "must be the file that `tirebench emulate --port-file` writes; start the "
+                "emulator, or wait for it with --wait"
             )
         if not told:
             console.print(f"waiting for {file}", soft_wrap=True, markup=False)
@@ -146,8 +146,8 @@ def conditions_of(
         if name not in QUANTITIES or name in given or not _is_number(number):
             units = ", ".join(f"{known} [{unit}]" for known, (unit, _) in QUANTITIES.items())
             raise DeviceError(
-                f"--condition {text}: NAME=VALUE is needed, each name once; names are {units}; "
-                "write it so"
+                f"--condition {text}: NAME=VALUE is needed, each name once; known names and units "
+                f"are {units}; correct it"
             )
         given[name] = float(number)
     if sidecar is None:
@@ -155,8 +155,8 @@ def conditions_of(
         return Conditions.constant(**si) if si else None
     if given:
         raise DeviceError(
-            f"{', '.join(given)} and --conditions {sidecar} are given; one or the other says "
-            "what holds; leave one out"
+            f"{', '.join(given)} and --conditions {sidecar} were both given; the conditions must "
+            "come from one of them; leave one out"
         )
     return read_conditions(sidecar)
 
@@ -218,7 +218,10 @@ def given_replayed(
     """Return what a recording says; options that are given replace it, and that is said."""
     header = link.recording.header
     if devices or conditions is not None:
-        console.print("note: device file or conditions of the recording are replaced by options")
+        console.print(
+            "note: options on the command line replace the device file or the "
+            "conditions of the recording"
+        )
     sources = recorded_sources(header, link.name, devices)
     if not wheels:
         wheels = tuple(header.settings.get("wheels") or ())
@@ -250,7 +253,7 @@ def say_missing(given: Given, calibration: Calibration, console: Console) -> Non
     needed, useful = missing(given, calibration)
     for name, words in needed.items():
         console.print(
-            f"WARNING: no {words}: this calibration needs it, and NO TURN WILL BE VALID; give "
+            f"WARNING: no {words}: the calibration needs it, so NO TURN WILL BE VALID; give "
             f"{_option(name)}--conditions FILE, or a map with [{name}]",
             style="bold red",
             soft_wrap=True,
@@ -265,8 +268,9 @@ def say_missing(given: Given, calibration: Calibration, console: Console) -> Non
         )
     if not calibration.knows_tire:
         console.print(
-            "note: this calibration cannot notice another tire on the wheel (fewer than 17 "
-            "conditions, or an earlier version); calibrate on more",
+            "note: this calibration cannot detect that another tire is on the wheel (it has fewer "
+            "than 17 conditions, or was made by an earlier version); calibrate with more "
+            "conditions",
             soft_wrap=True,
             markup=False,
         )

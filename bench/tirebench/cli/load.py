@@ -17,9 +17,10 @@ Examples:
   tirebench load --bus serial --baud 2000000
 
 \b
-Frames are counted bit by bit, checksum and stuffing included: the mean of gage waves, and the most
-that stuffing can do. A plan fits up to {HIGHEST_MEAN:.0%} mean load and 100 % in the worst case.
-Exit code: 0 it fits, 1 it does not (and what would is said), 2 bad input.
+Frames are counted bit by bit, checksum and bit stuffing included: the mean load for gage
+signals, and the worst case of bit stuffing. A plan fits up to {HIGHEST_MEAN:.0%} mean load and
+100 % in the worst case.
+Exit code: 0 it fits, 1 it does not (a plan that would fit is printed), 2 bad input.
 """
 
 
@@ -29,7 +30,7 @@ Exit code: 0 it fits, 1 it does not (and what would is said), 2 bad input.
 @click.option(
     "--data-bitrate",
     type=click.IntRange(min=1000),
-    help="Of the data in CAN FD.  [default: 2000000]",
+    help="Bit rate of the data phase of CAN FD. [default: 2000000]",
 )
 @click.option("--baud", default=2_000_000, show_default=True, type=click.IntRange(min=1200))
 @click.option(
@@ -45,9 +46,11 @@ Exit code: 0 it fits, 1 it does not (and what would is said), 2 bad input.
     show_default=True,
     metavar="HZ",
     type=click.FloatRange(153.0, 200_000.0),
-    help="Of the gages.",
+    help="Sample rate of the gages.",
 )
-@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers.")
+@click.option(
+    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the computed loads (JSON)."
+)
 @click.pass_context
 def load(
     context: click.Context,
@@ -80,15 +83,16 @@ def load(
     others = [] if found.fits else suggestions(plan)
     highest = highest_rate(plan)
     if found.fits:
-        click.echo(f"fits; up to {highest / 1e3:g} kHz would")
+        click.echo(f"the plan fits; sample rates up to {highest / 1e3:g} kHz would fit")
     else:
         click.echo(
-            f"does not fit ({HIGHEST_MEAN:.0%} mean and 100 % worst are allowed); this would:"
+            f"the plan does not fit (at most {HIGHEST_MEAN:.0%} mean and 100 % worst-case load are "
+            "allowed); these plans would:"
         )
         for text in others:
             click.echo(f"  {text}")
         if not others:
-            click.echo("  nothing on one line; take several")
+            click.echo("  no plan with one line fits; use several lines")
     if json_file is not None:
         write_json(
             json_file,
@@ -122,8 +126,8 @@ def _plan(
     if bus == "serial":
         if kind is not None:
             raise DeviceError(
-                f"--format {kind} --bus serial: a serial line carries SERIAL v1; formats are for "
-                "CAN; leave --format out"
+                f"--format {kind} --bus serial: a serial line carries SERIAL v1 only, and --format "
+                "chooses a CAN format; leave --format out"
             )
         return LoadPlan(SERIAL, baud, None, wheels, rate)
     if bus == "fd":

@@ -17,8 +17,8 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 WHEEL_MARK = "# wheel "
 PORTS = """\b
 Ports: /dev/ttyUSB0 or COM3, tcp://HOST:PORT, udp://[HOST]:PORT, rfc2217://HOST:PORT (SERIAL v1, or
-as a map says), slcan:/dev/ttyACM0 (CAN adapter with slcan, read in bulk), can:INTERFACE:CHANNEL
-(python-can: can:socketcan:can0, can:virtual:test, can:pcan:PCAN_USBBUS1).
+the layout that --map describes), slcan:/dev/ttyACM0 (CAN adapter with slcan, read in bulk),
+can:INTERFACE:CHANNEL (python-can: can:socketcan:can0, can:virtual:test, can:pcan:PCAN_USBBUS1).
 """
 
 _PORT_OPTIONS = (
@@ -27,26 +27,26 @@ _PORT_OPTIONS = (
         default=2_000_000,
         show_default=True,
         type=click.IntRange(min=1200),
-        help="Of a serial port.",
+        help="Baud rate of a serial port.",
     ),
     click.option(
         "--bitrate",
         default=BITRATE,
         show_default=True,
         type=click.IntRange(min=1000),
-        help="Of a CAN bus.",
+        help="Bit rate of a CAN bus [bit/s].",
     ),
     click.option(
         "--data-bitrate",
         type=click.IntRange(min=1000),
-        help="Of the data in CAN FD.  [default: classic CAN]",
+        help="Bit rate of the data phase of CAN FD [bit/s].  [default: classic CAN]",
     ),
     click.option(
         "--bus-option",
         "bus_options",
         metavar="KEY=VALUE",
         multiple=True,
-        help="More for python-can.",
+        help="Further option of the python-can interface; may be given several times.",
     ),
     click.option(
         "--rate",
@@ -54,14 +54,14 @@ _PORT_OPTIONS = (
         show_default=True,
         metavar="HZ",
         type=click.FloatRange(153.0, 200_000.0),
-        help="Sample rate of the gages on CAN; SERIAL v1 says its own.",
+        help="Sample rate of the gages on CAN; a SERIAL v1 frame states its own rate.",
     ),
     click.option(
         "--map",
         "map_file",
         metavar="M.toml",
         type=FILE,
-        help="Another make's transmitter, on CAN or a serial line.",
+        help="Map file (TOML) that describes another make's transmitter, on CAN or a serial line.",
     ),
     click.option(
         "--reconnect",
@@ -69,7 +69,7 @@ _PORT_OPTIONS = (
         show_default=True,
         metavar="S",
         type=click.FloatRange(min=0.0),
-        help="How long a port may be away before the run ends.",
+        help="How long a port may be disconnected before the run ends.",
     ),
 )
 
@@ -116,8 +116,9 @@ def devices_of(texts: Sequence[str]) -> tuple[dict[int | None, Device], str]:
         path = Path(rest)
         if wheel in devices:
             raise DeviceError(
-                f"--device {given}: a device of {'all wheels' if wheel is None else wheel} is "
-                "there already; one a wheel is allowed; leave one out"
+                f"--device {given}: a device file for "
+                f"{'all wheels' if wheel is None else f'wheel {wheel}'} was already given; one per "
+                "wheel is allowed; leave one out"
             )
         devices[wheel] = read_device(path)
         text = path.read_text(encoding="utf-8")

@@ -29,30 +29,34 @@ _OPTIONS = (
     click.option(
         "--page/--no-page",
         default=None,
-        help="Live page in the browser.  [default: yes, but for a replay without --pace]",
+        help="Show a live page in the browser. [default: yes, except in a replay without --pace]",
     ),
     click.option(
         "--host",
         default=LOOPBACK,
         show_default=True,
         metavar="ADDRESS",
-        help="Address of the page.",
+        help="Address on which the page is served.",
     ),
     click.option(
         "--network",
         is_flag=True,
-        help="Allow a --host that other machines can reach; not encrypted.",
+        help="Allow a --host that other machines can reach; the connection is not encrypted.",
     ),
     click.option(
         "--page-port",
         default=0,
         type=click.IntRange(0, 65535),
         metavar="N",
-        help="Port of the page.  [default: a free one]",
+        help="TCP port of the page. [default: any free port]",
     ),
-    click.option("--tui", is_flag=True, help="The same in this terminal."),
+    click.option("--tui", is_flag=True, help="Show the same values in this terminal."),
     click.option(
-        "--alarms", "alarms", metavar="A.toml", type=FILE, help="Limits of the page's alarms."
+        "--alarms",
+        "alarms",
+        metavar="A.toml",
+        type=FILE,
+        help="File (TOML) with the limits of the alarms.",
     ),
 )
 
@@ -120,7 +124,10 @@ class Shown:
         choice, console = self._choice, self._console
         missing = [name for name in NEEDED if find_spec(name) is None]
         if choice.page and missing:
-            console.print(f"no live page: {', '.join(missing)} missing; pip install tirelib[bench]")
+            console.print(
+                f"no live page: the package {', '.join(missing)} is not installed; run: "
+                "pip install 'tirelib[bench]'"
+            )
             choice = PageChoice(False, choice.terminal)
         if not (choice.page or choice.terminal):
             return
@@ -135,7 +142,7 @@ class Shown:
         if choice.open_to_others:
             console.print(
                 f"warning: the page is open to the network at {choice.host}, not encrypted; "
-                "whoever has its address can record and set markers",
+                "whoever knows its address can start recordings and set markers",
                 style="bold red",
                 soft_wrap=True,
             )

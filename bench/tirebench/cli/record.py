@@ -32,8 +32,8 @@ Examples:
 
 {PORTS}
 \b
-Every read is written as it came, bad frames included; decoding only counts.
-Exit code: 0 done, 1 the port went away or not one good frame came, 2 bad input.
+Every byte is written as it came, bad frames included; frames are decoded only to count them.
+Exit code: 0 done, 1 the port was lost or not one good frame came, 2 bad input.
 """
 
 
@@ -43,39 +43,53 @@ Exit code: 0 done, 1 the port went away or not one good frame came, 2 bad input.
     "ports",
     metavar="[WHEEL=]PORT",
     multiple=True,
-    help="Port to read, several allowed; see below.",
+    help="Port to read; may be given several times; the forms are listed below.",
 )
 @click.option(
     "--setup",
     metavar="S.toml",
     type=FILE,
-    help="Several sources, each with its protocol, wheel and device file.",
+    help="Setup file (TOML) of several sources, each with its protocol, wheel and device file.",
 )
-@click.option("--out", metavar="FILE.mcap", type=NEW_FILE, required=True, help="A new file.")
+@click.option(
+    "--out",
+    metavar="FILE.mcap",
+    type=NEW_FILE,
+    required=True,
+    help="New recording to write (.mcap).",
+)
 @recording_options
 @click.option(
     "--conditions",
     "sidecar",
     metavar="F.json",
     type=FILE,
-    help="Conditions over time, as `emulate --conditions` writes them.",
+    help="File with the conditions over time, as `tirebench emulate --conditions` writes it.",
 )
 @click.option(
     "--device",
     "device_texts",
     metavar="[WHEEL=]D.toml",
     multiple=True,
-    help="Scale and zero of the gages, kept in the recording.",
+    help="Device file (scale and zero of the gages), stored in the recording.",
 )
 @port_options
-@click.option("--duration", metavar="S", type=click.FloatRange(min=0.0), help="End after this.")
+@click.option(
+    "--duration", metavar="S", type=click.FloatRange(min=0.0), help="End after this time."
+)
 @click.option(
     "--silence",
     metavar="S",
     type=click.FloatRange(min=0.0),
-    help="End when nothing came for so long.",
+    help="End when nothing came for this time.",
 )
-@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the counters.")
+@click.option(
+    "--json",
+    "json_file",
+    metavar="FILE",
+    type=NEW_FILE,
+    help="Write the frame and loss counters (JSON).",
+)
 @click.pass_context
 def record(
     context: click.Context,
@@ -98,7 +112,7 @@ def record(
 ) -> None:
     """Record the raw bytes of a port; Ctrl-C ends in good order."""
     if bool(ports) == (setup is not None):
-        raise click.UsageError("just one of --port and --setup is needed")
+        raise click.UsageError("give exactly one of --port and --setup")
     keep_recordings(json_file, out)
     devices, text = devices_of(device_texts)
     plan = PortPlan("", baud, bitrate, data_bitrate, bus_options)
@@ -143,7 +157,7 @@ def record(
         )
     failed = counts["recording"]["error"]
     if failed:
-        click.secho(f"not everything is recorded: {failed}", fg="red")
+        click.secho(f"the recording is incomplete: {failed}", fg="red")
     good = wheels.counts[0].ok > 0 and outcome.reason != "unplugged" and not failed
     context.exit(0 if good else 1)
 

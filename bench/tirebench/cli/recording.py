@@ -28,13 +28,13 @@ _OPTIONS = (
         "--split-minutes",
         metavar="MIN",
         type=click.FloatRange(min=0.01),
-        help="Begin a new part of the recording after so long.",
+        help="Start a new part of the recording after this time.",
     ),
     click.option(
         "--split-mb",
         metavar="MB",
         type=click.FloatRange(min=0.1),
-        help="Begin a new part of the recording when one is so long.",
+        help="Start a new part of the recording when a part reaches this size.",
     ),
     click.option(
         "--strain/--no-strain",
@@ -45,9 +45,9 @@ _OPTIONS = (
         "--trigger",
         metavar="BEFORE,AFTER",
         callback=lambda _c, _p, text: _around(text),
-        help="Record only around a lost port and, with the page or --tui of `run`, around "
-        "markers and alarms that begin: so many seconds before and after, a file for "
-        "each.",
+        help="Record only around events, this many seconds before and after each, one file per "
+        "event. Events are a lost port and, with the page or --tui of `run`, markers and the "
+        "start of an alarm.",
     ),
 )
 
@@ -90,13 +90,13 @@ def at_start(path: Path, reader: ReaderPlan, rule: RecordingRule, *, watched: bo
     said = room(path, wheels, strain=rule.strain)
     if rule.around is not None:
         said += (
-            f"\n--trigger: the {rule.around[0]:g} s before take up to "
+            f"\n--trigger: keeping the {rule.around[0]:g} s before an event takes up to "
             f"{1e-6 * KEPT * wheels * rule.around[0]:.0f} MB of memory"
         )
     if rule.around is not None and not watched:
         said += (
-            "\n--trigger: a lost port triggers, and an alarm of the program itself; markers and "
-            "the limits of alarms need `tirebench run` with its page or with --tui"
+            "\n--trigger: only a lost port and alarms of the program itself trigger here; markers "
+            "and alarm limits need `tirebench run` with its page or with --tui"
         )
     return said
 
@@ -105,13 +105,13 @@ def room(path: Path, wheels: int, *, strain: bool = True) -> str:
     """Return what is to be said of the room where a recording of so many wheels will be."""
     free = free_at(path)
     if free != free:
-        return "room for the recording: the system does not tell"
+        return "room for the recording: unknown, the system does not report free disk space"
     hours = free / ((HOURLY if strain else HOURLY_RAW) * wheels)
     said = f"room for the recording: {free / 1e9:.1f} GB, about {hours:.0f} h"
     if hours < 1.0:
         said = f"room for the recording: {free / 1e6:.0f} MB, about {60.0 * hours:.0f} min"
     said += f" of {wheels} wheels at 10 kHz" if wheels > 1 else " of a wheel at 10 kHz"
-    return f"warning: {said}; free some or name another place" if free < LITTLE else said
+    return f"warning: {said}; free some space, or choose another disk" if free < LITTLE else said
 
 
 def _around(text: str | None) -> tuple[float, float] | None:
@@ -125,6 +125,6 @@ def _around(text: str | None) -> tuple[float, float] | None:
     if not (0.0 <= before <= 600.0 and 0.0 <= after <= 86_400.0):
         raise click.BadParameter(
             f"{text!r}; two times in seconds are needed, up to 600 before and 86400 after, such as "
-            "10,20; write it so"
+            "10,20; correct it"
         )
     return before, after

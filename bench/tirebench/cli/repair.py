@@ -13,28 +13,31 @@ from tirelib.cli.common import FILE, NEW_FILE, plain
 
 _EXAMPLE = """\b
 Examples:
-  tirebench repair live.mcap --out whole.mcap     # of a run or a machine that was switched off
+  tirebench repair live.mcap --out whole.mcap     # after the run was killed or the power failed
   tirebench repair live.json --out whole.json
 
 \b
-Readers that need an index (Foxglove) open the new file; the old one stays as it is. Of JSON the
-turns are kept; a replay of the recording gives the summary too. Each part of a recording is a file
-of its own.
-Exit code: 0 done, also where the file was whole; 2 nothing can be read.
+The new file has an index, so that readers which need one (Foxglove) can open it; the old file is
+not changed. From JSON the turns are recovered; replay the recording to get the summary too.
+Each part of a recording is repaired by itself.
+Exit code: 0 done, also where the file was complete; 2 nothing can be read.
 """
 
 
 @click.command(epilog=_EXAMPLE)
 @click.argument("file", metavar="FILE", type=FILE)
-@click.option("--out", metavar="FILE", type=NEW_FILE, required=True, help="A new file.")
+@click.option("--out", metavar="FILE", type=NEW_FILE, required=True, help="New file to write.")
 def repair(file: Path, out: Path) -> None:
     """Give a recording, or the JSON of a run, that breaks off its end and its index."""
     if out.exists():
-        raise RecordingError(f"{out}: it exists; nothing is overwritten; name another file")
+        raise RecordingError(f"{out}: already exists; repair never overwrites; name another file")
     if _is_json(file):
         document = completed(file.read_text(encoding="utf-8", errors="replace"))
         if document is None:
-            raise RecordingError(f"{file}: no turns stand in it; JSON of `tirebench run` is needed")
+            raise RecordingError(
+                f"{file}: it holds no turns; a file that `tirebench run --json` "
+                "wrote is needed; check the path"
+            )
         with whole(out) as new:
             new.write_text(json.dumps(plain(document), indent=1, allow_nan=False) + "\n")
         click.echo(f"{len(document['turns'])} turns in {out}")
@@ -42,7 +45,7 @@ def repair(file: Path, out: Path) -> None:
     found = repaired(file, out)
     click.echo(f"{found.messages} messages of {len(found.topics)} topics in {out}")
     if found.damage:
-        click.echo(f"note: {file} breaks off ({found.damage})")
+        click.echo(f"note: {file} is incomplete ({found.damage})")
 
 
 def _is_json(file: Path) -> bool:

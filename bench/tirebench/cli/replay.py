@@ -13,9 +13,9 @@ Examples:
   tirebench replay live.mcap --fmu StrainTire.fmu --pace 1
 
 \b
-The same as `tirebench run --replay`: the estimates are those of the run, to the bit, at any pace.
+The same as `tirebench run --replay`. At any pace the estimates equal those of the run, bit for bit.
 To play a recording to another program, see `tirebench emulate --recording`.
-Exit code: as of `tirebench run`.
+Exit code: as for `tirebench run`.
 """
 
 
@@ -27,21 +27,25 @@ Exit code: as of `tirebench run`.
     metavar="X.fmu",
     type=FILE,
     required=True,
-    help="Made by `tirelib fmu build`.",
+    help="FMU of the estimator, made by `tirelib fmu build`.",
 )
-@click.option("--trust", is_flag=True, help="Run this FMU although it is unknown; remember it.")
+@click.option(
+    "--trust",
+    is_flag=True,
+    help="Run this FMU although it is unknown, and add it to the list of trusted FMUs.",
+)
 @click.option(
     "--pace",
     metavar="X",
     type=click.FloatRange(0.001, 1000.0),
-    help="Times real time.  [default: as fast as possible]",
+    help="Replay speed as a multiple of real time. [default: as fast as possible]",
 )
 @click.option(
     "--wheel",
     "numbers",
     multiple=True,
     type=click.IntRange(0, 255),
-    help="Wheels to look at.  [default: as in the run]",
+    help="Numbers of the wheels to estimate. [default: as in the run]",
 )
 @click.option(
     "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write every turn as JSON."

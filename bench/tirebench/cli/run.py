@@ -58,9 +58,10 @@ Examples:
 \b
 Without --speed there is no slip ratio. A replay takes protocol, device files and conditions from
 the recording.
-JSON as of `tirelib estimate`: N, deg, ISO 8855 axes; plus what the line lost, for each wheel.
+The JSON is that of `tirelib estimate` (N, deg, ISO 8855 axes) plus the losses of each wheel's line.
 An FMU is native code: its hash is shown, and an unknown one is refused without --trust.
-Exit code: 0 done, 1 unplugged or not one valid turn, 2 bad input. Ctrl-C ends in good order.
+Exit code: 0 done, 1 the port was lost or not one turn was valid, 2 bad input. Ctrl-C ends
+the run in good order.
 """
 
 
@@ -70,13 +71,13 @@ Exit code: 0 done, 1 unplugged or not one valid turn, 2 bad input. Ctrl-C ends i
     "ports",
     metavar="[WHEEL=]PORT",
     multiple=True,
-    help="Port to read, several allowed; see below and `tirebench ports`.",
+    help="Port to read; may be given several times; see below and `tirebench ports`.",
 )
 @click.option(
     "--setup",
     metavar="S.toml",
     type=FILE,
-    help="Several sources, each with its protocol, wheel and device file.",
+    help="Setup file (TOML) of several sources, each with its protocol, wheel and device file.",
 )
 @click.option(
     "--port-file",
@@ -91,14 +92,14 @@ Exit code: 0 done, 1 unplugged or not one valid turn, 2 bad input. Ctrl-C ends i
     default=0.0,
     is_flag=False,
     flag_value=60.0,
-    help="Wait for ports that are not there yet, 60 s unless said.",
+    help="Wait for ports that do not exist yet, 60 s unless a time is given.",
 )
-@click.option("--replay", metavar="FILE", type=FILE, help="Recording to read instead.")
+@click.option("--replay", metavar="FILE", type=FILE, help="Recording to read instead of a port.")
 @click.option(
     "--pace",
     metavar="X",
     type=click.FloatRange(0.001, 1000.0),
-    help="Replay at X times real time.  [default: as fast as possible]",
+    help="Replay speed as a multiple of real time. [default: as fast as possible]",
 )
 @click.option(
     "--fmu",
@@ -106,9 +107,13 @@ Exit code: 0 done, 1 unplugged or not one valid turn, 2 bad input. Ctrl-C ends i
     metavar="X.fmu",
     type=FILE,
     required=True,
-    help="Made by `tirelib fmu build`; one instance for each wheel.",
+    help="FMU of the estimator, made by `tirelib fmu build`; each wheel gets its own instance.",
 )
-@click.option("--trust", is_flag=True, help="Run this FMU although it is unknown; remember it.")
+@click.option(
+    "--trust",
+    is_flag=True,
+    help="Run this FMU although it is unknown, and add it to the list of trusted FMUs.",
+)
 @click.option("--speed", metavar="KMH", type=float, help="Travel speed.")
 @click.option("--pressure", metavar="BAR", type=click.FloatRange(min=0.0), help="Gauge pressure.")
 @click.option("--camber", metavar="DEG", type=float, help="ISO 8855.")
@@ -117,28 +122,28 @@ Exit code: 0 done, 1 unplugged or not one valid turn, 2 bad input. Ctrl-C ends i
     "named",
     metavar="NAME=VALUE",
     multiple=True,
-    help="Any condition by its name: friction=0.8, tread_depth=5 (mm).",
+    help="Any other condition by its name, such as friction=0.8 or tread_depth=5 (mm).",
 )
 @click.option(
     "--conditions",
     "sidecar",
     metavar="F.json",
     type=FILE,
-    help="Conditions over time, as `emulate --conditions` writes them.",
+    help="File with the conditions over time, as `tirebench emulate --conditions` writes it.",
 )
 @click.option(
     "--device",
     "device_texts",
     metavar="[WHEEL=]D.toml",
     multiple=True,
-    help="Scale and zero of the gages; one for all wheels, or for each.",
+    help="Device file (scale and zero of the gages), one for all wheels or one for each.",
 )
 @click.option(
     "--wheel",
     "numbers",
     multiple=True,
     type=click.IntRange(0, 255),
-    help="Wheels to look at.  [default: the first four that are heard]",
+    help="Numbers of the wheels to estimate. [default: the first four that send frames]",
 )
 @port_options
 @click.option(
@@ -155,24 +160,29 @@ Exit code: 0 done, 1 unplugged or not one valid turn, 2 bad input. Ctrl-C ends i
     type=NEW_FILE,
     help="Write every turn as JSON, as it comes.",
 )
-@click.option("--duration", metavar="S", type=click.FloatRange(min=0.0), help="End after this.")
+@click.option(
+    "--duration", metavar="S", type=click.FloatRange(min=0.0), help="End after this time."
+)
 @click.option(
     "--silence",
     metavar="S",
     type=click.FloatRange(min=0.0),
-    help="End when nothing came for so long.",
+    help="End when nothing came for this time.",
 )
-@click.option("--turns", metavar="N", type=click.IntRange(min=1), help="End after so many turns.")
+@click.option(
+    "--turns", metavar="N", type=click.IntRange(min=1), help="End after this number of turns."
+)
 @click.option(
     "--every-turn",
     is_flag=True,
-    help="Skip none: the port waits.  [default: skip what is 3 s late]",
+    help="Estimate every turn, even late, while the port waits. [default: skip data that are 3 s "
+    "late]",
 )
 @click.option(
     "--realtime/--no-realtime",
     "asked",
     default=None,
-    help="Go before all other programs.  [default: where this user may]",
+    help="Run with real-time priority. [default: where the user's rights allow it]",
 )
 @bridge_options
 @page_options
@@ -220,9 +230,11 @@ def run(
 ) -> None:
     """Estimate Fz, alpha, kappa and Fy of each turn, live from a port or from a recording."""
     if [bool(ports), setup is not None, port_file is not None, replay is not None].count(True) != 1:
-        raise click.UsageError("just one of --port, --setup, --port-file and --replay is needed")
+        raise click.UsageError("give exactly one of --port, --setup, --port-file and --replay")
     if replay is not None and record is not None:
-        raise click.UsageError("--record goes with --port: a recording is there already")
+        raise click.UsageError(
+            "--record cannot be used with --replay: the data are already recorded"
+        )
     keep_recordings(json_file, record, replay)
     priority = realtime(asked) if replay is None else ""
     paced = replay is None or pace is not None
@@ -235,7 +247,7 @@ def run(
     if port_file is not None:
         ports = (port_of_file(port_file, wait, console),)
     elif wait and replay is None:
-        console.print(f"ports that are not there yet are waited for, {wait:g} s")
+        console.print(f"waiting up to {wait:g} s for ports that do not exist yet")
     options = {"speed": speed, "pressure": pressure, "camber": camber}
     conditions = conditions_of(options, named, sidecar)
     console.print(f"FMU {fmu_file}, sha256 {archive.sha256}", soft_wrap=True)
@@ -251,7 +263,9 @@ def run(
             known = given_replayed(link, conditions, devices, numbers, console)
             recorded_with = link.recording.header.fmu
             if recorded_with and recorded_with != archive.sha256:
-                console.print(f"note: recorded with another FMU ({recorded_with[:12]}...)")
+                console.print(
+                    f"note: the recording was made with another FMU ({recorded_with[:12]}...)"
+                )
         calibration = file.calibration
         if calibration is not None:
             known.check_layout(calibration.lateral, str(fmu_file))
@@ -376,7 +390,7 @@ def _session(
                 journal.add(news.turns)
                 if journal.error != said:
                     said = journal.error
-                    text = said or "every turn is in the file again"
+                    text = said or "the file is writable again and holds every turn"
                     news.alarms.append(text)
                     if switch is not None:
                         switch.alarm("json", text, on=bool(said))
@@ -416,11 +430,13 @@ def _summary(
         soft_wrap=True,
     )
     if link is not None and link.recording.complete is False:
-        console.print(f"note: the recording breaks off ({link.recording.damage})", soft_wrap=True)
+        console.print(
+            f"note: the recording is incomplete ({link.recording.damage})", soft_wrap=True
+        )
     counts = source.counts()
     for name, number in counts.get("restarts", {}).items():
         if number:
-            console.print(f"note: the {name} was started again {number} times")
+            console.print(f"note: the {name} stopped unexpectedly and was restarted {number} times")
     for wheel, mine in counts.get("wheels", {}).items():
         if mine["skipped_samples"]:
             console.print(f"note: wheel {wheel}: {mine['skipped_turns']} turns were skipped")
@@ -429,8 +445,8 @@ def _summary(
     if source.live and outcome.latency:
         middle, high = np.percentile(np.array(outcome.latency) * 1e3, (50, 99))
         console.print(
-            f"byte in to estimate out: median {middle:.1f} ms, 99 % {high:.1f} ms; "
-            f"{100 * used:.0f} % of a core"
+            f"delay from the last byte to the estimate: median {middle:.1f} ms, 99 % {high:.1f} "
+            f"ms; {100 * used:.0f} % of a core"
         )
     triggered = counts.get("recording", {}).get("recordings", 0)
     if triggered > 1:

@@ -17,13 +17,14 @@ Examples:
       --gage-factor 2.1 --gage 3 --out wheel.toml
 
 \b
-The wheel stands. It is read without the shunt, then with it: a resistor Rs beside a gage Rg looks
-like a strain of 4 x / (Ks (4 + 2 x)), x = - Rg / (Rg + Rs), in a quarter bridge, a compression.
-What the line shows instead gives the gain of each gage. With --positive the resistor is beside the
-next arm of the bridge, which looks like tension.
+The wheel must stand still. It is read without the shunt, then with it. In a quarter bridge a
+resistor Rs in parallel to a gage Rg looks like a compression, a strain of 4 x / (Ks (4 + 2 x)) with
+x = - Rg / (Rg + Rs).
+The ratio of the measured to this calculated strain gives the gain of each gage. With --positive the
+resistor is parallel to the next arm of the bridge, which looks like tension.
 {PORTS}
 \b
-Exit code: 0 done, 2 bad input, no such step included.
+Exit code: 0 done, 2 bad input, or the step of the shunt is not in the data.
 """
 
 
@@ -34,7 +35,7 @@ Exit code: 0 done, 2 bad input, no such step included.
     nargs=2,
     metavar="OFF.mcap ON.mcap",
     type=FILE,
-    help="Recordings without and with the shunt instead.",
+    help="Two recordings, without and with the shunt, instead of a port.",
 )
 @click.option(
     "--gage-resistance",
@@ -42,7 +43,7 @@ Exit code: 0 done, 2 bad input, no such step included.
     required=True,
     metavar="OHM",
     type=click.FloatRange(1.0, 1e5),
-    help="Rg, 350 say.",
+    help="Resistance Rg of the gage, such as 350.",
 )
 @click.option(
     "--shunt",
@@ -50,7 +51,7 @@ Exit code: 0 done, 2 bad input, no such step included.
     required=True,
     metavar="OHM",
     type=click.FloatRange(10.0, 1e8),
-    help="Rs, 100000 say.",
+    help="Resistance Rs of the shunt, such as 100000.",
 )
 @click.option(
     "--gage-factor",
@@ -58,7 +59,7 @@ Exit code: 0 done, 2 bad input, no such step included.
     required=True,
     metavar="KS",
     type=click.FloatRange(0.1, 300.0),
-    help="Ks of the gage.",
+    help="Gage factor Ks.",
 )
 @click.option(
     "--gage",
@@ -66,9 +67,13 @@ Exit code: 0 done, 2 bad input, no such step included.
     type=click.IntRange(1),
     multiple=True,
     metavar="N",
-    help="Gage that is shunted, several allowed.  [default: all]",
+    help="Number of a shunted gage; may be given several times.  [default: all]",
 )
-@click.option("--positive", is_flag=True, help="The shunt looks like tension.")
+@click.option(
+    "--positive",
+    is_flag=True,
+    help="The shunt is across the next arm of the bridge and looks like tension.",
+)
 def shunt(
     port: str | None,
     device_texts: tuple[str, ...],
@@ -92,7 +97,7 @@ def shunt(
 ) -> None:
     """Find the gain of each gage with a shunt, on a standing wheel."""
     if (port is None) == (replay is None):
-        raise click.UsageError("just one of --port and --replay is needed")
+        raise click.UsageError("give exactly one of --port and --replay")
     plan = PortPlan(port or "", baud, bitrate, data_bitrate, bus_options)
     wanted = asked(port, device_texts, number, seconds, still, plan, rate, map_file)
     apparent = apparent_strain(gage_ohm, shunt_ohm, factor) * (-1.0 if positive else 1.0)
@@ -104,8 +109,8 @@ def shunt(
         click.pause("Put the shunt on and press a key ...", err=True)
         _, after = wanted.of_port()
     new = shunted(device, before, after, apparent, gages)
-    write_device(out, new, f"shunt {shunt_ohm:g} ohm beside {gage_ohm:g} ohm, Ks {factor:g}")
-    click.echo(f"the shunt is {1e6 * apparent:+.1f} microstrain")
+    write_device(out, new, f"shunt {shunt_ohm:g} ohm parallel to {gage_ohm:g} ohm, Ks {factor:g}")
+    click.echo(f"the shunt looks like {1e6 * apparent:+.1f} microstrain")
     for gage, (step, gain) in enumerate(zip(after - before, new.gain, strict=True), 1):
         click.echo(f"gage {gage}: {1e6 * step:+.1f} microstrain, gain {gain:g}")
     click.echo(f"written: {out}")

@@ -95,5 +95,5 @@ def start_in_order() -> Iterator[Stop]:
         except KeyboardInterrupt:
             if stop.action is not interrupt:
                 raise
-            click.echo("stopped while it started; nothing was read", err=True)
+            click.echo("stopped during the start; nothing was read", err=True)
             raise click.exceptions.Exit(1) from None

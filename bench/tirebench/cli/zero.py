@@ -20,13 +20,15 @@ Lift the wheel, inflate it as for the test, and let it stand: the mean counts of
 its zero. A wheel that turns is refused. Give the new file to `run --device [WHEEL=]NEW.toml`.
 {PORTS}
 \b
-Exit code: 0 done, 2 bad input, a wheel that turns included.
+Exit code: 0 done, 2 bad input, or the wheel turns.
 """
 
 
 @click.command(epilog=_EXAMPLE)
 @gathering_options
-@click.option("--replay", metavar="FILE.mcap", type=FILE, help="Recording to read instead.")
+@click.option(
+    "--replay", metavar="FILE.mcap", type=FILE, help="Recording to read instead of a port."
+)
 def zero(
     port: str | None,
     device_texts: tuple[str, ...],
@@ -45,7 +47,7 @@ def zero(
 ) -> None:
     """Take the mean strain of a standing, unloaded wheel as the zero of its gages."""
     if (port is None) == (replay is None):
-        raise click.UsageError("just one of --port and --replay is needed")
+        raise click.UsageError("give exactly one of --port and --replay")
     plan = PortPlan(port or "", baud, bitrate, data_bitrate, bus_options)
     wanted = asked(port, device_texts, number, seconds, still, plan, rate, map_file)
     device, mean = wanted.of_port() if replay is None else wanted.of_recording(replay)
@@ -54,6 +56,6 @@ def zero(
     for gage, (offset, before, after) in enumerate(
         zip(mean, device.zero_of(len(mean)), new.zero, strict=True), 1
     ):
-        said = "shows nothing, kept" if np.isnan(offset) else f"{1e6 * offset:+.1f} microstrain"
+        said = "no data, zero kept" if np.isnan(offset) else f"{1e6 * offset:+.1f} microstrain"
         click.echo(f"gage {gage}: {said}, zero {before:g} -> {after:g} counts")
     click.echo(f"written: {out}")

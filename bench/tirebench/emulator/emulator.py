@@ -273,13 +273,13 @@ def _period(run: Run) -> int:
     if run.strain is None or run.strain.shape[0] != GAGES:
         given = "no strain" if run.strain is None else f"{run.strain.shape[0]} gages"
         raise DeviceError(
-            f"{where}: it has {given}; the transmitter sends {GAGES} gages; choose another run"
+            f"{where}: the run has {given}; the transmitter sends {GAGES} gages; choose another run"
         )
     period = round(1.0 / (run.rate * TICK))
     if not 1 <= period < 2**16 or abs(period * TICK * run.rate - 1.0) > 1e-6:
         raise DeviceError(
-            f"{where}: {run.rate:g} Hz has a period of {1e6 / run.rate:g} us; a frame says it in "
-            "steps of 0.1 us up to 6553.5 us; resample the run"
+            f"{where}: {run.rate:g} Hz has a period of {1e6 / run.rate:g} us; a frame states the "
+            "period in steps of 0.1 us up to 6553.5 us; resample the run"
         )
     return period
 

@@ -69,9 +69,8 @@ def parse_faults(texts: Iterable[str]) -> dict[str, float]:
         name, _, given = text.partition("=")
         if name not in RATES and name not in GAGE_FAULTS and name not in SIZES:
             problems.append(
-                f"--fault {text}: {name!r} is not known; allowed are "
-                f"{', '.join((*RATES, *GAGE_FAULTS, *SIZES))}; name one of "
-                "them"
+                f"--fault {text}: unknown fault {name!r}; allowed are "
+                f"{', '.join((*RATES, *GAGE_FAULTS, *SIZES))}; name one of them"
             )
             continue
         usual, low, high, what = _range(name)

@@ -73,8 +73,8 @@ class Manoeuvre:
         if points is None:
             known = ", ".join(str(number) for number in self.points)
             raise DeviceError(
-                f"wheel {wheel}: the manoeuvre has no points for it; it has those of {known}; "
-                "add some, or leave out the column wheel"
+                f"wheel {wheel}: the manoeuvre has no points for this wheel; it has points for "
+                f"{known}; add some, or leave out the column wheel"
             )
         return points
 
@@ -118,30 +118,32 @@ def read_manoeuvre(path: Path) -> Manoeuvre:
             document = tomllib.loads(text)
             if document.get("format") != FORMAT:
                 raise DeviceError(
-                    f"{path}: format = {document.get('format')!r}; {FORMAT!r} is understood here; "
+                    f"{path}: format = {document.get('format')!r}; this program reads {FORMAT!r}; "
                     "correct it"
                 )
             rows, tire = list(document.get("point", [])), str(document.get("tire", "reference"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, TypeError) as error:
         raise DeviceError(
-            f"{path}: it cannot be read ({cause(error)}); a manoeuvre is TOML or CSV in UTF-8; "
-            "check path and line"
+            f"{path}: cannot be read ({cause(error)}); a manoeuvre is TOML or CSV in UTF-8; check "
+            "the path and the file"
         ) from None
     if tire not in TIRES:
-        raise DeviceError(f"{path}: tire = {tire!r}; {', '.join(TIRES)} are known; choose one")
+        raise DeviceError(
+            f"{path}: tire = {tire!r}; known tires are {', '.join(TIRES)}; choose one"
+        )
     return Manoeuvre(TIRES[tire], _points(rows, str(path)))
 
 
 def _points(rows: Sequence[Any], where: str) -> dict[int | None, tuple[Point, ...]]:
     faults: list[str] = []
     if not rows:
-        faults.append(f"{where}: there is no point; two at least are needed; write them")
+        faults.append(f"{where}: the manoeuvre has no points; at least two are needed; write them")
     points: dict[int | None, list[Point]] = {}
     unknown: set[str] = set()
     for number, row in enumerate(rows, start=1):
         here = f"{where}: point {number}"
         if not isinstance(row, dict):
-            faults.append(f"{here}: {row!r}; a table is needed; begin each with [[point]]")
+            faults.append(f"{here}: {row!r}; a table is needed; begin each point with [[point]]")
             continue
         given = {str(k): v for k, v in row.items() if v not in (None, "")}
         said = [
@@ -151,7 +153,7 @@ def _points(rows: Sequence[Any], where: str) -> dict[int | None, tuple[Point, ..
         ]
         unknown |= set(given)
         said += [
-            f"{here}: {key} is missing; a number is needed; write it"
+            f"{here}: {key} is missing; a number is needed; add it"
             for key in REQUIRED
             if key not in given
         ]
@@ -169,10 +171,15 @@ def _points(rows: Sequence[Any], where: str) -> dict[int | None, tuple[Point, ..
 def _unknown(key: str, here: str) -> str:
     """Say that a column is none of ours, and which one means the same in another unit."""
     if key == "None":
-        return f"{here}: more values than columns; as many are needed; correct the line"
+        return (
+            f"{here}: the line has more values than the table has columns; one value per column "
+            "is needed; correct the line"
+        )
     meant = [column for column in COLUMNS if column.rpartition("_")[0] == key.rpartition("_")[0]]
-    hint = f"give {meant[0]}, in its unit" if meant else "correct the spelling"
-    return f"{here}: {key} is not known; t_s, wheel, {', '.join(COLUMNS)} are; {hint}"
+    hint = f"write {meant[0]}, in that unit" if meant else "correct the spelling"
+    return (
+        f"{here}: unknown column {key}; known columns are t_s, wheel, {', '.join(COLUMNS)}; {hint}"
+    )
 
 
 def _point(
@@ -193,7 +200,7 @@ def _point(
             )
     wheel, time = _number(given.get("wheel", -1.0)), _number(given.get("t_s", 0.0))
     if not math.isfinite(time):
-        faults.append(f"{here}: t_s = {given['t_s']}; seconds are needed; correct it")
+        faults.append(f"{here}: t_s = {given['t_s']}; a time in seconds is needed; correct it")
     if not wheel.is_integer():
         faults.append(f"{here}: wheel = {given['wheel']}; a whole number is needed; correct it")
     if faults:
@@ -215,10 +222,14 @@ def _order(wheel: int | None, points: Sequence[Point], where: str) -> Iterator[s
     times = [point.time for point in points]
     if len(points) < 2 or times[0] != 0.0 or any(b <= a for a, b in pairwise(times)):
         yield (
-            f"{where}: times {times[:5]}{of}; at least two are needed, growing from 0; correct them"
+            f"{where}: times {times[:5]}{of}; at least two times are needed, increasing from 0; "
+            "correct them"
         )
     if len({point.condition.slip_ratio is None for point in points}) > 1:
-        yield f"{where}: slip_ratio{of} is given at some points only; all or none; complete it"
+        yield (
+            f"{where}: slip_ratio{of} is given at some points only; it must be given at all "
+            "points or at none; complete it"
+        )
 
 
 def nodes(points: Sequence[Point]) -> tuple[Point, ...]:
@@ -232,8 +243,8 @@ def nodes(points: Sequence[Point]) -> tuple[Point, ...]:
     path = dense(points)
     if len(path) > MOST_SOLUTIONS:
         raise DeviceError(
-            f"manoeuvre: {len(path)} solutions of the rig; {MOST_SOLUTIONS} are allowed (0.7 s "
-            "each); move less, or more slowly"
+            f"manoeuvre: it needs {len(path)} solutions of the rig; {MOST_SOLUTIONS} are allowed "
+            "(0.7 s each); use smaller or slower changes"
         )
     return path
 

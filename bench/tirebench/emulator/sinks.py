@@ -84,7 +84,7 @@ class TerminalSink:
         self._port.close()
         self.unplugged += 1
         if self._away_for is None:
-            raise UnpluggedError(f"{self.path}: the cable was pulled, as asked for")
+            raise UnpluggedError(f"{self.path}: the cable was pulled, as --unplug asks")
         self._away, self._change = True, Deadline.after(self._away_for)
 
     def _plan(self) -> None:
@@ -125,8 +125,8 @@ class BusSink:
                     self._bus.send(message)
         except (can.CanError, OSError) as error:
             raise UnpluggedError(
-                f"{self.path}: the bus went away ({error}); a steady connection is needed; check "
-                "cable and adapter"
+                f"{self.path}: the bus was lost ({error}); an uninterrupted connection is needed; "
+                "check cable and adapter"
             ) from None
         return True
 
@@ -158,7 +158,7 @@ def open_bus(text: str, *, fd: bool) -> BusSink:
     if kind != "can" or not interface or not channel:
         raise LinkError(
             f"--bus {text}: can:INTERFACE:CHANNEL is needed, such as can:virtual:test or "
-            "can:socketcan:vcan0; write it so"
+            "can:socketcan:vcan0; correct it"
         )
     arguments: dict[str, Any] = {"fd": True} if fd else {}
     if interface == "virtual":
@@ -168,6 +168,6 @@ def open_bus(text: str, *, fd: bool) -> BusSink:
     except Exception as error:  # each backend has its own, and some raise bare OSError
         known = ", ".join(sorted(can.VALID_INTERFACES))
         raise LinkError(
-            f"--bus {text}: it cannot be opened ({type(error).__name__}: {error}); interfaces are "
-            f"{known}; check name, channel and driver"
+            f"--bus {text}: cannot be opened ({type(error).__name__}: {error}); known interfaces "
+            f"are {known}; check name, channel and driver"
         ) from None

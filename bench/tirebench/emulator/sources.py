@@ -39,7 +39,7 @@ def campaign_runs(campaign: Campaign, numbers: Sequence[int], everything: bool) 
     unknown = [str(number) for number in chosen if number not in plans]
     if unknown or not chosen:
         raise DeviceError(
-            f"{campaign.path}: run {', '.join(unknown) or 'none'}; its runs are "
+            f"{campaign.path}: no run {', '.join(unknown) or 'none'}; its runs are "
             f"{', '.join(str(number) for number in plans) or 'none'}; choose among them"
         )
     return [campaign.load(plans[number]) for number in chosen]
@@ -125,8 +125,9 @@ def chosen_source(recording: Recording, source: int | None) -> int:
     if source not in range(len(sources)) and (source is not None or len(sources) > 1):
         names = (f"{n} {one.get('name', '')}" for n, one in enumerate(sources))
         raise DeviceError(
-            f"{recording.path}: source {'none' if source is None else source}; its sources are "
-            f"{', '.join(names)}; one line carries one of them; choose with --source"
+            f"{recording.path}: source {'none' if source is None else source}: the recording has "
+            f"the sources {', '.join(names)}, and one line carries one of them; choose with "
+            "--source"
         )
     return source or 0
 
@@ -178,6 +179,6 @@ def write_truth(path: Path, motions: Mapping[int, Motion]) -> None:
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     except OSError as error:
         raise DeviceError(
-            f"{path}: it cannot be written ({error.strerror}); a file in a folder that is there is "
+            f"{path}: cannot be written ({error.strerror}); a file in an existing folder is "
             "needed; choose another"
         ) from None

@@ -58,8 +58,8 @@ class FmuArchive:
             name = folder.name
             folder.cleanup()
             raise FmuError(
-                f"{name}: a Python FMU crashes in such a folder; a temporary folder with plain "
-                "ASCII letters is needed; set TMPDIR"
+                f"{name}: a Python FMU crashes in a folder with such a name; a temporary folder "
+                "with an ASCII name is needed; set TMPDIR"
             )
         try:
             with zipfile.ZipFile(io.BytesIO(self.content)) as archive:
@@ -67,8 +67,8 @@ class FmuArchive:
         except Exception as error:  # of zipfile, zlib, lzma ...: damage provokes each of them
             folder.cleanup()
             raise FmuError(
-                f"{self.path}: it cannot be unpacked ({error}); a sound archive is needed; "
-                "build the FMU again"
+                f"{self.path}: cannot be unpacked ({error}); an undamaged archive is needed; build "
+                "the FMU again"
             ) from None
         return folder
 
@@ -87,13 +87,13 @@ def read_fmu(path: Path) -> FmuArchive:
             entries = archive.infolist()
     except OSError as error:
         raise FmuError(
-            f"{path}: it cannot be read ({error.strerror}); an FMU of `tirelib fmu build` is "
-            "needed; check the path"
+            f"{path}: cannot be read ({error.strerror}); an FMU of `tirelib fmu build` is needed; "
+            "check the path"
         ) from None
     except (zipfile.BadZipFile, ValueError, RuntimeError) as error:  # the last: a newer format
         raise FmuError(
-            f"{path}: it is no FMU ({error}); a zip archive is needed; build it with "
-            "`tirelib fmu build`"
+            f"{path}: not an FMU ({error}); a zip archive is needed; build it with `tirelib fmu "
+            "build`"
         ) from None
     problems = [f"{path}: {problem}; do not use this file" for problem in _problems(entries)]
     if problems:
@@ -105,10 +105,10 @@ def _problems(entries: list[zipfile.ZipInfo]) -> Iterator[str]:
     """Yield why an archive must not be unpacked: given and allowed."""
     names = [entry.orig_filename for entry in entries]
     if DESCRIPTION not in names:
-        yield f"there is no {DESCRIPTION}; every FMU has one at its top"
+        yield f"{DESCRIPTION} is missing; every FMU has this file at its top level"
     if len(set(names)) != len(names):
         twice = sorted({name for name in names if names.count(name) > 1})[:3]
-        yield f"{', '.join(twice)} comes twice; every name may come once"
+        yield f"{', '.join(twice)} occurs twice; every name may occur once"
     if len(entries) > LARGEST_COUNT:
         yield f"{len(entries)} files; at most {LARGEST_COUNT} are allowed"
     total = sum(entry.file_size for entry in entries)
@@ -122,16 +122,18 @@ def _entry_problems(entry: zipfile.ZipInfo) -> Iterator[str]:
     name = entry.orig_filename
     windows = PureWindowsPath(name)
     if "\\" in name or "\0" in name or windows.is_absolute() or windows.drive or name[:1] == "/":
-        yield f"{name!r} is no relative path; only names below the FMU's folder are allowed"
+        yield f"{name!r} is not a relative path; only names below the FMU's folder are allowed"
     elif ".." in windows.parts:
         yield f"{name!r} leads out of the FMU's folder; only names below it are allowed"
     mode = entry.external_attr >> 16
     if stat.S_IFMT(mode) not in (0, stat.S_IFREG, stat.S_IFDIR):
         yield f"{name!r} is a link or a device; only files and folders are allowed"
     if entry.flag_bits & 0x1:
-        yield f"{name!r} is encrypted; an FMU is not"
+        yield f"{name!r} is encrypted; files of an FMU must not be"
     if entry.file_size > LARGEST_FILE:
         yield f"{name!r} has {entry.file_size} bytes; at most {LARGEST_FILE} are allowed"
     elif entry.file_size > SMALL and entry.file_size > LARGEST_RATIO * entry.compress_size:
         ratio = entry.file_size / max(entry.compress_size, 1)
-        yield f"{name!r} unpacks to {ratio:.0f} times its size; {LARGEST_RATIO:g} is allowed"
+        yield (
+            f"{name!r} unpacks to {ratio:.0f} times its size; at most {LARGEST_RATIO:g} is allowed"
+        )

@@ -158,8 +158,8 @@ def _frame(path: Path, description: Any) -> tuple[int, int]:
     """Return samples a step and gages; refuse an FMU that is no strain estimator."""
     if description.coSimulation is None:
         raise FmuError(
-            f"{path}: it is no FMU for co-simulation; FMI 2.0 co-simulation "
-            "is needed; build it with `tirelib fmu build`"
+            f"{path}: not an FMU for co-simulation; FMI 2.0 co-simulation is needed; build it with "
+            "`tirelib fmu build`"
         )
     names = {variable.name for variable in description.modelVariables}
     found = [m for name in names if (m := _STRAIN.fullmatch(name))]
@@ -172,8 +172,8 @@ def _frame(path: Path, description: Any) -> tuple[int, int]:
         missing.append("variable communication steps")
     if missing or len(found) != len(wanted):
         raise FmuError(
-            f"{path}: {', '.join(missing[:8]) or 'some strain inputs'} are missing; the "
-            "variables of a StrainTire.fmu are needed; build it with `tirelib fmu build`"
+            f"{path}: the variables {', '.join(missing[:8]) or 'some strain inputs'} are missing; "
+            "all variables of a StrainTire.fmu are needed; build it with `tirelib fmu build`"
         )
     return samples, gages
 
@@ -362,7 +362,7 @@ class FmuModel:
 
 
 def _fmu_error(path: Path, what: str, error: Exception, messages: list[str]) -> FmuError:
-    said = "; it says: " + " | ".join(messages) if messages else ""
+    said = "; its message: " + " | ".join(messages) if messages else ""
     cause = str(error) or type(error).__name__
     cause = cause if len(cause) <= LONGEST_CAUSE else cause[:LONGEST_CAUSE] + " ..."
     return FmuError(

@@ -82,7 +82,7 @@ def standing_mean(levels: Sequence[Level], still: float = STILL) -> FloatArray:
     seconds = sum(level.seconds for level in levels)
     if seconds < SHORTEST:
         raise DeviceError(
-            f"{seconds:.1f} s of samples; {SHORTEST:.0f} s at least are needed; wait, then try "
+            f"{seconds:.1f} s of samples; at least {SHORTEST:.0f} s are needed; wait, then try "
             "again"
         )
     means = np.array([level.mean for level in levels])
@@ -94,17 +94,17 @@ def standing_mean(levels: Sequence[Level], still: float = STILL) -> FloatArray:
     for gage in np.flatnonzero(there).tolist():
         if missing[gage] > 0.01:
             faults.append(
-                f"gage {gage + 1}: {100.0 * missing[gage]:.0f} % of its samples are lost "
-                "or saturated; all are needed; mend the line or the bridge"
+                f"gage {gage + 1}: {100.0 * missing[gage]:.0f} % of its samples are lost or "
+                "saturated; all samples are needed; repair the line or the bridge"
             )
         elif spread[gage] > still or drift[gage] > CREEP * still:
             faults.append(
-                f"gage {gage + 1}: its strain moves by {1e6 * spread[gage]:.0f} microstrain and "
-                f"drifts by {1e6 * drift[gage]:.0f}; a standing wheel moves by up to "
-                f"{1e6 * still:.0f} and drifts by {1e6 * CREEP * still:.0f}; stop the wheel"
+                f"gage {gage + 1}: its strain varies by {1e6 * spread[gage]:.0f} microstrain and "
+                f"drifts by {1e6 * drift[gage]:.0f}; on a standing wheel it varies by up to "
+                f"{1e6 * still:.0f} and drifts by up to {1e6 * CREEP * still:.0f}; stop the wheel"
             )
     if not there.any():
-        faults.append("no gage shows a number; one at least is needed; look at the link")
+        faults.append("no gage sends values; at least one is needed; check the link")
     if faults:
         raise DeviceError(faults)
     return np.asarray(means.mean(axis=0))

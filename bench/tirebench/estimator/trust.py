@@ -36,7 +36,7 @@ def how_known(archive: FmuArchive) -> str | None:
     if archive.sha256 in _listed():
         return "in the list of trusted FMUs"
     if _rebuilt(archive) == archive.content:
-        return "as this tirelib builds it"
+        return "identical to what this version of tirelib builds"
     return None
 
 
@@ -58,12 +58,13 @@ def check_trust(archive: FmuArchive, *, trust: bool) -> str:
         return known
     if not trust:
         raise FmuError(
-            f"{archive.path}: sha256 {archive.sha256} is unknown; an FMU is native code and runs "
-            "with your rights; FMUs that this tirelib builds and those trusted before are allowed; "
-            "build it with `tirelib fmu build`, or, if you trust its source, say --trust once"
+            f"{archive.path}: sha256 {archive.sha256} is unknown, and an FMU is native code that "
+            "runs with your rights; FMUs that this version of tirelib builds and those trusted "
+            "before are allowed; build it with `tirelib fmu build`, or add --trust once if you "
+            "trust its source"
         )
     remember(archive)
-    return "trusted from now on, by --trust"
+    return "added to the list of trusted FMUs by --trust"
 
 
 def remember(archive: FmuArchive) -> None:
@@ -82,7 +83,7 @@ def remember(archive: FmuArchive) -> None:
     except OSError as error:
         raise FmuError(
             f"{path}: the list of trusted FMUs cannot be written ({error.strerror}); a folder that "
-            "is yours is needed; set XDG_CONFIG_HOME"
+            "you may write to is needed; set XDG_CONFIG_HOME"
         ) from None
 
 

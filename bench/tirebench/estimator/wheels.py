@@ -156,9 +156,9 @@ class Line:
         sent = sorted(set(item.wheel.tolist()))
         if len(sent) > 1:
             raise DeviceError(
-                f"{self.name}: wheels {', '.join(map(str, sent))} are heard; one is allowed where "
-                f"the source says wheel = {self.wheel}; leave that out, and give each transmitter "
-                "a number of its own"
+                f"{self.name}: frames came from wheels {', '.join(map(str, sent))}; a source with "
+                f"wheel = {self.wheel} may carry one wheel only; leave that out, and give each "
+                "transmitter its own number"
             )
         return replace(item, wheel=np.full(len(item), self.wheel))
 
@@ -348,5 +348,5 @@ class Wheels:
         names = self.lines[self._sources[wheel]].name, self.lines[source].name
         return DeviceError(
             f"wheel {wheel} comes from {names[0]} and from {names[1]}; each wheel may come from "
-            "one source; say `wheel = N` of a source in the setup, or --port N=PORT"
+            "one source only; write `wheel = N` for a source in the setup, or --port N=PORT"
         )

@@ -32,7 +32,7 @@ class Read(NamedTuple):
 
 
 LOST, BACK, RESUMED = "lost", "back", "resumed"
-PASSED, DECODED = "not decoded from here", "decoded from here"
+PASSED, DECODED = "decoding paused from here on", "decoded from here"
 """Between the two bytes were recorded and not decoded, for want of processor."""
 
 

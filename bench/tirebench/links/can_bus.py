@@ -92,8 +92,8 @@ class CanLink:
         except Exception as error:  # each backend has its own, and some raise bare OSError
             known = ", ".join(sorted(can.VALID_INTERFACES))
             raise LinkError(
-                f"{self.name}: the bus cannot be opened ({type(error).__name__}: {error}); "
-                f"interfaces are {known}; check name, channel, driver and rights"
+                f"{self.name}: the bus cannot be opened ({type(error).__name__}: {error}); known "
+                f"interfaces are {known}; check its name, channel, driver and your access rights"
             ) from None
 
     def receive(self, deadline: Deadline) -> Read | None:
@@ -125,7 +125,8 @@ class CanLink:
         """
         if not self._transmit:
             raise LinkError(
-                f"{self.name}: it was opened to listen; transmission must be asked for; open it so"
+                f"{self.name}: the bus was opened for listening only; sending needs a bus that is "
+                "opened for sending; open it so"
             )
         try:
             for row in range(len(batch)):
@@ -158,11 +159,11 @@ class CanLink:
                 except OSError as error:
                     raise self._gone(error) from None
                 if ended:
-                    raise self._gone(ConnectionError("the server has hung up"))
+                    raise self._gone(ConnectionError("the server closed the connection"))
 
     def _gone(self, error: Exception) -> UnpluggedError:
         return UnpluggedError(
-            f"{self.name}: the bus went away ({type(error).__name__}: {error}); a steady "
+            f"{self.name}: the bus was lost ({type(error).__name__}: {error}); an uninterrupted "
             "connection is needed; check cable and adapter, then start again"
         )
 
@@ -174,9 +175,9 @@ def _silent(name: str, interface: str) -> dict[str, Any]:
     if interface not in can.VALID_INTERFACES:
         return {}  # python-can says so better
     raise DeviceError(
-        f"{name}: python-can cannot make this interface silent, and its controller would "
-        f"acknowledge the frames of others; {', '.join(sorted(_SILENT))} can be silent; use one of "
-        f"them, or accept it with --bus-option {ACKNOWLEDGE}=1"
+        f"{name}: python-can cannot set this interface to listen-only, so its controller would "
+        f"acknowledge the frames of other nodes; {', '.join(sorted(_SILENT))} can listen only; use "
+        f"one of them, or accept the acknowledgement with --bus-option {ACKNOWLEDGE}=1"
     )
 
 

@@ -79,20 +79,20 @@ class PortPlan:
             return
         elif self.port in KINDS or (colon and kind not in KINDS and "/" not in kind):
             raise DeviceError(
-                f"--port {self.port}: {kind!r} is no {'name' if kind in KINDS else 'kind'} of a "
+                f"--port {self.port}: {kind!r} is not a {'name' if kind in KINDS else 'kind'} of a "
                 "port; a serial port such as /dev/ttyUSB0 or COM3, tcp://HOST:PORT, "
                 "udp://[HOST]:PORT, slcan:/dev/ttyACM0 or can:INTERFACE:CHANNEL is needed; see "
                 "`tirebench ports`"
             )
         if self.encoding == SLCAN and not rest:
             raise DeviceError(
-                f"--port {self.port}: no serial port; slcan:PORT is needed, such as "
-                "slcan:/dev/ttyACM0; write it so, see `tirebench ports`"
+                f"--port {self.port}: the serial port is missing; slcan:PORT is needed, such as "
+                "slcan:/dev/ttyACM0; `tirebench ports` lists the ports"
             )
         if self.encoding == CAN and not all(rest.partition(":")):
             raise DeviceError(
-                f"--port {self.port}: no channel; can:INTERFACE:CHANNEL is needed, such as "
-                "can:socketcan:can0; write it so"
+                f"--port {self.port}: the channel is missing; can:INTERFACE:CHANNEL is needed, "
+                "such as can:socketcan:can0; correct it"
             )
         bus_options(self.options)
 
@@ -147,7 +147,7 @@ def bus_options(texts: Sequence[str]) -> dict[str, Any]:
     {'host': '127.0.0.1', 'port': 29536}
     """
     faults = [
-        f"--bus-option {text}: there is no '='; KEY=VALUE is needed; write it so"
+        f"--bus-option {text}: the '=' is missing; KEY=VALUE is needed; correct it"
         for text in texts
         if "=" not in text
     ]

@@ -37,7 +37,7 @@ class PseudoTerminal:
             self._master, slave = os.openpty()
         except OSError as error:
             raise LinkError(
-                f"no pseudo-terminal can be had ({error.strerror}); Linux or macOS with a free "
+                f"no pseudo-terminal is available ({error.strerror}); Linux or macOS with a free "
                 "one is needed; close other programs"
             ) from None
         tty.setraw(slave, termios.TCSANOW)
@@ -69,8 +69,8 @@ class PseudoTerminal:
         while not self.listened:
             if deadline.expired:
                 raise LinkTimeoutError(
-                    f"{self.path}: nobody opened the port in time; a reader is needed, such as "
-                    f"`tirebench run --port {self.path}`; start one"
+                    f"{self.path}: no program opened the port in time; a reader is needed, such as "
+                    f"`tirebench run --port {self.path}`; start it"
                 )
             time.sleep(POLL)
         time.sleep(SETTLE)

@@ -62,7 +62,7 @@ class ReconnectingLink:
         self._wait = FIRST_WAIT
         self._next = self._given_up = 0.0
         self._loss: LinkError = UnpluggedError(
-            f"{away}: the port went away; check cable and receiver"
+            f"{away}: the port was lost; check cable and receiver"
         )
         self._seen = True
         self._found = BACK  # what it means when the port is there

@@ -27,12 +27,12 @@ _TIOCGICOUNT = 0x545D
 """Linux: the counters of a UART."""
 _COUNTERS = struct.Struct("20i")
 _CAUSES = {
-    errno.ENOENT: "there is no such port; plug it in, or name another",
-    errno.EACCES: "this user may not; join the group dialout (then log in anew)",
-    errno.EAGAIN: "another program has it open; close that one",
-    errno.EBUSY: "another program has it open; close that one",
-    errno.EISDIR: "it is a folder; name a port",
-    errno.ENOTTY: "it is no serial port; name another",
+    errno.ENOENT: "no such port exists; plug the receiver in, or name another port",
+    errno.EACCES: "this user has no access; add the user to the group dialout and log in again",
+    errno.EAGAIN: "another program has it open; close that program",
+    errno.EBUSY: "another program has it open; close that program",
+    errno.EISDIR: "it is a folder; name a serial port",
+    errno.ENOTTY: "it is not a serial port; name another",
 }
 _OVERRUNS = (7, 10)
 """Places of `overrun` and `buf_overrun` in ``struct serial_icounter_struct``."""
@@ -73,7 +73,7 @@ class SerialLink:
             known = ", ".join(entry.split()[0] for entry in ports()) or "none"
             raise LinkError(
                 f"{port}: the port cannot be opened: {_cause(error)}; a free serial port is "
-                f"needed, those found are: {known}"
+                f"needed; the ports found are: {known}"
             ) from None
 
     def receive(self, deadline: Deadline) -> Read | None:
@@ -139,7 +139,7 @@ class SerialLink:
 
     def _gone(self, error: Exception) -> UnpluggedError:
         return UnpluggedError(
-            f"{self.name}: the port went away ({error}); a steady connection is needed; "
+            f"{self.name}: the port was lost ({error}); an uninterrupted connection is needed; "
             "check cable and receiver, then start again"
         )
 
@@ -149,7 +149,7 @@ def _cause(error: Exception) -> str:
     number = getattr(error, "errno", None)
     if number is None and f"({errno.ENOTTY}," in str(error):  # told in the text only
         number = errno.ENOTTY
-    return _CAUSES.get(number or 0, f"{error}; plug it in, or close the program that has it")
+    return _CAUSES.get(number or 0, f"{error}; plug it in, or close the program that uses it")
 
 
 def ports() -> Iterator[str]:

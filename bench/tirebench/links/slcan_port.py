@@ -46,7 +46,7 @@ def commands(bitrate: int, data_bitrate: int | None, *, transmit: bool) -> bytes
     for given, known in ((bitrate, BITRATES), (data_bitrate, DATA_BITRATES)):
         if given is not None and given not in known:
             raise DeviceError(
-                f"bit rate {given}; slcan knows {', '.join(str(rate) for rate in known)}; "
+                f"bit rate {given}: slcan supports {', '.join(str(rate) for rate in known)}; "
                 "choose one of them, or another kind of adapter"
             )
     words = ["", "", "C", BITRATES[bitrate]]

@@ -50,9 +50,13 @@ class SocketLink:
             else:
                 self._socket = _bound(host, number)
         except OSError as error:
-            what = "a server that listens there" if self._stream else "a free address of this host"
+            what = (
+                "a server that listens at this address"
+                if self._stream
+                else "a free address of this host"
+            )
             raise LinkError(
-                f"{url}: it cannot be opened ({error.strerror or error}); {what} is needed; check "
+                f"{url}: cannot be opened ({error.strerror or error}); {what} is needed; check "
                 "address, cable and firewall"
             ) from None
         self._socket.setblocking(False)
@@ -104,14 +108,14 @@ class SocketLink:
             if self._stream and not part:
                 if parts:
                     break
-                raise self._gone(ConnectionError("the server has hung up"))
+                raise self._gone(ConnectionError("the server closed the connection"))
             parts.append(part)
         return b"".join(parts)
 
     def _gone(self, error: OSError) -> UnpluggedError:
         return UnpluggedError(
-            f"{self.name}: the connection went away ({error}); a steady connection is needed; "
-            "check cable and receiver, then start again"
+            f"{self.name}: the connection was lost ({error}); an uninterrupted connection is "
+            "needed; check cable and receiver, then start again"
         )
 
 
@@ -150,7 +154,7 @@ def address(url: str) -> tuple[str, str, int]:
     nobody = parts.scheme in _STREAMS and not parts.hostname
     if not url.startswith(SOCKETS) or not number or parts.path or nobody:
         raise DeviceError(
-            f"--port {url}: it is no address; tcp://HOST:PORT or udp://[HOST]:PORT is needed, such "
-            "as tcp://192.168.1.20:4001 or udp://:5005; write it so"
+            f"--port {url}: not a valid address; tcp://HOST:PORT or udp://[HOST]:PORT is needed, "
+            "such as tcp://192.168.1.20:4001 or udp://:5005; correct it"
         )
     return parts.scheme, parts.hostname or "", number

@@ -66,8 +66,8 @@ class CanSender:
     def __init__(self, port: PortPlan) -> None:
         if port.encoding == SERIAL:
             raise DeviceError(
-                f"--estimates-out {port.port}: it is no CAN bus; slcan:PORT or "
-                "can:INTERFACE:CHANNEL is needed; name one"
+                f"--estimates-out {port.port}: not a CAN bus; slcan:PORT or can:INTERFACE:CHANNEL "
+                "is needed; name one"
             )
         self.dropped = 0
         self._packed = port.encoding == CAN
@@ -113,6 +113,6 @@ def udp_target(text: str) -> tuple[str, int]:
     if not 0 < number < 65536:
         raise DeviceError(
             f"--plotjuggler {text}: PORT or ADDRESS:PORT is needed, such as 9870 or "
-            "192.0.2.7:9870; write it so"
+            "192.0.2.7:9870; correct it"
         )
     return host, number

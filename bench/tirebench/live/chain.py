@@ -356,8 +356,8 @@ class LiveChain:
                 due = Deadline.after(pause)
             if end.expired:
                 raise LinkTimeoutError(
-                    f"waited {START:.0f} s for: {awaited()}; a machine with time for it is needed; "
-                    "end other programs, then try again"
+                    f"waited {START:.0f} s in vain for: {awaited()}; the machine is too busy; "
+                    "close other programs, then try again"
                 )
 
     def _gather(self) -> News:

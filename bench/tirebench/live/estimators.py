@@ -99,8 +99,8 @@ class Estimators:
         """
         if any(kept.starts > TRIES for kept in self.kept.values()):
             raise FmuError(
-                f"{self._path}: the process that loads it ended {TRIES} times, as native code does "
-                "when it crashes; an FMU that loads is needed; build it again with `tirelib fmu "
+                f"{self._path}: the process that loads it died {TRIES} times, so its native code "
+                "probably crashes; an FMU that loads is needed; build it again with `tirelib fmu "
                 "build`"
             )
 

@@ -7,8 +7,8 @@ from tirebench.errors import DeviceError
 PRIORITY = 5
 """Real-time priority of a run."""
 RIGHT = (
-    f"the right to it is needed, such as a line '* - rtprio {PRIORITY}' in "
-    "/etc/security/limits.conf (then log in anew)"
+    f"it needs a permission, such as the line '* - rtprio {PRIORITY}' in /etc/security/limits.conf "
+    "(then log in again)"
 )
 BELOW = 5
 """Niceness of what only shows."""
@@ -38,17 +38,17 @@ def realtime(asked: bool | None) -> str:
     except AttributeError:
         if asked:
             raise DeviceError(
-                "--realtime: this system has no real-time priority that a program may ask for; "
-                "Linux is needed; leave it out"
+                "--realtime: this system offers programs no real-time priority; Linux is needed; "
+                "leave the option out"
             ) from None
-        return "ordinary; this system has no other that a program may ask for"
+        return "ordinary; this system offers programs no real-time priority"
     except PermissionError:
         if asked:
             raise DeviceError(
-                f"--realtime: this user may not have real-time priority; {RIGHT}; add it, or "
-                "leave --realtime out"
+                f"--realtime: this user may not use real-time priority; {RIGHT}; add it, or leave "
+                "--realtime out"
             ) from None
-        return f"ordinary; for real-time {RIGHT}"
+        return f"ordinary; for real-time priority: {RIGHT}"
     return f"real-time {PRIORITY}"
 
 

@@ -34,7 +34,7 @@ RETRY = 1.0
 """Time between two attempts where nothing can be written, [s]."""
 LINK_EVERY = 1.0
 """Time between two messages of the counters, [s]."""
-NO_ROOM = "it could not be written any more"
+NO_ROOM = "it could no longer be written"
 MOST_EVENTS = 1000
 """So many events are kept while nothing can be written."""
 LEFT = 0.5
@@ -136,7 +136,7 @@ class _Recorder:
         if self._kept is None:
             self._state.answer = self._begin(path)
         elif path.exists():
-            self._state.answer = f"{path}: it exists; a recording is never overwritten"
+            self._state.answer = f"{path}: already exists; a recording is never overwritten"
         else:
             self._state.answer, self._state.waits = "", path
 
@@ -163,7 +163,7 @@ class _Recorder:
             self._drop()
         second = part_path(path, 2)
         if second.exists():
-            return f"{second}: it exists and is of another recording; name another file"
+            return f"{second}: already exists and belongs to another recording; name another file"
         error = self._open(path, None)
         state.recordings += not error
         return error

@@ -46,9 +46,9 @@ def memory(size: int) -> SharedMemory:
 def too_little(size: float) -> LinkError:
     """Return the error that tells of missing shared memory."""
     return LinkError(
-        f"{SHARED}: {free() / 2**20:.0f} MB of shared memory are free; {size / 2**20:.0f} MB "
-        "are needed; give a container more (--shm-size), name fewer wheels with --wheel, or show "
-        "nothing (--no-page)"
+        f"{SHARED}: {free() / 2**20:.0f} MB of shared memory are free; {size / 2**20:.0f} MB are "
+        "needed; give a container more (--shm-size), estimate fewer wheels with --wheel, or leave "
+        "out the page (--no-page)"
     )
 
 

@@ -9,12 +9,12 @@ from tirebench.live.reader import LineState
 from tirebench.live.recording_state import RecorderState
 from tirebench.recording.recorder import alarm_event
 
-RECORDED_AGAIN = "recording goes on"
+RECORDED_AGAIN = "the recording continues"
 TOO_BUSY = (
-    "this machine is too busy to decode what comes: bytes are only recorded, and estimates pause; "
-    f"end other programs, or allow real-time priority ({RIGHT})"
+    "the machine is too busy to decode the incoming frames: raw bytes are still recorded, but "
+    f"estimates pause; close other programs, or allow real-time priority ({RIGHT})"
 )
-DECODED_AGAIN = "estimates go on"
+DECODED_AGAIN = "the estimates continue"
 
 
 class RunAlarms:
@@ -72,7 +72,7 @@ class RunAlarms:
         for wheel, said in line.wheels.contradicted.items():
             if wheel not in self._contradicted:
                 self._contradicted.add(wheel)
-                told.append(f"{said}; no turn of it is told" if self._estimated else said)
+                told.append(f"{said}; its turns are not reported" if self._estimated else said)
                 self._write(alarm_event("sample rate", told[-1], on=True))
         return told
 
@@ -80,9 +80,9 @@ class RunAlarms:
         told = []
         for number, state in enumerate(ports):
             gone = "" if state is None else state.gone
-            why = f"{gone}; the port is still tried" if gone else ""
+            why = f"{gone}; reconnecting is tried until the port is back" if gone else ""
             if why != self.given_up.get(number, ""):
                 self.given_up[number] = why
-                told.append(why or f"{self._ports[number]}: it is back")
+                told.append(why or f"{self._ports[number]}: the port is back")
                 self._write(alarm_event(f"source {number}", told[-1], on=bool(gone)))
         return told

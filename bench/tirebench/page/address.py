@@ -20,8 +20,8 @@ def listener(host: str, port: int) -> socket.socket:
     except OSError as error:
         raise LinkError(
             f"--host {host} --page-port {port}: the page cannot be bound ({error.strerror}); an "
-            "address and a free port of this machine are needed; choose others, 0 for any port, "
-            "or --no-page"
+            "address and a free port of this machine are needed; choose others (port 0 for any "
+            "free one), or --no-page"
         ) from None
 
 

@@ -62,7 +62,7 @@ class Rule:
 
 RULES = {
     "silence": Rule("no sample for", "s", high=1.0, hysteresis=0.5),
-    "rate": Rule("samples of those expected", "%", low=95.0, hysteresis=2.0),
+    "rate": Rule("share of the expected samples received", "%", low=95.0, hysteresis=2.0),
     "loss": Rule("samples lost", "%", high=1.0, hysteresis=0.5),
     "saturated": Rule("samples saturated", "%", high=0.5, hysteresis=0.25),
     "invalid": Rule("turns invalid", "%", high=50.0, hysteresis=20.0),
@@ -96,17 +96,18 @@ def read_alarms(path: Path) -> dict[str, Rule]:
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         said = str(error) if isinstance(error, tomllib.TOMLDecodeError) else cause(error)
         raise DeviceError(
-            f"--alarms {path}: it cannot be read ({said}); TOML in UTF-8 is needed; correct it"
+            f"--alarms {path}: cannot be read ({said}); TOML in UTF-8 is needed; correct it"
         ) from None
     if document.pop("format", None) != FORMAT:
         raise DeviceError(
-            f"--alarms {path}: format is not {FORMAT!r}, which is understood here; write it"
+            f"--alarms {path}: the key format is not {FORMAT!r}; this program reads that format "
+            "only; write it"
         )
     rules, faults = dict(RULES), []
     for name, table in document.items():
         if name not in RULES:
             faults.append(
-                f"--alarms {path}: [{name}] is not known; allowed are "
+                f"--alarms {path}: [{name}] is an unknown alarm; known alarms are "
                 f"{', '.join(RULES)}; correct the spelling"
             )
             continue
@@ -124,7 +125,7 @@ def read_alarms(path: Path) -> dict[str, Rule]:
 
 def _fault(name: str, table: Any) -> str:
     if not isinstance(table, dict) or set(table) - {"low", "high", "hysteresis", "off"}:
-        return f"[{name}] holds low, high, hysteresis and off, nothing else; correct it"
+        return f"[{name}] has an unknown key; low, high, hysteresis and off are allowed; correct it"
     for key, value in table.items():
         if key == "off":
             good = isinstance(value, bool)

@@ -66,7 +66,8 @@ def parse_command(document: Any) -> Command:
     given = document.get("command") if isinstance(document, dict) else type(document).__name__
     if given not in KINDS:
         raise DeviceError(
-            f"command = {str(given)[:40]!r}; {' and '.join(KINDS)} are known; send one of them"
+            f"command = {str(given)[:40]!r}; known commands are {' and '.join(KINDS)}; send one of "
+            "them"
         )
     text, on, wheel = (document.get(*one) for one in (("text", ""), ("on", False), ("wheel", 0)))
     printable = isinstance(text, str) and all(c.isprintable() for c in text)
@@ -169,7 +170,7 @@ class CommandDesk:
         if command.kind in ("zero", "shunt"):
             self._set_up(command)
         elif switch is None:
-            self._say(False, "this run cannot record: a recording is being replayed")
+            self._say(False, "a replay cannot be recorded")
         elif command.kind == "marker":
             if switch.recorder is None:
                 self._say(False, "nothing is being recorded: start a recording first")
@@ -187,7 +188,7 @@ class CommandDesk:
 
     def _set_up(self, command: Command) -> None:
         if self._gages is None:
-            self._say(False, "gages are set up while a wheel sends: this is a replay")
+            self._say(False, "gages cannot be set up in a replay, only while a wheel sends")
             return
         if command.kind == "zero":
             said = self._gages.zero(command.wheel)

@@ -88,10 +88,13 @@ class GageSetup:
         device, mean = self._now(wheel)
         if not on:
             self._without[wheel] = mean
-            return f"wheel {wheel}: taken without the shunt; put it on, wait {SPAN:.0f} s"
+            return (
+                f"wheel {wheel}: the mean without the shunt is taken; connect the shunt and "
+                f"wait {SPAN:.0f} s"
+            )
         if wheel not in self._without:
             raise DeviceError(
-                f"wheel {wheel}: nothing was taken without the shunt; take that first"
+                f"wheel {wheel}: no mean without the shunt was taken; take that first"
             )
         try:
             gage, resistor, factor = map(float, text.split())
@@ -100,7 +103,7 @@ class GageSetup:
         if not (1.0 <= gage <= 1e5 and 10.0 <= abs(resistor) <= 1e8 and 0.1 <= factor <= 300.0):
             raise DeviceError(
                 f"shunt {text[:60]!r}; the gage's resistance (1 .. 1e5 ohm), the shunt's (10 .. "
-                "1e8 ohm) and the gage factor (0.1 .. 300) are needed; write three numbers"
+                "1e8 ohm) and the gage factor (0.1 .. 300) are needed; give three numbers"
             )
         apparent = math.copysign(1.0, resistor) * apparent_strain(gage, abs(resistor), factor)
         new = shunted(device, self._without[wheel], mean, apparent)
@@ -110,7 +113,7 @@ class GageSetup:
         """Return the device of a wheel and what its gages show at this moment."""
         kept, heard = self._levels.get(wheel), self._source.wheels.heard.get(wheel)
         if not kept or heard is None or time.monotonic() - kept[-1][0] > OLDEST:
-            raise DeviceError(f"wheel {wheel}: it shows nothing at this moment; look at the link")
+            raise DeviceError(f"wheel {wheel}: no data come at this moment; check the link")
         return heard.timeline.device, standing_mean([level for _, level in kept])
 
     def _written(self, wheel: int, device: Device, what: str) -> str:

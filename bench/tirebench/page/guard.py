@@ -17,10 +17,10 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 LONGEST_BODY = 4096
 """Bytes of a request's body."""
 _REFUSED = {
-    "host": (400, "the page answers only under the address that `tirebench run` printed"),
+    "host": (400, "the page answers only at the address that `tirebench run` printed"),
     "origin": (403, "the request comes from another page"),
     "token": (403, "the token is missing or wrong: open the address that `tirebench run` printed"),
-    "length": (413, f"a request holds up to {LONGEST_BODY} bytes"),
+    "length": (413, f"a request may hold up to {LONGEST_BODY} bytes"),
 }
 
 

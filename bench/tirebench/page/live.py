@@ -68,12 +68,12 @@ class PageChoice:
         except ValueError:
             raise DeviceError(
                 f"--host {self.host}: an address of this machine is needed, such as {LOOPBACK} or "
-                "192.0.2.7; write one"
+                "192.0.2.7; correct it"
             ) from None
         if not (address.is_loopback or self.network):
             raise DeviceError(
-                f"--host {self.host}: other machines could open the page, over a line that is not "
-                f"encrypted; {LOOPBACK} is allowed by itself; add --network to let them in"
+                f"--host {self.host}: other machines could open the page over an unencrypted "
+                f"connection; {LOOPBACK} needs no permission; add --network to allow other machines"
             )
         return PageChoice(self.page, self.terminal, host, self.port, self.network)
 

@@ -135,7 +135,7 @@ class Page:
         try:
             self._pipe.send_bytes(command.pack())
         except OSError:
-            return JSONResponse({"error": "the run takes no commands any more"}, 503)
+            return JSONResponse({"error": "the run no longer accepts commands"}, 503)
         return JSONResponse({"accepted": command.kind}, 202)
 
     async def _stream(self, socket: WebSocket) -> None:

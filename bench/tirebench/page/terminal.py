@@ -216,7 +216,7 @@ def _clock(moment: float) -> str:
 def in_use_line(conditions: dict[str, dict[str, Any]]) -> str:
     """Return which conditions are in use and where each comes from, in one line."""
     return ", ".join(
-        f"{name} not known"
+        f"{name} unknown"
         if one["value"] is None
         else f"{name} {one['value']:.2f} {one['unit']} ({one['source']})"
         for name, one in conditions.items()

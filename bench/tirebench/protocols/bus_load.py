@@ -148,12 +148,12 @@ def suggestions(plan: LoadPlan) -> list[str]:
     found = []
     rate = highest_rate(plan)
     if rate > 0.0:
-        found.append(f"{rate / 1e3:g} kHz on the same line")
+        found.append(f"{rate / 1e3:g} kHz sample rate on the same line")
     for wheels in range(plan.wheels - 1, 0, -1):
         fewer = replace(plan, wheels=wheels)
         if load_of(fewer).fits:
             lines = -(-plan.wheels // wheels)
-            found.append(f"{wheels} wheels a line, on {lines} lines")
+            found.append(f"{lines} lines with {wheels} wheels each")
             break
     if plan.kind == SERIAL:
         needed = load_of(plan).mean * plan.bitrate / HIGHEST_MEAN
@@ -256,7 +256,10 @@ def _frames_of(kind: str) -> CanBatch:
     record = Record(0, 0, 1000, counts, np.zeros(len(counts), np.int16))
     sent = CanTransmitter(kind).send(record, 0, len(counts)).frames
     if not isinstance(sent, CanBatch):
-        raise DeviceError(f"format {kind}: it is no CAN frame; choose RAW16, RAW12 or RAW12C")
+        raise DeviceError(
+            f"format {kind}: not a CAN frame format; RAW16, RAW12 and RAW12C are; "
+            "choose one of them"
+        )
     return sent.take(np.flatnonzero(sent.identifier == LAYOUTS[kind].base))
 
 
@@ -282,12 +285,13 @@ def _check(plan: LoadPlan) -> None:
         return
     if plan.kind not in (RAW16, RAW12, RAW12C):
         raise DeviceError(
-            f"format {plan.kind!r}; {SERIAL}, {RAW16}, {RAW12} and {RAW12C} are known; choose one"
+            f"format {plan.kind!r}; known formats are {SERIAL}, {RAW16}, {RAW12} and {RAW12C}; "
+            "choose one"
         )
     fd = LAYOUTS[plan.kind].fd
     if fd != (plan.data_bitrate is not None):
         needs = "CAN FD, with a data bit rate" if fd else "classic CAN, without a data bit rate"
         raise DeviceError(
-            f"format {plan.kind}: the bus is of the other kind; {needs} is needed; "
-            "change one of them"
+            f"format {plan.kind}: the bus cannot carry this format; it needs {needs}; change the "
+            "bus or the format"
         )

@@ -40,11 +40,11 @@ def estimate_signals(kind: str) -> tuple[Signal, ...]:
             Signal("turn", 0, 16),
             Signal("age", 16, 16, factor=AGE_STEP * 1e3, unit="ms"),
             Signal("flags", 32, 24, comment="as the output flags of the FMU"),
-            Signal("valid", 56, 8, comment=f"1: may be used; {names}"),
+            Signal("valid", 56, 8, comment=f"1: the value is valid; {names}"),
         )
     signed = kind == ESTIMATE
     ending = "" if signed else "_std"
-    note = "-32768: not known" if signed else "65535: not known"
+    note = "-32768: no value" if signed else "65535: no value"
     return tuple(
         Signal(f"{name}{ending}", 16 * i, 16, signed, step, unit, comment=note)
         for i, (name, (step, _, unit)) in enumerate(STEPS.items())

@@ -123,7 +123,9 @@ def listed(table: Mapping[str, Any], number: int) -> Message:
     """
     kind = kind_of(table)
     if unknown := sorted(set(table) - _KEYS[kind]):
-        raise ValueError(f"{', '.join(unknown)}: not known; {', '.join(sorted(_KEYS[kind]))}")
+        raise ValueError(
+            f"unknown key {', '.join(unknown)}; allowed keys are {', '.join(sorted(_KEYS[kind]))}"
+        )
     if kind == BINARY:
         return _binary(table, number)
     return _text(table, number) if kind == TEXT else _can(table)
@@ -177,11 +179,11 @@ def _can(table: Mapping[str, Any]) -> Message:
 def _binary(table: Mapping[str, Any], number: int) -> Message:
     sync, layout = bytes.fromhex(table["sync"]), str(table["struct"])
     if not sync or layout[:1] not in "<>" or not layout:
-        raise ValueError("sync needs hex digits, and struct begins with < or >")
+        raise ValueError("sync must be hex digits, and struct must begin with < or >")
     items = [c for count, c in _ITEM.findall(layout[1:]) for c in c * int(count or 1)]
     size = struct.calcsize(layout)
     if struct.calcsize("<" + "".join(items)) != size or size > LONGEST_FRAME:
-        raise ValueError("struct knows x b B h H i I l L q Q f d here, up to 4096 bytes")
+        raise ValueError("struct may use x b B h H i I l L q Q f d and describe up to 4096 bytes")
     big, signals, place = layout[0] == ">", [], 0
     fields = list(table["fields"])
     for item in items:
@@ -204,10 +206,10 @@ def _binary(table: Mapping[str, Any], number: int) -> Message:
             )
         place += width
     if fields:
-        raise ValueError(f"struct has {len(signals)} values, fields has more names")
+        raise ValueError(f"struct has {len(signals)} values, but fields has more names")
     start, order = table.get("checksum_from", "sync"), table.get("checksum_order")
     if start not in ("sync", "fields") or order not in (None, "little", "big"):
-        raise ValueError("checksum_from is sync or fields, checksum_order little or big")
+        raise ValueError("checksum_from must be sync or fields, checksum_order little or big")
     cut = BinaryCut(
         sync,
         size,
@@ -225,7 +227,7 @@ def _text(table: Mapping[str, Any], number: int) -> Message:
         given = _named(entry)
         bits = int(given.get("bits", 0))
         if not 0 <= bits <= 32:
-            raise ValueError("bits is 1 .. 32")
+            raise ValueError("bits must be 1 .. 32")
         signals.append(
             Signal(
                 str(given["name"]),
@@ -242,7 +244,10 @@ def _text(table: Mapping[str, Any], number: int) -> Message:
         place += 64
     separator, starts = str(table.get("separator", ",")), str(table.get("starts", ""))
     if len(separator) != 1 or not separator.isascii() or not starts.isascii() or not signals:
-        raise ValueError("separator is one character of ASCII, columns has names")
+        raise ValueError(
+            "separator must be one ASCII character, starts must be ASCII, and "
+            "columns must hold at least one name"
+        )
     cut = TextCut(starts, separator, tuple(signals), _checksum(table))
     named = {signal.name: signal for signal in signals if signal.name}
     return Message(str(table["name"]), number, False, place // 8, named, cut)
@@ -253,9 +258,8 @@ def _checksum(table: Mapping[str, Any]) -> str:
     name = key(given)
     if given and name not in CHECKSUMS:
         raise ValueError(
-            f"checksum = {given!r} is not known; SUM-8, SUM-16, XOR-8 are, and CRCs "
-            "by their name in the catalogue of G. Cook, such as CRC-32, "
-            "CRC-16/MODBUS"
+            f"checksum = {given!r} is unknown; SUM-8, SUM-16, XOR-8 and the CRC names of G. Cook's "
+            "catalogue are known, such as CRC-32 and CRC-16/MODBUS"
         )
     return name
 
@@ -286,7 +290,7 @@ def _multiplexed(
 def _signal(table: Mapping[str, Any]) -> Signal:
     order = table.get("order", "little")
     if order not in ("little", "big"):
-        raise ValueError(f"order = {order!r}; little or big")
+        raise ValueError(f"order = {order!r}; little or big is allowed")
     return Signal(
         str(table["name"]),
         int(table["start"]),

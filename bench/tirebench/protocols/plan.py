@@ -91,21 +91,22 @@ class ProtocolPlan:
         encoding = header.get("encoding", SERIAL)
         if encoding not in ENCODINGS:
             raise RecordingError(
-                f"{where}: its bytes are {encoding!r}; {', '.join(ENCODINGS)} are understood here; "
-                "take a newer program"
+                f"{where}: the encoding of its bytes is {encoding!r}; this program reads "
+                f"{', '.join(ENCODINGS)}; use a newer version of tirelib"
             )
         rate = header.get("rate_hz", RATE)
         if isinstance(rate, bool) or not isinstance(rate, int | float) or not 153 <= rate <= 2e5:
             raise RecordingError(
                 f"{where}: rate_hz = {str(rate)[:40]}; 153 .. 200000 Hz is allowed; the header is "
-                "damaged; take another recording"
+                "damaged; use another recording"
             )
         text, _, dbc = str(header.get("map", "")).partition("\0")
         user = parse_map(text, dbc, where) if text else None
         if (encoding == LINE_MAP) != (user is not None and user.of_line):
             raise RecordingError(
-                f"{where}: its bytes are {encoding!r}, and its map is of another kind of line; the "
-                "header is damaged; take another recording"
+                f"{where}: the encoding of its bytes is {encoding!r}, but its map describes "
+                "another kind of line; the two must agree; the header is damaged; use another "
+                "recording"
             )
         return cls(encoding, float(rate), user)
 

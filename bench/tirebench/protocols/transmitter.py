@@ -179,7 +179,8 @@ class CanTransmitter:
         """Return strain frames with SYNC and HEALTH between them."""
         if not 0 <= record.wheel < WHEELS:
             raise DeviceError(
-                f"wheel {record.wheel}; 0 .. {WHEELS - 1} can be told apart on CAN; choose one"
+                f"wheel {record.wheel}; 0 .. {WHEELS - 1} have identifiers on CAN; choose a number "
+                "in this range"
             )
         n = LAYOUTS[self._kind].samples
         frames = (last - first) // n
@@ -275,4 +276,6 @@ def transmitter(kind: str) -> Callable[[], Transmitter]:
         return SerialTransmitter
     if kind in FORMATS:
         return lambda: CanTransmitter(kind)
-    raise DeviceError(f"format {kind!r}; {', '.join(FORMATS)} are known; choose one of them")
+    raise DeviceError(
+        f"format {kind!r}: unknown; known formats are {', '.join(FORMATS)}; choose one of them"
+    )

@@ -66,7 +66,10 @@ FORMAT = "tirebench-map/1"
 LONGEST_SIGNAL = 32
 SHORTEST_WRAP = 0.1
 """A counter that wraps sooner needs a time beside it, or a gap could not be seen, [s]."""
-_WANTED = "name, id, length and signals of CAN; name, sync, struct and fields; or name and columns"
+_WANTED = (
+    "the keys name, id, length and signals (CAN), or name, sync, struct and fields "
+    "(binary), or name and columns (text)"
+)
 _KEYS = {"format", "dbc", "rate_hz", "strain_unit", "wheel", "message", "name", *TELLABLE}
 
 
@@ -86,8 +89,8 @@ def read_map(path: Path) -> UserMap:
             dbc = (path.parent / str(document["dbc"])).read_text(encoding="cp1252")
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise DeviceError(
-            f"{path}: it cannot be read ({cause(error)}); a map is TOML in UTF-8, its DBC stands "
-            "beside it; check path and line"
+            f"{path}: cannot be read ({cause(error)}); a map is TOML in UTF-8, with its DBC in the "
+            "same folder; check the path and the file"
         ) from None
     return parse_map(text, dbc, str(path))
 
@@ -98,12 +101,12 @@ def parse_map(text: str, dbc: str, where: str) -> UserMap:
         document = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise DeviceError(
-            f"{where}: the map is no TOML ({error}); a map is TOML; correct that line"
+            f"{where}: the map is not valid TOML ({error}); a map is a TOML file; correct that line"
         ) from None
     if document.get("format") != FORMAT:
         raise DeviceError(
-            f"{where}: format = {document.get('format')!r}; {FORMAT!r} is understood here; "
-            "correct it, or take a program of that version"
+            f"{where}: format = {document.get('format')!r}; this program reads {FORMAT!r}; correct "
+            "it, or use the version of tirelib that wrote the file"
         )
     return _Reader(document, where).read(text if not dbc else f"{text}\0{dbc}", dbc)
 
@@ -115,7 +118,7 @@ class _Reader:
         self.document = document
         self.where = where
         self.faults = [
-            f"{where}: {key} is not known; allowed are {', '.join(sorted(_KEYS))}; correct it"
+            f"{where}: unknown key {key}; allowed keys are {', '.join(sorted(_KEYS))}; correct it"
             for key in sorted(set(document) - _KEYS)
         ]
 
@@ -127,7 +130,7 @@ class _Reader:
         tables = self._tables("wheel")
         rate = self.document.get("rate_hz", None if tables else 1e3)
         if not isinstance(rate, int | float) or isinstance(rate, bool) or not 153 <= rate <= 2e5:
-            self.fault("rate_hz", rate, "153 .. 200000 Hz is needed")
+            self.fault("rate_hz", rate, "a rate of 153 .. 200000 Hz is needed")
             rate = 1e3
         wheels = [w for table in tables if (w := self._wheel(table, messages, float(rate)))]
         told = [name for name in TELLABLE if name in self.document]
@@ -139,7 +142,7 @@ class _Reader:
                 "write it",
             )
         if len({w.wheel for w in wheels}) < len(wheels):
-            self.fault("wheel", [w.wheel for w in wheels], "each number may come once")
+            self.fault("wheel", [w.wheel for w in wheels], "each wheel number may occur once")
         device = self._device(wheels)
         quantities = [q for name in told for q in self._quantities(name, messages)]
         places = [(TELLABLE[q.name][0], q.wheel) for q in quantities]
@@ -147,7 +150,7 @@ class _Reader:
             self.fault(
                 "conditions",
                 sorted(twice, key=str),
-                "each may come once for a wheel, or once for all",
+                "each condition may occur once per wheel, or once for all wheels",
             )
         if self.faults:
             raise DeviceError(self.faults)
@@ -169,7 +172,7 @@ class _Reader:
         try:
             database: Any = cantools.database.load_string(dbc, "dbc")
         except Exception as error:  # cantools raises its own, textparser's and bare ones
-            self.fault("dbc", str(error)[:200], "a sound DBC is needed")
+            self.fault("dbc", str(error)[:200], "a valid DBC is needed")
             return {}
         return of_dbc(database)
 
@@ -183,14 +186,14 @@ class _Reader:
                 self.fault("message", table, f"{_WANTED} are needed ({_why(e)})")
                 continue
             if message.name in messages:
-                self.fault("message", message.name, "each name may come once")
+                self.fault("message", message.name, "each name may occur once")
             messages[message.name] = message
         if len({kind_of(table) for table in tables}) > 1:
             self.fault(
                 "message",
                 [t.get("name") for t in tables],
-                "all are frames of CAN, or all "
-                "have a sync, or all are columns: a line has one kind",
+                "one line carries one kind of message: all are CAN frames, or all have a sync, or "
+                "all have columns",
             )
         return messages
 
@@ -210,7 +213,7 @@ class _Reader:
             self.fault(
                 f"{what}: samples",
                 rows,
-                f"lists of 1 to {MOST_GAGES} signals are needed, a list a sample",
+                f"one list per sample is needed, each of the same 1 to {MOST_GAGES} signals",
             )
             return None
         if message is None:
@@ -222,7 +225,7 @@ class _Reader:
             self.fault(
                 f"{what}: samples",
                 rows,
-                'each sample needs the same gages, one at least; a gage that is not there is ""',
+                'each sample needs the same gages, at least one; "" stands for a missing gage',
             )
         counter = self._optional(what, table, "counter", message)
         time = self._optional(what, table, "time", message)
@@ -234,17 +237,17 @@ class _Reader:
             self.fault(
                 what,
                 sorted(table),
-                "counter or time is needed: else no loss can be seen",
+                "a counter or time signal is needed, because lost frames could not be detected "
+                "without one",
                 "name one",
             )
         elif (wrap := 2**counter.length * len(rows) / rate) < SHORTEST_WRAP:
             self.fault(
                 f"{what}: counter",
                 counter.name,
-                f"it wraps after {1e3 * wrap:.0f} ms, "
-                f"{1e3 * SHORTEST_WRAP:.0f} ms are needed without a time, or a gap could "
-                "not be seen",
-                "name a time too",
+                f"it wraps after {1e3 * wrap:.0f} ms; without a time signal at least "
+                f"{1e3 * SHORTEST_WRAP:.0f} ms are needed, or a gap could not be detected",
+                "name a time signal too",
             )
         if counter is not None:
             self._integer(what, counter)
@@ -253,9 +256,8 @@ class _Reader:
             self.fault(
                 f"{what}: samples",
                 [s.name for s in used],
-                "all signals of a wheel, "
-                "counter and time included, must stand in the same frames: one "
-                "multiplexer, one value",
+                "all signals of a wheel, counter and time included, must be in the same frames: "
+                "the same multiplexer with the same value",
             )
         number = table.get("wheel")
         if not _is_wheel(number):
@@ -268,7 +270,9 @@ class _Reader:
     def _message(self, what: str, name: Any, messages: Mapping[str, Message]) -> Message | None:
         message = messages.get(str(name))
         if message is None:
-            self.fault(what, name, f"known are {', '.join(sorted(messages)) or 'none'}")
+            self.fault(
+                what, name, f"the known messages are {', '.join(sorted(messages)) or 'none'}"
+            )
         return message
 
     def _signal(self, what: str, name: Any, message: Message) -> Signal | None:
@@ -285,16 +289,15 @@ class _Reader:
                 self.fault(
                     f"{what}: signal",
                     part.name,
-                    f"1 to {LONGEST_SIGNAL} bits, 32 or 64 of "
-                    f"a real one, inside the {message.length} bytes of {message.name} are "
-                    "allowed",
+                    f"a signal must lie inside the {message.length} bytes of {message.name} and "
+                    f"have 1 to {LONGEST_SIGNAL} bits, or 32 or 64 bits if it is a float",
                 )
                 return None
         if signal.selector is not None and signal.selector.selector is not None:
             self.fault(
                 f"{what}: signal",
                 name,
-                "a multiplexer that is multiplexed itself is not read",
+                "a multiplexer that is itself multiplexed is not supported",
                 "name another",
             )
             return None
@@ -305,8 +308,8 @@ class _Reader:
             self.fault(
                 f"{what}: signal",
                 signal.name,
-                "counter and time must be integers: a real number does not say where it wraps",
-                "name another, or say the bits of the column",
+                "counter and time must be integers, because a float does not show where it wraps",
+                "name another signal, or give the column's bits",
             )
 
     def _optional(
@@ -326,7 +329,9 @@ class _Reader:
         strain = [signal for wheel in wheels for signal in wheel.strain]
         kinds = {(s.length, s.signed, s.factor, s.real) for s in strain}
         if len(kinds) > 1:
-            self.fault("samples", sorted(kinds), "all gages need one length, sign and factor")
+            self.fault(
+                "samples", sorted(kinds), "all gages must have the same length, sign and factor"
+            )
         if len(kinds) != 1:
             return Device()
         low: float
@@ -334,7 +339,7 @@ class _Reader:
         low, high = (-math.inf, math.inf) if strain[0].real else strain[0].bounds
         unit = self.document.get("strain_unit")
         if unit is None and strain[0].real:
-            self.fault("strain_unit", unit, "real numbers are no counts: their unit is needed")
+            self.fault("strain_unit", unit, "strain that is sent as float needs its unit")
             return Device()
         if unit is None:
             return Device(lowest=low, highest=high)
@@ -352,7 +357,9 @@ class _Reader:
         given = self.document[name]
         tables = given if isinstance(given, list) else [given]
         if not all(isinstance(table, dict) for table in tables):
-            self.fault(name, given, f"a table [{name}], or tables [[{name}]] of wheels, are needed")
+            self.fault(
+                name, given, f"a table [{name}], or one table [[{name}]] per wheel, is needed"
+            )
             return []
         found = [self._quantity(name, table, messages) for table in tables]
         return [quantity for quantity in found if quantity is not None]
@@ -371,7 +378,11 @@ class _Reader:
         except TirelibError as error:
             self.fault(f"{name}: unit", unit, f"a unit of {dimension} is needed ({error})")
         if wheel is not None and not _is_wheel(wheel):
-            self.fault(f"{name}: wheel", wheel, "0 .. 255 is needed, or nothing for all wheels")
+            self.fault(
+                f"{name}: wheel",
+                wheel,
+                "0 .. 255 is needed; leave it out if the value holds for all wheels",
+            )
         return None if signal is None else Quantity(name, message, signal, unit, wheel)
 
 

@@ -44,7 +44,7 @@ def period_of(rate: float) -> int:
     """
     if not SLOWEST <= rate <= FASTEST:
         raise DeviceError(
-            f"rate {rate:g} Hz; {SLOWEST:.0f} .. {FASTEST:.0f} Hz is allowed; say the sample rate "
+            f"rate {rate:g} Hz; {SLOWEST:.0f} .. {FASTEST:.0f} Hz is allowed; give the sample rate "
             "of the gages"
         )
     return round(1.0 / (rate * TICK))

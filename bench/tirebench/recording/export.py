@@ -88,8 +88,8 @@ def write_campaign_of(
     runs = list(campaign_runs(found, recording.conditions))
     if not runs:
         raise RecordingError(
-            f"{recording.path}: it has no {SHORTEST:g} s of strain of that wheel; a recording with "
-            "samples is needed; name another wheel or recording"
+            f"{recording.path}: it holds less than {SHORTEST:g} s of strain of that wheel; at "
+            "least that much is needed; name another wheel or recording"
         )
     rate = runs[0].rate
     write_campaign(folder, replace(header, rate=rate, strain_unit="ustrain"), runs)
@@ -153,8 +153,8 @@ def can_frames(recording: Recording) -> Iterator[tuple[int, CanBatch]]:
     encoding = recording.header.encoding
     if encoding not in (SLCAN, CAN):
         raise RecordingError(
-            f"{recording.path}: it is of a serial line; a CAN log needs a recording of a bus "
-            "(slcan:... or can:...); export it as a campaign, CSV or Parquet"
+            f"{recording.path}: it was recorded from a serial line; a CAN log needs a recording of "
+            "a CAN bus (slcan:... or can:...); export it as a campaign, CSV or Parquet"
         )
     lines = SlcanDecoder(_Nothing(), LineCounts())
     for read in recording.reads():

@@ -60,7 +60,7 @@ def results(path: Path, wheel: int | None = None) -> tuple[Rows, Rows]:
             if wrong := _wrong(content, is_event):
                 raise RecordingError(
                     f"{recording.path}: {channel.topic} at {moment} ns: {wrong}; the samples are "
-                    "exported, estimates and events are not; take another recording"
+                    "exported, but estimates and events are not; use another recording"
                 )
             row = {
                 **content,
@@ -195,14 +195,14 @@ def _wrong(content: Mapping[str, Any], is_event: bool) -> str:
     """Return the first field that is not what the schemas say, and what it must be, or nothing."""
     for name in _TEXTS if is_event else ():
         if not _is_text(content.get(name, "")):
-            return f"{name} = {str(content[name])[:40]!r}; a text is needed"
+            return f"{name} = {str(content[name])[:40]!r}; a string is needed"
     for name in ("wheel",) if is_event else _ESTIMATED:
         value = content.get(name)
         if value is not None and not (isinstance(value, int | float) and abs(value) < _LARGEST):
             return f"{name} = {str(value)[:40]!r}; a number or null is needed"
     flags = () if is_event else content.get("flags", ())
     sound = isinstance(flags, list | tuple) and all(map(_is_text, flags))
-    return "" if sound else f"flags = {str(flags)[:40]!r}; a list of texts is needed"
+    return "" if sound else f"flags = {str(flags)[:40]!r}; a list of strings is needed"
 
 
 def _is_text(value: Any) -> bool:

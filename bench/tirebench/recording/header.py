@@ -99,8 +99,8 @@ def header_of(text: Mapping[str, str], where: str) -> RecordingHeader:
     """
     if text.get("format") not in (FORMAT, FORMER):
         raise RecordingError(
-            f"{where}: format = {text.get('format')!r}; {FORMAT!r} and {FORMER!r} are understood "
-            "here; take a program of that version"
+            f"{where}: format = {text.get('format')!r}; this program reads {FORMAT!r} and "
+            f"{FORMER!r}; use the version of tirelib that wrote the file"
         )
     try:
         if text["format"] == FORMER:
@@ -123,7 +123,7 @@ def header_of(text: Mapping[str, str], where: str) -> RecordingHeader:
     except (KeyError, TypeError, ValueError) as error:
         raise RecordingError(
             f"{where}: the header is damaged ({error}); settings, device, fmu_sha256, sources and "
-            "both clocks are needed; take another recording"
+            "both clocks are needed; use another recording"
         ) from None
 
 

@@ -73,7 +73,10 @@ class Journal:
         try:
             self._write(b"".join(self._waiting))
         except OSError as error:
-            self.error = f"{self._name}: turns cannot be written ({cause(error)}); they wait"
+            self.error = (
+                f"{self._name}: turns cannot be written ({cause(error)}); they are kept "
+                "in memory until they can"
+            )
             return
         self._waiting.clear()
         self.error = ""
@@ -100,8 +103,8 @@ class Journal:
             if target != self._path:
                 target.unlink(missing_ok=True)
             raise RecordingError(
-                f"{self._name}: the document cannot be written ({cause(error)}); the turns that "
-                "stand in the file are kept; free space and complete it with `tirebench repair`"
+                f"{self._name}: the document cannot be written ({cause(error)}); the turns already "
+                "in the file are kept; free some space and complete it with `tirebench repair`"
             ) from None
 
     def close(self) -> None:
@@ -148,6 +151,6 @@ def completed(text: str) -> dict[str, Any] | None:
 
 def _unwritable(path: Path, error: OSError) -> RecordingError:
     return RecordingError(
-        f"{path}: it cannot be written ({cause(error)}); a file in a folder with room is needed; "
-        "name another one"
+        f"{path}: cannot be written ({cause(error)}); a file in a folder with free space is "
+        "needed; name another file"
     )

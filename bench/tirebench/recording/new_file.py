@@ -31,8 +31,8 @@ def keep_recordings(file: Path | None, *recordings: Path | None) -> None:
     whole = [part_path(path.resolve(), 1) for path in recordings if path is not None]
     if part_path(file.resolve(), 1) in whole or _is_recording(file):
         raise RecordingError(
-            f"{file}: it is a recording, or a part of one, and a recording is never overwritten; "
-            "a file of its own is needed; name another one"
+            f"{file}: a recording, or a part of one, is never overwritten; another file is needed; "
+            "name one"
         )
 
 
@@ -55,8 +55,8 @@ def whole(out: Path) -> Iterator[Path]:
             new.replace(out)
     except OSError as error:
         raise RecordingError(
-            f"{out}: it cannot be written ({cause(error)}), and nothing of it is left; free space "
-            "or name another place"
+            f"{out}: cannot be written ({cause(error)}), and no partial file is left; free some "
+            "space, or choose another disk"
         ) from None
     finally:
         if new.is_dir():
@@ -74,6 +74,6 @@ def _is_recording(file: Path) -> bool:
             return opened.read(len(MCAP0_MAGIC)) == MCAP0_MAGIC
     except OSError as error:
         raise RecordingError(
-            f"{file}: it cannot be read ({cause(error)}), and may be a recording, which is never "
+            f"{file}: cannot be read ({cause(error)}), and could be a recording, which is never "
             "overwritten; name another file"
         ) from None

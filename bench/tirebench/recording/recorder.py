@@ -81,7 +81,7 @@ class Recorder:
             self._log = McapLog(path, length)
         except FileExistsError:
             raise RecordingError(
-                f"{path}: it exists; a recording is never overwritten; name another file"
+                f"{path}: already exists; a recording is never overwritten; name another file"
             ) from None
         except OSError as error:
             raise unwritable(path, error) from None
@@ -265,6 +265,6 @@ def next_part(header: RecordingHeader) -> RecordingHeader:
 def unwritable(path: Path, error: OSError) -> RecordingError:
     """Return the error that tells of a file that cannot be written."""
     return RecordingError(
-        f"{path}: it cannot be written ({error.strerror}); a place with room for 1 GB an hour and "
-        "wheel is needed; free space or name another file"
+        f"{path}: cannot be written ({error.strerror}); a disk with room for 1 GB per hour and "
+        "wheel is needed; free some space, or name another file"
     )

@@ -92,7 +92,7 @@ class Recording:
                 return header, self._conditions(record.data)
         damage = f" ({self.damage})" if self.complete is False else ""
         raise RecordingError(
-            f"{self.path}: it has no header of a recording{damage}; a file of `tirebench run "
+            f"{self.path}: the header of a recording is missing{damage}; a file of `tirebench run "
             "--record` is needed; name one"
         )
 
@@ -141,7 +141,7 @@ class Recording:
             self._file: BinaryIO = path.open("rb")
         except OSError as error:
             raise RecordingError(
-                f"{path}: it cannot be read ({error.strerror}); a recording of `tirebench run "
+                f"{path}: cannot be read ({error.strerror}); a recording of `tirebench run "
                 "--record` is needed; check the path"
             ) from None
         self._records = records(self._file)
@@ -160,7 +160,7 @@ class Recording:
             self.header, _ = self._open()
         except RecordingError:
             self.path, self.complete = path, False
-            self.damage = f"{file} is no part of it"
+            self.damage = f"{file} is not a part of it"
             return False
         if self.header.recording != header.recording:
             self.path, self.header = path, header
@@ -207,8 +207,8 @@ class Recording:
             return parse_conditions(json_of(data), f"{self.path}: {CONDITIONS}")
         except (ValueError, DeviceError) as error:
             raise RecordingError(
-                f"{self.path}: the conditions are damaged ({error}); JSON is needed; "
-                "take another recording"
+                f"{self.path}: the conditions are damaged ({error}); JSON is needed; use another "
+                "recording"
             ) from None
 
 

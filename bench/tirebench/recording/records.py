@@ -43,8 +43,8 @@ def records(file: BinaryIO) -> Iterator[McapRecord]:
         taken, unpacked = taken + len(record.data), unpacked + len(content)
         if unpacked > LARGEST + MOST_TIMES * taken:
             raise RecordingError(
-                f"{taken} bytes of chunks unpack to {unpacked} or more; {MOST_TIMES} times is "
-                "allowed"
+                f"{taken} bytes of chunks unpack to {unpacked} or more; a factor of {MOST_TIMES} "
+                "is allowed"
             )
         yield from _within(content)
 
@@ -64,14 +64,14 @@ def _unpacked(chunk: Chunk) -> bytes:
         content = LZ4FrameDecompressor().decompress(chunk.data, max_length=LARGEST + 1)
     else:
         raise RecordingError(
-            f"a chunk is packed by {chunk.compression[:20]!r}; zstd and lz4 are allowed"
+            f"a chunk is compressed with {chunk.compression[:20]!r}; zstd and lz4 are allowed"
         )
     if len(content) != chunk.uncompressed_size:
         raise RecordingError(
-            f"a chunk unpacks to {len(content)} bytes or more; it says {chunk.uncompressed_size}"
+            f"a chunk unpacks to {len(content)} bytes or more, but states {chunk.uncompressed_size}"
         )
     if chunk.uncompressed_crc and zlib.crc32(content) != chunk.uncompressed_crc:
-        raise RecordingError("a chunk is damaged: what it holds is not what its checksum says")
+        raise RecordingError("a chunk is damaged: its checksum does not match its content")
     return content
 
 
@@ -83,5 +83,5 @@ def _within(content: bytes) -> Iterator[McapRecord]:
     while stream.tell() < len(content):
         record = next(found)
         if isinstance(record, Chunk):
-            raise RecordingError("a chunk stands within a chunk; messages are allowed there")
+            raise RecordingError("a chunk contains a chunk; only messages are allowed there")
         yield record

@@ -54,13 +54,14 @@ def _repaired(path: Path, new: Path) -> Repaired:
             finish()
     except OSError as error:
         raise RecordingError(
-            f"{path}: it cannot be read, or its whole copy cannot be written ({cause(error)}); "
-            "nothing of the copy is left; a recording and room on the disk are needed; check both"
+            f"{path}: cannot be read, or its repaired copy cannot be written ({cause(error)}), and "
+            "no partial copy is left; a recording and enough free disk space are needed; check "
+            "both"
         ) from None
     if not found.topics:
         raise RecordingError(
-            f"{path}: nothing can be read of it ({found.damage}); a file of `tirebench run "
-            "--record` or its JSON is needed; name one"
+            f"{path}: nothing in it can be read ({found.damage}); a file that `tirebench run` "
+            "wrote with --record or --json is needed; name one"
         )
     return found
 

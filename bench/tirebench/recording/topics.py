@@ -52,7 +52,7 @@ _TEXT = {"type": "string"}
 _COUNT = {"type": "integer"}
 EVENT_SCHEMA = _schema(
     "tirebench.Event",
-    "What happened, and markers of the user.",
+    "Events of the run, and markers that the user set.",
     {"event": _TEXT, "text": _TEXT, "wheel": _COUNT},
 )
 CONDITIONS_SCHEMA = _schema(
@@ -60,17 +60,17 @@ CONDITIONS_SCHEMA = _schema(
 )
 STRAIN_SCHEMA = _schema(
     "tirebench.Strain",
-    "Samples that follow each other; the message's time is that of the first.",
+    "Consecutive samples; the message's time is that of the first sample.",
     {
         "segment": _COUNT,
-        "t_us": {"type": "integer", "description": "Device time of the first sample, us."},
-        "period_us": _number("Time between two samples, us."),
+        "t_us": {"type": "integer", "description": "Device time of the first sample, in us."},
+        "period_us": _number("Time between two samples, in us."),
         **{name: {"type": "array", "items": _number("microstrain")} for name in _GAGES},
     },
 )
 ESTIMATE_SCHEMA = _schema(
     "tirebench.Estimate",
-    "One turn, ISO 8855 axes, as in the run's JSON.",
+    "Estimates of one turn in ISO 8855 axes, as in the run's JSON.",
     {
         **{
             f"{name}{end}": _number(f"{unit}{said}")
@@ -84,12 +84,12 @@ ESTIMATE_SCHEMA = _schema(
 )
 LINK_SCHEMA = _schema(
     "tirebench.Link",
-    "Good frames and every loss by its kind, counted.",
+    "Counters of good frames and of each kind of loss.",
     {"frames": _COUNT, "lost_frames": _COUNT, "crc_bad": _COUNT, "clock_drift_ppm": _number("ppm")},
 )
 TOLD_SCHEMA = _schema(
     "tirebench.Told",
-    "What a bus told of the conditions, when it changed.",
+    "Conditions that a bus sent, written at each change.",
     {field_of(name): _number(unit) for name, (unit, _) in CONDITION_UNITS.items()},
 )
 

@@ -63,21 +63,23 @@ def read_setup(path: Path, usual: SourcePlan) -> tuple[SourcePlan, ...]:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
         raise DeviceError(
-            f"{path}: it cannot be read ({cause(error)}); a setup is TOML in UTF-8; check path and "
-            "line"
+            f"{path}: cannot be read ({cause(error)}); a setup is TOML in UTF-8; check the path "
+            "and the file"
         ) from None
     if document.get("format") != FORMAT:
         raise DeviceError(
-            f"{path}: format = {document.get('format')!r}; {FORMAT!r} is understood here; correct "
-            "it, or take a program of that version"
+            f"{path}: format = {document.get('format')!r}; this program reads {FORMAT!r}; correct "
+            "it, or use the version of tirelib that wrote the file"
         )
     tables = document.get("source")
     faults = [
-        f"{path}: {key} is not known; allowed are format and [[source]]; correct it"
+        f"{path}: unknown key {key}; allowed keys are format and [[source]]; correct it"
         for key in sorted(set(document) - {"format", "source"})
     ]
     if not isinstance(tables, list) or not tables or not all(isinstance(t, dict) for t in tables):
-        faults.append(f"{path}: source = {tables!r}; tables [[source]] are needed; write them")
+        faults.append(
+            f"{path}: source = {tables!r}; at least one table [[source]] is needed; write it"
+        )
         raise DeviceError(faults)
     for number, table in enumerate(tables, start=1):
         faults += _faults(table, f"{path}: source {number}")
@@ -97,11 +99,13 @@ def read_setup(path: Path, usual: SourcePlan) -> tuple[SourcePlan, ...]:
 def _faults(table: dict[str, Any], where: str) -> list[str]:
     """Return what is wrong with the keys of a table."""
     faults = [
-        f"{where}: {key} is not known; allowed are {', '.join(_KEYS)}; correct it"
+        f"{where}: unknown key {key}; allowed keys are {', '.join(_KEYS)}; correct it"
         for key in sorted(set(table) - set(_KEYS))
     ]
     if "port" not in table:
-        faults.append(f"{where}: port is missing; a port as --port takes it is needed; write it")
+        faults.append(
+            f"{where}: port is missing; each source needs a port, in the form of --port; add it"
+        )
     for key, kind in _KEYS.items():
         value = table.get(key)
         if value is not None and (not isinstance(value, kind) or isinstance(value, bool)):
@@ -144,31 +148,29 @@ def check_sources(sources: Sequence[SourcePlan], conditions: Conditions | None) 
     faults = []
     ports = [source.port.port for source in sources]
     for port in sorted({port for port in ports if ports.count(port) > 1}):
-        faults.append(
-            f"--port {port}: it comes twice; each source needs a port of its own; leave one out"
-        )
+        faults.append(f"--port {port}: given twice; each source needs its own port; leave one out")
     wheels = [(wheel, source.port.port) for source in sources for wheel in source.known_wheels]
     for wheel in sorted({w for w, _ in wheels}):
         named = [port for w, port in wheels if w == wheel]
         if len(named) > 1:
             faults.append(
-                f"wheel {wheel} comes from {' and '.join(named)}; each wheel may come "
-                "from one source; number them: `wheel = N` or --port N=PORT"
+                f"wheel {wheel} comes from {' and '.join(named)}; each wheel may come from one "
+                "source only; give each source its wheel number with `wheel = N` or --port N=PORT"
             )
     told = [(place, source.port.port) for source in sources for place in source.told]
     places = [place for place, _ in told]
     if clash := [(place, port) for place, port in told if clashes(place, places)]:
         names = ", ".join(f"{_words(place)} from {port}" for place, port in clash)
         faults.append(
-            f"two sources give the same condition: {names}; each may come from one source, for a "
-            "wheel or for all; leave one out of its map"
+            f"two sources send the same condition: {names}; each condition may come from one "
+            "source, for one wheel or for all; remove it from one map"
         )
     known = () if conditions is None else conditions.known
     for place, port in told:
         if (name := place[0]) in known:
             faults.append(
-                f"{_words(place)} comes from {port}, and from --{name} or "
-                "--conditions; one of them may say it; leave one out"
+                f"{_words(place)} comes from {port}, and from --{name} or --conditions; only one "
+                "of them may set it; leave one out"
             )
     if faults:
         raise DeviceError(faults)

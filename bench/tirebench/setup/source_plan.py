@@ -107,7 +107,7 @@ def protocol_of(port: PortPlan, rate: float, map_file: Path | None) -> ProtocolP
             else ("CAN frames", "slcan:... or can:...")
         )
         raise DeviceError(
-            f"--map {map_file} with --port {port.port}: this map is for {mine}; {other} is needed; "
-            "name such a port, or another map"
+            f"--map {map_file} with --port {port.port}: this map describes {mine}, which needs a "
+            f"port {other}; name such a port, or another map"
         )
     return ProtocolPlan(LINE_MAP if user.of_line else port.encoding, user.rate, user)

@@ -58,7 +58,7 @@ Condition = tuple[float, ...]
 def condition(*values: float, **known: float) -> Condition:
     """Return a condition from what is known of it, SI, by order or name."""
     if unknown := known.keys() - set(HELD):
-        raise TypeError(f"no condition: {', '.join(sorted(unknown))}")
+        raise TypeError(f"unknown condition: {', '.join(sorted(unknown))}")
     given = {**dict(zip(HELD, values, strict=False)), **known}
     return tuple(given.get(name, math.nan) for name in HELD)
 
@@ -256,8 +256,8 @@ def parse_conditions(document: Any, where: str) -> Conditions:
     if given not in (*EARLIER_FORMATS, FORMAT):
         known = ", ".join((*EARLIER_FORMATS, FORMAT))
         raise DeviceError(
-            f"{where}: format = {given!r}; {known} are understood here; "
-            "take the file that `tirebench emulate --conditions` wrote"
+            f"{where}: format = {given!r}; this program reads {known}; use a file that `tirebench "
+            "emulate --conditions` wrote"
         )
     try:
         times = tuple(int(t) for t in document["t_us"])
@@ -273,14 +273,15 @@ def parse_conditions(document: Any, where: str) -> Conditions:
         campaign = None if document.get("campaign") is None else dict(document["campaign"])
     except (AttributeError, KeyError, OverflowError, TypeError, ValueError) as error:
         raise DeviceError(
-            f"{where}: {type(error).__name__} {error}; t_us, {', '.join(QUANTITIES)}, "
-            "runs and loop_us are needed, lists of one length; write it anew with "
+            f"{where}: {type(error).__name__} {error}; t_us, {', '.join(QUANTITIES)}, runs and "
+            "loop_us are needed, as lists of the same length; write the file again with "
             "`tirebench emulate`"
         ) from None
     if len(values) != len(times) or not times or list(times) != sorted(times):
         raise DeviceError(
-            f"{where}: {len(times)} times for {len(values)} conditions; as many are needed, at "
-            "least one, in order of time; write it anew with `tirebench emulate`"
+            f"{where}: {len(times)} times for {len(values)} conditions; one time per condition is "
+            "needed, at least one, in increasing order; write the file again with `tirebench "
+            "emulate`"
         )
     return Conditions(times, values, runs, loop, campaign)
 
@@ -291,8 +292,8 @@ def read_conditions(path: Path) -> Conditions:
         document = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise DeviceError(
-            f"{path}: it cannot be read ({cause(error)}); JSON as `tirebench emulate --conditions` "
-            "writes it is needed; check the path"
+            f"{path}: cannot be read ({cause(error)}); a JSON file of `tirebench emulate "
+            "--conditions` is needed; check the path"
         ) from None
     return parse_conditions(document, str(path))
 

@@ -112,8 +112,8 @@ class Device:
             return np.full(gages, usual)
         if len(known) != gages:
             raise DeviceError(
-                f"the device {self.name!r} has zeros or gains of {len(known)} gages, its wheel "
-                f"sends {gages}; both must agree; take the device file of this wheel"
+                f"the device {self.name!r} has zeros or gains for {len(known)} gages, but the "
+                f"wheel sends {gages}; the numbers must agree; use the device file of this wheel"
             )
         return np.asarray(known)
 
@@ -148,9 +148,9 @@ class Device:
         if same and len(lateral) == gages:
             return
         raise DeviceError(
-            f"{where}: gages lie at {_millimetres(lateral)} mm (ISO), the device "
+            f"{where}: its gages are at {_millimetres(lateral)} mm (ISO), but the device "
             f"{self.name!r} has {_millimetres(self.lateral) if self.lateral else gages} of them; "
-            "both must agree; take the device file of this wheel"
+            "both must agree; use the device file of this wheel"
         )
 
 
@@ -166,8 +166,8 @@ def read_device(path: Path) -> Device:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise DeviceError(
-            f"{path}: it cannot be read ({cause(error)}); a device file is TOML in UTF-8; check "
-            "the path"
+            f"{path}: cannot be read ({cause(error)}); a device file is TOML in UTF-8; check the "
+            "path"
         ) from None
     return parse_device(text, str(path))
 
@@ -178,12 +178,12 @@ def parse_device(text: str, where: str) -> Device:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise DeviceError(
-            f"{where}: it is no TOML ({error}); a device file is TOML; correct that line"
+            f"{where}: not valid TOML ({error}); a device file is a TOML file; correct that line"
         ) from None
     if document.get("format") != FORMAT:
         raise DeviceError(
-            f"{where}: format = {document.get('format')!r}; {FORMAT!r} is understood here; "
-            "correct it, or take a program of that version"
+            f"{where}: format = {document.get('format')!r}; this program reads {FORMAT!r}; correct "
+            "it, or use the version of tirelib that wrote the file"
         )
     faults = _unknown_keys(document, where)
     scale = _scale(document, where, faults)
@@ -195,8 +195,8 @@ def parse_device(text: str, where: str) -> Device:
     for key, given in (("zero_counts", zero), ("gain", gain)):
         if given and lateral and len(given) != len(lateral):
             faults.append(
-                f"{where}: gages.{key} has {len(given)} numbers, lateral_m "
-                f"{len(lateral)}; one a gage is needed; correct them"
+                f"{where}: gages.{key} has {len(given)} numbers, but lateral_m has {len(lateral)}; "
+                "one number per gage is needed; correct them"
             )
     if faults:
         raise DeviceError(faults)
@@ -211,13 +211,13 @@ def _unknown_keys(document: dict[str, Any], where: str) -> list[str]:
         content = document.get(table, {}) if table else document
         if not isinstance(content, dict):
             faults.append(
-                f"{where}: {table} = {content!r}; a table [{table}] is needed; write it as one"
+                f"{where}: {table} = {content!r}; a table [{table}] is needed; write it as a table"
             )
             continue
         for key in sorted(set(content) - known):
             faults.append(
-                f"{where}: {table + '.' if table else ''}{key} is not known; allowed are "
-                f"{', '.join(sorted(known))}; correct the spelling or take it out"
+                f"{where}: {table + '.' if table else ''}{key} is an unknown key; allowed keys are "
+                f"{', '.join(sorted(known))}; correct the spelling, or delete the line"
             )
     return faults
 
@@ -231,8 +231,9 @@ def _scale(document: dict[str, Any], where: str, faults: list[str]) -> float:
     given = [name for name in ("scale", "bridge") if name in document]
     if len(given) != 1:
         faults.append(
-            f"{where}: {' and '.join(f'[{name}]' for name in given) or 'neither table'} is given; "
-            "just one of [scale] and [bridge] says what a count is; write one of them"
+            f"{where}: {' and '.join(f'[{name}]' for name in given) or 'neither table'} is "
+            "present; exactly one of [scale] and [bridge] must define the size of a count; write "
+            "one of them"
         )
         return math.nan
     table = document[given[0]] if isinstance(document[given[0]], dict) else {}
@@ -255,8 +256,8 @@ def _number(
         return math.nan
     if not low <= abs(value) <= high:
         faults.append(
-            f"{where}: {key} = {value:g}; {low:g} .. {high:g} is allowed, of either "
-            "sign; check the unit of the source"
+            f"{where}: {key} = {value:g}; a magnitude of {low:g} .. {high:g} is allowed; check its "
+            "unit"
         )
     return float(value)
 
@@ -271,15 +272,15 @@ def _numbers(
     good = good and all(isinstance(x, int | float) and not isinstance(x, bool) for x in value)
     if not good:
         faults.append(
-            f"{where}: gages.{key} = {value!r}; 1 to {MOST_GAGES} numbers are needed, "
-            "one a gage; correct the list"
+            f"{where}: gages.{key} = {value!r}; 1 to {MOST_GAGES} numbers are needed, one per "
+            "gage; correct the list"
         )
         return None
     for number, x in enumerate(value, start=1):
         if not low <= x <= high:
             faults.append(
-                f"{where}: gages.{key} of gage {number} = {x:g}; {low:g} .. {high:g} is "
-                "allowed; check the unit of the source"
+                f"{where}: gages.{key} of gage {number} = {x:g}; {low:g} .. {high:g} is allowed; "
+                "check its unit"
             )
     return tuple(float(x) for x in value)
 

@@ -82,7 +82,8 @@ def shunted(
     step = after - before
     if beyond := [number for number in gages if number > len(step)]:
         raise DeviceError(
-            f"gage {beyond[0]}; 1 .. {len(step)} are there; name the gages that are shunted"
+            f"gage {beyond[0]} does not exist; the wheel has gages 1 .. {len(step)}; name the "
+            "shunted gages with --gage"
         )
     chosen = [n - 1 for n in gages] or np.flatnonzero(np.isfinite(step)).tolist()
     gain, faults = device.gain_of(len(step)).tolist(), []
@@ -91,9 +92,9 @@ def shunted(
         ratio = apparent / step[gage] if step[gage] else np.inf
         if not low <= ratio * gain[gage] <= high:
             faults.append(
-                f"gage {gage + 1}: a step of {1e6 * step[gage]:.0f} microstrain where the shunt is "
-                f"{1e6 * apparent:.0f}; a gain of {low:g} .. {high:g} is allowed; check resistors, "
-                "gage factor and sign, or name the gages that are shunted"
+                f"gage {gage + 1}: a step of {1e6 * step[gage]:.0f} microstrain where the shunt "
+                f"should give {1e6 * apparent:.0f}; a gain of {low:g} .. {high:g} is allowed; "
+                "check resistors, gage factor and sign, or name the shunted gages with --gage"
             )
         else:
             gain[gage] = round(float(ratio * gain[gage]), 6)
@@ -136,8 +137,8 @@ def write_device(path: Path, device: Device, said: str = "") -> None:
             file.write(device_text(device, said))
     except OSError as error:
         raise DeviceError(
-            f"{path}: it cannot be written ({cause(error)}); a new file in a folder that may be "
-            "written to is needed; name another"
+            f"{path}: cannot be written ({cause(error)}); a new file in a writable folder is "
+            "needed; name another file"
         ) from None
 
 

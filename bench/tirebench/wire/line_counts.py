@@ -2,10 +2,11 @@
 
 from dataclasses import dataclass
 
-NOTHING = "no byte came: is the transmitter on, and is this its port?"
+NOTHING = "no byte was received: check that the transmitter is on and that this is its port"
 NO_FRAME = (
-    "bytes came, but no frame of a wheel: check the rate (--baud; --bitrate and --data-bitrate), "
-    "the kind of port (PORT, slcan:PORT), and --map for another make"
+    "bytes were received, but no valid frame: check the rate (--baud, or --bitrate and "
+    "--data-bitrate), the kind of port (PORT or slcan:PORT), and whether another make's "
+    "transmitter needs --map"
 )
 
 

@@ -96,6 +96,6 @@ class RateCheck:
             return
         rate = 1e6 / step if step > 0.0 else 0.0
         self.contradiction = (
-            f"wheel {wheel}: its clock shows {rate:.0f} samples a second, {1e6 / expected:.0f} "
-            f"were said; both must agree within {TOLERANCE:.1%}; correct {self._said_by}"
+            f"wheel {wheel}: its clock shows {rate:.0f} samples a second, but {1e6 / expected:.0f} "
+            f"were configured; the two must agree within {TOLERANCE:.1%}; correct {self._said_by}"
         )
