@@ -35,8 +35,8 @@ def test_an_export_without_its_package_says_what_to_install(tmp_path: Path) -> N
     done = program("tirelib.cli", "fmu", "virtual", "--out", str(tmp_path / "V.fmu"))
     assert done.returncode == 2
     assert done.stderr.splitlines() == [
-        "Error: the package 'pythonfmu' is not installed, which this verb needs; install it with "
-        "pip install 'tirelib[fmu]'"
+        "Error: this command needs the package 'pythonfmu', which is not installed; install it "
+        "with pip install 'tirelib[fmu]'"
     ]
 
 

@@ -148,7 +148,7 @@ def test_effects_of_a_model_are_named_as_left_out(tmp_path: Path) -> None:
     assert found["effects_left_out"] == ["tread_friction"]
     words = ["simulate", "--model", str(path), "--load", "4000", "--contact", "shear"]
     shown = CliRunner().invoke(program, words)
-    assert "left out here: tread_friction" in shown.output
+    assert "left out of this simulation: tread_friction" in shown.output
 
 
 def test_an_inflation_that_the_sidewall_does_not_know_is_noted(tmp_path: Path) -> None:
@@ -163,7 +163,7 @@ def test_a_load_that_no_tire_would_carry_is_noted_with_the_range(tmp_path: Path)
     notes = document(tmp_path, "--model", "table-6-1", "--load", "4000,19000")["notes"]
     assert len(notes) == 1
     assert "19000 N press this tire by" in notes[0]
-    found = re.search(r"free radius \(62 mm\).*range: up to (\d+) N", notes[0])
+    found = re.search(r"free radius \(62 mm\).*model's range ends at (\d+) N", notes[0])
     assert found
     assert 4000.0 < float(found[1]) < 19000.0
     inside = document(tmp_path, "--model", "table-6-1", "--load", float(found[1]) - 1.0)
@@ -206,8 +206,8 @@ WRONG = {
     "nothing": ([], "neither --load nor --deflection"),
     "both": (["--load", "4000", "--deflection", "20"], "both --load and --deflection"),
     "speeds": (["--load", "4000", "--speed", "50", "--omega", "50"], "both --speed and --omega"),
-    "words": (["--load", "heavy"], "is no number"),
-    "empty": (["--load", "1500,"], "is no number"),
+    "words": (["--load", "heavy"], "is neither a number"),
+    "empty": (["--load", "1500,"], "is neither a number"),
     "zero": (["--load", "0"], "vertical load = 0 N"),
     "pull": (["--deflection", "-5"], "deflection = -0.005 m"),
     "heavy": (["--load", "90000"], "90000 N"),
@@ -216,7 +216,10 @@ WRONG = {
     "fast": (["--load", "4000", "--speed", "550"], "0 to 540 km/h"),
     "spinning": (["--load", "4000", "--omega", "600"], "600 rad/s; the model holds from 0 to 500"),
     "no speed": (["--load", "4000", "--speed", "nan"], "nan km/h"),
-    "backward": (["--load", "4000", "--speed", "-50"], "--speed -50 km/h; the model holds from 0"),
+    "backward": (
+        ["--load", "4000", "--speed", "-50"],
+        "--speed -50 km/h; the model holds for forward rolling from 0",
+    ),
     "infinite": (["--load", "inf"], "inf N"),
     "damping": (["--load", "4000", "--damping", "-0.1"], "damping = -0.1"),
     "lists": (["--load", "1000,2000", "--speed", "1,2,3"], "2 values beside 3"),

@@ -14,11 +14,11 @@ from tirelib.threads import bound_process
 VERBS = {
     "campaign": "Validate a folder of measurements, or show what is in it.",
     "import": "Make a campaign from measured files: MATLAB, CSV, Parquet, TYDEX, loose MDF 4.",
-    "features": "Read contact edges, peaks and integrals of every turn and gage of DIR.",
+    "features": "Extract contact edges, peaks and integrals for every turn and gage of DIR.",
     "calibrate": "Fit the estimators of Fz, alpha, kappa and Fy on the campaigns in DIR...",
-    "estimate": "Estimate every turn of DIR, and compare with the rig where it measured.",
+    "estimate": "Estimate every turn of DIR, and compare with the forces that the rig measured.",
     "identify": "Fit the base model, ring and brush, to DIR.",
-    "compare": "Hold a model against CAMPAIGN and say where it fails.",
+    "compare": "Compare a model with CAMPAIGN and show where it fails.",
     "diagnose": "Tell which physical effect the model lacks in CAMPAIGN.",
     "explain": "Find what a model of CAMPAIGN lacks, add it, and show before and after.",
     "effects": "List the effects of the catalogue, or register effects of your own.",
@@ -26,7 +26,7 @@ VERBS = {
     "add": "Add EFFECT to a model, fit it to CAMPAIGN and show what the error does.",
     "selftest": "Plant each effect at the plan and noise of CAMPAIGN and tell the chance of "
     "finding it.",
-    "simulate": "Press the rolling ring onto the road: shape, pressure, shear, strain and strain "
+    "simulate": "Simulate the rolling ring on the road: shape, pressure, shear, strain and strain "
     "rate.",
     "fmu": "Export the estimator or the virtual tire as an FMU, check it, and run it.",
     "rig": "Measure a virtual tire on the numerical rig and write a campaign.",
@@ -48,7 +48,7 @@ Examples:
   tirelib simulate --model build/out/M.toml --load 4000 --speed 80 --out build/out/simulated
 
 \b
-Exit code: 0 done, 1 ran but the answer is negative, 2 bad input.
+Exit code: 0 done, 1 the command ran and its answer is negative, 2 bad input.
 """
 
 
@@ -98,8 +98,8 @@ def main() -> None:
         if package not in OPTIONAL:
             raise
         click.echo(
-            f"Error: the package {package!r} is not installed, which this verb needs; install it "
-            f"with pip install 'tirelib[{OPTIONAL[package]}]'",
+            f"Error: this command needs the package {package!r}, which is not installed; install "
+            f"it with pip install 'tirelib[{OPTIONAL[package]}]'",
             err=True,
         )
         sys.exit(2)

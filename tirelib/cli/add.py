@@ -33,7 +33,7 @@ Examples:
   tirelib add friction_load --model M.toml --data build/out/cornering --out M2.toml
 
 \b
-The base model and all strengths are fitted anew. Held-out errors are on the highest load and the
+The base model and all strengths are fitted again. Held-out errors are on the highest load and the
 highest pressure, each left out of the fit; of a sweep of forces, on blocks of time. An effect of
 the brush is fitted to --quantity, else to the force of the model's last such step, else to the one
 whose error it lowers most. Exit code: 0 done, 2 bad input.
@@ -59,17 +59,19 @@ FORMAT = "tirelib-model/1"
     metavar="FILE.py",
     type=FILE,
     multiple=True,
-    help="Effects of your own; may be given again.",
+    help="Python file with effects of your own; may be given several times.",
 )
-@click.option("--remove", is_flag=True, help="Take EFFECT out instead, and fit anew.")
+@click.option("--remove", is_flag=True, help="Remove EFFECT from the model instead, and fit again.")
 @click.option(
-    "--undo", is_flag=True, help="Go back to before the last entry of the history, to the digit."
+    "--undo",
+    is_flag=True,
+    help="Restore the model exactly as it was before the last entry of its history.",
 )
 @click.option(
     "--quantity",
     metavar="strain|Fy|Fx|Mz",
-    help="Measured quantity to fit; default: strain, and for an effect of the brush the "
-    "force of the last step, else the one that it helps most.",
+    help="Measured quantity to fit. Default: strain; for a brush effect the force of the model's "
+    "last step, else the force whose error the effect lowers most.",
 )
 @click.option(
     "--out", "out", metavar="M2.toml", type=NEW_FILE, required=True, help="New model file."
@@ -79,8 +81,8 @@ FORMAT = "tirelib-model/1"
     "report",
     metavar="DIR",
     type=NEW_FOLDER,
-    help="Write extension.html and extension.md: the waterfall of the error, each run, "
-    "what was held out.",
+    help="Folder for extension.html and extension.md: a waterfall of the error, each run, and the "
+    "held-out errors.",
 )
 @click.option(
     "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
@@ -261,10 +263,11 @@ def _numbers(values: float | list[float]) -> str:
 
 def _warnings(flags: list[str], low: float, high: float) -> list[str]:
     told = {
-        "out_of_range": f"out_of_range: the strength lies outside the plausible {low:g} to "
-        f"{high:g}; something else may be missing",
-        "not_significant": "not_significant: the strength is no different from zero",
-        "no_gain": "no_gain: the error does not fall",
-        "heldout_worse": "heldout_worse: the error on left-out runs grows",
+        "out_of_range": "out_of_range: the fitted strength lies outside the plausible range "
+        f"{low:g} to {high:g}; another effect may be missing",
+        "not_significant": "not_significant: the fitted strength does not differ significantly "
+        "from zero",
+        "no_gain": "no_gain: the effect does not lower the error",
+        "heldout_worse": "heldout_worse: the effect raises the error on the held-out runs",
     }
     return [told[flag] for flag in flags]

@@ -51,8 +51,8 @@ Examples:
       --report build/out/calibration
 
 \b
-Several campaigns must be of the same tire and gages. More conditions in the data
-(pressure, speed, camber, slip ratio) make the calibration hold for them.
+Several campaigns must have the same tire and gages. More conditions in the data (pressure, speed,
+camber, slip ratio) make the calibration hold for them.
 """
 
 
@@ -64,7 +64,7 @@ Several campaigns must be of the same tire and gages. More conditions in the dat
     metavar="CAL.toml",
     type=NEW_FILE,
     required=True,
-    help="Calibration to write.",
+    help="Calibration file to write.",
 )
 @click.option(
     "--report",
@@ -72,7 +72,7 @@ Several campaigns must be of the same tire and gages. More conditions in the dat
     type=NEW_FOLDER,
     help="Write statistics and residual plots as HTML.",
 )
-@click.option("--quick", is_flag=True, help="Leave out the cross-validation by level.")
+@click.option("--quick", is_flag=True, help="Skip the cross-validation by level.")
 @low_pass_options
 @click.option(
     "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write statistics as JSON."
@@ -90,7 +90,9 @@ def calibrate(
     campaigns = [read_campaign(folder) for folder in folders]
     repeated = [str(f) for f in folders if [p.resolve() for p in folders].count(f.resolve()) > 1]
     if repeated:
-        raise CalibrationError(f"{repeated[0]}: is given twice; give every campaign once")
+        raise CalibrationError(
+            f"{repeated[0]}: the campaign is given twice; give every campaign once"
+        )
     low_pass = make_low_pass(order, cut_off)
     runs = sum(len(campaign.plans) for campaign in campaigns)
     with progress_bar("reading", runs) as progress:
@@ -108,9 +110,10 @@ def calibrate(
     _print(console, trained, document)
     for odd in document["other_tire"]:
         console.print(
-            f"another tire? {odd['unlike']} of {odd['judged']} runs of {odd['name']} show strain "
-            f"that the tire of {odd['of']} does not (one in a thousand would by chance); look "
-            "whether both are of one tire in one state, else calibrate them apart"
+            f"another tire? {odd['unlike']} of {odd['judged']} runs of {odd['name']} have a strain "
+            f"pattern that the tire of {odd['of']} does not show (by chance one run in a thousand "
+            "would); check that both campaigns are of the same tire in the same state, otherwise "
+            "calibrate them separately"
         )
     for sentence in (not_given(document["not_given"]), *not_checked(trained.calibration)):
         if sentence:
@@ -276,7 +279,9 @@ def _print(console: Console, trained: Trained, document: dict[str, Any]) -> None
     for name, reason in trained.skipped.items():
         console.print(f"not fitted: {name}: {reason}")
     table = Table(
-        title="Estimators in use (conditions held out)", box=SIMPLE_HEAD, title_justify="left"
+        title="Error of the estimators (rms, with conditions held out)",
+        box=SIMPLE_HEAD,
+        title_justify="left",
     )
     for column in ("quantity", "rmse", "unit", "R2", "runs", "terms"):
         table.add_column(column, justify="left" if column in ("quantity", "unit") else "right")
@@ -310,11 +315,11 @@ def _print(console: Console, trained: Trained, document: dict[str, Any]) -> None
 def _held_out_table(rows: list[dict[str, Any]]) -> Table:
     """Worst rmse over the levels of each condition: the dissertation's and ours."""
     table = Table(
-        title="Worst level held out, within the others (rmse over run means)",
+        title="Worst held-out level inside the range of the others (rms error of the run means)",
         box=SIMPLE_HEAD,
         title_justify="left",
-        caption="in use: turns in range; flagged: most turns of a level that are out of "
-        "range; with these: rmse of all",
+        caption="in use: turns within the calibrated range; flagged: the largest share of a "
+        "level's turns outside it; with these: rms error of all turns",
         caption_justify="left",
     )
     for column in (

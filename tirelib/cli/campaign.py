@@ -84,7 +84,11 @@ def _print_problems(folder: Path, problems: list[Problem], errors: int) -> None:
         console.print(f"[bold {colour}]{problem.severity:>7}[/]  ", end="")
         console.print(str(problem), markup=False)
     warnings = len(problems) - errors
-    verdict = "[bold red]not usable as it stands[/]" if errors else "[bold green]sound[/]"
+    verdict = (
+        "[bold red]not usable until the errors are corrected[/]"
+        if errors
+        else "[bold green]sound[/]"
+    )
     counts = f"{_count(errors, 'error')}, {_count(warnings, 'warning')}"
     console.print(f"{folder}: {counts}: ", markup=False, end="")
     console.print(verdict)
@@ -127,7 +131,7 @@ Example:
     "--out",
     metavar="DIR",
     type=NEW_FOLDER,
-    help="Folder for the overview plot; default build/out/show-NAME.",
+    help="Folder for the overview plot. Default: build/out/show-NAME.",
 )
 @click.option(
     "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write header and runs as JSON."

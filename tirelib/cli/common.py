@@ -34,8 +34,8 @@ class NewPath(click.Path):
                 path.open("ab").close()
         except OSError as error:
             self.fail(
-                f"{path}: it cannot be written ({error.strerror}); a place in a folder that may be "
-                "written is needed; choose another one",
+                f"{path}: cannot be written ({error.strerror}); a file in a writable folder is "
+                "needed; choose another one",
                 param,
                 ctx,
             )
@@ -86,12 +86,12 @@ def low_pass_options(function: Callable[..., None]) -> Callable[..., None]:
         type=float,
         metavar="HZ",
         default=None,
-        help="Fixed cut-off instead; turns that it does not suit are flagged.",
+        help="Fixed cut-off frequency instead; turns whose speed it does not suit are flagged.",
     )(function)
     return click.option(
         "--order",
         type=float,
         metavar="N",
         default=None,
-        help="Cut-off of the low-pass in cycles per turn (default 24: 225 Hz at 65 km/h).",
+        help="Cut-off of the low-pass filter in cycles per turn (default 24: 225 Hz at 65 km/h).",
     )(function)

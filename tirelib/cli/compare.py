@@ -23,8 +23,8 @@ Examples:
   tirelib compare build/out/set1 --model build/out/M.toml --quantity Fy --json build/out/Fy.json
 
 \b
-DIR/index.html is one file with everything in it; comparison.md and comparison.json hold the same in
-words and numbers. Errors are in units of the noise between repeated runs. Exit code 2: bad input.
+DIR/index.html holds everything in one file; comparison.md and comparison.json hold the same as
+text and as numbers. Errors are in units of the noise between repeated runs. Exit code 2: bad input.
 """
 
 
@@ -34,12 +34,13 @@ words and numbers. Errors are in units of the noise between repeated runs. Exit 
     "--model",
     metavar="M.toml|NAME",
     required=True,
-    help="Model or tire file, or the name of a tire of tirelib.",
+    help="Model file, tire file, or the name of a tire that tirelib ships.",
 )
 @click.option(
     "--quantity",
     metavar="strain|Fy|Fx|Mz",
-    help="Default: strain where the campaign has it, else the force that fits worst.",
+    help="Measured quantity to compare. Default: strain where the campaign has it, else the force "
+    "with the largest error.",
 )
 @click.option(
     "--effects",
@@ -47,14 +48,14 @@ words and numbers. Errors are in units of the noise between repeated runs. Exit 
     metavar="FILE.py",
     type=FILE,
     multiple=True,
-    help="Effects of your own that the model has; may be given again.",
+    help="Python file with your own effects that the model contains; may be given several times.",
 )
 @click.option(
     "--out",
     "out",
     metavar="DIR",
     type=NEW_FOLDER,
-    help="Write the page, comparison.md and comparison.json.",
+    help="Folder for index.html, comparison.md and comparison.json.",
 )
 @click.option(
     "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
@@ -67,7 +68,7 @@ def compare(
     out: Path | None,
     json_file: Path | None,
 ) -> None:
-    """Hold a model against CAMPAIGN and say where it fails."""
+    """Compare a model with CAMPAIGN and show where it fails."""
     from tirelib.compare import compare as compare_model
     from tirelib.compare.document import comparison_document
     from tirelib.model.registration import registered_effects
@@ -96,7 +97,10 @@ def compare(
 
 def _answer(document: dict[str, object]) -> str:
     unit, error, noise = document["unit"], document["error"], document["noise"]
-    numbers = f"{document['residual_rms']:.4g} of {document['measured_rms']:.4g} {unit} rms left"
+    numbers = (
+        f"{document['residual_rms']:.4g} of {document['measured_rms']:.4g} {unit} rms are not "
+        "explained"
+    )
     if isinstance(error, float) and error == error:
         numbers += f"; error {error:.2f} in units of the noise ({noise:.3g} {unit})"
     return f"{document['campaign']}, {document['quantity']}: {document['verdict']}; {numbers}"

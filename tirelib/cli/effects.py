@@ -16,9 +16,9 @@ Examples:
   tirelib effects --effects mine.py
 
 \b
-Every effect of your own is registered: strength zero is the base, the derivative at zero is alive
-and linear, the whole range can be computed, a planted strength is found again. Exit code: 0 all may
-take part; 2 one may not.
+Each effect of your own is tested: strength zero must give the base model, the derivative at zero
+must exist and not vanish, the whole range must be computable, and a planted strength must be found
+again. Exit code: 0 all passed, 2 one did not.
 """
 
 
@@ -29,7 +29,7 @@ take part; 2 one may not.
     metavar="FILE.py",
     type=FILE,
     multiple=True,
-    help="Effects of your own; may be given again.",
+    help="Python file with effects of your own; may be given several times.",
 )
 def effects(effect_files: tuple[Path, ...]) -> None:
     """List the effects of the catalogue, or register effects of your own."""
@@ -59,13 +59,13 @@ def effects(effect_files: tuple[Path, ...]) -> None:
         effect, console = report.effect, output()
         console.print(f"{effect.name}: {effect.title}")
         if effect.untestable:
-            console.print(f"  no campaign can show it: {effect.untestable}")
+            console.print(f"  no campaign can show this effect: {effect.untestable}")
             continue
         console.print(
-            f"  {report.planted:.4g} {effect.unit} planted, {report.recovered:.4g} found; the "
-            f"base imitates {100.0 * (1.0 - report.survives):.0f} % of it"
+            f"  {report.planted:.4g} {effect.unit} planted, {report.recovered:.4g} found; the base "
+            f"imitates {100.0 * (1.0 - report.survives):.0f} % of its trace"
         )
         twins = ", ".join(f"{name} ({np.round(angle):.0f} deg)" for name, angle in report.twins)
-        console.print(f"  looks like: {twins or 'no other effect'}")
+        console.print(f"  effects with a similar trace: {twins or 'none'}")
     if faults:
         raise FormatError(faults)

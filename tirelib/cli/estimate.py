@@ -31,10 +31,10 @@ Example:
   tirelib estimate data/another-day --calibration build/out/cal.toml --json build/out/e.json
 
 \b
-JSON: N, deg, kappa without unit, ISO 8855 axes; null where a quantity has no calibration or
-cannot be estimated; not_given: what conditions that nobody gave cost; other_tire null: the
-calibration cannot notice another tire. Exit code 1: not one turn is valid, or the tire is probably
-another one.
+JSON: N, deg, kappa without unit, ISO 8855 axes. A value is null where a quantity has no calibration
+or cannot be estimated; not_given lists the accuracy lost to missing conditions; other_tire is null
+where the calibration cannot detect another tire. Exit code 1: not one turn is valid, or the tire is
+probably another one.
 """
 
 
@@ -46,10 +46,10 @@ another one.
     metavar="CAL.toml",
     type=FILE,
     required=True,
-    help="Made by `tirelib calibrate`.",
+    help="Calibration file that `tirelib calibrate` wrote.",
 )
 @click.option(
-    "--report", metavar="FOLDER", type=NEW_FOLDER, help="Write accuracy and figures as HTML."
+    "--report", metavar="FOLDER", type=NEW_FOLDER, help="Write the accuracy with figures as HTML."
 )
 @click.option(
     "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write every turn as JSON."
@@ -62,7 +62,7 @@ def estimate(
     report: Path | None,
     json_file: Path | None,
 ) -> None:
-    """Estimate every turn of DIR, and compare with the rig where it measured."""
+    """Estimate every turn of DIR, and compare with the forces that the rig measured."""
     calibration = read_calibration(calibration_file)
     campaign = read_campaign(folder)
     header = campaign.header
@@ -71,7 +71,8 @@ def estimate(
     )
     if not campaign.header.gage_lateral:
         raise CalibrationError(
-            f"{folder}: the campaign holds no strain; there is nothing to estimate from"
+            f"{folder}: the campaign holds no strain; estimates need strain; choose another "
+            "campaign"
         )
     low_pass = LowPass(calibration.order, calibration.cut_off)
     with progress_bar("reading", len(campaign.plans)) as progress:
@@ -115,9 +116,10 @@ def print_document(name: str, document: dict[str, Any], calibration: Calibration
     other = document["other_tire"]
     if other and other["suspected"]:
         console.print(
-            f"another tire? {other['turns']} of {other['judged']} turns in range show strain that "
-            f"the calibrated {document['tire']!r} does not (one in a thousand would by chance); "
-            "look whether this tire is on the wheel, worn or soft; else calibrate anew"
+            f"another tire? {other['turns']} of {other['judged']} turns in range have a strain "
+            f"pattern that the calibrated {document['tire']!r} does not show (by chance one turn "
+            "in a thousand would); check whether this tire is on the wheel, and whether it is "
+            "worn or soft; otherwise calibrate again"
         )
     for sentence in (not_given(document["not_given"]), *not_checked(calibration)):
         if sentence:

@@ -39,14 +39,14 @@ gage's contact, ISO 8855 axes. FILE may end in .parquet or .csv.
     metavar="FILE",
     type=NEW_FILE,
     required=True,
-    help="Table to write: .parquet or .csv.",
+    help="Table to write, .parquet or .csv.",
 )
 @low_pass_options
 @click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write a summary as JSON.")
 def features(
     folder: Path, target: Path, order: float | None, cut_off: float | None, json_file: Path | None
 ) -> None:
-    """Read contact edges, peaks and integrals of every turn and gage of DIR."""
+    """Extract contact edges, peaks and integrals for every turn and gage of DIR."""
     from tirelib.features.table import feature_frame, units  # with pandas
 
     if target.suffix not in (".parquet", ".csv"):

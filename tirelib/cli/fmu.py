@@ -42,8 +42,9 @@ Examples:
 
 \b
 FMI 2.0 co-simulation, one wheel. Needs CPython with numpy and scipy where it runs; the rest is
-inside. The communication step is samples per step over sample rate; with --buffered it is free,
-and the input `samples` says how many samples of the frame are new. Estimates are the same.
+inside. The communication step is the samples per step divided by the sample rate. With --buffered
+the step is free, and the input `samples` gives the number of new samples in the frame; the
+estimates are the same.
 """
 _RUN = """\b
 Example:
@@ -58,10 +59,10 @@ Examples:
   tirelib fmu check Foreign.fmu --reference cross-check/Foreign --json check.json --out report
 
 \b
-Runs the code inside, in a process of its own. Reference signals are looked for in
-resources/reference of the FMU (X_in.csv, X_ref.csv, X_ref.opt). An FMU of another tool that holds
-none is validated and run for a few steps.
-Exit code 0: all passed; 1: something failed; 2: the file is no FMU.
+The FMU's code runs in a separate process. Reference signals are read from resources/reference of
+the FMU (X_in.csv, X_ref.csv, X_ref.opt). An FMU of another tool without reference signals is
+validated and run for a few steps.
+Exit code 0: all checks passed; 1: a check failed; 2: the file is not an FMU.
 """
 
 
@@ -79,16 +80,16 @@ fmu.add_command(virtual)
     metavar="CAL.toml",
     type=FILE,
     required=True,
-    help="Made by `tirelib calibrate`; it is embedded.",
+    help="Calibration file that `tirelib calibrate` wrote; it is embedded.",
 )
-@click.option("--out", metavar="X.fmu", type=NEW_FILE, required=True, help="The FMU to write.")
+@click.option("--out", metavar="X.fmu", type=NEW_FILE, required=True, help="FMU to write.")
 @click.option(
     "--samples-per-step",
     metavar="K",
     type=int,
     default=1,
     show_default=True,
-    help="Samples of every gage that one communication step brings.",
+    help="Number of samples of each gage in one communication step.",
 )
 @click.option(
     "--sample-rate",
@@ -96,16 +97,20 @@ fmu.add_command(virtual)
     type=float,
     default=DEFAULT_RATE,
     show_default=True,
-    help="Start value of the parameter of that name.",
+    help="Start value of the FMU's parameter of the same name.",
 )
-@click.option("--buffered", is_flag=True, help="Steps of any length, with up to K samples each.")
+@click.option(
+    "--buffered",
+    is_flag=True,
+    help="Allow communication steps of any length, with up to K samples each.",
+)
 @click.option(
     "--missing",
     metavar="NUMBER",
     type=float,
     default=math.nan,
     show_default="NaN",
-    help="What outputs show where there is no value; see docs.",
+    help="What an output shows where it has no value; see docs/fmu.md.",
 )
 def build(
     calibration: Path,
@@ -163,7 +168,10 @@ def run(context: click.Context, file: Path, folder: Path, json_file: Path | None
 @fmu.command(epilog=_CHECK)
 @click.argument("file", metavar="X.fmu", type=FILE)
 @click.option(
-    "--reference", metavar="DIR", type=CAMPAIGN, help="Reference signals, where the FMU holds none."
+    "--reference",
+    metavar="DIR",
+    type=CAMPAIGN,
+    help="Folder of reference signals, where the FMU holds none.",
 )
 @click.option("--out", metavar="REPORT", type=NEW_FOLDER, help="Folder for the page.")
 @click.option(

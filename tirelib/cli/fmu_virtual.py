@@ -22,14 +22,14 @@ for StrainTire.fmu with the same samples per step. Needs CPython with numpy and 
 
 
 @click.command(epilog=_EPILOG)
-@click.option("--out", metavar="X.fmu", type=NEW_FILE, required=True, help="The FMU to write.")
+@click.option("--out", metavar="X.fmu", type=NEW_FILE, required=True, help="FMU to write.")
 @click.option(
     "--samples-per-step",
     metavar="K",
     type=int,
     default=10,
     show_default=True,
-    help="Most samples of every gage that one communication step brings.",
+    help="Largest number of samples of each gage in one communication step.",
 )
 @click.option(
     "--sample-rate",
@@ -37,16 +37,18 @@ for StrainTire.fmu with the same samples per step. Needs CPython with numpy and 
     type=float,
     default=DEFAULT_RATE,
     show_default=True,
-    help="Start value of the parameter of that name.",
+    help="Start value of the FMU's parameter of the same name.",
 )
 @click.option(
     "--surface",
     metavar="FILE.npz",
     type=FILE,
-    help="Response surface; by default the reference tire's.",
+    help="Response surface of the tire. Default: that of the reference tire.",
 )
 @click.option(
-    "--friction", is_flag=True, help="The reference tire's surface that has friction as an input."
+    "--friction",
+    is_flag=True,
+    help="Use the reference tire's response surface with friction as an input.",
 )
 def virtual(
     out: Path, samples_per_step: int, sample_rate: float, surface: Path | None, friction: bool
@@ -54,8 +56,8 @@ def virtual(
     """Write VirtualTire.fmu: the numerical rig as a sensor."""
     if friction and surface is not None:
         raise ParameterError(
-            f"fmu virtual: --friction and --surface {surface}; one of them is allowed; a surface "
-            "that knows friction brings the input by itself"
+            f"fmu virtual: --friction and --surface {surface}; only one of them is allowed; leave "
+            "out --friction: a surface that covers friction provides the input by itself"
         )
     usual = friction_surface() if friction else default_surface()
     with progress_bar("building", 3) as progress:

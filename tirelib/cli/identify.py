@@ -26,10 +26,10 @@ Examples:
   tirelib simulate --model build/out/M.toml --load 4000 --speed 80 --out build/out/simulated
 
 \b
-The ring is fitted to straight runs with strain, the brush to forces over slip; either alone will
-do. Intervals are 95 % and hold the structural misfit; "not_identifiable" marks numbers whose
-interval is wider than 25 % to either side, with the test that would tell them. Exit code 1:
-nothing could be identified, or no ring although the plan holds straight runs for one.
+The ring is fitted to straight runs with strain, the brush to forces over slip; either alone is
+enough. Intervals are 95 % and include the structural misfit. "not_identifiable" marks parameters
+whose interval is wider than 25 % to either side, with the test that would determine them. Exit code
+1: no parameter could be identified, or the straight runs gave no ring.
 """
 
 
@@ -39,15 +39,16 @@ nothing could be identified, or no ring although the plan holds straight runs fo
     "--tire",
     "tire_file",
     metavar="T.toml|NAME",
-    help="Start and priors (default: the campaign's geometry, literature).",
+    help="Tire file with start values and priors. Default: the campaign's geometry and literature "
+    "values.",
 )
 @click.option(
     "--base",
     type=click.Choice(BASES),
     default="plain",
     show_default=True,
-    help="The plain tire: belt shear, section inertia, a tread that sticks and hardens; "
-    "or the dissertation's ring, in which these are effects to be found.",
+    help="Base model: `tire` includes belt shear, section inertia and a tread that sticks and "
+    "hardens; in the dissertation's ring these are effects to be found.",
 )
 @click.option(
     "--out",
@@ -55,7 +56,7 @@ nothing could be identified, or no ring although the plan holds straight runs fo
     metavar="M.toml",
     type=NEW_FILE,
     required=True,
-    help="The identified model; the other verbs read it.",
+    help="File for the identified model, which the other commands read.",
 )
 @click.option(
     "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
@@ -122,10 +123,9 @@ def _errors(campaign: Campaign, whole: "Whole") -> dict[str, Any]:
 
 def _say_ring(console: Console, document: dict[str, Any], gages: int) -> None:
     console.print(
-        f"{document['campaign']}: {len(document['runs'])} straight runs, "
-        f"{len(document['gages'])} of {gages} gages averaged; strain rms left "
-        f"{document['rms_ustrain']:.0f} "
-        f"of {document['strain_rms_ustrain']:.0f} microstrain; error {document['error']:.3g} "
+        f"{document['campaign']}: {len(document['runs'])} straight runs, {len(document['gages'])} "
+        f"of {gages} gages averaged; the residual is {document['rms_ustrain']:.0f} of "
+        f"{document['strain_rms_ustrain']:.0f} microstrain rms; error {document['error']:.3g} "
         f"[{'noise' if document['error_unit'] == 'noise' else 'microstrain'}]"
     )
     _say_parameters(console, document["parameters"])
@@ -175,8 +175,8 @@ def _say_routes(
                 f"{load['corrected_percent']:+.1f}",
             )
         console.print(
-            "contact angles from strain-rate peaks, the bias of that reading, and the load that "
-            "they give" + (f" (every {step}. run; all with --json)" if step > 1 else "")
+            "contact angles from strain-rate peaks, the bias of this method, and the load that "
+            "follows from them" + (f" (every {step}th run; --json writes all)" if step > 1 else "")
         )
         console.print(table)
     if static is not None:
@@ -192,7 +192,8 @@ def _say_routes(
             for name, unit in names
         )
         console.print(
-            f"  static ring without tension (chapter 5), from strain against contact model: {said}"
+            "  static ring without tension (chapter 5), fitted to strain with the contact model: "
+            f"{said}"
         )
 
 
@@ -203,14 +204,14 @@ def _say_damping(console: Console, damping: dict[str, Any]) -> None:
         flags = f" ({', '.join(found['flags'])})" if found["flags"] else ""
         return f"{found['value']:.3f}, 95 % {found['low']:.3f} to {found['high']:.3f}{flags}"
 
-    console.print(f"  damping of the sidewall's dashpots {words(damping)}, from strain alone;")
-    console.print("    not in the model: `tirelib add sidewall_damping` puts it there")
+    console.print(f"  damping of the sidewall's dashpots: {words(damping)}, from strain alone;")
+    console.print("    it is not in the model; `tirelib add sidewall_damping` adds it")
     readings, modal = damping["readings"], damping["modal"]
-    console.print(f"    against the trigger: {words(readings['with_angle'])}")
+    console.print(f"    with the wheel angle from the trigger: {words(readings['with_angle'])}")
     if modal is not None:
         console.print(
-            f"    as a ratio of every mode, Eq. (107): {words(modal['without_angle'])}; `simulate "
-            "--damping` takes this one"
+            f"    as a ratio of every mode, Eq. (107): {words(modal['without_angle'])}; this is "
+            "the value for `tirelib simulate --damping`"
         )
 
 
@@ -222,7 +223,9 @@ def _say_brush(console: Console, document: dict[str, Any]) -> None:
         for name, entry in forces.items()
         if isinstance(entry, dict)
     )
-    console.print(f"{document['campaign']}: brush from {forces['points']} points; left: {left}")
+    console.print(
+        f"{document['campaign']}: brush fitted to {forces['points']} points; residuals: {left}"
+    )
     _say_parameters(console, brush["parameters"])
     table = Table(box=SIMPLE_HEAD)
     for column in ("stiffness over", "load N", "bar", "value", "95 % from", "to", "unit"):
@@ -240,7 +243,7 @@ def _say_brush(console: Console, document: dict[str, Any]) -> None:
     console.print(table)
     where = {"ring": "the ring", "Mz": "Mz", "assumed": "an assumption"}[brush["half_length_from"]]
     console.print(
-        f"  contact length from {where}; values hold at the median load, "
+        f"  contact length from {where}; the values hold at the median load, "
         f"{brush['reference']['load_N']:.0f} N"
     )
     for note in brush["notes"]:
@@ -249,8 +252,8 @@ def _say_brush(console: Console, document: dict[str, Any]) -> None:
 
 def _say_pressure(console: Console, found: dict[str, Any]) -> None:
     console.print(
-        "lateral force by the ring's pressure against the parabola, rms error N "
-        "(unseen points in brackets)"
+        "lateral force with the ring's pressure and with a parabola, rms error in N (held-out "
+        "points in brackets)"
     )
     table = Table(box=SIMPLE_HEAD)
     for column in ("by", "from", "to", "points", "ring", "parabola", "better"):

@@ -44,11 +44,11 @@ Exit code: 0 done, 2 bad input (all faults are listed, nothing is written).
 
 @click.command("import", epilog=_EXAMPLE)
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE)
-@click.option("--map", "map_file", metavar="MAP.toml", type=FILE, help="The import map.")
+@click.option("--map", "map_file", metavar="MAP.toml", type=FILE, help="Import map (TOML).")
 @click.option("--out", metavar="DIR", type=NEW_FOLDER, help="Campaign folder.")
-@click.option("--force", is_flag=True, help="Replace the campaign that is in DIR.")
-@click.option("--list", "show_list", is_flag=True, help="List the columns of each FILE, then stop.")
-@click.option("--suggest", is_flag=True, help="Print a draft of the map for FILE, then stop.")
+@click.option("--force", is_flag=True, help="Replace a campaign that already exists in DIR.")
+@click.option("--list", "show_list", is_flag=True, help="List the columns of each FILE and stop.")
+@click.option("--suggest", is_flag=True, help="Print a draft of the map for FILE and stop.")
 @click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write a summary as JSON.")
 def import_(
     files: tuple[Path, ...],
@@ -75,7 +75,9 @@ def import_(
         missing = " and ".join(
             name for name, given in (("--map", map_file), ("--out", out)) if given is None
         )
-        raise click.UsageError(f"{missing} is missing; both are needed; see --help for a map.")
+        raise click.UsageError(
+            f"{missing} is missing; --map and --out are both needed; see --help for a map."
+        )
     with progress_bar("reading", len(files)) as progress:
         report = import_campaign(files, map_file, out, overwrite=force, progress=progress)
     for note in report.notes:
@@ -84,8 +86,8 @@ def import_(
         click.echo(f"warning: {warning}", err=True)
     document = report_document(report)
     output().print(
-        f"{out}: {len(report.runs)} run(s), {sum(run.rows for run in report.runs)} rows, "
-        f"files in axes {report.header.axes}; look at it with `tirelib campaign show {out}`"
+        f"{out}: {len(report.runs)} run(s), {sum(run.rows for run in report.runs)} rows, files in "
+        f"axes {report.header.axes}; view it with `tirelib campaign show {out}`"
     )
     if json_file is not None:
         write_json(json_file, document)

@@ -26,7 +26,8 @@ def not_given(rows: Sequence[Mapping[str, Any]]) -> str:
     parts = [_cost(row) for row in dear if row["condition"] == first]
     others = list(dict.fromkeys(r["condition"] for r in dear if r["condition"] != first))
     verb = "cost" if len(others) > 1 else "costs"
-    also = f"; {' and '.join(map(_words, others))} {verb} less, see --json" if others else ""
+    rest = " and ".join(map(_words, others))
+    also = f"; {rest} {verb} less accuracy, see --json" if others else ""
     return (
         f"The {_words(first)} was not given: the standard deviation of {', of '.join(parts)} "
         f"(column {dear[0]['column']} of runs.csv{also})"
@@ -51,16 +52,16 @@ def not_checked(calibration: Calibration) -> list[str]:
     found = []
     if calibration.version < 2:
         found.append(
-            "The calibration is of an earlier version: it knows neither friction nor its own "
-            "border, and its slip angle has a brush's curve; calibrate anew"
+            "The calibration was made by an earlier version: it covers neither friction nor the "
+            "limits of its own range, and its slip angle follows a brush curve; calibrate again"
         )
     if not calibration.knows_tire:
         found.append(
-            "Another tire would not be noticed: the calibration "
+            "Another tire would not be detected: the calibration "
             + (
-                "is of an earlier version"
+                "was made by an earlier version"
                 if calibration.version < 2
-                else "has too few conditions for that (17 are needed); calibrate on more"
+                else "has too few conditions (17 are needed); calibrate with more"
             )
         )
     return found

@@ -19,27 +19,27 @@ Example:
   tirelib rig --plan set1 --out build/out/set1 --seed 1 --repeats 6
 
 \b
-The folder is a campaign (campaign.toml, runs.csv, runs/*.mf4). truth.csv in it holds
-the noise-free forces, slip, contact lengths and edges of each run (of each solved state of a ramp),
+The folder is a campaign (campaign.toml, runs.csv, runs/*.mf4). Its truth.csv holds the noise-free
+forces, slip, contact lengths and edges of each run (of each solved state of a ramp),
 in SI and ISO signs.
 """
 
 
 @click.command(epilog=_EXAMPLE)
-@click.option("--plan", "plan_name", metavar="NAME", help="The test plan, see --list.")
+@click.option("--plan", "plan_name", metavar="NAME", help="Test plan; --list shows all.")
 @click.option("--out", metavar="DIR", type=NEW_FOLDER, help="Campaign folder.")
 @click.option(
     "--seed",
     default=0,
     show_default=True,
     type=click.IntRange(min=0),
-    help="The day: other noise and set-point errors, same tire and gages.",
+    help="Seed of one test day: it changes noise and set-point errors, not the tire and the gages.",
 )
 @click.option(
     "--repeats",
     type=click.IntRange(min=0),
     metavar="K",
-    help="Runs repeated at the end.  [default: the plan's own]",
+    help="Number of runs that are repeated at the end. [default: as in the plan]",
 )
 @click.option(
     "--tire",
@@ -47,20 +47,20 @@ in SI and ISO signs.
     default="reference",
     show_default=True,
     metavar="NAME",
-    help="The virtual tire, see --list.",
+    help="Virtual tire; --list shows all.",
 )
 @click.option(
     "--friction",
     type=float,
     metavar="MU",
-    help="Friction of the road in every run.  [default: the tire's own]",
+    help="Friction coefficient of the road in every run. [default: that of the tire]",
 )
 @click.option(
     "--tread-depth",
     "tread_depth_mm",
     type=float,
     metavar="MM",
-    help="Depth of the grooves; 8 mm is a new tread.  [default: 8]",
+    help="Depth of the tread grooves; a new tread has 8 mm. [default: 8]",
 )
 @click.option(
     "--axes",
@@ -71,7 +71,7 @@ in SI and ISO signs.
 )
 @click.option("--jobs", default=2, show_default=True, type=click.IntRange(min=1), help="Processes.")
 @click.option("--force", is_flag=True, help="Write into a folder that is not empty.")
-@click.option("--list", "show_list", is_flag=True, help="List plans and tires, then stop.")
+@click.option("--list", "show_list", is_flag=True, help="List plans and tires, and stop.")
 @click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write a summary as JSON.")
 def rig(
     plan_name: str | None,

@@ -40,8 +40,8 @@ Examples:
   tirelib simulate --model build/out/M.toml --load 1500,4500,7500 --speed 80 --out build/out/mine
 
 \b
-A file of `identify` or `add` is simulated as these fitted it: large displacements, and the effects
-that it has. A tire file is the dissertation's linear ring, unless --ring large is given.
+A model file of `identify` or `add` is simulated as it was fitted, with large displacements and its
+effects. A tire file is simulated as the dissertation's linear ring unless --ring large is given.
 Values with commas are operating points, drawn together; an option with one value holds for all.
 Wheel angle 0 is below the axle, entry < 0 < exit; strain is positive in tension.
 """
@@ -57,8 +57,8 @@ def _numbers(
         return tuple(float(word) for word in text.split(","))
     except ValueError:
         raise click.BadParameter(
-            f"{text!r} is no number and no list like 1500,3000,4500; separate numbers with commas "
-            "only, without spaces",
+            f"{text!r} is neither a number nor a list like 1500,3000,4500; separate numbers with "
+            "commas and no spaces",
             context,
             option,
         ) from None
@@ -69,39 +69,56 @@ def _numbers(
     "--model",
     metavar="M.toml|NAME",
     required=True,
-    help="Tire or model file, or the name of a tire of tirelib.",
+    help="Tire file, model file, or the name of a tire that tirelib ships.",
 )
-@click.option("--load", metavar="N", callback=_numbers, help="Vertical load Fz; or --deflection.")
-@click.option("--deflection", metavar="MM", callback=_numbers, help="Free minus loaded radius.")
 @click.option(
-    "--pressure", metavar="BAR", callback=_numbers, help="Inflation, gauge; default: tire's."
+    "--load", metavar="N", callback=_numbers, help="Vertical load Fz; give this or --deflection."
+)
+@click.option(
+    "--deflection",
+    metavar="MM",
+    callback=_numbers,
+    help="Deflection: free radius minus loaded radius.",
+)
+@click.option(
+    "--pressure",
+    metavar="BAR",
+    callback=_numbers,
+    help="Inflation pressure (gauge). Default: that of the tire.",
 )
 @click.option(
     "--speed",
     metavar="KMH",
     callback=_numbers,
-    help="Free rolling; turn rate = speed / ring radius, as a belt of "
-    "constant length rolls. Default 0.",
+    help="Speed in free rolling. The turn rate is the speed divided by the ring radius, because "
+    "the belt keeps its length. Default: 0.",
 )
-@click.option("--omega", metavar="RAD_S", callback=_numbers, help="Turn rate, instead of --speed.")
+@click.option(
+    "--omega", metavar="RAD_S", callback=_numbers, help="Turn rate, to be given instead of --speed."
+)
 @click.option(
     "--contact",
     type=click.Choice(CONTACTS),
     default=CONTACTS[0],
     show_default=True,
-    help="Tread springs: along the radius, or pressed and sheared.",
+    help="Tread springs: compressed along the radius only, or compressed and sheared.",
 )
 @click.option(
     "--ring",
     type=click.Choice(tuple(RINGS)),
-    help="Default: the model file's; linear for a tire file.",
+    help="Ring theory. Default: that of the model file; linear for a tire file.",
 )
-@click.option("--camber", metavar="DEG", callback=_numbers, help="For effects of it; default 0.")
+@click.option(
+    "--camber",
+    metavar="DEG",
+    callback=_numbers,
+    help="Camber angle, used by effects that depend on it. Default: 0.",
+)
 @click.option(
     "--temperature",
     metavar="DEGC",
     callback=_numbers,
-    help="Of the tread, for effects of it; unknown by default.",
+    help="Tread temperature, used by effects that depend on it. Default: unknown.",
 )
 @click.option(
     "--effects",
@@ -109,13 +126,13 @@ def _numbers(
     metavar="FILE.py",
     type=FILE,
     multiple=True,
-    help="Effects of your own that the model has; may be given again.",
+    help="Python file with your own effects that the model contains; may be given several times.",
 )
 @click.option(
     "--damping",
     metavar="LAMBDA",
     type=float,
-    help="lambda of c_n = 2 lambda sqrt(m_n k_n); default: tire's.",
+    help="Damping ratio lambda in c_n = 2 lambda sqrt(m_n k_n). Default: that of the tire.",
 )
 @click.option(
     "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the results as JSON."
@@ -143,7 +160,7 @@ def simulate(
     json_file: Path | None,
     folder: Path | None,
 ) -> None:
-    """Press the rolling ring onto the road: shape, pressure, shear, strain and strain rate."""
+    """Simulate the rolling ring on the road: shape, pressure, shear, strain and strain rate."""
     file = read_tire(model)
     chosen = _model(file, ring, contact, effect_files)
     tire = file.tire if damping is None else file.tire.changed(damping=damping)
@@ -153,7 +170,9 @@ def simulate(
         given = (
             "neither --load nor --deflection" if load is None else "both --load and --deflection"
         )
-        raise ParameterError(f"simulate: {given}; give exactly one, the other one is a result")
+        raise ParameterError(
+            f"simulate: {given}; give exactly one, because the other one is a result"
+        )
     turn_rate = np.zeros(1) if omega is None else np.array(omega)
     if speed is not None:
         turn_rate = _turn_rate(_si(speed, "km/h", "speed"), tire)
@@ -178,8 +197,8 @@ def simulate(
         )
     else:
         raise ParameterError(
-            "simulate: --camber and --temperature act on the effects of a model, and this "
-            "simulation has none; leave them out"
+            "simulate: --camber and --temperature act on effects only, and this simulation has "
+            "none; leave them out"
         )
     notes = _notes(file, done, chosen)
     _print(file, done, notes)
@@ -225,8 +244,8 @@ def _turn_rate(speed: FloatArray, tire: Tire) -> FloatArray:
             from_si(x, "km/h", "speed") for x in (float(speed[~good][0]), LARGEST_BELT_SPEED)
         )
         raise ParameterError(
-            f"simulate: --speed {given:g} km/h; the model holds from 0 to {most:.0f} km/h, rolling "
-            "forward, entry first; no tire's belt runs faster; check value and unit"
+            f"simulate: --speed {given:g} km/h; the model holds for forward rolling from 0 to "
+            f"{most:.0f} km/h, faster than any tire's belt; check value and unit"
         )
     rate: FloatArray = speed / tire.ring_radius
     return rate
@@ -271,7 +290,11 @@ def _notes(file: TireFile, done: Simulation, chosen: Model | None) -> list[str]:
     """Say what a reader of the figures should know."""
     notes, tire = [], done.tire
     if left_out := _left_out(file, chosen):
-        which = "effects are left out here" if chosen is None else "brush effects have no part here"
+        which = (
+            "effects are left out of this simulation"
+            if chosen is None
+            else "brush effects do not act in this simulation"
+        )
         notes.append(f"the model's {which}: {', '.join(left_out)}")
     if chosen is None and "model" in file.extra:
         notes.append(
@@ -286,8 +309,8 @@ def _notes(file: TireFile, done: Simulation, chosen: Model | None) -> list[str]:
     slopes = tire.radial_pressure_slope, tire.tangential_pressure_slope
     if not any(slopes) and not np.allclose(done.inflation, tire.pressure, rtol=1e-9):
         notes.append(
-            "the tire does not say how its sidewall stiffens with inflation (slopes of k_u and k_v "
-            "are 0): inflation acts through the tension of the belt only"
+            "the tire file does not state how the sidewall stiffens with inflation (the slopes of "
+            "k_u and k_v are 0), so that inflation acts through the belt tension only"
         )
     if chosen is None and wanted_modes(tire, done.inflation) > MOST_MODES:
         length = 1e3 * bending_length(tire, done.inflation)
@@ -308,8 +331,8 @@ def _overload(done: Simulation) -> list[str]:
     point = int(too_deep[np.argmax(done.deflection[too_deep])])
     note = (
         f"{done.load[point]:.0f} N press this tire by {1e3 * done.deflection[point]:.0f} mm, more "
-        f"than {100 * LARGEST_DEFLECTION:.0f} % of its free radius ({1e3 * largest:.0f} mm): "
-        "hardly a load that it would carry"
+        f"than {100 * LARGEST_DEFLECTION:.0f} % of its free radius ({1e3 * largest:.0f} mm): the "
+        "tire would hardly carry this load"
     )
     try:
         bearable = simulate_tire(
@@ -321,7 +344,7 @@ def _overload(done: Simulation) -> list[str]:
         )
     except (ParameterError, ConvergenceError):
         return [note]  # the model ends before: no range to name
-    return [f"{note}; range: up to {bearable.load[0]:.0f} N at this inflation"]
+    return [f"{note}; the model's range ends at {bearable.load[0]:.0f} N for this inflation"]
 
 
 def _write(done: Simulation, name: str, folder: Path) -> list[Path]:

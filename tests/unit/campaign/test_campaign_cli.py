@@ -37,7 +37,7 @@ def test_errors_exit_1_and_all_are_listed_and_counted(
     lines = result.stdout.splitlines()
     assert [line.split()[0] for line in lines[:-1]] == ["error", "warning", "error"]
     assert "a factor of 0.001 is suspected (N and kN mixed up)" in lines[0]
-    assert "2 errors, 1 warning: not usable as it stands" in lines[-1]
+    assert "2 errors, 1 warning: not usable until the errors are corrected" in lines[-1]
 
     document = json.loads((tmp_path / "out" / "check.json").read_text())
     assert document["format"] == "tirelib-campaign-check/1"

@@ -175,7 +175,7 @@ def test_the_verb_tells_what_was_planted_and_found(tmp_path: Path) -> None:
     found = CliRunner().invoke(effects, ["--effects", str(file)])
     assert found.exit_code == 0, found.output
     assert "0.3 1 planted, 0.3 found" in found.output
-    assert "looks like: friction_speed (21 deg)" in found.output
+    assert "effects with a similar trace: friction_speed (21 deg)" in found.output
     file.write_text(documented()[1].replace("strength):", "strength)"))
     refused = CliRunner().invoke(effects, ["--effects", str(file)])
     assert "line 10: not Python" in str(refused.exception)
