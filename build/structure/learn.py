@@ -26,10 +26,9 @@ from tirelib.effects import CATALOGUE
 from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.identify import estimated
-from tirelib.infer.normal import Normal
-from tirelib.infer.plain import Family, learn, save
+from tirelib.infer.plain import Family, Whitened, learn, save
 from tirelib.infer.posterior import Posterior, posterior
-from tirelib.infer.select import judged
+from tirelib.infer.select import OWN, judged
 from tirelib.infer.strain import StrainProblem
 from tirelib.threads import one_thread
 
@@ -38,9 +37,6 @@ OUT = ROOT / "build" / "out" / "structure"
 FAMILIES = ("rig", "continuum", "ring")
 FIRST = {"effect": 0.02**2, "shape": 0.005**2}
 """Variances of the fit from which the learning starts."""
-SIZES = (0.0005, 0.001, 0.002, 0.004)
-"""Sizes of a run's own misfit among which the likelihood chooses."""
-
 Fit = tuple[StrainProblem, Posterior]
 
 
@@ -105,7 +101,7 @@ def fit_of(file: Path) -> Fit | None:
         spread = {effect.name: FIRST["effect"] for effect in problem.living}
         groups = problem.remainder(problem.start, problem.solve(problem.start))
         spread |= dict.fromkeys(groups, FIRST["shape"])
-        fit = posterior(problem, (), spread, SIZES[1])
+        fit = posterior(problem, (), spread, OWN[1])
     except TirelibError as error:
         say(f"{file.name}: {error}")
         return None
@@ -114,15 +110,14 @@ def fit_of(file: Path) -> Fit | None:
 
 
 def family_of(name: str, fits: Sequence[Fit]) -> Family:
-    """Return what a family's tires show, with the most likely size of a run's own misfit."""
-    found: list[tuple[float, Family]] = []
-    for own in SIZES:
-        cases = [Normal.of(fit.rows, fit.solved.rest, p.whitener(own)) for p, fit in fits]
-        family, likelihood = learn(name, own, cases, fits[0][0].widths)
-        likelihood += sum(p.whitener(own).log_volume for p, _ in fits)
-        say(f"{name}: {len(fits)} tires, own {own:g}: log likelihood {likelihood:.0f}")
-        found.append((likelihood, family))
-    return max(found, key=lambda pair: pair[0])[1]
+    """Return what a family's tires show."""
+    tires = [
+        [Whitened(own, fit.normal(problem, own), problem.whitener(own).log_volume) for own in OWN]
+        for problem, fit in fits
+    ]
+    family = learn(name, tires, fits[0][0].widths)
+    say(f"{name}: {len(fits)} tires, median of a run's own misfit {family.own:g}")
+    return family
 
 
 def provenance(fits: dict[str, dict[int, Fit]]) -> dict[str, Any]:

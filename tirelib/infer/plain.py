@@ -3,10 +3,10 @@
 A model is not a tire. What a fitted model leaves of a tire without any of the catalogue's effects
 looks to some extent like them, and to some extent like nothing known. Both are learned, from plain
 tires of families that share no code: for every family the variance of each effect's apparent
-strength, in ranges, that of each group of smooth shapes, and the size of what each run has for
-itself (expectation and maximisation of the likelihood; Dempster, Laird and Rubin 1977). The tires
-themselves are kept as well, each as one draw of all coefficients from its posterior. Put into a
-user's plan they show how large a statistic gets where nothing is hidden.
+strength, in ranges, and that of each group of smooth shapes (expectation and maximisation of the
+likelihood; Dempster, Laird and Rubin 1977). The tires themselves are kept as well, each as one draw
+of all coefficients from its posterior. Put into a user's plan they show how large a statistic gets
+where nothing is hidden.
 """
 
 import json
@@ -43,7 +43,7 @@ class Family:
     ----------
     name : str
     own : float
-        Size of each run's own misfit, over its rms strain.
+        Median size of the misfit that each run has for itself, over its rms strain.
     blocks : mapping of name to number of rows
     draws : shape (n_tires, n_rows)
         Coefficients of all blocks, one draw of the posterior a tire; NaN where its plan did not
@@ -93,58 +93,73 @@ class Family:
         return np.nan_to_num(out)
 
 
-def learn(
-    name: str, own: float, cases: Sequence[Normal], widths: FloatArray, *, seed: int = 0
-) -> tuple[Family, float]:
-    """Return a family from the normal equations of its plain tires, and their log likelihood.
+@dataclass(frozen=True, slots=True, eq=False)
+class Whitened:
+    """Normal equations of a tire's plan at one size of the misfit that each run has for itself.
+
+    Attributes
+    ----------
+    own : float
+    normal : Normal
+    log_volume : float
+        Of the whitening, by which likelihoods at several sizes compare.
+    """
+
+    own: float
+    normal: Normal
+    log_volume: float
+
+
+def learn(name: str, tires: Sequence[Sequence[Whitened]], widths: FloatArray) -> Family:
+    """Return a family from its plain tires.
 
     Parameters
     ----------
     name : str
-    own : float
-        At which the rows were whitened.
-    cases : sequence of Normal
-        About fitted models without effects.
+    tires : sequence of sequence of Whitened
+        Each about a fitted model without effects, at the same sizes of a run's own misfit. Every
+        tire takes its most likely one.
     widths : shape (n_base,)
         Prior standard deviations of the base.
-    seed : int
-        Of the draws.
     """
     blocks: dict[str, int] = {}
-    for case in cases:
-        for block, where in case.blocks.items():
+    for tire in tires:
+        for block, where in tire[0].normal.blocks.items():
             if block != BASE:
                 blocks.setdefault(block, where.stop - where.start)
     spread = dict.fromkeys(blocks, START)
-    squares = np.zeros((len(cases), len(blocks)))
-    likelihood = -np.inf
+    squares = np.zeros((len(tires), len(blocks)))
+    likeliest = [tire[0] for tire in tires]
     for _ in range(ROUNDS):
-        likelihood = 0.0
-        for square, case in zip(squares, cases, strict=True):
-            weighed = Weighed(case, case.spread({**spread, BASE: widths**2}))
-            likelihood += weighed.log_likelihood()
-            mean, variance = weighed.mean(case.right), np.diag(weighed.covariance)
-            for k, block in enumerate(blocks):
-                rows = case.blocks.get(block)
-                square[k] = (
-                    np.nan if rows is None else float(np.mean(mean[rows] ** 2 + variance[rows]))
-                )
+        known: dict[str, float | FloatArray] = {**spread, BASE: widths**2}
+        for k, tire in enumerate(tires):
+            weighed = [Weighed(each.normal, each.normal.spread(known)) for each in tire]
+            at = [w.log_likelihood() + e.log_volume for w, e in zip(weighed, tire, strict=True)]
+            best = int(np.argmax(at))
+            likeliest[k] = tire[best]
+            mean = weighed[best].mean(tire[best].normal.right)
+            square = mean**2 + np.diag(weighed[best].covariance)
+            for j, block in enumerate(blocks):
+                rows = tire[best].normal.blocks.get(block)
+                squares[k, j] = np.nan if rows is None else float(np.mean(square[rows]))
         new = np.maximum(np.nanmean(squares, axis=0), TINY)
         old = np.array(list(spread.values()))
         spread = dict(zip(blocks, new.tolist(), strict=True))
         if float(np.abs(np.log(new / old)).max()) < SETTLED:
             break
-    random = np.random.default_rng(seed)
-    draws = np.full((len(cases), sum(blocks.values())), np.nan)
-    for draw, case in zip(draws, cases, strict=True):
-        weighed = Weighed(case, case.spread({**spread, BASE: widths**2}))
-        drawn, first = weighed.draw(random), 0
+    random = np.random.default_rng(0)
+    draws = np.full((len(tires), sum(blocks.values())), np.nan)
+    for draw, each in zip(draws, likeliest, strict=True):
+        normal = each.normal
+        drawn = Weighed(normal, normal.spread({**spread, BASE: widths**2})).draw(random)
+        first = 0
         for block, size in blocks.items():
-            rows = case.blocks.get(block)
+            rows = normal.blocks.get(block)
             if rows is not None:
                 draw[first : first + size] = drawn[rows]
             first += size
-    return Family(name, own, blocks, draws, squares), likelihood
+    own = float(np.median([each.own for each in likeliest]))
+    return Family(name, own, blocks, draws, squares)
 
 
 def save(path: Path, families: Sequence[Family], provenance: Mapping[str, object]) -> None:

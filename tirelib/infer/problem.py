@@ -6,7 +6,7 @@ differs from run to run without anybody's will (noise, set points). The rest of 
 nothing else of tires.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -30,6 +30,17 @@ class Point:
     base: FloatArray
     effects: tuple[Effect, ...] = ()
     strengths: tuple[FloatArray, ...] = ()
+
+
+class Whitening(Protocol):
+    """Turns rows (k, ...) into whitened ones (k, n)."""
+
+    @property
+    def log_volume(self) -> float:
+        """Logarithm of the determinant of what it multiplies rows with."""
+
+    def __call__(self, rows: FloatArray) -> FloatArray:
+        """Return whitened rows."""
 
 
 class Solved(Protocol):
@@ -59,8 +70,8 @@ class Problem(Protocol):
     def living(self) -> Sequence[Effect]:
         """Effects that it may show and the model has not."""
 
-    def whitener(self, own: float) -> Callable[[FloatArray], FloatArray]:
-        """Return what turns rows (k, ...) into whitened ones (k, n).
+    def whitener(self, own: float) -> Whitening:
+        """Return the whitening.
 
         `own` is the size of the misfit that each run has for itself.
         """

@@ -37,6 +37,9 @@ tire that leaves little shows a weak effect; one that leaves far more than its f
 unknown, so that twice as much is the most that is excused."""
 SIZE_STD = 1.5
 """Standard deviation of the logarithm of this size."""
+OWN = tuple(0.0005 * 2.0 ** np.arange(6))
+"""Sizes of the misfit that each run has for itself, over its rms strain, among which its likelihood
+chooses."""
 LAW = 0.15
 """Relative standard deviation by which a law is off as conditions change."""
 SINGLES, PARTNERS, LEADERS = 6, 3, 3
@@ -67,6 +70,8 @@ class Hypothesis:
         Log evidence of every further effect beside it, [nats].
     limit : float
         T that plain tires exceed with the false-alarm probability.
+    left : mapping of name to float
+        Largest T, less this limit, that first order leaves beside each further effect.
     """
 
     fit: Posterior
@@ -78,6 +83,7 @@ class Hypothesis:
     plausible: bool
     evidence: dict[str, float]
     limit: float
+    left: dict[str, float]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -118,7 +124,7 @@ class Null:
     Parameters
     ----------
     normal : Normal
-        About the fit, in the family's whitening.
+        About the fit, whitened at the most likely size of a run's own misfit.
     family : Family
     allowed : mapping of block to variance
         What the hypothesis leaves open beside what plain tires show.
@@ -145,35 +151,48 @@ class Null:
         noise = random.standard_normal(planted.shape) * np.sqrt(np.clip(values, 0.0, None))
         self.right = normal.gram @ planted.T + vectors @ noise.T
 
-    def _of(self, without: int | None, right: FloatArray, names: Sequence[str]) -> FloatArray:
+    def _of(
+        self,
+        without: int | None,
+        right: FloatArray,
+        names: Sequence[str],
+        further: Mapping[str, FloatArray] | None = None,
+    ) -> FloatArray:
         """Return the log evidence of effects or shapes for right-hand sides, (n_names, k).
 
-        Each right-hand side is one tire's, and is judged at its own most likely size of what plain
-        tires show: some leave much of everything, some little.
+        Each right-hand side is one tire's. It is judged at its most likely size of what plain tires
+        show, by itself without the effect and with it: some tires leave much of everything, some
+        little, and a hidden effect must not pass for a tire that leaves much.
         """
         blocks = [self.normal.blocks[name] for name in names]
         typical = self.family.spread(without)
-        highest = np.full(right.shape[1], -np.inf)
-        out = np.zeros((len(names), right.shape[1]))
+        plain, missing = [], []
         for size in SIZES:
-            spread = {name: size**2 * variance for name, variance in typical.items()}
-            diagonal = self.normal.spread({**spread, **self.allowed})
+            allowed = {**_sized(typical, size), **self.allowed, **(further or {})}
+            diagonal = self.normal.spread(allowed)
             weighed = Weighed(self.normal, diagonal)
-            likelihood = weighed.gain(right) - 0.5 * (np.log(size) / SIZE_STD) ** 2
+            likelihood = weighed.gain(right) + _size_prior(size)
             more = [
                 MORE * diagonal[block]
                 if "," in name
                 else np.full(block.stop - block.start, PRIOR**2)
                 for name, block in zip(names, blocks, strict=True)
             ]
-            found = evidence(weighed, weighed.right(right), blocks, more)
-            better = likelihood > highest
-            highest[better], out[:, better] = likelihood[better], found[:, better]
-        return out
+            plain.append(likelihood)
+            missing.append(likelihood + evidence(weighed, weighed.right(right), blocks, more))
+        return np.asarray(np.max(missing, axis=0) - np.max(plain, axis=0))
 
     def seen(self) -> FloatArray:
         """Return the log evidence of every effect and shape beside the hypothesis, (n_names,)."""
         return self._of(None, self.normal.right[:, None], self.names)[:, 0]
+
+    def beside(self, name: str) -> float:
+        """Return the largest log evidence of anything beside the hypothesis and one more effect."""
+        block = self.normal.blocks[name]
+        more = {name: np.full(block.stop - block.start, PRIOR**2)}
+        names = [each for each in self.names if each != name]
+        found = self._of(None, self.normal.right[:, None], names, more)
+        return float(found.max())
 
     def largest(self) -> FloatArray:
         """Return the largest log evidence of each plain tire by the others, (n_tires,)."""
@@ -211,6 +230,12 @@ def judged(
             null = _null(problem, fit, family, 1.0 / LAW)
             free = max(free, _rank(float(null.seen().max()), null.largest()))
     top = int(np.argmax(seen[best]))
+    limits = [float(np.quantile(each, 1.0 - alpha)) for each in largest]
+    names = [name for name in nulls[best].names if "," not in name] if each[best] <= alpha else []
+    left = {
+        name: min(null.beside(name) - limit for null, limit in zip(nulls, limits, strict=True))
+        for name in names
+    }
     return Hypothesis(
         fit,
         float(seen[best][top]),
@@ -220,7 +245,8 @@ def judged(
         free,
         plausible(fit, own_effects),
         dict(zip(nulls[best].names, seen[best].tolist(), strict=True)),
-        float(np.quantile(largest[best], 1.0 - alpha)),
+        limits[best],
+        left,
     )
 
 
@@ -236,7 +262,40 @@ def _null(
         **_law_errors(fit, looser),
         **(more or {}),
     }
-    return Null(fit.normal(problem, family.own), family, allowed)
+    return Null(_likeliest(problem, fit, family, allowed), family, allowed)
+
+
+def _likeliest(
+    problem: Problem,
+    fit: Posterior,
+    family: Family,
+    allowed: Mapping[str, float | FloatArray],
+) -> Normal:
+    """Return the normal equations at the most likely size of what each run has for itself.
+
+    It belongs to a laboratory rather than to a tire, so that no family may tell it.
+    """
+    typical, found = family.spread(), []
+    for own in OWN:
+        normal = fit.normal(problem, own)
+        volume = problem.whitener(own).log_volume
+        each = [
+            Weighed(normal, normal.spread({**_sized(typical, size), **allowed})).log_likelihood()
+            + _size_prior(size)
+            for size in SIZES
+        ]
+        found.append((max(each) + volume, own))
+    return fit.normal(problem, max(found)[1])
+
+
+def _sized(typical: Mapping[str, float], size: float) -> dict[str, float]:
+    """Return variances of a tire that leaves so much more than its family does."""
+    return {name: size**2 * variance for name, variance in typical.items()}
+
+
+def _size_prior(size: float) -> float:
+    """Return the log density of a tire's size, up to a constant."""
+    return float(-0.5 * (np.log(size) / SIZE_STD) ** 2)
 
 
 def _rank(seen: float, largest: FloatArray) -> float:
@@ -337,7 +396,7 @@ def select(
         level = []
         for leader in [h for h in fitted if h.plausible][: LEADERS if size == 1 else 1]:
             added = _added(leader, len(had))
-            for partner in [n for n in _leading(leader, effects) if n not in added][:PARTNERS]:
+            for partner in _partners(leader, effects)[:PARTNERS]:
                 level.append(at((*added, partner), leader))
     free = [h for h in tried.values() if h is not None and h.fit.names[len(had) :]]
     free = [h for h in free if h.plausible and h.free_p > false_alarm]
@@ -358,6 +417,16 @@ def _leading(hypothesis: Hypothesis, effects: dict[str, Effect]) -> list[str]:
     """Return effects by their evidence beside a hypothesis, best first."""
     found = {name: value for name, value in hypothesis.evidence.items() if name in effects}
     return sorted(found, key=lambda name: -found[name])
+
+
+def _partners(leader: Hypothesis, effects: dict[str, Effect]) -> list[str]:
+    """Return the effects that take away most of what stands against a hypothesis, best first.
+
+    One that leaves more than half of it, to first order, is no partner.
+    """
+    excess = leader.statistic - leader.limit
+    found = {name: left for name, left in leader.left.items() if name in effects}
+    return sorted((n for n, left in found.items() if left < 0.5 * excess), key=lambda n: found[n])
 
 
 def _start(

@@ -83,7 +83,6 @@ class StrainSolved:
     deflection: FloatArray
     changes: Changes
     delay: float
-    effects: "_Changed | None" = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -147,6 +146,7 @@ class StrainProblem:
         self._tangent = tangents(solved.waveform, slopes.waveform[-2], slopes.waveform[-1])
         self._noise = noise
         self._whiteners: dict[float, Whitener] = {}
+        self._changed: _Changed | None = None
         self.living = self._alive(catalogue)
 
     def whitener(self, own: float) -> Whitener:
@@ -166,12 +166,8 @@ class StrainProblem:
 
     def solve(self, point: Point, near: StrainSolved | None = None) -> StrainSolved:
         """Return the model at a point; raises TirelibError where it has none."""
-        near = near or self.reference
-        solved = self._solve(point, near)
-        kept = near.effects if near.effects is not None and near.effects.serves(point) else None
-        if point.effects and kept is None:
-            kept = _Changed(point, self._changed_slopes(solved))
-        return replace(solved, rest=self.data.strain - solved.waveform, effects=kept)
+        solved = self._solve(point, near or self.reference)
+        return replace(solved, rest=self.data.strain - solved.waveform)
 
     def _solve(self, point: Point, near: StrainSolved | None) -> StrainSolved:
         data, values = self.data, move(self.values, point.base[:-1], self.free)
@@ -211,8 +207,10 @@ class StrainProblem:
     def slopes(self, point: Point, solved: StrainSolved) -> FloatArray:
         """Return slopes by the base, the delay and strengths in ranges."""
         slopes = self._base_slopes(solved).waveform[: len(self.free)]
-        if solved.effects is not None:
-            slopes = slopes + solved.effects.slopes
+        if point.effects:
+            if self._changed is None or not self._changed.serves(point):
+                self._changed = _Changed(point, self._changed_slopes(solved))
+            slopes = slopes + self._changed.slopes
         rows = [*slopes, by_delay(solved.waveform, self.data.points.omega)]
         for k, effect in enumerate(point.effects):
             for j in range(effect.components):

@@ -35,6 +35,21 @@ class Solved:
     rest: FloatArray
 
 
+LEAST_OWN = 0.0005
+"""Size of a sample's own misfit at which there is none."""
+
+
+class Louder:
+    """Whitening of noise that is larger by what each sample has for itself."""
+
+    def __init__(self, own: float) -> None:
+        self.std = np.hypot(1.0, (own - LEAST_OWN) / 0.001)
+        self.log_volume = -N * float(np.log(self.std))
+
+    def __call__(self, rows: FloatArray) -> FloatArray:
+        return np.asarray(rows / self.std)
+
+
 class Toy:
     """Measured numbers that are linear in everything."""
 
@@ -52,8 +67,8 @@ class Toy:
         self.dead: Mapping[str, str] = {}
         self.living = tuple(EFFECTS.values())
 
-    def whitener(self, own: float) -> Any:
-        return lambda rows: rows
+    def whitener(self, own: float) -> "Louder":
+        return Louder(own)
 
     def solve(self, point: Point, near: Any = None) -> Solved:
         model = point.base @ self.base

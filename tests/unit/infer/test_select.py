@@ -88,3 +88,12 @@ def test_a_tire_that_leaves_little_shows_less_of_an_effect_sooner() -> None:
         verdicts = [select(Toy(drawn(random, size=size, swell=0.25)), FAMILIES) for _ in range(30)]
         found[size] = sum(verdict.sets == (("swell",),) for verdict in verdicts)
     assert found[0.2] > found[1.0]
+
+
+def test_samples_with_more_misfit_of_their_own_hide_nothing() -> None:
+    random = np.random.default_rng(14)
+    kinds = [
+        select(Toy(drawn(random) + 3.0 * random.standard_normal(N)), FAMILIES).kind
+        for _ in range(20)
+    ]
+    assert sum(kind != "none" for kind in kinds) <= 3  # 98 % bound of 5 %
