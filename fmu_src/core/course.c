@@ -2,6 +2,8 @@
 
 #include <float.h>
 
+#include "linear.h"
+
 enum { DEGREE = 3, FEWEST = 3, BINS = 64 };
 
 /* Rows: Legendre polynomials by their powers; means of the powers from -1 to 0; slope at 0 less the
@@ -12,32 +14,6 @@ static const double MEANS[4] = {1.0, -1.0 / 2.0, 1.0 / 3.0, -1.0 / 4.0};
 static const double BENT[4] = {0.0, 0.0, 1.0, -1.0};
 
 static int smaller(int a, int b) { return a < b ? a : b; }
-
-/* Solve a x = b of `size` unknowns in place, with partial pivoting; b becomes x. */
-static void solve(double a[4][4], double *b, int size) {
-    for (int k = 0; k < size; k++) {
-        int pivot = k;
-        for (int i = k + 1; i < size; i++)
-            if (fabs(a[i][k]) > fabs(a[pivot][k])) pivot = i;
-        for (int j = 0; j < size; j++) {
-            double kept = a[k][j];
-            a[k][j] = a[pivot][j];
-            a[pivot][j] = kept;
-        }
-        double kept = b[k];
-        b[k] = b[pivot];
-        b[pivot] = kept;
-        for (int i = k + 1; i < size; i++) {
-            double share = a[i][k] / a[k][k];
-            for (int j = k; j < size; j++) a[i][j] -= share * a[k][j];
-            b[i] -= share * b[k];
-        }
-    }
-    for (int k = size - 1; k >= 0; k--) {
-        for (int j = k + 1; j < size; j++) b[k] -= a[k][j] * b[j];
-        b[k] /= a[k][k];
-    }
-}
 
 /* How many values in a row count as one. Reference: _alike. */
 static double alike(const double *left, int size, int lag) {
@@ -99,7 +75,7 @@ static double fit(const double *z, double *y, int n, int size, double *fitted) {
             for (int j = 0; j < size; j++) normal[k][j] += design[i][k] * design[i][j];
         }
     }
-    solve(normal, fitted, size);
+    solve(&normal[0][0], 4, fitted, size);
     for (int i = 0; i < n; i++) {
         for (int k = 0; k < size; k++) y[i] -= design[i][k] * fitted[k];
         square += y[i] * y[i];

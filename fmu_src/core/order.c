@@ -31,3 +31,25 @@ double median(double *x, size_t n) {
         if (x[i] > lower) lower = x[i];
     return 0.5 * (lower + upper);
 }
+
+/* Let the number at `root` sink in a heap of n. */
+static void sink(double *x, size_t root, size_t n) {
+    for (size_t child = 2 * root + 1; child < n; child = 2 * root + 1) {
+        if (child + 1 < n && x[child] < x[child + 1]) child++;
+        if (x[root] >= x[child]) return;
+        double kept = x[root];
+        x[root] = x[child];
+        x[child] = kept;
+        root = child;
+    }
+}
+
+void sort(double *x, size_t n) { /* heapsort (J. W. J. Williams, 1964): no memory, bounded time */
+    for (size_t i = n / 2; i > 0; i--) sink(x, i - 1, n);
+    for (size_t last = n; last > 1; last--) {
+        double kept = x[0];
+        x[0] = x[last - 1];
+        x[last - 1] = kept;
+        sink(x, 0, last - 1);
+    }
+}

@@ -8,4 +8,7 @@
  * them. Reference: numpy.median. */
 double median(double *x, size_t n);
 
+/* Sort n numbers in place, smallest first. Reference: numpy.sort */
+void sort(double *x, size_t n);
+
 #endif

@@ -89,6 +89,12 @@ def compiled(folder: Path, *flags: str) -> c.CDLL:
     core.cutter_run.argtypes = [c.c_void_p, c.c_void_p, c.c_int64, c.c_void_p, c.c_void_p]
     core.extract_features.restype = None
     core.extract_features.argtypes = [c.c_void_p, c.c_int, c.c_void_p]
+    core.calibration_size.restype = core.calibration_read.restype = c.c_size_t
+    core.calibration_read.argtypes = [c.c_void_p, c.c_void_p, c.c_size_t]
+    core.estimate_scratch.restype = c.c_size_t
+    core.estimate_scratch.argtypes = [c.c_void_p]
+    core.estimate.restype = None
+    core.estimate.argtypes = [c.c_void_p] * 5
     core.median.restype = REAL
     core.median.argtypes = [c.c_void_p, c.c_size_t]
     return core

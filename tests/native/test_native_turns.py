@@ -207,6 +207,20 @@ def test_every_fault_is_told_alike(core: ctypes.CDLL, fault: str) -> None:
     assert any(flag & FAULTS[fault] == FAULTS[fault] for flag in flags) or not FAULTS[fault]
 
 
+@pytest.mark.parametrize("length", [1, 4])
+def test_a_gap_anywhere_in_a_turn(core: ctypes.CDLL, length: int) -> None:
+    """At every distance from the contact's edges, and from the extremes beside it."""
+    clean, _, _ = record(turns=3.6, noise=4e-6, rate=2e3, start=0.5)
+    turn = int(2.0 * np.pi * 0.305 / SPEED * 2e3)
+    said = set()
+    for start in range(turn, 2 * turn, 3):
+        strain = clean.copy()
+        strain[2, start : start + length] = np.nan
+        strain[:, 2 * turn :] *= 1.05
+        said |= set(assert_same(core, strain, rate=2e3, speed=SPEED))
+    assert len(said) > 3
+
+
 @pytest.mark.parametrize("speed", [0.0, np.nan, np.inf, -18.0])
 def test_a_speed_that_says_nothing(core: ctypes.CDLL, speed: float) -> None:
     strain, _, _ = record(turns=3.3, noise=4e-6)

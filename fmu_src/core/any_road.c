@@ -1,0 +1,102 @@
+#include "any_road.h"
+
+enum { POINTS = NODES + WHOLE + 1 };
+
+/* Slips that may be, with the shares that slide and how likely they are. */
+typedef struct {
+    double slip[POINTS], t[POINTS], weight[POINTS], angle[POINTS];
+    double across; /* slip on the calibrated road; last of the slips */
+} Possible;
+
+/* Minus the logarithm of a normal likelihood. Reference: _surprise */
+static double surprise_of(double apart, double std) {
+    if (!isfinite(std) || !isfinite(apart)) return 0.0;
+    return 0.5 * (apart / std * (apart / std)) + log(std);
+}
+
+/* Reference: _moments */
+static double moments(const double *x, const double *weight, double *variance) {
+    double sum = 0.0, mean = 0.0;
+    for (int i = 0; i < POINTS; i++) sum += weight[i];
+    for (int i = 0; i < POINTS; i++) mean += weight[i] / sum * x[i];
+    *variance = 0.0;
+    for (int i = 0; i < POINTS; i++)
+        *variance += weight[i] / sum * ((x[i] - mean) * (x[i] - mean));
+    return mean;
+}
+
+/* The slips that frictions from `low` to `high` share leave, those beyond full sliding, and that of
+ * the calibrated road. */
+static void possible(const Calibration *cal, const SlidingCurve *c, const Seen *s, double used,
+                     double along, double widest, Possible *p) {
+    const Constants *k = &cal->constants;
+    double n = c->sharpness, cornering = curve_cornering(c, k, s->load), pulled = fabs(along);
+    double rough = fmax(k->rougher * c->friction, k->smooth), slippery = k->slippery;
+    double low = curve_share(c, k, used, rough, s->load, along);
+    double high = curve_share(c, k, used, slippery, s->load, along);
+    for (int i = 0; i < NODES; i++) {
+        double t = low + 0.5 * (high - low) * (cal->node[i] + 1.0);
+        double filled = maximum(1.0 - pow(1.0 - t, n), k->tiny);
+        p->t[i] = t;
+        p->slip[i] = curve_across(c, k, used, t, s->load);
+        p->weight[i] =
+            n * used / (cornering * (filled * filled)) * 0.5 * (high - low) * cal->weight[i];
+    }
+    double begin = maximum(n * used / cornering, lost_slip(k, used, c->grip * rough, pulled));
+    double end = minimum(tan(widest), lost_slip(k, used, c->grip * slippery, pulled));
+    double room = isfinite(begin) ? maximum(end - begin, 0.0) : 0.0;
+    for (int i = 0; i < WHOLE; i++) {
+        double beyond = (room > 0.0 ? begin : 0.0) + room * (i + 0.5) / WHOLE;
+        p->slip[NODES + i] = maximum(beyond, k->tiny);
+        p->t[NODES + i] = 1.0;
+        p->weight[NODES + i] = room / WHOLE + 0.0 * beyond;
+    }
+    int last = POINTS - 1;
+    p->across = curve_lateral(c, k, used, c->friction, s->load, along, &p->t[last]);
+    p->slip[last] = p->across;
+    p->weight[last] = 0.0 * used;
+    for (int i = 0; i < POINTS; i++) {
+        p->angle[i] = angle_of(k, p->slip[i], s->slip_ratio);
+        p->weight[i] *= hypot(pulled / p->slip[i], 1.0) * (p->angle[i] <= widest ? 1.0 : 0.0);
+    }
+}
+
+/* Multiply the weights by how likely the readings are with each slip; return that of the
+ * calibrated road. */
+static double weigh(const Calibration *cal, const SlidingCurve *c, const Seen *s, double used,
+                    double along, Possible *p) {
+    const Constants *k = &cal->constants;
+    double surprise[POINTS], least = INFINITY, stiffer = curve_stiffer(c, k, s->load);
+    double dry = used * pow(1.0 - p->t[POINTS - 1], c->fading);
+    for (int i = 0; i < POINTS; i++) {
+        /* a regression of one road shows a part only of what another takes from the moment */
+        double aligned = used * pow(1.0 - p->t[i], c->fading), taken = s->unseen * (dry - aligned);
+        double apart = s->moment - aligned - k->hidden * taken;
+        double expected = used * along / p->slip[i], unsure = used * stiffer / p->slip[i];
+        double slanted = hypot(c->slant * expected, unsure * s->slip_std);
+        surprise[i] = surprise_of(apart, hypot(s->moment_std, k->hidden_doubt * taken));
+        surprise[i] += surprise_of(s->pull - expected, hypot(s->pull_std, slanted));
+        least = minimum(least, surprise[i]);
+    }
+    for (int i = 0; i < POINTS; i++) p->weight[i] *= exp(least - surprise[i]);
+    return exp(least - surprise[POINTS - 1]);
+}
+
+Told tell(const Calibration *cal, const SlidingCurve *c, const Seen *s, double widest) {
+    const Constants *k = &cal->constants;
+    Possible p;
+    double variance, scatter, unused, used = maximum(s->used, k->least_utilisation);
+    double free = atan(curve_lateral(c, k, used, c->friction, s->load, 0.0, &unused));
+    double along = curve_along(c, k, free, s->slip_ratio, s->load);
+    possible(cal, c, s, used, along, widest, &p);
+    double learnt = 1.0 - weigh(cal, c, s, used, along, &p);
+    double middle = moments(p.angle, p.weight, &variance), usual = p.angle[POINTS - 1];
+    double change = learnt * (middle - usual), rest = middle - usual - change;
+    double doubt = k->curve_doubt * change;
+    double at = moments(p.t, p.weight, &scatter), apart = at - p.t[POINTS - 1];
+    /* at a share that is known the angle grows with u in proportion */
+    double steep = curve_slope_at(c, k, used, at, p.across, s->load, along);
+    Told told = {1, usual + change, sqrt(variance + rest * rest + doubt * doubt), change,
+                 learnt * middle / used + (1.0 - learnt) * steep, sqrt(scatter + apart * apart)};
+    return told;
+}

@@ -1,0 +1,18 @@
+/* What is assumed of conditions that a calibration did not vary. Reference:
+ * tirelib.estimators.laws.ConditionLaws, methods of the same names. */
+#ifndef TIRE_LAWS_H
+#define TIRE_LAWS_H
+
+#include "calibration.h"
+
+double load_correction(const Laws *laws, const Constants *k, const double *values, double *std);
+double force_factor(const Laws *laws, const Constants *k, const double *values, double *std);
+double equivalent_load(const Laws *laws, double load, const double *values);
+int conditions_allowed(const Laws *laws, const Constants *k, const double *values);
+double speed_departure(const Laws *laws, const Constants *k, const double *values);
+double speed_spread(const Laws *laws, const Constants *k, const double *values, double value);
+double pressure_departure(const Laws *laws, const Constants *k, const double *values,
+                          double *unknown);
+int extrapolated(const Laws *laws, const Constants *k, const double *values);
+
+#endif

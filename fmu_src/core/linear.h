@@ -1,0 +1,9 @@
+/* Linear equations. */
+#ifndef TIRE_LINEAR_H
+#define TIRE_LINEAR_H
+
+/* Solve a x = b of n unknowns by elimination with partial pivoting; row i of a begins at
+ * a + i * stride. Overwrites a; b becomes x. Reference: numpy.linalg.solve */
+void solve(double *a, int stride, double *b, int n);
+
+#endif

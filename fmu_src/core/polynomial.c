@@ -1,0 +1,108 @@
+#include "polynomial.h"
+
+#include "order.h"
+
+double standardised(const Form *form, int variable, const double *values) {
+    const double *v = form->variable + 3 * variable;
+    return (values[(int)v[0]] - v[1]) / v[2];
+}
+
+static double power(double z, int exponent) {
+    double product = 1.0;
+    for (int i = 0; i < exponent; i++) product *= z;
+    return product;
+}
+
+void design(const Form *form, const double *values, double *terms) {
+    double z[VARIABLES];
+    for (int v = 0; v < form->variables; v++) z[v] = standardised(form, v, values);
+    for (int t = 0; t < form->terms; t++) {
+        const double *exponent = form->exponent + t * form->variables;
+        terms[t] = 1.0;
+        for (int v = 0; v < form->variables; v++) terms[t] *= power(z[v], (int)exponent[v]);
+    }
+}
+
+/* Variance that uncertain coefficients leave. Reference: leverage */
+static double leverage(const double *x, const double *covariance, int n) {
+    double sum = 0.0;
+    for (int i = 0; i < n; i++) {
+        double row = 0.0;
+        for (int j = 0; j < n; j++) row += covariance[i * n + j] * x[j];
+        sum += row * x[i];
+    }
+    return sum;
+}
+
+double predicted(const Polynomial *p, const Constants *k, const double *values, double *std) {
+    double x[TERMS], value = 0.0;
+    design(&p->form, values, x);
+    for (int t = 0; t < p->form.terms; t++) value += x[t] * p->coefficient[t];
+    double uncertain = leverage(x, p->covariance, p->form.terms);
+    if (p->bordered) uncertain += p->growth * maximum(uncertain - p->near, 0.0);
+    if (p->pulled != 0.0) {
+        double square = values[V_TRACTION] * values[V_TRACTION];
+        uncertain += p->pulled * p->pulled * (square / (square + k->pull * k->pull));
+    }
+    *std = sqrt(p->residual * p->residual + p->floor * p->floor + uncertain);
+    return value;
+}
+
+int within_data(const Polynomial *p, const double *values) {
+    double x[TERMS];
+    if (!p->bordered) return 1;
+    design(&p->form, values, x);
+    return leverage(x, p->covariance, p->form.terms) <= p->far;
+}
+
+double slope_by(const Polynomial *p, const double *values, int value) {
+    const Form *form = &p->form;
+    double z[VARIABLES], sum = 0.0;
+    int by = -1;
+    for (int v = 0; v < form->variables; v++) {
+        z[v] = standardised(form, v, values);
+        if ((int)form->variable[3 * v] == value) by = v;
+    }
+    for (int t = 0; by >= 0 && t < form->terms; t++) {
+        const double *exponent = form->exponent + t * form->variables;
+        double product = 1.0, factor = exponent[by] / form->variable[3 * by + 2];
+        for (int v = 0; v < form->variables; v++) {
+            int e = (int)exponent[v];
+            product *= power(z[v], v == by && e > 0 ? e - 1 : e);
+        }
+        sum += product * (factor * p->coefficient[t]);
+    }
+    return sum;
+}
+
+int all_inside(const Guard *guard, const double *values, double own) {
+    for (int i = 0; i < guard->ranges; i++) {
+        const double *range = guard->range + RANGE_WIDTH * i;
+        double x = range[RANGE_NUMBER] < 0.0 ? own : values[(int)range[RANGE_NUMBER]];
+        int inside = x >= range[RANGE_LOW] && x <= range[RANGE_HIGH];
+        if (!inside && !(range[RANGE_OPTIONAL] != 0.0 && isnan(x))) return 0;
+    }
+    return 1;
+}
+
+/* Whether no gap between n directions exceeds pi; sorts them. Reference: _surrounded */
+static int surrounded(double *angle, size_t n) {
+    if (n == 0) return 0;
+    sort(angle, n);
+    double largest = angle[0] + 2.0 * PI - angle[n - 1];
+    for (size_t i = 1; i < n; i++) largest = fmax(largest, angle[i] - angle[i - 1]);
+    return largest <= PI;
+}
+
+int in_cloud(const Cloud *c, const double *values, double *scratch) {
+    double x[2] = {values[c->name[0]] / c->scale[0], values[c->name[1]] / c->scale[1]};
+    size_t n = 0;
+    for (int side = 1; side >= (c->mirrored ? -1 : 1); side -= 2)
+        for (int i = 0; i < c->points; i++) {
+            double dx = c->point[2 * i] - x[0], dy = side * c->point[2 * i + 1] - x[1];
+            double square = dx * dx + dy * dy;
+            if (square <= c->reach * c->reach) return 1;
+            if (square <= c->around * c->around) scratch[n++] = atan2(dy, dx);
+        }
+    return c->around != 0.0 && isfinite(x[0]) && isfinite(x[1]) && surrounded(scratch, n);
+}

@@ -1,0 +1,30 @@
+/* Polynomials in standardised regressors. Reference: tirelib.estimators.polynomial, border,
+ * pulled. Test of all: test_native_estimates. */
+#ifndef TIRE_POLYNOMIAL_H
+#define TIRE_POLYNOMIAL_H
+
+#include "calibration.h"
+
+/* The value of a variable, standardised. */
+double standardised(const Form *form, int variable, const double *values);
+
+/* The terms' values. Reference: design */
+void design(const Form *form, const double *values, double *terms);
+
+/* Value and standard deviation. Reference: Polynomial.predict */
+double predicted(const Polynomial *p, const Constants *k, const double *values, double *std);
+
+/* Reference: Polynomial.within */
+int within_data(const Polynomial *p, const double *values);
+
+/* Derivative by a value. Reference: Polynomial.slope */
+double slope_by(const Polynomial *p, const double *values, int value);
+
+/* Whether a quantity and its regressors lie in their ranges. Reference: all_inside */
+int all_inside(const Guard *guard, const double *values, double own);
+
+/* Whether a combination of two regressors was calibrated; `scratch` holds a double for each point,
+ * and for each mirrored one. Reference: Cloud.inside */
+int in_cloud(const Cloud *cloud, const double *values, double *scratch);
+
+#endif

@@ -1,0 +1,90 @@
+"""Estimates of the native core, called through ctypes."""
+
+import ctypes as c
+
+import numpy as np
+
+from tests.native.core import BY_GAGE, REAL, ROW, SCALARS, NativeFeatures, NativeTurn
+from tirelib.estimators.calibration import Calibration, Estimates
+from tirelib.estimators.chain import QUANTITIES
+from tirelib.features.extract import Features
+from tirelib.fmu.calibration_table import flat_table
+
+NOTES = (
+    *(f"{quantity}_out_of_range" for quantity in QUANTITIES),
+    *("alpha_saturated", "condition_extrapolated", "camber_unknown"),
+    *("friction_implausible", "tread_depth_implausible", "tread_temperature_implausible"),
+)
+ROLLING = ("unknown", "free", "braking", "driving")
+SIZE = {"Fz": 1e2, "alpha": 1e-2, "kappa": 1e-2, "Fy": 1e2}
+"""Usual size of a quantity, SI, of which 1e-9 is as good as none."""
+
+
+class NativeEstimates(c.Structure):
+    """Estimates of estimates.h."""
+
+    _fields_ = [
+        ("value", REAL * 4),
+        ("std", REAL * 4),
+        ("radius", REAL),
+        ("contact_length", ROW),
+        ("contact_length_std", ROW),
+        ("valid", c.c_int * 4),
+        *((name, c.c_int) for name in ("turn_valid", "flags", "notes", "rolling")),
+    ]
+
+
+class NativeCalibration:
+    """A calibration in the core."""
+
+    def __init__(self, core: c.CDLL, calibration: Calibration) -> None:
+        self.core, self.gages = core, len(calibration.lateral)
+        self._table = flat_table(calibration)
+        self._memory = c.create_string_buffer(core.calibration_size())
+        place = core.calibration_read(self._memory, self._table.ctypes.data, self._table.size)
+        assert place == 0, f"the table is damaged at {place} of {self._table.size}"
+        self._scratch = np.empty(core.estimate_scratch(self._memory))
+
+    def estimate(self, turn: NativeTurn, features: NativeFeatures) -> NativeEstimates:
+        found = NativeEstimates()
+        self.core.estimate(
+            self._memory,
+            c.byref(turn),
+            c.byref(features),
+            self._scratch.ctypes.data,
+            c.byref(found),
+        )
+        return found
+
+    def row(self, features: Features, row: int) -> NativeEstimates:
+        """Estimate one row of features."""
+        turn, given = NativeTurn(), NativeFeatures()
+        for name in set(SCALARS) - {"pulse"}:
+            setattr(turn, name, getattr(features, name)[row])
+        turn.offset_std[: self.gages] = features.offset_std[row].tolist()
+        for name in BY_GAGE:
+            getattr(given, name)[: self.gages] = getattr(features, name)[row].tolist()
+        given.gage_flags[: self.gages] = features.gage_flags[row].tolist()
+        given.flags = int(features.flags[row])
+        return self.estimate(turn, given)
+
+
+def assert_same_estimates(got: NativeEstimates, wanted: Estimates, row: int) -> None:
+    """Hold the estimates of a turn against the reference: numbers to 1e-9, flags exactly."""
+    gages = wanted.contact_length.shape[1]
+    notes = tuple(name for bit, name in enumerate(NOTES) if got.notes & 1 << bit)
+    assert got.flags == wanted.flags[row]
+    assert notes == wanted.notes[row]
+    assert ROLLING[got.rolling] == wanted.rolling[row]
+    assert bool(got.turn_valid) == wanted.turn_valid[row]
+    for index, name in enumerate(QUANTITIES):
+        assert bool(got.valid[index]) == wanted.valid[name][row], name
+        for kind in ("value", "std"):
+            close(getattr(got, kind)[index], getattr(wanted, kind)[name][row], SIZE[name], name)
+    close(got.radius, wanted.radius[row], 0.1, "radius")
+    for name in ("contact_length", "contact_length_std"):
+        close(getattr(got, name)[:gages], getattr(wanted, name)[row], 0.1, name)
+
+
+def close(got: object, wanted: object, size: float, name: str) -> None:
+    np.testing.assert_allclose(got, wanted, rtol=1e-9, atol=1e-9 * size, err_msg=name)
