@@ -22,7 +22,7 @@ from tirelib.fmu.virtual.options import Options
 from tirelib.fmu.virtual.spec import default_surface
 from tirelib.fmu.virtual.surface import read_surface
 from tirelib.fmu.virtual.wheel import VirtualWheel
-from tirelib.signal import LowPass, cut_turns, slip, turns
+from tirelib.signal import LowPass, angle, cut_turns, slip, turns
 from tirelib.signal.angle import angle_law
 from tirelib.threads import one_thread
 
@@ -38,6 +38,7 @@ RESTING = {
     "speed": 20.0,
     "pressure": 2.3e5,
 }
+ROAD = {"friction": 1.0, "tread_depth": 8e-3, "tread_temperature": 300.0}
 STEADY = 0.5
 """Time before the speed begins to change, [s]."""
 
@@ -168,6 +169,12 @@ def pulses(speed: float, begins: float, t: float) -> dict[str, float]:
     return {"Fz": 3500.0, "speed": speed - lost, "kappa": -0.025 * (1.0 - np.cos(w * x))}
 
 
+def back(speed: float, begins: float, t: float) -> dict[str, float]:
+    """Return the inputs of a slip ratio that grows evenly and turns round; the speed is held."""
+    x = max(t - begins, 0.0)
+    return {"Fz": 3500.0, "speed": speed, "kappa": -0.12 * max(min(x, 0.8 - x), 0.0)}
+
+
 def press(speed: float, begins: float, t: float) -> dict[str, float]:
     """Return the inputs of a load that jumps."""
     return {"Fz": 3000.0 if t < begins else 4000.0, "speed": speed}
@@ -175,17 +182,16 @@ def press(speed: float, begins: float, t: float) -> dict[str, float]:
 
 def slips() -> None:
     """Print the worst error of the slip ratio, itself and over its standard deviation."""
-    road = {"friction": 1.0, "tread_depth": 8e-3, "tread_temperature": 300.0}
     for law in (brake, pulses, press):
         for told in (("speed", "omega"), ("speed",)):
             rows = []
             for speed, phase in product((12.0, 20.0), np.linspace(0.0, 1.0, 9)[:-1]):
                 made = play(0.9, partial(law, speed, 0.4 + phase * 1.92 / speed))
-                made |= {name: np.full(made["Fz"].size, x) for name, x in road.items()}
+                made |= {name: np.full(made["Fz"].size, x) for name, x in ROAD.items()}
                 for stiffness in (0.5, 1.0, 2.0):
                     known = stiffness * slip.SLIP_STIFFNESS
                     with mock.patch.object(slip, "SLIP_STIFFNESS", known):
-                        features, found = estimate(made, *told, *road)
+                        features, found = estimate(made, *told, *ROAD)
                     here = np.minimum((features.time * RATE).astype(int), made["Fz"].size - 1)
                     good = found.turn_valid & (np.arange(here.size) > 0)
                     error = np.abs(found.value["kappa"] - made["kappa"][here])[good]
@@ -202,12 +208,36 @@ def slips() -> None:
             sys.stdout.write(f"| {' | '.join(cells)} |\n")
 
 
+def turning() -> None:
+    """Print how a slip ratio is told that begins to grow and turns round, from `speed` alone."""
+    rows: dict[tuple[str, float], list[tuple[float, float]]] = {}
+    for speed, phase in product((12.0, 20.0), np.linspace(0.0, 1.0, 9)[:-1]):
+        begins = 0.4 + phase * 1.92 / speed
+        made = play(1.4, partial(back, speed, begins))
+        made |= {name: np.full(made["Fz"].size, x) for name, x in ROAD.items()}
+        for factor in (0.5, 1.0, 2.0):
+            with mock.patch.object(angle, "ENDS", factor * angle.ENDS):
+                features, found = estimate(made, "speed", *ROAD)
+            here = np.minimum((features.time * RATE).astype(int), made["Fz"].size - 1)
+            error = np.abs(found.value["kappa"] - made["kappa"][here])
+            onset = (features.time > begins) & (features.time - features.period <= begins)
+            for label, use in (("it begins", onset), ("later", features.time > begins)):
+                good = found.valid["kappa"] & use & (onset if label == "it begins" else ~onset)
+                over = error[good] / found.std["kappa"][good]
+                pairs = zip(error[good].tolist(), over.tolist(), strict=True)
+                rows.setdefault((label, factor), []).extend(pairs)
+    for (label, factor), values in rows.items():
+        error, over = np.array(values).max(axis=0)
+        sys.stdout.write(f"| {label} | {factor:g} | {error:.4f} | {over:.1f} |\n")
+
+
 def _step(change: dict[str, tuple[float, float]], at: float, t: float) -> dict[str, float]:
     return {name: values[int(t >= at)] for name, values in change.items()}
 
 
 if __name__ == "__main__":
     with one_thread():
+        turning()
         slips()
         steps()
         draw()

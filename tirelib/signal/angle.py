@@ -12,7 +12,9 @@ contact is exact. How the rate runs within that turn, up to the contact and a li
   is the slip ratio's if the source is the speed, the rate's own without a source, and noise if the
   source is the turn rate. The smaller of the last two slopes of q over time is followed, and none
   where their signs differ: the limiter *minmod* (P. L. Roe, Annu. Rev. Fluid Mech. 18, 1986). So a
-  lasting change is followed exactly; noise and a single jump are not.
+  lasting change is followed exactly; noise and a single jump are not. A rate falls for many turns
+  while a vehicle brakes, but the slip ratio of a tire stays within some hundredths, so what changes
+  it by a hundredth a turn soon ends or turns round: the doubt `ENDS`.
 
 What the fit of the source leaves, and what the last slopes differ by, is the uncertainty.
 """
@@ -36,6 +38,12 @@ NEWTON = 8
 LARGEST_RATIO = 2.0
 """A rate beyond this ratio to the turn's mean, either way, is not followed: the wheel stops,
 starts or locks, and polynomials say nothing of that."""
+
+ENDS = float(np.sqrt(17.0 / 240.0))
+"""Error of q at the contact over the slope that is followed, where the slope ended within the turn:
+``d - 3/4 d^2`` with d the share of the turn that remained, root mean square over all d. Where the
+slope turns round the error is twice as large, at most 2/3 of the slope: 2.5 of this.
+``python build/ramp_error.py`` shows half and double."""
 
 Past = tuple[tuple[float, ...], ...]
 """For each of the last turns: its middle in time [samples], and q for each source and without."""
@@ -126,7 +134,11 @@ def angle_law(
         if course is not None and course.known:
             shape, fit_std, row = course.shape, course.std, index
             break
+    slip_slope, slip_slope_std = _followed(past, _SPEED, turn)
+    slip_slope_std = float(np.hypot(slip_slope_std, ENDS * slip_slope))
     slope, slope_std = _followed(past, 1 + row, turn)
+    if 1 + row == _SPEED:
+        slope_std = slip_slope_std
     if len(past) == 1 and all(course is None for course in known):
         slope_std = unknown
     rate = np.convolve(shape, (1.0 + 0.5 * slope, slope))
@@ -134,7 +146,7 @@ def angle_law(
     if not _steady_enough(rate, ahead / turn):
         rate, fit_std = np.ones(1), 1.0
     contact_rate = float(rate[0]) / turn
-    slip, slip_std, late = _slip(known, *_followed(past, _SPEED, turn), slope_std)
+    slip, slip_std, late = _slip(known, slip_slope, slip_slope_std, slope_std)
     if not 1.0 / LARGEST_RATIO < slip < LARGEST_RATIO:
         slip, slip_std, fit_std = 1.0, 1.0, 1.0
     whole = 2.0 * np.pi * rate / np.arange(1, rate.size + 1)

@@ -181,6 +181,26 @@ def test_a_slip_that_grows_evenly_is_told_at_the_contact() -> None:
     np.testing.assert_allclose(found[3:], slip * turns.time[3:], atol=2e-4)
 
 
+@pytest.mark.parametrize("turns_left", np.linspace(0.05, 0.95, 10))
+@pytest.mark.parametrize("onward", [0.0, 0.012])
+def test_a_slip_that_stops_or_turns_round_is_told_within_three_standard_deviations(
+    turns_left: float, onward: float
+) -> None:
+    """The speed is held and known; the slip ratio falls evenly, then stays or comes back."""
+    period, corner = 1000.0, 6500.0 - 1000.0 * turns_left
+    time = np.arange(0.0, 12e3)
+    slip = -0.012 / period * np.minimum(time, corner) + onward / period * np.fmax(time - corner, 0)
+    angle = np.cumsum(1.0 + slip) / period  # in turns; a contact in the middle of each
+    middles = np.interp(np.arange(0.5, angle[-1]), angle, time)
+    known, past, over = Course(np.array([20.0]), 20.0, 0.0, known=True), (), []
+    for before, middle in pairwise(middles):
+        law = angle_law(middle, middle - before, 0.1 * period, {"speed": known}, past)
+        past = law.past
+        slip_here = law.step / law.speed * 20.0 * period / (2.0 * np.pi) - 1.0
+        over.append(abs(slip_here - np.interp(middle, time, slip)) / max(law.slip_std, 1e-12))
+    assert max(over[3:]) < 3.0  # it had lasted for three turns
+
+
 def test_a_held_value_is_taken_at_the_time_of_its_measurement() -> None:
     sample = np.arange(-1000, 100)
     measured = 100 * (sample // 100)  # 100 values a second
