@@ -28,6 +28,7 @@ def identification_document(campaign: Campaign, found: Identification) -> dict[s
         "gages": [gage + 1 for gage in runs.gages],
         "noise_ustrain": 1e6 * runs.noise.std,
         "rms_ustrain": 1e6 * fit.rms,
+        "delay_us": 1e6 * fit.delay,
         "strain_rms_ustrain": 1e6 * float(np.sqrt(np.mean(runs.strain**2))),
         "parameters": [_parameter(found, k) for k in range(len(found.estimates))],
         "correlation": found.correlation,

@@ -1,10 +1,10 @@
-"""The cost of a fit: whitened residuals, with the structural misfit eliminated, and priors.
+"""The cost of a fit: whitened residuals, with delay and structural misfit eliminated, and priors.
 
 A run's strain and deflection share the load and the pressure that it really had. The deflections
 are therefore taken less what the strain already tells of those, and are then independent of it.
 
 It is taken about one solution of the model: its tangents by the set points give the whitening, its
-strain the misfit's shapes. The misfit's coefficients have a normal prior and enter linearly, so
+strain the shapes of delay and misfit. Their coefficients have a normal prior and enter linearly, so
 they are eliminated exactly.
 """
 
@@ -16,6 +16,7 @@ from scipy import linalg
 
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.campaign import Tolerance
+from tirelib.identify.delay import STD, UNIT, by_delay
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.random_effects import Whitening, scales, tangents, whitening_of
 from tirelib.model.state import Operating
@@ -139,7 +140,7 @@ class Cost:
     prior_std : shape (n_free,)
     whiten : Whitening
     shapes : shape (n_shapes, n_runs, n_phi), [-]
-        Of the structural misfit, each for one standard deviation; none without misfit.
+        Of the delay first, then of the structural misfit, each for one standard deviation.
     white_shapes : shape (n_shapes, n_rows)
         Whitened as `rows` does.
     inner : shape (n_shapes, n_shapes)
@@ -170,9 +171,7 @@ class Cost:
         scale = scales(data.tolerance, data.angle_std)
         tangent = tangents(model.waveform, slopes.waveform[-2], slopes.waveform[-1])
         whiten = whitening_of(tangent, scale, data.noise)
-        shapes = np.zeros((0, *data.strain.shape))
-        if discrepancy is not None:
-            shapes = misfit_shapes(discrepancy, model, data.points, free_radius)
+        shapes = nuisance_shapes(discrepancy, model, data.points, free_radius)
         depth = None
         if data.with_deflection:
             depth = Depth.about(
@@ -180,8 +179,6 @@ class Cost:
             )
         empty = np.zeros((0, 0))
         bare = cls(data, prior_std, whiten, shapes, empty, empty, depth)
-        if not len(shapes):
-            return bare
         flat = bare.rows(shapes, np.zeros(shapes.shape[:2]))
         return replace(
             bare, white_shapes=flat, inner=linalg.cholesky(flat @ flat.T + np.eye(len(flat)))
@@ -211,10 +208,8 @@ class Cost:
         k = self.prior_std.size
         rest = self.rows(*self._rest(model))
         every = np.concatenate([self.rows(slopes.waveform[:k], slopes.deflection[:k]), rest])
-        gram = every @ every.T
-        if len(self.shapes):
-            half = self._eliminate(every)
-            gram = gram - half.T @ half
+        half = self._eliminate(every)
+        gram = every @ every.T - half.T @ half
         weight = 1.0 / self.prior_std**2
         normal = gram[:-1, :-1] + np.diag(weight)
         return normal, gram[:-1, -1] - weight * z, float(gram[-1, -1] + np.sum(weight * z**2))
@@ -222,22 +217,25 @@ class Cost:
     def value(self, model: Whole, z: FloatArray) -> float:
         """Return the cost of a solution at coordinates z."""
         white = self.rows(*self._rest(model))
-        cost = float(np.sum(white**2) + np.sum((z / self.prior_std) ** 2))
-        if len(self.shapes):
-            cost -= float(np.sum(self._eliminate(white) ** 2))
-        return cost
+        taken = np.sum(self._eliminate(white) ** 2)
+        return float(np.sum(white**2) + np.sum((z / self.prior_std) ** 2) - taken)
 
     def misfit(self, model: Whole) -> FloatArray:
         """Return the structural misfit that serves the residual best, (n_runs, n_phi)."""
-        if not len(self.shapes):
-            return np.zeros(self.data.strain.shape)
-        white = self.rows(*self._rest(model))
-        weights = linalg.solve_triangular(self.inner, self._eliminate(white)[:, 0])
-        return np.asarray(np.tensordot(weights, self.shapes, axes=1))
+        return np.asarray(np.tensordot(self._weights(model)[1:], self.shapes[1:], axes=1))
+
+    def delay(self, model: Whole) -> float:
+        """Return the delay that the residual has beside what the data were made earlier by, [s]."""
+        return STD * float(self._weights(model)[0])
 
     def error(self, model: Whole) -> float:
         """Return the rms of the whitened residual of the model alone."""
         return float(np.sqrt(np.mean(self.whiten(self.data.strain - model.waveform) ** 2)))
+
+    def _weights(self, model: Whole) -> FloatArray:
+        """Return the coefficients of the shapes that serve the residual best."""
+        white = self.rows(*self._rest(model))
+        return np.asarray(linalg.solve_triangular(self.inner, self._eliminate(white)[:, 0]))
 
     def _rest(self, model: Whole) -> tuple[FloatArray, FloatArray]:
         """Return measured less model of strain and deflection, as one row each."""
@@ -245,16 +243,22 @@ class Cost:
         return rest[None], (self.data.deflection - model.deflection)[None]
 
     def _eliminate(self, white: FloatArray) -> FloatArray:
-        """Return the part of whitened rows that the misfit takes, as (n_shapes, n_rows)."""
+        """Return the part of whitened rows that delay and misfit take, as (n_shapes, n_rows)."""
         found: FloatArray = linalg.solve_triangular(
             self.inner, self.white_shapes @ white.T, trans="T"
         )
         return found
 
 
-def misfit_shapes(
-    discrepancy: Discrepancy, model: Whole, points: Operating, free_radius: float
+def nuisance_shapes(
+    discrepancy: Discrepancy | None, model: Whole, points: Operating, free_radius: float
 ) -> FloatArray:
-    """Return the shapes of the structural misfit about a solution, (n_shapes, n_runs, n_phi)."""
+    """Return the shapes of delay and misfit about a solution, (n_shapes, n_runs, n_phi).
+
+    Without a discrepancy the delay stands alone.
+    """
+    late = STD / UNIT * by_delay(model.waveform, np.asarray(points.omega))[None]
+    if discrepancy is None:
+        return late
     half = 0.6 * np.sqrt(2.0 * model.deflection / free_radius)
-    return discrepancy.columns(model.waveform, half, points, GRID)
+    return np.concatenate([late, discrepancy.columns(model.waveform, half, points, GRID)])

@@ -49,6 +49,7 @@ def _no_ring(campaign: Campaign, whole: Whole) -> dict[str, Any]:
         "gages": [],
         "noise_ustrain": None,
         "rms_ustrain": None,
+        "delay_us": None,
         "strain_rms_ustrain": None,
         "parameters": [],
         "correlation": [],

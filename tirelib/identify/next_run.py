@@ -20,7 +20,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.errors import TirelibError
 from tirelib.identify.discrepancy import Discrepancy
-from tirelib.identify.fit_cost import misfit_shapes
+from tirelib.identify.fit_cost import nuisance_shapes
 from tirelib.identify.laboratory import Test, laboratory_tests
 from tirelib.identify.random_effects import scales, tangents, whitening_of
 from tirelib.identify.waveform_fit import WaveformFit
@@ -101,8 +101,7 @@ class _State:
         cost, linear = fit.cost, fit.linear
         k = len(fit.free)
         every = cost.rows(linear.waveform_slopes, linear.deflection_slopes)
-        if len(cost.shapes):
-            every = np.concatenate([every, cost.white_shapes])
+        every = np.concatenate([every, cost.white_shapes])
         information = every @ every.T + np.eye(len(every))
         information[:k, :k] += np.diag(1.0 / fit.prior_std**2 - 1.0)
         return cls(information, structure**2)
@@ -245,9 +244,8 @@ def _information(
         data.noise,
     )
     rows = [whiten(slopes.waveform[:k])]
-    if discrepancy is not None:
-        radius = float(np.max(fit.values["free_radius"]))
-        rows.append(whiten(misfit_shapes(discrepancy, model, points, radius)))
+    radius = float(np.max(fit.values["free_radius"]))
+    rows.append(whiten(nuisance_shapes(discrepancy, model, points, radius)))
     each = np.concatenate(rows).reshape(-1, data.strain.shape[1])
     return np.asarray(each @ each.T)
 

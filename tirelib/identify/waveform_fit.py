@@ -1,18 +1,20 @@
 """All runs at once: the base model's parameters from whole strain waveforms.
 
 Gauss-Newton on the cost of `fit_cost`: residuals whitened by noise and set points
-(`random_effects`), the structural misfit as part of the fit (`discrepancy`), priors from the tire
-file, and the measured loaded radius where the rig has it. The interval of a parameter therefore
-holds what noise, set points, structure and the other parameters leave open.
+(`random_effects`), delay of the day (`delay`) and structural misfit (`discrepancy`) as parts of the
+fit, priors from the tire file, and the measured loaded radius where the rig has it. The interval of
+a parameter therefore holds what noise, set points, delay, structure and the other parameters leave
+open.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.errors import ConvergenceError, TirelibError
+from tirelib.identify.delay import earlier
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.fit_cost import Cost, Data
 from tirelib.identify.random_effects import Whitening
@@ -62,15 +64,17 @@ class WaveformFit:
     whiten : Whitening
     misfit : shape (n_runs, n_phi), [-]
         The structural misfit that was fitted.
+    delay : float, [s]
+        Of the gages against the trigger.
     interval : shape (n_free, 2)
         95 % interval of each coordinate, relative to the solution, along the ridge that the other
         coordinates follow.
     quadratic : shape (n_free,)
         Whether the surface is a parabola there, so that the standard deviation tells all.
     error : float, [-]
-        Rms of the whitened residual of the model alone, in noise units.
+        Rms of the whitened residual of the model alone, the delay taken out, in noise units.
     rms : float, [-]
-        Rms of the plain residual of the model alone.
+        Rms of the plain residual of the model alone, the delay taken out.
     steps : int
     cost : Cost
         About the solution.
@@ -83,6 +87,7 @@ class WaveformFit:
     linear: Linear
     whiten: Whitening
     misfit: FloatArray
+    delay: float
     interval: FloatArray
     quadratic: BoolArray
     error: float
@@ -161,6 +166,7 @@ class Solver:
         self.discrepancy, self.exact = discrepancy, exact
         self.start = dict(start)
         self.z = np.zeros(len(free))
+        self.delay = 0.0
         self.damping = 1e-3
         self.slopes: WholeSlopes | None = None
         self.model = self.at(self.z)
@@ -195,11 +201,21 @@ class Solver:
             low_pass=self.data.low_pass,
         )
         if renew:
-            radius = float(np.max(self.start["free_radius"]))
-            self.cost = Cost.about(
-                self.data, self.prior.std, self.discrepancy, radius, self.model, self.slopes
-            )
+            self.renew(self.slopes)
         self.normal, self.gradient, self.height = self.cost.normal(self.model, self.slopes, self.z)
+
+    def renew(self, slopes: WholeSlopes) -> None:
+        """Take the cost about the present solution, after what is known of the delay."""
+        radius = float(np.max(self.start["free_radius"]))
+
+        def about() -> Cost:
+            strain = earlier(self.data.strain, np.asarray(self.data.points.omega), self.delay)
+            data = replace(self.data, strain=strain)
+            return Cost.about(data, self.prior.std, self.discrepancy, radius, self.model, slopes)
+
+        self.cost = about()
+        self.delay += self.cost.delay(self.model)
+        self.cost = about()
 
     def step(self) -> float:
         """Take one step that lowers the cost.
@@ -247,7 +263,9 @@ class Solver:
         k = len(self.free)
         covariance = np.asarray(np.linalg.inv(self.normal), dtype=np.float64)
         interval, quadratic = self.ridges(covariance)
-        rest = self.data.strain - self.model.waveform
+        self.delay += self.cost.delay(self.model)
+        strain = earlier(self.data.strain, np.asarray(self.data.points.omega), self.delay)
+        rest = strain - self.model.waveform
         linear = Linear(
             self.model.waveform,
             self.model.deflection,
@@ -262,9 +280,10 @@ class Solver:
             linear,
             self.cost.whiten,
             self.cost.misfit(self.model),
+            self.delay,
             interval,
             quadratic,
-            self.cost.error(self.model),
+            float(np.sqrt(np.mean(self.cost.whiten(rest) ** 2))),
             float(np.sqrt(np.mean(rest**2))),
             steps,
             self.cost,

@@ -10,6 +10,7 @@ from tirelib.arrays import FloatArray
 from tirelib.errors import ConvergenceError
 from tirelib.identify import waveform_fit
 from tirelib.identify.campaign_data import straight_runs
+from tirelib.identify.delay import earlier
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.waveform_fit import (
     Data,
@@ -248,7 +249,7 @@ def test_the_misfit_that_is_eliminated_is_the_best_one() -> None:
     fit = fit_waveforms(measured, values_of(START), WIDE, free=BARE, discrepancy=Discrepancy())
     cost = fit.cost
     rest = cost.rows(
-        (measured.strain - fit.linear.waveform)[None],
+        (cost.data.strain - fit.linear.waveform)[None],
         (measured.deflection - fit.linear.deflection)[None],
     )[0]
     weights = np.linalg.solve(
@@ -258,7 +259,20 @@ def test_the_misfit_that_is_eliminated_is_the_best_one() -> None:
     explicit = float(left @ left + weights @ weights)
     model = Whole(fit.linear.waveform, fit.linear.deflection, None)
     assert cost.value(model, np.zeros(len(BARE))) == pytest.approx(explicit)
-    assert fit.misfit == pytest.approx(np.tensordot(weights, cost.shapes, axes=1), abs=1e-9)
+    misfit = np.tensordot(weights[1:], cost.shapes[1:], axes=1)
+    assert fit.misfit == pytest.approx(misfit, abs=1e-9)
+
+
+def test_a_late_trigger_is_a_delay_and_moves_no_parameter(fitted: WaveformFit) -> None:
+    """A tenth of a millisecond: seven standard deviations of a run's angle zero."""
+    measured = data()
+    omega = np.asarray(measured.points.omega)
+    late = replace(measured, strain=earlier(measured.strain, omega, -1e-4))
+    fit = plain(late)
+    assert fit.delay - fitted.delay == pytest.approx(1e-4, abs=1e-7)
+    moved = errors(fit) - errors(fitted)
+    assert np.abs(moved / np.sqrt(np.diag(fit.covariance))).max() < 0.05
+    assert fit.error == pytest.approx(fitted.error, abs=0.005)
 
 
 def test_a_tire_with_damping_is_fitted_as_one() -> None:
