@@ -166,7 +166,7 @@ static int window_of(Cutter *c, Turn *turn, double sigma) {
 /* Offset at the contact, its std, and how it moved since the turn before; keeps what was read.
  * Reference: TurnCutter._offset */
 static void follow_offset(Cutter *c, const double *opposite, Turn *turn, double *moved) {
-    Opposite now;
+    Opposite now = {0};
     now.time = law_sample(&c->law, -PI);
     for (int g = 0; g < c->gages; g++) {
         double follow = 0.0, left = 0.0;

@@ -95,6 +95,15 @@ def compiled(folder: Path, *flags: str) -> c.CDLL:
     core.estimate_scratch.argtypes = [c.c_void_p]
     core.estimate.restype = None
     core.estimate.argtypes = [c.c_void_p] * 5
+    core.wheel_size.restype = core.state_size.restype = c.c_size_t
+    core.wheel_size.argtypes = [c.c_void_p, REAL]
+    core.wheel_start.restype = c.c_void_p
+    core.wheel_start.argtypes = [c.c_void_p, c.c_void_p, REAL, c.c_int, c.c_int]
+    core.wheel_step.argtypes = [c.c_void_p, c.c_void_p, REAL, c.c_int, c.c_void_p, c.c_int]
+    core.wheel_outputs.restype = core.state_save.restype = None
+    core.wheel_outputs.argtypes = core.state_save.argtypes = [c.c_void_p, c.c_void_p]
+    core.state_size.argtypes = [c.c_void_p]
+    core.state_restore.argtypes = [c.c_void_p, c.c_char_p, c.c_size_t]
     core.median.restype = REAL
     core.median.argtypes = [c.c_void_p, c.c_size_t]
     return core

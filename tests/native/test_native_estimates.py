@@ -55,10 +55,12 @@ def observed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Calibration, Fea
     campaign = read_campaign(write(tmp_path_factory.mktemp("native") / "rich", runs))
     found = observe([campaign])
     known = train(found).calibration
-    chains = {
-        missing: replace(chain, moment=MOMENT, road=replace(chain.road, friction=(0.8, 0.9)))
-        for missing, chain in known.chains.items()
-    }
+    chains = {}
+    for missing, chain in known.chains.items():
+        assert chain.sliding is not None
+        curve = replace(chain.sliding, misfit=0.01)
+        road = replace(chain.road, friction=(0.6, 0.9))
+        chains[missing] = replace(chain, moment=MOMENT, road=road, sliding=curve)
     return replace(known, chains=chains), found.features
 
 
