@@ -178,7 +178,7 @@ def test_a_chunk_of_many_small_records_takes_little_memory(
     packed: CompressionType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = made(tmp_path / "a.mcap", packed=packed, event="{}", times=15_000)  # 0.5 MB
-    monkeypatch.setattr(records, "LARGEST", 2**20)
+    monkeypatch.setattr(records, "LARGEST_RECORD", 2**20)
     tracemalloc.start()
     try:
         with path.open("rb") as file:
@@ -246,7 +246,7 @@ def test_a_chunk_that_lies_is_refused(
     said: str,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(records, "LARGEST", 2**20)
+    monkeypatch.setattr(records, "LARGEST_RECORD", 2**20)
     with pytest.raises(RecordingError, match=said):
         list(records.records(chunks(count, packed, change)))
 
@@ -257,7 +257,7 @@ def test_chunks_that_unpack_to_much_more_than_the_file_are_refused(
     def same(_: Chunk) -> None:
         pass
 
-    monkeypatch.setattr(records, "LARGEST", 2**20)
+    monkeypatch.setattr(records, "LARGEST_RECORD", 2**20)
     few, many = chunks(3, ZSTD, same), chunks(8, ZSTD, same)
     with pytest.raises(EndOfFile):  # they have no footer
         list(records.records(few))

@@ -26,7 +26,7 @@ from tirebench.live.run_alarms import DECODED_AGAIN, RECORDED_AGAIN, TOO_BUSY, R
 from tirebench.page.alarms import RULES, Alarms, Rule, event_of, read_alarms
 from tirebench.page.condition_lines import in_use
 from tirebench.page.feed import About, Feed, vitals
-from tirebench.page.recent import SPAN, Recent
+from tirebench.page.recent import WINDOW_SECONDS, Recent
 from tirebench.page.terminal import alarms as alarm_lines
 from tirebench.page.terminal import in_use_line
 from tirebench.protocols import layouts
@@ -126,7 +126,7 @@ def test_rate_and_loss_are_those_of_the_last_seconds() -> None:
     assert seen[40]["rate_percent"] == pytest.approx(90.0)
     assert seen[40]["loss_percent"] == pytest.approx(10.0)
     assert seen[40]["invalid_percent"] == pytest.approx(100.0 / 3.0)
-    assert len(recent._seen) == round(SPAN / 0.25) + 1
+    assert len(recent._seen) == round(WINDOW_SECONDS / 0.25) + 1
 
 
 def test_what_a_wheel_says_of_itself_reaches_the_page() -> None:

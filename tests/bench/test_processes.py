@@ -416,8 +416,8 @@ def test_a_start_that_takes_long_says_what_is_awaited(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Nothing was started, so nothing gets ready."""
-    monkeypatch.setattr("tirebench.live.chain.SAY", 0.0)
-    monkeypatch.setattr("tirebench.live.chain.START", 0.0)
+    monkeypatch.setattr("tirebench.live.chain.FIRST_REPORT_AFTER", 0.0)
+    monkeypatch.setattr("tirebench.live.chain.START_TIME_LIMIT", 0.0)
     said: list[str] = []
     chain = LiveChain(plan_of("p", None, tmp_path / "a.mcap"), said.append)
     chain._estimators.kept = dict.fromkeys(range(3), cast(Any, SimpleNamespace(starts=1, look=int)))

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.synthetic import frames as cuts
-from tirebench.protocols.slcan import LONGEST, SlcanDecoder, encode
+from tirebench.protocols.slcan import LONGEST_LINE, SlcanDecoder, encode
 from tirebench.wire.can_batch import CanBatch, joined, same_kind
 from tirebench.wire.frames import Frames
 from tirebench.wire.line_counts import LineCounts
@@ -107,7 +107,7 @@ def test_a_line_without_end_fills_no_memory() -> None:
     reader = decoder()
     for _ in range(100):
         reader.frames_of(b"t" * 10_000)
-    assert len(reader._tail) <= LONGEST
+    assert len(reader._tail) <= LONGEST_LINE
 
 
 @given(st.binary(max_size=3000))

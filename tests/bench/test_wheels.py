@@ -11,7 +11,7 @@ from tirebench.cli.live import counters
 from tirebench.emulator.emulator import Player, record_tape
 from tirebench.emulator.faults import Faults, parse_faults
 from tirebench.estimator.chain import Outputs
-from tirebench.estimator.wheels import MOST, Wheels
+from tirebench.estimator.wheels import MOST_WHEELS, Wheels
 from tirebench.protocols import SERIAL
 from tirebench.protocols.plan import ProtocolPlan
 from tirebench.protocols.transmitter import transmitter
@@ -91,7 +91,7 @@ def test_each_wheel_has_its_own_estimator_device_and_counters() -> None:
 def test_no_more_wheels_than_can_be_afforded_unless_they_are_named() -> None:
     numbers = (3, 4, 5, 6, 7, 8)
     wheels, made = played(numbers)
-    assert sorted(made) == [3, 4, 5, 6][:MOST]
+    assert sorted(made) == [3, 4, 5, 6][:MOST_WHEELS]
     assert wheels.ignored > 500
     assert sorted(played(numbers, (8, 3))[1]) == [3, 8]
 

@@ -222,7 +222,7 @@ WRONG = {
     ),
     "infinite": (["--load", "inf"], "inf N"),
     "damping": (["--load", "4000", "--damping", "-0.1"], "damping = -0.1"),
-    "lists": (["--load", "1000,2000", "--speed", "1,2,3"], "2 values beside 3"),
+    "lists": (["--load", "1000,2000", "--speed", "1,2,3"], "2 values where the longest list has 3"),
     "contact": (["--load", "4000", "--contact", "magic"], "'radial', 'shear'"),
 }
 

@@ -229,7 +229,9 @@ def test_the_bundle_is_named_by_its_content_and_holds_the_core_only() -> None:
 def test_a_module_that_needs_more_than_numpy_and_scipy_is_refused(tmp_path: Path) -> None:
     slave = tmp_path / "slave.py"
     slave.write_text("import pandas\n")
-    with pytest.raises(FormatError, match=r"slave\.py: imports pandas; an FMU has numpy and scipy"):
+    with pytest.raises(
+        FormatError, match=r"slave\.py: imports pandas; an FMU may import numpy and scipy"
+    ):
         collect(slave)
 
 
@@ -299,5 +301,5 @@ def test_bad_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match="cannot be read"):
         build_fmu(tmp_path / "none.toml", tmp_path / "x.fmu")
     (tmp_path / "no.fmu").write_text("nothing")
-    with pytest.raises(FormatError, match="is no FMU made by"):
+    with pytest.raises(FormatError, match="is not an FMU made by"):
         embedded_calibration(tmp_path / "no.fmu")

@@ -73,7 +73,7 @@ def test_what_was_built_passes_and_leaves_a_page_and_json(
     file = live.fmu_file(samples, buffered=buffered)
     code, told = run(str(file), "--json", str(tmp_path / "c.json"), "--out", str(tmp_path / "p"))
     assert code == 0, told
-    assert "Passed: it validates, runs, and gives what its reference signals expect." in told
+    assert "Passed: the FMU is valid, runs, and reproduces its reference signals." in told
     found = json.loads((tmp_path / "c.json").read_text())
     assert (found["format"], found["passed"], found["compared"]) == (
         "tirelib-fmu-check/1",
@@ -144,7 +144,7 @@ def test_an_fmu_of_ours_without_its_reference_fails(tmp_path: Path) -> None:
     path = changed(tmp_path / "x.fmu", lambda n, d: None if "reference" in n else d)
     document = check_fmu(path)
     assert not document["passed"]
-    assert "are missing; build the FMU anew" in parts(document)["reference"][1]
+    assert "are missing; build the FMU again" in parts(document)["reference"][1]
 
 
 def test_a_broken_description_and_a_broken_slave_are_named(tmp_path: Path) -> None:
@@ -171,7 +171,7 @@ def test_a_path_that_leads_outside_is_never_unpacked(tmp_path: Path, name: str) 
 def test_an_archive_that_unpacks_to_too_much_is_never_unpacked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(checking, "LARGEST", 1_000_000)
+    monkeypatch.setattr(checking, "LARGEST_UNPACKED", 1_000_000)
     found = parts(check_fmu(live.fmu_file(10)))
     assert "it would unpack to" in found["archive"][1]
     assert len(found) == 1
@@ -194,8 +194,8 @@ def test_what_is_no_fmu_is_bad_input(tmp_path: Path) -> None:
         archive.writestr("readme.txt", "a zip")
     for name, cause in (
         ("none", "cannot be read"),
-        ("text", "is no FMU"),
-        ("cut", "is cut short or damaged"),
+        ("text", "is not an FMU"),
+        ("cut", "is truncated or damaged"),
         ("zip", "without modelDescription.xml"),
     ):
         with pytest.raises(FormatError, match=cause):
@@ -229,7 +229,7 @@ def test_a_foreign_fmu_is_validated_and_run_and_compared_where_it_can_be(tmp_pat
     file = foreign(tmp_path, "self.y = current_time + step_size")
     code, told = run(str(file))
     assert code == 0, told
-    assert "Passed as far as it goes" in told
+    assert "Passed without reference" in told
     signals = tmp_path / "signals"
     signals.mkdir()
     (signals / "Foreign_in.csv").write_text('"time"\n0\n0.1\n')

@@ -134,7 +134,7 @@ def test_frames_longer_than_a_turn_are_an_error_not_a_lost_turn(tmp_path: Path) 
 
 def test_a_file_that_is_no_fmu_is_refused(tmp_path: Path) -> None:
     (tmp_path / "no.fmu").write_text("nothing")
-    with pytest.raises(FormatError, match="is no FMU"):
+    with pytest.raises(FormatError, match="is not an FMU"):
         LoadedFmu(tmp_path / "no.fmu")
 
 

@@ -192,7 +192,9 @@ def without(path: Path, change: str, text: bytes) -> Path:
     return path
 
 
-@pytest.mark.parametrize(("text", "cause"), [(b"", "No such file"), (b"PK\3\4", "is no surface")])
+@pytest.mark.parametrize(
+    ("text", "cause"), [(b"", "No such file"), (b"PK\3\4", "is not the response surface")]
+)
 def test_a_surface_that_is_missing_or_damaged_fails_the_instance_and_says_why(
     tmp_path: Path, text: bytes, cause: str
 ) -> None:

@@ -356,7 +356,7 @@ def test_a_refused_parameter_is_an_error_of_the_importer_not_its_end(ten: Host) 
 def test_a_damaged_surface_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "bad.npz"
     path.write_bytes(default_surface().read_bytes()[:5000])
-    with pytest.raises(FormatError, match="is no surface of a virtual tire"):
+    with pytest.raises(FormatError, match="is not the response surface of a virtual tire"):
         build_virtual(tmp_path / "x.fmu", surface=path)
     with pytest.raises(ParameterError, match="samples per step = 0"):
         build_virtual(tmp_path / "x.fmu", samples_per_step=0)

@@ -233,10 +233,13 @@ def _check(
     if unknown:
         raise ParameterError(f"held {', '.join(unknown)}; allowed are {', '.join(NAMES)}")
     if not 1.0 <= held.get("C", 1.0) <= 2.0:
-        raise ParameterError(f"C held at {held['C']}; allowed is 1 .. 2, where D is the peak")
+        raise ParameterError(
+            f"C held at {held['C']}; allowed is 1 .. 2, because only there D is the peak"
+        )
     if alpha.ndim != 1 or alpha.shape != force.shape:
         raise ParameterError(
-            f"slip_angle has shape {alpha.shape}, Fy {force.shape}; both need one axis, as long"
+            f"slip_angle has shape {alpha.shape}, Fy {force.shape}; both must be one-dimensional "
+            "and of the same length"
         )
     if not np.all(np.isfinite(alpha) & np.isfinite(force)):
         raise ParameterError("a slip angle or a force is not finite; leave such samples out")

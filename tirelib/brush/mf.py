@@ -31,6 +31,7 @@ def magic_forces(
         )
     if pressure is not None:
         raise ParameterError(
-            f"fit type {tire.fit_type} knows no pressure; leave it out or use an MF 6.1 file"
+            f"fit type {tire.fit_type} has no pressure terms; leave the pressure out or use an MF "
+            "6.1 file"
         )
     return magic_forces_5(tire, load, slip_angle, slip_ratio, camber, combined=combined)

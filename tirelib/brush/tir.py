@@ -179,8 +179,8 @@ def parse_tir(text: str, where: str = "tir") -> TirFile:
     preamble, sections = _structure(text, problems)
     if not sections:
         raise FormatError(
-            f"{where}: no [SECTION] in {len(text.splitlines())} lines; this is no .tir file; give "
-            "another one"
+            f"{where}: no [SECTION] in {len(text.splitlines())} lines; this is not a .tir file; "
+            "give another one"
         )
     factors = _factors(sections, problems)
     _check_values(sections, problems)
@@ -260,8 +260,8 @@ def _structure(text: str, problems: list[str]) -> tuple[list[TirLine], list[TirS
             bodies[-1].append(TirLine(raw))
         else:
             problems.append(
-                f"line {number}: {line!r} is no KEY = value, comment, [SECTION] or table row; "
-                "correct it or mark it with !"
+                f"line {number}: {line!r} is not a KEY = value, a comment, a [SECTION] or a table "
+                "row; correct it or make it a comment with !"
             )
     sections = [
         TirSection(name, tuple(body), comment)
@@ -273,7 +273,7 @@ def _structure(text: str, problems: list[str]) -> tuple[list[TirLine], list[TirS
 def _entry(line: str, number: int, problems: list[str]) -> TirEntry | None:
     key, rest = (part.strip() for part in line.split("=", 1))
     if not _KEY.fullmatch(key):
-        problems.append(f"line {number}: key {key!r} is no word of letters, digits, _ . - /")
+        problems.append(f"line {number}: key {key!r} is not a word of letters, digits, _ . - /")
         return None
     quote = rest[:1]
     if quote in ("'", '"'):

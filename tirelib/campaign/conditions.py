@@ -12,7 +12,7 @@ from tirelib.arrays import FloatArray
 from tirelib.campaign.model import Run
 from tirelib.held import HELD
 
-LATE = 3.0
+LONGEST_HOLD = 3.0
 """Rig samples after which the last one is no longer held: itself, one that is lost and one of
 jitter. With half of it the end of a run is unknown where a sample is lost; with double what nobody
 measured is held for 60 ms at 100 Hz."""
@@ -54,4 +54,4 @@ def _held(run: Run, name: str, times: FloatArray) -> FloatArray:
 def _end(rig_time: FloatArray) -> float:
     """Return the time until which the last measurement is held; infinite for a single one."""
     step = float(np.median(np.diff(rig_time))) if rig_time.size > 1 else np.inf
-    return float(rig_time[-1]) + LATE * step
+    return float(rig_time[-1]) + LONGEST_HOLD * step

@@ -5,9 +5,9 @@ from typing import Any
 
 from tirelib.estimators.calibration import Calibration
 
-WORTH = 1.2
+REPORTED_STD_RATIO = 1.2
 """Ratio of standard deviations from which an unknown condition is worth a word."""
-LOST = 0.05
+REPORTED_LOSS = 0.05
 """Share of turns lost to it from which that is worth one."""
 
 
@@ -19,7 +19,9 @@ def not_given(rows: Sequence[Mapping[str, Any]]) -> str:
     rows : sequence of mappings
         ``not_given`` of an estimate or calibration document, the dearest first.
     """
-    dear = [r for r in rows if r["std"] is None or r["std"] > WORTH * r["std_if_given"]]
+    dear = [
+        r for r in rows if r["std"] is None or r["std"] > REPORTED_STD_RATIO * r["std_if_given"]
+    ]
     if not dear:
         return ""
     first = dear[0]["condition"]
@@ -38,7 +40,7 @@ def _cost(row: Mapping[str, Any]) -> str:
     unit = "" if row["unit"] == "1" else f" {row['unit']}"
     now = "unknown" if row["std"] is None else f"{row['std']:.3g}{unit}"
     lost = ""
-    if row["valid"] < row["valid_if_given"] - LOST:
+    if row["valid"] < row["valid_if_given"] - REPORTED_LOSS:
         lost = f" and valid in {row['valid']:.0%} instead of {row['valid_if_given']:.0%} of turns"
     return f"{row['quantity']} is {now} instead of {row['std_if_given']:.3g}{unit}{lost}"
 

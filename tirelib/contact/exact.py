@@ -44,9 +44,9 @@ MAX_ITERATIONS = 60
 TOLERANCE = 5e-13
 """Last step, [m]: so small that the strain of a point does not tell which points were solved
 beside it; round-off is ten thousand times less."""
-NEAR = 3e-4
+MATRIX_KEPT_BELOW = 3e-4
 """Step below which the next one keeps the matrix, [m]."""
-SLOW = 0.5
+SLOW_CONVERGENCE = 0.5
 """Share of the step before, above which it is renewed all the same."""
 CHUNK = 8
 _WHERE = "exact contact"
@@ -265,7 +265,9 @@ def _newton(
     iterations, before = 0, np.inf
     reach = np.full(loads.size, np.inf)
     while reach.max() >= TOLERANCE and iterations < MAX_ITERATIONS:
-        short = iterations == 0 or bool(reach.max() < min(NEAR, SLOW * before))
+        short = iterations == 0 or bool(
+            reach.max() < min(MATRIX_KEPT_BELOW, SLOW_CONVERGENCE * before)
+        )
         if matrix is None or not short:
             matrix = np.asarray(np.linalg.inv(energy.jacobian(x, d0, k)), dtype=np.float64)
         iterations, before = iterations + 1, float(reach.max())

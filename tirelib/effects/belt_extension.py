@@ -2,7 +2,7 @@
 
 from tirelib.effects.effect import State, effect
 
-LEAST = 1e-6
+LEAST_STRENGTH = 1e-6
 """Strength below which it is none: beyond 1e12 N the stiffness would drown in round-off."""
 
 
@@ -20,6 +20,6 @@ def belt_extension(state: State, strength: float) -> State:
 
     1 / EA + s: zero keeps the inextensible ring exactly.
     """
-    if abs(strength) < LEAST:
+    if abs(strength) < LEAST_STRENGTH:
         return state
     return state.but(EA=1.0 / (1.0 / state.EA + 1e-6 * strength))

@@ -5,7 +5,7 @@ import numpy as np
 from tirelib.effects.effect import State, effect
 from tirelib.errors import ParameterError
 
-LEAST = 1e-9
+LEAST_STRENGTH = 1e-9
 """Strength below which it is none: beyond 1e12 N the stiffness would drown in round-off."""
 
 
@@ -26,7 +26,7 @@ def belt_shear(state: State, strength: float) -> State:
     size from their shear stiffness: the compliance is 1 / (1 / s - N), larger the harder the tire
     is blown up and the faster it rolls. Zero keeps the Bernoulli-Euler ring exactly.
     """
-    if abs(strength) < LEAST:
+    if abs(strength) < LEAST_STRENGTH:
         return state
     left = 1e3 / strength - state.belt_tension
     if np.sign(strength) * np.min(left) <= 0.0:

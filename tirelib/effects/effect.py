@@ -173,7 +173,7 @@ class Effect:
         given = 1 if np.ndim(strength) == 0 else len(strength)  # type: ignore[arg-type]
         if given != self.components:
             raise ParameterError(
-                f"effect {self.name!r}: a strength of {given} numbers, {strength!r}; "
+                f"effect {self.name!r}: the strength has {given} numbers, {strength!r}; "
                 f"{self.components} are needed, in {self.unit}"
             )
         return self.hook, lambda state: self._change(state, strength)

@@ -58,8 +58,8 @@ def all_effects(
             if effect.name in found:
                 first = found[effect.name].origin
                 problems.append(
-                    f"{label}: effect {effect.name!r} ({effect.origin}) has the name of another "
-                    f"({first}); names are unique: choose one that nobody has"
+                    f"{label}: effect {effect.name!r} ({effect.origin}) has the same name as "
+                    f"another effect ({first}); names must be unique; choose another name"
                 )
             else:
                 found[effect.name] = effect
@@ -111,7 +111,7 @@ def _listed(source: object, label: str) -> list[Effect]:
     found = {id(m): m for m in members if isinstance(m, Effect) and id(m) not in own}
     if not found:
         raise FormatError(
-            f"{label}: holds no effect; a law under the decorator @effect(...) of "
+            f"{label}: holds no effect; a function with the decorator @effect(...) of "
             f"tirelib.effects is needed ({_EXAMPLE})"
         )
     return list(found.values())

@@ -176,8 +176,8 @@ def _check_writable(target: Path) -> None:
         raise _unwritable(target, error) from None
     if target.suffix.lower() != ".fmu":
         raise FormatError(
-            f"{target}: ends in {target.suffix!r}; allowed is .fmu, by which importers know an "
-            "FMU; choose another name"
+            f"{target}: ends in {target.suffix!r}; allowed is .fmu, the ending that importers "
+            "expect; choose another name"
         )
 
 
@@ -191,7 +191,8 @@ def _pythonfmu() -> str:
         return metadata.version("pythonfmu")
     except metadata.PackageNotFoundError:
         raise FormatError(
-            "fmu build: pythonfmu is not installed; it writes the FMU; `pip install tirelib[fmu]`"
+            "fmu build: the package pythonfmu, which writes the FMU, is not installed; install it "
+            "with pip install 'tirelib[fmu]'"
         ) from None
 
 
@@ -303,5 +304,5 @@ def embedded_calibration(fmu: str | Path) -> Calibration:
             return read_calibration(Path(folder) / "calibration.toml")
     except (OSError, KeyError, zipfile.BadZipFile) as error:
         raise FormatError(
-            f"{fmu}: is no FMU made by `tirelib fmu build` ({error}); build it anew"
+            f"{fmu}: is not an FMU made by `tirelib fmu build` ({error}); build it again"
         ) from None

@@ -97,8 +97,8 @@ def _imports(source: str, where: str) -> set[str]:
     strange = other - ALLOWED - {BROUGHT} - sys.stdlib_module_names
     if strange:
         raise FormatError(
-            f"{where}: imports {', '.join(sorted(strange))}; an FMU has numpy and scipy only; "
-            "keep it out of the modules that tirelib.fmu.wheel needs"
+            f"{where}: imports {', '.join(sorted(strange))}; an FMU may import numpy and scipy "
+            "only; keep other packages out of the modules that tirelib.fmu.wheel needs"
         )
     root = Path(__file__).parents[1]
     return {name for name in own if name != PACKAGE and _module_file(root, name).is_file()}

@@ -27,7 +27,7 @@ from tirelib.errors import FormatError
 from tirelib.fmu.reference import FOLDER, TOLERANCE
 
 FORMAT = "tirelib-fmu-check/1"
-LARGEST = 2_000_000_000
+LARGEST_UNPACKED = 2_000_000_000
 """Bytes that an FMU may unpack to."""
 MOST_FILES = 20_000
 TIME_LIMIT = 600.0
@@ -67,7 +67,8 @@ def check_fmu(
     names = _archive(path)
     if importlib.util.find_spec("fmpy") is None:
         raise FormatError(
-            "fmu check: fmpy is not installed; it runs the FMU; `pip install tirelib[fmu]`"
+            "fmu check: the package fmpy, which runs the FMU, is not installed; install it with "
+            "pip install 'tirelib[fmu]'"
         )
     own = "resources/settings.json" in names and "resources/slavemodule.txt" in names
     document: dict[str, Any] = {
@@ -125,21 +126,23 @@ def _archive(path: Path) -> list[str]:
         with zipfile.ZipFile(path) as archive:
             names = archive.namelist()
     except OSError as error:
-        raise FormatError(f"{path}: cannot be read ({error.strerror}); give an FMU") from None
+        raise FormatError(
+            f"{path}: cannot be read ({error.strerror}); an FMU is needed; check the path"
+        ) from None
     except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:
         with path.open("rb") as file:
             if file.read(4) == b"PK\x03\x04":
                 raise FormatError(
-                    f"{path}: is cut short or damaged (it begins as a zip archive, but: {error}); "
-                    "an FMU is whole; copy it once more, or build it anew"
+                    f"{path}: is truncated or damaged (it begins as a zip archive, but: {error}); "
+                    "a complete FMU is needed; copy it again, or build it again"
                 ) from None
         raise FormatError(
-            f"{path}: is no FMU ({error}); an FMU is a zip archive; build one with "
-            "`tirelib fmu build`"
+            f"{path}: is not an FMU ({error}); an FMU is a zip archive; build one with `tirelib "
+            "fmu build`"
         ) from None
     if "modelDescription.xml" not in names:
         raise FormatError(
-            f"{path}: is no FMU (a zip archive without modelDescription.xml); build one with "
+            f"{path}: is not an FMU (a zip archive without modelDescription.xml); build one with "
             "`tirelib fmu build`"
         )
     return names
@@ -150,17 +153,17 @@ def _damage(path: Path) -> str:
     with zipfile.ZipFile(path) as archive:
         entries = archive.infolist()
         size = sum(entry.file_size for entry in entries)
-        if len(entries) > MOST_FILES or size > LARGEST:
+        if len(entries) > MOST_FILES or size > LARGEST_UNPACKED:
             return (
                 f"it would unpack to {len(entries)} files and {size / 1e6:.0f} MB; allowed are "
-                f"{MOST_FILES} and {LARGEST / 1e6:.0f} MB"
+                f"{MOST_FILES} and {LARGEST_UNPACKED / 1e6:.0f} MB"
             )
         for entry in entries:
             parts = entry.filename.replace("\\", "/").split("/")
             if ".." in parts or parts[0] == "" or ":" in parts[0] or "\\" in entry.filename:
                 return f"{entry.filename!r} would be written outside the folder of the FMU"
         if len({entry.filename for entry in entries}) != len(entries):
-            return "a name stands in the archive twice"
+            return "a name occurs twice in the archive"
         try:
             broken = archive.testzip()
         except (
@@ -211,7 +214,7 @@ def _try(path: Path, folder: Path, document: dict[str, Any]) -> None:
             last = told.stderr.decode("utf-8", "replace").strip().splitlines()[-1:]
             end = f"its process ended with code {told.returncode}: {' '.join(last)}"
     except subprocess.TimeoutExpired:
-        end = f"it did not end within {TIME_LIMIT:g} s"
+        end = f"the run did not end within {TIME_LIMIT:g} s"
     found: dict[str, Any] = {}
     if (folder / "trial.json").is_file():
         found = json.loads((folder / "trial.json").read_text())
@@ -245,12 +248,12 @@ def _compare(path: Path, folder: Path, document: dict[str, Any], names: list[str
                 document,
                 "reference",
                 False,
-                "the reference signals that `tirelib fmu build` "
-                "puts inside are missing; build the FMU anew",
+                "the reference signals that `tirelib fmu build` embeds are missing; build the FMU "
+                "again",
             )
         return
     if not passed.get("run") or not (folder / "result.csv").is_file():
-        _add(document, "reference", False, "not compared: the run failed")
+        _add(document, "reference", False, "not compared, because the run failed")
         return
     try:
         head, wanted = _table(text)
@@ -268,9 +271,9 @@ def _compare(path: Path, folder: Path, document: dict[str, Any], names: list[str
         document,
         "reference",
         not bad,
-        f"{', '.join(bad[:8])} differ from what is expected"
+        f"{', '.join(bad[:8])} differ from the reference signals"
         if bad
-        else f"{len(rows)} outputs at {len(wanted)} points as expected",
+        else f"{len(rows)} outputs at {len(wanted)} points agree with the reference signals",
     )
 
 
@@ -297,7 +300,9 @@ def _differences(
 ) -> list[dict[str, Any]]:
     """Return a row for each expected output; a NaN must meet a NaN."""
     if given.shape[0] != wanted.shape[0]:
-        raise ValueError(f"{wanted.shape[0]} points are expected, {given.shape[0]} were reached")
+        raise ValueError(
+            f"the reference has {wanted.shape[0]} points, but the run reached {given.shape[0]}"
+        )
     rows = []
     for column, name in enumerate(head[1:], start=1):
         a, b = wanted[:, column], given[:, shown.index(name)]

@@ -30,14 +30,14 @@ UNITS: Mapping[str, tuple[dict[str, str], dict[str, float]]] = {
 """Exponents of the base units, and factors of the display units, of every unit in use."""
 TYPES: Mapping[str, tuple[str, str | None, str]] = {
     "Strain": ("1", "ustrain", "strain, positive in tension"),
-    "StrainRate": ("1/s", "ustrain/s", "strain per time"),
+    "StrainRate": ("1/s", "ustrain/s", "strain rate"),
     "Force": ("N", "kN", "force"),
     "Moment": ("N m", "kN m", "moment"),
     "Angle": ("rad", "deg", "angle"),
-    "Ratio": ("1", None, "number without unit"),
+    "Ratio": ("1", None, "dimensionless number"),
     "Length": ("m", "mm", "length"),
-    "Speed": ("m/s", "km/h", "speed of travel"),
-    "Pressure": ("Pa", "bar", "pressure above that of the air"),
+    "Speed": ("m/s", "km/h", "travel speed"),
+    "Pressure": ("Pa", "bar", "gauge pressure"),
     "TurnRate": ("rad/s", "rpm", "turn rate"),
     "Time": ("s", "ms", "time"),
     "Frequency": ("Hz", "kHz", "frequency"),

@@ -38,7 +38,10 @@ class Journal:
         if self._full:
             return None
         self._full = True
-        return f"{MOST_CAUSES} different causes were told; further ones are not, until a reset"
+        return (
+            f"{MOST_CAUSES} different causes were reported; further causes are not reported until "
+            "a reset"
+        )
 
 
 def _is_power_of_ten(count: int) -> bool:

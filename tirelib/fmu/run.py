@@ -62,8 +62,8 @@ class LoadedFmu:
             from fmpy.fmi2 import FMU2Slave
         except ModuleNotFoundError as error:
             raise FormatError(
-                f"fmu run: {error.name} is not installed; it steps the FMU; "
-                "`pip install tirelib[fmu]`"
+                f"fmu run: the package {error.name}, which steps the FMU, is not installed; "
+                "install it with pip install 'tirelib[fmu]'"
             ) from None
         self.path = Path(path)
         self.calibration = embedded_calibration(path)
@@ -71,7 +71,7 @@ class LoadedFmu:
         try:
             description = read_model_description(str(path))
         except Exception as error:  # FMPy raises bare exceptions
-            raise FormatError(f"{path}: is no FMU ({error}); build it anew") from None
+            raise FormatError(f"{path}: is not an FMU ({error}); build it again") from None
         self.references = {v.name: v.valueReference for v in description.modelVariables}
         strains = [name for name in self.references if name.startswith("strain_")]
         self.samples = len(strains) // len(self.calibration.lateral)
@@ -200,7 +200,7 @@ def play_run(fmu: LoadedFmu, run: Run) -> Iterator[dict[str, Any]]:
         if now > turns + 1:
             raise FormatError(
                 f"run {run.plan.run}: {now - turns} turns end within one frame of {fmu.samples} "
-                f"samples at {run.rate:g} Hz; build the FMU with fewer samples a step"
+                f"samples at {run.rate:g} Hz; build the FMU with fewer samples per step"
             )
         turns = now
         values = fmu.read()
@@ -249,8 +249,8 @@ def play_campaign(
             progress(f"{header.name} run {run.plan.run}")
     if not rows:
         raise CalibrationError(
-            f"{header.name}: no contact was found in any run; look at the strain with "
-            "`tirelib campaign show`"
+            f"{header.name}: no contact was found in any run; view the strain with `tirelib "
+            "campaign show`"
         )
     plans = [row["plan"] for row in rows]
     observations = Observations(

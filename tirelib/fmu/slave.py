@@ -161,8 +161,8 @@ class GuardedSlave:
         if not self._settable.issuperset(references):
             names = [self._variables[r].name for r in references if r not in self._settable]
             raise ParameterError(
-                f"{', '.join(names)}: cannot be set now; inputs may be set at any time, parameters "
-                "before initialisation, outputs never"
+                f"{', '.join(names)}: cannot be set now; inputs can be set at any time, parameters "
+                "before initialisation only, outputs never"
             )
 
     def _named(self, vrs: Iterable[int], kind: str) -> list[Variable]:
@@ -335,7 +335,7 @@ class GuardedSlave:
     @guarded
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
         if "real" not in state or len(state["real"]) != len(self.real):
-            raise FormatError("the bytes are no state of this FMU; save it anew")
+            raise FormatError("the bytes are not a saved state of this FMU; save the state again")
         self.real[:] = [None if value is None else float.fromhex(value) for value in state["real"]]
         self.other.update(state["other"])
         self._allow(self._inputs | self._fixed)

@@ -36,7 +36,7 @@ BREATH = 0.01
 PHASE = 0.7
 TILT = 0.02
 """Relative growth of a made-up contact from the centre to the outermost gage."""
-SLOW = 0.01
+LARGEST_ANGLE_STEP = 0.01
 """Largest wheel angle between two samples, [rad]."""
 _PASSES = 4
 
@@ -140,7 +140,7 @@ def _middle(calibration: Calibration, name: str, otherwise: float) -> float:
 
 def _measured(turn: ReferenceTurn, rate: float) -> _Scene:
     """Return the measured turn, again and again; slowed down where the rate asks for it."""
-    slow = min(1.0, SLOW * rate / turn.omega)
+    slow = min(1.0, LARGEST_ANGLE_STEP * rate / turn.omega)
 
     def strain(angle: FloatArray) -> FloatArray:
         return turn.at(angle + BREATH * np.sin(0.5 * angle + PHASE) * np.sin(angle))
@@ -171,7 +171,7 @@ def _made_up(calibration: Calibration, rate: float) -> _Scene:
     speed = _middle(calibration, "speed", 20.0)
     pressure = _middle(calibration, "pressure", 2.2e5)
     shape = _Shape(0.5 * angle, compression * tension, tension, -0.5 * traction / compression)
-    omega = min(speed / 0.3, SLOW * rate)
+    omega = min(speed / 0.3, LARGEST_ANGLE_STEP * rate)
 
     def scene() -> _Scene:
         return _Scene(

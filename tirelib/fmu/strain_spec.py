@@ -153,9 +153,9 @@ def _accuracy(document: Mapping[str, Any]) -> str:
         return "<p>The calibration holds no statistics.</p>"
     head = ("quantity", "cross-validated error (rms)", "R2", "runs", "conditions")
     return (
-        f"{html_table(head, rows)}\n<p>Of the calibration, made on: {_plain(data)}. In use, every "
-        "estimate carries its own standard deviation; steady parts of a manoeuvre only: an "
-        "estimate is one turn of the wheel.</p>"
+        f"{html_table(head, rows)}\n<p>These are the errors of the calibration, made on: "
+        f"{_plain(data)}. In use every estimate carries its own standard deviation. They hold for "
+        "steady parts of a manoeuvre, because an estimate covers one turn of the wheel.</p>"
     )
 
 
@@ -173,7 +173,10 @@ def _ranges(calibration: Calibration) -> str:
                     (quantity, f"{factor * known.low:.4g}", f"{factor * known.high:.4g}", unit)
                 )
     head = ("quantity", "from", "to", "unit")
-    return f"{html_table(head, rows)}\n<p>Outside, the quantity is not valid (out_of_range).</p>"
+    return (
+        f"{html_table(head, rows)}\n<p>Outside these ranges the quantity is not valid "
+        "(out_of_range).</p>"
+    )
 
 
 def _flags() -> str:
@@ -187,23 +190,21 @@ def _flags() -> str:
 _CONVENTIONS = """<p>All values are SI. Positive slip angle gives negative lateral force (ISO 8855).
 With <code>axes</code> = sae the signs of Fz, alpha and Fy turn, with adapted_sae that of Fy; in
 both, y points to the right, so <code>strain_1</code> is the gage on the other side.</p>"""
-_FRAMES = """<p>A communication step brings a frame of samples, oldest first. A shorter step takes
-the first samples of the frame, in a longer one the samples after it are missing. A step that is no
-whole number of samples is refused. Estimates are the same for every frame length.</p>"""
-_BUFFERED = """<p>The input <code>samples</code> says how many samples of the frame are new, oldest
-first; the step may have any length, time is counted in samples. A step with none lets the estimate
-age, and after two turns' time nothing is valid. Estimates are the same however samples are
-packed.</p>"""
-_LIMITS = """<ul>
-<li>An estimate is made once per turn, 20 degrees of wheel angle and half the filter after the
-trailing edge; <code>age</code> counts from there.</li>
-<li>The first turn after a start or a gap is never valid.</li>
-<li>Without an estimate a Real output shows the parameter <code>missing</code>, NaN by default; a
-number there says nothing, <code>valid</code> does.</li>
-<li>Forward rolling on a flat road; a turn shorter than 3 s.</li>
-<li>The slip ratio needs <code>speed</code>; a calibration with pressure or camber needs those.</li>
-<li>Without contacts for two turns <code>valid</code> drops and the last values are held.</li>
-<li>The path of the unpacked FMU may hold spaces, but no percent-encoded character else.</li>
-</ul>"""
+_FRAMES = """<p>A communication step brings one frame of samples, oldest first. A shorter step uses
+the first samples of the frame only; after a longer step the samples beyond the frame count as
+missing. A step that is not a whole number of samples is refused. The frame length does not change
+the estimates.</p>"""
+_BUFFERED = """<p>The input <code>samples</code> gives the number of new samples in the frame,
+oldest first; the step may have any length, because time is counted in samples. In a step without
+samples the estimate ages, and after the time of two turns it is no longer valid. The packing of the
+samples does not change the estimates.</p>"""
+_LIMITS = """<ul> <li>An estimate is made once per turn, 20 degrees of wheel angle and half the
+filter after the trailing edge; <code>age</code> counts from there.</li> <li>The first turn after a
+start or a gap is never valid.</li> <li>Without an estimate a Real output shows the parameter
+<code>missing</code>, NaN by default; only <code>valid</code> states whether there is an
+estimate.</li> <li>Forward rolling on a flat road; a turn shorter than 3 s.</li> <li>The slip ratio
+needs <code>speed</code>; a calibration with pressure or camber needs those.</li> <li>Without
+contacts for two turns <code>valid</code> drops and the last values are held.</li> <li>The path of
+the unpacked FMU may hold spaces, but no percent-encoded character else.</li> </ul>"""
 _CHECK = """<p><code>resources/reference</code> holds input and expected output in the FMI
 cross-check layout; <code>tirelib fmu check X.fmu</code> plays and compares them.</p>"""

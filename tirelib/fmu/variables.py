@@ -69,8 +69,8 @@ def parameters(
             "filter_order",
             "Real",
             "parameter",
-            "cut-off of the low-pass, cycles per turn: a check that the calibration was made "
-            "with this one; 0: whatever it was made with",
+            "cut-off of the low-pass filter in cycles per turn: a check that the calibration was "
+            "made with this cut-off; 0: no check",
             0.0,
             "1",
             None,
@@ -83,8 +83,8 @@ def parameters(
             MISSING,
             "Real",
             "parameter",
-            "what Real outputs show where there is no value, as before the first turn: NaN, "
-            "or a number for importers that take none; valid and flags are the same",
+            "what Real outputs show where there is no value, as before the first turn: NaN, or a "
+            "number for importers that do not accept NaN; valid and flags do not depend on it",
             missing,
             "1",
             None,
@@ -111,8 +111,8 @@ def parameters(
             "tire",
             "String",
             "parameter",
-            "name of the tire on the wheel, which the calibration must be of; empty: the "
-            "embedded calibration's",
+            "name of the tire on the wheel, for which the calibration must be made; empty: that "
+            "of the embedded calibration",
             "",
         ),
     ]
@@ -183,8 +183,8 @@ def inputs(
             "camber",
             "Real",
             "input",
-            "camber angle; NaN: unknown, which a calibration at "
-            "one camber answers with a large Fy_std and alpha_std (camber_unknown in status)",
+            "camber angle; NaN: unknown, which makes Fy_std and alpha_std large if the "
+            "calibration has one camber only (camber_unknown in status)",
             NAN,
             "rad",
             "deg",
@@ -197,7 +197,7 @@ def inputs(
             "omega",
             "Real",
             "input",
-            "measured turn rate: its change within the turn is the wheel angle's; zero: "
+            "measured turn rate, whose change within the turn corrects the wheel angle; zero: "
             "standing; NaN: unknown",
             NAN,
             "rad/s",
@@ -223,7 +223,7 @@ def inputs(
             "tread_depth",
             "Real",
             "input",
-            "depth of the tread's grooves that is left; NaN: unknown",
+            "remaining depth of the tread grooves; NaN: unknown",
             NAN,
             "m",
             "mm",
@@ -257,7 +257,7 @@ def inputs(
                 "samples",
                 "Integer",
                 "input",
-                "how many samples of the frame are new, oldest first; the step may have any length",
+                "number of new samples in the frame, oldest first; the step may have any length",
                 0,
                 low=0,
                 high=samples,
@@ -274,7 +274,7 @@ def outputs(lateral: tuple[float, ...]) -> list[Variable]:
             q,
             "Real",
             "output",
-            f"{MEANING[q]}; NaN: not to be had",
+            f"{MEANING[q]}; NaN: no estimate",
             NAN,
             UNITS[q],
             DISPLAY[q],
@@ -304,7 +304,7 @@ def outputs(lateral: tuple[float, ...]) -> list[Variable]:
             f"contact_length_{gage}",
             "Real",
             "output",
-            f"contact length, corrected for the reading's bias, at lateral position "
+            "contact length, corrected for the bias of the edge detection, at lateral position "
             f"{1e3 * y:+g} mm of the chosen axes",
             NAN,
             "m",
@@ -351,7 +351,7 @@ def outputs(lateral: tuple[float, ...]) -> list[Variable]:
             "turn_rate",
             "Real",
             "output",
-            "turn rate from the strain's contacts",
+            "turn rate from the contacts in the strain",
             NAN,
             "rad/s",
             "rpm",
@@ -363,7 +363,7 @@ def outputs(lateral: tuple[float, ...]) -> list[Variable]:
             "contact_time",
             "Real",
             "output",
-            "middle of the contact, since the start of the first sample",
+            "time of the middle of the contact since the first sample",
             NAN,
             "s",
             "ms",
@@ -388,14 +388,14 @@ def outputs(lateral: tuple[float, ...]) -> list[Variable]:
             "flags",
             "Integer",
             "output",
-            "sum of flag bits, named in status",
+            "sum of the flag bits, whose names are in status",
             1,
             low=0,
             high=2 * max(TurnFlag) - 1,
         ),
-        Variable("valid", "Boolean", "output", "every calibrated quantity may be used now", False),
+        Variable("valid", "Boolean", "output", "every calibrated quantity is valid now", False),
         *(
-            Variable(f"{q}_valid", "Boolean", "output", f"{q} may be used now", False)
+            Variable(f"{q}_valid", "Boolean", "output", f"{q} is valid now", False)
             for q in QUANTITIES
         ),
         Variable("rolling", "String", "output", "free, braking, driving or unknown", "unknown"),
@@ -403,7 +403,8 @@ def outputs(lateral: tuple[float, ...]) -> list[Variable]:
             "status",
             "String",
             "output",
-            "names of flags and notes, by semicolons; the cause of a fault or refused step",
+            "names of flags and notes, separated by semicolons; the cause of a fault or of a "
+            "refused step",
             "first_turn",
         ),
     ]

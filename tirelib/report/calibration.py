@@ -50,23 +50,26 @@ def write_calibration_report(
     calibration = trained.calibration
     sections = [
         Section(
-            "Estimators in use",
+            "Estimators that this calibration uses",
             "in-use",
-            "Each estimate is a polynomial in a few regressors, its terms chosen by leaving "
-            "conditions out.",
+            "Each estimator is a polynomial in a few regressors. Its terms were selected by "
+            "cross-validation over held-out conditions.",
             [in_use_table(trained), *estimator_tables(trained)],
         ),
         Section(
             "Residuals",
             "residuals",
-            "Each point is one independent measurement (a run, or a turn of a sweep), estimated by "
-            "a fit that had not seen its condition. Below: the dissertation's regression.",
+            "Each point is one independent measurement (a run, or a turn of a sweep), estimated "
+            "by a fit from which its condition was held out. Below: the dissertation's "
+            "regression.",
             pictures=draw_all(folder, _residuals(trained)),
         ),
     ]
     if held_out:
         sections.append(
-            Section("Levels held out", "held-out", tables=[held_out_table(list(held_out))])
+            Section(
+                "Errors at held-out levels", "held-out", tables=[held_out_table(list(held_out))]
+            )
         )
     sections.append(
         Section(
@@ -101,8 +104,8 @@ def _residuals(trained: Trained) -> list[Drawing]:
         Drawing(
             f"residuals_{quantity}",
             f"Residuals of the {TITLE[quantity]}",
-            "Over the estimate, the load and the slip angle; right: against a normal law. Each row "
-            "has its own scale.",
+            "Against the estimate, the load and the slip angle; right: compared with a normal "
+            "distribution. Each row has its own scale.",
             lambda quantity=quantity: figures.figure_residuals(trained, quantity),  # type: ignore[misc]
         )
         for quantity in QUANTITIES
@@ -117,20 +120,21 @@ def regression_drawings(trained: Trained) -> list[Drawing]:
         Drawing(
             "figure_4_3",
             "Contact length over slip angle (Fig. 4-3)",
-            "The off-centre lengths follow the slip angle, the centre one hardly: it tells load.",
+            "The off-centre lengths follow the slip angle. The centre length hardly does, so it "
+            "indicates the load.",
             lambda: figures.figure_4_3(means),
         ),
         Drawing(
             "figure_4_4",
             "Load from the centre contact length (Fig. 4-4)",
-            "Left the quadratic, middle its residuals, right the held-out residuals of the "
-            "estimator in use on the same scale.",
+            "Left: the quadratic; middle: its residuals; right: held-out residuals of the "
+            "estimator in use, on the same scale.",
             lambda: figures.figure_4_4(trained),
         ),
         Drawing(
             "figure_4_5",
             "Slip angle from the in/out ratio of peak rates (Fig. 4-5)",
-            "Thin lines are fits to one load each: the ratio depends on the load, too.",
+            "Thin lines are fits to one load each: the ratio also depends on the load.",
             lambda: figures.figure_4_5(trained),
         ),
         Drawing(
@@ -143,7 +147,8 @@ def regression_drawings(trained: Trained) -> list[Drawing]:
         Drawing(
             "figure_4_12",
             "Lateral force by load (Fig. 4-12)",
-            "Left six regressors, right the estimator in use, held out; below their residuals.",
+            "Left: the regression with six regressors; right: the estimator in use, held out; "
+            "below: their residuals.",
             lambda: figures.figure_4_12(trained),
         ),
     ]
@@ -152,7 +157,8 @@ def regression_drawings(trained: Trained) -> list[Drawing]:
             Drawing(
                 "figure_4_14",
                 "Lateral force under camber (Fig. 4-14)",
-                "Six regressors refitted at each camber, one fit for all, the estimator in use.",
+                "Six regressors fitted at each camber, one fit for all cambers, and the estimator "
+                "in use.",
                 lambda: figures.figure_4_14(trained),
             )
         )
@@ -161,7 +167,7 @@ def regression_drawings(trained: Trained) -> list[Drawing]:
         Drawing(
             "figure_4_20",
             "Cornering curves (Fig. 4-20)",
-            "Run means and the Magic Formula through them.",
+            "Run means, and the Magic Formula fitted to them.",
             lambda: figures.figure_4_20(means, _needed(trend)),
         )
     )
@@ -169,7 +175,8 @@ def regression_drawings(trained: Trained) -> list[Drawing]:
         Drawing(
             "figure_4_23",
             "Cornering stiffness and peak force over contact length (Fig. 4-23)",
-            "Bars are 95 % intervals; a hollow ring is a peak that the slip angles did not reach.",
+            "Bars are 95 % intervals; a hollow ring is an extrapolated peak beyond the measured "
+            "slip angles.",
             lambda: figures.figure_4_23(_needed(trend)),
         )
     )

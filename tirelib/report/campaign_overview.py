@@ -119,7 +119,7 @@ def _draw_plan(axes: Axes, points: dict[str, FloatArray], sweep: bool) -> None:
     across = _abscissae(points)[0]
     upward = _second(points, [across]) or "Fz"
     _scatter(axes, points, across, upward, _second(points, [across, upward]), sweep)
-    axes.set_title("plan: samples of sweeps" if sweep else "plan: a point is a run")
+    axes.set_title("plan: samples of sweeps" if sweep else "plan: each point is a run")
     if upward == "Fz":
         axes.set_ylim(0.0, 1.08 * float(np.nanmax(points["Fz"], initial=1.0)))
 
@@ -143,7 +143,7 @@ def _draw_loads(axes: Axes, rows: Sequence[RunRow]) -> None:
     known = [(p, m) for p, m in pairs if p and m is not None]
     if not known:
         axes.set_axis_off()
-        axes.text(0.5, 0.5, "no force was measured", ha="center", va="center")
+        axes.text(0.5, 0.5, "no forces were measured", ha="center", va="center")
         return
     planned, measured = np.array(known).T
     axes.scatter(planned, 100.0 * (measured / planned - 1.0), s=26.0)

@@ -33,9 +33,10 @@ from tirelib.report.page import Table, number, write_page
 from tirelib.report.style import millimetres
 
 SENTENCE_NOTE = (
-    "Only what stands out is said: each statement holds against noise and set-point errors at a "
-    "chance of 1 % that any of its kind (mean strain, contact and deflection, single gages) is "
-    "false, and holds at least 2 % of the squares of the difference. The differences are means."
+    "Only significant differences are listed. Against noise and set-point errors the chance is 1 "
+    "% that any statement of a kind (mean strain, contact and deflection, single gages) is false, "
+    "and each explains at least 2 % of the summed squares of the difference. The differences are "
+    "means."
 )
 RING = (
     "Flexible ring on an elastic foundation with inner pressure and unilateral radial tread "
@@ -46,7 +47,7 @@ RING = (
 )
 METHOD = (
     "G. K. Robinson, That BLUP is a good thing: the estimation of random effects, Statistical "
-    "Science 6 (1991) 15-32: prediction of the set points' random part.",
+    "Science 6 (1991) 15-32: prediction of the random errors of the set points.",
     "M. C. Kennedy, A. O'Hagan, Bayesian calibration of computer models, Journal of the Royal "
     "Statistical Society B 63 (2001) 425-464: the smooth misfit behind the floor.",
 )
@@ -74,13 +75,13 @@ def answer_of(found: Comparison | ForceComparison) -> str:
     error = found.error if isinstance(found, ForceComparison) else found.error.value
     left = _left(found)
     but = (
-        " Single gages, the contact or the deflection differ, see below." if found.sentences else ""
+        " Single gages, the contact or the deflection differ; see below." if found.sentences else ""
     )
     return {
-        "fits": f"The model fits: error {number(error, 3)} in units of the repeats' noise; {left}."
-        + but,
-        "lack_of_fit": f"The model does not reach the noise: error {number(error, 3)} in units of "
-        f"the repeats' noise; {left}.",
+        "fits": f"The model fits: its error is {number(error, 3)} times the noise of the repeats; "
+        f"{left}." + but,
+        "lack_of_fit": "The model does not fit to within the noise: its error is "
+        f"{number(error, 3)} times the noise of the repeats; {left}.",
         "does_not_fit": f"The model does not fit: {left}.",
         "noise_unknown": f"Noise unknown: {left}; whether that is more than noise cannot be said.",
     }[verdict]
@@ -105,11 +106,11 @@ def floor_text(found: Comparison) -> str:
     floor, parts = found.floor, []
     if np.isfinite(floor.value):
         parts.append(
-            f"Of the error, noise and the tire's structure explain {number(floor.value, 3)} (the "
-            "floor, by the last entry of the model's history)."
+            f"Noise and the tire's structure explain an error of {number(floor.value, 3)} (the "
+            "floor, from the last entry of the model's history)."
         )
     else:
-        parts.append("The model's history tells no floor for these data.")
+        parts.append("The model's history states no floor for these data.")
     if np.isfinite(floor.share):
         parts.append(
             f"A smooth misfit of angle, load and pressure explains {100 * floor.share:.0f} % of "
@@ -122,10 +123,10 @@ def force_floor_text(found: ForceComparison) -> str:
     """Say what is known of a force's floor."""
     if np.isfinite(found.floor):
         return (
-            f"Of the error, noise and the brush's structure explain {number(found.floor, 3)} (the "
-            f"floor, by the last entry for {found.quantity} in the model's history)."
+            f"Noise and the brush's structure explain an error of {number(found.floor, 3)} (the "
+            f"floor, from the last entry for {found.quantity} in the model's history)."
         )
-    return f"The model's history tells no floor for {found.quantity} on these data."
+    return f"The model's history states no floor for {found.quantity} on these data."
 
 
 def write_comparison(found: Comparison | ForceComparison, folder: Path) -> tuple[Path, Path]:
@@ -218,8 +219,8 @@ def strain_parts(found: Comparison) -> list[Part]:
         Part(
             "Where: angle and condition",
             "maps",
-            "Model less measured; set-point errors taken out. Angle 0 is below the axle, "
-            "the entry is negative.",
+            "Model minus measurement, after correction of set-point errors. Angle 0 is below the "
+            "axle; the entry has negative angles.",
             plots=heat_maps(found),
         ),
         Part("Gages", "gages", tables=gage_tables(found), plots=gage_plots(found)),
@@ -249,7 +250,7 @@ def force_parts(found: ForceComparison) -> list[Part]:
             "Best, median and worst curve",
             "curves",
             tables=[listed] if curves else (),
-            text="" if curves else "No set point has three points or more: there is no curve.",
+            text="" if curves else "No curve can be drawn: no set point has three points or more.",
             plots=curve_plots(found, curves),
         ),
         Part("Trends", "trends", plots=force_trends(found)),
@@ -264,7 +265,9 @@ def _provenance(found: Comparison) -> list[Table]:
         [u.effect.name, u.effect.title, f"{_strength(u.strength)} {u.effect.unit}", u.effect.source]
         for u in found.model.used
     ]
-    out = [Table("Numbers of the tire", ["number", "kind and source"], rows, texts=2, folded=True)]
+    out = [
+        Table("Parameters of the tire", ["number", "kind and source"], rows, texts=2, folded=True)
+    ]
     if effects:
         out.insert(
             0,

@@ -25,20 +25,26 @@ def number_table(found: Comparison) -> Table:
         ],
         [f"error [{found.error.unit}]", number(found.error.value, 4)],
         [
-            "delay of the gages against the trigger, counted out [microseconds]",
+            "delay of the gages against the trigger, corrected for [microseconds]",
             f"{number(1e6 * found.error.delay, 3)} \u00b1 {number(1e6 * found.error.delay_std, 2)}",
         ],
-        ["rms difference, set points and delay taken out [noise]", number(fit.rms / noise.std, 4)],
-        ["rms difference, set points and delay taken out [microstrain]", number(1e6 * fit.rms, 4)],
         [
-            "rms difference, the delay taken out, set points left in [microstrain]",
+            "rms difference, corrected for set points and delay [noise]",
+            number(fit.rms / noise.std, 4),
+        ],
+        [
+            "rms difference, corrected for set points and delay [microstrain]",
+            number(1e6 * fit.rms, 4),
+        ],
+        [
+            "rms difference, corrected for the delay only [microstrain]",
             number(1e6 * found.error.rms, 4),
         ],
         ["rms measured strain [microstrain]", number(1e6 * fit.strain_rms, 4)],
         ["floor as far as known [noise]", number(found.floor.value, 4)],
         ["error without a smooth misfit [noise]", number(found.floor.smooth, 4)],
     ]
-    note = "The error counts straight, freely rolling runs." if found.error.known else ""
+    note = "The error is that of the straight, freely rolling runs." if found.error.known else ""
     return Table("Noise, error and floor", ["", "value"], rows, note=note)
 
 
@@ -51,7 +57,7 @@ def sector_tables(found: Comparison) -> list[Table]:
         cells = [cell for cell in found.table if cell.by == by]
         cells.sort(key=lambda c: (np.nan_to_num(c.value), SECTORS.index(c.sector)))
         rows = [_row(cell, factor) for cell in cells]
-        title = "All counted runs" if by == "all" else f"By {CONDITIONS[by]}"
+        title = "All straight, freely rolling runs" if by == "all" else f"By {CONDITIONS[by]}"
         out.append(
             Table(
                 title,
@@ -67,7 +73,7 @@ def sector_tables(found: Comparison) -> list[Table]:
                 rows,
                 texts=2,
                 folded=by != "all",
-                note="Model less measured; a positive mean is too much tension.",
+                note="Model minus measurement; a positive mean is too much tension.",
             )
         )
     return out
@@ -105,7 +111,7 @@ def gage_tables(found: Comparison) -> list[Table]:
     ]
     return [
         Table(
-            "Difference of each gage, counted runs",
+            "Difference at each gage, straight and freely rolling runs",
             [
                 "y (ISO 8855)",
                 "gage",
@@ -114,14 +120,14 @@ def gage_tables(found: Comparison) -> list[Table]:
                 "rms [noise of the gage]",
             ],
             rows,
-            note="y to the left; set points taken out.",
+            note="y is positive to the left; corrected for set points.",
         ),
         Table(
             "Mean difference of each gage in each sector [microstrain]",
             ["sector", *(f"y = {millimeters(g.lateral)}" for g in gages)],
             means,
-            note="Model less measured, with 95 % intervals by the noise of the gage and by set "
-            "points. A positive mean is too much tension.",
+            note="Model minus measurement, with 95 % intervals from the noise of the gage and the "
+            "set points. A positive mean is too much tension.",
         ),
     ]
 
@@ -149,8 +155,8 @@ def track_table(found: Comparison) -> Table:
             ]
         )
     note = (
-        "Model less measured. No number is corrected for a constant offset of the campaign; the "
-        "last column is what stays beside one."
+        "Model minus measurement. No number is corrected for a constant offset of the campaign; "
+        "the last column is the rms that remains after such a correction."
     )
     return Table(
         "Counted runs",
@@ -162,7 +168,7 @@ def track_table(found: Comparison) -> Table:
             "95 % \u00b1",
             "rms",
             "rms [noise]",
-            "rms beside the mean",
+            "rms about the mean",
         ],
         rows,
         note=note,
@@ -187,12 +193,12 @@ def point_table(found: Comparison) -> Table:
             ]
         )
     return Table(
-        "Random part of the set points",
+        "Random errors of the set points",
         ["set point", "tolerance (1 sigma)", "rms [tolerance]", "largest [tolerance]", "in run"],
         rows,
         texts=2,
-        note="An rms far above 1 is misfit that looks like a set-point error; far below 1, the "
-        "misfit hides the set points.",
+        note="An rms far above 1 is a misfit of the model that looks like a set-point error; far "
+        "below 1, the misfit hides the set-point errors.",
     )
 
 
@@ -227,7 +233,7 @@ def force_tables(found: ForceComparison, curves: tuple[Curve, ...]) -> tuple[Tab
         for cell in found.table
     ]
     table = Table(
-        "Difference, model less measured (slips by size)",
+        "Difference, model minus measurement (slips by magnitude)",
         [
             "by",
             "range",
@@ -235,7 +241,7 @@ def force_tables(found: ForceComparison, curves: tuple[Curve, ...]) -> tuple[Tab
             f"rms [{unit}]",
             "rms [noise]",
             f"mean [{unit}]",
-            f"size too large by [{unit}]",
+            f"magnitude too large by [{unit}]",
             f"95 % \u00b1 [{unit}]",
         ],
         rows,

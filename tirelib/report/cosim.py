@@ -26,10 +26,11 @@ QUANTITIES: Mapping[str, tuple[str, float, str]] = {
 }
 """Axis title, factor from SI, and the unit of the error."""
 _METHOD = (
-    "Errors (rms) of valid turns against the truth at the contact that the estimate is of. Steady: "
-    "from the contact before to the output, Fz changed by less than 3 % of the static load, the "
-    "slip angle by less than 0.25 deg and the slip ratio by less than 0.01; all else is transient. "
-    "Fy refers to the tire whose strain is seen, not to the vehicle's own."
+    "Errors (rms) of valid turns against the true value at the contact to which the estimate "
+    "belongs. Steady: from the contact before to the output, Fz changed by less than 3 % of the "
+    "static load, the slip angle by less than 0.25 deg and the slip ratio by less than 0.01; "
+    "every other turn is transient. Fy refers to the tire whose strain is seen, not to the "
+    "vehicle's own."
 )
 
 
@@ -150,7 +151,9 @@ def _errors(document: Mapping[str, Any], part: str) -> Table:
     goal = [["goal", "", *(number(limits[name]) for name in QUANTITIES)]]
     heads = [f"{name} [{unit}]" for name, (_, _, unit) in QUANTITIES.items()]
     note = (
-        "A star marks an error above the goal." if part == "steady" else "Goals bind steady turns."
+        "A star marks an error larger than its goal."
+        if part == "steady"
+        else "The goals apply to steady turns."
     )
     return Table(
         f"{part.capitalize()} turns, all wheels",
@@ -205,14 +208,14 @@ def _intervals(document: Mapping[str, Any]) -> Table:
         *(f"{name}: largest [std]" for name in QUANTITIES),
     )
     return Table(
-        "What the 95 % intervals hold, all turns",
+        "Coverage of the 95 % intervals, all turns",
         ["manoeuvre", "friction", *heads],
         rows,
-        note="Friction: the least under any wheel, as a factor of the calibrated road's. Valid: "
-        "share of the turns. Covered: share of the valid turns whose truth lies within 1.96 "
-        "standard deviations; 95 is right. Largest: error over standard deviation. The calibration "
-        "is made on the numerical rig, so its intervals do not know the error of the surface that "
-        "stands for the rig here.",
+        note="Friction: the lowest under any wheel, relative to the calibrated road. Valid: share "
+        "of the turns. Covered: share of the valid turns whose truth lies within 1.96 standard "
+        "deviations; 95 % is correct. Largest: error over standard deviation. The calibration is "
+        "made on the numerical rig, so its intervals do not include the error of the response "
+        "surface that replaces the rig here.",
     )
 
 
@@ -244,15 +247,16 @@ def _delays(document: Mapping[str, Any]) -> Table:
             "false alarms [%]",
             "gage out [%]",
             "out of range [s]",
-            "of it valid [s]",
+            "valid while out of range [s]",
         ],
         rows,
         note="Age: from the middle of the contact to the output, median. Lag: largest wheel angle "
-        "from the trailing edge to the output. Late: largest lag beyond 20 deg, half the filter "
-        "and one frame; negative is in time. Shares are of the time. False alarms: a quantity is "
-        "not valid though everything was in the calibrated range for two turns. Gage out: every "
-        "quantity may be used, but `valid` is false, because the strip over an outer gage carries "
-        "next to nothing. Out of range: for two turns, by more than a tenth of the range.",
+        "from the trailing edge to the output. Late: largest lag beyond 20 deg plus half the "
+        "filter and one frame; a negative value is in time. Shares are of the time. False alarms: "
+        "a quantity is not valid though everything was in the calibrated range for two turns. "
+        "Gage out: every quantity may be used, but `valid` is false, because the strip over an "
+        "outer gage carries next to nothing. Out of range: for two turns, by more than a tenth of "
+        "the range.",
     )
 
 
@@ -267,11 +271,11 @@ def _held(document: Mapping[str, Any]) -> Table:
     ]
     heads = [f"{name} [{unit}]" for name, (_, _, unit) in QUANTITIES.items()]
     return Table(
-        "What a controller meets: the value held, at every step",
+        "What a controller receives: the held value, at every step",
         ["manoeuvre", *heads, *(f"{name}: delay [ms]" for name in QUANTITIES)],
         rows,
-        note=f"Delay: that of the truth which fits the held value best; {DASH} where the truth "
-        "hardly changes or no delay stands out.",
+        note=f"Delay: the delay of the true value that fits the held value best; {DASH} where the "
+        "true value hardly changes or no delay is clearly best.",
     )
 
 
@@ -309,7 +313,7 @@ def _shares(document: Mapping[str, Any]) -> Plot:
     return Plot(
         "shares",
         "Steady errors as a share of the goal",
-        "Below the line: reached.",
+        "Below the line the goal is reached.",
         figure,
         ["manoeuvre", "quantity", "error / goal"],
         rows,
@@ -359,8 +363,8 @@ def _tracks(one: Series) -> Plot:
     return Plot(
         f"tracks-{one.name}",
         "Truth and estimates of each wheel",
-        "Estimates stand at the middle of the contact that they are of; they are put out about "
-        "30 deg of wheel angle after its end. Filled: steady turn; open: transient; cross: not "
+        "Each estimate is drawn at the middle of its contact; it becomes available about 30 deg "
+        "of wheel angle after the contact's end. Filled: steady turn; open: transient; cross: not "
         "valid. ISO 8855.",
         figure,
         ["wheel", "quantity", "contact [s]", "estimate (SI)", "valid", "steady"],

@@ -118,9 +118,9 @@ def _lead(seen: Mapping[str, Seen], calibration: Calibration) -> str:
     day = seen["set1-unseen"]
     return (
         f"A tire ({calibration.tire}) with {len(calibration.lateral)} strain gages on its "
-        f"innerliner was calibrated on a rig. It was then asked about {len(day.observations)} "
-        "turns of a day that the calibration had not seen "
-        f"({day.campaign.header.name}, {len(day.campaign.plans)} runs)."
+        f"innerliner was calibrated on a rig. It then estimated {len(day.observations)} turns of a "
+        f"day that the calibration had not seen ({day.campaign.header.name}, "
+        f"{len(day.campaign.plans)} runs)."
     )
 
 
@@ -193,8 +193,8 @@ def _comparison(trained: Trained) -> Table:
         ),
         rows,
         texts=3,
-        note="Another tire, so other numbers. Where a regression is much worse here, its figure "
-        "shows why: mostly it also depends on the load.",
+        note="The numbers differ because the tire is another one. Where a regression is much "
+        "worse here, its figure shows why: usually the regressor also depends on the load.",
     )
 
 
@@ -207,7 +207,7 @@ def _parts(
     """Return title, anchor, text and drawings of each section."""
     set1, unseen = seen["set1"], seen["set1-unseen"]
     drawn = {drawing.name: drawing for drawing in regression_drawings(trained)}
-    day = "Estimated on the unseen day."
+    day = "Estimates on the unseen day."
     accuracy_drawings = [
         Drawing(
             f"accuracy_{name.replace('-', '_')}",
@@ -229,7 +229,8 @@ def _parts(
                 Drawing(
                     "figure_4_2",
                     "Contact shapes at the middle load (Fig. 4-2)",
-                    "The contact grows on the outer side of the corner, shrinks on the inner one.",
+                    "The contact grows on the outer side of the corner and shrinks on the inner "
+                    "side.",
                     lambda: figures.figure_4_2(set1.observations, set1.estimates),
                 ),
                 drawn["figure_4_3"],
@@ -286,8 +287,8 @@ def _strain(part: Seen) -> list[Drawing]:
             "figure_3_7",
             "Strain and strain rate at several loads (Fig. 3-7, 3-8)",
             "Time runs to the right. The innerliner is compressed before the contact (CP1), "
-            "stretched in it (TP), compressed after it (CP2). A turn is looked at up to 20 degrees "
-            "behind its contact.",
+            "stretched in it (TP), compressed after it (CP2). A turn is evaluated up to 20 "
+            "degrees after its contact.",
             lambda: figures.figure_3_7(free_turns()),
         ),
         Drawing(
@@ -326,8 +327,8 @@ def _camber(camber: Trained | None) -> list[Drawing]:
         Drawing(
             "figure_4_16",
             "Slip and camber together (Fig. 4-16)",
-            "Contact lengths at the outer gages stop changing after a few degrees (saturation), "
-            "CP1 goes on a little longer: it follows the lateral force.",
+            "Contact lengths at the outer gages stop changing after a few degrees (saturation). "
+            "CP1 changes a little longer, because it follows the lateral force.",
             lambda: figures.figure_4_16(camber.means),
         ),
     ]
@@ -350,15 +351,16 @@ def _braking(seen: Mapping[str, Seen], calibration: Calibration) -> list[Drawing
         Drawing(
             "figure_4_17",
             "Braking, driving and free rolling (Fig. 4-17)",
-            "Braking deepens CP2, driving CP1. Below: the balance of every turn; the band is read "
-            "as free rolling. The slip axis is linear up to 2 % and logarithmic beyond.",
+            "Braking deepens CP2, driving CP1. Below: the balance of every turn; turns inside the "
+            "band count as free rolling. The slip axis is linear up to 2 % and logarithmic "
+            "beyond.",
             lambda: figures.figure_4_17(turns(), part.observations, calibration.rolling),
         ),
         Drawing(
             "figure_4_18",
             "Slip ratio (Fig. 4-18)",
             "From the turn rate in the strain, the rolling radius and the travel speed. "
-            + ("Unseen day." if unseen else "The calibration has seen this campaign."),
+            + ("Unseen day." if unseen else "The calibration was fitted to this campaign."),
             lambda: figures.figure_4_18(part.observations, part.estimates),
         ),
     ]
@@ -370,8 +372,8 @@ def _cut_off(part: Seen) -> Drawing:
         "Why the low-pass is set by order of the turn rate",
         "Shift: change of a feature from its value at order 24. Scatter: standard deviation over "
         "the turns of a run. By order (left) the shifts agree at all speeds, so a calibration "
-        "carries over. At a fixed 300 Hz (right) fast rolling is smeared and CP1 loses depth; slow "
-        "rolling would hardly be filtered, and where the order leaves the allowed range the "
-        "cut-off is refused.",
+        "carries over. At a fixed 300 Hz (right) fast rolling is smeared and CP1 loses depth; "
+        "slow rolling would hardly be filtered, and the cut-off is refused where its order leaves "
+        "the allowed range.",
         lambda: figures.figure_cut_off(study_cut_off(part.campaign, nearest_runs(part.campaign))),
     )

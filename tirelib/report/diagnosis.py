@@ -27,12 +27,12 @@ from tirelib.waveforms import GRID
 
 TITLE = "Which effect is missing"
 METHOD_TEXT = (
-    "All effects of the catalogue are fitted at once, in the metric of what variants of the model "
-    "that differ in structure and lack no effect leave by themselves: what structure does often "
-    "counts little. An effect's score is the misfit that returns when it alone is taken out. The "
-    "threshold is the largest score that so many variants are expected to have, each judged by "
-    "the others. From "
-    f"{ALARM:g} times it on an effect in its plausible range is an alarm, from once on a hint."
+    "All effects of the catalogue are fitted together. Residuals are weighted by what variants of "
+    "the model leave that differ in structure but lack no effect, so residuals that structure "
+    "often causes count little. An effect's score is the misfit that returns when it alone is "
+    "removed. The threshold is the largest score expected among that many variants, each judged "
+    f"by the others. An effect with a plausible strength is an alarm from {ALARM:g} times the "
+    "threshold on, and a hint from the threshold on."
 )
 
 
@@ -46,13 +46,13 @@ def answer_of(told: Assessment) -> str:
     like = told.diagnosis.like
     looks = "" if like is None else f" Here {told_like(like)}."
     return {
-        "none": "No effect stands out: the error "
-        f"{number(told.before.value, 3)} (floor {number(told.floor, 3)}) is no reason to name one.",
+        "none": f"No effect stands out: the error {number(told.before.value, 3)} (floor "
+        f"{number(told.floor, 3)}) gives no reason to name one.",
         "named": f"Missing: {names}. With it {fall}.",
         "form_inadequate": f"{names} acts here, but its law has the wrong form: {fall}, and more "
         "is left than the structure of the ring explains.",
-        "indistinguishable": f"One of {names} is missing; this campaign cannot tell which. With "
-        f"{told.named[0] if told.named else 'it'} {fall}.",
+        "indistinguishable": f"One of {names} is missing; this campaign cannot distinguish them. "
+        f"With {told.named[0] if told.named else 'it'} {fall}.",
         "unknown": "Something is missing that no effect of the catalogue explains; error "
         f"{number(told.before.value, 3)} (floor {number(told.floor, 3)}).{looks}",
     }[told.verdict]
@@ -110,7 +110,9 @@ def parts_of(told: Assessment, history: Sequence[Mapping[str, Any]] = ()) -> lis
         ),
         Part("Error", "error", tables=[_errors(told)], plots=[fall] if fall else []),
         Part("What is left", "left", _left_text(told), plots=plots),
-        Part("What this plan cannot show", "blind", tables=dead_effects(told.diagnosis.dead)),
+        Part(
+            "Effects that this plan cannot show", "blind", tables=dead_effects(told.diagnosis.dead)
+        ),
         Part("Next", "next", advice(next_test(told))),
         Part("Sources", "sources", sources=_sources(told)),
     ]
@@ -168,9 +170,9 @@ def _candidates(told: Assessment) -> Table:
         ],
         rows,
         texts=4,
-        note="Twins: effects whose signatures are less than 30 degrees apart. Power: chance that a "
-        "third of the range would be an alarm. Errors with effects that are not named are "
-        "of first order.",
+        note="Twins: effects whose signatures are less than 30 degrees apart. Power: chance that "
+        "a third of the range would be an alarm. Errors with effects that are not named are "
+        "linear approximations.",
     )
 
 
@@ -181,19 +183,20 @@ def _errors(told: Assessment) -> Table:
             "noise of a run's waveform, from repeats [microstrain]",
             number(1e6 * told.before.noise, 3),
         ],
-        [f"error of the model as it is given [{unit}]", number(told.before.value, 4)],
-        [f"error with its numbers fitted anew [{unit}]", number(told.refitted.value, 4)],
+        [f"error of the given model [{unit}]", number(told.before.value, 4)],
+        [f"error with its parameters fitted again [{unit}]", number(told.refitted.value, 4)],
         [f"error with the named effects [{unit}]", number(told.after.value, 4)],
         [
-            f"floor: part of it that noise and the ring's structure explain [{unit}]",
+            f"floor: the error that noise and the ring's structure explain [{unit}]",
             number(told.floor, 4),
         ],
         [
-            "raw rms of model less measured, as given and with the named effects [microstrain]",
+            "unweighted rms of model minus measurement, as given and with the named effects "
+            "[microstrain]",
             f"{number(1e6 * told.before.rms, 4)}; {number(1e6 * told.after.rms, 4)}",
         ],
         [
-            "misfit beyond structure, over the largest of the variants",
+            "misfit beyond structure, relative to the largest of the variants",
             number(found.left / found.floor, 3),
         ],
     ]
@@ -213,12 +216,16 @@ def _errors(told: Assessment) -> Table:
 
 def _left_text(told: Assessment) -> str:
     like, guess = told.diagnosis.like, told.diagnosis.guess
-    looks = f" Of what is missing, {told_like(like)}." if like is not None else ""
+    looks = f" The missing part: {told_like(like)}." if like is not None else ""
     if not exceeds(told):
         return (
-            "What is left is no more than variants of the model without any effect leave." + looks
+            "The remaining residual is no larger than that of model variants which lack no "
+            "effect." + looks
         )
-    text = f"What structure does not explain stands {told.left.where}; it {told.left.scaling}."
+    text = (
+        f"The residual that structure does not explain lies {told.left.where}; it "
+        f"{told.left.scaling}."
+    )
     text += looks
     if guess is not None:
         text += (
@@ -266,8 +273,8 @@ def _map(told: Assessment, left: Left, name: str, title: str) -> Plot:
     return Plot(
         f"residual-{name}",
         title,
-        "Model less measured, set-point errors weighed down as the fit does. One colour scale for "
-        "both maps. Red: the model shows too much tension; blue: too much compression.",
+        "Model minus measurement, with set-point errors weighted down as in the fit. One colour "
+        "scale for both maps. Red: the model shows too much tension; blue: too much compression.",
         figure,
         ["wheel angle [deg]", *labels],
         rows,

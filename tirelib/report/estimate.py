@@ -28,7 +28,7 @@ def write_estimate_report(
             Drawing(
                 "accuracy",
                 "Estimated against measured, turn by turn",
-                "Above the agreement, below the residual with its 95 % interval.",
+                "Top: estimate against measurement; bottom: the residual with its 95 % interval.",
                 lambda: figures.figure_accuracy(observations, estimates),
             )
         )
@@ -37,7 +37,7 @@ def write_estimate_report(
             Drawing(
                 "figure_4_8",
                 "Slip angle turn after turn (Fig. 4-8)",
-                "Steps are measured, dots are estimated; each load for itself.",
+                "Steps are measured, dots are estimated; each load has its own panel.",
                 lambda: figures.figure_4_8(observations, estimates),
             )
         )
@@ -45,15 +45,15 @@ def write_estimate_report(
         Section(
             "Accuracy",
             "accuracy",
-            "" if rows else "The campaign holds no measurement to compare with.",
+            "" if rows else "The campaign holds no measured forces or slip to compare with.",
             [accuracy_table(rows)] if rows else [],
             draw_all(folder, drawings),
         ),
         Section(
             "Validity",
             "validity",
-            "A turn that was not measured well, or that lies outside the calibrated range, gets a "
-            "flag and no valid estimate; nothing is clamped.",
+            "A turn with faulty data, or outside the calibrated range, gets a flag and no valid "
+            "estimate; no value is clamped.",
             [_validity(estimates, calibration), _flags(estimates)],
         ),
     ]
@@ -107,9 +107,9 @@ def accuracy_table(
         columns,
         cells,
         texts=2 if names is None else 3,
-        note="Errors are of the mean of a run's valid turns (of each turn in a sweep); the share "
-        "in the 95 % interval is of single turns. A dash: the quantity was not varied, a share of "
-        "its range says nothing.",
+        note="Errors refer to the mean of a run's valid turns (in a sweep to each turn); the "
+        "share in the 95 % interval refers to single turns. A dash: the quantity was not varied, "
+        "so that a percentage of its range is meaningless.",
     )
 
 

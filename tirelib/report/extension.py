@@ -62,9 +62,9 @@ def write_extension(told: Mapping[str, Any], folder: Path) -> tuple[Path, Path]:
 def _errors(told: Mapping[str, Any]) -> Table:
     unit = WORDS.get(told["error_unit"], told["error_unit"])
     rows = [
-        ["all that is fitted, as the model was given", number(told["error_before"], 3), ""],
+        ["given model, fitted runs", number(told["error_before"], 3), ""],
         [
-            "its numbers fitted anew",
+            "parameters fitted again",
             number(told["error_refitted"], 3),
             number(told["error_after"], 3),
         ],
@@ -76,6 +76,6 @@ def _errors(told: Mapping[str, Any]) -> Table:
             ]
             for fold in told["held_out"]
         ),
-        ["what noise and structure explain (floor)", "", number(told["floor"], 3)],
+        ["explained by noise and structure (floor)", "", number(told["floor"], 3)],
     ]
     return Table("Errors", ["", f"before [{unit}]", f"after [{unit}]"], rows)

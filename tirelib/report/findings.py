@@ -67,8 +67,8 @@ def score_bars(findings: Sequence[Finding], alarm: float) -> Plot:
     return Plot(
         "scores",
         "Score over threshold",
-        f"Red: alarm; blue: hint; gray: quiet. An effect beyond {alarm:g} that is no alarm lies "
-        "outside its range, or an exact refit does as well without it.",
+        f"Red: alarm; blue: hint; gray: quiet. An effect beyond {alarm:g} that is not an alarm "
+        "lies outside its plausible range, or an exact refit is as good without it.",
         figure,
         ["effect", "score / threshold", "level"],
         [[f.effect.name, r, f.level] for f, r in zip(findings, ratio, strict=True)],
@@ -86,5 +86,8 @@ def advice(step: Mapping[str, Any]) -> str:
     text = f"{step['what'][0].upper()}{step['what'][1:]}."
     revived = step["would_revive"]
     if revived:
-        text += f" Other runs would show {', '.join(revived)}: see the dead effects."
+        text += (
+            f" Other runs would show {', '.join(revived)}: see the effects that this plan cannot "
+            "show."
+        )
     return text

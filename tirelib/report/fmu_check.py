@@ -31,8 +31,8 @@ def verdict(document: Document) -> str:
     if failed:
         return f"Failed: {', '.join(failed)}."
     if document["compared"]:
-        return "Passed: it validates, runs, and gives what its reference signals expect."
-    return "Passed as far as it goes: it validates and runs; it holds no reference signals."
+        return "Passed: the FMU is valid, runs, and reproduces its reference signals."
+    return "Passed without reference: the FMU is valid and runs, but holds no reference signals."
 
 
 def write_check(document: Document, folder: Path) -> Path:
@@ -51,9 +51,9 @@ def write_check(document: Document, folder: Path) -> Path:
         drawings.append(
             Drawing(
                 "outputs",
-                "Outputs and what is expected of them",
-                "Broad: expected by the reference signals inside; thin: what this FMU gave "
-                "here. SI units.",
+                "Outputs and their reference signals",
+                "Broad line: reference signal in the FMU; thin line: output of this FMU here. SI "
+                "units.",
                 partial(_draw, curves, document["units"]),
             )
         )
@@ -130,7 +130,7 @@ def _variables(document: Document) -> Table:
         rows,
         texts=3,
         note=f"Allowed: {document['tolerance']:g} of the largest magnitude of the output. A dash: "
-        "a number where none is expected, or the other way round.",
+        "the output has a number where the reference has none, or the reverse.",
     )
 
 

@@ -18,13 +18,13 @@ from tirelib.report.page import Table, number
 from tirelib.report.parts_page import write_parts_page
 
 METHOD_TEXT = (
-    "All effects of the brush are fitted at once. An effect's score is the misfit that returns "
-    "when it alone is taken out, over what the fit leaves. The threshold is the largest score "
-    "among variants of the model that differ in structure and lack no effect: another shape of "
-    "the pressure, a carcass that turns, the shape of the Magic Formula, a smooth misfit over slip "
-    "and load, drift, delay, set-point errors, noise. From three times it on an effect in its "
-    "plausible range that an exact refit needs is an alarm, from once on a hint. Named effects "
-    "stand in the order of what each alone gains on held-out points."
+    "All effects of the brush are fitted together. An effect's score is the misfit that returns "
+    "when it alone is removed, relative to the residual of the fit. The threshold is the largest "
+    "score among variants of the model that differ in structure and lack no effect: another shape "
+    "of the pressure, a carcass that turns, the shape of the Magic Formula, a smooth misfit over "
+    "slip and load, drift, delay, set-point errors, noise. An effect with a plausible strength "
+    "that an exact refit needs is an alarm from three times the threshold on, and a hint from the "
+    "threshold on. Named effects stand in the order of what each alone gains on held-out points."
 )
 
 
@@ -34,12 +34,13 @@ def answer_of(told: ForceAssessment) -> str:
     before, after, floor = (number(e, 3) for e in (told.before, told.after, told.floor))
     fall = f"the error falls from {before} to {after} {unit} (floor {floor})"
     return {
-        "none": f"No effect stands out: the error {before} {unit} (floor {floor}) is no reason to "
-        "name one.",
+        "none": f"No effect stands out: the error {before} {unit} (floor {floor}) gives no reason "
+        "to name one.",
         "named": f"Missing: {names}. With {'them' if len(told.named) > 1 else 'it'} {fall}.",
         "form_inadequate": f"Missing: {names}: {fall}. More is left than the structure of the "
         "brush explains, so a law has the wrong form or more is missing.",
-        "indistinguishable": f"One of {names} is missing; this campaign cannot tell which: {fall}.",
+        "indistinguishable": f"One of {names} is missing; this campaign cannot distinguish them: "
+        f"{fall}.",
         "unknown": "Something is missing that no effect of the catalogue explains; error "
         f"{before} {unit} (floor {floor}).",
     }[told.verdict]
@@ -90,7 +91,9 @@ def parts_of(told: ForceAssessment) -> list[Part]:
         ),
         Part("Error", "error", tables=[_errors(told)], plots=_fall(told)),
         Part("What is left", "left", _left_text(told), plots=maps),
-        Part("What this plan cannot show", "blind", tables=dead_effects(told.diagnosis.dead)),
+        Part(
+            "Effects that this plan cannot show", "blind", tables=dead_effects(told.diagnosis.dead)
+        ),
         Part("Next", "next", advice(next_test(told))),
         Part("Sources", "sources", sources=_sources(told)),
     ]
@@ -155,14 +158,17 @@ def _errors(told: ForceAssessment) -> Table:
             f"[{'Nm' if told.case.quantity == 'Mz' else 'N'}]",
             number(told.case.noise, 3),
         ],
-        [f"error of the model as it is given [{unit}]", number(told.before, 4)],
-        [f"error with its numbers fitted anew [{unit}]", number(told.case.error(found.base), 4)],
+        [f"error of the given model [{unit}]", number(told.before, 4)],
+        [
+            f"error with its parameters fitted again [{unit}]",
+            number(told.case.error(found.base), 4),
+        ],
         [f"error with the named effects [{unit}]", number(told.after, 4)],
         [
-            f"floor: part of it that noise and the brush's structure explain [{unit}]",
+            f"floor: the error that noise and the brush's structure explain [{unit}]",
             number(told.floor, 4),
         ],
-        [f"left when all effects are fitted at once [{unit}]", number(scale * found.left, 4)],
+        [f"residual when all effects are fitted together [{unit}]", number(scale * found.left, 4)],
         [f"the same, largest of the variants [{unit}]", number(scale * found.most_left, 4)],
     ]
     for fold, old, new in zip(found.folds, found.held_before, found.held_final, strict=True):
@@ -189,7 +195,7 @@ def _fall(told: ForceAssessment) -> list[Plot]:
             told.case.unit,
             told.floor,
             "fall",
-            "The named effects one after the other",
+            "Error as the named effects are added one after the other",
         )
     ]
     if history is not None:
@@ -199,9 +205,11 @@ def _fall(told: ForceAssessment) -> list[Plot]:
 
 def _left_text(told: ForceAssessment) -> str:
     if not exceeds(told):
-        return "What is left is no more than variants of the model without any effect leave."
+        return (
+            "The remaining residual is no larger than that of model variants which lack no effect."
+        )
     guess = f" A guess at its law: {told.left.guess}." if told.left.guess else ""
-    return f"What is left stands {told.left.where}; it {told.left.scaling}.{guess}"
+    return f"The remaining residual lies {told.left.where}; it {told.left.scaling}.{guess}"
 
 
 def _sources(told: ForceAssessment) -> Sequence[str]:

@@ -135,7 +135,7 @@ def _table(journey: Journey) -> Table:
         ["model", "what it has", f"error [{unit}]", f"held out [{unit}]", f"rms left [{raw}]"],
         rows,
         texts=2,
-        note="Held out: the error on runs that took no part in the fit.",
+        note="Held out: the error on runs that were not used in the fit.",
     )
 
 
@@ -180,8 +180,8 @@ def part_errors(told: Mapping[str, Any]) -> list[Plot]:
     return [
         Plot(
             "part-errors",
-            "All that is fitted, and each part held out",
-            "Held out: the error on what took no part in the fit.",
+            "Error of the fitted runs and of each held-out part",
+            "Held out: the error on data that were not used in the fit.",
             figure,
             ["part", f"before [{unit}]", f"after [{unit}]"],
             data,
@@ -231,8 +231,8 @@ def run_errors(steps: Sequence[Mapping[str, Any]], unit: str) -> list[Plot]:
         Plot(
             "run-errors",
             "The error of each run",
-            "Bars: of the fit to all runs. Marks: of a fit that has not seen the run, with its "
-            "load or its pressure held out (the larger of both where a run is in both).",
+            "Bars: error of the fit to all runs. Marks: error of a fit without the run, because "
+            "its load or its pressure was held out (the larger value where both were).",
             figure,
             [
                 "run",
@@ -285,7 +285,7 @@ def _waveform(before: Comparison, after: Comparison, i: int, name: str) -> Plot:
         figure.add_scatter(
             x=DEGREES,
             y=left[k],
-            name=f"model {word} less measured",
+            name=f"model {word} minus measured",
             row=2,
             col=1,
             line={"color": colour, "width": 1.5, "dash": dash},
@@ -304,9 +304,9 @@ def _waveform(before: Comparison, after: Comparison, i: int, name: str) -> Plot:
         f"waveform-{name}",
         f"{name.capitalize()} run of before: {before.run[i]} ({c['Fz'][i]:,.0f} N, "
         f"{c['pressure'][i] / 1e5:.2f} bar, {c['speed'][i] * 3.6:.0f} km/h)",
-        f"The difference, set points taken out, was {size[0]:.0f} microstrain rms and is "
-        f"{size[1]:.0f}. Strain without its mean over the turn, mean over the gages, tension "
-        "positive. Dotted: edges of the contact of the model after.",
+        f"The difference, corrected for set points, was {size[0]:.0f} microstrain rms and is now "
+        f"{size[1]:.0f}. Shown is the strain minus its mean over the turn, averaged over the "
+        "gages, tension positive. Dotted: edges of the contact of the model after.",
         figure,
         [
             "wheel angle [deg]",
@@ -376,7 +376,7 @@ def _force_curve(before: ForceComparison, after: ForceComparison, curve: Curve, 
             y=found.difference[k],
             mode="markers",
             showlegend=False,
-            name=f"model {word} less measured",
+            name=f"model {word} minus measured",
             marker=marker,
             row=2,
             col=1,

@@ -103,7 +103,7 @@ def live_table(files: LiveFiles, line: Line) -> Table:
     """Return the table library = FMU = bench."""
     rounded = (
         f"The line rounds strain to whole counts of {1e6 * line.scale:.3g} microstrain, which "
-        f"changed a sample by at most {1e6 * line.rounding:.2g} microstrain: that is the "
+        f"changed a sample by at most {1e6 * line.rounding:.2g} microstrain; this causes the "
         "difference between live and library"
         if line.rounding
         else f"A count of the line is {1e6 * line.scale:.3g} microstrain, the rig's own step, so "
@@ -111,10 +111,10 @@ def live_table(files: LiveFiles, line: Line) -> Table:
     )
     return agreement_table(
         agreements(files, line.rounding),
-        f"Turns compared, and the largest difference. {rounded}. Relative: to the largest number "
-        f"of the quantity; library and FMU must agree to {TOLERANCE:.0e}, live and replay to the "
-        "last bit. Turns are matched by their order "
-        "within each run; the first turn of a run has no estimate in any of them.",
+        f"Number of compared turns, and the largest difference. {rounded}. Relative: divided by "
+        f"the largest magnitude of the quantity. Library and FMU must agree to {TOLERANCE:.0e}, "
+        "live and replay to the last bit. Turns are matched by their order within each run; the "
+        "first turn of a run has no estimate in any of them.",
     )
 
 
@@ -134,8 +134,8 @@ def live_drawing(files: LiveFiles, campaign: Campaign, low_pass: LowPass) -> Dra
         "live",
         "The live strip",
         "Top: strain of the last turn on the line. Below: estimates of the bench, turn after turn "
-        "and run after run, with their 95 % bands, beside the mean that the rig measured in the "
-        "run; right, their difference. The first turn of a run has no estimate.",
+        "and run after run, with their 95 % bands and the mean that the rig measured in the run; "
+        "right: their difference. The first turn of a run has no estimate.",
         lambda: figures.figure_live(last_turn(files, campaign, low_pass), read_strip(files)),
     )
 
@@ -187,8 +187,8 @@ def last_turn(files: LiveFiles, campaign: Campaign, low_pass: LowPass) -> LastTu
     whole = np.flatnonzero(np.isfinite(turns.trace.rate).any(axis=(1, 2)))
     if whole.size == 0:
         raise CalibrationError(
-            f"{campaign.header.name}, run {number}: no whole turn; the strip shows the last one; "
-            "play a longer run"
+            f"{campaign.header.name}, run {number}: the run holds no whole turn, and the figure "
+            "shows the last one; play a longer run"
         )
     trace = turns.trace
     return LastTurn(number, trace.phi, trace.strain[whole[-1]], np.asarray(trace.lateral))
@@ -199,8 +199,8 @@ def _strain(campaign: Campaign, number: int) -> FloatArray:
     run = None if plan is None else campaign.load(plan)
     if run is None or run.strain is None:
         raise CalibrationError(
-            f"{campaign.header.name}: no strain of run {number}, which went over the line; take "
-            "the campaign that was played"
+            f"{campaign.header.name}: run {number}, which was played, has no strain here; give the "
+            "campaign that was played"
         )
     return np.asarray(run.strain, dtype=np.float64)
 

@@ -18,12 +18,12 @@ from tirelib.report.style import BLUE, FAINT, RED
 
 TITLE = "Which run to measure next"
 METHOD = (
-    "Every suspect is fitted to the present runs, with what variants of the model do anyway among "
-    "the unknowns. At each possible run one suspect is taken as true, with what the present runs "
-    "leave open of it, and the other may adapt within what they leave open of its own; what it "
-    "still misses, in chi-square, is the separation. The smaller of both directions counts. A "
-    "chi-square of "
-    f"{RESOLVED:.0f} between two suspects rules the worse one out."
+    "Every suspect is fitted to the present runs, with the differences between model variants as "
+    "further unknowns. At each possible run one suspect is assumed to be true, with the "
+    "uncertainty that the present runs leave, and the other is adapted within its own "
+    "uncertainty. The chi-square that the other still misses is the separation; the smaller of "
+    f"both directions counts. A chi-square of {RESOLVED:.0f} between two suspects rules the worse "
+    "one out."
 )
 SOURCES = (
     "Criterion: A. C. Atkinson, V. V. Fedorov, Biometrika 62 (1975) 57: T-optimum designs for "
@@ -128,8 +128,8 @@ def _runs(test: NextTest) -> Table:
             "hardest pair",
         ],
         [*rows, median],
-        note="Separation of the pair that is hardest there; the chance is a mean over the pairs in "
-        "doubt. Last row: median separation and mean chance over all possible runs.",
+        note="Separation of the pair that this run separates least; the chance is a mean over the "
+        "undecided pairs. Last row: median separation and mean chance over all possible runs.",
     )
 
 
@@ -157,9 +157,11 @@ def _envelope_text(test: NextTest) -> str:
         text += f" Every run is a sweep: {_heading(name)} {slips}."
     if open_:
         wider = ", ".join(f"{name} by {100 * AXES[name].wider:.0f} %" for name in open_)
-        text += f" Not declared, so the campaign's range was widened to both sides: {wider}."
+        text += (
+            f" No range was declared, so the campaign's range was widened to both sides: {wider}."
+        )
     if test.dropped:
-        text += f" {test.dropped} runs are beyond the tire's validity and were dropped."
+        text += f" {test.dropped} runs lie outside the tire's range of validity and were dropped."
     return text
 
 
@@ -251,7 +253,7 @@ def _map(test: NextTest, pair: PairForecast) -> Plot:
         "advised run; blank fields are beyond the tire's validity."
     )
     if others:
-        note += " What is not drawn is as in the advised run."
+        note += " Conditions that are not drawn are those of the advised run."
     return Plot(
         f"separation-{'-'.join(pair.names)}",
         f"Separation of {_said(pair)}",
@@ -353,7 +355,8 @@ def _repeats(plan: Plan, test: NextTest, pairs: tuple[PairForecast, ...]) -> Plo
     return Plot(
         "repeats",
         "What repeats of the advised run add",
-        f"Dotted: what no number of repeats exceeds, for {plan.structure} does not average out.",
+        f"Dotted: the limit that no number of repeats exceeds, because {plan.structure} does not "
+        "average out.",
         figure,
         ["pair", "repeats", "separation"],
         rows,
@@ -378,9 +381,9 @@ def _repeat_tables(plan: Plan, test: NextTest) -> list[Table]:
             "Repeating the whole plan",
             [
                 "effect",
-                "chi-square over no effect, now",
-                "the same, endless repeats",
-                f"times the plan until {RESOLVED:.0f}",
+                "chi-square of the effect against no effect, now",
+                "the same, infinitely many repeats",
+                f"repeats of the plan until {RESOLVED:.0f}",
             ],
             rows,
         )

@@ -12,7 +12,7 @@ from tirelib.report.figures.compare_plot import Plot, styled_figure
 from tirelib.report.page import DASH, Table, number
 from tirelib.report.parts_page import write_parts_page
 
-TITLE = "What this plan can find"
+TITLE = "Effects that this plan can find"
 
 
 def write_selftest(document: Mapping[str, Any], folder: Path) -> tuple[Path, Path]:
@@ -65,12 +65,12 @@ def parts_of(document: Mapping[str, Any]) -> list[Part]:
         Part(
             "Chance of finding",
             "chance",
-            "The error ratio is the rms residual of the fitted model with the effect, over that "
-            "without.",
+            "The error ratio is the rms residual of the fitted model with the effect, divided by "
+            "that without.",
             plots=[_map(document)] if document["effects"] else [],
         ),
         Part("Effects", "effects", tables=[_effects(document)]),
-        Part("What this plan cannot show", "blind", tables=tables),
+        Part("Effects that this plan cannot show", "blind", tables=tables),
     ]
 
 

@@ -20,7 +20,7 @@ from tirelib.contact.tread import Tread
 from tirelib.errors import ParameterError
 from tirelib.parameters import FIELDS, Tire
 from tirelib.report.simulation_series import (
-    FINE,
+    FINE_ANGLES_PER_ANGLE,
     N_SERIES,
     fine_grid,
     long_series,
@@ -194,7 +194,7 @@ def simulate(
     if (load is None) == (deflection is None):
         given = "neither load nor deflection" if load is None else "both load and deflection"
         raise ParameterError(
-            f"simulation: {given}; the other one follows from the model; give exactly one"
+            f"simulation: {given}; give exactly one, because the other one follows from the model"
         )
     if contact not in CONTACTS:
         raise ParameterError(
@@ -260,8 +260,8 @@ def points_of(*given: Any) -> tuple[FloatArray, ...]:
     for array in arrays:
         if array.ndim > 1 or array.size not in (1, count):
             raise ParameterError(
-                f"simulation: {array.size} values beside {count}; one value, or as many as the "
-                "longest list has, is needed"
+                f"simulation: {array.size} values where the longest list has {count}; give one "
+                "value, or as many as the longest list"
             )
     return tuple(np.broadcast_to(array, (count,)).copy() for array in arrays)
 
@@ -411,7 +411,11 @@ def _shape(
     wave = strain_harmonics(displacement, tire.ring_radius, tire.innerliner_offset)
     slope = wave * 1j * np.arange(wave.shape[-1])
     waves = (displacement[..., 0], displacement[..., 1], wave, slope)
-    u, v, strain_fine, rate_fine = (on_grid(x, FINE * (N_ANGLES - 1)) for x in waves)
+    u, v, strain_fine, rate_fine = (
+        on_grid(x, FINE_ANGLES_PER_ANGLE * (N_ANGLES - 1)) for x in waves
+    )
     peaks = find_peaks(fine_grid(N_ANGLES), strain_fine, rate_fine, edges)
-    u, v, strain, rate = (x[:, ::FINE].copy() for x in (u, v, strain_fine, rate_fine))
+    u, v, strain, rate = (
+        x[:, ::FINE_ANGLES_PER_ANGLE].copy() for x in (u, v, strain_fine, rate_fine)
+    )
     return u, v, strain, rate, peaks

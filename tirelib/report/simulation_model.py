@@ -159,8 +159,8 @@ def _check_known(model: Model, conditions: Conditions) -> None:
     wants = [u.effect.name for u in model.used if u.effect.varies_with == ("temperature",)]
     if wants and not np.isfinite(conditions.temperature).all():
         raise ParameterError(
-            f"simulate: the model's {', '.join(wants)} needs the tread's temperature, which is "
-            "unknown; give --temperature DEGC"
+            f"simulate: the model's {', '.join(wants)} needs the tread temperature, which was not "
+            "given; give --temperature DEGC"
         )
 
 
@@ -205,7 +205,7 @@ def _load_at(
         more = np.where(moved, more, load * (1.0 + 1e-9))
         now = depth(more)
     raise ConvergenceError(
-        f"simulate: no load is found that presses the model by {1e3 * deflection.max():.4g} mm; "
+        f"simulate: no load was found that deflects the model by {1e3 * deflection.max():.4g} mm; "
         f"after {MOST} solves it is {1e3 * float(np.abs(deflection - now).max()):.2g} mm off; give "
         "a smaller --deflection, or --load",
         more,

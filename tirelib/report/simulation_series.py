@@ -25,7 +25,7 @@ NODES_A_MODE = 0.6
 """More than half the contact angle, or the highest harmonics alias in the patch."""
 N_SERIES = 6000
 """Harmonics of the belt under a tread that slides."""
-FINE = 48
+FINE_ANGLES_PER_ANGLE = 48
 """Angles of the fine grid for each one of the curves."""
 
 
@@ -60,8 +60,8 @@ def nodes(n_modes: int) -> int:
 
 
 def fine_grid(n_angles: int) -> FloatArray:
-    """Return angles from -pi to pi, `FINE` for each step of a grid of n_angles, [rad]."""
-    return np.linspace(-np.pi, np.pi, FINE * (n_angles - 1) + 1)
+    """Return the fine grid of angles from -pi to pi that refines a grid of n_angles, [rad]."""
+    return np.linspace(-np.pi, np.pi, FINE_ANGLES_PER_ANGLE * (n_angles - 1) + 1)
 
 
 def on_grid(harmonics: ComplexArray, n_steps: int) -> FloatArray:

@@ -121,7 +121,7 @@ def in_use_table(trained: Trained) -> Table:
             )
         )
     return Table(
-        "Estimators in use: errors at conditions that the fit had not seen",
+        "Estimators in use: errors at held-out conditions",
         (
             "quantity",
             "unit",
@@ -134,8 +134,8 @@ def in_use_table(trained: Trained) -> Table:
         ),
         rows,
         texts=2,
-        note="Held out: one condition after the other is left out of the fit and then estimated. "
-        "The dissertation's column is the best of its own regressions of the quantity, on the same "
+        note="Held out: each condition in turn is left out of the fit and then estimated. The "
+        "dissertation's column is the best of its own regressions of the quantity, on the same "
         f"data up to {SMALL_ANGLE} deg of slip angle.",
     )
 
@@ -160,9 +160,9 @@ def estimator_tables(trained: Trained) -> list[Table]:
                     (term, number(factor * b, 5), number(factor * s, 3))
                     for term, b, s in zip(model.names(), model.coefficients, std, strict=True)
                 ],
-                note=f"Regressors are standardised, (x {DASH} centre) / scale. What the polynomial "
-                f"leaves: {number(factor * model.residual)} {unit}; scatter of one turn about the "
-                f"mean of its run: {number(factor * model.floor)} {unit}.",
+                note=f"Regressors are standardised, (x {DASH} centre) / scale. Residual of the "
+                f"polynomial: {number(factor * model.residual)} {unit}; scatter of one turn about "
+                f"the mean of its run: {number(factor * model.floor)} {unit}.",
                 folded=True,
             )
         )
@@ -186,7 +186,7 @@ def _regressors(trained: Trained, quantity: str, name: str, model: Polynomial) -
         else:
             rows.append((guard.name, unit, DASH, DASH, *limits))
     return Table(
-        f"{name}: regressors and where they are valid",
+        f"{name}: regressors and their valid ranges",
         ("regressor", "SI unit", "centre", "scale", "valid from", "to"),
         rows,
         texts=2,
@@ -201,9 +201,11 @@ def _candidates(trained: Trained, quantity: str, name: str, model: Polynomial) -
         factor, unit = 1e3, "mm of radius"
     fitting = [score for terms, score in tried if terms == len(model.terms)]
     best = min(fitting) if fitting else float("nan")
-    note = "The error is weighed: less where the cornering curve is flat." * (quantity == "alpha")
+    note = "The error is weighted: it counts less where the cornering curve is flat." * (
+        quantity == "alpha"
+    )
     return Table(
-        f"{name}: candidates tried",
+        f"{name}: candidate estimators",
         ("terms", f"held-out error [{unit}]", ""),
         [
             (
@@ -222,7 +224,7 @@ def _candidates(trained: Trained, quantity: str, name: str, model: Polynomial) -
 def held_out_table(rows: Sequence[Mapping[str, Any]]) -> Table:
     """Return the cross-validation by level: each level of a condition left out of the fit."""
     return Table(
-        "Error at a level that the fit had not seen",
+        "Error at a held-out level",
         (
             "held out",
             "level",
@@ -251,8 +253,9 @@ def held_out_table(rows: Sequence[Mapping[str, Any]]) -> Table:
             for row in rows
         ],
         texts=5,
-        note="A level beyond the others is an extrapolation. Root mean square over run means. What "
-        "is not in range is flagged: the last column is of what is.",
+        note="A level beyond the others is an extrapolation. Errors are root mean squares over "
+        "run means. Turns outside the calibrated range are flagged; the last column holds the "
+        "turns inside it.",
     )
 
 

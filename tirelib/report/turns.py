@@ -45,8 +45,8 @@ def typical_turns(
         good = np.flatnonzero(np.isfinite(features.lead).all(axis=1))
         if good.size == 0:
             raise CalibrationError(
-                f"{campaign.header.name}, run {plan.run}: no turn with every gage; a figure of one "
-                "turn needs one; look at the strain with `tirelib campaign show`"
+                f"{campaign.header.name}, run {plan.run}: no turn has data of every gage, which a "
+                "figure of one turn needs; view the strain with `tirelib campaign show`"
             )
         row = slice(int(good[good.size // 2]), int(good[good.size // 2]) + 1)
         traces.append(_one(turns.trace, row))

@@ -19,7 +19,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.rolling.constants import Constants
 
-CREEP = 0.01
+SLIDING_STIFFNESS = 0.01
 """Share of a further shear that a sliding bristle takes: the road's speed stays determined where
 everything slides."""
 
@@ -87,12 +87,12 @@ def bristles(
     wanted = before + step
     sticks = np.abs(wanted) <= limit
     side = np.sign(wanted) * ~sticks
-    held = side * limit * (1.0 - CREEP) + CREEP * wanted
-    slope = np.where(sticks, 1.0, CREEP * (limit > 0.0))
+    held = side * limit * (1.0 - SLIDING_STIFFNESS) + SLIDING_STIFFNESS * wanted
+    slope = np.where(sticks, 1.0, SLIDING_STIFFNESS * (limit > 0.0))
     return (
         np.where(sticks, wanted, np.where(limit > 0.0, held, 0.0)),
         slope,
-        side * (1.0 - CREEP) * (limit > 0.0),
+        side * (1.0 - SLIDING_STIFFNESS) * (limit > 0.0),
     )
 
 

@@ -31,7 +31,7 @@ SHARES = (0.1, 0.3, 1.0)
 """Parts of the load in which a solution is found that starts from nothing."""
 TOUCH = 2e-3
 """Deflection to begin with, [m]: so little that the tread does not throw the belt off."""
-NEAR = 1e-3
+START_STEP = 1e-3
 """Last step of the frictionless ring from which one with friction starts, [m]."""
 LONGEST_STEP = 0.008
 TURN = np.array([1.0, 1.0, 0.05])
@@ -263,7 +263,7 @@ def _cold(k: Constants, grid: Mesh) -> tuple[Unknowns, int]:
     x = Unknowns(np.zeros((n, grid.node.size, 4)), np.full(n, TOUCH), 0.98 * k.free_radius)
     for share in SHARES:
         smooth = k.but(k_s=np.zeros(n), load=share * k.load)
-        x, iterations = _newton(smooth, x, grid, NEAR)
+        x, iterations = _newton(smooth, x, grid, START_STEP)
         total += iterations
     return _gripped(k, x, grid), total
 

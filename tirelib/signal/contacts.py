@@ -28,7 +28,7 @@ GAP_REACH = 0.1
 """Turns before a pulse and after the one before within which a gap may hide an extreme: the dips
 lie within 0.6 rad of the pulse. The levels then stay as they were. With half and double the same
 turns are valid and as exact (``python build/signal_constants.py``)."""
-PATIENCE = 2.5
+MOST_TURNS_WITHOUT_CONTACT = 2.5
 """Turns to wait for a contact before starting afresh."""
 
 
@@ -229,7 +229,7 @@ class ContactFinder:
         """Return the samples left until patience ends."""
         patience = self._longest_turn
         if self._last_period is not None:
-            patience = min(patience, int(PATIENCE * self._last_period))
+            patience = min(patience, int(MOST_TURNS_WITHOUT_CONTACT * self._last_period))
         return max(1, self._since + patience - self._count)
 
     def _extreme_hidden(self) -> bool:

@@ -25,7 +25,7 @@ from tirelib.arrays import FloatArray
 
 DEGREE = 3
 """Highest degree: braking may begin and end within one turn."""
-FEWEST = 3
+FEWEST_VALUES = 3
 """Values that must be told within the turn: a line, and one to show the scatter about it."""
 BINS = 64
 """Means into which the samples are gathered before the fit; a cubic needs no more."""
@@ -82,7 +82,7 @@ def course(samples: FloatArray, first: float, turn: float) -> Course | None:
     if not np.isfinite(samples).all() or samples.min() * samples.max() <= 0.0:
         return None
     told = 1 + int(np.count_nonzero(samples[1:] != samples[:-1]))
-    if told < FEWEST:
+    if told < FEWEST_VALUES:
         part = samples[: max(1, round(-first))]
         mean = float(samples[0] if told == 1 else part.mean())
         return Course(np.array([mean]), mean, 0.0, known=False)
@@ -91,7 +91,7 @@ def course(samples: FloatArray, first: float, turn: float) -> Course | None:
     y = np.add.reduceat(samples, edges[:-1]) / np.diff(edges)
     late = 0.5 * (n / told - 1.0)  # samples since its measurement, on average
     told = min(told, y.size)
-    size = 1 + min(DEGREE, told - FEWEST + 1)
+    size = 1 + min(DEGREE, told - FEWEST_VALUES + 1)
     half = 0.5 * (first + n - 1 + turn) / turn  # of the span from -1 to its end, in turns
     z = (0.5 * (edges[:-1] + edges[1:] - 1) - late + first + turn) / (turn * half) - 1.0
     design = legvander(z, size - 1)

@@ -14,7 +14,7 @@ from tirelib.arrays import FloatArray
 from tirelib.signal.contacts import JUMP, ContactFinder
 from tirelib.signal.turns import TurnCutter
 
-MOST = 512
+MOST_SAMPLES = 512
 """Samples that are kept at most."""
 _MEDIAN = 2
 """Samples by which the finder lags."""
@@ -106,7 +106,11 @@ def quiet_range(cutter: TurnCutter) -> tuple[float, float, int] | None:
         low = max(known["_low_level"], highest - jump)
         high = min(lowest, low) + jump
     lacking = cutter.lacking
-    room = min(MOST, finder._room() - _MEDIAN - 1, (MOST if lacking is None else lacking) - 1)
+    room = min(
+        MOST_SAMPLES,
+        finder._room() - _MEDIAN - 1,
+        (MOST_SAMPLES if lacking is None else lacking) - 1,
+    )
     if room < 1 or not (low <= float(tail.min()) and float(tail.max()) <= high):
         return None
     return low, high, room

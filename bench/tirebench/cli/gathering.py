@@ -12,7 +12,7 @@ from tirebench.cli.given import given_replayed, live_sources
 from tirebench.cli.options import PORTS, devices_of, port_options
 from tirebench.deadline import Deadline
 from tirebench.errors import DeviceError
-from tirebench.estimator.standing import STILL, Level, Levels, standing_mean
+from tirebench.estimator.standing import LARGEST_STANDING_RANGE, Level, Levels, standing_mean
 from tirebench.estimator.wheels import Wheels
 from tirebench.links import Link
 from tirebench.links.opening import PortPlan
@@ -53,7 +53,7 @@ _OPTIONS = (
     ),
     click.option(
         "--still",
-        default=1e6 * STILL,
+        default=1e6 * LARGEST_STANDING_RANGE,
         show_default=True,
         metavar="MICROSTRAIN",
         type=click.FloatRange(min=0.0, min_open=True),

@@ -17,10 +17,10 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 HOURLY, HOURLY_RAW = 0.75e9, 0.26e9
 """What a wheel at 10 kHz takes in an hour, [bytes]: with its strain and without; measured in
 docs/bench_proof.md."""
-KEPT = 1e6
+KEPT_BYTES_PER_SECOND = 1e6
 """Memory that a second of a wheel at 10 kHz takes before a trigger, [bytes]; measured by
 build/bench_trigger.py, rounded up. With `--no-strain` it is less."""
-LITTLE = 1e9
+LITTLE_ROOM = 1e9
 """Room below which there is a warning, [bytes]: about an hour of one wheel."""
 
 _OPTIONS = (
@@ -91,7 +91,7 @@ def at_start(path: Path, reader: ReaderPlan, rule: RecordingRule, *, watched: bo
     if rule.around is not None:
         said += (
             f"\n--trigger: keeping the {rule.around[0]:g} s before an event takes up to "
-            f"{1e-6 * KEPT * wheels * rule.around[0]:.0f} MB of memory"
+            f"{1e-6 * KEPT_BYTES_PER_SECOND * wheels * rule.around[0]:.0f} MB of memory"
         )
     if rule.around is not None and not watched:
         said += (
@@ -111,7 +111,9 @@ def room(path: Path, wheels: int, *, strain: bool = True) -> str:
     if hours < 1.0:
         said = f"room for the recording: {free / 1e6:.0f} MB, about {60.0 * hours:.0f} min"
     said += f" of {wheels} wheels at 10 kHz" if wheels > 1 else " of a wheel at 10 kHz"
-    return f"warning: {said}; free some space, or choose another disk" if free < LITTLE else said
+    return (
+        f"warning: {said}; free some space, or choose another disk" if free < LITTLE_ROOM else said
+    )
 
 
 def _around(text: str | None) -> tuple[float, float] | None:

@@ -33,7 +33,7 @@ from tirelib.campaign import CampaignHeader, Run
 from tirelib.campaign.conditions import changes_of, conditions_of
 from tirelib.campaign.header import header_document
 
-PAUSE = 0.1
+PAUSE_BETWEEN_RUNS = 0.1
 """Device time between two runs, [s]."""
 BURST = 0.002
 """Frames are sent this often, [s]."""
@@ -122,7 +122,7 @@ def record_tape(
             struck, bits = faults.gages(counts, period * TICK, device.scale)
             bits = (bits | (marked << np.arange(GAGES)).sum(axis=1)).astype(np.int16)
             records.append(Record(wheel, start, period, struck, bits))
-        seconds += _samples(run) * period * TICK + PAUSE
+        seconds += _samples(run) * period * TICK + PAUSE_BETWEEN_RUNS
     campaign = None if header is None else header_document(replace(header, axes="iso"))
     conditions = Conditions(tuple(times), tuple(values), tuple(marks), campaign=campaign)
     return Tape(tuple(records), conditions, seconds)

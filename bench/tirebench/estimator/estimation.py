@@ -11,7 +11,7 @@ from tirebench.estimator.wheels import Block
 from tirebench.wire.conditions import Conditions
 from tirebench.wire.timeline import Samples
 
-LATE = 1.0
+LONGEST_WAIT_FOR_LAPS = 1.0
 """When samples have waited longer than this, laps are left out, [s]."""
 
 
@@ -112,7 +112,7 @@ class WheelEstimation:
         if self._looked_at and isinstance(content, Samples):
             self._levels = self._levels or Levels(block.wheel)
             news.levels = self._levels.take(content)
-        if live and news.laps and time.monotonic_ns() - block.arrival > 1e9 * LATE:
+        if live and news.laps and time.monotonic_ns() - block.arrival > 1e9 * LONGEST_WAIT_FOR_LAPS:
             news.left_out, news.laps = len(news.laps), []
         return news
 

@@ -21,7 +21,7 @@ LARGEST_TOTAL = 512 * 2**20
 LARGEST_COUNT = 20_000
 LARGEST_RATIO = 200.0
 """Unpacked over packed size; an FMU's code and text reach about 10."""
-SMALL = 2**20
+RATIO_CHECKED_FROM = 2**20
 """Below this unpacked size a ratio says nothing, [bytes]."""
 DESCRIPTION = "modelDescription.xml"
 
@@ -132,7 +132,10 @@ def _entry_problems(entry: zipfile.ZipInfo) -> Iterator[str]:
         yield f"{name!r} is encrypted; files of an FMU must not be"
     if entry.file_size > LARGEST_FILE:
         yield f"{name!r} has {entry.file_size} bytes; at most {LARGEST_FILE} are allowed"
-    elif entry.file_size > SMALL and entry.file_size > LARGEST_RATIO * entry.compress_size:
+    elif (
+        entry.file_size > RATIO_CHECKED_FROM
+        and entry.file_size > LARGEST_RATIO * entry.compress_size
+    ):
         ratio = entry.file_size / max(entry.compress_size, 1)
         yield (
             f"{name!r} unpacks to {ratio:.0f} times its size; at most {LARGEST_RATIO:g} is allowed"

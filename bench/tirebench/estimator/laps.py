@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 Float32Array = npt.NDArray[np.float32]
 
-ROOM = 65_536
+SAMPLES_KEPT = 65_536
 """Samples of a wheel that are remembered: 6.5 s at 10 kHz."""
 MOST_SAMPLES = 1440
 """A lap with more samples is thinned to every k-th."""
@@ -97,7 +97,7 @@ class Laps:
     def __init__(self, wheel: int) -> None:
         self.wheel = wheel
         self.lost = 0
-        self._rows = np.empty((ROOM, GAGES), np.float32)
+        self._rows = np.empty((SAMPLES_KEPT, GAGES), np.float32)
         self._used = 0
         self._start = 0  # number within the segment of the first row
         self._first = 0  # the same, of the first sample that the estimator was given
@@ -113,11 +113,11 @@ class Laps:
             self._segment, self._start, self._used = block.segment, block.start, 0
             self._first = block.start
         self._period = block.period
-        strain = block.strain[-ROOM // 2 :]
+        strain = block.strain[-SAMPLES_KEPT // 2 :]
         if len(strain) < len(block.strain):
             self._used = 0  # what is left out may not be bridged
-        if self._used + len(strain) > ROOM:
-            kept = min(self._used, ROOM // 2)
+        if self._used + len(strain) > SAMPLES_KEPT:
+            kept = min(self._used, SAMPLES_KEPT // 2)
             self._rows[:kept] = self._rows[self._used - kept : self._used]
             self._used = kept
         shown = min(strain.shape[1], GAGES)  # the chart has room for five

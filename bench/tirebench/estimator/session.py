@@ -12,7 +12,7 @@ from tirebench.estimator.chain import Turn
 from tirebench.estimator.estimation import News
 from tirebench.estimator.wheels import Wheels
 
-WAIT = 0.2
+LONGEST_WAIT = 0.2
 """The longest wait for news before the screen is looked after, [s]."""
 
 
@@ -176,7 +176,7 @@ class Session:
                 outcome.reason = "silence"
             else:
                 try:
-                    self._note(self._source.poll(end.sooner(WAIT)))
+                    self._note(self._source.poll(end.sooner(LONGEST_WAIT)))
                     continue
                 except BenchError as error:
                     if not outcome.count:

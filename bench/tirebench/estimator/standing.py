@@ -11,13 +11,13 @@ from tirelib.arrays import FloatArray
 
 EVERY = 0.25
 """Length of a block, [s]."""
-SHORTEST = 1.0
+SHORTEST_MEAN = 1.0
 """A mean is taken over at least so much, [s]."""
-STILL = 100e-6
+LARGEST_STANDING_RANGE = 100e-6
 """Within a block the strain of a standing wheel stays within this: noise of 14 microstrain (3.5
 standard deviations either way in 2,500 samples); half of it refuses noise of 7, twice of it 28. A
 turning tire shows thousands. `--still` sets another."""
-CREEP = 0.2
+LARGEST_STANDING_DRIFT = 0.2
 """The means of blocks stay within this part of it: a wheel that creeps drifts from one to the next.
 """
 
@@ -71,7 +71,7 @@ class Levels:
         return [Level(self._wheel, len(strain) * samples.period, mean, low, high, missing)]
 
 
-def standing_mean(levels: Sequence[Level], still: float = STILL) -> FloatArray:
+def standing_mean(levels: Sequence[Level], still: float = LARGEST_STANDING_RANGE) -> FloatArray:
     """Return the mean strain of each gage, shape (n_gages,); NaN where it showed nothing.
 
     Raises
@@ -80,10 +80,10 @@ def standing_mean(levels: Sequence[Level], still: float = STILL) -> FloatArray:
         If the wheel turned, a gage was saturated now and then, or there is too little.
     """
     seconds = sum(level.seconds for level in levels)
-    if seconds < SHORTEST:
+    if seconds < SHORTEST_MEAN:
         raise DeviceError(
-            f"{seconds:.1f} s of samples; at least {SHORTEST:.0f} s are needed; wait, then try "
-            "again"
+            f"{seconds:.1f} s of samples; at least {SHORTEST_MEAN:.0f} s are needed; wait, then "
+            "try again"
         )
     means = np.array([level.mean for level in levels])
     there = ~np.all([level.missing == 1.0 for level in levels], axis=0)
@@ -97,11 +97,12 @@ def standing_mean(levels: Sequence[Level], still: float = STILL) -> FloatArray:
                 f"gage {gage + 1}: {100.0 * missing[gage]:.0f} % of its samples are lost or "
                 "saturated; all samples are needed; repair the line or the bridge"
             )
-        elif spread[gage] > still or drift[gage] > CREEP * still:
+        elif spread[gage] > still or drift[gage] > LARGEST_STANDING_DRIFT * still:
             faults.append(
                 f"gage {gage + 1}: its strain varies by {1e6 * spread[gage]:.0f} microstrain and "
                 f"drifts by {1e6 * drift[gage]:.0f}; on a standing wheel it varies by up to "
-                f"{1e6 * still:.0f} and drifts by up to {1e6 * CREEP * still:.0f}; stop the wheel"
+                f"{1e6 * still:.0f} and drifts by up to "
+                f"{1e6 * LARGEST_STANDING_DRIFT * still:.0f}; stop the wheel"
             )
     if not there.any():
         faults.append("no gage sends values; at least one is needed; check the link")

@@ -19,7 +19,7 @@ from tirebench.wire.line_counts import LineCounts
 from tirebench.wire.rate_check import PERIOD
 from tirebench.wire.timeline import Samples, Timeline, TimelineCounts
 
-MOST = 4
+MOST_WHEELS = 4
 """Wheels that are looked at unless others are named; each costs an estimator."""
 
 
@@ -175,7 +175,7 @@ class Wheels:
     lines : sequence of Line
         By the number of the source.
     chosen : sequence of int, optional
-        Wheels to look at; by default the first `MOST` that are heard.
+        Wheels to look at; by default the first `MOST_WHEELS` that are heard.
 
     Attributes
     ----------
@@ -279,7 +279,7 @@ class Wheels:
             If no such wheel is left, and no other is expected.
         """
         wrong = self.contradicted
-        expected = len(self._chosen) or min(sum(line.expected for line in self.lines), MOST)
+        expected = len(self._chosen) or min(sum(line.expected for line in self.lines), MOST_WHEELS)
         if wrong and len(wrong) == len(self.heard) >= expected:
             raise DeviceError(list(wrong.values()))
         return [block for block in blocks if block.wheel not in wrong]
@@ -336,7 +336,7 @@ class Wheels:
     def _wanted(self, wheel: int, heard: int) -> bool:
         if self._chosen:
             return wheel in self._chosen
-        return wheel in self.heard or heard < MOST  # heard counts those of before too
+        return wheel in self.heard or heard < MOST_WHEELS  # heard counts those of before too
 
     def _wheel(self, number: int) -> Wheel:
         if number not in self.heard:

@@ -21,7 +21,7 @@ GATHER = 0.004
 MUCH, NAP = 2048, 0.001
 """Half of what the system holds for one read, [bytes]; where so much came at once, more waits
 behind it, and is fetched after a nap, [s]."""
-LARGE = 2**16
+LARGEST_BATCH = 2**16
 """A batch does not grow beyond this by gathering, [bytes]."""
 _TIOCGICOUNT = 0x545D
 """Linux: the counters of a UART."""
@@ -98,7 +98,7 @@ class SerialLink:
         A port that goes away meanwhile is noticed at the next batch: this one is not lost.
         """
         more, end = b"", deadline.sooner(self._last + self._gather - time.monotonic())
-        while not end.expired and len(more) < LARGE:
+        while not end.expired and len(more) < LARGEST_BATCH:
             time.sleep(min(end.remaining, NAP) if newest >= MUCH else end.remaining)
             try:
                 chunk = self._port.read(self._port.in_waiting)

@@ -10,7 +10,7 @@ from tirebench.deadline import Deadline
 from tirebench.errors import DeviceError, LinkError, UnpluggedError
 from tirebench.links import Read
 from tirebench.links.opening import SOCKETS
-from tirebench.links.serial_port import GATHER, LARGE
+from tirebench.links.serial_port import GATHER, LARGEST_BATCH
 from tirebench.protocols import SERIAL
 
 CONNECT = 2.0
@@ -98,9 +98,9 @@ class SocketLink:
     def _take(self) -> bytes:
         """Return what is there, up to `LARGE` bytes and one piece more."""
         parts: list[bytes] = []
-        while sum(map(len, parts)) < LARGE:
+        while sum(map(len, parts)) < LARGEST_BATCH:
             try:
-                part = self._socket.recv(LARGE)
+                part = self._socket.recv(LARGEST_BATCH)
             except BlockingIOError:
                 break
             except OSError as error:

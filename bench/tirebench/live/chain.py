@@ -17,7 +17,7 @@ from tirebench.estimator.chain import Jump
 from tirebench.estimator.estimation import News, skipped
 from tirebench.estimator.fmu_model import FmuFile
 from tirebench.estimator.judged import JudgedTurns
-from tirebench.estimator.wheels import MOST, Wheels
+from tirebench.estimator.wheels import MOST_WHEELS, Wheels
 from tirebench.live.board import SIZE
 from tirebench.live.estimators import Estimators
 from tirebench.live.exchange import FINISH, STOP, Exchange, woken
@@ -32,13 +32,13 @@ from tirebench.recording.header import RecordingHeader, part_path
 from tirebench.recording.recorder import jump_event
 from tirebench.wire.conditions import Conditions
 
-START = 300.0
+START_TIME_LIMIT = 300.0
 """Processes that are not ready after so long do not start, even on a busy machine, [s]."""
-SAY = 5.0
+FIRST_REPORT_AFTER = 5.0
 """After so long the run says what it waits for, then again after twice the time, and so on, [s]."""
 LOOK = 0.05
 """Time between two looks after the processes and the line, [s]."""
-PATIENCE = 60.0
+END_TIME_LIMIT = 60.0
 """At the end, estimators and recorder may be silent for so long before they are given up, [s]."""
 LEAVE, AT_ONCE = 60.0, 5.0
 """A process that was told to end may take so long before it is killed, [s]: one that still has
@@ -96,7 +96,7 @@ class LiveChain:
         self.ended = self.message = ""
         self.jumps: list[Jump] = []
         self._plan, self._say = plan, say
-        self._slots = len(plan.reader.wheels) or MOST
+        self._slots = len(plan.reader.wheels) or MOST_WHEELS
         beside = SIZE if plan.laps else 0
         self._exchange = Exchange.create(CONTEXT, self._slots, beside, plan.reader.ports)
         self._state = LineState(plan.reader.fresh())
@@ -285,23 +285,23 @@ class LiveChain:
                 kept.wait(LEAVE)
         self._see()
         self._exchange.set(FINISH)
-        end = Deadline.after(PATIENCE)
+        end = Deadline.after(END_TIME_LIMIT)
         while len(self._estimators.done) < len(self._estimators.kept) and not end.expired:
             woken(self._exchange.address.news, LOOK)
             if came := self._gather():
-                end = Deadline.after(PATIENCE)
+                end = Deadline.after(END_TIME_LIMIT)
                 news.add(self._judge(came))
             self._estimators.look()
         news.add(self._judge(self._gather(), end=True))
         self.order("close", reason)
         if self._recorder is not None:
-            self.obeyed(Deadline.after(PATIENCE))
+            self.obeyed(Deadline.after(END_TIME_LIMIT))
             self._let_write(self._recorder)
         return news
 
     def _let_write(self, recorder: Kept) -> None:
         """Wait for the recorder as long as its file grows, and say so where that takes long."""
-        end, due, before = Deadline.after(LEAVE), Deadline.after(SAY), -1
+        end, due, before = Deadline.after(LEAVE), Deadline.after(FIRST_REPORT_AFTER), -1
         while recorder.alive and not end.expired:
             time.sleep(LOOK)
             self._see()
@@ -340,7 +340,7 @@ class LiveChain:
 
     def _wait(self, ready: Callable[[], bool], awaited: Callable[[], str]) -> None:
         """Wait until `ready` says yes; `awaited` names what is missing."""
-        end, pause = Deadline.after(START), SAY
+        end, pause = Deadline.after(START_TIME_LIMIT), FIRST_REPORT_AFTER
         due = Deadline.after(pause)
         while not ready():
             woken(self._exchange.address.news, LOOK)
@@ -356,8 +356,8 @@ class LiveChain:
                 due = Deadline.after(pause)
             if end.expired:
                 raise LinkTimeoutError(
-                    f"waited {START:.0f} s in vain for: {awaited()}; the machine is too busy; "
-                    "close other programs, then try again"
+                    f"waited {START_TIME_LIMIT:.0f} s in vain for: {awaited()}; the machine is too "
+                    "busy; close other programs, then try again"
                 )
 
     def _gather(self) -> News:

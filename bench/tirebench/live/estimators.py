@@ -15,7 +15,7 @@ from tirebench.live.exchange import Exchange
 from tirebench.live.kept import Kept
 from tirebench.wire.conditions import Conditions
 
-TRIES = 3
+MOST_CRASHES_WHEN_LOADED = 3
 """So often the FMU may crash when it is loaded."""
 
 
@@ -97,11 +97,11 @@ class Estimators:
         ------
         FmuError
         """
-        if any(kept.starts > TRIES for kept in self.kept.values()):
+        if any(kept.starts > MOST_CRASHES_WHEN_LOADED for kept in self.kept.values()):
             raise FmuError(
-                f"{self._path}: the process that loads it died {TRIES} times, so its native code "
-                "probably crashes; an FMU that loads is needed; build it again with `tirelib fmu "
-                "build`"
+                f"{self._path}: the process that loads it died {MOST_CRASHES_WHEN_LOADED} times, "
+                "so its native code probably crashes; an FMU that loads is needed; build it again "
+                "with `tirelib fmu build`"
             )
 
     def awaited(self) -> str:

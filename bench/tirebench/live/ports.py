@@ -19,9 +19,9 @@ from tirebench.live.exchange import STOP, Address, Exchange, woken
 from tirebench.live.kept import orphaned, settled
 from tirebench.live.priority import own_share
 
-WAIT = 0.1
+LONGEST_READ_WAIT = 0.1
 """The longest wait for bytes before it is looked whether the run goes on, [s]."""
-FULL = 0.002
+FULL_QUEUE_WAIT = 0.002
 """Wait for a reader that is behind, [s]."""
 
 
@@ -97,7 +97,7 @@ class _Sender:
     def run(self, link: ReconnectingLink) -> None:
         """Go on until the end of the link or of the run."""
         while not self._exchange.is_set(STOP) and not orphaned():
-            read = link.receive(Deadline.after(WAIT))
+            read = link.receive(Deadline.after(LONGEST_READ_WAIT))
             if read is None:
                 return
             if read.data or read.event:
@@ -111,7 +111,7 @@ class _Sender:
         """Hand a read over; the port waits while the reader has no room for it."""
         message = pickle.dumps(read, 5)
         while not self._exchange.reads[self._number].put(message):
-            time.sleep(FULL)
+            time.sleep(FULL_QUEUE_WAIT)
             if self._exchange.is_set(STOP) or orphaned():
                 return
         self._exchange.address.came.release()
@@ -151,7 +151,7 @@ class GatheredLink:
             if all(state.name for state in states):
                 self.name = " + ".join(state.name for state in states)
                 break
-            woken(exchange.address.came, WAIT)
+            woken(exchange.address.came, LONGEST_READ_WAIT)
 
     def receive(self, deadline: Deadline) -> Read | None:
         """Return the earliest of the reads that are there, or what has come by the deadline."""
@@ -160,7 +160,7 @@ class GatheredLink:
             self._taken = None
         while True:
             if time.monotonic() > self._next_look:
-                self._next_look = time.monotonic() + WAIT
+                self._next_look = time.monotonic() + LONGEST_READ_WAIT
                 self._states()
             read = self._earliest()
             if read is not None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from tirebench.deadline import Deadline
 from tirebench.errors import BenchError, UnpluggedError
-from tirebench.estimator.wheels import MOST, Wheels
+from tirebench.estimator.wheels import MOST_WHEELS, Wheels
 from tirebench.links import BACK, DECODED, LOST, PASSED, RESUMED, Link, Read
 from tirebench.links.reconnecting import ReconnectingLink
 from tirebench.live.exchange import RAW, STOP, Address, Exchange
@@ -20,9 +20,9 @@ from tirebench.live.priority import own_share
 from tirebench.live.rings import ByteQueue
 from tirebench.setup.source_plan import SourcePlan, wheels_of
 
-WAIT = 0.1
+LONGEST_READ_WAIT = 0.1
 """The longest wait for bytes before it is looked whether the run goes on, [s]."""
-FULL = 0.01
+FULL_QUEUE_WAIT = 0.01
 """Wait for those that are behind, [s]."""
 TRIES = 2
 TOO_LATE, CAUGHT_UP = 2.0, 0.2
@@ -78,7 +78,7 @@ class ReaderPlan:
     def expected(self) -> int:
         """Wheels that are known before anything is heard, one at least; as many as are read."""
         known = sum(len(source.known_wheels) for source in self.sources)
-        return max(1, len(self.wheels) or min(known, MOST))
+        return max(1, len(self.wheels) or min(known, MOST_WHEELS))
 
     def fresh(self) -> Wheels:
         """Return the wheels before anything was heard."""
@@ -202,10 +202,10 @@ class _Reader:
         state, exchange = self.state, self._exchange
         while not exchange.is_set(STOP) and not orphaned():
             if self._plan.every_turn and self._behind():
-                time.sleep(FULL)
+                time.sleep(FULL_QUEUE_WAIT)
                 continue
             try:
-                read = link.receive(Deadline.after(WAIT))
+                read = link.receive(Deadline.after(LONGEST_READ_WAIT))
             except UnpluggedError as error:
                 state.ended, state.message = "unplugged", str(error)
                 state.away.setdefault(0, time.time())

@@ -7,7 +7,7 @@ from pathlib import Path
 
 EVERY = 1.0
 """Time between two looks at the disk, [s]."""
-SPAN = 30
+LOOKS_FOR_A_RATE = 30
 """Looks that the rate is taken over."""
 
 
@@ -28,7 +28,7 @@ class Space:
     def __init__(self) -> None:
         self._path: Path | None = None
         self._next = 0.0
-        self._seen: deque[tuple[float, int]] = deque(maxlen=SPAN)
+        self._seen: deque[tuple[float, int]] = deque(maxlen=LOOKS_FOR_A_RATE)
         self._found = float("nan"), float("nan")
 
     def look(self, path: Path | None, size: int) -> tuple[float, float]:

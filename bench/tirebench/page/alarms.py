@@ -27,9 +27,9 @@ from typing import Any
 from tirebench.errors import DeviceError, cause
 
 FORMAT = "tirebench-alarms/1"
-KEPT = 50
+ALARMS_KEPT = 50
 """Alarms that are remembered."""
-MOST = 1e9
+LARGEST_LIMIT = 1e9
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +131,7 @@ def _fault(name: str, table: Any) -> str:
             good = isinstance(value, bool)
         else:
             good = isinstance(value, int | float) and not isinstance(value, bool)
-            good = good and abs(value) <= MOST and (key != "hysteresis" or value >= 0.0)
+            good = good and abs(value) <= LARGEST_LIMIT and (key != "hysteresis" or value >= 0.0)
         if not good:
             return f"[{name}] {key} = {value!r}; a number is needed (off: true or false); write it"
     low, high = (table.get(key, getattr(RULES[name], key)) for key in ("low", "high"))
@@ -181,7 +181,7 @@ class Alarms:
     def __init__(self, rules: Mapping[str, Rule] = RULES) -> None:
         self.rules = dict(rules)
         self._active: dict[tuple[str, int | None], Alarm] = {}
-        self._past: deque[Alarm] = deque(maxlen=KEPT)
+        self._past: deque[Alarm] = deque(maxlen=ALARMS_KEPT)
 
     def look(
         self, values: Mapping[str, float | None], wheel: int | None, now: float

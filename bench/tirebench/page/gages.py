@@ -18,7 +18,7 @@ from tirebench.wire.device import Device
 from tirebench.wire.gage_setup import apparent_strain, shunted, write_device, zeroed
 from tirelib.arrays import FloatArray
 
-SPAN = 3.0
+MEAN_SECONDS = 3.0
 """The mean is taken over the last so many seconds, [s]."""
 OLDEST = 2.0
 """A wheel that was silent for longer shows nothing of this moment, [s]."""
@@ -44,7 +44,7 @@ class GageSetup:
         """Take what the gages show."""
         now = time.monotonic()
         for level in levels:
-            kept = self._levels.setdefault(level.wheel, deque(maxlen=round(SPAN / EVERY)))
+            kept = self._levels.setdefault(level.wheel, deque(maxlen=round(MEAN_SECONDS / EVERY)))
             kept.append((now, level))
 
     def state(self) -> dict[str, Any]:
@@ -90,7 +90,7 @@ class GageSetup:
             self._without[wheel] = mean
             return (
                 f"wheel {wheel}: the mean without the shunt is taken; connect the shunt and "
-                f"wait {SPAN:.0f} s"
+                f"wait {MEAN_SECONDS:.0f} s"
             )
         if wheel not in self._without:
             raise DeviceError(

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 from tirebench.estimator.wheels import Wheel
 
-SPAN = 5.0
+WINDOW_SECONDS = 5.0
 """What is said of the last seconds is said of so many, [s]."""
-SHORTEST = 1.0
+SHORTEST_WINDOW = 1.0
 """Before so much of it has passed, nothing is said, [s]."""
 
 
@@ -31,7 +31,7 @@ class Recent:
     def look(
         self, wheel: Wheel, turns: int, invalid: int, now: float | None = None
     ) -> dict[str, Any]:
-        """Return what came and was lost in the last `SPAN`; null before anything can be said.
+        """Return what came and was lost in the last seconds; null before the shortest window.
 
         Parameters
         ----------
@@ -55,7 +55,7 @@ class Recent:
                 counts.low_battery,
             )
         )
-        while len(seen) > 2 and now - seen[1].moment >= SPAN:
+        while len(seen) > 2 and now - seen[1].moment >= WINDOW_SECONDS:
             seen.popleft()
         first, last = seen[0], seen[-1]
         elapsed, expected = last.moment - first.moment, wheel.timeline.rate
@@ -64,7 +64,7 @@ class Recent:
             last.lost - first.lost,
             last.turns - first.turns,
         )
-        known = elapsed >= SHORTEST
+        known = elapsed >= SHORTEST_WINDOW
         return {
             "rate_hz": came / elapsed if known else None,
             "rate_expected_hz": expected or None,

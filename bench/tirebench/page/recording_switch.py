@@ -10,7 +10,7 @@ from tirebench.live.chain import LiveChain
 from tirebench.recording.header import numbered
 from tirebench.recording.recorder import alarm_event
 
-PATIENCE = 5.0
+ANSWER_TIME = 5.0
 """How long the recorder may take to answer, [s]."""
 
 
@@ -72,7 +72,7 @@ class RecordingSwitch:
         if not self._on:
             file = numbered(self._first)
             self._chain.order("start", str(file))
-            if not self._chain.obeyed(Deadline.after(PATIENCE)):
+            if not self._chain.obeyed(Deadline.after(ANSWER_TIME)):
                 raise RecordingError(f"{file}: the recorder does not answer; wait, then try again")
             if self._chain.recorded.answer:
                 raise RecordingError(self._chain.recorded.answer)
@@ -85,4 +85,4 @@ class RecordingSwitch:
         if self._on:
             self._on = False
             self._chain.order("stop", "stopped by a viewer")
-            self._chain.obeyed(Deadline.after(PATIENCE))
+            self._chain.obeyed(Deadline.after(ANSWER_TIME))

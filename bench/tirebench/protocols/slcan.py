@@ -20,7 +20,7 @@ from tirebench.wire.conditions import Measured
 from tirebench.wire.frames import Frames
 from tirebench.wire.line_counts import LineCounts
 
-LONGEST = 1 + 8 + 1 + 128 + 4
+LONGEST_LINE = 1 + 8 + 1 + 128 + 4
 """Characters of the longest line."""
 _LETTERS = {
     b"t": (3, False),
@@ -72,7 +72,7 @@ class SlcanDecoder:
             self._joined = True
             if not _is_frame(lines[0]):
                 lines = lines[1:]
-        if len(self._tail) > LONGEST:
+        if len(self._tail) > LONGEST_LINE:
             self._tail, self._too_long = b"", True
         return self._parsed(lines)
 

@@ -26,7 +26,7 @@ from tirelib.campaign import CampaignHeader, Run, RunPlan, write_campaign
 from tirelib.held import HELD
 from tirelib.units import from_si
 
-SHORTEST = 0.05
+SHORTEST_RUN = 0.05
 """A segment shorter than this becomes no run of a campaign, [s]."""
 RIG_TRUTH = {"Fz": "Fz", "alpha": "slip_angle", "kappa": "slip_ratio", "Fy": "Fy"}
 CAN_LOGS = (".blf", ".asc", ".log")
@@ -38,7 +38,7 @@ def campaign_runs(found: Sequence[Segment], conditions: Conditions) -> Iterator[
     for segment in found:
         left = left_out(segment, conditions)
         strain = segment.strain[left:]
-        if len(strain) * segment.period < SHORTEST:
+        if len(strain) * segment.period < SHORTEST_RUN:
             continue
         first_us = segment.t_us + round(1e6 * segment.period * left)
         known = conditions.run_at(segment.t_us)
@@ -71,7 +71,7 @@ def left_out(segment: Segment, conditions: Conditions) -> int:
     told = np.isfinite(values).any(axis=0)
     row = int(np.argmax(np.isfinite(values[:, told]).all(axis=1)))
     left = round(1e-6 * (known.t_us[row] - segment.t_us) / segment.period)
-    enough = (len(segment.strain) - left) * segment.period >= SHORTEST
+    enough = (len(segment.strain) - left) * segment.period >= SHORTEST_RUN
     return left if enough else 0
 
 
@@ -88,7 +88,7 @@ def write_campaign_of(
     runs = list(campaign_runs(found, recording.conditions))
     if not runs:
         raise RecordingError(
-            f"{recording.path}: it holds less than {SHORTEST:g} s of strain of that wheel; at "
+            f"{recording.path}: it holds less than {SHORTEST_RUN:g} s of strain of that wheel; at "
             "least that much is needed; name another wheel or recording"
         )
     rate = runs[0].rate

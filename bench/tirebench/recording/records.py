@@ -1,7 +1,8 @@
 """Records of an MCAP file one after the other, in bounded memory whatever the file says of itself.
 
-A record, and a chunk once it is unpacked, may have `LARGEST` bytes; all chunks together may unpack
-to `MOST_TIMES` what they take in the file. The records of a chunk are yielded one by one.
+A record, and a chunk once it is unpacked, may have `LARGEST_RECORD` bytes; all chunks together may
+unpack to `LARGEST_RATIO` times their size in the file. The records of a chunk are yielded one by
+one.
 """
 
 import io
@@ -16,12 +17,12 @@ from zstandard import ZstdDecompressor
 
 from tirebench.errors import RecordingError
 
-LARGEST = 64 * 2**20
+LARGEST_RECORD = 64 * 2**20
 """A longer record is damage, not data, [bytes]."""
-MOST_TIMES = 100
+LARGEST_RATIO = 100
 """zstd makes strain 2 to 4 times smaller, and gages that say nothing 39 times (frames of
 `tests.bench.campaigns`, serial and slcan), so that 50 would do; what goes beyond is made to cost
-memory and time. The first `LARGEST` bytes are free."""
+memory and time. The first `LARGEST_RECORD` bytes are free."""
 
 
 def records(file: BinaryIO) -> Iterator[McapRecord]:
@@ -34,34 +35,36 @@ def records(file: BinaryIO) -> Iterator[McapRecord]:
         unpacked. A damaged file raises whatever mcap does.
     """
     taken = unpacked = 0
-    reader = StreamReader(file, emit_chunks=True, record_size_limit=LARGEST)
+    reader = StreamReader(file, emit_chunks=True, record_size_limit=LARGEST_RECORD)
     for record in reader.records:
         if not isinstance(record, Chunk):
             yield record
             continue
         content = _unpacked(record)
         taken, unpacked = taken + len(record.data), unpacked + len(content)
-        if unpacked > LARGEST + MOST_TIMES * taken:
+        if unpacked > LARGEST_RECORD + LARGEST_RATIO * taken:
             raise RecordingError(
-                f"{taken} bytes of chunks unpack to {unpacked} or more; a factor of {MOST_TIMES} "
-                "is allowed"
+                f"{taken} bytes of chunks unpack to {unpacked} or more; a factor of "
+                f"{LARGEST_RATIO} is allowed"
             )
         yield from _within(content)
 
 
 def _unpacked(chunk: Chunk) -> bytes:
-    """Return what a chunk holds; never more than `LARGEST` bytes are made of it."""
-    if chunk.uncompressed_size > LARGEST:
+    """Return what a chunk holds; never more than `LARGEST_RECORD` bytes are made of it."""
+    if chunk.uncompressed_size > LARGEST_RECORD:
         raise RecordingError(
-            f"a chunk unpacks to {chunk.uncompressed_size} bytes; {LARGEST} are allowed"
+            f"a chunk unpacks to {chunk.uncompressed_size} bytes; {LARGEST_RECORD} are allowed"
         )
     if chunk.compression == "":
         return chunk.data
     if chunk.compression == "zstd":
-        unpacking = ZstdDecompressor(max_window_size=LARGEST).stream_reader(io.BytesIO(chunk.data))
-        content = unpacking.read(LARGEST + 1)
+        unpacking = ZstdDecompressor(max_window_size=LARGEST_RECORD).stream_reader(
+            io.BytesIO(chunk.data)
+        )
+        content = unpacking.read(LARGEST_RECORD + 1)
     elif chunk.compression == "lz4":
-        content = LZ4FrameDecompressor().decompress(chunk.data, max_length=LARGEST + 1)
+        content = LZ4FrameDecompressor().decompress(chunk.data, max_length=LARGEST_RECORD + 1)
     else:
         raise RecordingError(
             f"a chunk is compressed with {chunk.compression[:20]!r}; zstd and lz4 are allowed"

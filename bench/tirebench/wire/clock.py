@@ -11,7 +11,7 @@ import numpy as np
 
 WINDOW = 20
 """Seconds that the line spans."""
-LEAST = 3
+SECONDS_FOR_A_FIT = 3
 """Seconds that a line needs."""
 
 
@@ -72,7 +72,7 @@ class ClockFit:
         return 1e-6 * (device_us + delay + slope * (device_us - middle))
 
     def _fit(self) -> None:
-        if len(self._points) < LEAST:
+        if len(self._points) < SECONDS_FOR_A_FIT:
             return
         time, delay = np.array(self._points).T
         middle = float(time.mean())

@@ -51,9 +51,9 @@ HEADER = np.dtype(
 )
 TICK = 1e-7
 """Unit of a frame's sample period, [s]."""
-LONGEST = HEADER.itemsize + 255 * GAGES * 2 + 4
+LONGEST_FRAME = HEADER.itemsize + 255 * GAGES * 2 + 4
 """Bytes of the longest frame before COBS."""
-LONGEST_ON_WIRE = LONGEST + LONGEST // 254 + 1
+LONGEST_ON_WIRE = LONGEST_FRAME + LONGEST_FRAME // 254 + 1
 
 Int16Array = npt.NDArray[np.int16]
 IntArray = npt.NDArray[np.int64]

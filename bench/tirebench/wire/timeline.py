@@ -19,7 +19,7 @@ from tirelib.arrays import BoolArray, FloatArray, IntArray
 
 LONGEST_FILL = 1.0
 """A gap up to this long is filled with NaN, [s]; a longer one begins a new segment."""
-LATE = 64
+LATEST_FRAME = 64
 """A frame up to this many numbers back is late; further back, the transmitter restarted."""
 SEQ_RANGE = 2**16
 TIME_RANGE = 2**32
@@ -194,7 +194,7 @@ class Timeline:
         if steps == 0 and elapsed == 0:
             self.counts.duplicates += 1
             return []
-        if -LATE <= steps < 0 and elapsed < 0:
+        if -LATEST_FRAME <= steps < 0 and elapsed < 0:
             self.counts.out_of_order += 1
             return []
         missing = round(elapsed * 10 / self._period) - self._samples

@@ -91,8 +91,10 @@ def test_the_floor_is_of_the_same_force() -> None:
     assert np.isnan(last_floor(history, "Fy", "other"))
     made = replace(comparison(), floor=2.0)
     assert comparison_document(made)["floor"] == 2.0
-    assert "explain 2 (the floor, by the last entry for Fy" in force_parts(made)[0].text
-    assert "tells no floor for Fy" in force_parts(comparison())[0].text
+    assert (
+        "explain an error of 2 (the floor, from the last entry for Fy" in force_parts(made)[0].text
+    )
+    assert "states no floor for Fy" in force_parts(comparison())[0].text
 
 
 def test_json_has_the_curves() -> None:

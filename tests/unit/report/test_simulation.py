@@ -182,7 +182,10 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "no number": ({"load": 4000.0, "turn_rate": np.nan}, "nan rad/s"),
     "heavy": ({"load": 1e5}, "100000 N"),
     "deep": ({"deflection": 0.29}, "290"),
-    "lists": ({"load": [1.0, 2.0], "turn_rate": [1.0, 2.0, 3.0]}, "2 values beside 3"),
+    "lists": (
+        {"load": [1.0, 2.0], "turn_rate": [1.0, 2.0, 3.0]},
+        "2 values where the longest list has 3",
+    ),
 }
 
 

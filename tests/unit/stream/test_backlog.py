@@ -15,7 +15,7 @@ from tirelib.flags import TurnFlag
 from tirelib.held import HELD
 from tirelib.signal.turns import TurnCutter
 from tirelib.stream import StreamEstimator
-from tirelib.stream.backlog import MOST, quiet_range
+from tirelib.stream.backlog import MOST_SAMPLES, quiet_range
 
 TURN = int(2.0 * np.pi * live.RADIUS / live.SPEED * live.RATE)
 
@@ -89,7 +89,7 @@ def test_most_of_a_turn_waits_and_never_more_than_a_bound(monkeypatch: pytest.Mo
     for first in range(0, rest.shape[1], 10):
         estimator.take(rest[:, first : first + 10].T.ravel().tolist(), [*held(0).values()])
     assert len(calls) < 0.35 * rest.shape[1] / 10
-    assert 100 < max(calls) <= MOST
+    assert 100 < max(calls) <= MOST_SAMPLES
 
 
 def test_a_standing_wheel_is_seen_at_once() -> None:

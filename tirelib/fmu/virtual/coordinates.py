@@ -16,9 +16,9 @@ MIRRORED = np.array([1.0, -1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
 """Sign of the inputs in the mirror image of a condition, left for right."""
 LOAD, SPEED, PRESSURE = 4000.0, 20.0, 2.4e5
 """Sizes by which loads, speeds and pressures are divided."""
-HALF = 0.25
+COMMON_HALF_ANGLE = 0.25
 """Half contact angle of the common waveform [rad]; the warp is monotonic up to twice that."""
-SMALLEST = 0.08
+SMALLEST_HALF_ANGLE = 0.08
 """Half contact angle below which the warp does not follow [rad]."""
 _PI = float(np.pi)
 
@@ -65,7 +65,7 @@ def coordinates(
 
 def half_angle(square: Any, by: Any = np) -> Any:
     """Return half contact angles [rad] of squares that an interpolation may leave below zero."""
-    return by.sqrt(0.5 * (square + by.hypot(square, SMALLEST**2)))
+    return by.sqrt(0.5 * (square + by.hypot(square, SMALLEST_HALF_ANGLE**2)))
 
 
 def warped(angle: Any, centre: Any, half: Any, by: Any = np) -> Any:
@@ -84,7 +84,7 @@ def warped(angle: Any, centre: Any, half: Any, by: Any = np) -> Any:
     """
     t = (angle - centre + _PI) % (2.0 * _PI) - _PI
     pull = by.tanh(2.0 * t / half) * (1.0 - (t / _PI) ** 2) ** 2
-    return t - (half - HALF) * pull
+    return t - (half - COMMON_HALF_ANGLE) * pull
 
 
 def spline_weights(t: Any) -> tuple[Any, Any, Any, Any]:

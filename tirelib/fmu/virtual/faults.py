@@ -96,6 +96,6 @@ def check(name: str, value: float, low: float, high: float) -> None:
     """
     if not low <= value <= high or value == math.inf:
         raise ParameterError(
-            f"{name} = {value:g}; allowed are finite numbers from {low:g} to {high:g}; set "
-            "another value before the FMU is initialised"
+            f"{name} = {value:g}; allowed are finite numbers from {low:g} to {high:g}; set a value "
+            "in this range before the FMU is initialised"
         )

@@ -136,13 +136,13 @@ def _row(wheel: VirtualWheel) -> list[float]:
 
 def _page(surface: Surface, table: list[Any], samples: int, rate: float) -> str:
     lead = (
-        "A tire in place of a measured one: what five gages on its innerliner would show, sample "
-        "by sample, at the load, slip, camber, speed and pressure that a vehicle model gives."
+        "A virtual tire: the signals that five gages on its innerliner would show, sample by "
+        "sample, at the load, slip, camber, speed and pressure that a vehicle model gives."
     )
     facts = {
         "tire": str(surface.about.get("tire", "")),
         "gages": ", ".join(f"{1e3 * y:+g}" for y in surface.lateral) + " mm, ISO 8855",
-        "samples per step": f"up to {samples} (output samples says how many are new)",
+        "samples per step": f"up to {samples} (the output samples gives the number of new ones)",
         "sample rate": f"{rate:g} Hz (parameter sample_rate)",
         "communication step": f"up to {1e3 * samples / rate:g} ms",
         "needs": "CPython 3.11 or newer with numpy and scipy; linux64 or win64",
@@ -179,8 +179,8 @@ def _ranges(surface: Surface) -> str:
         for factor, unit in (_SHOWN[name],)
     ]
     return html_table(("input", "from", "to", "unit"), rows) + (
-        "<p>Outside, nothing is extrapolated: <code>frame_valid</code> is false, the last frame is "
-        "held, <code>status</code> names the inputs.</p>"
+        "<p>Outside these ranges nothing is extrapolated: <code>frame_valid</code> is false, the "
+        "last frame is held, and <code>status</code> names the inputs that are out of range.</p>"
     )
 
 
@@ -205,8 +205,8 @@ def _errors(about: Mapping[str, Any]) -> str:
     spread = float(about.get("strain_spread_ustrain", math.nan))
     return (
         f"{html_table(head, rows)}\n<p>Against {about.get('solutions', 0)} solutions of the "
-        "numerical rig, each left out with its mirror image. The strain itself spreads by "
-        f"{spread:.0f} ustrain (rms); the largest errors are at the edges of the contact.</p>"
+        "numerical rig, each held out together with its mirror image. The strain itself spreads "
+        f"by {spread:.0f} ustrain (rms); the largest errors are at the edges of the contact.</p>"
     )
 
 
@@ -215,12 +215,12 @@ force. <code>wheel_angle</code> is 0 where the gages are over the road. The slip
 travel speed: a wheel that rolls freely at a slip angle has cos(alpha) - 1.</p>"""
 _FRAMES = """<p>Samples are taken at whole multiples of the sample period. After a step the frame
 holds the samples that were due in it, oldest first, the last one repeated to the frame's end; a
-step may have any length up to a full frame. Frames of any length hold the same samples.</p>"""
-_TRANSIENTS = """<p>Slip angle and slip ratio are felt after first-order relaxation over the way
-travelled; load, camber, pressure and friction at once. Everything else is the steady rolling state
+step may have any length up to a full frame. The frame length does not change the samples.</p>"""
+_TRANSIENTS = """<p>Slip angle and slip ratio act after first-order relaxation over the distance
+travelled; load, camber, pressure and friction act at once. Everything else is the steady rolling
+state
 of the numerical rig.</p>"""
-_LIMITS = """<ul>
-<li>Steady rolling only, apart from the relaxation: no vibration, no uneven road.</li>
-<li>Gages are alike and exact but for the noise and the faults that are asked for.</li>
-<li>Without a finite speed the wheel goes on at its last turn rate, not valid.</li>
-</ul>"""
+_LIMITS = """<ul> <li>Steady rolling only, apart from the relaxation: no vibration, no uneven
+road.</li> <li>All gages are equal and exact, apart from the noise and the faults that the
+parameters set.</li> <li>Without a finite speed the wheel continues at its last turn rate, and its
+frames are not valid.</li> </ul>"""

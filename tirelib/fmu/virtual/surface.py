@@ -257,14 +257,14 @@ def read_surface(source: Path | bytes) -> Surface:
         raise _damaged(where, f"its format is not {FORMAT}")
     for name, part in parts.items():
         if not np.all(np.isfinite(part)):
-            raise _damaged(where, f"{name} holds values that are no numbers")
+            raise _damaged(where, f"{name} holds values that are not numbers")
     return Surface(**parts, about=about)
 
 
 def _damaged(where: str, cause: str) -> FormatError:
     return FormatError(
-        f"{where}: is no surface of a virtual tire ({cause}); allowed is a file like "
-        "models/virtual_tire/reference.npz; make it with build/virtual_tire/surface.py"
+        f"{where}: is not the response surface of a virtual tire ({cause}); a file like "
+        "models/virtual_tire/reference.npz is needed; make it with build/virtual_tire/surface.py"
     )
 
 
