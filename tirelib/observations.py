@@ -31,7 +31,7 @@ class Observations:
     Attributes
     ----------
     features : Features
-        Of all turns, run after run.
+        Features of all turns, run after run.
     run : array of int, shape (n,)
         Run number of each turn.
     campaign : array of int, shape (n,)

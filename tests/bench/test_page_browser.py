@@ -375,7 +375,7 @@ class FourWheels(FakeSource):
         super().__init__(0, 1, 2, 3)
         self.heard = time.time() + 3600.0
         self.wheels.heard[2].rssi = -93
-        self.wheels.heard[2].told["speed"] = 18.0
+        self.wheels.heard[2].bus_conditions["speed"] = 18.0
         self.events: list[Any] = []
         self.about = About("port", conditions=Conditions.constant(pressure=2.3e5), folder=folder)
 

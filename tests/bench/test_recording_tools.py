@@ -22,7 +22,7 @@ from tirebench.cli import program
 from tirebench.emulator.emulator import write_script
 from tirebench.emulator.faults import Faults
 from tirebench.errors import RecordingError
-from tirebench.estimator.wheels import Told, Wheels
+from tirebench.estimator.wheels import BusCondition, Wheels
 from tirebench.links import Read
 from tirebench.protocols.decoder import SerialDecoder
 from tirebench.recording.document import line_document, turn_document, wheel_document
@@ -59,7 +59,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
             for block in wheels.push(read.data, read.arrival):
                 recorder.block(block)
         recorder.read(Read(start, b"bus", "", 1))
-        told = Told(0, Measured("pressure", 2.3e5))
+        told = BusCondition(0, Measured("pressure", 2.3e5))
         recorder.block(type(block)(0, start, 0, told))
         recorder.estimate(2, start, json.dumps(turn_document(TURN)).encode())
         recorder.link(None, line_document(*wheels.counts))

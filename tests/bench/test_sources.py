@@ -138,7 +138,7 @@ def replayed(path: Path, file: FmuFile) -> tuple[News, Wheels]:
 
 
 def speed_of(chain: LiveChain) -> float:
-    known = chain.wheels._told.get(("speed", None))
+    known = chain.wheels._bus_conditions.get(("speed", None))
     return 0.0 if known is None else 3.6 * known.value
 
 

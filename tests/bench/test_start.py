@@ -252,7 +252,7 @@ unit = "{unit}"
     given = conditions_of({}, [f"{condition}=2.5"], None)
     assert given is not None
     assert given.values[0][place] == pytest.approx(wanted)
-    assert [place for place, _ in source.told] == [condition]
+    assert [place for place, _ in source.conditions_sent] == [condition]
 
 
 @pytest.mark.parametrize("text", ["grip=1", "speed=fast", "speed", "friction=nan", "speed=70"])

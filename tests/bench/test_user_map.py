@@ -242,10 +242,10 @@ def test_a_speed_on_the_bus_holds_from_the_sample_after_it(reads: int) -> None:
 def test_what_is_held_is_bounded_and_the_newest_counts() -> None:
     held = Held(Conditions.constant(1.0, 2e5, 0.0))
     for i in range(1000):
-        held.tell(1000 * i, Measured("speed", float(i)))
+        held.set_from_bus(1000 * i, Measured("speed", float(i)))
     assert held.at(999_500)[:3] == (999.0, 2e5, 0.0)
     assert held.next_change(998_500) == 999_000
-    assert len(held._told) < 300
+    assert len(held._from_bus) < 300
 
 
 @pytest.mark.parametrize(

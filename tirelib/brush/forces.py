@@ -32,7 +32,7 @@ MOST_HALVINGS = 8
 MOST_NAMED = 8
 """Operating points that an error names."""
 TOLERANCE = 1e-11
-"""Of the carcass balance, relative to mu Fz and mu Fz times the contact length."""
+"""Residual of the carcass balance, relative to mu Fz and mu Fz times the contact length."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

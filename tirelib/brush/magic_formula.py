@@ -46,7 +46,7 @@ class SineFit:
     peak_told : bool
         The data saw at least 0.9 of the peak and tell it within 5 %.
     residual_std : float, [N]
-        Of the fit.
+        Residual standard deviation of the fit.
     at_limit : tuple of str
         Coefficients that ended at their bound.
     """

@@ -55,7 +55,7 @@ def magic_forces_6(
     Parameters
     ----------
     tire : MagicTire
-        Of fit type 60, 61 or 62.
+        Tire of fit type 60, 61 or 62.
     load : array_like, [N]
         > 0.
     slip_angle, camber : array_like, [rad]

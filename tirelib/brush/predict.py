@@ -23,7 +23,7 @@ from tirelib.errors import ConvergenceError, ParameterError, ShapeError
 
 MOST_ITERATIONS = 40
 TOLERANCE = 1e-10
-"""Of the balance with a compliant carcass, relative to mu Fz a."""
+"""Residual of the balance with a compliant carcass, relative to mu Fz a."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -117,7 +117,7 @@ class Run:
     strain : array, shape (n_gages, n_samples), or None
         In the file order of the gages, tension positive.
     rate : float, [Hz]
-        Of the strain; NaN without strain.
+        Sample rate of the strain; NaN without strain.
     start_time : float, [s]
         Time of the first strain sample on the recording's clock, the one of `rig_time`;
         the start on the campaign's clock is ``plan.start``.

@@ -51,7 +51,7 @@ def parse_plans(folder: Path, axes: str) -> tuple[tuple[RunPlan, ...], list[Prob
     Returns
     -------
     plans : tuple of RunPlan
-        Of the rows without a fault, in file order.
+        Plans of the rows without a fault, in file order.
     problems : list of Problem
         Every fault found, in reading order.
     """

@@ -66,14 +66,14 @@ class ExactContact:
     deflection : shape (n_points,), [m]
         d0, free radius minus loaded radius.
     half_angle : shape (n_points,), [rad]
-        Of the contact, as material angle on the belt.
+        Half angle of the contact, as material angle on the belt.
     load : shape (n_points,), [N]
     iterations : int
     tread : Tread
     constants : Constants
-        Of ring and tread at every point.
+        Constants of ring and tread at every point.
     inverse : shape (n_points, n_dof + 1, n_dof + 1), or None
-        Of the Newton matrix of a solution nearby: as a start it saves making one.
+        Inverse of the Newton matrix of a solution nearby: as a start it saves making one.
     """
 
     radius: FloatArray

@@ -120,7 +120,7 @@ def parts(
     slope : shape (6, n_points, n_nodes, 6)
         By (u, v, a, c, a', c').
     force : shape (n_points, n_nodes)
-        Of the tread, by the deflection, for k_t = 1.
+        Derivative of the tread's force by the deflection, for k_t = 1.
     """
     (a, c, da, dc), q = belt = _belt(local, k)
     u, v = local[..., 0], local[..., 1]

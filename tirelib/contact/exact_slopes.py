@@ -29,7 +29,7 @@ class ExactSlopes:
     coefficients : shape (n_directions, n_points, n_dof), [m]
     deflection : shape (n_directions, n_points), [m]
     inverse : shape (n_points, n_dof + 1, n_dof + 1)
-        Of the Newton matrix.
+        Inverse of the Newton matrix.
     """
 
     coefficients: FloatArray

@@ -104,7 +104,7 @@ class StripContact:
         d0 at the equator.
     camber, pressure, omega : shape (n_points,), [rad], [Pa], [rad/s]
     radius : shape (n_points,), [m]
-        Of the neutral line.
+        Radius of the neutral line.
     free_radius : shape (n_strips,), [m]
     strip_deflection : shape (n_points, n_strips), [m]
     edges : shape (n_points, n_strips, 2), [rad]
@@ -116,7 +116,7 @@ class StripContact:
     displacement : shape (n_points, n_strips, n_modes + 1, 3)
         Harmonics of (u, v, beta) of each strip, [m], [m], [rad].
     bending : LateralDeflection
-        Of the whole belt.
+        Lateral deflection of the whole belt.
     iterations : int
     """
 

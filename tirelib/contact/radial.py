@@ -67,7 +67,7 @@ class RadialContact:
     phi, weights, delta : shape (n_points, n_nodes), [rad], [rad], [m]
         Gauss nodes in the patch, their weights and the tread's compression there.
     compliance : Compliance
-        Of the ring, at the solution.
+        Compliance of the ring, at the solution.
     tread : Tread
     extra : shape (n_points, n_modes + 1, 3) or None, [N/m]
         Harmonics of other line loads on the belt.
@@ -169,8 +169,8 @@ def press(
     Parameters
     ----------
     compliance : Compliance or callable
-        Of the ring; a callable takes the deflections (n_points,), [m], and returns it, for
-        sidewalls that soften with deflection, Eq. (54).
+        Compliance of the ring; a callable takes the deflections (n_points,), [m], and returns it,
+        for sidewalls that soften with deflection, Eq. (54).
     tread : Tread
     deflection : float or shape (n_points,), [m]
     extra : shape (n_points, n_modes + 1, 3), optional, [N/m]
@@ -208,7 +208,7 @@ def load(
         As for `press`.
     vertical_load : float or shape (n_points,), [N]
     start : Start, optional
-        Of a contact nearby, of as many points: saves time and changes nothing else.
+        Solution of a contact nearby, of as many points: saves time and changes nothing else.
 
     Raises
     ------

@@ -67,14 +67,14 @@ def press(
     Parameters
     ----------
     compliance : Compliance or callable
-        Of the ring, or a function of the deflections (n_points,), [m], that returns it.
+        Compliance of the ring, or a function of the deflections (n_points,), [m], that returns it.
     tread : Tread
         h_0 is its free radius minus the ring's radius.
     shear : Shear
     deflection : float or shape (n_points,), [m]
     torque : float or shape (n_points,), optional, [N m]
-        Of the road about the axle, along +phi; 0 rolls freely, it is positive on a braked wheel.
-        Without it free rolling is that of Eq. (103), x_0 = 0.
+        Torque of the road about the axle, along +phi; 0 rolls freely, it is positive on a braked
+        wheel. Without it free rolling is that of Eq. (103), x_0 = 0.
     extra : shape (n_points, n_modes + 1, 3), optional
         Harmonics of line loads (q_u, q_v, q_beta) on the belt besides the tread's, [N/m], [N].
     n_nodes : int
@@ -178,8 +178,8 @@ def friction_loads(contact: ShearContact) -> ComplexArray:
     Returns
     -------
     shape (n_points, n_modes + 1, 3)
-        Of (-f_t sin beta, f_t cos beta, h f_t), [N/m], [N/m], [N]; fits `extra` of the radial
-        contact.
+        Harmonics of (-f_t sin beta, f_t cos beta, h f_t), [N/m], [N/m], [N]; fits `extra` of the
+        radial contact.
     """
     beta = contact.declination - contact.phi
     moment = contact.belt_loads[..., 2]

@@ -42,7 +42,7 @@ class ShearContact:
     belt_loads : shape (n_points, n_nodes, 3)
         q_u outward, q_v along +phi, [N/m], and q_beta, [N], on the belt.
     compliance : Compliance
-        Of the ring, at the solution.
+        Compliance of the ring, at the solution.
     tread : Tread
     tread_shear : Shear
     extra : shape (n_points, n_modes + 1, 3) or None, [N/m]

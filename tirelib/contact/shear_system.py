@@ -193,7 +193,8 @@ def _whole_patch(
 ) -> ComplexArray:
     """Return displacement harmonics about the patch's middle, shape (..., n_modes + 1, 3, 7).
 
-    Of all loads; their derivatives by the edges, R_e, R_l, x_0; the displacement's slope.
+    The last axis holds the displacement under all loads, its derivatives by the edges, R_e, R_l and
+    x_0, and its slope.
     """
     weight, (loads, d_loads) = patch.weights[..., None], (patch.tread.loads, patch.tread.d_loads)
     with_lead, with_trail = patch.mesh.shares

@@ -48,7 +48,8 @@ __all__ = ["Layout", "RoadForces", "StripContact", "press_strips"]
 
 MAX_ITERATIONS = 40
 TOLERANCE = 1e-6
-"""Of the load, relative; of the other line loads' harmonics, relative to load over radius."""
+"""Residual of the load, relative; of the other line loads' harmonics, relative to load over
+radius."""
 SHARED = MappingProxyType(
     dict.fromkeys(
         (

@@ -61,7 +61,7 @@ class Effect:
     stage : str
         What it acts on (`HOOKS`).
     unit : str
-        Of the strength.
+        Unit of the strength.
     low, high : float
         Plausible strengths; the sign is part of it. Zero, which is the base model, lies inside.
         They hold for each component.

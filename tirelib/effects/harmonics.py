@@ -23,7 +23,7 @@ def with_gain(state: State, gain: FloatArray | ComplexArray) -> State:
     state : State
         With a waveform over one turn, in equal steps.
     gain : array, shape (n_points or 1, n_phi // 2 + 1)
-        Of harmonics exp(i n phi).
+        Gain of harmonics exp(i n phi).
     """
     # what changes is added: gains of one change no bit
     change = np.fft.irfft(np.fft.rfft(state.waveform) * (gain - 1.0), n=state.phi.size)

@@ -61,7 +61,7 @@ class Features:
     offset
         Strain opposite the contact.
     time, ready, period, omega, speed, pressure, camber, axis_shift
-        Of the turn, SI; `omega`, `speed` and `camber` at its contact.
+        Values of the turn, SI; `omega`, `speed` and `camber` at its contact.
     angle_std, slip_std
         Relative standard deviation of angles about the contact, and of ``omega / speed``.
     offset_std : shape (n, n_gages)

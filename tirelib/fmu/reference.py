@@ -15,7 +15,7 @@ from tirelib.arrays import FloatArray
 
 FOLDER = "reference"
 TOLERANCE = 1e-9
-"""Of the expected output, relative to the largest magnitude of the variable."""
+"""Tolerance of the expected output, relative to the largest magnitude of the variable."""
 
 
 @dataclass(frozen=True, slots=True)

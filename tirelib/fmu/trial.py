@@ -18,7 +18,7 @@ from fmpy.util import read_csv
 from fmpy.validation import validate_fmu
 
 MOST_STEPS = 100
-"""Of a run without reference signals."""
+"""Largest number of steps of a run without reference signals."""
 _FACTS = ("modelName", "fmiVersion", "guid", "generationTool", "version", "description")
 
 

@@ -24,7 +24,7 @@ class Coordinate:
     Attributes
     ----------
     name : str
-        Of `Tire`.
+        Field name of `Tire`.
     unit : float
         Change for z = 1; zero means that the parameter is scaled by exp(z).
     """
@@ -140,7 +140,7 @@ class CorrectionSlopes:
     waveform : shape (n_free, n_points, n_phi), [-]
     deflection : shape (n_free, n_points), [m]
     contact : RolledSlopes
-        Of the rolling ring; its last two directions are load and pressure.
+        Slopes of the rolling ring; its last two directions are load and pressure.
     """
 
     waveform: FloatArray
@@ -159,7 +159,7 @@ class Correction:
     contact : Rolling or None
         The solution behind it: a start for one nearby, and for slopes.
     start : Start or None
-        Of the linear ring's contact.
+        Solution of the linear ring's contact.
     depth : shape (n_points,) or None, [m]
         A deflection of the linear ring nearby, from which constants that follow it start.
     slopes : CorrectionSlopes or None

@@ -23,9 +23,9 @@ class BrushConditions:
     load, pressure : [N], [Pa]
     slip_angle, slip_ratio, camber : [rad], [-], [rad]
     speed : [m/s]
-        Of the road under the wheel; negative where the tire rolls the other way round.
+        Speed of the road under the wheel; negative where the tire rolls the other way round.
     temperature : [K]
-        Of the tread.
+        Temperature of the tread.
     slip_rate : [rad/s]
         Rate of the slip angle; zero in steady runs.
     order : [-]
@@ -65,8 +65,8 @@ class BrushState:
     a : [m]
         Half the contact length.
     flatness, ring_flatness : [-]
-        Of the pressure (`tirelib.brush.shaped`): as it is, and that of the tire's ring; 1 where no
-        ring is known.
+        Flatness of the pressure (`tirelib.brush.shaped`): as it is, and that of the tire's ring; 1
+        where no ring is known.
     camber_thrust : [-]
         Slip angle that a radian of camber is worth.
     slip_angle, slip_ratio : [rad], [-]

@@ -77,7 +77,7 @@ def register(
     Parameters
     ----------
     effect : Effect
-        Of the strain chain or the brush; `others` may hold it.
+        Effect of the strain chain or the brush; `others` may hold it.
     others : mapping
         Effects to compare it with.
     tire : Tire

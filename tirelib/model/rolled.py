@@ -16,7 +16,8 @@ from tirelib.rolling.solve import Rolling, slopes
 STEP = 1e-6
 """Relative change of what the ring is made of, of which the residual's slope is taken."""
 FRICTION = 1.0
-"""Of tread and road. A wheel that rolls freely slides only where its contact ends."""
+"""Friction coefficient between tread and road. A wheel that rolls freely slides only where its
+contact ends."""
 ALONG = 1e-3
 """Share of a slope of the solution, of which the strain's slope is taken."""
 

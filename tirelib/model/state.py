@@ -68,16 +68,16 @@ class State:
         Ring radius R, free radius R0, belt width b, tread thickness h0, gage offset y < 0.
     EI, mass, tension_pressure, k_u, k_v, damping, EA, GA, rotary_inertia, inertia_share, tension,
     dashpots
-        Of the ring (`tirelib.ring.ring.Ring`); tension_pressure is p of the tension p b R, and GA
-        is the tire's less that tension.
+        Parameters of the ring (`tirelib.ring.ring.Ring`); tension_pressure is p of the tension p b
+        R, and GA is the tire's less that tension.
     k_t, hardening
-        Of the tread (`tirelib.contact.tread.Tread`).
+        Parameters of the tread (`tirelib.contact.tread.Tread`).
     lateral : float, [m]
         Position of the gage (ISO, left positive).
     deflection : shape (n_points,), [m]
         d0 that the constants follow; at the contact stage and later, that of the solution.
     start : Start or None
-        Of a contact nearby; it only saves time.
+        Solution of a contact nearby; it only saves time.
     contact : RadialContact or None
         From the contact stage on.
     belt : shape (n_points, n_modes + 1, 3)

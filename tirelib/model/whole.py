@@ -27,7 +27,7 @@ from tirelib.waveforms import GRID
 
 Values = Mapping[str, float | FloatArray]
 LINEAR_STEP = 1e-4
-"""Of differences of the linear ring."""
+"""Relative step of the finite differences of the linear ring."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +83,7 @@ def solve_whole(
     Parameters
     ----------
     values : mapping
-        Of a tire.
+        Parameters of a tire.
     points : Operating
     changes : sequence of (stage, change)
         Effects.

@@ -71,7 +71,7 @@ def write_diagnosis(
     told : Assessment
     folder : Path
     history : sequence of mapping
-        Of the model, as its file holds it.
+        History of the model, as its file holds it.
     lines : sequence of (title, sentence)
         The verdict in four lines (`tirelib.report.explanation`).
 

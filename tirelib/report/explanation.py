@@ -204,7 +204,7 @@ def journey_explained(
     journey : mapping
         ``tirelib-explanation/1``: the errors of the models in the end.
     folder, out : Path
-        Of the campaign, and of the journey's files.
+        Folders of the campaign, and of the journey's files.
     """
     lines = asdict(explained(told, journey["steps"][0]["model"], str(folder)))
     if journey["added"]:

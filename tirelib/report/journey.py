@@ -38,13 +38,13 @@ class Journey:
     Attributes
     ----------
     before, after : Comparison or ForceComparison
-        Of the first and of the last model; the same if nothing was added.
+        Comparisons of the first and of the last model; the same if nothing was added.
     document : mapping
         ``tirelib-explanation/1``.
     steps : sequence of mapping
         ``tirelib-extension/1`` of each effect that was added.
     history : sequence of mapping
-        Of the last model.
+        History of the last model.
     """
 
     before: Comparison | ForceComparison
@@ -197,7 +197,7 @@ def run_errors(steps: Sequence[Mapping[str, Any]], unit: str) -> list[Plot]:
     steps : sequence of mapping
         ``tirelib-extension/1`` of strain.
     unit : str
-        Of the errors.
+        Unit of the errors.
     """
     if not steps or "runs" not in steps[0]:
         return []

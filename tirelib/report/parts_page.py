@@ -32,7 +32,7 @@ def write_parts_page(
     lines : sequence of (title, sentence)
         The result in a few lines at the head of the page, in the place of `answer`.
     links : sequence of (title, address)
-        Of other pages, relative to the folder.
+        Titles and addresses of other pages, relative to the folder.
     commands : sequence of str
         Command lines that made it.
 

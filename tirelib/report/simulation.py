@@ -100,7 +100,8 @@ class Simulation:
         Extremes between the angles of `phi`, where they are known: the strain rate has a kink where
         the tread begins to slide.
     gage : shape (n_points, n_phi) or None, [-]
-        Of a model file: the waveform as the gage and its filter give it, which `compare` uses.
+        Gage signal of a model file: the waveform as the gage and its filter give it, which
+        `compare` uses.
     """
 
     tire: Tire

@@ -88,7 +88,7 @@ class Conditions:
     inflation, turn_rate : [Pa], [rad/s]
     camber : [rad]
     temperature : [K]
-        Of the tread; NaN where unknown.
+        Temperature of the tread; NaN where unknown.
     """
 
     inflation: FloatArray
@@ -135,7 +135,7 @@ def simulate_model(
     load, deflection : shape (n_points,), [N], [m]
         One of the two.
     low_pass : LowPass, optional
-        Of the gage's waveform; the default is that of the signal chain.
+        Low-pass filter of the gage's waveform; the default is that of the signal chain.
 
     Raises
     ------

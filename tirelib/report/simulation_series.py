@@ -110,7 +110,7 @@ def long_series(found: ShearContact, ring: Compliance, n_angles: int) -> Complex
     ring : Compliance
         The ring of the contact, with as many harmonics as are wanted.
     n_angles : int
-        Of the curves; the loads are taken on their fine grid.
+        Number of angles of the curves; the loads are taken on their fine grid.
 
     Returns
     -------

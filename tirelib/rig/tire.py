@@ -221,7 +221,8 @@ class Condition:
 NEW_DEPTH = 0.008
 """Depth of the grooves of a new tread; what is below them does not wear [m]."""
 TREAD_DENSITY = 800.0
-"""Of the tread that wears, its grooves included: 1,150 kg/m^3 of rubber on 70 % of it [kg/m^3]."""
+"""Density of the tread that wears, its grooves included: 1,150 kg/m^3 of rubber on 70 % of it
+[kg/m^3]."""
 
 
 def on_road(tire: RigTire, cond: Condition) -> RigTire:

@@ -93,7 +93,7 @@ def three_mode_bending_stiffness(
     Parameters
     ----------
     frequency : array, shape (..., 3), [rad/s]
-        Of orders 1, 2, 3.
+        Frequencies of orders 1, 2, 3.
     ring_radius, inflation, mass : array, shape (...), [m], [N/m], [kg/m]
         R, p0 b, rho A.
 

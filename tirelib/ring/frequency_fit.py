@@ -28,8 +28,8 @@ class StiffnessFit:
     Attributes
     ----------
     names : tuple of str
-        Of the parameters: bending_stiffness, then radial_stiffness and tangential_stiffness with
-        .offset and .slope (per Pa) or @pressure, after the law.
+        Names of the parameters: bending_stiffness, then radial_stiffness and tangential_stiffness
+        with .offset and .slope (per Pa) or @pressure, after the law.
     value, low, high : array, shape (p,)
         Estimate and interval; NaN and infinite where the modes do not hold the parameter at all.
     covariance : array, shape (p, p)
@@ -96,7 +96,7 @@ def fit_stiffness(
         Known standard deviations: intervals are normal. Without: equal relative noise, estimated
         from the residuals; intervals are Student's.
     confidence : float
-        Of the intervals, between 0 and 1.
+        Confidence level of the intervals, between 0 and 1.
     limit : float
         Half-width, relative, up to which a parameter counts as identifiable.
 

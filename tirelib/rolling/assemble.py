@@ -71,11 +71,11 @@ class Contact:
     q, sticks, side : shape (n_points, n_fine, 3)
         Law of the bristles at each element's second to fourth node.
     limit_slope : shape (n_points, n_fine, 3)
-        Of the most shear mu P / k_s by the overlap.
+        Derivative of the most shear mu P / k_s by the overlap.
     entered : shape (n_points, n_fine, 3)
         Share of the way from the node before on which the bristle touches the road.
     entered_slope : shape (2, n_points, n_fine, 3), [-]
-        Of the shear through it, by the overlaps at the node before and at the node.
+        Derivative of the shear through it, by the overlaps at the node before and at the node.
     """
 
     tip: road.Tip

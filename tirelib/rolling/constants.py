@@ -29,7 +29,8 @@ class Constants:
     inflation : [N/m]
         p b: pressure times the width that carries it.
     tension : [N]
-        Of the belt beside p b R; a radial force of the sidewalls holds it (`tirelib.rolling.belt`).
+        Tension of the belt beside p b R; a radial force of the sidewalls holds it
+        (`tirelib.rolling.belt`).
     k_u, k_v : [N/m^2]
         Sidewall, radial and tangential.
     dashpots : [-]
@@ -44,7 +45,7 @@ class Constants:
         Tread, in shear.
     friction : [-]
     omega, load, torque : [rad/s], [N], [N m]
-        Of the wheel; a torque that drives is positive.
+        Values of the wheel; a torque that drives is positive.
     """
 
     radius: FloatArray

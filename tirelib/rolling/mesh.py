@@ -36,7 +36,7 @@ class Mesh:
     fine : slice
         Elements that can touch the road.
     node : shape (n_nodes,), [rad]
-        Of all elements but the last's end, which is the first's start.
+        Nodes of all elements but the last's end, which is the first's start.
     belt, road : Points
         Integration points of all elements, and of the fine ones.
     """

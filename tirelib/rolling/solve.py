@@ -57,7 +57,7 @@ class Rolling:
     contact : Contact
     iterations : int
     size : (fine, coarse)
-        Of the mesh.
+        Size of the mesh.
     """
 
     constants: Constants
@@ -154,7 +154,7 @@ class OnTurn:
     delta : [m]
         Overlap of tread and road; negative is clearance.
     pressure, shear : [N/m]
-        Of the road per length of belt: upward, and along its own motion.
+        Force of the road per length of belt: upward, and along its own motion.
     """
 
     phi: FloatArray

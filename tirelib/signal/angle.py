@@ -118,7 +118,7 @@ def angle_law(
     ahead : float, [samples]
         How far beyond the middle the courses reach.
     courses : mapping of name to Course
-        Of `SOURCES`, as far as they are known.
+        Courses of `SOURCES`, as far as they are known.
     past : Past
         From the law of the preceding turn; empty if there is none.
     unknown : float, [1]

@@ -136,7 +136,7 @@ _LEGENDRE = np.array(
 _MEANS = np.array([1.0, -1.0 / 2.0, 1.0 / 3.0, -1.0 / 4.0])
 """Means of the powers from -1 to 0."""
 _BENT = np.array([0.0, 0.0, 1.0, -1.0])
-"""Of the powers: slope at 0 less the mean slope from -1 to 0."""
+"""Weights of the powers: slope at 0 less the mean slope from -1 to 0."""
 
 
 def _moved(gain: float, shift: float) -> FloatArray:

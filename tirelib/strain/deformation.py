@@ -25,9 +25,9 @@ from tirelib.contact.static import LARGEST_DEFLECTION, road_gap
 from tirelib.errors import ParameterError, ShapeError
 
 SMALLEST_EIGENVALUE = 0.05
-"""Of u + u'' on the arc; an error of the strain grows by its inverse."""
+"""Smallest eigenvalue of u + u'' on the arc; an error of the strain grows by its inverse."""
 LARGEST_STRAIN = 0.1
-"""Of an innerliner; more is microstrain or percent taken for strain."""
+"""Largest strain of an innerliner; more is microstrain or percent taken for strain."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,7 @@ def strain_harmonics(
     displacement : shape (..., n_modes + 1, 3)
         Harmonics of u [m], v [m], beta [rad].
     radius : [m]
-        Of the neutral line; scalar or shape (...).
+        Radius of the neutral line; scalar or shape (...).
     offset : [m]
         y of the gage from the neutral line, negative toward the inside; scalar or shape (...).
 

@@ -156,7 +156,7 @@ def tread_strain(contact: StripContact, traction: FloatArray, beam: TreadBeam) -
     traction : shape (n_points, n_strips, n_nodes), [N/m]
         Along +phi on the tire, at the contact's nodes; without resultant on any strip.
     beam : TreadBeam
-        Of the whole belt; a strip has its share of it.
+        Beam of the whole belt; a strip has its share of it.
 
     Returns
     -------

@@ -19,7 +19,7 @@ MOST_SAMPLES = 512
 _MEDIAN = 2
 """Samples by which the finder lags."""
 _NEARLY = 1.0 - 1e-9
-"""Of the swing that a jump needs: what rounding may not reach."""
+"""Share of a jump's required swing that round-off cannot reach."""
 
 
 class Backlog:

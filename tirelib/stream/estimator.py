@@ -38,9 +38,10 @@ class TurnEstimate:
     turn : int
         Number of the turn since the start, from 1.
     features : Features
-        Of one row; ``time`` and ``ready`` are in s since the first sample.
+        Features of one row; ``time`` and ``ready`` are in s since the first sample.
     estimates : Estimates
-        Of one row: value, std and valid of Fz, alpha, kappa, Fy; flags, notes, contact lengths.
+        Estimates of one row: value, std and valid of Fz, alpha, kappa, Fy; flags, notes, contact
+        lengths.
     """
 
     turn: int

@@ -84,7 +84,7 @@ class Asked:
     ----------
     sources : tuple of SourcePlan
     number : int or None
-        Of the wheel.
+        Number of the wheel.
     seconds, still : float, [s] and strain
     """
 

@@ -1,4 +1,4 @@
-"""What a run is told: its sources, and what is known beside the strain."""
+"""The options of a run: its sources, and the conditions that are known besides the strain."""
 
 import math
 import time
@@ -171,7 +171,7 @@ def _is_number(text: str) -> bool:
 def given_live(
     sources: tuple[SourcePlan, ...], conditions: Conditions | None, wheels: tuple[int, ...]
 ) -> Given:
-    """Return what a live run is told.
+    """Return the sources and conditions that the options of a live run give.
 
     Raises
     ------
@@ -230,7 +230,7 @@ def given_replayed(
 
 def missing(given: Given, calibration: Calibration) -> tuple[dict[str, str], dict[str, str]]:
     """Return what is not known, by name and in words: needed by the calibration, and useful."""
-    told = [place for source in given.sources for place in source.told]
+    told = [place for source in given.sources for place in source.conditions_sent]
     wheels = {*given.wheels, *(w for source in given.sources for w in source.known_wheels)}
     words: dict[str, str] = {}
     for name in {*calibration.needed, *_WITHOUT} - set(given.conditions.known):

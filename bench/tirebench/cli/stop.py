@@ -23,7 +23,7 @@ def silence() -> None:
     for stream in (sys.stdout, sys.stderr):
         try:
             if not stat.S_ISCHR(os.fstat(stream.fileno()).st_mode):
-                continue  # once it is gone, a terminal does not tell that it was one
+                continue  # a terminal that is gone no longer reports that it was one
             nowhere = os.open(os.devnull, os.O_WRONLY)
             os.dup2(nowhere, stream.fileno())
             os.close(nowhere)

@@ -51,7 +51,7 @@ class Tape:
     records : tuple of Record
         In order of device time; several wheels side by side.
     conditions : Conditions
-        Of one pass, with the runs and their truth.
+        Conditions of one pass, with the runs and their truth.
     duration : float, [s]
     """
 

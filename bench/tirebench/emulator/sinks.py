@@ -107,7 +107,7 @@ class BusSink:
         self._bus = bus
 
     def wait_for_reader(self, deadline: Deadline) -> None:
-        """Go on at once: a bus does not tell who listens."""
+        """Go on at once: a bus does not show who listens."""
 
     def send(self, frames: Sequence[Any]) -> bool:
         """Send frames, each a list of messages.

@@ -21,7 +21,7 @@ from tirebench.wire.frames import GAGES, TICK
 from tirelib.campaign import Campaign, Run
 
 CONDITION_STEP = 0.01
-"""Speed, pressure and camber of a manoeuvre are told this often, [s]."""
+"""Interval at which speed, pressure and camber of a manoeuvre are given, [s]."""
 READS = 256
 """Reads of a recording that are played as one piece."""
 
@@ -71,12 +71,12 @@ def manoeuvre_tape(
         records.append(Record(wheel, 0, period, struck, bits))
         motions[wheel] = motion
     duration = max(len(record.counts) for record in records) * period * TICK
-    told = _conditions(motions[wheels[0]], alone=len(wheels) == 1)
-    return Tape(tuple(records), told, duration + 0.1), motions
+    conditions = _conditions(motions[wheels[0]], alone=len(wheels) == 1)
+    return Tape(tuple(records), conditions, duration + 0.1), motions
 
 
 def _conditions(motion: Motion, *, alone: bool) -> Conditions:
-    """Return what is told along a motion; the turn rate only of a wheel that plays alone."""
+    """Return the conditions along a motion; the turn rate only of a wheel that plays alone."""
     time = np.arange(0.0, motion.time[-1], CONDITION_STEP)
     columns = {
         name: np.interp(time, motion.time, [getattr(c, name) for c in motion.conditions]).tolist()

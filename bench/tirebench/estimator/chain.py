@@ -44,7 +44,7 @@ class Turn:
     Attributes
     ----------
     run : int
-        Of the campaign, where a sidecar says; else 0.
+        Run number of the campaign, where a sidecar states it; else 0.
     segment : int
         Stretch of the line's samples, see `tirebench.wire.timeline`.
     t, ready : float, [s]
@@ -144,9 +144,9 @@ class _Segment:
     until: float = -1.0  # the sample at which the condition changes
     condition: Condition = UNKNOWN
     marks: BoolArray = field(default_factory=lambda: np.empty((0, 0), np.bool_))
-    """Of those that wait: saturated in each gage, lost."""
+    """Marks of the waiting samples: saturated in each gage, lost."""
     marked: IntArray = field(default_factory=lambda: np.empty((0, 0), np.int64))
-    """Of those since the turn before that have a mark: number, saturated in each gage, lost."""
+    """Marked samples since the preceding turn: number, saturated in each gage, lost."""
 
     def mark(self, marks: BoolArray) -> None:
         """Keep the marks of samples that are to be stepped next."""
@@ -194,7 +194,7 @@ class Chain:
         """Take what comes next and return the turns that it ends."""
         content = block.content
         if not isinstance(content, Samples):
-            self._conditions.tell(content.t_us, content.measured)
+            self._conditions.set_from_bus(content.t_us, content.measured)
             if self._segment is not None:
                 self._segment.until = -1.0
             return []
@@ -207,7 +207,7 @@ class Chain:
         return turns + self._take(content)
 
     def jump(self, why: str) -> None:
-        """Begin afresh with the next samples; what was not stepped and what a bus told is lost."""
+        """Start again with the next samples; drop waiting samples and conditions from the bus."""
         self._segment, self._afresh, self._note = None, True, why
         self._conditions = Held(self._known)
 

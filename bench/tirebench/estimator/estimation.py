@@ -126,7 +126,7 @@ class WheelEstimation:
         return self._news(self._chain.finish())
 
     def _left_out(self, place: Place) -> bool:
-        """Do what the run did here; tell whether it left these samples out."""
+        """Do what the recorded run did here; return whether it left these samples out."""
         if not self._jumps or place < self._jumps[0].start:
             return False
         if place < self._jumps[0].end:

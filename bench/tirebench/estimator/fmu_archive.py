@@ -34,7 +34,7 @@ class FmuArchive:
     ----------
     path : Path
     sha256 : str
-        Of the file, hex.
+        Hash of the file, hex.
     content : bytes
     """
 

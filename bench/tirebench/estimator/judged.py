@@ -18,7 +18,7 @@ class JudgedTurns:
         self._waiting: list[Turn] = []
 
     def take(self, turns: Sequence[Turn], wheels: Wheels, *, end: bool = False) -> list[Turn]:
-        """Take new turns and return those that may be told by now.
+        """Take new turns and return those that may be reported by now.
 
         Parameters
         ----------
@@ -34,6 +34,6 @@ class JudgedTurns:
         """
         waiting = [*self._waiting, *turns]
         wrong, judged = wheels.contradicted, wheels.judged
-        told = [end or turn.wheel in judged for turn in waiting]
-        self._waiting = [turn for turn, now in zip(waiting, told, strict=True) if not now]
-        return [t for t, now in zip(waiting, told, strict=True) if now and t.wheel not in wrong]
+        ready = [end or turn.wheel in judged for turn in waiting]
+        self._waiting = [turn for turn, now in zip(waiting, ready, strict=True) if not now]
+        return [t for t, now in zip(waiting, ready, strict=True) if now and t.wheel not in wrong]

@@ -38,7 +38,7 @@ class Lap:
     wheel, turn, segment : int
         Turn counts the estimates of the wheel from 1.
     valid : bool
-        Of the turn's estimate.
+        Validity of the turn's estimate.
     first, step : float, [deg]
         Wheel angle of the first sample, and from one to the next.
     strain : float32 array, shape (n, 5)

@@ -22,7 +22,7 @@ class Source(Protocol):
     Attributes
     ----------
     name : str
-        Of the port or the file.
+        Name of the port or the file.
     live : bool
         Whether time passes at the other end.
     ended, message : str
@@ -102,7 +102,7 @@ class Outcome:
     reason : str
         ``end`` (of a recording), ``duration``, ``silence``, ``turns``, ``stopped``, ``unplugged``.
     message : str
-        Of the port that went away.
+        Message of the port that went away.
     count, valid : int
         Turns so far, and those that may be used.
     turns : list of Turn

@@ -24,8 +24,8 @@ MOST_WHEELS = 4
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
-    """A condition that a bus told, and the device time of the sample from which it holds [us]."""
+class BusCondition:
+    """A condition that a bus sent, and the device time of the sample from which it holds [us]."""
 
     t_us: int
     measured: Measured
@@ -42,13 +42,13 @@ class Block:
         Monotonic, of the bytes that brought it.
     first_us : int, [us]
         Device time of the wheel's very first sample.
-    content : Samples or Told
+    content : Samples or BusCondition
     """
 
     wheel: int
     arrival: int
     first_us: int
-    content: Samples | Told
+    content: Samples | BusCondition
 
 
 class Wheel:
@@ -59,8 +59,8 @@ class Wheel:
     timeline : Timeline
     clock : ClockFit
         The wheel's clock against the host's.
-    told : dict of float, SI
-        What a bus told last of the conditions, by name.
+    bus_conditions : dict of float, SI
+        The conditions that a bus sent last, by name.
     rssi, temperature : int or None, [dBm], [degC]
         As the last frame says.
     """
@@ -68,7 +68,7 @@ class Wheel:
     def __init__(self, device: Device, number: int, rate_said_by: str = PERIOD) -> None:
         self.timeline = Timeline(device, number, rate_said_by)
         self.clock = ClockFit()
-        self.told: dict[str, float] = {}
+        self.bus_conditions: dict[str, float] = {}
         self.rssi: int | None = None
         self.temperature: int | None = None
         self._number = number
@@ -80,13 +80,13 @@ class Wheel:
         return self.timeline.end_us
 
     def take(self, items: Sequence[Frames | Measured], arrival: int) -> list[Block]:
-        """Take the frames of this wheel and what the bus told between them."""
+        """Take the frames of this wheel and the conditions that the bus sent between them."""
         blocks: list[Block] = []
         newest: int | None = None
         for item in items:
             if isinstance(item, Measured):
-                self.told[item.name] = item.value
-                blocks.append(self._block(Told(self.timeline.end_us, item), arrival))
+                self.bus_conditions[item.name] = item.value
+                blocks.append(self._block(BusCondition(self.timeline.end_us, item), arrival))
                 continue
             self._note(item)
             for samples in self.timeline.push(item):
@@ -105,7 +105,7 @@ class Wheel:
         if len(frames) and frames.rssi[-1]:
             self.rssi, self.temperature = int(frames.rssi[-1]), int(frames.temperature[-1])
 
-    def _block(self, content: Samples | Told, arrival: int) -> Block:
+    def _block(self, content: Samples | BusCondition, arrival: int) -> Block:
         return Block(self._number, arrival, self._first_us or 0, content)
 
 
@@ -191,7 +191,9 @@ class Wheels:
         self.ignored = 0
         self._chosen = tuple(chosen)
         self._sources: dict[int, int] = {}  # of each wheel that was heard
-        self._told: dict[tuple[str, int | None], Measured] = {}  # what a bus told last
+        self._bus_conditions: dict[
+            tuple[str, int | None], Measured
+        ] = {}  # the last that a bus sent
 
     @classmethod
     def of_one(
@@ -211,7 +213,7 @@ class Wheels:
     def push(self, data: bytes, arrival: int = 0, source: int = 0) -> list[Block]:
         """Take bytes of a source that came at a moment [ns, monotonic]; return what they bring.
 
-        What a bus tells holds for the wheels of all lines, from the sample that comes next.
+        A condition from a bus holds for the wheels of all lines, from their next sample on.
 
         Raises
         ------
@@ -219,12 +221,14 @@ class Wheels:
             If a wheel comes from two sources.
         """
         sorted_items: dict[int, list[Frames | Measured]] = {wheel: [] for wheel in self.heard}
-        told: dict[tuple[str, int | None], Measured] = {}  # since the last frame of strain
+        bus_conditions: dict[
+            tuple[str, int | None], Measured
+        ] = {}  # since the last frame of strain
         for item in self.lines[source].push(data, arrival):
             if isinstance(item, Measured):
-                told[item.name, item.wheel] = item
+                bus_conditions[item.name, item.wheel] = item
                 continue
-            self._tell(told, sorted_items)
+            self._hand_over(bus_conditions, sorted_items)
             numbers = sorted(set(item.wheel.tolist()))
             for wheel in numbers:
                 rows = item.wheel == wheel
@@ -234,11 +238,11 @@ class Wheels:
                 if self._sources.setdefault(wheel, source) != source:
                     raise self._twice(wheel, source)
                 known: list[Frames | Measured] = [
-                    one for one in self._told.values() if one.wheel in (None, wheel)
+                    one for one in self._bus_conditions.values() if one.wheel in (None, wheel)
                 ]
                 items = sorted_items.setdefault(wheel, known)
                 items.append(item if len(numbers) == 1 else select(item, rows))
-        self._tell(told, sorted_items)
+        self._hand_over(bus_conditions, sorted_items)
         return [
             block
             for wheel, items in sorted_items.items()
@@ -246,18 +250,18 @@ class Wheels:
             for block in self._wheel(wheel).take(items, arrival)
         ]
 
-    def _tell(
+    def _hand_over(
         self,
-        told: dict[tuple[str, int | None], Measured],
+        bus_conditions: dict[tuple[str, int | None], Measured],
         sorted_items: dict[int, list[Frames | Measured]],
     ) -> None:
-        """Hand what a bus told to the wheels for which it holds, and forget it."""
-        for item in told.values():
+        """Hand the conditions from a bus to the wheels for which they hold, and clear the list."""
+        for item in bus_conditions.values():
             for wheel, items in sorted_items.items():
                 if item.wheel in (None, wheel):
                     items.append(item)
-        self._told |= told
-        told.clear()
+        self._bus_conditions |= bus_conditions
+        bus_conditions.clear()
 
     @property
     def contradicted(self) -> dict[int, str]:

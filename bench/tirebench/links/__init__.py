@@ -68,7 +68,7 @@ class Link(Protocol):
         """Give the port back; calling twice does no harm."""
 
     def overruns(self) -> int:
-        """Return how often a buffer below was full, as far as the system tells."""
+        """Return how often a buffer below was full, as far as the system reports it."""
 
 
 __all__ = ["BACK", "DECODED", "LOST", "PASSED", "RESUMED", "Link", "Read"]

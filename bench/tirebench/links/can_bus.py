@@ -28,11 +28,11 @@ _SILENT: Mapping[str, dict[str, Any]] = {
     "systec": {"state": can.BusState.PASSIVE},
     "vector": {"listen_only": True},
 }
-"""How an interface is told to listen only."""
+"""Option that sets each interface to listen-only."""
 _NO_CONTROLLER = ("virtual", "udp_multicast", "serial", "socketcan", "socketcand")
 """Interfaces that drive no controller themselves; that of SocketCAN is set by the system."""
 ACKNOWLEDGE = "acknowledge"
-"""Bus option that accepts a controller which cannot be told to be silent."""
+"""Bus option that accepts a controller which cannot be set to listen-only."""
 
 
 class CanLink:
@@ -47,14 +47,14 @@ class CanLink:
     options : mapping, optional
         More of python-can's arguments: ``host``, ``port``, ``app_name``.
     transmit : bool
-        Else nothing is sent, and the controller is told to be silent.
+        Otherwise nothing is sent, and the controller is set to listen-only.
 
     Raises
     ------
     LinkError
         If the bus cannot be opened.
     DeviceError
-        If the controller cannot be told to be silent, and the option `ACKNOWLEDGE` does not accept
+        If the controller cannot be set to listen-only, and the option `ACKNOWLEDGE` does not accept
         that.
     """
 
@@ -139,7 +139,7 @@ class CanLink:
         self._bus.shutdown()
 
     def overruns(self) -> int:
-        """Return 0: python-can does not tell."""
+        """Return 0: python-can does not report it."""
         return 0
 
     def _next(self, timeout: float) -> can.Message | None:

@@ -37,9 +37,9 @@ class PortPlan:
     port : str
         As typed.
     baud : int
-        Of a serial line.
+        Baud rate of a serial line.
     bitrate : int
-        Of a CAN bus.
+        Bit rate of a CAN bus.
     data_bitrate : int or None
         None for classic CAN.
     options : tuple of str

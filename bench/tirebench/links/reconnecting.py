@@ -15,7 +15,7 @@ GLANCE = 0.05
 
 
 class ReconnectingLink:
-    """Tell that a port was lost, try to open it, tell that it is back; see `tirebench.links.Link`.
+    """Report a lost port, try to open it again, and report its return; see `tirebench.links.Link`.
 
     Parameters
     ----------

@@ -125,7 +125,7 @@ class SerialLink:
         self._port.close()
 
     def overruns(self) -> int:
-        """Return how often the UART or its buffer was full; 0 where the system does not tell."""
+        """Return how often the UART or its buffer was full; 0 where this is unknown."""
         if sys.platform != "linux":
             return 0
         import fcntl
@@ -147,7 +147,7 @@ class SerialLink:
 def _cause(error: Exception) -> str:
     """Return why a port does not open, and what to do; pyserial's own words where it is rare."""
     number = getattr(error, "errno", None)
-    if number is None and f"({errno.ENOTTY}," in str(error):  # told in the text only
+    if number is None and f"({errno.ENOTTY}," in str(error):  # given in the text only
         number = errno.ENOTTY
     return _CAUSES.get(number or 0, f"{error}; plug it in, or close the program that uses it")
 

@@ -92,7 +92,7 @@ class SocketLink:
         self._socket.close()
 
     def overruns(self) -> int:
-        """Return 0: the system does not tell."""
+        """Return 0: the system does not report it."""
         return 0
 
     def _take(self) -> bytes:

@@ -31,7 +31,7 @@ class Before:
         return len(self._kept) - self._written
 
     def take(self, exchange: Exchange, *, forget: bool = True) -> tuple[bool, int]:
-        """Take what waits for the recorder; tell whether there was anything.
+        """Take what waits for the recorder; return whether there was anything.
 
         Parameters
         ----------

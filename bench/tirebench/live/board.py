@@ -1,7 +1,7 @@
 """What the run shows, in shared memory: rings of messages that one process writes, others read.
 
 A writer never waits and never asks who reads. The newest message wins: a reader that is slow misses
-the oldest ones and is told how many. A message has a number and a CRC, so that one that is being
+the oldest ones and learns how many. A message has a number and a CRC, so that one that is being
 overwritten while it is read counts as missed and never passes for good.
 """
 
@@ -51,7 +51,7 @@ RINGS = {
 }
 """Estimates and samples of each turn, and the state of the line."""
 SIZE = _START + sum(ring.bytes for ring in RINGS.values())
-"""Of a board, [bytes]."""
+"""Size of a board, [bytes]."""
 
 
 class Board:
@@ -60,7 +60,7 @@ class Board:
     Parameters
     ----------
     name : str, optional
-        Of a board that is there; without it a new one is made.
+        Name of an existing board; without it a new one is made.
 
     Attributes
     ----------

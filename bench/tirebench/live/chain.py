@@ -41,7 +41,7 @@ LOOK = 0.05
 END_TIME_LIMIT = 60.0
 """At the end, estimators and recorder may be silent for so long before they are given up, [s]."""
 LEAVE, AT_ONCE = 60.0, 5.0
-"""A process that was told to end may take so long before it is killed, [s]: one that still has
+"""Time that a process may take to end on request before it is killed, [s]: one that still has
 something to save, and one that has not."""
 
 
@@ -56,7 +56,7 @@ class LivePlan:
         None: nothing is estimated.
     conditions : Conditions
     header : RecordingHeader
-        Of every recording.
+        Header of every recording.
     record : Path or None
         File of the recording that begins with the run.
     laps : bool
@@ -266,7 +266,7 @@ class LiveChain:
             self._orders += 1
 
     def obeyed(self, deadline: Deadline) -> bool:
-        """Wait until the recorder has done what it was told; False at the deadline."""
+        """Wait until the recorder has carried out its commands; return False at the deadline."""
         while self._recorder is not None and self._recorded.done < self._orders:
             if deadline.expired:
                 return False
@@ -367,7 +367,7 @@ class LiveChain:
         return news
 
     def _judge(self, news: News, *, end: bool = False) -> News:
-        """Let turns be told, and recorded, once the rate of their wheel is judged."""
+        """Report and record turns once the sample rate of their wheel has been checked."""
         news.turns = self._judged.take(news.turns, self.wheels, end=end)
         now = time.monotonic_ns()
         news.latency = [1e-9 * (now - turn.arrival) for turn in news.turns]
@@ -377,7 +377,7 @@ class LiveChain:
         return news
 
     def _jumped(self, jump: Jump) -> None:
-        """Keep a jump, and let the recording tell of it."""
+        """Keep a jump, and write it into the recording."""
         self.jumps.append(jump)
         path = self._recorded.path
         whole = path is None or part_path(path, 1) == self._plan.record

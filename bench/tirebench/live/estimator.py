@@ -57,7 +57,7 @@ class EstimatorPlan:
 
 @dataclass(slots=True)
 class Report:
-    """What an estimator tells the run.
+    """A report from an estimator to the run.
 
     Attributes
     ----------
@@ -142,7 +142,7 @@ class _Estimator:
         elif self._expected is not None and not content.reset and place != self._expected:
             self._left_out(block.wheel, self._expected, self._end_us, content)  # no room for them
         if content.reset:
-            self._report(self._estimation.finish())  # before the FMU takes its time to start anew
+            self._report(self._estimation.finish())  # before the FMU takes its time to start again
         start = Place(content.segment, content.start)
         self._expected = Place(content.segment, content.start + len(content.strain))
         self._end_us = content.end_us

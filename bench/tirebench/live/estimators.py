@@ -37,7 +37,7 @@ class Estimators:
     ----------
     kept : dict of slot to Kept
     ready, done : set of int
-        Slots whose FMU is loaded; slots that have ended and told all.
+        Slots whose FMU is loaded; slots that have ended and reported everything.
     cpu : dict of slot to float, [s]
         Time that they have used.
     """

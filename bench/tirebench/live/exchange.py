@@ -34,7 +34,7 @@ class Address:
     Attributes
     ----------
     name : str
-        Of the shared memory.
+        Name of the shared memory.
     slots : int
         Wheels that there is room for.
     fresh : tuple of semaphores
@@ -64,7 +64,7 @@ class Exchange:
     Parameters
     ----------
     address : Address
-        Of memory that is there.
+        Address of existing memory; without it new memory is made.
     owner : bool
         Whether the memory ends with this object.
 
@@ -77,11 +77,11 @@ class Exchange:
     orders : ByteQueue
         From the run to the recorder.
     samples, news : tuple of ByteQueue
-        Of each slot: blocks to the estimator, reports to the run.
+        Queues for each slot: blocks to the estimator, reports to the run.
     line, recorded : Cell
         State of the reader and of the recorder.
     reads : tuple of ByteQueue
-        Of each port of several, to the reader.
+        Queues from each port to the reader, where there are several ports.
     ports : tuple of Cell
         How each of them is.
     """
@@ -126,7 +126,7 @@ class Exchange:
         beside : int
             What others will need after this, [bytes].
         ports : int
-            Of several, each read by a process of its own; 0 where there is one.
+            Number of ports that are read by separate processes; 0 where there is one port.
 
         Raises
         ------

@@ -72,7 +72,7 @@ class Kept:
 
     @property
     def process_id(self) -> int | None:
-        """Of the process, while there is one."""
+        """Id of the process, while there is one."""
         return None if self._process is None else self._process.pid
 
     @property
@@ -111,7 +111,7 @@ class Kept:
             self.start()
 
     def wait(self, patience: float) -> None:
-        """Wait for the end of a process that was told to end; end it when it does not [s]."""
+        """Wait for a process that was asked to end; kill it when it does not end in time [s]."""
         process, self._process = self._process, None
         spare, self._spare = self._spare, None
         if spare is not None:

@@ -29,7 +29,7 @@ TOO_LATE, CAUGHT_UP = 2.0, 0.2
 """Reads that have waited for the reader for longer are recorded and not decoded, until they wait
 no longer than the second, [s]. A queue of reads holds 4 s of four wheels on CAN FD."""
 RAW_LOST = "raw bytes lost: "
-"""Begins the event of a recording that tells of bytes that the recorder had no room for."""
+"""First words of the event that records bytes for which the recorder had no room."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +93,7 @@ class LineState:
     ----------
     wheels : Wheels
     name : str
-        Of the port, once it is open.
+        Name of the port, once it is open.
     heard, lost : float or None, [s]
         When bytes came last and when a port went away, on `time.time`; None if not.
     last_byte : float or None, [s]
@@ -190,7 +190,7 @@ class _Reader:
         self._exchange = exchange
         self._fresh = exchange.address.fresh
         self._queues = (*exchange.samples, exchange.strain)
-        self._raw_lost = 0  # bytes since the recorder was told of it
+        self._raw_lost = 0  # bytes since the recorder was last informed
         self._overruns: list[int] = []
         self._next_look = 0.0
         saved = exchange.line.get()
@@ -309,8 +309,8 @@ class _Reader:
         """Put a read into the queue of the recorder; False if there is no room for it."""
         raw = self._exchange.raw
         if self._raw_lost:
-            told = Read(read.arrival, b"", f"{RAW_LOST}{self._raw_lost}", read.source)
-            if not raw.put(pickle.dumps(told, 5)):
+            loss = Read(read.arrival, b"", f"{RAW_LOST}{self._raw_lost}", read.source)
+            if not raw.put(pickle.dumps(loss, 5)):
                 self._raw_lost += len(read.data)
                 return False
             self._raw_lost = 0

@@ -177,7 +177,7 @@ class _Recorder:
             self._unfinished.add(path, state.length, NO_ROOM)
 
     def _write(self) -> bool:
-        """Write what has come; tell whether there was anything."""
+        """Write what has come; return whether there was anything."""
         if self._state.path is None and self._state.waits is not None and self._kept is not None:
             busy, lost = self._kept.take(self._exchange)
             if lost:

@@ -64,13 +64,14 @@ class RecorderState:
     Attributes
     ----------
     path : Path or None
-        Of the file that is written, or waits for room; None where nothing is recorded.
+        Path of the file that is being written or waits for free space; None where nothing is
+        recorded.
     length : int
         Bytes of that file that are whole.
     bytes : int
         Raw bytes in the recording.
     part : int
-        Of the recording that goes on, from 1.
+        Number of the part that is being written, from 1.
     written : int
         Bytes of the recording's parts before it.
     began : tuple of str, int and int
@@ -89,7 +90,7 @@ class RecorderState:
     error : str
         Why nothing can be written at the moment; empty if it can.
     waits : Path or None
-        Of the recording that begins with the next trigger.
+        Path of the recording that the next trigger starts.
     until : int, [ns]
         Monotonic, when the recording around a trigger ends.
     recordings : int

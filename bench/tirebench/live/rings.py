@@ -23,7 +23,7 @@ _SKIP = 0xFFFFFFFF
 
 
 def free() -> float:
-    """Return the shared memory that is free, [bytes]; infinite where the system does not tell."""
+    """Return the free shared memory, [bytes]; infinite where the system does not report it."""
     if not SHARED.is_dir():
         return math.inf
     state = os.statvfs(SHARED)
@@ -44,7 +44,7 @@ def memory(size: int) -> SharedMemory:
 
 
 def too_little(size: float) -> LinkError:
-    """Return the error that tells of missing shared memory."""
+    """Return the error about missing shared memory."""
     return LinkError(
         f"{SHARED}: {free() / 2**20:.0f} MB of shared memory are free; {size / 2**20:.0f} MB are "
         "needed; give a container more (--shm-size), estimate fewer wheels with --wheel, or leave "

@@ -1,4 +1,4 @@
-"""What is wrong with a live run, in words: told once when it begins, and once when it ends."""
+"""Alarms of a live run as sentences, one when a fault begins and one when it ends."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -53,11 +53,11 @@ class RunAlarms:
 
         `ports` holds the state of each port that a process of its own reads, None before the first.
         """
-        told = self._busy(line) + self._rates(line) + self._away(ports)
+        alarms = self._busy(line) + self._rates(line) + self._away(ports)
         if recorded.error != self._unrecorded:  # there is no recording to write this into
             self._unrecorded = recorded.error
-            told.append(recorded.error or RECORDED_AGAIN)
-        return told
+            alarms.append(recorded.error or RECORDED_AGAIN)
+        return alarms
 
     def _busy(self, line: LineState) -> list[str]:
         if line.passing == self._passing:
@@ -68,21 +68,21 @@ class RunAlarms:
         return [said]
 
     def _rates(self, line: LineState) -> list[str]:
-        told = []
+        alarms = []
         for wheel, said in line.wheels.contradicted.items():
             if wheel not in self._contradicted:
                 self._contradicted.add(wheel)
-                told.append(f"{said}; its turns are not reported" if self._estimated else said)
-                self._write(alarm_event("sample rate", told[-1], on=True))
-        return told
+                alarms.append(f"{said}; its turns are not reported" if self._estimated else said)
+                self._write(alarm_event("sample rate", alarms[-1], on=True))
+        return alarms
 
     def _away(self, ports: Sequence[PortState | None]) -> list[str]:
-        told = []
+        alarms = []
         for number, state in enumerate(ports):
             gone = "" if state is None else state.gone
             why = f"{gone}; reconnecting is tried until the port is back" if gone else ""
             if why != self.given_up.get(number, ""):
                 self.given_up[number] = why
-                told.append(why or f"{self._ports[number]}: the port is back")
-                self._write(alarm_event(f"source {number}", told[-1], on=bool(gone)))
-        return told
+                alarms.append(why or f"{self._ports[number]}: the port is back")
+                self._write(alarm_event(f"source {number}", alarms[-1], on=bool(gone)))
+        return alarms

@@ -12,7 +12,7 @@ LOOKS_FOR_A_RATE = 30
 
 
 def free_at(path: Path) -> float:
-    """Return the room where a file is or will be, [bytes]; NaN where the system does not tell."""
+    """Return the free space where a file is or will be, [bytes]; NaN if unknown."""
     place = path.absolute()
     while not place.exists() and place != place.parent:
         place = place.parent

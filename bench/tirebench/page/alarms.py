@@ -151,7 +151,7 @@ class Alarm:
     Attributes
     ----------
     name, text : str
-        Of the rule, and what happened in words.
+        Name of the rule, and a sentence on what happened.
     wheel : int or None
         None: of the run.
     since : float, [s]
@@ -214,7 +214,7 @@ class Alarms:
         self._past.extend(ended)
         return ended
 
-    def tell(self, name: str, text: str, now: float) -> list[Alarm]:
+    def report(self, name: str, text: str, now: float) -> list[Alarm]:
         """Take what is wrong with the run, in words, empty if nothing is: an alarm without a limit.
 
         Return the alarm if it begins or ends with it.

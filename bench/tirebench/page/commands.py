@@ -32,11 +32,11 @@ class Command:
     kind : str
         One of `KINDS`.
     text : str
-        Of a marker; resistance of the gage and of the shunt, and gage factor, of a shunt.
+        Text of a marker, or for a shunt the resistances of gage and shunt and the gage factor.
     on : bool
         Whether to record; whether the shunt is on.
     wheel : int
-        Of a zero or a shunt.
+        Wheel whose zero or shunt is meant.
     """
 
     kind: str
@@ -101,7 +101,7 @@ class Switch(Protocol):
 
     @property
     def name(self) -> str:
-        """Of the recording that goes on, or went on last; empty before the first."""
+        """Name of the present recording, else of the last one; empty before the first."""
 
     def start(self) -> str:
         """Begin a recording and return its name; the name of one that is going on."""

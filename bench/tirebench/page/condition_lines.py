@@ -19,15 +19,15 @@ def in_use(wheel: Wheel, conditions: Conditions, origin: str) -> dict[str, dict[
     ----------
     wheel : Wheel
     conditions : Conditions
-        Known beside what a bus tells.
+        Conditions that are known besides those from a bus.
     origin : str
         Where those come from, in words.
     """
     beside = conditions.at(wheel.newest_us)
     found: dict[str, dict[str, Any]] = {}
     for name, value in zip(HELD, beside, strict=True):
-        told = wheel.told.get(name, math.nan)
-        used, source = (told, "bus") if name in wheel.told else (value, origin)
+        bus_conditions = wheel.bus_conditions.get(name, math.nan)
+        used, source = (bus_conditions, "bus") if name in wheel.bus_conditions else (value, origin)
         if math.isfinite(used):
             unit, dimension = UNITS[name]
             found[name] = {"value": from_si(used, unit, dimension), "unit": unit, "source": source}

@@ -1,4 +1,4 @@
-"""What the run tells its page: turns, laps and the state of the line, onto the board.
+"""Messages of the run to its page, written to the board: turns, laps and the state of the line.
 
 This is all that the page costs the run: some writes to memory, never a wait.
 """
@@ -49,7 +49,7 @@ class About:
     lateral : tuple of float, [m]
         ISO 8855, left positive, as the gages are numbered.
     conditions : Conditions
-        Known beside what a bus tells.
+        Conditions that are known besides those from a bus.
     origin : str
         Where they come from, in words.
     folder : Path
@@ -200,11 +200,11 @@ class Feed:
             changed += self._alarms.look(values, number, now)
         changed += [] if busy else self._unheard(now)
         for number, said in self._source.wheels.contradicted.items():
-            self._alarms.tell(f"sample rate of wheel {number}", said, now)
+            self._alarms.report(f"sample rate of wheel {number}", said, now)
         for source, said in chain.get("given_up", {}).items():
-            self._alarms.tell(f"port of source {source}", said, now)
-        self._alarms.tell("busy", busy, now)  # the run writes these into the recording
-        self._alarms.tell("json", self._unwritten, now)
+            self._alarms.report(f"port of source {source}", said, now)
+        self._alarms.report("busy", busy, now)  # the run writes these into the recording
+        self._alarms.report("json", self._unwritten, now)
         recorded = chain.get("recording", {})
         free = recorded.get("free_bytes")
         room = {
@@ -222,7 +222,7 @@ class Feed:
         rung = self._alarms.rules["silence"].beyond(waited, already=False)
         hints, changed = wheels.hints() if rung else {}, []
         for source in range(len(wheels.lines)):
-            changed += self._alarms.tell(f"source {source}", hints.get(source, ""), now)
+            changed += self._alarms.report(f"source {source}", hints.get(source, ""), now)
         for number in wheels.missing:
             changed += self._alarms.look({"silence": waited}, number, now)
         return changed

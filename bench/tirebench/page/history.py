@@ -22,7 +22,7 @@ from tirebench.page.quantities import NORMAL_95, UNITS
 REMEMBERED = 6000
 """Turns of a wheel: 7 min at 14 turns a second."""
 BAND_EVERY = 0.25
-"""A band is made anew so often, [s]."""
+"""Interval at which a band is computed again, [s]."""
 COLUMNS = ("time", *(f"{name}{part}" for name in UNITS for part in ("", "_95")), "valid")
 """Columns of the rows of turns; ``valid`` is a sum of bits: the quantities in order, the turn."""
 
@@ -98,7 +98,7 @@ class History:
         return self._turns.missed + self._laps.missed
 
     def update(self) -> bool:
-        """Read what is new; tell whether there was anything."""
+        """Read what is new; return whether there was anything."""
         turns, laps, states = self._turns.take(), self._laps.take(), self._states.take()
         for message in turns:
             self._turn(json.loads(message))

@@ -173,7 +173,7 @@ class LivePage:
 
     @property
     def process_id(self) -> int | None:
-        """Of the first process that shows the board."""
+        """Process id of the first process that shows the board."""
         return self._kept[0].process_id if self._kept else None
 
     def _state(self) -> dict[str, Any]:

@@ -37,7 +37,7 @@ class Recent:
         ----------
         wheel : Wheel
         turns, invalid : int
-            Of the wheel so far.
+            Number of turns and of invalid turns of the wheel so far.
         now : float, optional, [s]
             Monotonic.
         """

@@ -20,9 +20,9 @@ class RecordingSwitch:
     Parameters
     ----------
     chain : LiveChain
-        Whose recorder is told.
+        The run whose recorder is switched.
     first : Path
-        Of the first recording; those after it get a number, see `numbered`.
+        File of the first recording; those after it get a number, see `numbered`.
     started : bool
         Whether it goes on already.
 
@@ -50,7 +50,7 @@ class RecordingSwitch:
 
     @property
     def name(self) -> str:
-        """Of the recording that goes on, or went on last; empty before the first."""
+        """Name of the present recording, else of the last one; empty before the first."""
         return self.files[-1].name if self.files else ""
 
     def event(self, event: Mapping[str, Any]) -> None:

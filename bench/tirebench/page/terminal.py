@@ -32,7 +32,8 @@ NOW = (
     ("battery_v", "V", 2),
     ("tire_pressure_bar", "bar", 2),
 )
-"""Of the last seconds and what the wheel says of itself: key, heading, digits."""
+"""Columns of the table: values of the last seconds and of the wheel's HEALTH frame, as key,
+heading, digits."""
 LOSSES = (
     "crc_bad",
     "framing_bad",

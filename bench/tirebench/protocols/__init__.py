@@ -42,7 +42,7 @@ class Decoder(Protocol):
         """What each wheel said last of itself in frames of their own."""
 
     def push(self, data: bytes, arrival: int = 0) -> "Sequence[Frames | Measured]":
-        """Return the frames that `data` completes, in order, and conditions told between them.
+        """Return the frames that `data` completes, in order, and the conditions sent between them.
 
         Parameters
         ----------

@@ -48,13 +48,13 @@ class LoadPlan:
     kind : str
         ``serial``, RAW16, RAW12 or RAW12C.
     bitrate : int, [bit/s]
-        Of the bus, or baud of the serial line.
+        Bit rate of the bus, or baud of the serial line.
     data_bitrate : int or None, [bit/s]
-        Of the data in CAN FD; None for classic CAN and serial lines.
+        Bit rate of the data phase of CAN FD; None for classic CAN and serial lines.
     wheels : int
         On this one line.
     rate : float, [Hz]
-        Of the gages.
+        Sample rate of the gages.
     """
 
     kind: str
@@ -80,12 +80,12 @@ class Load:
     Attributes
     ----------
     mean, worst : float
-        Of the strain frames.
+        Load of the strain frames.
     service : float
-        Of HEALTH and SYNC, worst case.
+        Load of HEALTH and SYNC, worst case.
     frames : float, [1/s]
     bits, worst_bits : tuple of float
-        Of one strain frame at the slow and the fast rate.
+        Bits of one strain frame at the slow and the fast rate.
     usb : float, [byte/s]
         What an slcan adapter sends to the host; 0 for a serial line.
     """

@@ -74,5 +74,5 @@ def _known() -> dict[str, Checksum]:
 
 
 CHECKSUMS: Mapping[str, Checksum] = _known()
-"""Of whole bytes, up to four. Those of the library cost 2.5 us a byte; CRC-32, CRC-16/XMODEM and
-CRC-16/CCITT-FALSE, which Python has in C, a hundredth."""
+"""Checksums of whole bytes, up to four. Those of the library cost 2.5 us a byte; CRC-32,
+CRC-16/XMODEM and CRC-16/CCITT-FALSE, which Python has in C, a hundredth."""

@@ -63,7 +63,7 @@ class SerialDecoder:
         return [_batch(list(group), size) for size, group in groupby(bodies, len)]
 
     def interrupt(self) -> None:
-        """Forget a half frame: the line was broken, and is joined anew."""
+        """Drop a half frame: the line was interrupted, and is connected again."""
         self._tail, self._too_long, self._joined = b"", False, False
 
     def _take(self, piece: bytes, bodies: list[bytes]) -> None:

@@ -27,7 +27,7 @@ from tirebench.wire.can_batch import ByteArray
 from tirebench.wire.frames import GAGES, HIGHEST, Int16Array, IntArray
 
 WHEELS = 8
-"""Wheels that the identifiers can tell apart."""
+"""Number of wheels that have identifiers of their own."""
 STEP12 = 16
 """Counts of RAW16 in one of RAW12."""
 RAW16, RAW12, RAW12C, SYNC, HEALTH = "RAW16", "RAW12", "RAW12C", "SYNC", "HEALTH"

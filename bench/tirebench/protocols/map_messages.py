@@ -33,7 +33,7 @@ class Message:
     ----------
     name : str
     identifier : int
-        Of CAN; else the number of the message in its map.
+        Identifier of a frame of CAN; else the number of the message in its map.
     extended : bool
     length : int
         Data bytes.

@@ -1,4 +1,4 @@
-"""What a map of another make's transmitter says: wheels, and what is told beside the strain."""
+"""Content of a map of another make's transmitter: its wheels, and the conditions that it sends."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ class WheelMap:
     wheel : int
     message : Message
     strain : tuple of Signal
-        Of the gages that are there, oldest sample first.
+        Signals of the gages that are there, oldest sample first.
     counter, time : Signal or None
     tick : float, [s]
         Step of `time`.
@@ -53,7 +53,7 @@ class Quantity:
     message : Message
     signal : Signal
     unit : str
-        Of the signal's value.
+        Unit of the signal's value.
     wheel : int or None
         For which it holds; None: for all.
     """
@@ -79,12 +79,12 @@ class UserMap:
     ----------
     rate : float, [Hz]
     wheels : tuple of WheelMap
-        None of a bus that only tells conditions.
+        Empty for a bus that only sends conditions.
     device : Device
         Scale and zero, where the map says a unit of strain; else those of counts.
     quantities : tuple of Quantity
     text : str
-        Of the file, DBC included, for the header of a recording.
+        Text of the file, DBC included, for the header of a recording.
     messages : tuple of Message
     """
 
@@ -102,7 +102,7 @@ class UserMap:
 
 
 def clashes(place: tuple[str, int | None], places: Sequence[tuple[str, int | None]]) -> bool:
-    """Tell whether a condition of a wheel (None: of all) is told by more than one of the places."""
+    """Return whether more than one place sends a condition of a wheel (None: of all wheels)."""
     name, wheel = place
     same = [w for n, w in places if n == name and (w is None or wheel is None or w == wheel)]
     return len(same) > 1

@@ -32,9 +32,9 @@ class ProtocolPlan:
     encoding : str
         Name of the byte layout (`tirebench.protocols`).
     rate : float, [Hz]
-        Of the gages, where the frames do not say it.
+        Sample rate of the gages, where the frames do not say it.
     user_map : UserMap or None
-        Of another make's transmitter.
+        Map of another make's transmitter.
     """
 
     encoding: str = SERIAL

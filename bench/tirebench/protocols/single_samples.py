@@ -3,7 +3,7 @@
 A counter of four bits cannot see a gap of sixteen samples. So samples are held until the next SYNC,
 which tells how many there should have been; at 100 Hz that costs 10 ms. Where the counters explain
 what is missing, the gap is placed; where they do not, the samples between the two SYNC frames are
-dropped and counted, because nobody can say when they were taken.
+dropped and counted, because the time of their measurement is unknown.
 """
 
 import numpy as np
@@ -60,7 +60,7 @@ class SingleSamples:
         return frames
 
     def interrupt(self) -> None:
-        """Drop what waits; the next SYNC begins anew."""
+        """Drop the waiting samples; the next SYNC starts again."""
         self._counts.unplaced += sum(len(block) for block, _ in self._waiting)
         self._waiting.clear()
         self._anchor = None

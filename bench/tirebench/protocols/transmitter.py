@@ -95,7 +95,7 @@ class Transmitter(Protocol):
         """Return the frames of the samples `first` to `last` of a record."""
 
     def restart(self) -> None:
-        """Begin anew: number and clock start at zero, as after a power failure."""
+        """Start again: number and clock begin at zero, as after a power failure."""
 
 
 class _Clock:
@@ -153,7 +153,7 @@ class SerialTransmitter:
         return Sent(np.asarray(1e-6 * record.times(ends)), wire)
 
     def restart(self) -> None:
-        """Begin anew."""
+        """Start again with the first number."""
         self._clock.restart()
         self._seq = 0
 
@@ -191,7 +191,7 @@ class CanTransmitter:
         self._clock.now = int(record.times(np.array([first]))[0])
         parts = [(1e-6 * record.times(starts + n), strain)]
         flags = self._clock.announcements(first, frames)
-        parts += self._told(record, starts, flags)
+        parts += self._health_of(record, starts, flags)
         if self._kind == RAW12C:
             parts += self._synced(record, starts, last == len(record.counts))
         self._seq += frames
@@ -200,7 +200,7 @@ class CanTransmitter:
         return Sent(due[order], joined([batch for _, batch in parts]).take(order))
 
     def restart(self) -> None:
-        """Begin anew."""
+        """Start again with the first number."""
         self._clock.restart()
         self._seq = 0
         self._next_sync = self._next_health = self._clock.now
@@ -216,7 +216,7 @@ class CanTransmitter:
         data = encode_raw16(raw) if self._kind == RAW16 else encode_raw12(raw)
         return same_kind(identifier, data, fd=True)
 
-    def _told(
+    def _health_of(
         self, record: Record, starts: IntArray, flags: IntArray
     ) -> list[tuple[FloatArray, CanBatch]]:
         """HEALTH every 0.1 s, and wherever the announcement begins, goes on, or ends."""

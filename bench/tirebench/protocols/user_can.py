@@ -30,35 +30,35 @@ class UserCan:
     health: Mapping[int, Health] = MappingProxyType({})
 
     def push(self, batch: CanBatch, arrival: int) -> list[Frames | Measured]:
-        """Return strain frames, and between them what the bus tells, before its own frame."""
-        told = self._told(batch)
+        """Return the strain frames, and between them the conditions that the bus sent, in order."""
+        sent = self._conditions(batch)
         wheels = [
             (wheel, _rows(batch, wheel.map.message, wheel.map.strain[0])) for wheel in self._wheels
         ]
         known = np.zeros(len(batch), np.bool_)
-        known[[row for row, _ in told]] = True
+        known[[row for row, _ in sent]] = True
         for _, rows in wheels:
             known |= rows
         self._counts.ok += int(known.sum())
         self._counts.unknown += int((~known).sum())
         items: list[Frames | Measured] = []
         first = 0
-        for row, measured in told:
+        for row, measured in sent:
             items += self._strain(batch, wheels, first, row, arrival)
             items.append(measured)
             first = row
         return items + self._strain(batch, wheels, first, len(batch), arrival)
 
-    def _told(self, batch: CanBatch) -> list[tuple[int, Measured]]:
-        """Return what the bus tells in which row, in order."""
-        told: list[tuple[int, Measured]] = []
+    def _conditions(self, batch: CanBatch) -> list[tuple[int, Measured]]:
+        """Return the conditions that the bus sent with their rows, in order."""
+        sent: list[tuple[int, Measured]] = []
         for quantity in self._map.quantities:
             signal = quantity.signal
             rows = np.flatnonzero(_rows(batch, quantity.message, signal))
             read = real_values if signal.real else raw_values
             raw = read(batch.data[rows], [signal])[:, 0]
-            told += zip(rows.tolist(), map(quantity.measured, raw.tolist()), strict=True)
-        return sorted(told, key=lambda one: one[0])
+            sent += zip(rows.tolist(), map(quantity.measured, raw.tolist()), strict=True)
+        return sorted(sent, key=lambda one: one[0])
 
     def interrupt(self) -> None:
         """Nothing waits here."""

@@ -140,9 +140,9 @@ class Binary:
         if not cut.checksum:
             return data.startswith(self._syncs, cut.length)
         frame = data[: cut.length]
-        told = int.from_bytes(frame[-cut.tail :], "big" if cut.big else "little")
+        stated = int.from_bytes(frame[-cut.tail :], "big" if cut.big else "little")
         covered = frame[0 if cut.covers_sync else len(cut.sync) : -cut.tail]
-        return CHECKSUMS[cut.checksum].of(covered) == told
+        return CHECKSUMS[cut.checksum].of(covered) == stated
 
     def _reject(self, counter: str) -> None:
         """Count one damage, however many pieces are left of a frame."""
@@ -192,13 +192,13 @@ class Text:
             return
         why = "unknown"
         for number, cut in self._cuts:
-            content, star, told = text.rpartition("*") if cut.checksum else (text, "", "")
+            content, star, stated = text.rpartition("*") if cut.checksum else (text, "", "")
             words = (content if star else text).split(cut.blanks)
             if cut.starts:
                 if words[:1] != [cut.starts]:
                     continue
                 del words[0]
-            if cut.checksum and not (star and _right(content, told, cut.checksum)):
+            if cut.checksum and not (star and _right(content, stated, cut.checksum)):
                 why = "crc"
                 continue
             why = "framing"
@@ -216,10 +216,10 @@ class Text:
             setattr(self._counts, counter, getattr(self._counts, counter) + 1)
 
 
-def _right(content: str, told: str, checksum: str) -> bool:
+def _right(content: str, stated: str, checksum: str) -> bool:
     """Tell whether the hex digits after the star are the checksum of what is before it."""
     number = CHECKSUMS[checksum].of(content.lstrip("$!").encode())
-    return f"{number:x}" == (told.lower().lstrip("0") or "0")
+    return f"{number:x}" == (stated.lower().lstrip("0") or "0")
 
 
 def _packed(word: str, column: Signal) -> bytes:

@@ -15,7 +15,7 @@
     time      = "stamp"           # device time of the first sample
     time_unit = "us"              # of the signal's value
 
-    [speed]                       # optional: what the bus tells beside the strain
+    [speed]                       # optional: a condition that the bus sends
     message = "ABS"
     signal  = "v_ref"
     unit    = "km/h"
@@ -133,8 +133,8 @@ class _Reader:
             self.fault("rate_hz", rate, "a rate of 153 .. 200000 Hz is needed")
             rate = 1e3
         wheels = [w for table in tables if (w := self._wheel(table, messages, float(rate)))]
-        told = [name for name in TELLABLE if name in self.document]
-        if not tables and not told:
+        sent = [name for name in TELLABLE if name in self.document]
+        if not tables and not sent:
             self.fault(
                 "wheel",
                 tables,
@@ -144,7 +144,7 @@ class _Reader:
         if len({w.wheel for w in wheels}) < len(wheels):
             self.fault("wheel", [w.wheel for w in wheels], "each wheel number may occur once")
         device = self._device(wheels)
-        quantities = [q for name in told for q in self._quantities(name, messages)]
+        quantities = [q for name in sent for q in self._quantities(name, messages)]
         places = [(TELLABLE[q.name][0], q.wheel) for q in quantities]
         if twice := {place for place in places if clashes(place, places)}:
             self.fault(

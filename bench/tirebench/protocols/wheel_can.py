@@ -58,7 +58,7 @@ class WheelCan:
     rate : float, [Hz]
         Sample rate: RAW16, RAW12 and RAW12C do not say it.
     counts : LineCounts
-        Of the line; `ok`, `unknown` and `unplaced` are kept here.
+        Counters of the line; `ok`, `unknown` and `unplaced` are kept here.
 
     Attributes
     ----------

@@ -43,7 +43,7 @@ class Widener:
         seq, t_us : int arrays, shape (m,), m > 0
             As sent, time in ticks.
         arrival : int, [ns]
-            Of all of them, monotonic.
+            Arrival time of all values, monotonic.
         """
         if self._seq < 0:
             self._seq, self._time, self._arrival = int(seq[0]), int(t_us[0]), arrival

@@ -33,7 +33,7 @@ CAN_LOGS = (".blf", ".asc", ".log")
 
 
 def campaign_runs(found: Sequence[Segment], conditions: Conditions) -> Iterator[Run]:
-    """Yield each segment as a run with the conditions that were told, see `left_out`."""
+    """Yield each segment as a run with the conditions that were sent; see `left_out`."""
     taken: set[int] = set()
     for segment in found:
         left = left_out(segment, conditions)
@@ -61,15 +61,15 @@ def campaign_runs(found: Sequence[Segment], conditions: Conditions) -> Iterator[
 
 
 def left_out(segment: Segment, conditions: Conditions) -> int:
-    """Return how many samples of a segment came before a bus told what it tells.
+    """Return how many samples of a segment came before the bus had sent its conditions.
 
     A channel of a campaign holds numbers from its first sample on, so that a run begins there; none
     are left out where too few would remain.
     """
     known = segment.known(conditions)
     values = np.array(known.values)
-    told = np.isfinite(values).any(axis=0)
-    row = int(np.argmax(np.isfinite(values[:, told]).all(axis=1)))
+    present = np.isfinite(values).any(axis=0)
+    row = int(np.argmax(np.isfinite(values[:, present]).all(axis=1)))
     left = round(1e-6 * (known.t_us[row] - segment.t_us) / segment.period)
     enough = (len(segment.strain) - left) * segment.period >= SHORTEST_RUN
     return left if enough else 0
@@ -105,8 +105,8 @@ def sample_table(segment: Segment, conditions: Conditions) -> dict[str, Any]:
     strain = segment.strain
     n = len(strain)
     t_us = segment.t_us + 1e6 * segment.period * np.arange(n)
-    told = segment.known(conditions)
-    held = np.array(told.values)[np.searchsorted(told.t_us, t_us + ROUNDING, side="right") - 1]
+    course = segment.known(conditions)
+    held = np.array(course.values)[np.searchsorted(course.t_us, t_us + ROUNDING, side="right") - 1]
     known = conditions.run_at(segment.t_us)
     return {
         "wheel": np.full(n, segment.wheel, np.int16),
@@ -194,7 +194,7 @@ def write_can_log(recording: Recording, path: Path) -> int:
             count += len(batch)
             first = next(frames, None)
     except BaseException:
-        with suppress(OSError):  # the first failure is the one that is told
+        with suppress(OSError):  # the first failure is the one that is reported
             writer.stop()
         raise
     writer.stop()
@@ -212,19 +212,19 @@ class _Nothing(FrameDecoder):
 
 
 def _plan(mark: RunMark, number: int, start: float) -> RunPlan:
-    told = mark.plan
+    plan = mark.plan
     load, pressure, speed, slip_angle, camber, slip_ratio = (
-        float(told.get(name, float("nan")))
+        float(plan.get(name, float("nan")))
         for name in ("load", "pressure", "speed", "slip_angle", "camber", "slip_ratio")
     )
-    file, kind = f"runs/{number:03d}.mf4", str(told.get("kind", "sweep"))
+    file, kind = f"runs/{number:03d}.mf4", str(plan.get("kind", "sweep"))
     return RunPlan(number, file, kind, load, pressure, speed, slip_angle, camber, slip_ratio, start)
 
 
 def _rig(
     conditions: Conditions, span: tuple[int, int], start: float, mark: RunMark
 ) -> tuple[FloatArray | None, dict[str, FloatArray]]:
-    """Return times and channels of what was told about a segment; constants where they are."""
+    """Return times and channels of a segment's conditions; constants where they do not change."""
     rows: list[tuple[float, Condition]] = [(start, conditions.at(span[0]))]
     moment = conditions.next_change(span[0])
     while moment < span[1]:

@@ -1,4 +1,4 @@
-"""What a recording tells beside its samples: estimates of the run, events and markers, as tables.
+"""Tables of what a recording holds besides samples: estimates of the run, events and markers.
 
 A recording of the former version holds no estimates.
 """
@@ -128,13 +128,13 @@ def write_mdf(path: Path, found: Sequence[Segment], known: Any, out: Path) -> in
                 ],
                 comment=title,
             )
-            told = segment.known(known)
-            values = np.array(told.values)
+            course = segment.known(known)
+            values = np.array(course.values)
             mdf.append(
                 [
                     Signal(
                         np.asarray(from_si(values[:, column], unit, dimension)),
-                        1e-6 * np.array(told.t_us),
+                        1e-6 * np.array(course.t_us),
                         unit,
                         f"{mine}{name}",
                     )

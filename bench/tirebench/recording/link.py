@@ -15,8 +15,8 @@ class ReplayLink:
     ----------
     path : Path
     pace : float, optional
-        Times real time; by default as fast as the reads are asked for. The arrival that is told is
-        always the recorded one, so that the estimates do not depend on the pace.
+        Replay speed as a multiple of real time; by default as fast as possible. The reported
+        arrival is always the recorded one, so that the estimates do not depend on the pace.
 
     Raises
     ------

@@ -33,7 +33,8 @@ from mcap.records import (
 from mcap.writer import MCAP0_MAGIC
 
 LEVEL = 1
-"""Of the compression: 1 halves the text of samples at 300 MB/s; 3 takes twice the time for 5 %."""
+"""Level of the compression: 1 halves the text of samples at 300 MB/s; 3 takes twice the time for 5
+%."""
 LARGEST_CHUNK = 4 * 2**20
 """A chunk is closed when it is longer, [bytes before compression]."""
 _HEAD = Struct("<BQ")
@@ -49,7 +50,7 @@ class McapLog:
     ----------
     path : Path
     length : int, optional
-        Of a file that is there: bytes that are known to be whole. What follows them is cut off.
+        Length of the undamaged part of an existing file, in bytes. What follows is cut off.
 
     Attributes
     ----------

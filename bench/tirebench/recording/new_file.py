@@ -20,7 +20,7 @@ def keep_recordings(file: Path | None, *recordings: Path | None) -> None:
     file : Path or None
         That is to be written; None if none is.
     *recordings : Path or None
-        Of the same command; all parts of each count.
+        Recordings that the same command writes, with all their parts.
 
     Raises
     ------

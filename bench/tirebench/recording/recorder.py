@@ -26,10 +26,10 @@ from tirebench.recording.topics import (
     RAW,
     STRAIN,
     STRAIN_SCHEMA,
-    TOLD,
-    TOLD_SCHEMA,
+    BUS_CONDITION,
+    BUS_CONDITION_SCHEMA,
     strain_messages,
-    told_message,
+    bus_condition_message,
 )
 from tirebench.wire.conditions import Conditions, conditions_document
 from tirebench.wire.timeline import Samples
@@ -51,8 +51,8 @@ class Recorder:
         What the run was.
     conditions : Conditions
     length : int, optional
-        Of a file that another recorder has begun: bytes that are known to be whole. What follows
-        them is cut off, and the recording goes on there.
+        Length of a file that another recorder has begun: bytes that are known to be whole. What
+        follows them is cut off, and the recording goes on there.
 
     Attributes
     ----------
@@ -135,7 +135,7 @@ class Recorder:
         self._message(self._events, json.dumps(event).encode(), moment)
 
     def block(self, block: Block) -> None:
-        """Write what a read brought of a wheel: its strain, or what a bus told."""
+        """Write what a read brought of a wheel: its strain, or conditions from a bus."""
         content, wheel = block.content, block.wheel
         if isinstance(content, Samples):
             channel = self._log.channel(STRAIN.format(wheel), "json", STRAIN_SCHEMA)
@@ -143,8 +143,8 @@ class Recorder:
             for offset, data in strain_messages(content):
                 self._message(channel, data, begin + offset)
         else:
-            channel = self._log.channel(TOLD.format(wheel), "json", TOLD_SCHEMA)
-            self._message(channel, told_message(content.measured), block.arrival)
+            channel = self._log.channel(BUS_CONDITION.format(wheel), "json", BUS_CONDITION_SCHEMA)
+            self._message(channel, bus_condition_message(content.measured), block.arrival)
 
     def estimate(self, wheel: int, arrival: int, document: bytes) -> None:
         """Write a turn, as JSON, whose last bytes came at a moment [ns, monotonic]."""
@@ -228,7 +228,7 @@ def jump_event(jump: Jump, *, whole: bool = True) -> dict[str, Any]:
     """Return a jump as an event of a recording.
 
     Its places count from the beginning of the run: a recording that is not `whole`, because it was
-    begun later, tells of the jump, but a replay does not find the place.
+    begun later, records the jump, but a replay does not find the place.
     """
     return {
         "event": "jump" if whole else "jump of the run",
@@ -263,7 +263,7 @@ def next_part(header: RecordingHeader) -> RecordingHeader:
 
 
 def unwritable(path: Path, error: OSError) -> RecordingError:
-    """Return the error that tells of a file that cannot be written."""
+    """Return the error about a file that cannot be written."""
     return RecordingError(
         f"{path}: cannot be written ({error.strerror}); a disk with room for 1 GB per hour and "
         "wheel is needed; free some space, or name another file"

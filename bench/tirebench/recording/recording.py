@@ -103,7 +103,7 @@ class Recording:
                 yield read.arrival, read.data
 
     def reads(self) -> Iterator[Read]:
-        """Yield every read in order, those included that tell of a lost port; once."""
+        """Yield every read in order, once, with the records of a lost port."""
         for channel, time, data in self.messages():
             if (source := self._source(channel)) is not None:
                 yield Read(time, data, "", source)
@@ -222,7 +222,7 @@ def _event(data: bytes) -> dict[str, Any]:
 
 
 def _jump(event: Mapping[str, Any]) -> Jump | None:
-    """Return the jump that an event tells of; None if it tells of something else."""
+    """Return the jump that an event describes; None if it describes something else."""
     if event.get("event") != "jump":
         return None
     try:

@@ -12,7 +12,7 @@ from tirebench.recording.new_file import whole
 from tirebench.recording.records import records
 
 CHUNK = 2**20
-"""Of the repaired file, [bytes before compression]."""
+"""Chunk size of the repaired file, [bytes before compression]."""
 
 
 @dataclass(frozen=True, slots=True)

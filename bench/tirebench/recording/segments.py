@@ -26,9 +26,9 @@ class Segment:
         Device time of the wheel's very first sample, and of this segment's.
     period : float, [s]
     blocks : list of Samples
-    told : list of (int, str, float)
-        What a bus told: device time from which it holds [us], condition, value (SI). Those at the
-        beginning were told before.
+    bus_conditions : list of (int, str, float)
+        Conditions from a bus: device time from which it holds [us], condition, value (SI). Those at
+        the beginning were sent before.
     """
 
     wheel: int
@@ -37,7 +37,7 @@ class Segment:
     t_us: int
     period: float
     blocks: list[Samples] = field(default_factory=list)
-    told: list[tuple[int, str, float]] = field(default_factory=list)
+    bus_conditions: list[tuple[int, str, float]] = field(default_factory=list)
 
     @property
     def end_us(self) -> int:
@@ -55,23 +55,28 @@ class Segment:
         return np.concatenate([block.lost for block in self.blocks])
 
     def known(self, base: Conditions) -> Conditions:
-        """Return what holds in this segment: conditions that were given, and what a bus told."""
+        """Return the conditions of this segment: those that were given, and those from a bus."""
         moments = {self.t_us}
         moment = base.next_change(self.t_us)
         while moment < self.end_us:
             moments.add(round(moment))
             moment = base.next_change(moment)
-        moments |= {t_us for t_us, _, _ in self.told if t_us < self.end_us}
+        moments |= {t_us for t_us, _, _ in self.bus_conditions if t_us < self.end_us}
         times, names = sorted(moments), list(QUANTITIES)
         values = []
-        told = dict.fromkeys(names, np.nan)
-        waiting = [entry for entry in self.told if entry[1] in told]
+        bus_conditions = dict.fromkeys(names, np.nan)
+        waiting = [entry for entry in self.bus_conditions if entry[1] in bus_conditions]
         for time in times:
             while waiting and waiting[0][0] <= time:
                 _, name, value = waiting.pop(0)
-                told[name] = value
+                bus_conditions[name] = value
             given = dict(zip(names, base.at(time), strict=True))
-            values.append(tuple(told[n] if told[n] == told[n] else given[n] for n in names))
+            values.append(
+                tuple(
+                    bus_conditions[n] if bus_conditions[n] == bus_conditions[n] else given[n]
+                    for n in names
+                )
+            )
         return Conditions(tuple(times), tuple(values), base.runs)
 
 
@@ -88,7 +93,7 @@ def segments(
     """
     wheels = wheels_of(sources, EVERY_WHEEL if wheel is None else (wheel,))
     current: dict[int, Segment] = {}
-    told: dict[int, dict[str, float]] = {}
+    bus_conditions: dict[int, dict[str, float]] = {}
     for read in recording.reads():
         if read.event in (BACK, RESUMED):
             wheels.interrupt(read.source)
@@ -98,21 +103,23 @@ def segments(
             number, content = block.wheel, block.content
             if not isinstance(content, Samples):
                 name, value = content.measured.name, content.measured.value
-                told.setdefault(number, {})[name] = value
+                bus_conditions.setdefault(number, {})[name] = value
                 if number in current:
-                    current[number].told.append((content.t_us, name, value))
+                    current[number].bus_conditions.append((content.t_us, name, value))
                 continue
             if content.reset or number not in current:
                 if number in current:
                     yield current[number]
-                before = [(content.t_us, *entry) for entry in told.get(number, {}).items()]
+                before = [
+                    (content.t_us, *entry) for entry in bus_conditions.get(number, {}).items()
+                ]
                 current[number] = Segment(
                     number,
                     content.segment,
                     block.first_us,
                     content.t_us,
                     content.period,
-                    told=before,
+                    bus_conditions=before,
                 )
             current[number].blocks.append(content)
     yield from current.values()

@@ -20,7 +20,7 @@ from tirebench.wire.timeline import Samples
 from tirelib.units import from_si
 
 RAW, EVENTS, CONDITIONS, LINE = "/raw/{}", "/events", "/conditions", "/line"
-STRAIN, ESTIMATE, LINK, TOLD = (
+STRAIN, ESTIMATE, LINK, BUS_CONDITION = (
     "/wheel/{}/strain",
     "/wheel/{}/estimate",
     "/wheel/{}/link",
@@ -87,7 +87,7 @@ LINK_SCHEMA = _schema(
     "Counters of good frames and of each kind of loss.",
     {"frames": _COUNT, "lost_frames": _COUNT, "crc_bad": _COUNT, "clock_drift_ppm": _number("ppm")},
 )
-TOLD_SCHEMA = _schema(
+BUS_CONDITION_SCHEMA = _schema(
     "tirebench.Told",
     "Conditions that a bus sent, written at each change.",
     {field_of(name): _number(unit) for name, (unit, _) in CONDITION_UNITS.items()},
@@ -111,8 +111,8 @@ def strain_messages(samples: Samples) -> list[tuple[int, bytes]]:
     return messages
 
 
-def told_message(measured: Measured) -> bytes:
-    """Return what a bus told; what is no condition of the estimator as it is, SI."""
+def bus_condition_message(measured: Measured) -> bytes:
+    """Return the message of a condition from a bus; an unknown quantity stays in SI."""
     value, name = measured.value, measured.name
     if name in CONDITION_UNITS:
         value, name = from_si(value, *CONDITION_UNITS[name]), field_of(name)

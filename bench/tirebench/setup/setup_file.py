@@ -143,7 +143,8 @@ def check_sources(sources: Sequence[SourcePlan], conditions: Conditions | None) 
     Raises
     ------
     DeviceError
-        If two have one port, one wheel, or tell the same condition; if an option does.
+        If two sources have the same port or wheel or send the same condition, or an option gives it
+        too.
     """
     faults = []
     ports = [source.port.port for source in sources]
@@ -157,16 +158,18 @@ def check_sources(sources: Sequence[SourcePlan], conditions: Conditions | None) 
                 f"wheel {wheel} comes from {' and '.join(named)}; each wheel may come from one "
                 "source only; give each source its wheel number with `wheel = N` or --port N=PORT"
             )
-    told = [(place, source.port.port) for source in sources for place in source.told]
-    places = [place for place, _ in told]
-    if clash := [(place, port) for place, port in told if clashes(place, places)]:
+    conditions_sent = [
+        (place, source.port.port) for source in sources for place in source.conditions_sent
+    ]
+    places = [place for place, _ in conditions_sent]
+    if clash := [(place, port) for place, port in conditions_sent if clashes(place, places)]:
         names = ", ".join(f"{_words(place)} from {port}" for place, port in clash)
         faults.append(
             f"two sources send the same condition: {names}; each condition may come from one "
             "source, for one wheel or for all; remove it from one map"
         )
     known = () if conditions is None else conditions.known
-    for place, port in told:
+    for place, port in conditions_sent:
         if (name := place[0]) in known:
             faults.append(
                 f"{_words(place)} comes from {port}, and from --{name} or --conditions; only one "

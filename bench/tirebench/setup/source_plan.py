@@ -29,7 +29,7 @@ class SourcePlan:
     wheel : int or None
         Number that its only wheel gets; None: numbers are as sent.
     device_text : str
-        Of the device files.
+        Text of the device files.
     """
 
     port: PortPlan
@@ -53,8 +53,8 @@ class SourcePlan:
         return {GAGES} if user is None else {len(wheel.absent) for wheel in user.wheels}
 
     @property
-    def told(self) -> list[tuple[str, int | None]]:
-        """The conditions that it tells, each with the wheel for which it holds; None: for all."""
+    def conditions_sent(self) -> list[tuple[str, int | None]]:
+        """Conditions that the source sends, each with its wheel; None stands for all wheels."""
         user = self.protocol.user_map
         return [] if user is None else [(TELLABLE[q.name][0], q.wheel) for q in user.quantities]
 

@@ -2,7 +2,7 @@
 
 Bytes come late by chance, never early, so that the earliest arrivals lie on the line between the
 two clocks. What remains unknown is the constant smallest latency. Nothing here decides what is
-estimated; it tells how far the quartz is off, and when a sample was taken at the host.
+estimated; it gives the error of the quartz, and the host time at which a sample was taken.
 """
 
 from collections import deque

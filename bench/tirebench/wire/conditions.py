@@ -48,7 +48,7 @@ TRUTH = {
 ROUNDING = 0.6
 """Device time is a whole number of microseconds; a condition this close has begun, [us]."""
 LONGEST_MEMORY = 256
-"""Changes of what a bus tells that are remembered; the chain is a few samples behind, no more."""
+"""Number of past changes that are kept; the chain is only a few samples behind."""
 UNKNOWN = (math.nan,) * len(HELD)
 
 Condition = tuple[float, ...]
@@ -155,7 +155,7 @@ class Conditions:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """A condition that a bus told, between two frames of strain.
+    """A condition that a bus sent between two frames of strain.
 
     Attributes
     ----------
@@ -172,7 +172,7 @@ class Measured:
 
 
 class Held:
-    """Conditions with what a bus told on top, held until it tells otherwise.
+    """Conditions, with those from a bus on top; each is held until the bus sends a new value.
 
     Same questions as `Conditions`; what is no longer asked for is forgotten.
     """
@@ -180,24 +180,24 @@ class Held:
     def __init__(self, base: Conditions) -> None:
         self.runs = base.runs
         self._base = base
-        self._told: list[tuple[int, int, float]] = []  # t_us, index of the condition, value
+        self._from_bus: list[tuple[int, int, float]] = []  # t_us, index of the condition, value
 
-    def tell(self, t_us: int, measured: Measured) -> None:
+    def set_from_bus(self, t_us: int, measured: Measured) -> None:
         """Note what holds from a device time on."""
         if measured.name not in QUANTITIES:
             return
         index = list(QUANTITIES).index(measured.name)
-        last = next((value for _, i, value in reversed(self._told) if i == index), None)
+        last = next((value for _, i, value in reversed(self._from_bus) if i == index), None)
         if last != measured.value:
-            self._told.append((t_us, index, measured.value))
-        if len(self._told) > LONGEST_MEMORY:
-            held = {i: (t, i, value) for t, i, value in self._told[: -LONGEST_MEMORY // 2]}
-            self._told = [*held.values(), *self._told[-LONGEST_MEMORY // 2 :]]
+            self._from_bus.append((t_us, index, measured.value))
+        if len(self._from_bus) > LONGEST_MEMORY:
+            held = {i: (t, i, value) for t, i, value in self._from_bus[: -LONGEST_MEMORY // 2]}
+            self._from_bus = [*held.values(), *self._from_bus[-LONGEST_MEMORY // 2 :]]
 
     def at(self, t_us: float) -> Condition:
         """Return what holds at a device time."""
         values = list(self._base.at(t_us))
-        for moment, index, value in self._told:
+        for moment, index, value in self._from_bus:
             if moment > t_us + ROUNDING:
                 break
             values[index] = value
@@ -205,7 +205,7 @@ class Held:
 
     def next_change(self, t_us: float) -> float:
         """Return the device time of the next change after `t_us`; infinite if none is known."""
-        ahead = (moment for moment, _, _ in self._told if moment > t_us + ROUNDING)
+        ahead = (moment for moment, _, _ in self._from_bus if moment > t_us + ROUNDING)
         return min(next(ahead, math.inf), self._base.next_change(t_us))
 
     def run_at(self, t_us: float) -> tuple[RunMark, int] | None:

@@ -70,7 +70,7 @@ class Device:
     lowest, highest : float
         Counts at the ends of the range, which mean saturation.
     gain : tuple of 5 float
-        Of each gage, from a shunt calibration.
+        Gain of each gage, from a shunt calibration.
     """
 
     name: str = "default"

@@ -29,7 +29,7 @@ import numpy.typing as npt
 from cobs import cobs
 
 GAGES, MOST_GAGES = 5, 16
-"""Of our transmitter; of another make's, at most."""
+"""Number of gages of the published transmitter, and the largest number of another make's."""
 SAMPLES = 16
 """Samples in a full frame."""
 STRAIN = 1

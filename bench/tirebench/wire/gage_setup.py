@@ -104,7 +104,7 @@ def shunted(
 
 
 def device_text(device: Device, said: str = "") -> str:
-    """Return the device file of a device; `said` is a comment that tells where it comes from."""
+    """Return the text of a device file; `said` is a comment on its origin."""
     lateral = [] if device.lateral is None else [f"lateral_m   = {list(device.lateral)}"]
     return "\n".join(
         [

@@ -1,4 +1,4 @@
-"""What a line has shown and lost."""
+"""Counters of what was received on a line and lost."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ NO_FRAME = (
 
 @dataclass(slots=True)
 class LineCounts:
-    """What a line has shown so far, in frames unless said otherwise.
+    """Counters of a line so far, in frames unless stated otherwise.
 
     Attributes
     ----------
@@ -23,14 +23,14 @@ class LineCounts:
     crc : int
         Frames whose CRC is wrong.
     framing : int
-        Pieces that are no frame: broken code, too short, too long, or of another length than they
-        say.
+        Pieces that are not a frame: broken code, too short, too long, or of another length than
+        stated.
     unknown : int
-        Good frames that nobody here knows: of another type, or another node on the bus.
+        Good frames of an unknown type, or of another node on the bus.
     unplaced : int
-        Samples of RAW12C that no SYNC frame puts in time; they are dropped.
+        Samples of RAW12C without a SYNC frame that gives their time; they are dropped.
     overruns : int
-        Times that a buffer on the way was full, as far as the receiver tells.
+        Times that a buffer on the way was full, as far as the receiver reports it.
     reconnects : int
         Times that the port went away and came back.
     """
@@ -51,7 +51,7 @@ class LineCounts:
 
     @property
     def hint(self) -> str:
-        """What to look at where no good frame came; empty where one did."""
+        """Advice where no good frame came; empty where one did."""
         if self.ok:
             return ""
         return NO_FRAME if self.bytes else NOTHING

@@ -14,9 +14,9 @@ microseconds or milliseconds is not blamed for its rounding."""
 JUDGED = 4 * BASELINE
 """Frames after which the rate is judged, again and again (0.2 s of SERIAL v1 at 10 kHz)."""
 LONGEST_WAIT = 4 * JUDGED
-"""A wheel that begins anew again and again, before it can be judged, is waited for so many frames;
-half of it would tell turns of a wheel whose first frames are broken off twice, double would keep
-twice as many in memory."""
+"""Frames to wait for a wheel that restarts again and again before it can be checked; half of it
+would report turns of a wheel whose first frames break off twice, double would keep twice as many in
+memory."""
 TOLERANCE = 0.005
 """What passes makes a slip ratio wrong by as much. A quartz is a hundred times better; half of it
 would refuse a clock of whole milliseconds (`BASELINE` frames of 2.56 ms leave 0.3 %), double would

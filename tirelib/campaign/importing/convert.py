@@ -37,7 +37,7 @@ class Piece:
     source : str
         File, and run where the file holds several.
     rows : int
-        Of the rig quantities, of the gages where there are none.
+        Number of rows of the rig quantities, of the gages where there are none.
     rig : mapping of quantity to array, shape (n_rig,)
     rig_time : array, shape (n_rig,), or None, [s]
     strain : array, shape (n_gages, n_samples), or None
@@ -80,7 +80,7 @@ def convert(table: Table, rules: ImportMap, number: int) -> tuple[list[Piece], l
     table : Table
     rules : ImportMap
     number : int
-        Of the run, when the file holds one.
+        Number of the run, when the file holds one.
 
     Returns
     -------

@@ -50,7 +50,7 @@ class ImportReport:
     notes : tuple of str
         What was found out and is worth knowing.
     warnings : tuple of Problem
-        Of the map, and of the check of the campaign.
+        Warnings of the map, and of the check of the campaign.
     """
 
     campaign: Path

@@ -61,7 +61,7 @@ class ChannelRule:
     factor, offset : float
         `factor` includes the sign.
     rate : float, [Hz]
-        Of a clock without a column, else NaN.
+        Sample rate of a clock without a column, else NaN.
     override : bool
         `unit` holds even where the file states another one.
     """
@@ -129,7 +129,7 @@ class ImportMap:
     header : CampaignHeader
         With NaN for a rate that the map leaves to the time column.
     kind : str
-        Of the runs that have no entry of their own.
+        Kind of the runs that have no entry of their own.
     run_column : str
         Empty: each file is a run.
     channels : mapping of quantity to ChannelRule
@@ -163,7 +163,7 @@ def read_map(path: str | Path, name: str = "import") -> ImportMap:
     ----------
     path : str or Path
     name : str
-        Of the campaign, when the map gives none.
+        Name of the campaign, when the map gives none.
 
     Raises
     ------

@@ -22,7 +22,7 @@ class Options:
     noise : float
         Standard deviation of the gages' noise, as strain.
     seed : int
-        Of noise and dropped frames; the wheels of a car need different ones.
+        Seed of noise and dropped frames; the wheels of a car need different ones.
     start_angle : float, [rad]
         Wheel angle at the start.
     faults : Faults

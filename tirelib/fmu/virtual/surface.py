@@ -37,7 +37,7 @@ FORCES = ("Fx", "Fy", "Mz", "loaded_radius")
 _FORCE_MIRROR = np.array([1.0, -1.0, -1.0, 1.0])
 KERNEL: Final = "quintic"
 DEGREE: Final = 2
-"""Of `scipy.interpolate.RBFInterpolator`."""
+"""Degree of the polynomial of `scipy.interpolate.RBFInterpolator`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class Surface:
     low, high : array, shape (i,)
         Range of the `inputs`, SI; i is 6, or 7 with friction.
     slip, scales : array, shapes (4,) and (i + 2,)
-        Of `coordinates`.
+        Results of `coordinates`.
     points : array, shape (n, i)
         Conditions of the rig's solutions, SI.
     even, odd : array, shapes (n, a) and (n, b)
@@ -162,7 +162,7 @@ class Surface:
         Parameters
         ----------
         answers : array, shape (1, ...)
-            Of `answers`.
+            Result of `answers`.
         """
         return self._waveforms.mixed(answers[0, : len(self.basis)])
 
@@ -177,11 +177,11 @@ class Surface:
         Parameters
         ----------
         answers : array, shape (n, ...) or (1, ...)
-            Of `answers`; one row serves all angles.
+            Result of `answers`; one row serves all angles.
         angle : array or list, shape (n,), [rad]
             Wheel angle of the gages: 0 over the road, negative before.
         waveform : array, optional
-            Of `waveform`, where there is one row: spares the sum over the components.
+            Result of `waveform`, where there is one row: spares the sum over the components.
         """
         k, g = len(self.basis), self.lateral.size
         if waveform is None and len(angle) == 1:

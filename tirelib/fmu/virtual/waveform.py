@@ -60,7 +60,7 @@ class Waveforms:
             Squared half contact angle and middle of the contact.
         angle : array, shape (n,), [rad]
         mixed : array, optional
-            Of `mixed`, where there is one row: spares the sum over the components.
+            Result of `mixed`, where there is one row: spares the sum over the components.
         """
         place = (warped(angle[:, None], middles, half_angle(squares)) + np.pi) * self._scale
         first = np.floor(place)

@@ -215,7 +215,12 @@ def _trend(found: ForceComparison, name: str, label: str, scale: float) -> Plot:
     return Plot(
         f"force-trend-{name.replace('_', '-')}",
         f"Mean difference by {label.split(' [')[0]}",
-        ("" if own else "Of the sizes, since both signs of the slip are in it. ")
+        (
+            ""
+            if own
+            else "The differences are those of the magnitudes, because both signs of the "
+            "slip occur. "
+        )
         + "The band is the 95 % confidence interval of the bin's mean, from the scatter of its "
         "points over the other conditions; bins of one point have none.",
         figure,

@@ -44,7 +44,8 @@ def contact_area(lateral: FloatArray, length: FloatArray) -> float:
 def figure_4_2(observations: Observations, estimates: Estimates) -> Figure:
     """Contact shapes from the contact lengths at all gages, one outline for each slip angle.
 
-    Of the middle load, without camber, run means. Source: dissertation, Fig. 4-2.
+    The figure shows run means of the middle load, without camber, run means. Source: dissertation,
+    Fig. 4-2.
 
     Raises
     ------

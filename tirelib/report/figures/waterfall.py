@@ -31,7 +31,7 @@ def waterfall(
     ----------
     steps : sequence of Step
     unit : str
-        Of the errors.
+        Unit of the errors.
     floor : float
         Error that structure leaves without a missing effect; NaN if unknown.
     name, title : str
