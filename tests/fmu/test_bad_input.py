@@ -342,7 +342,7 @@ def test_a_fault_at_every_step_is_logged_a_few_times_and_the_values_are_held(
         "RuntimeError: each one differs (100 times by now)",
     ]
     assert len(fmu.messages) == 3 + 49 + 1
-    assert fmu.messages[-1].startswith("50 different causes were told")
+    assert fmu.messages[-1].startswith("50 different causes were reported")
     last = fmu.read()
     assert last["Fz"] == before["Fz"]
     assert not last["valid"]

@@ -121,7 +121,7 @@ def test_a_changed_number_in_the_reference_is_found_and_named(
     assert not document["passed"]
     bad = [row["name"] for row in document["variables"] if not row["passed"]]
     assert bad == ["Fz"]
-    assert parts(document)["reference"] == (False, "Fz differ from what is expected")
+    assert parts(document)["reference"] == (False, "Fz differ from the reference signals")
 
 
 def test_a_validity_that_differs_for_one_step_is_found(tmp_path: Path) -> None:
@@ -137,7 +137,7 @@ def test_a_validity_that_differs_for_one_step_is_found(tmp_path: Path) -> None:
 
     code, told = run(str(changed(tmp_path / "x.fmu", change)))
     assert code == 1
-    assert "valid differ from what is expected" in told
+    assert "valid differ from the reference signals" in told
 
 
 def test_an_fmu_of_ours_without_its_reference_fails(tmp_path: Path) -> None:
@@ -251,4 +251,4 @@ def test_an_fmu_that_kills_its_process_is_a_result(tmp_path: Path) -> None:
 def test_an_fmu_that_never_ends_is_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(checking, "TIME_LIMIT", 6.0)
     document = check_fmu(foreign(tmp_path, "import time; time.sleep(60)"))
-    assert parts(document)["run"] == (False, "it did not end within 6 s")
+    assert parts(document)["run"] == (False, "the run did not end within 6 s")

@@ -140,4 +140,4 @@ def test_the_command_line_makes_it_and_refuses_two_surfaces(tmp_path: Path) -> N
     assert out.read_bytes() == friction_file().read_bytes()
     both = ["virtual", "--out", str(out), "--friction", "--surface", "y.npz"]
     refused = CliRunner().invoke(command, both)
-    assert "--friction and --surface y.npz; one of them is allowed" in str(refused.exception)
+    assert "--friction and --surface y.npz; only one of them is allowed" in str(refused.exception)

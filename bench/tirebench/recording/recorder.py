@@ -14,6 +14,8 @@ from tirebench.links import Read
 from tirebench.recording.header import RecordingHeader, encoding_of
 from tirebench.recording.mcap_log import McapLog
 from tirebench.recording.topics import (
+    BUS_CONDITION,
+    BUS_CONDITION_SCHEMA,
     CONDITIONS,
     CONDITIONS_SCHEMA,
     ESTIMATE,
@@ -26,10 +28,8 @@ from tirebench.recording.topics import (
     RAW,
     STRAIN,
     STRAIN_SCHEMA,
-    BUS_CONDITION,
-    BUS_CONDITION_SCHEMA,
-    strain_messages,
     bus_condition_message,
+    strain_messages,
 )
 from tirebench.wire.conditions import Conditions, conditions_document
 from tirebench.wire.timeline import Samples

@@ -76,7 +76,7 @@ def test_no_name_is_given_twice_and_all_faults_come_at_once(tmp_path: Path) -> N
     with pytest.raises(FormatError) as caught:
         all_effects(files)
     first, second = caught.value.problems
-    for word in ("one.py", "'camber'", "camber.py", "names are unique"):
+    for word in ("one.py", "'camber'", "camber.py", "names must be unique"):
         assert word in first
     for word in ("three.py", "'mine'", "two.py"):
         assert word in second
