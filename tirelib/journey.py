@@ -162,7 +162,7 @@ def add(
     effects: "Mapping[str, Effect] | None" = None,
     progress: Progress | None = None,
 ) -> "tuple[TireFile, dict[str, Any]]":
-    """Add an effect to a model and fit the model anew.
+    """Add an effect to a model and fit the model again.
 
     Parameters
     ----------
@@ -279,7 +279,7 @@ def explains_forces(quantity: str | None, campaign: "Campaign", model: "TireFile
     ParameterError
         If there is no such quantity.
     CalibrationError
-        If strain is asked for and not measured, or is all that the campaign tells and the model has
+        If strain is asked for and not measured, or is all that the campaign holds and the model has
         no ring.
     """
     from tirelib.compare.compare import needs_ring

@@ -59,5 +59,5 @@ def one_thread() -> Iterator[None]:
 
 @lru_cache(maxsize=1)
 def _pools(modules: int) -> list[LibController]:
-    """Return the libraries that have threads; looked for anew when modules were imported."""
+    """Return the libraries that have threads; searched again when modules were imported."""
     return list(ThreadpoolController().lib_controllers)

@@ -170,7 +170,7 @@ QUANTITIES = MappingProxyType(
 
 
 def dimension_of(quantity: str) -> str | None:
-    """Return the dimension of a quantity by its name, or None for a name nobody fixed.
+    """Return the dimension of a quantity by its name, or None for a name without a fixed dimension.
 
     ``strain_3`` is a strain and ``tread_temperature`` a temperature.
     """

@@ -2,7 +2,7 @@ r"""Friction coefficient from measured forces, by the parabolic brush (Eq. 3 to 
 
 Three ways, by what is known besides Fy and Fz:
 
-- the aligning moment: the trail -Mz/Fy alone tells how much of the contact slides;
+- the aligning moment: the trail -Mz/Fy alone shows how much of the contact slides;
 - the bristle stiffness and the slip angle;
 - a second force at another slip angle.
 
@@ -36,7 +36,7 @@ class FrictionEstimate:
     friction : array
         NaN where `told` is False.
     std : array
-        First-order standard deviation, also where it is too large; inf where nothing is told.
+        First-order standard deviation, also where it is too large; inf where there is no estimate.
     sliding : array
         t = abs(tan alpha / tan alpha_sl), 0 .. 1; 1 where the whole contact slides.
     told : array of bool

@@ -44,7 +44,7 @@ class SineFit:
     reach : float
         Largest offset-free force in the data, as a share of the peak.
     peak_told : bool
-        The data saw at least 0.9 of the peak and tell it within 5 %.
+        The data reach at least 0.9 of the peak and determine it within 5 %.
     residual_std : float, [N]
         Residual standard deviation of the fit.
     at_limit : tuple of str
@@ -212,7 +212,7 @@ class _Search:
 def _covariance(
     jacobian: FloatArray, scale: FloatArray, free: list[str], noise: float
 ) -> FloatArray:
-    """Return the covariance of all six; infinite where the data do not tell a coefficient."""
+    """Return the covariance of all six; infinite where the data do not determine a coefficient."""
     _, s, vt = np.linalg.svd(jacobian, full_matrices=False)
     weak = s <= s[0] * 1e-10
     inverse = np.where(weak, 0.0, 1.0 / np.where(weak, 1.0, s))

@@ -129,7 +129,7 @@ def friction_at_angle(
     Raises
     ------
     ParameterError
-        If a slip angle is zero: it tells nothing about friction.
+        If a slip angle is zero, where the force does not depend on friction.
     """
     share, _ = _share(slip_angle, _positive("angle", angle, "rad"))
     if np.any(share == 0.0):

@@ -132,7 +132,7 @@ class TirFile:
 
 
 def read_tir(path: str | Path) -> TirFile:
-    """Read a .tir file; result and errors as `parse_tir`, which also tells that it is no file."""
+    """Read a .tir file; result and errors as `parse_tir`, and an error if it cannot be read."""
     try:
         data = Path(path).read_bytes()
     except OSError as error:

@@ -125,7 +125,7 @@ def words(base: str) -> tuple[str, ...]:
 
 
 def factor(base: str, word: str) -> float | None:
-    """Return SI per unit of a base, or None for a word that nobody knows."""
+    """Return SI per unit of a base, or None for an unknown word."""
     unit = _WORDS[base].get(word.strip().lower().replace(" ", "_"))
     return None if unit is None else to_si(1.0, unit, base)
 

@@ -129,8 +129,8 @@ def _neighbours_agree(samples: FloatArray) -> float:
 def longest_by_chance(samples: FloatArray, rails: BoolArray) -> float:
     r"""Return the longest run of equal samples that quantised noise explains.
 
-    With the share rho of equal neighbours off the rails, the longest of n is about
-    :math:`\ln n / \ln(1 / \rho)`. Infinite when nearly all are equal: then nothing can be told.
+    With the share rho of equal neighbours off the rails, the longest of n is about :math:`\ln n /
+    \ln(1 / \rho)`. Infinite when nearly all are equal, so that nothing can be concluded.
     """
     free = ~(rails[1:] | rails[:-1])
     equal = float(np.mean(samples[1:][free] == samples[:-1][free])) if free.any() else 0.0
@@ -306,7 +306,7 @@ def _spikes(
 ) -> list[Finding]:
     samples = turn_samples(run, header)
     if run.strain is None or samples is None or samples < 150:
-        return []  # the contact itself is a few samples long: nothing to tell it from a spike
+        return []  # the contact itself is only a few samples long, like a spike
     found: list[Finding] = []
     scale = float(np.median(spread[sound])) if sound.any() else math.nan
     window = 3 if samples < 600 else 7

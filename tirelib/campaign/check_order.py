@@ -323,14 +323,14 @@ def force_sign_findings(
 
 @dataclass(frozen=True, slots=True)
 class ForceSign:
-    """The share of a run's telling samples in which Fy has the sign of the slip angle (ISO)."""
+    """Share of a run's samples with a clear slip angle in which Fy has its sign (ISO)."""
 
     file: str
     share: float | None
 
 
 def force_sign_of(run: Run) -> ForceSign:
-    """Return how often Fy has the wrong sign; None where angle or force are too small to tell."""
+    """Return how often Fy has the wrong sign; None where angle or force are too small."""
     if not {"Fy", "slip_angle"} <= set(run.rig):
         return ForceSign(run.plan.file, None)
     force, angle = run.rig["Fy"], run.rig["slip_angle"]

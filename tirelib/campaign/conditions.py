@@ -14,8 +14,8 @@ from tirelib.held import HELD
 
 LONGEST_HOLD = 3.0
 """Rig samples after which the last one is no longer held: itself, one that is lost and one of
-jitter. With half of it the end of a run is unknown where a sample is lost; with double what nobody
-measured is held for 60 ms at 100 Hz."""
+jitter. With half of it the end of a run is unknown where a sample is lost; with double an
+unmeasured value is held for 60 ms at 100 Hz."""
 
 
 def conditions_of(run: Run, times: FloatArray) -> dict[str, FloatArray]:

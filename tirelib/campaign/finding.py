@@ -13,7 +13,7 @@ _NAMED = 3
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """A problem of one run with what it is about, so that equal ones can be told.
+    """A problem of one run with its subject, so that equal problems of several runs can be joined.
 
     Attributes
     ----------

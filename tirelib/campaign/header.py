@@ -269,7 +269,7 @@ def _tolerance(reader: _Reader) -> Tolerance | None:
 
 
 def _check_keys(reader: _Reader) -> None:
-    """Warn of keys that nobody reads: most are misspelt."""
+    """Warn of unknown keys: most are misspelt."""
     for table, known in _KNOWN.items():
         values = reader.table(table) if table else reader.document
         for key in values:

@@ -19,7 +19,7 @@ def trigger_samples(run: Run) -> npt.NDArray[np.intp] | None:
 
 
 def expected_period(run: Run, header: CampaignHeader) -> tuple[float, str, float] | None:
-    r"""Return the time of a turn that the rig tells.
+    r"""Return the time of a turn from the rig's channels.
 
     .. math:: T = 2 \pi / \Omega \quad\text{or}\quad T = 2 \pi R / (v (1 + \kappa))
 

@@ -107,7 +107,7 @@ def identify(
 
 
 def _errors(campaign: Campaign, whole: "Whole") -> dict[str, Any]:
-    """Return the errors of the identified model, as every other verb tells them."""
+    """Return the errors of the identified model, computed as in every other command."""
     from tirelib.compare.error import error_of
     from tirelib.compare.forces import compare_forces
     from tirelib.compare.model import model_of

@@ -6,9 +6,9 @@ from typing import Any
 from tirelib.estimators.calibration import Calibration
 
 REPORTED_STD_RATIO = 1.2
-"""Ratio of standard deviations from which an unknown condition is worth a word."""
+"""Ratio of standard deviations from which an unknown condition is reported."""
 REPORTED_LOSS = 0.05
-"""Share of turns lost to it from which that is worth one."""
+"""Share of turns made invalid by it from which that is reported."""
 
 
 def not_given(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -50,7 +50,7 @@ def _words(name: str) -> str:
 
 
 def not_checked(calibration: Calibration) -> list[str]:
-    """Return sentences on what a calibration cannot tell."""
+    """Return sentences on what a calibration cannot detect."""
     found = []
     if calibration.version < 2:
         found.append(

@@ -42,12 +42,12 @@ INEXTENSIBLE = 1e8
 LONGEST_STEP = 0.01
 MAX_ITERATIONS = 60
 TOLERANCE = 5e-13
-"""Last step, [m]: so small that the strain of a point does not tell which points were solved
+"""Last step, [m]: so small that the strain of a point does not depend on which points were solved
 beside it; round-off is ten thousand times less."""
 MATRIX_KEPT_BELOW = 3e-4
 """Step below which the next one keeps the matrix, [m]."""
 SLOW_CONVERGENCE = 0.5
-"""Share of the step before, above which it is renewed all the same."""
+"""Ratio to the preceding step above which the matrix is renewed all the same."""
 CHUNK = 8
 _WHERE = "exact contact"
 

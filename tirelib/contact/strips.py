@@ -67,7 +67,7 @@ SHARED = MappingProxyType(
 )
 """Constants of the ring that a strip has its share of; the others are the same for all."""
 PROBE = np.linspace(-0.5, 0.5, 101)
-"""Angles at which a strip is looked at to tell whether it touches the road, [rad]."""
+"""Angles at which a strip is checked for contact with the road, [rad]."""
 
 
 def press_strips(

@@ -20,7 +20,7 @@ from tirelib.effects.effect import State, effect
 def nonuniformity(state: State, strength: Sequence[float]) -> State:
     """Nonuniformity of the tire: a wave of one turn at the gage.
 
-    s_1 cos(phi) + s_2 sin(phi): gage and fault turn together, so the wheel angle tells the phase.
+    s_1 cos(phi) + s_2 sin(phi): gage and fault turn together, so the wheel angle gives the phase.
     """
     cosine, sine = strength
     wave = cosine * np.cos(state.phi) + sine * np.sin(state.phi)

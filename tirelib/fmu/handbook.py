@@ -32,7 +32,7 @@ def page(
     facts : mapping
         Name and text of what is particular to this file; plain text.
     table : sequence of Variable
-        Numbered inputs (``strain_2_3``) are told once.
+        Numbered inputs (``strain_2_3``) are described once.
     sections : mapping
         Title and finished HTML of what follows the facts, before the variables.
     """

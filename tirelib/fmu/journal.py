@@ -1,13 +1,14 @@
-"""What an FMU tells its importer, so that a fault that comes back does not flood the log."""
+"""Log messages of an FMU to its importer, so that a repeated fault does not flood the log."""
 
 MOST_CAUSES = 50
-"""Different causes that are told; the host's log and memory must not grow with a run."""
+"""Largest number of different causes in the log; the host's log and memory must not grow with a
+run."""
 
 
 class Journal:
     """Counts causes and decides which are worth a line.
 
-    A cause is told when it is new, and again at its 10th, 100th, 1000th .. occurrence, with the
+    A cause is logged when it is new, and again at its 10th, 100th, 1000th .. occurrence, with the
     count. After `MOST_CAUSES` different ones, one line says that no further ones will come.
 
     Examples

@@ -31,7 +31,7 @@ class Model(Protocol):
         """Return the values of the Real outputs and of the others, in the table's order."""
 
     def fault(self, cause: str) -> None:
-        """Hold the last values as invalid and start anew, after an error."""
+        """Hold the last values as invalid and start again, after an error."""
 
     def state(self) -> dict[str, Any]:
         """Return everything that is remembered, as JSON knows it."""
@@ -131,7 +131,7 @@ class GuardedSlave:
         raise NotImplementedError
 
     def advance(self, step: float) -> bool:
-        """Go on by a step [s]; tell whether the outputs have to be written anew.
+        """Go on by a step [s]; return whether the outputs have changed.
 
         Raises
         ------
@@ -241,14 +241,14 @@ class GuardedSlave:
         """Before the start, show what the outputs would be if it came now.
 
         Importers that connect several FMUs read outputs while they initialise them, and set them as
-        inputs of others. Parameters that cannot be leave the start values; a refused step is told
-        until the start.
+        inputs of others. Parameters that cannot be leave the start values; a refused step is
+        reported until the start.
         """
         if self._refused or self._foreseen == (self.real, self.other):
             return
         try:
             self.model = self.started()
-        except Exception:  # the start will tell why
+        except Exception:  # the start reports the reason
             first = [float(self._results_first[v.name]) for v in self._variables[self._results]]
             self.real[self._results] = self.shown(first)
             self.other.update((name, self._results_first[name]) for name in self._names)

@@ -54,7 +54,7 @@ class Wheel:
         self.samples = samples
         self._known_step = math.nan, 0  # a communication step [s] and its samples
         self._seen: tuple[int, bool] | None = None
-        self._offset = 0.0  # time at which the estimator was started anew, after a fault
+        self._offset = 0.0  # time at which the estimator was started again, after a fault
         self._turns = 0  # turns before that
         self._fault = False
         self._cause = ""  # of the last fault
@@ -96,7 +96,7 @@ class Wheel:
         *conditions: float,
         count: int | None = None,
     ) -> bool:
-        """Take a frame and go on by one communication step; tell whether more than age changed.
+        """Take a frame and go on by one communication step; return whether more than age changed.
 
         A step of fewer samples than the frame takes the first of them; in a longer one the samples
         after the frame are missing.
@@ -152,7 +152,7 @@ class Wheel:
         return count
 
     def fault(self, cause: str) -> None:
-        """Hold the last values as invalid and start the estimator anew, after an error."""
+        """Hold the last values as invalid and start the estimator again, after an error."""
         values, texts = self.outputs()
         self._offset += self._estimator.time
         self._turns += self._estimator.turns

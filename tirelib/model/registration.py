@@ -45,7 +45,8 @@ class Registration:
     survives : float, [-]
         Share of the signature that the base model's parameters cannot imitate.
     twins : tuple of (name, degrees)
-        Effects that look nearly the same, nearest first; a diagnosis may not tell them apart.
+        Effects that look nearly the same, nearest first; a diagnosis may not be able to separate
+        them.
     planted, recovered : float
         Strength of the trial and what was found, in the effect's unit; the component that is
         worst if there are several. NaN where no trial was made.

@@ -43,7 +43,7 @@ def made_of(values: Values, points: Operating) -> Made:
     """Return the constants of a tire's values (names of `Tire`; arrays allowed) at points.
 
     A tire's damping is that of every mode, Eq. (107); the linear ring adds what it changes. The
-    crown's curvature changes which strips touch first; a ring in one plane cannot tell it from
+    crown's curvature changes which strips touch first; a ring in one plane cannot separate it from
     a softer tread, so that it has none here.
     """
     v, width = values, np.asarray(values["belt_width"])

@@ -50,7 +50,7 @@ class Number:
     Attributes
     ----------
     value, std : float
-        In SI; std is NaN where nobody knows it.
+        In SI; std is NaN where it is unknown.
     kind : str
         measured, fitted, literature or assumed.
     source : str

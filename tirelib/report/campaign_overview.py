@@ -104,7 +104,7 @@ def _spread(values: FloatArray) -> float:
 
 
 def _abscissae(points: dict[str, FloatArray]) -> list[str]:
-    """Return the conditions that vary, the most telling first; slip angle when none does."""
+    """Return the conditions that vary, the most important first; slip angle when none does."""
     enough = {"slip_angle": 0.7, "slip_ratio": 0.02, "speed": 5.0, "pressure": 0.15, "camber": 0.7}
     return [n for n in _ABSCISSAE if _spread(points[n]) > enough[n]] or ["slip_angle"]
 

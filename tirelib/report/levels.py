@@ -14,7 +14,8 @@ from tirelib.report.style import signed_degrees
 class Level:
     """One level of a condition.
 
-    `value` is the mean of its rows, `rows` tells which belong to it, `text` says it with a unit.
+    `value` is the mean of its rows, `rows` marks the rows that belong to it, `text` is the value
+    with its unit.
     """
 
     value: float

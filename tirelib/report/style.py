@@ -1,4 +1,4 @@
-"""One look for every figure: colours that colour-blind readers can tell, labels, legends, files.
+"""One look for all figures: colours for colour-blind readers too, labels, legends, files.
 
 Categories use the palette of Okabe and Ito and a marker of their own; ordered quantities (loads)
 use viridis without its palest end. Legends stand outside the axes, so they never cover data.

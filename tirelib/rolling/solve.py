@@ -84,7 +84,7 @@ class Rolling:
 
     @property
     def rolling_radius(self) -> FloatArray:
-        """V / Omega, (n_points,), [m]; without friction nothing tells it."""
+        """V / Omega, (n_points,), [m]; without friction it is undetermined."""
         return np.where(self.constants.grips, self.x.rolling, np.nan)
 
     @property

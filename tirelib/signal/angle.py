@@ -1,4 +1,4 @@
-r"""Wheel angle over time within a turn: the wheel's own turn rate, as its sources tell it.
+r"""Wheel angle over time within a turn, from the sources of the wheel's turn rate.
 
 Between the middles of two contacts the wheel turns once, so the mean rate of the turn before a
 contact is exact. How the rate runs within that turn, up to the contact and a little beyond, is
@@ -30,7 +30,7 @@ from tirelib.arrays import FloatArray
 from tirelib.signal.course import Course
 
 SOURCES = ("omega", "speed")
-"""Conditions whose course tells how the turn rate runs, best first."""
+"""Conditions whose course within a turn gives that of the turn rate, best first."""
 REMEMBERED = 4
 """Turns whose q is kept: two slopes to be followed or not, and one before them."""
 NEWTON = 8
@@ -70,7 +70,7 @@ class AngleLaw:
     slip_std : float, [1]
         Relative standard deviation of ``step / speed``, without `late`.
     late : float, [1]
-        Share of a change of slip within the turn that the law does not tell.
+        Share of a change of slip within the turn that the law does not describe.
     past : Past
         What the law of the next turn needs.
     """
@@ -123,7 +123,7 @@ def angle_law(
         From the law of the preceding turn; empty if there is none.
     unknown : float, [1]
         Relative standard deviation of the rate at the contact over the turn's mean where nothing
-        tells it: no source, and no turn before.
+        gives it: no source, and no preceding turn.
     """
     known = [courses.get(name) for name in SOURCES]
     means = [np.nan if course is None else course.mean for course in known]
@@ -169,7 +169,7 @@ def _slip(
     """Return q of the speed at the contact over its mean of the turn, its doubt, and what is late.
 
     From turn to turn it is known precisely, but late; where turn rate and speed both have a course,
-    these tell it at once, but with their noise. What they tell beyond the former is shrunk as their
+    these show it at once, but with their noise. Their difference from the former is shrunk as their
     own coefficients are. Where the speed was hardly renewed, a turn rate that moves within the turn
     is slip as likely as not. What a measured turn rate and the contacts differ by from turn to turn
     (`rate_std` is half of it) is how far a change of traction moves the pulse's middle.

@@ -3,7 +3,7 @@ r"""How a held condition runs over one turn: a cubic at most, as certain as its 
 A source of a wheel's motion is noisy, quantised, and held from one value to the next. It is fitted
 over a turn by Legendre polynomials, whose coefficients are independent of each other: each has the
 sampling variance :math:`v_j = (2j + 1)\,\sigma^2 / n`, with the scatter :math:`\sigma` about the
-fit and n the number of values that were told. A coefficient c is then shrunk to
+fit and n the number of measured values. A coefficient c is then shrunk to
 
 .. math:: c\,\max\left(0,\ 1 - \frac{v}{c^2}\right),
 
@@ -26,7 +26,7 @@ from tirelib.arrays import FloatArray
 DEGREE = 3
 """Highest degree: braking may begin and end within one turn."""
 FEWEST_VALUES = 3
-"""Values that must be told within the turn: a line, and one to show the scatter about it."""
+"""Measured values that the turn must contain: two for a line, and one for the scatter about it."""
 BINS = 64
 """Means into which the samples are gathered before the fit; a cubic needs no more."""
 
@@ -44,7 +44,7 @@ class Course:
     std : float, [1]
         Relative standard deviation of the shape at the contact over its mean.
     known : bool
-        Whether the source told enough values to have a course; else it is its mean.
+        Whether the source has enough values for a course; otherwise its mean is used.
     surge : float
         Slope at the contact less the turn's mean slope, in the source's unit a turn.
     """
@@ -119,8 +119,8 @@ def _alike(left: FloatArray, lag: int) -> float:
 
     Noise leaves values that know nothing of each other; a course that no cubic follows leaves
     waves. Each value stands `lag` times in a row, whose mean is looked at: the steps of a held one
-    are no waves. With the correlation r of neighbours, (1 + r) / (1 - r) of them tell as much as
-    one (M. S. Bartlett, J. R. Stat. Soc. 98, 1935). Fewer than one are not believed.
+    are no waves. With the correlation r of neighbours, (1 + r) / (1 - r) of them carry as much
+    information as one (M. S. Bartlett, J. R. Stat. Soc. 98, 1935). Fewer than one are not believed.
     """
     value = left[: left.size // lag * lag].reshape(-1, lag).mean(axis=1)
     square = float(value @ value)

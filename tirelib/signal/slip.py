@@ -1,4 +1,4 @@
-r"""How far the slip ratio may move within a turn when only whole turns tell it.
+r"""Possible change of the slip ratio within a turn when only whole turns are measured.
 
 Turn rate over speed is known of whole turns; in the contact at the turn's end it may differ, by
 what acts differently there. Two things are seen at once:

@@ -1,9 +1,9 @@
 """From measured strain back to the radial deformation of the belt in the contact, Eq. (35)-(40).
 
-Eq. (35), u + u'' = -R^2 eps / y, is an ordinary differential equation for u. Its free solutions
-are cos phi and sin phi, the rigid shift of the belt: no strain tells it, and the mean of u goes
-with the gages' offset. In the contact the belt meets the road at both edges (38), which replaces
-what the strain does not tell; finite differences of second order do the rest. A whole turn has no
+Eq. (35), u + u'' = -R^2 eps / y, is an ordinary differential equation for u. Its free solutions are
+cos phi and sin phi, the rigid shift of the belt: it causes no strain, and the mean of u goes with
+the gages' offset. In the contact the belt meets the road at both edges (38), which replaces what
+the strain does not determine; finite differences of second order do the rest. A whole turn has no
 such help: `tirelib.strain.full_turn`.
 
 The right side of Eq. (39) is -eps_i - a u_1 (from (36)); the print lacks the minus sign.

@@ -1,8 +1,8 @@
-"""What the strain of a full turn tells of the belt's radial deformation, Eq. (35).
+"""Radial deformation of the belt from the strain of a full turn, Eq. (35).
 
-Harmonics 2, 3, ... of u are told. The first is the rigid shift of the belt, which strains nothing,
-and the mean goes with the gages' offset: both are unknown. Signs and validity are those of
-`tirelib.strain.deformation`, where the road tells what is missing here.
+Harmonics 2, 3, ... of u follow from it. The first is the rigid shift of the belt, which causes no
+strain, and the mean goes with the gages' offset: both are unknown. Signs and validity are those of
+`tirelib.strain.deformation`, where the road supplies what is missing here.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from tirelib.strain.deformation import check_belt
 
 @dataclass(frozen=True, slots=True)
 class RingDeformation:
-    """What the strain of a full turn tells about the radial deformation.
+    """Radial deformation as far as the strain of a full turn determines it.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ def full_ring_deformation(
 
 
 def untold_part(radial: npt.ArrayLike) -> FloatArray:
-    """Return the part of a full-turn deformation that no strain tells: mean and first harmonic.
+    """Return the part of a full-turn deformation that causes no strain: mean and first harmonic.
 
     Parameters
     ----------

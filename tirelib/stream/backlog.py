@@ -47,12 +47,12 @@ class Backlog:
         self.forget_range()
 
     def forget_range(self) -> None:
-        """Ask the cutter anew: it was given samples."""
+        """Ask the cutter again after new samples."""
         self._range: tuple[float, float, int] | None = None
         self._asked = False
 
     def keep(self, values: list[float], n: int, held: Sequence[float]) -> bool:
-        """Keep a frame if it cannot end a turn; tell whether it was kept.
+        """Keep a frame if it cannot end a turn; return whether it was kept.
 
         Parameters
         ----------
@@ -89,7 +89,7 @@ class Backlog:
 def quiet_range(cutter: TurnCutter) -> tuple[float, float, int] | None:
     """Return between which strains of the centre gage, and for how many samples, no turn can end.
 
-    None where that cannot be told: before the first contact.
+    None where that is unknown: before the first contact.
     """
     inside: dict[str, Any] = vars(cutter)
     finder: ContactFinder = inside["_finder"]

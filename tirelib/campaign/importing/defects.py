@@ -66,7 +66,7 @@ def mended(
     defects : Defects
     clocks : sequence of Clock
     run_column : str
-        Time is judged within the runs that it tells apart; may be empty.
+        Column that divides the rows into runs, within which time is checked; may be empty.
     """
     notes: list[str] = []
     for clock in clocks:

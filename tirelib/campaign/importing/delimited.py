@@ -1,6 +1,6 @@
 """Text tables (CSV and kin): separator, decimal sign and header lines are found and said.
 
-What cannot be told apart is refused; the table ``[csv]`` of the map then states it.
+An ambiguous layout is refused; the table ``[csv]`` of the map then states it.
 """
 
 import csv

@@ -35,7 +35,7 @@ from tirelib.errors import FormatError, ParameterError
 
 Progress = Callable[[str], None]
 
-_UNEVEN = 0.01  # samples that lie this much of a step off the even clock are told of
+_UNEVEN = 0.01  # samples that lie this share of a step off the uniform clock are reported
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +134,7 @@ class _Import:
         found: list[Finding] = []
         imported: list[ImportedRun] = []
         clocks: list[tuple[str, int, float]] = []
-        missing = False  # runs are, so that what is told of the plan may be wrong
+        missing = False  # runs are missing, so that problems of the plan may be wrong
         for place, file in enumerate(self.files):
             if file in self.files[:place]:
                 faults.append(f"{file}: named twice; each file once; drop one")
@@ -190,7 +190,7 @@ class _Import:
         if not header.gage_lateral or math.isfinite(header.rate) or not clocks:
             return header
         rate = sum(steps for _, steps, _ in clocks) / sum(duration for _, _, duration in clocks)
-        rate = float(f"{rate:.10g}")  # ten digits: what a clock of seconds can tell
+        rate = float(f"{rate:.10g}")  # ten digits: the resolution of a clock in seconds
         self.notes.append(f"rate of the gages from the time columns: {rate:.10g} Hz")
         return replace(header, rate=rate)
 

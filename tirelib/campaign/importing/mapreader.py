@@ -35,7 +35,7 @@ class MapReader:
         return {}
 
     def known(self, where: str, keys: Mapping[str, Any], allowed: tuple[str, ...]) -> None:
-        """Note every key that nobody reads."""
+        """Note every unknown key."""
         for key in keys:
             if key not in allowed:
                 place = f"{where} {key}".strip()

@@ -1,8 +1,8 @@
 """MATLAB files, version 5 (scipy) and 7.3 (HDF5, h5py), as columns.
 
-A vector is a column, a matrix one column for each of its shorter side (``strain(:,2)``), a field
-of a struct ``run.FZ``, a scalar a constant. A struct with the fields ``name`` and ``units`` (tire
-test consortium) tells the units of the vectors beside it.
+A vector is a column, a matrix one column for each of its shorter side (``strain(:,2)``), a field of
+a struct ``run.FZ``, a scalar a constant. A struct with the fields ``name`` and ``units`` (tire test
+consortium) states the units of the vectors next to it.
 """
 
 import warnings
@@ -107,7 +107,7 @@ def _table(path: Path, form: str, content: Mapping[str, Any], notes: tuple[str, 
 def _leaves(
     content: Mapping[str, Any], prefix: str
 ) -> Iterator[tuple[str, Any, Mapping[str, str]]]:
-    """Yield every value that is no struct, its dotted name and the units told beside it."""
+    """Yield every value that is not a struct, with its dotted name and its stated units."""
     units = _units(content)
     for key, value in content.items():
         if key.startswith("__"):

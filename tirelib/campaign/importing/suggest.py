@@ -136,7 +136,7 @@ def quantity_of(name: str) -> str:
 def suggest_map(path: str | Path, options: CsvOptions | None = None) -> str:
     """Return the draft of a map for a file, as TOML.
 
-    Axes are told from the sign of Fz and of Fy against the slip angle, and marked as a guess; a
+    Axes are guessed from the sign of Fz and of Fy against the slip angle, and marked as a guess; a
     unit that the file does not state stays empty, and the import then asks for it.
 
     Parameters
@@ -202,7 +202,7 @@ def _quoted(text: str) -> str:
 
 
 def _guessed_axes(table: Table, known: Mapping[str, ColumnSummary]) -> tuple[str, str]:
-    """Return the axis system that the signs fit, empty when they do not tell, and why."""
+    """Return the axis system that the signs fit (empty if not exactly one), and the reason."""
     load, force, angle = (_values(table, known, name) for name in ("Fz", "Fy", "slip_angle"))
     if load is None:
         return "", "required: iso, sae or adapted_sae; without Fz the file does not tell"

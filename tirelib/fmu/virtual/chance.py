@@ -49,6 +49,6 @@ def noise(seed: int, first: int, count: int, gages: int) -> FloatArray:
 
 
 def chance(seed: int, sample: int) -> float:
-    """Return a number evenly spread over (0, 1) that tells whether the frame here is lost."""
+    """Return a number uniformly distributed over (0, 1) that decides whether this frame is lost."""
     bits = np.random.Philox(key=seed, counter=[0, sample, _LOSS, 0]).random_raw(1)
     return float(_even(bits)[0])

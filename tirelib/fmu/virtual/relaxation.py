@@ -31,7 +31,7 @@ class Relaxation:
         self._rates = [0.0, 0.0]
 
     def aim(self, given: list[float], speed: float) -> bool:
-        """Take the slip that is given from now on; tell whether it is felt already.
+        """Take the slip that is given from now on; return whether it acts already.
 
         What is no number, or beyond `FOLLOWED`, leaves the slip as it is; without a speed none
         changes.

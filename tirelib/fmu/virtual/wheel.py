@@ -184,7 +184,7 @@ class VirtualWheel:
         return found if math.isfinite(found) else self._omega
 
     def _lag_outside(self, given: list[float], settled: bool, *times: float) -> tuple[str, ...]:
-        """Return which of the relaxed inputs are still out of range; the ends of a step tell."""
+        """Return which of the relaxed inputs are still out of range at the ends of a step."""
         names: tuple[str, ...] = ()
         if settled:
             return names

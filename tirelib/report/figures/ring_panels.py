@@ -105,7 +105,7 @@ def speed_labels(done: Simulation) -> list[str]:
 
 
 def point_labels(done: Simulation) -> list[str]:
-    """Say what tells the operating points apart: the load, and what else varies."""
+    """Return a label of each operating point: the load, and whatever else varies."""
     parts = [load_labels(done)]
     if np.ptp(done.inflation) > 0.0:
         parts.append(inflation_labels(done))

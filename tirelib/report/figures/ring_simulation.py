@@ -22,7 +22,7 @@ from tirelib.report.style import BLACK, FAINT, label, legend_below, new_figure, 
 
 @styled
 def figure_simulation(done: Simulation, name: str) -> Figure:
-    """Everything that the ring model tells about its operating points.
+    """All results of the ring model at its operating points.
 
     Above: belt in the wheel's plane, radial and tangential displacement, strain. Below: contact
     pressure, shear, strain rate.

@@ -65,7 +65,7 @@ def figure_6_29(by_damping: Sequence[Simulation]) -> Figure:
 def figure_6_33(by_damping: Sequence[Simulation]) -> Figure:
     """How far features move with speed, from the lowest speed on; forward (to the entry) is > 0.
 
-    Left the middle of the contact and the distance of Eq. (113), which is to tell the damping;
+    Left the middle of the contact and the distance of Eq. (113), which is to indicate the damping;
     right what makes the distance: the peak of the strain rate, and the compressive peak that does
     not quite stay. Source: dissertation, Fig. 6-33.
     """
