@@ -16,7 +16,7 @@ from tirelib.strain.deformation import (
     series_strain,
     symmetric_series,
 )
-from tirelib.strain.full_turn import full_ring_deformation, untold_part
+from tirelib.strain.full_turn import full_ring_deformation, undetermined_part
 from tirelib.strain.relations import (
     BeltShape,
     bending_strain,
@@ -262,9 +262,11 @@ def test_full_ring_tells_all_but_mean_and_shift(
     shape = sampled_shape(bent + rigid, np.zeros(PHI.size))
     strain = inextensible_strain(shape, **BELT)
     found = full_ring_deformation(strain, **GAGE)
-    np.testing.assert_allclose(found.told, bent, atol=1e-12)
-    np.testing.assert_allclose(untold_part(bent + rigid), rigid, atol=1e-14)
-    np.testing.assert_allclose(found.told + untold_part(bent + rigid), bent + rigid, atol=1e-12)
+    np.testing.assert_allclose(found.determined, bent, atol=1e-12)
+    np.testing.assert_allclose(undetermined_part(bent + rigid), rigid, atol=1e-14)
+    np.testing.assert_allclose(
+        found.determined + undetermined_part(bent + rigid), bent + rigid, atol=1e-12
+    )
     assert found.contradiction < 1e-15
     assert np.isnan(found.cosine[:2]).all()
     assert np.isnan(found.sine[:2]).all()
@@ -278,7 +280,7 @@ def test_first_harmonic_of_strain_is_reported_as_contradiction() -> None:
     strain = np.stack((np.zeros(64), 2e-4 * np.cos(2 * np.pi * np.arange(64) / 64 + 0.3)))
     found = full_ring_deformation(strain, **GAGE)
     np.testing.assert_allclose(found.contradiction, [0.0, 2e-4], atol=1e-18)
-    np.testing.assert_allclose(found.told, 0.0, atol=1e-18)
+    np.testing.assert_allclose(found.determined, 0.0, atol=1e-18)
 
 
 @given(centre=st.floats(-1.0, 1.0), start=st.floats(-4.0, 4.0), offset=st.floats(-1.0, 1.0))
@@ -321,7 +323,7 @@ def test_bad_traces_are_refused() -> None:
     with pytest.raises(ParameterError, match="count = 3"):
         arc_nodes(-0.1, 0.1, 3)
     with pytest.raises(ShapeError, match="one turn needs 8"):
-        untold_part(np.zeros(5))
+        undetermined_part(np.zeros(5))
     with pytest.raises(ParameterError, match="0 < ring_radius < free_radius"):
         contact_deformation(
             np.zeros(9), -0.2, 0.2, deflection=0.02, ring_radius=R, free_radius=0.2, liner_offset=Y

@@ -8,9 +8,9 @@ Three ways, by what is known besides Fy and Fz:
 
 At small slip all three vanish: force and moment follow from stiffness alone and say nothing about
 friction. Each estimate therefore has a standard deviation, propagated to first order from those of
-its inputs (all independent), and `told` is False, with a NaN for the friction, where the inputs lie
-outside what the model can produce or where the deviation exceeds `most_std` of the value. Real
-tires are not parabolic: the deviation covers noise, not the model's own error.
+its inputs (all independent), and `determined` is False, with a NaN for the friction, where the
+inputs lie outside what the model can produce or where the deviation exceeds `most_std` of the
+value. Real tires are not parabolic: the deviation covers noise, not the model's own error.
 """
 
 from dataclasses import dataclass
@@ -34,18 +34,18 @@ class FrictionEstimate:
     Attributes
     ----------
     friction : array
-        NaN where `told` is False.
+        NaN where `determined` is False.
     std : array
         First-order standard deviation, also where it is too large; inf where there is no estimate.
     sliding : array
         t = abs(tan alpha / tan alpha_sl), 0 .. 1; 1 where the whole contact slides.
-    told : array of bool
+    determined : array of bool
     """
 
     friction: FloatArray
     std: FloatArray
     sliding: FloatArray
-    told: BoolArray
+    determined: BoolArray
 
 
 def friction_from_moment(
@@ -82,7 +82,7 @@ def friction_from_moment(
     Examples
     --------
     >>> found = friction_from_moment(-2317.79, 22.398, 4000.0, 0.06, Fy_std=20.0, Mz_std=1.0)
-    >>> bool(found.told), round(float(found.friction), 3)
+    >>> bool(found.determined), round(float(found.friction), 3)
     (True, 0.9)
     """
     force, moment, Fz, a, s_force, s_moment, s_load, s_a = _inputs(
@@ -263,8 +263,10 @@ def _estimate(
 ) -> FrictionEstimate:
     spread = np.where(np.isfinite(std) & np.isfinite(mu), std, np.inf)
     with np.errstate(invalid="ignore"):
-        told = np.asarray(possible & (spread <= most_std * mu), dtype=np.bool_)
-    return FrictionEstimate(np.where(told, mu, np.nan), spread, np.asarray(sliding), told)
+        determined = np.asarray(possible & (spread <= most_std * mu), dtype=np.bool_)
+    return FrictionEstimate(
+        np.where(determined, mu, np.nan), spread, np.asarray(sliding), determined
+    )
 
 
 def _inputs(**given: npt.ArrayLike) -> tuple[FloatArray, ...]:

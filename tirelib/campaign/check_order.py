@@ -193,14 +193,14 @@ def _swapped(
         return None
     moved = [(int(p) + 1, int(c) + 1) for p, c in enumerate(channels) if p != c]
     names = ", ".join(f"strain_{channel}" for _, channel in sorted(moved, key=lambda pair: pair[1]))
-    told = ", ".join(
+    swaps = ", ".join(
         f"strain_{channel} fits the place of strain_{place}" for place, channel in moved
     )
     return finding(
         "swapped",
         file,
         names,
-        f"swapped gages: against the other runs, {told} "
+        f"swapped gages: against the other runs, {swaps} "
         f"(residual {np.sqrt(here / count):.0f} sigma, {np.sqrt(best / count):.1f} after the swap)",
         "a gage keeps its channel through a campaign",
         "exchange the channels in this run, or take it out of runs.csv",
@@ -293,17 +293,17 @@ def force_sign_findings(
     summaries: Sequence["ForceSign"], header: CampaignHeader
 ) -> tuple[list[Finding], list[Problem]]:
     """Compare the signs of Fy and slip angle with the axis system: in ISO they are opposite."""
-    told = [item for item in summaries if item.share is not None]
-    wrong = [item for item in told if item.share is not None and item.share > 0.5]
+    clear = [item for item in summaries if item.share is not None]
+    wrong = [item for item in clear if item.share is not None and item.share > 0.5]
     if not wrong:
         return [], []
     same = "the same sign" if header.axes == "adapted_sae" else "opposite signs"
-    if 2 * len(wrong) > len(told):
+    if 2 * len(wrong) > len(clear):
         return [], [
             Problem(
                 "campaign.toml, axes",
                 f"wrong sign: Fy against slip angle contradicts axes = {header.axes!r} in "
-                f"{len(wrong)} of {len(told)} runs with a slip angle ({wrong[0].file} first)",
+                f"{len(wrong)} of {len(clear)} runs with a slip angle ({wrong[0].file} first)",
                 f"Fy and slip angle have {same} in these axes",
                 "name the axis system of the data, or correct the sign of Fy or slip_angle",
             )

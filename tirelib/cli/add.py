@@ -262,7 +262,7 @@ def _numbers(values: float | list[float]) -> str:
 
 
 def _warnings(flags: list[str], low: float, high: float) -> list[str]:
-    told = {
+    meanings = {
         "out_of_range": "out_of_range: the fitted strength lies outside the plausible range "
         f"{low:g} to {high:g}; another effect may be missing",
         "not_significant": "not_significant: the fitted strength does not differ significantly "
@@ -270,4 +270,4 @@ def _warnings(flags: list[str], low: float, high: float) -> list[str]:
         "no_gain": "no_gain: the effect does not lower the error",
         "heldout_worse": "heldout_worse: the effect raises the error on the held-out runs",
     }
-    return [told[flag] for flag in flags]
+    return [meanings[flag] for flag in flags]

@@ -48,11 +48,11 @@ def effects(effect_files: tuple[Path, ...]) -> None:
         return
     faults: list[str] = []
     with progress_bar("registering") as progress:
-        told = []
+        reports = []
         for effect in own:
             progress(effect.name)
-            told.append(register(effect, found))
-    for report in told:
+            reports.append(register(effect, found))
+    for report in reports:
         faults += report.faults
         if not report.accepted:
             continue

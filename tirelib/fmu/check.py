@@ -200,7 +200,7 @@ def _try(path: Path, folder: Path, document: dict[str, Any]) -> None:
     }
     end = ""
     try:
-        told = subprocess.run(
+        process = subprocess.run(
             command,
             capture_output=True,
             timeout=TIME_LIMIT,
@@ -208,11 +208,11 @@ def _try(path: Path, folder: Path, document: dict[str, Any]) -> None:
             cwd=folder,
             env=environment,
         )
-        if told.returncode < 0:
-            end = f"its process died of signal {-told.returncode}"
-        elif told.returncode:
-            last = told.stderr.decode("utf-8", "replace").strip().splitlines()[-1:]
-            end = f"its process ended with code {told.returncode}: {' '.join(last)}"
+        if process.returncode < 0:
+            end = f"its process died of signal {-process.returncode}"
+        elif process.returncode:
+            last = process.stderr.decode("utf-8", "replace").strip().splitlines()[-1:]
+            end = f"its process ended with code {process.returncode}: {' '.join(last)}"
     except subprocess.TimeoutExpired:
         end = f"the run did not end within {TIME_LIMIT:g} s"
     found: dict[str, Any] = {}

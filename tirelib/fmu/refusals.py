@@ -12,12 +12,12 @@ class StepError(ParameterError):
     """A communication step that cannot be done; time does not go on."""
 
 
-def told(word: str, cause: str) -> str:
+def status_entry(word: str, cause: str) -> str:
     """Return a word of the status with its cause, without the semicolon that parts words.
 
     Examples
     --------
-    >>> told(FAULT, "ZeroDivisionError: a; b")
+    >>> status_entry(FAULT, "ZeroDivisionError: a; b")
     'fault: ZeroDivisionError: a, b'
     """
     return f"{word}: {cause.replace(';', ',')}"

@@ -301,14 +301,14 @@ def _features(rows: list[dict[str, Any]], calibration: Calibration) -> Features:
 
 
 def _estimates(rows: list[dict[str, Any]], calibration: Calibration) -> Estimates:
-    def told(name: str) -> BoolArray:
+    def is_valid(name: str) -> BoolArray:
         return np.array([row[name] for row in rows], dtype=np.bool_)
 
     gages = range(1, len(calibration.lateral) + 1)
     return Estimates(
         value={quantity: _column(rows, quantity) for quantity in QUANTITIES},
         std={quantity: _column(rows, f"{quantity}_std") for quantity in QUANTITIES},
-        valid={quantity: told(f"{quantity}_valid") for quantity in QUANTITIES},
+        valid={quantity: is_valid(f"{quantity}_valid") for quantity in QUANTITIES},
         turn_valid=np.array([_turn_valid(row) for row in rows], dtype=np.bool_),
         flags=_column(rows, "flags").astype(np.int64),
         notes=tuple(_notes(row) for row in rows),

@@ -20,7 +20,7 @@ from typing import Any, ClassVar, NoReturn, Protocol
 
 from tirelib.errors import FormatError, ParameterError
 from tirelib.fmu.journal import Journal
-from tirelib.fmu.refusals import STEP_REFUSED, StepError, told
+from tirelib.fmu.refusals import STEP_REFUSED, StepError, status_entry
 from tirelib.fmu.variables import Variable
 
 
@@ -313,7 +313,7 @@ class GuardedSlave:
         self._refused = True
         self.other.update(dict.fromkeys(self._truths, False))
         if "status" in self.other:
-            self.other["status"] = told(STEP_REFUSED, cause)
+            self.other["status"] = status_entry(STEP_REFUSED, cause)
         raise StepError(cause)
 
     def complain(self, cause: str) -> None:

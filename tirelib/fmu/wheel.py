@@ -14,7 +14,7 @@ from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.estimators.chain import QUANTITIES
 from tirelib.flags import TurnFlag, flag_names
-from tirelib.fmu.refusals import FAULT, StepError, told
+from tirelib.fmu.refusals import FAULT, StepError, status_entry
 from tirelib.signal.turns import LONGEST_TURN
 from tirelib.stream.estimator import StreamEstimator, TurnEstimate
 
@@ -212,7 +212,7 @@ class Wheel:
             flags |= int(TurnFlag.NO_CONTACT)
         none_valid = (False,) * (1 + len(QUANTITIES))
         names = [name for name in flag_names(flags) if name != FAULT]
-        status = ";".join((*names, told(FAULT, self._cause)))
+        status = ";".join((*names, status_entry(FAULT, self._cause)))
         return (*values[:-1], self.age), (others[0], flags, *none_valid, others[-2], status)
 
     def state(self) -> dict[str, Any]:

@@ -81,24 +81,24 @@ def course(samples: FloatArray, first: float, turn: float) -> Course | None:
     """
     if not np.isfinite(samples).all() or samples.min() * samples.max() <= 0.0:
         return None
-    told = 1 + int(np.count_nonzero(samples[1:] != samples[:-1]))
-    if told < FEWEST_VALUES:
+    n_measured = 1 + int(np.count_nonzero(samples[1:] != samples[:-1]))
+    if n_measured < FEWEST_VALUES:
         part = samples[: max(1, round(-first))]
-        mean = float(samples[0] if told == 1 else part.mean())
+        mean = float(samples[0] if n_measured == 1 else part.mean())
         return Course(np.array([mean]), mean, 0.0, known=False)
     n = samples.size
     edges = np.linspace(0, n, min(BINS, n) + 1).astype(np.int64)
     y = np.add.reduceat(samples, edges[:-1]) / np.diff(edges)
-    late = 0.5 * (n / told - 1.0)  # samples since its measurement, on average
-    told = min(told, y.size)
-    size = 1 + min(DEGREE, told - FEWEST_VALUES + 1)
+    late = 0.5 * (n / n_measured - 1.0)  # samples since its measurement, on average
+    n_measured = min(n_measured, y.size)
+    size = 1 + min(DEGREE, n_measured - FEWEST_VALUES + 1)
     half = 0.5 * (first + n - 1 + turn) / turn  # of the span from -1 to its end, in turns
     z = (0.5 * (edges[:-1] + edges[1:] - 1) - late + first + turn) / (turn * half) - 1.0
     design = legvander(z, size - 1)
     fitted = np.linalg.solve(design.T @ design, y @ design)
     left = y - design @ fitted
-    scatter = float(np.mean(left**2)) / (1.0 - size / told)
-    independent = told / _alike(left, -(-y.size // told))
+    scatter = float(np.mean(left**2)) / (1.0 - size / n_measured)
+    independent = n_measured / _alike(left, -(-y.size // n_measured))
     variance = scatter * (2.0 * np.arange(size) + 1.0) / independent
     square = np.maximum(fitted**2, np.finfo(np.float64).tiny)
     kept = np.maximum(1.0 - variance / square, 0.0) * fitted

@@ -21,7 +21,7 @@ class RingDeformation:
 
     Attributes
     ----------
-    told : array, shape (..., n), [m]
+    determined : array, shape (..., n), [m]
         Sum of the harmonics 2, 3, ... of u on the grid of the strain.
     cosine, sine : array, shape (..., n // 2 + 1), [m]
         Coefficients of u by order, from the first sample's angle; NaN for the orders 0 and 1.
@@ -30,7 +30,7 @@ class RingDeformation:
         equation lacks (stretch, drift, a grid that is not one turn).
     """
 
-    told: FloatArray
+    determined: FloatArray
     cosine: FloatArray
     sine: FloatArray
     contradiction: FloatArray
@@ -79,7 +79,7 @@ def full_ring_deformation(
     )
 
 
-def untold_part(radial: npt.ArrayLike) -> FloatArray:
+def undetermined_part(radial: npt.ArrayLike) -> FloatArray:
     """Return the part of a full-turn deformation that causes no strain: mean and first harmonic.
 
     Parameters

@@ -77,5 +77,5 @@ def test_bad_data_are_refused() -> None:
         fit_sine(alpha, force, held={"Q": 1.0})
     with pytest.raises(ParameterError, match=r"C held at 0\.5"):
         fit_sine(alpha, force, held={"C": 0.5})
-    with pytest.raises(ParameterError, match="one axis"):
+    with pytest.raises(ParameterError, match="must be one-dimensional"):
         fit_sine(alpha, force[:3])

@@ -367,7 +367,7 @@ def test_bad_inputs_are_refused() -> None:
         magic_forces(PURE, 0.0, 0.1)
     with pytest.raises(ParameterError, match="in radians"):
         magic_forces(PURE, 4000.0, 5.0)
-    with pytest.raises(ParameterError, match="knows no pressure"):
+    with pytest.raises(ParameterError, match="has no pressure terms"):
         magic_forces(FIVE, 4000.0, 0.1, pressure=2e5)
     with pytest.raises(ParameterError, match="magic_forces_5 takes 5, 6 and 52"):
         magic_forces_5(PURE, 4000.0, 0.1)

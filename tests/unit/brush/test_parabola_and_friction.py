@@ -77,7 +77,7 @@ def test_moment_tells_friction(sign: float, mu: float, share: float) -> None:
     force = lateral_force(alpha, CPY, mu, LOAD, A)
     moment = aligning_moment(alpha, CPY, mu, LOAD, A)
     found = friction_from_moment(force, moment, LOAD, A, Fy_std=1e-3, Mz_std=1e-4)
-    assert bool(found.told)
+    assert bool(found.determined)
     assert float(found.friction) == pytest.approx(mu, rel=1e-9)
     assert float(found.sliding) == pytest.approx(share, rel=1e-7)
 
@@ -127,7 +127,7 @@ def test_standard_deviation_is_the_scatter_of_repeats(way: str, share: float) ->
         )
     else:
         found = friction_from_two_angles(force, alpha[:, None], LOAD, Fy_std=both)
-    assert found.told.mean() > 0.99
+    assert found.determined.mean() > 0.99
     scatter = np.nanstd(found.friction)
     assert float(np.median(found.std)) == pytest.approx(scatter, rel=0.12)
 
@@ -146,7 +146,7 @@ def test_tiny_slip_tells_nothing() -> None:
         Fy_std=2.0,
     )
     for found in (a, b, c):
-        assert not found.told
+        assert not found.determined
         assert np.isnan(found.friction)
         assert float(found.std) > 0.1
 
@@ -155,7 +155,7 @@ def test_tiny_slip_tells_nothing() -> None:
 def test_impossible_moments_are_flagged(Fy: float, Mz: float) -> None:
     """No force, a trail of the wrong sign, a trail beyond a third of half the length."""
     found = friction_from_moment(Fy, Mz, LOAD, A, Fy_std=10.0, Mz_std=1.0)
-    assert not found.told
+    assert not found.determined
     assert np.isnan(found.friction)
 
 

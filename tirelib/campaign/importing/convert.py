@@ -358,10 +358,10 @@ class _Conversion:
         gages = None if gage_time is None else gage_time[span]
         if gages is not None and len(self.found) == before:
             for problem in gage_time_problems(source, gages, self.rate(gages)):
-                told = replace(
+                named = replace(
                     problem, allowed=problem.allowed.replace("campaign.toml", self.rules.file)
                 )
-                self.found.append(Finding("gage time", source, "", told))
+                self.found.append(Finding("gage time", source, "", named))
         trigger = values.get("trigger")
         piece = Piece(
             number=run,

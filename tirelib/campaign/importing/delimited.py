@@ -87,11 +87,11 @@ def read_delimited(path: Path, options: CsvOptions) -> Table:
     columns, left_out, found = _columns(
         names, units, [line for _, line in body], layout, options.text_is_missing
     )
-    told = f"read as text table: {layout}, names in line {names_at + 1}"
-    told += f", units in line {units_at + 1}" if units_at is not None else ""
-    told += f", {len(body)} rows from line {first + 1}"
-    told += f", encoding {encoding}" if encoding != "utf-8" else ""
-    return Table(str(path), "text table", columns, left_out, (told, *found))
+    note = f"read as text table: {layout}, names in line {names_at + 1}"
+    note += f", units in line {units_at + 1}" if units_at is not None else ""
+    note += f", {len(body)} rows from line {first + 1}"
+    note += f", encoding {encoding}" if encoding != "utf-8" else ""
+    return Table(str(path), "text table", columns, left_out, (note, *found))
 
 
 def _decoded(path: Path) -> tuple[str, str]:

@@ -261,17 +261,17 @@ def _checked(
 
 
 def _translated(problem: Problem, sources: dict[str, str], map_file: str) -> Problem:
-    def told(text: str) -> str:
+    def translated(text: str) -> str:
         for file, source in sources.items():
             text = text.replace(file, source)
         return text.replace(header_file.FILE, map_file)
 
     return replace(
         problem,
-        where=told(problem.where),
-        given=told(problem.given),
-        remedy=told(problem.remedy),
-        allowed=told(problem.allowed),
+        where=translated(problem.where),
+        given=translated(problem.given),
+        remedy=translated(problem.remedy),
+        allowed=translated(problem.allowed),
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.errors import ParameterError
-from tirelib.fmu.refusals import FAULT, StepError, told
+from tirelib.fmu.refusals import FAULT, StepError, status_entry
 from tirelib.fmu.virtual.chance import chance, noise
 from tirelib.fmu.virtual.coordinates import INPUTS
 from tirelib.fmu.virtual.options import Options
@@ -259,7 +259,7 @@ class VirtualWheel:
     def fault(self, cause: str) -> None:
         """Hold the last values as invalid, after an error."""
         self._run = None
-        self._valid, self._status = False, told(FAULT, cause)
+        self._valid, self._status = False, status_entry(FAULT, cause)
 
     def outputs(self) -> tuple[list[float], tuple[Any, ...]]:
         """Return the values of the Real outputs and of the others, in the table's order."""

@@ -21,15 +21,15 @@ DIGITS = {"N": "z,.0f", "bar": "z.2f", "deg": "z.1f", "km/h": "z.0f"}
 _BINS = 24
 
 
-def residual_map(told: ForceAssessment, model: ForceFit, name: str, title: str) -> Plot:
+def residual_map(assessment: ForceAssessment, model: ForceFit, name: str, title: str) -> Plot:
     """Return the mean of model less measured by slip and by set point of the other conditions."""
-    case = told.case
+    case = assessment.case
     at, unit = case.problem.bench.conditions, case.unit
     slip = at.slip_ratio if case.quantity == "Fx" else np.rad2deg(at.slip_angle)
     edges = np.linspace(slip.min(), slip.max() + 1e-9, _BINS + 1)
-    labels, group = _rows(told)
+    labels, group = _rows(assessment)
     data = case.factor * (model.predicted - case.problem.measured)
-    first = case.factor * (told.diagnosis.base.predicted - case.problem.measured)
+    first = case.factor * (assessment.diagnosis.base.predicted - case.problem.measured)
     cells = _means(data, np.digitize(slip, edges) - 1, group, len(labels))
     limit = limit_of(_means(first, np.digitize(slip, edges) - 1, group, len(labels)))
     middle = 0.5 * (edges[1:] + edges[:-1])
@@ -63,9 +63,9 @@ def residual_map(told: ForceAssessment, model: ForceFit, name: str, title: str) 
     )
 
 
-def _rows(told: ForceAssessment) -> tuple[list[str], IntArray]:
+def _rows(assessment: ForceAssessment) -> tuple[list[str], IntArray]:
     """Return labels of set points and the set point of each point, by load first."""
-    at = told.case.problem.bench.conditions
+    at = assessment.case.problem.bench.conditions
     keys: list[IntArray] = []
     shown: list[tuple[FloatArray, str]] = []
     for name, unit, dimension in CONDITIONS:

@@ -102,10 +102,10 @@ def waterfall_of(history: Sequence[Mapping[str, Any]], quantity: str) -> Plot | 
         )
         for e in entries
     ]
-    told = {"ustrain": "microstrain"}.get(unit, unit)
+    unit_name = {"ustrain": "microstrain"}.get(unit, unit)
     return waterfall(
         [first, *steps],
-        told,
+        unit_name,
         value(entries[-1], "floor"),
         f"history-{quantity}",
         f"The model's history, {quantity}",
