@@ -169,7 +169,9 @@ class Calibration:
                 flags[rows] |= int(TurnFlag.TOO_FEW_GAGES)
                 continue
             part = compute_regressors(moved, chain.gages)
-            part = {name: x[np.tile(rows, 3)] for name, x in part.items()}
+            if not rows.all():
+                each = np.tile(rows, 3)
+                part = {name: x[each] for name, x in part.items()}
             estimates, radii = chain.predict(part)
             many = int(rows.sum())
             unlike[rows] = chain.unlike(part, estimates, features.angle_std[rows])

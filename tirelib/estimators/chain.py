@@ -44,19 +44,26 @@ WIDEST = 0.5
 """Largest slip angle and largest standard deviation of one, [rad]: for a flat cornering curve the
 latter has no end. Half and double change no validity, which ends at 1 deg."""
 QUANTITIES = ("Fz", "alpha", "kappa", "Fy")
+STANDS_ON = {"Fz": ("Fz",), "Fy": ("Fy",), "alpha": ("Fz", "Fy"), "kappa": ()}
+"""Models on whose calibrated data a quantity stands. The slip ratio has none: where the load is not
+known, its own doubt of the radius holds. The slip angle's own polynomial is judged by its standard
+deviation."""
 
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
     """One quantity for n turns: value, standard deviation (SI), and whether it may be trusted.
 
-    `by_camber` is the part of the standard deviation that a camber leaves which nobody gave.
+    `by_camber` is the part of the standard deviation that a camber leaves which nobody gave;
+    `sliding` how far the sliding share may be from that at the calibrated friction, NaN where no
+    slip angle fits. Both belong to the lateral force.
     """
 
     value: FloatArray
     std: FloatArray
     valid: BoolArray
     by_camber: FloatArray | None = None
+    sliding: FloatArray | None = None
 
     @property
     def camber_decides(self) -> BoolArray:
@@ -167,13 +174,10 @@ class Chain:
         moves = moved_by(self.likeness.rest(every), angle_std)
         values = {name: x[:n] for name, x in every.items()}
         sliding = None
-        if {"Fz", "Fy"} <= set(found):
-            load, force = (found[quantity].value[:n] for quantity in ("Fz", "Fy"))
-            slip = found["kappa"].value[:n] if "kappa" in found else np.full(n, np.nan)
-            at = {**values, "load": load, "slip_ratio": slip, "slip_size": np.abs(slip)}
-            slid = self._slid(at, force, load)
-            if slid is not None:  # where no slip angle fits, any share may slide
-                sliding = np.where(force > 0.0, -1.0, 1.0) * np.nan_to_num(slid.sliding, nan=1.0)
+        if {"Fz", "Fy"} <= set(found) and found["Fy"].sliding is not None:
+            side = np.where(found["Fy"].value[:n] > 0.0, -1.0, 1.0)
+            share = np.nan_to_num(found["Fy"].sliding[:n], nan=1.0)  # any, where no angle fits
+            sliding = side * share
         tread = self.road.hardened(values)
         camber = np.where(np.isnan(values["camber"]), tilt.USUAL, 0.0)
         apart = self.likeness.apart(
@@ -199,31 +203,33 @@ class Chain:
         if self.cloud is not None:
             calibrated &= self.cloud.inside(values)
         result: dict[str, Estimate] = {}
+        near: dict[str, BoolArray] = {}
+        tread = harder, unknown = self.road.hardened(values)
         load = np.full(n, self.mean_load)
         if self.load is not None:
-            load, std = self.load.predict(values)
+            load, std, near["Fz"] = self.load.judge(values)
             correction, extra = self.laws.load_correction(values)
-            load = load + correction + self._load_per_hardening() * self.road.hardened(values)[0]
+            load = load + correction + self._load_per_hardening() * harder
             std = np.hypot(std, extra + self.laws.spread(values, load))
-            result["Fz"] = Estimate(load, std, self._valid("Fz", values, load, std) & calibrated)
+            valid = self._valid("Fz", values, load, std, near) & calibrated
+            result["Fz"] = Estimate(load, std, valid)
         values["load"] = load
         radius = np.full(n, np.nan)
         values["slip_ratio"] = np.full(n, np.nan)
         if self.radius is not None:
-            radius, radius_std = self._rolling_radius(values, result.get("Fz"))
+            radius, radius_std = self._rolling_radius(values, result.get("Fz"), tread)
             with np.errstate(invalid="ignore", divide="ignore"):
                 gain = values["omega"] / values["speed"]
                 kappa = gain * radius - 1.0
             kappa = np.where(values["speed"] > 0.0, kappa, np.nan)
             std = np.abs(gain) * radius_std
             values["slip_ratio"], values["slip_std"] = kappa, std
-            valid = self._valid("kappa", values, kappa, std) & plausible
+            valid = self._valid("kappa", values, kappa, std, near) & plausible
             result["kappa"] = Estimate(kappa, std, valid)
         values["slip_size"] = np.abs(values["slip_ratio"])
         if self.force is not None:
-            self._lateral(self.force, values, load, calibrated, result)
+            self._lateral(self.force, values, load, calibrated, result, near, tread)
         if "Fz" in result:
-            harder, unknown = self.road.hardened(values)
             doubt = self._load_per_hardening() * np.hypot(unknown, LAW_DOUBT * harder)
             result["Fz"] = result["Fz"].widened(doubt)
         return result, radius
@@ -235,16 +241,18 @@ class Chain:
         load: FloatArray,
         calibrated: BoolArray,
         result: dict[str, Estimate],
+        near: dict[str, BoolArray],
+        tread: tuple[FloatArray, FloatArray],
     ) -> None:
         """Add lateral force and slip angle to the result."""
         laws = self.force_laws
         calibrated = calibrated & laws.allowed(values)
-        force, std = model.predict(values)
+        force, std, near["Fy"] = model.judge(values)
         factor, doubt = laws.force_factor(values)
         law = doubt * np.abs(force) + laws.spread(values, factor * force)
         leaning, tilted = self._tilt(model, values, factor * force, load)
         force, std = factor * force - leaning, np.hypot(np.hypot(factor * std, law), tilted)
-        valid = self._valid("Fy", values, force, std) & calibrated
+        valid = self._valid("Fy", values, force, std, near) & calibrated
         owed = np.where(np.isnan(values["camber"]), tilted, 0.0)
         result["Fy"] = Estimate(force, std, valid, by_camber=owed)
         load_std = result["Fz"].std if "Fz" in result else np.zeros_like(load)
@@ -253,14 +261,15 @@ class Chain:
             spread = np.hypot(std, values["utilisation"] * load_std) / np.abs(load)
         slid = self._slid(values, force, load)
         if self.angle is not None:
-            angle = self._slip_angle(self.angle, values, load, spread, slid)
-            valid = self._valid("alpha", values, angle.value, angle.std) & angle.valid
+            angle = self._slip_angle(self.angle, values, load, spread, slid, tread)
+            valid = self._valid("alpha", values, angle.value, angle.std, near) & angle.valid
             result["alpha"] = replace(angle, valid=valid & calibrated)
-        harder, unknown = self.road.hardened(values)
+        harder, unknown = tread
         result["Fy"] = result["Fy"].widened(FORCE * np.hypot(harder, unknown) * np.abs(force))
         if slid is not None:
             share = np.nan_to_num(slid.sliding, nan=1.0)  # any, where no slip angle fits
-            result["Fy"] = result["Fy"].widened(FORCE_DOUBT * share * np.abs(force))
+            widened = result["Fy"].widened(FORCE_DOUBT * share * np.abs(force))
+            result["Fy"] = replace(widened, sliding=slid.sliding)
             if "Fz" in result:
                 result["Fz"] = result["Fz"].widened(LOAD_DOUBT * share * np.abs(load))
 
@@ -271,6 +280,7 @@ class Chain:
         load: FloatArray,
         spread: FloatArray,
         slid: Told | None,
+        tread: tuple[FloatArray, FloatArray],
     ) -> Estimate:
         """Return the slip angle; valid where road and tread leave it known."""
         angle, std = model.predict(values, spread)
@@ -283,7 +293,7 @@ class Chain:
             angle, told = angle + slid.change, np.isfinite(slid.std)
             std = np.sqrt(std**2 + slid.std**2 + (np.fmax(model.blur, spread) * flatter) ** 2)
             slope = slid.slope
-        harder, unknown = self.road.hardened(values)
+        harder, unknown = tread
         # a stiffer tread hides load, so the utilisation seems larger, and turns it into more force
         hidden = self._load_per_hardening() / np.abs(load)
         lighter = slope * np.abs(values["utilisation"])
@@ -385,7 +395,10 @@ class Chain:
         )
 
     def _rolling_radius(
-        self, values: Mapping[str, FloatArray], load: Estimate | None
+        self,
+        values: Mapping[str, FloatArray],
+        load: Estimate | None,
+        tread: tuple[FloatArray, FloatArray],
     ) -> tuple[FloatArray, FloatArray]:
         """Return R_eff and its standard deviation, [m].
 
@@ -417,24 +430,10 @@ class Chain:
                 away = np.fmax(away, np.abs(told[0] - radius))
                 away = np.where(known, per_load * load.std, away)
             std = np.hypot(std, away)
-            harder, unknown = self.road.hardened(values)
+            harder, unknown = tread
             hidden = self._load_per_hardening() * np.hypot(unknown, LAW_DOUBT * harder)
             doubt = doubt + per_load * hidden  # one tread is behind both
         return radius - share * worn, np.hypot(std, doubt)
-
-    def _carried(self, quantity: str) -> tuple[Polynomial, ...]:
-        """Return the models on whose calibrated data a quantity stands.
-
-        The slip ratio has none: where the load is not known, its own doubt of the radius holds. The
-        slip angle's own polynomial is judged by its standard deviation.
-        """
-        models = {
-            "Fz": (self.load,),
-            "Fy": (self.force,),
-            "alpha": (self.load, self.force),
-            "kappa": (),
-        }[quantity]
-        return tuple(model for model in models if model is not None)
 
     def _valid(
         self,
@@ -442,10 +441,12 @@ class Chain:
         values: Mapping[str, FloatArray],
         value: FloatArray,
         std: FloatArray,
+        near: Mapping[str, BoolArray],
     ) -> BoolArray:
+        """Tell which turns may be used; `near`: which lie near the data of load and force."""
         known = np.isfinite(value) & np.isfinite(std)
-        for model in self._carried(quantity):
-            known &= model.within(values)
+        for model in STANDS_ON[quantity]:
+            known &= near.get(model, True)
         guards = self.guards[quantity]
         if not guards:
             return known

@@ -160,21 +160,24 @@ class Polynomial:
 
     def predict(self, values: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
         """Return value and standard deviation (one turn), each of shape (n,)."""
+        value, std, _ = self.judge(values)
+        return value, std
+
+    def judge(self, values: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray, BoolArray]:
+        """Return value, standard deviation (one turn) and whether a row lies near the data.
+
+        A row is near that lies no further from the data than held-out ones did; each of shape (n,).
+        """
         x = self.design(values)
         uncertain = leverage(x, self.covariance)
+        near = np.ones(uncertain.shape, dtype=np.bool_)
         if self.border is not None:
+            near = np.asarray(uncertain <= self.border.far, dtype=np.bool_)
             uncertain = self.border.grown(uncertain)
         if self.pulled:
             uncertain = uncertain + self.pulled**2 * pull_share(values["traction"])
         std = np.sqrt(self.residual**2 + self.floor**2 + uncertain)
-        return x @ self.coefficients, std
-
-    def within(self, values: Mapping[str, FloatArray]) -> BoolArray:
-        """Tell which rows lie no further from the data than held-out ones did, shape (n,)."""
-        if self.border is None:
-            return np.ones(next(iter(values.values())).shape, dtype=np.bool_)
-        uncertain = leverage(self.design(values), self.covariance)
-        return np.asarray(uncertain <= self.border.far, dtype=np.bool_)
+        return x @ self.coefficients, std, near
 
     def slope(self, values: Mapping[str, FloatArray], name: str) -> FloatArray:
         """Return the derivative of y by the regressor `name`, shape (n,), unit of y per SI."""
@@ -208,8 +211,11 @@ def _products(
     """Multiply the standardised variables, each to its power; shape (n, k)."""
     n, count = next(iter(values.values())).shape[0], len(variables)
     powers = np.ones((n, count, int(powers_of.max(initial=0)) + 1))
-    for position, variable in enumerate(variables):
-        powers[:, position, 1:] = variable.standardise(values[variable.name])[:, None]
+    if count:
+        x = np.stack([values[variable.name] for variable in variables], axis=1)
+        centre = np.array([variable.centre for variable in variables])
+        scale = np.array([variable.scale for variable in variables])
+        powers[:, :, 1:] = ((x - centre) / scale)[:, :, None]
     np.multiply.accumulate(powers, axis=2, out=powers)
     products = np.multiply.reduce(powers[:, np.arange(count), powers_of], axis=2)
     return np.asarray(products, dtype=np.float64)

@@ -155,13 +155,16 @@ class SlidingCurve:
         """Return t at a lateral utilisation; 1 where the tread slides as a whole.
 
         The slip along and the force across each ask for a share at least; from the larger of both,
-        Newton's method climbs to where they are met together: what is left falls, convexly.
+        Newton's method climbs to where they are met together: what is left falls, convexly. Without
+        slip along, the force's share is the answer.
         """
         n, effective = self.sharpness, self.grip * np.asarray(friction)
         across = used / effective
         pull = np.abs(self.cornering(load) * along) / (n * effective)
         alone = 1.0 - np.maximum(1.0 - across, 0.0) ** (1.0 / n)
         t = np.asarray(np.maximum(alone, np.minimum(pull, 1.0)), dtype=np.float64)
+        if not np.any(pull):
+            return alone
         for _ in range(NEWTON):
             at = np.maximum(t, TINY)
             rest = (1.0 - at) ** (n - 1.0)
@@ -169,7 +172,7 @@ class SlidingCurve:
             a, b = (pull / at) ** 2, (across / filled) ** 2
             fall = 2.0 * (a / at + b * n * rest / filled)
             t = np.minimum(t + np.maximum(a + b - 1.0, 0.0) / np.maximum(fall, TINY), 1.0)
-        return t
+        return np.where(pull > 0.0, t, alone)
 
     def across(self, used: FloatArray, t: FloatArray, load: FloatArray) -> FloatArray:
         """Return s_y at a lateral utilisation and a sliding share, below full sliding."""

@@ -101,7 +101,8 @@ class Road:
 
     def said(self, values: Mapping[str, FloatArray], name: str) -> FloatArray:
         """Return friction, depth or temperature; NaN where it is unknown or cannot be."""
-        return np.where(self.plausible(values)[name], values[name], np.nan)
+        low, high = self.ends[name]
+        return np.where((values[name] < low) | (values[name] > high), np.nan, values[name])
 
     def unseen_friction(self, reference: float) -> float:
         """Return which share of the way down to the lowest friction no data cover, 0 to 1."""

@@ -54,7 +54,7 @@ def test_where_the_polynomial_is_right_little_grows() -> None:
 def test_a_combination_that_was_never_measured_lies_beyond_though_each_part_was() -> None:
     model = fitted(bent).model
     corners = {"a": np.array([0.0, 0.9, 0.9]), "b": np.array([0.0, 0.9, -0.9])}
-    assert model.within(corners).tolist() == [True, True, False]
+    assert model.judge(corners)[2].tolist() == [True, True, False]
 
 
 def test_errors_at_the_worst_end_are_one_standard_deviation_on_average() -> None:
@@ -120,5 +120,5 @@ def test_more_conditions_of_the_same_range_do_not_make_it_narrower() -> None:
     """Leverage falls as conditions are added; so does a border learned from single ones."""
     outer = {"a": np.array([-0.98, 0.95])}
     for n in (120, 240, 480):
-        assert evenly(n, banded=True).model.within(outer).all()
-    assert not evenly(240, banded=False).model.within(outer).any()
+        assert evenly(n, banded=True).model.judge(outer)[2].all()
+    assert not evenly(240, banded=False).model.judge(outer)[2].any()
