@@ -1,11 +1,11 @@
-"""Flags of a turn: what was wrong with it, and whether it may still be used."""
+"""Flags of a turn: its faults, and whether it may still be used."""
 
 from collections.abc import Iterable
 from enum import IntFlag
 
 
 class TurnFlag(IntFlag):
-    """What was seen in one turn; several may hold at once.
+    """Observations in one turn; several flags may be set together.
 
     The value is what an FMU's ``flags`` output carries, so a number, once given, stays.
     """
@@ -19,7 +19,7 @@ class TurnFlag(IntFlag):
     SPIKE = 8
     """A spike was seen."""
     SATURATED = 16
-    """A gage stands still at the end of its range inside the window."""
+    """A gage is constant at the end of its range inside the window."""
     DEAD_GAGE = 32
     """A gage shows no contact while its neighbours do."""
     PERIOD_JUMP = 64
@@ -43,16 +43,17 @@ class TurnFlag(IntFlag):
     NO_CONDITION = 32768
     """A condition that the calibration needs (pressure, camber) is unknown."""
     WEAK_EDGE = 65536
-    """A peak stands at the border of its search range: the edge is not distinct."""
+    """A peak lies at the border of its search range: the edge is not distinct."""
     NO_CONTACT = 131072
     """No contact for two turns (standstill, gages frozen or dead). Live only: a batch has turns."""
     FAULT = 262144
     """The estimator met an error that it did not expect; the log names it. Live only."""
     OTHER_TIRE = 1048576
-    """The strain is not what the calibrated tire shows: another tire, or another state of it."""
+    """The strain pattern is not that of the calibrated tire: another tire, or another state of
+    it."""
 
     ACCELERATING = 524288
-    """The wheel's rate changes within the turn more than is known of it: angles are uncertain."""
+    """The turn rate changes within the turn by more than its sources show: angles are uncertain."""
 
 
 INVALIDATING = (

@@ -1,4 +1,4 @@
-"""What holds while samples are taken: one list for batch, stream, FMU and bench.
+"""Conditions that are held while samples are taken: one list for batch, stream, FMU and bench.
 
 A condition that is added here, to `Turn` and to the inputs of the FMU reaches an estimate from
 every source: a campaign's rig channels, frames of a stream, an FMU's inputs, the bench's options,

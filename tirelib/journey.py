@@ -70,7 +70,7 @@ def compare(
     effects: "Mapping[str, Effect] | None" = None,
     progress: Progress | None = None,
 ) -> "Comparison | ForceComparison":
-    """Hold a model against one measured quantity of a campaign.
+    """Compare a model with one measured quantity of a campaign.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a campaign shows: the features of every turn beside what the rig measured."""
+"""Observations of a campaign: the features of every turn, with the values that the rig measured."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields, replace
@@ -17,7 +17,7 @@ from tirelib.sizes import differing
 TRUTH = ("Fx", "Fy", "Fz", "Mz", "slip_angle", "slip_ratio")
 """Rig quantities that an estimate is held against."""
 ROAD = ("friction", "tread_depth", "tread_temperature")
-"""What a plan may say of road and tread."""
+"""Conditions of road and tread that a plan may state."""
 SET_POINTS = ("load", "pressure", "speed", "slip_angle", "camber", "slip_ratio")
 """Nominal conditions of a run."""
 BLOCK = 10

@@ -1,4 +1,4 @@
-"""Edge conversions: what files, buses and people write, to SI and radians and back.
+"""Conversions at the edges: units of files, buses and people to SI and radians, and back.
 
 One literal table holds every unit met in the field. Inside the library nothing has a unit in its
 name; here, and only here, a unit has a number: ``si = factor * value + offset``.

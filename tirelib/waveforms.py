@@ -173,7 +173,7 @@ class _Row:
 
 
 def _measure(run: Run, header: CampaignHeader, low_pass: LowPass) -> _Row | str:
-    """Return a run's mean waveform, or why there is none."""
+    """Return a run's mean waveform, or the reason why it has none."""
     if run.strain is None:
         return "holds no strain"
     if run.plan.kind == "sweep":

@@ -1,4 +1,4 @@
-"""The bench: a wheel transmitter's line read, estimated with an FMU, recorded, played and shown.
+"""The bench: reads a wheel transmitter, estimates with an FMU, records, replays and shows.
 
 =============  ====================================================================
 `wire`         what a wheel sends: frames, samples, counts, clocks, conditions

@@ -1,4 +1,4 @@
-"""Checks of the folder: files that are there and not listed, copies, repeats."""
+"""Checks of the folder: files that are not listed, copies, repeats."""
 
 import csv
 from collections.abc import Sequence
@@ -37,7 +37,7 @@ def extra_files(folder: Path) -> list[Problem]:
 
 
 def _listed(folder: Path) -> set[str] | None:
-    """Return the files that the rows name, those of faulty rows included; None without a column."""
+    """Return the files that the rows name, also in faulty rows; None without a column."""
     try:
         with (folder / plan_file.FILE).open(encoding="utf-8-sig", newline="") as stream:
             table = csv.DictReader(stream)

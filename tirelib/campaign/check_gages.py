@@ -17,13 +17,13 @@ DEAD = 0.05
 """A gage with less than this share of its neighbours' peak-to-peak strain is dead."""
 
 SPIKE = 0.02
-"""A sample that stands out by less than this share of the peak-to-peak strain is no spike."""
+"""A sample that deviates by less than this share of the peak-to-peak strain is not a spike."""
 
 _CONTACT = 45.0 / 360.0  # the dips before and behind the contact lie within this part of a turn
 
 
 def gage_findings(run: Run, header: CampaignHeader, *, whole: bool) -> list[Finding]:
-    """Return what is wrong with the gages of one run.
+    """Return the faults of the gages of one run.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def not_finite(file: str, channel: str, samples: FloatArray, times: FloatArray) 
 def _life(
     run: Run, gage: int, samples: FloatArray, spread: FloatArray, header: CampaignHeader
 ) -> list[Finding]:
-    """Find a gage that says nothing: constant, noise only, or far weaker than the others."""
+    """Find a dead gage: constant, noise only, or far weaker than the others."""
     others = np.delete(spread, gage)
     usual = float(np.nanmedian(others)) if np.isfinite(others).any() else math.nan
     if spread[gage] == 0.0:

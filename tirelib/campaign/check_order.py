@@ -30,7 +30,7 @@ _CLEAR = 0.10  # and the share of the range of all slopes
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunSummary:
-    """What the checks over the runs need to know of one run.
+    """Values of one run that the checks over all runs need.
 
     Attributes
     ----------
@@ -275,7 +275,7 @@ def _unchecked(held: str) -> Problem:
 
 
 def _out_of_order(slopes: FloatArray, error: float) -> list[int]:
-    """Return the places, side by side, whose slopes would have to move for a steady row."""
+    """Return the neighboring places whose slopes would have to change for a monotonic row."""
     clear = max(_STEADY * error, _CLEAR * float(np.ptp(slopes)))
     rows = []
     for direction in (1.0, -1.0):

@@ -66,7 +66,7 @@ SPIKE = 20.0
 
 
 def rig_findings(run: Run, header: CampaignHeader) -> list[Finding]:
-    """Return what is wrong with the rig quantities of one run."""
+    """Return the faults of the rig quantities of one run."""
     found: list[Finding] = []
     if run.rig_time is None:
         return found
@@ -125,7 +125,7 @@ def _far_from_set_point(run: Run, quantity: str, header: CampaignHeader) -> list
 
 
 def _suspect(ratio: float, rule: _SetPoint) -> tuple[float | None, str]:
-    """Return the factor of a known mix-up and what to do about it."""
+    """Return the factor of a known mix-up of units, and the remedy."""
     if abs(ratio + 1.0) < 0.2:
         return -1.0, "the sign is suspected: correct it, or the axes of campaign.toml"
     for factor, units in rule.factors:

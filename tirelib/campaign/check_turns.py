@@ -12,7 +12,7 @@ from tirelib.campaign.turns import expected_period, trigger_samples, turn_sample
 
 
 def turn_findings(run: Run, header: CampaignHeader) -> list[Finding]:
-    """Return what is wrong with the number of turns and with the trigger of one run."""
+    """Return the faults of the number of turns and of the trigger of one run."""
     if run.strain is None or not math.isfinite(run.rate):
         return []
     found: list[Finding] = []

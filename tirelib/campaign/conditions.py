@@ -1,4 +1,4 @@
-"""What held while a run's samples were taken: one rule for batch, stream, FMU and bench.
+"""Conditions while a run's samples were taken: one rule for batch, stream, FMU and bench.
 
 A condition is what the rig measured, held from one measurement to the next; where the rig did not
 measure it at all, it is the set point; where neither is there, it is unknown. A measurement that

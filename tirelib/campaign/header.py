@@ -143,7 +143,7 @@ def parse_header(folder: Path) -> tuple[CampaignHeader | None, list[Problem]]:
 
 
 def _blocks(problem: Problem) -> bool:
-    """Return whether the runs mean nothing as long as this key is wrong."""
+    """Return whether the runs cannot be interpreted as long as this key is wrong."""
     keys = ("format", "axes", "[gages]", "[tire] free_radius_m")
     return problem.where.startswith(tuple(f"{FILE}, {key}" for key in keys))
 

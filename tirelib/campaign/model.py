@@ -1,4 +1,4 @@
-"""What a campaign holds: tire, gages, plan and runs. Everything here is SI, radians and ISO."""
+"""Content of a campaign: tire, gages, plan and runs. Everything here is SI, radians and ISO."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -53,7 +53,7 @@ class Tolerance:
 
 @dataclass(frozen=True, slots=True)
 class CampaignHeader:
-    """What ``campaign.toml`` says, in SI and ISO signs.
+    """Content of ``campaign.toml``, in SI and ISO signs.
 
     Attributes
     ----------

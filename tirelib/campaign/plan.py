@@ -38,7 +38,7 @@ ROAD: tuple[_Column, ...] = (
     _Column("tread_depth", "tread_depth_mm", "mm", "length", 0.0, 30.0),
     _Column("tread_temperature", "tread_temperature_degC", "degC", "temperature", -60.0, 200.0),
 )
-"""Columns that need not be there: what is known of road and tread, of sweeps too."""
+"""Optional columns: conditions of road and tread, for sweeps too."""
 
 REQUIRED = ("run", "file", "kind", *(column.name for column in SET_POINTS))
 _START = "start_s"
@@ -95,7 +95,7 @@ def parse_plans(folder: Path, axes: str) -> tuple[tuple[RunPlan, ...], list[Prob
 
 
 def _separator_problems(columns: list[str]) -> list[Problem]:
-    """Return a fault where the columns stand apart by another sign than a comma."""
+    """Return a fault where the separator of the columns is not a comma."""
     for mark, words in ((";", "semicolons"), ("\t", "tabs"), ("|", "bars")):
         if len(columns) == 1 and {"run", "file"} <= {c.strip() for c in columns[0].split(mark)}:
             return [
@@ -269,7 +269,7 @@ def _extra(cell: str) -> float | str:
 
 
 def _duplicates(table: list[list[str]], columns: list[str]) -> list[Problem]:
-    """Return the run numbers and the files that stand in more than one row."""
+    """Return the run numbers and the files that occur in more than one row."""
     problems: list[Problem] = []
     for name, allowed in (
         ("run", "each run has its own number"),

@@ -15,7 +15,7 @@ from tirelib.errors import FormatError
 
 @dataclass(frozen=True, slots=True)
 class Campaign:
-    """A campaign: what was measured, on what, and where each run lies.
+    """A campaign: its header, its plan, and the place of each run.
 
     Attributes
     ----------

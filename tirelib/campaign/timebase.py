@@ -1,4 +1,4 @@
-"""What a clock should be: finite, growing, uniform, at the declared rate."""
+"""Checks of a clock: finite, increasing, uniform, at the declared rate."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ RATE_TOLERANCE = 1e-3
 
 
 def gage_time_problems(file: str, times: FloatArray, rate: float) -> list[Problem]:
-    """Return what is wrong with the gages' clock.
+    """Return the faults of the gages' clock.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def gage_time_problems(file: str, times: FloatArray, rate: float) -> list[Proble
 
 
 def rig_time_problems(file: str, times: FloatArray) -> list[Problem]:
-    """Return what is wrong with the rig's clock: it must grow, but may pause."""
+    """Return the faults of the rig's clock: it must increase, but may pause."""
     return _growth_problems(f"{file}, time of the rig quantities", times)
 
 

@@ -12,7 +12,7 @@ from tirelib.errors import TirelibError
 from tirelib.threads import bound_process
 
 VERBS = {
-    "campaign": "Validate a folder of measurements, or show what is in it.",
+    "campaign": "Validate a folder of measurements, or show its content.",
     "import": "Make a campaign from measured files: MATLAB, CSV, Parquet, TYDEX, loose MDF 4.",
     "features": "Extract contact edges, peaks and integrals for every turn and gage of DIR.",
     "calibrate": "Fit the estimators of Fz, alpha, kappa and Fy on the campaigns in DIR...",
@@ -23,7 +23,7 @@ VERBS = {
     "explain": "Find what a model of CAMPAIGN lacks, add it, and show before and after.",
     "effects": "List the effects of the catalogue, or register effects of your own.",
     "next-test": "Tell which further run would separate the suspects of CAMPAIGN best.",
-    "add": "Add EFFECT to a model, fit it to CAMPAIGN and show what the error does.",
+    "add": "Add EFFECT to a model, fit it to CAMPAIGN and show how the error changes.",
     "selftest": "Plant each effect at the plan and noise of CAMPAIGN and tell the chance of "
     "finding it.",
     "simulate": "Simulate the rolling ring on the road: shape, pressure, shear, strain and strain "

@@ -99,7 +99,7 @@ def add(
     report: Path | None,
     json_file: Path | None,
 ) -> None:
-    """Add EFFECT to a model, fit it to CAMPAIGN and show what the error does."""
+    """Add EFFECT to a model, fit it to CAMPAIGN and show how the error changes."""
     if quantity is not None and quantity not in QUANTITIES:
         raise ParameterError(
             f"--quantity {quantity}: allowed are {', '.join(QUANTITIES)}; correct the name"

@@ -242,7 +242,7 @@ def _cornering(trained: Trained) -> dict[str, Any] | None:
 
 
 def _provenance(document: dict[str, Any]) -> dict[str, Any]:
-    """Return what of the statistics goes into the calibration file (TOML knows no null)."""
+    """Return the statistics for the calibration file, without null values (TOML has none)."""
 
     def without_null(value: Any) -> Any:
         if isinstance(value, dict):

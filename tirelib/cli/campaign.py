@@ -1,4 +1,4 @@
-"""``tirelib campaign``: is a folder of measurements sound, and what is in it."""
+"""``tirelib campaign``: checks a folder of measurements, and shows its content."""
 
 import json
 from collections.abc import Iterator
@@ -25,7 +25,7 @@ _WIDE = 145
 
 @click.group()
 def campaign() -> None:
-    """Validate a folder of measurements, or show what is in it."""
+    """Validate a folder of measurements, or show its content."""
 
 
 @contextmanager

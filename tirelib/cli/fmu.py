@@ -185,7 +185,7 @@ def check(
     out: Path | None,
     json_file: Path | None,
 ) -> None:
-    """Validate X.fmu, play its reference signals, compare with what they expect."""
+    """Validate X.fmu, play its reference signals, and compare its outputs with them."""
     with progress_bar("checking", 3) as progress:
         document = check_fmu(file, reference=reference, progress=progress)
     _print_check(document)

@@ -1,4 +1,4 @@
-"""Sentences after a calibration or an estimate: what was not given costs, what was not checked."""
+"""Notes after a calibration or an estimate: cost of missing conditions, missing checks."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,7 +12,7 @@ REPORTED_LOSS = 0.05
 
 
 def not_given(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Return a sentence on the condition that costs most by not being given; empty if none does.
+    """Return a sentence on the missing condition that costs most accuracy; empty if there is none.
 
     Parameters
     ----------

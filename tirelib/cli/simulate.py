@@ -287,7 +287,7 @@ def _left_out(file: TireFile, chosen: Model | None) -> list[str]:
 
 
 def _notes(file: TireFile, done: Simulation, chosen: Model | None) -> list[str]:
-    """Say what a reader of the figures should know."""
+    """Return the notes that a reader of the figures needs."""
     notes, tire = [], done.tire
     if left_out := _left_out(file, chosen):
         which = (
@@ -322,7 +322,7 @@ def _notes(file: TireFile, done: Simulation, chosen: Model | None) -> list[str]:
 
 
 def _overload(done: Simulation) -> list[str]:
-    """Say where the tire is pressed flatter than a tire would bear, and by which load."""
+    """Return a note where the deflection is larger than a tire would bear, with the load."""
     tire = done.tire
     largest = LARGEST_DEFLECTION * tire.free_radius
     too_deep = np.flatnonzero(done.deflection > largest)

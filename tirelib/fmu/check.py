@@ -1,4 +1,4 @@
-"""Check an FMU: validate it, play its reference signals, compare with what they expect.
+"""Check an FMU: validate it, play its reference signals, and compare the outputs with them.
 
 The FMU runs in a process of its own (`tirelib.fmu.trial`), so that a broken one is a result and not
 the end. Nothing is unpacked before the archive has been looked at.
@@ -121,7 +121,7 @@ def _environment() -> dict[str, str]:
 
 
 def _archive(path: Path) -> list[str]:
-    """Return the names inside; refuse what is no FMU."""
+    """Return the names inside; refuse a file that is not an FMU."""
     try:
         with zipfile.ZipFile(path) as archive:
             names = archive.namelist()
@@ -149,7 +149,7 @@ def _archive(path: Path) -> list[str]:
 
 
 def _damage(path: Path) -> str:
-    """Say why an archive must not be unpacked; empty if it may."""
+    """Return why an archive must not be unpacked; empty if it may."""
     with zipfile.ZipFile(path) as archive:
         entries = archive.infolist()
         size = sum(entry.file_size for entry in entries)
@@ -190,7 +190,7 @@ def _take_reference(source: Path, target: Path) -> None:
 
 
 def _try(path: Path, folder: Path, document: dict[str, Any]) -> None:
-    """Run the trial in its own process and take over what it found."""
+    """Run the trial in its own process, and return its findings."""
     command = [sys.executable, "-m", "tirelib.fmu.trial", str(path.resolve()), str(folder)]
     environment = {
         **os.environ,
@@ -229,7 +229,7 @@ def _try(path: Path, folder: Path, document: dict[str, Any]) -> None:
 
 
 def _compare(path: Path, folder: Path, document: dict[str, Any], names: list[str]) -> None:
-    """Compare the reference run with what was expected."""
+    """Compare the reference run with the expected outputs."""
     model = document["facts"].get("modelName")
     passed = {part["name"]: part["passed"] for part in document["parts"]}
     place = f"resources/{FOLDER}/{model}_ref"

@@ -1,4 +1,4 @@
-"""``documentation/index.html`` of an FMU: one page for whoever meets the file alone."""
+"""``documentation/index.html`` of an FMU: one page that explains the file by itself."""
 
 import html
 from collections.abc import Mapping, Sequence

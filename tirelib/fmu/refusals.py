@@ -1,4 +1,4 @@
-"""How a slave says that it could not do a step: an error class and the words of ``status``."""
+"""Refused steps of a slave: an error class, and their entry in ``status``."""
 
 from tirelib.errors import ParameterError
 
@@ -9,7 +9,7 @@ FAULT = "fault"
 
 
 class StepError(ParameterError):
-    """A communication step that cannot be done; time does not go on."""
+    """A communication step that cannot be done; time does not advance."""
 
 
 def status_entry(word: str, cause: str) -> str:

@@ -1,4 +1,4 @@
-"""Play a campaign to an FMU with FMPy, and gather what it says as the batch does."""
+"""Play a campaign to an FMU with FMPy, and collect its outputs in the form of the batch."""
 
 import math
 import shutil
@@ -208,7 +208,7 @@ def play_run(fmu: LoadedFmu, run: Run) -> Iterator[dict[str, Any]]:
 
 
 def _frames(conditions: FloatArray, samples: int) -> Iterator[slice]:
-    """Cut samples into frames within which the conditions, shape (k, n), stand still."""
+    """Cut samples into frames within which the conditions, shape (k, n), are constant."""
     before, after = conditions[:, :-1], conditions[:, 1:]
     changed = ((before != after) & ~(np.isnan(before) & np.isnan(after))).any(axis=0)
     borders = [0, *(np.flatnonzero(changed) + 1).tolist(), conditions.shape[1]]
@@ -322,12 +322,12 @@ def _estimates(rows: list[dict[str, Any]], calibration: Calibration) -> Estimate
 
 
 def _turn_valid(row: Mapping[str, Any]) -> bool:
-    """Tell what the batch calls valid: a turn with one gage out, or without a speed, may be."""
+    """Return the validity as in the batch, where one gage or the speed may be missing."""
     in_range = not any(note.endswith("_out_of_range") for note in _notes(row))
     return not row["flags"] & int(INVALIDATING) and in_range
 
 
 def _notes(row: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return what the status says beyond the flags."""
+    """Return the notes in the status beyond the flags."""
     names = set(flag_names(row["flags"]))
     return tuple(word for word in row["status"].split(";") if word and word not in names)

@@ -1,4 +1,4 @@
-"""What every slave shares: variables by reference, guarded calls, refused steps, exact states.
+"""Common base of the slaves: variables by reference, guarded calls, refused steps, exact states.
 
 A slave that pythonfmu exports derives from `GuardedSlave` first and from ``Fmi2Slave`` second::
 
@@ -25,7 +25,7 @@ from tirelib.fmu.variables import Variable
 
 
 class Model(Protocol):
-    """What a slave steps: it gives its output values and its state."""
+    """The model that a slave steps; it supplies its output values and its state."""
 
     def outputs(self) -> tuple[Sequence[float], Sequence[Any]]:
         """Return the values of the Real outputs and of the others, in the table's order."""
@@ -303,7 +303,7 @@ class GuardedSlave:
         self._refused = False
 
     def _refuse(self, cause: str) -> NoReturn:
-        """Let nothing be valid until a step is done: time stands still.
+        """Make every output invalid until a step is done: time does not advance.
 
         Raises
         ------
@@ -363,7 +363,7 @@ _PHASES = {
 
 
 def _unread() -> None:
-    """Stand in for a getter: values are read by reference, from the slave."""
+    """Replace a getter: values are read by reference, from the slave."""
 
 
 def _once_in_path(folder: str) -> None:

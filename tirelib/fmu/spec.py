@@ -1,4 +1,4 @@
-"""What `tirelib.fmu.build.export` needs to know of a slave to make an FMU of it."""
+"""Description of a slave from which `tirelib.fmu.build.export` makes an FMU."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -24,7 +24,7 @@ from tirelib.held import HELD
 from tirelib.stream.estimator import StreamEstimator
 
 TURNS, STILL = 6.4, 2.3
-"""Turns that roll, and what would be turns that stand."""
+"""Number of rolling turns, and the duration of standstill in turns."""
 RESOLUTION = 1e-7
 """Strain is written in steps of this."""
 SLIP = 0.01
@@ -43,7 +43,7 @@ _PASSES = 4
 
 @dataclass(frozen=True, slots=True)
 class _Scene:
-    """What rolls; SI. `strain` is that of growing wheel angles, 0 over the road."""
+    """The rolling tire of the reference, SI; `strain` by growing wheel angle, 0 over the road."""
 
     omega: float
     speed: float
@@ -150,7 +150,7 @@ def _measured(turn: ReferenceTurn, rate: float) -> _Scene:
 
 @dataclass(frozen=True, slots=True)
 class _Shape:
-    """What made-up strain is made of; SI."""
+    """Shape of the made-up strain; SI."""
 
     half: float
     dip: float

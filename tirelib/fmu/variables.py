@@ -11,7 +11,7 @@ NAN = math.nan
 RIGHT = 0.5 * math.pi
 TYPE = {"Fz": "Force", "alpha": "Angle", "kappa": "Ratio", "Fy": "Force"}
 LIMITS = {"Fz": (-1e5, 1e5), "alpha": (-RIGHT, RIGHT), "kappa": (None, None), "Fy": (-1e5, 1e5)}
-"""A number outside says that the wiring is wrong; nothing is clamped to them."""
+"""A number outside means that the wiring is wrong; no value is clamped to them."""
 UNITS = {"Fz": "N", "alpha": "rad", "kappa": "1", "Fy": "N"}
 DISPLAY = {"Fz": None, "alpha": "deg", "kappa": "%", "Fy": None}
 MEANING = {
@@ -45,7 +45,7 @@ class Variable:
 
 
 MISSING = "missing"
-"""Name of the parameter that says what Real outputs show where there is no value."""
+"""Name of the parameter that sets what Real outputs show where there is no value."""
 
 
 def parameters(

@@ -166,7 +166,7 @@ def angle_law(
 def _slip(
     known: Sequence[Course | None], slope: float, slope_std: float, rate_std: float
 ) -> tuple[float, float, float]:
-    """Return q of the speed at the contact over its mean of the turn, its doubt, and what is late.
+    """Return q, the speed at the contact over the turn's mean, its uncertainty and its lag.
 
     From turn to turn it is known precisely, but late; where turn rate and speed both have a course,
     these show it at once, but with their noise. Their difference from the former is shrunk as their

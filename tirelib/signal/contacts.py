@@ -29,7 +29,7 @@ GAP_REACH = 0.1
 lie within 0.6 rad of the pulse. The levels then stay as they were. With half and double the same
 turns are valid and as exact (``python build/signal_constants.py``)."""
 MOST_TURNS_WITHOUT_CONTACT = 2.5
-"""Turns to wait for a contact before starting afresh."""
+"""Turns without a contact after which the search starts again."""
 
 
 @dataclass(frozen=True, slots=True)

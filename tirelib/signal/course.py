@@ -115,7 +115,7 @@ def course(samples: FloatArray, first: float, turn: float) -> Course | None:
 
 
 def _alike(left: FloatArray, lag: int) -> float:
-    """Return how many values in a row count as one, from what a fit leaves of them.
+    """Return how many consecutive values count as one, from the residuals of a fit.
 
     Noise leaves values that know nothing of each other; a course that no cubic follows leaves
     waves. Each value stands `lag` times in a row, whose mean is looked at: the steps of a held one

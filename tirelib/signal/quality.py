@@ -1,4 +1,4 @@
-"""What is wrong with a window of samples: missing, spiked, standing still.
+"""Faults in a window of samples: missing, spiked, or constant samples.
 
 Nothing is repaired silently: at most two samples in a row are bridged by a straight line, and the
 gage then carries a flag for the turn. Anything longer makes the gage invalid for the turn.
@@ -27,7 +27,7 @@ CORNER_SHARE = 0.02
 """... by this share of the swing. A rounded peak of a quantised signal may stand still, too, but
 leaves slowly."""
 UNUSABLE = TurnFlag.GAP | TurnFlag.SATURATED | TurnFlag.DEAD_GAGE
-"""Flags with which a gage says nothing in a turn."""
+"""Flags with which a gage is not used in a turn."""
 
 
 def inspect(window: FloatArray, step: float) -> tuple[FloatArray, IntArray]:

@@ -14,7 +14,7 @@ PHI = np.linspace(-1.0, 0.8, 361)
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """One turn; arrays over gages and wheel angle. NaN where the flags say why.
+    """One turn; arrays over gages and wheel angle. NaN values are explained by the flags.
 
     `time` is the middle of the contact pulse, [s since the start]; `ready` is when the last sample
     that the turn needs was taken, [s]. `omega` and `speed` are those at the middle of the contact,

@@ -36,7 +36,7 @@ from tirelib.signal.turn import PHI, Turn, Turns, stack_turns
 __all__ = ["PHI", "Turn", "TurnCutter", "Turns", "cut_turns", "stack_turns"]
 
 AFTER = np.deg2rad(20.0)
-"""How far beyond the end of the pulse a turn is looked at, [rad]."""
+"""Wheel angle after the end of the pulse up to which a turn is evaluated, [rad]."""
 OFFSET_HALF_WIDTH = 0.5
 """Half-width of the sector opposite the contact from which the offset is taken, [rad]."""
 LARGEST_MISSING = 0.1
@@ -157,7 +157,7 @@ class TurnCutter:
         return self._buffer[:, self._oldest() - self._base : self._filled].copy()
 
     def refill(self, samples: FloatArray) -> None:
-        """Put back what `needed` returned, with all else as it was then."""
+        """Restore the samples that `needed` returned; everything else is as it was then."""
         self._base += self._filled - samples.shape[1]
         self._filled = samples.shape[1]
         self._buffer[:, : self._filled] = samples
@@ -184,7 +184,7 @@ class TurnCutter:
 
     @property
     def lacking(self) -> int | None:
-        """How many samples the contact that waits for those after it lacks; None: none waits."""
+        """Number of samples that the waiting contact still needs; None if none waits."""
         if not self._waiting or self._previous is None:
             return None
         stop = self._needs(self._waiting[0], self._previous)[1]
@@ -237,7 +237,7 @@ class TurnCutter:
         return int(law.sample(end + half_width(sigma)) + 2.0) + 1
 
     def _damaged(self, contact: Contact) -> bool:
-        """Tell whether samples of the centre gage are missing where the contact begins or ends."""
+        """Return whether samples of the centre gage are missing at the ends of the contact."""
         for edge in (contact.rise, contact.fall):
             near = int(edge) - self._base
             part = self._buffer[self._centre, max(near - NEAR_EDGE, 0) : near + 2]
@@ -251,7 +251,7 @@ class TurnCutter:
         return not np.isfinite(self._buffer[self._centre, max(a, 0) : b]).all()
 
     def _first_turn(self, contact: Contact) -> Turn:
-        """Return the turn of a contact that no turn precedes: nothing is known of it."""
+        """Return the turn of a contact without a preceding turn: its values are unknown."""
         unknown = np.full(self._gages, np.nan)
         empty = np.full((self._gages, PHI.size), np.nan)
         return Turn(

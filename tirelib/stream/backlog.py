@@ -1,4 +1,4 @@
-"""Samples that cannot end a turn, kept to be looked at together: most of a turn is such.
+"""Samples that cannot end a turn are kept and evaluated together: most samples of a turn are such.
 
 A turn ends after a pulse of the centre gage. While that gage stays between levels that its contact
 finder knows, nothing can be found, so short frames need no work of their own. What is found later
@@ -79,7 +79,7 @@ class Backlog:
         return True
 
     def drained(self) -> tuple[FloatArray, FloatArray]:
-        """Return strain, shape (n_gages, n), and what was held, shape (k, n); forget them."""
+        """Return strain, shape (n_gages, n), and held conditions, shape (k, n), and clear both."""
         strain = np.array(self._values).reshape(-1, self._gages).T
         held = np.repeat(np.array(self._held).T, self._counts, axis=1)
         self.clear()

@@ -26,12 +26,12 @@ STANDSTILL = 0.05
 """Turn rate below which a wheel whose rate is measured counts as standing, [rad/s]."""
 _OMEGA = HELD.index("omega")
 RATES = (100.0, 1e5)
-"""Sample rates that are taken, [Hz]; an estimator holds 12 s of samples."""
+"""Allowed sample rates, [Hz]; an estimator holds 12 s of samples."""
 
 
 @dataclass(frozen=True, slots=True)
 class TurnEstimate:
-    """What one turn says: one row of `Features` and of `Estimates`, SI, ISO 8855.
+    """Result of one turn: one row of `Features` and of `Estimates`, SI, ISO 8855.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class TurnEstimate:
         return float(self.estimates.std[quantity][0])
 
     def is_valid(self, quantity: str) -> bool:
-        """Tell whether a quantity may be used."""
+        """Return whether a quantity may be used."""
         return bool(self.estimates.valid[quantity][0])
 
 
@@ -179,7 +179,7 @@ class StreamEstimator:
         return [self._estimate(turn) for turn in turns] if turns else []
 
     def take(self, samples: list[float], conditions: Sequence[float]) -> list[TurnEstimate]:
-        """Do as `push`, for short frames of plain numbers; what cannot end a turn waits.
+        """Like `push`, for short frames of plain numbers; samples that cannot end a turn wait.
 
         Parameters
         ----------
@@ -199,7 +199,7 @@ class StreamEstimator:
         return self.push(frame, **held)
 
     def _caught_up(self) -> list[Turn]:
-        """Give the cutter what waits; no turn ends in it."""
+        """Give the waiting samples to the cutter; no turn ends in them."""
         if not self._backlog.count:
             return []
         strain, rows = self._backlog.drained()
@@ -234,7 +234,7 @@ class StreamEstimator:
         return self._latest
 
     def _gage_out(self, flags: IntArray) -> bool:
-        """Tell whether a gage is missing, saturated or frozen; one without contact may be well."""
+        """Return whether a gage is missing, saturated or frozen; no contact does not count."""
         silent = (flags & int(TurnFlag.DEAD_GAGE)) != 0
         if ((flags & int(UNUSABLE)) != 0)[~silent].any():
             return True
@@ -293,7 +293,7 @@ class StreamEstimator:
         return self._latest is not None and self._latest.valid and self._complete and not self.stale
 
     def is_valid(self, quantity: str) -> bool:
-        """Tell whether a quantity of the last estimate may be used now."""
+        """Return whether a quantity of the last estimate may be used now."""
         return self._latest is not None and self._latest.is_valid(quantity) and not self.stale
 
     def state(self) -> dict[str, Any]:

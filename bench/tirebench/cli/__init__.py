@@ -45,7 +45,7 @@ class Verbs(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the verb of the arguments; say which there are where it is none of them."""
+        """Return the verb of the arguments; name the known verbs where it is unknown."""
         if args and args[0] not in VERBS and not args[0].startswith("-"):
             near = get_close_matches(args[0], VERBS, 1, 0.5)
             meant = f"; did you mean '{near[0]}'?" if near else ""
@@ -54,7 +54,7 @@ class Verbs(click.Group):
 
 
 def _lacking(verb: str, error: ModuleNotFoundError) -> click.Command:
-    """Return a verb that says which package it lacks; a plain install holds the library only."""
+    """Return a verb that only names the missing package; a plain install holds the library only."""
     package = (error.name or "").partition(".")[0]
     if package in ("tirebench", "tirelib"):
         raise error

@@ -1,4 +1,4 @@
-"""Estimates to other programs while a run goes on; off unless asked for."""
+"""Sends estimates to other programs during a run; off by default."""
 
 from collections.abc import Callable, Sequence
 from types import TracebackType
@@ -36,7 +36,7 @@ def bridge_options(command: Command) -> Command:
 
 
 class Bridges:
-    """What sends turns on; a context manager that closes it.
+    """The senders of turns to other programs, as a context manager that closes them.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class Bridges:
             self._senders.append(CanSender(out))
 
     def send(self, turns: Sequence[Turn]) -> None:
-        """Send turns on."""
+        """Send turns to the other programs."""
         for sender in self._senders:
             sender.send(turns)
 

@@ -276,7 +276,7 @@ def emulate(
 
 
 def _wait_for(file: Path) -> None:
-    """Wait until somebody makes a file, or stops the program."""
+    """Wait until the file exists or the program is stopped."""
     while not file.exists():
         time.sleep(LOOK)
 
@@ -320,7 +320,7 @@ def _manoeuvre(
 
 
 def _check(recording: Path, source: int | None) -> None:
-    """Refuse a recording before anybody waits for it."""
+    """Refuse a faulty recording before a reader waits for it."""
     from tirebench.emulator.sources import chosen_source
     from tirebench.recording.recording import Recording
 

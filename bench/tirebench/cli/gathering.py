@@ -78,7 +78,7 @@ def gathering_options(command: Command) -> Command:
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """Where strain is taken from.
+    """The port or the recording from which strain is taken.
 
     Attributes
     ----------
@@ -135,7 +135,7 @@ def asked(
     rate: float,
     map_file: Path | None,
 ) -> Asked:
-    """Return what the options ask for."""
+    """Return the request that the options describe."""
     devices, text = devices_of(device_texts)
     usual = SourcePlan(plan, ProtocolPlan(rate=rate), devices, None, text)
     sources = (usual,) if port is None else live_sources((port,), None, map_file, usual)

@@ -35,7 +35,7 @@ _WITHOUT = {
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """What is read, and what is known beside it.
+    """The sources of a run, and the conditions that are known besides them.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Given:
 
     @property
     def devices(self) -> list[Device]:
-        """What a count means, of all wheels."""
+        """The device of each wheel, which defines the strain of a count."""
         return [
             device
             for source in self.sources
@@ -75,7 +75,7 @@ class Given:
 def live_sources(
     ports: Sequence[str], setup: Path | None, map_file: Path | None, usual: SourcePlan
 ) -> tuple[SourcePlan, ...]:
-    """Return what is read live: ``[WHEEL=]PORT`` each, or the sources of a setup.
+    """Return the live sources: one for each ``[WHEEL=]PORT``, or those of a setup.
 
     Raises
     ------
@@ -215,7 +215,7 @@ def given_replayed(
     wheels: tuple[int, ...],
     console: Console,
 ) -> Given:
-    """Return what a recording says; options that are given replace it, and that is said."""
+    """Return what a recording states; given options replace it, with a note."""
     header = link.recording.header
     if devices or conditions is not None:
         console.print(
@@ -229,7 +229,7 @@ def given_replayed(
 
 
 def missing(given: Given, calibration: Calibration) -> tuple[dict[str, str], dict[str, str]]:
-    """Return what is not known, by name and in words: needed by the calibration, and useful."""
+    """Return the unknown conditions in words: those that the calibration needs, and useful ones."""
     told = [place for source in given.sources for place in source.conditions_sent]
     wheels = {*given.wheels, *(w for source in given.sources for w in source.known_wheels)}
     words: dict[str, str] = {}
@@ -249,7 +249,7 @@ def _option(name: str) -> str:
 
 
 def say_missing(given: Given, calibration: Calibration, console: Console) -> None:
-    """Say what is not known, and cannot be noticed, before the first turn shows it."""
+    """Print which conditions are unknown, and what cannot be detected, before the first turn."""
     needed, useful = missing(given, calibration)
     for name, words in needed.items():
         console.print(

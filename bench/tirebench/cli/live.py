@@ -75,7 +75,7 @@ class Screen:
             self._live.stop()
 
     def watch(self, news: News) -> None:
-        """Show what is new, also when nothing is; called again and again."""
+        """Draw the present state; called again and again, also without news."""
         for said in news.messages:
             self._console.print(f"FMU: {said}", soft_wrap=True, markup=False)
         for said in news.alarms:
@@ -99,7 +99,7 @@ class Screen:
 
 
 def counters(wheels: Wheels) -> str:
-    """Return the state of the line in one line; what is zero is left out but for the frames.
+    """Return the line's counters as one line of text; zero counters are left out except the frames.
 
     Where no frame came of a line or of a wheel that is known beforehand, it says so.
     """

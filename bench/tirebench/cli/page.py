@@ -1,4 +1,4 @@
-"""Options of the live page, and what is said of it."""
+"""Options of the live page, and its messages on the screen."""
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
@@ -71,7 +71,7 @@ def page_options(command: Command) -> Command:
 def page_choice(
     page: bool | None, host: str, network: bool, page_port: int, tui: bool, *, paced: bool
 ) -> PageChoice:
-    """Return what is to be shown.
+    """Return the page and terminal view that the options choose.
 
     Raises
     ------
@@ -116,7 +116,7 @@ class Shown:
         origin: str,
         folder: Path,
     ) -> None:
-        """Start what is to be shown and say where it is.
+        """Start the page and the terminal view, and print the address.
 
         `conditions` are what is known beside a bus, `origin` says where they come from; device
         files that the page asks for are written into `folder`.

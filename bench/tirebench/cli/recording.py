@@ -1,4 +1,4 @@
-"""Options of a recording, and what is said of its room at the start."""
+"""Options of a recording, and its messages on free disk space at the start."""
 
 from collections.abc import Callable
 from functools import wraps
@@ -76,7 +76,7 @@ def recording_options(command: Command) -> Command:
 
 
 def at_start(path: Path, reader: ReaderPlan, rule: RecordingRule, *, watched: bool) -> str:
-    """Return what is to be said of a recording at the start.
+    """Return the messages on a recording at the start.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def at_start(path: Path, reader: ReaderPlan, rule: RecordingRule, *, watched: bo
 
 
 def room(path: Path, wheels: int, *, strain: bool = True) -> str:
-    """Return what is to be said of the room where a recording of so many wheels will be."""
+    """Return the message on the free disk space for a recording of this number of wheels."""
     free = free_at(path)
     if free != free:
         return "room for the recording: unknown, the system does not report free disk space"

@@ -1,4 +1,4 @@
-"""``tirebench repair``: a recording or JSON that breaks off, with its end."""
+"""``tirebench repair``: completes a recording or JSON that was cut off."""
 
 import json
 from pathlib import Path
@@ -28,7 +28,7 @@ Exit code: 0 done, also where the file was complete; 2 nothing can be read.
 @click.argument("file", metavar="FILE", type=FILE)
 @click.option("--out", metavar="FILE", type=NEW_FILE, required=True, help="New file to write.")
 def repair(file: Path, out: Path) -> None:
-    """Give a recording, or the JSON of a run, that breaks off its end and its index."""
+    """Complete a recording, or the JSON of a run, that was cut off."""
     if out.exists():
         raise RecordingError(f"{out}: already exists; repair never overwrites; name another file")
     if _is_json(file):

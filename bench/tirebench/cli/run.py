@@ -378,7 +378,7 @@ def _session(
     journal: Journal | None,
     switch: RecordingSwitch | None,
 ) -> tuple[Outcome, float]:
-    """Run until something ends it; return what came of it and the share of a core it took."""
+    """Run until something ends it; return the outcome and the share of a core that it used."""
     with ExitStack() as stack:
         screen = None if shown.quiet else stack.enter_context(Screen(console, source))
 
@@ -421,7 +421,7 @@ def _summary(
     link: ReplayLink | None,
     switch: RecordingSwitch | None,
 ) -> None:
-    """Say how it ended and what came of it."""
+    """Print how the run ended, and its result."""
     if outcome.message:
         console.print(f"unplugged: {outcome.message}", soft_wrap=True, markup=False)
     console.print(

@@ -1,4 +1,4 @@
-"""``tirebench shunt``: the gain of each gage from a resistor of known size beside it."""
+"""``tirebench shunt``: the gain of each gage from a known resistor in parallel to it."""
 
 from pathlib import Path
 

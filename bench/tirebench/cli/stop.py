@@ -19,7 +19,7 @@ STOPS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if ha
 
 
 def silence() -> None:
-    """Let output to a terminal that is gone go nowhere; files and pipes are kept."""
+    """Discard output to a terminal that is gone; files and pipes are kept."""
     for stream in (sys.stdout, sys.stderr):
         try:
             if not stat.S_ISCHR(os.fstat(stream.fileno()).st_mode):
@@ -32,7 +32,7 @@ def silence() -> None:
 
 
 def interrupt() -> None:
-    """Interrupt whatever goes on, so that it removes what it has made."""
+    """Interrupt the running work, so that it removes its unfinished files."""
     raise KeyboardInterrupt
 
 
@@ -80,7 +80,7 @@ def on_stop(action: Callable[[], None] = interrupt) -> Iterator[Stop]:
 
 @contextmanager
 def start_in_order() -> Iterator[Stop]:
-    """Let a program that is stopped while it starts remove what it has made, and say so.
+    """Let a program that is stopped during its start remove its unfinished files, with a message.
 
     Once it has begun, its `action` says what stops it.
 

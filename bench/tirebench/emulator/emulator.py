@@ -84,7 +84,7 @@ class Sink(Protocol):
     """Where frames go."""
 
     def send(self, frames: Sequence[Any]) -> bool:
-        """Take frames; False if nobody listens.
+        """Take frames; return False if no reader listens.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Faults on request: what goes wrong between a gage and the receiver.
+"""Faults on request between a gage and the receiver.
 
 ``NAME[=VALUE]``; a rate is per frame (``nan``: per sample, ``fades``: per second).
 
@@ -31,7 +31,7 @@ from tirebench.wire.frames import GAGES, HIGHEST, LOWEST, Int16Array
 from tirelib.arrays import FloatArray
 
 RATES = {"flips": 0.01, "cuts": 0.01, "inserts": 0.01, "lost": 0.01, "dup": 0.01, "nan": 0.001}
-"""Faults that strike at random, and how often by default."""
+"""Random faults, with their default rates."""
 GAGE_FAULTS = ("saturate", "dead")
 """Faults of one gage, given by its number."""
 SIZES = {
@@ -99,7 +99,7 @@ def _range(name: str) -> tuple[float, float, float, str]:
 
 
 class Faults:
-    """Strike counts and frames; what was done is counted.
+    """Applies faults to counts and frames, and counts them.
 
     Parameters
     ----------

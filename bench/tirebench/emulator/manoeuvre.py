@@ -81,7 +81,7 @@ class Manoeuvre:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """What a wheel shows along a manoeuvre, at the rig's solutions.
+    """Strain of a wheel along a manoeuvre, at the rig's solutions.
 
     Attributes
     ----------
@@ -169,7 +169,7 @@ def _points(rows: Sequence[Any], where: str) -> dict[int | None, tuple[Point, ..
 
 
 def _unknown(key: str, here: str) -> str:
-    """Say that a column is none of ours, and which one means the same in another unit."""
+    """Return the fault of an unknown column; name one with the same meaning if there is any."""
     if key == "None":
         return (
             f"{here}: the line has more values than the table has columns; one value per column "
@@ -209,7 +209,7 @@ def _point(
 
 
 def _number(value: Any) -> float:
-    """Return a value of a file as a number; NaN where it is none."""
+    """Return a value of a file as a number; NaN where it is not a number."""
     try:
         return float(value)
     except (TypeError, ValueError):

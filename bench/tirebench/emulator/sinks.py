@@ -51,7 +51,7 @@ class TerminalSink:
         self._plan()
 
     def send(self, frames: Sequence[bytes]) -> bool:
-        """Write frames; what is sent while the cable is out is unheard.
+        """Write frames; frames sent while the cable is out are lost.
 
         Raises
         ------

@@ -21,17 +21,17 @@ from tirelib.flags import TurnFlag
 Outputs = tuple[Mapping[str, float], Mapping[str, str]]
 """Numbers (SI) and texts that an estimator gives at the end of a turn."""
 RESTARTED, SKIPPED = "restarted", "skipped"
-"""Why an estimator began afresh within a segment; a note of the turn that comes next."""
+"""Reasons for a restart of an estimator within a segment; each is a note of the next turn."""
 
 
 class Estimator(Protocol):
-    """What is stepped: an FMU, or a stand-in."""
+    """The estimator that is stepped: an FMU, or a replacement for it."""
 
     samples: int
-    """Most samples that a step takes."""
+    """Largest number of samples in a step."""
 
     def start(self, period: float) -> None:
-        """Begin afresh with this sample period [s]."""
+        """Start again with this sample period [s]."""
 
     def step(self, strain: FloatArray, conditions: Condition, valid: bool) -> "Outputs | None":
         """Take 1 to k samples; return outputs when they ended a turn."""
@@ -105,7 +105,7 @@ class Place(NamedTuple):
 
 
 class Jump(NamedTuple):
-    """Where the estimator of a wheel left the line of samples and where it began afresh.
+    """The samples at which the estimator of a wheel stopped and started again.
 
     It is written into the recording, so that a replay does the same.
 
@@ -130,7 +130,7 @@ class Jump(NamedTuple):
 
 @dataclass(slots=True)
 class _Segment:
-    """The stretch of samples since the estimator's last fresh start."""
+    """The samples since the estimator's last start."""
 
     number: int
     t_us: int
@@ -191,7 +191,7 @@ class Chain:
         self._afresh = False
 
     def take(self, block: Block) -> list[Turn]:
-        """Take what comes next and return the turns that it ends."""
+        """Take the next block and return the turns that it ends."""
         content = block.content
         if not isinstance(content, Samples):
             self._conditions.set_from_bus(content.t_us, content.measured)
@@ -212,7 +212,7 @@ class Chain:
         self._conditions = Held(self._known)
 
     def finish(self) -> list[Turn]:
-        """Step what is left, in a shorter step, and close the segment."""
+        """Step the remaining samples, in a shorter step, and close the segment."""
         segment, self._segment = self._segment, None
         if segment is None or not len(segment.waiting):
             return []

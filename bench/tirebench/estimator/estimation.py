@@ -1,4 +1,4 @@
-"""Samples of wheels to news: turns, and laps for whoever looks. One way, live and in a replay."""
+"""From samples of the wheels to turns and laps; the same code live and in a replay."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -17,7 +17,7 @@ LONGEST_WAIT_FOR_LAPS = 1.0
 
 @dataclass(slots=True)
 class News:
-    """What came of some samples.
+    """Results of some samples.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class WheelEstimation:
         self._levels: Levels | None = None
 
     def take(self, block: Block, *, live: bool = False) -> News:
-        """Take what comes next and return what came of it."""
+        """Take the next block and return its results."""
         content = block.content
         if isinstance(content, Samples):
             if self._left_out(Place(content.segment, content.start)):
@@ -117,12 +117,12 @@ class WheelEstimation:
         return news
 
     def jump(self, why: str) -> None:
-        """Begin afresh with the next samples."""
+        """Start again with the next samples."""
         self._chain.jump(why)
         self._laps = None
 
     def finish(self) -> News:
-        """Step what is left."""
+        """Step the remaining samples."""
         return self._news(self._chain.finish())
 
     def _left_out(self, place: Place) -> bool:

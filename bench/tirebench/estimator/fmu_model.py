@@ -109,7 +109,7 @@ class FmuFile:
             raise
 
     def description(self) -> Any:
-        """Return what the FMU says of itself.
+        """Return the FMU's model description.
 
         Raises
         ------
@@ -252,7 +252,7 @@ class FmuModel:
         return _Ports(self._slave, variables, kinds.pop())
 
     def start(self, period: float) -> None:
-        """Begin afresh, with this sample period [s]; whatever came before is forgotten."""
+        """Start again with this sample period [s]; the former state is dropped."""
         slave = self._slave
         try:
             if self._ready:
@@ -323,7 +323,7 @@ class FmuModel:
         return dict(zip((v.name for v in self._texts), texts, strict=True))
 
     def take_messages(self) -> list[str]:
-        """Return what the FMU has logged since the last call: errors that it lived through."""
+        """Return what the FMU has logged since the last call: errors that did not end it."""
         said, self._messages[:] = list(self._messages), []
         return said
 

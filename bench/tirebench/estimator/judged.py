@@ -1,4 +1,4 @@
-"""Turns wait until the clock of their wheel has been held against the sample rate that was said."""
+"""Turns wait until the sample rate of their wheel has been checked against its clock."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,7 @@ from tirebench.estimator.wheels import Wheels
 
 
 class JudgedTurns:
-    """Turns between the estimators and whoever shows or records them.
+    """Turns on their way from the estimators to the screen, the page and the recording.
 
     A turn of a wheel whose rate is not judged yet is kept back. These are few, because a judgement
     takes `tirebench.wire.rate_check.JUDGED` frames, and `LONGEST_WAIT` at most. A turn of a wheel

@@ -60,7 +60,7 @@ class Source(Protocol):
         """Return when bytes came last, on the monotonic clock."""
 
     def counts(self) -> dict[str, Any]:
-        """Return what was started again, skipped and not recorded."""
+        """Return the counts of restarts, skipped turns and unrecorded bytes."""
 
     def cpu_time(self) -> float:
         """Return what the processes beside this one have used, [s]."""
@@ -95,7 +95,7 @@ class Limits:
 
 @dataclass(slots=True)
 class Outcome:
-    """What a session brought.
+    """Result of a session.
 
     Attributes
     ----------

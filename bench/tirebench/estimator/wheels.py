@@ -1,4 +1,4 @@
-"""Several lines, several wheels: bytes to the samples of each wheel, in line, with its clock.
+"""From the bytes of several lines to the samples of each wheel, in order and with its clock.
 
 All of it can be pickled, so that a reader that is started again goes on where the last one was.
 """
@@ -33,7 +33,7 @@ class BusCondition:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Block:
-    """What comes next on the line of one wheel.
+    """The next samples, or the next condition, of one wheel.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Wheel:
         return blocks
 
     def _note(self, frames: Frames) -> None:
-        """Remember what the wheel says of itself."""
+        """Keep the state that the wheel sends about itself."""
         if len(frames) and frames.rssi[-1]:
             self.rssi, self.temperature = int(frames.rssi[-1]), int(frames.temperature[-1])
 
@@ -111,7 +111,7 @@ class Wheel:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """What one source of bytes means.
+    """One source of bytes, with its decoder and its wheels.
 
     Attributes
     ----------
@@ -163,7 +163,7 @@ class Line:
         return replace(item, wheel=np.full(len(item), self.wheel))
 
     def device(self, wheel: int) -> Device:
-        """Return what the counts of a wheel mean."""
+        """Return the device of a wheel, which converts its counts to strain."""
         return self.devices.get(wheel, self.devices.get(None, Device()))
 
 
@@ -265,13 +265,13 @@ class Wheels:
 
     @property
     def contradicted(self) -> dict[int, str]:
-        """Wheels whose clock contradicts the sample rate that was said, and how."""
+        """Wheels whose clock contradicts the configured sample rate, with a sentence on each."""
         said = {number: wheel.timeline.contradiction for number, wheel in self.heard.items()}
         return {number: text for number, text in said.items() if text}
 
     @property
     def judged(self) -> set[int]:
-        """Wheels whose sample rate was held against their clock."""
+        """Wheels whose sample rate was checked against their clock."""
         return {number for number, wheel in self.heard.items() if wheel.timeline.judged}
 
     def agreeing(self, blocks: Sequence[Block]) -> list[Block]:
@@ -289,11 +289,11 @@ class Wheels:
         return [block for block in blocks if block.wheel not in wrong]
 
     def line_counts(self, wheel: int) -> LineCounts:
-        """Return what the line of a wheel has seen and lost."""
+        """Return the counters of a wheel's line."""
         return self.lines[self._sources.get(wheel, 0)].decoder.counts
 
     def health(self, wheel: int) -> Health | None:
-        """Return what a wheel said last of itself in frames of their own, if it did."""
+        """Return the content of a wheel's last HEALTH frame, if there was one."""
         line = self.lines[self._sources.get(wheel, 0)]
         said = line.decoder.health
         if line.wheel is not None:  # whatever number it says, it is the only one
@@ -311,7 +311,7 @@ class Wheels:
         return seen, total
 
     def hints(self) -> dict[int, str]:
-        """Return what to look at on each line from which no good frame came, by its source."""
+        """Return advice for each line from which no good frame came, by its source."""
         said = {source: line.decoder.counts.hint for source, line in enumerate(self.lines)}
         many = len(self.lines) > 1
         return {
@@ -322,18 +322,18 @@ class Wheels:
 
     @property
     def missing(self) -> list[int]:
-        """Wheels that are chosen or known beforehand and were not heard so far."""
+        """Wheels that are chosen or known beforehand and have not sent a frame so far."""
         known = self._chosen or [wheel for line in self.lines for wheel in line.known]
         return sorted(set(known) - set(self.heard))
 
     def interrupt(self, source: int = 0) -> None:
-        """Note that a line was broken here: a half frame is forgotten."""
+        """Note that a line was interrupted here: a half frame is dropped."""
         decoder = self.lines[source].decoder
         decoder.interrupt()
         decoder.counts.reconnects += 1
 
     def forget(self) -> None:
-        """Forget half frames of all lines: what follows on them is not decoded."""
+        """Drop half frames of all lines: the bytes that follow are not decoded."""
         for line in self.lines:
             line.decoder.interrupt()
 

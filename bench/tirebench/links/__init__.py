@@ -1,4 +1,4 @@
-"""Where bytes come from: one protocol, a child for each kind of line.
+"""Sources of bytes: one protocol class, with an implementation for each kind of line.
 
 A reader asks for bytes with a deadline that is handed down; nothing below it waits longer. No link
 transmits unless it is asked to.
@@ -33,7 +33,7 @@ class Read(NamedTuple):
 
 LOST, BACK, RESUMED = "lost", "back", "resumed"
 PASSED, DECODED = "decoding paused from here on", "decoded from here"
-"""Between the two bytes were recorded and not decoded, for want of processor."""
+"""Between these two marks bytes were recorded but not decoded, because the machine was too busy."""
 
 
 class Link(Protocol):

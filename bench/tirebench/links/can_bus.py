@@ -149,7 +149,7 @@ class CanLink:
             raise self._gone(error) from None
 
     def _check_server(self) -> None:
-        """Notice a server that hung up: python-can takes its silence for an idle bus."""
+        """Detect a closed connection to a server, which python-can takes for an idle bus."""
         for own in vars(self._bus).values():
             if isinstance(own, socket.socket) and own.type == socket.SOCK_STREAM:
                 try:

@@ -54,7 +54,7 @@ class PortPlan:
 
     @property
     def encoding(self) -> str:
-        """What its bytes are, see `tirebench.protocols`."""
+        """Encoding of its bytes; see `tirebench.protocols`."""
         return {"slcan": SLCAN, "can": CAN}.get(self.port.partition(":")[0], SERIAL)
 
     def load(self) -> None:

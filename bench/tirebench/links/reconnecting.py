@@ -140,6 +140,6 @@ class ReconnectingLink:
         return True
 
     def _there(self) -> bool:
-        """Tell whether the port's name is in the file system, where it is a path."""
+        """Return whether the port exists in the file system, where its name is a path."""
         path = self.name.rpartition(":")[2]
         return path.startswith("/") and Path(path).exists()

@@ -14,7 +14,7 @@ from tirebench.links.serial_port import GATHER, LARGEST_BATCH
 from tirebench.protocols import SERIAL
 
 CONNECT = 2.0
-"""A server that does not answer for so long is not there, [s]."""
+"""Time limit for the answer of a server, [s]."""
 BUFFER = 2**22
 """What the system is asked to hold between two reads, [bytes]: 9 s of four wheels."""
 _STREAMS = ("tcp", "socket")
@@ -96,7 +96,7 @@ class SocketLink:
         return 0
 
     def _take(self) -> bytes:
-        """Return what is there, up to `LARGE` bytes and one piece more."""
+        """Return the waiting bytes, up to `LARGEST_BATCH` and one piece more."""
         parts: list[bytes] = []
         while sum(map(len, parts)) < LARGEST_BATCH:
             try:

@@ -25,7 +25,7 @@ FULL = 0.01
 
 @dataclass(frozen=True, slots=True)
 class EstimatorPlan:
-    """What is stepped.
+    """The FMU and the wheel of an estimator process.
 
     Attributes
     ----------
@@ -154,7 +154,7 @@ class _Estimator:
         self._report(news)
 
     def _too_late(self, age: float) -> bool:
-        """Tell whether samples that have waited so long [s] are to be left out."""
+        """Return whether samples that have waited for this time [s] are to be skipped."""
         if self._plan.every or self._exchange.is_set(FINISH):
             return False
         return self._caught_up and age > BACKLOG
@@ -198,7 +198,7 @@ class _Estimator:
             self.send(Report(news))
 
     def send(self, report: Report) -> None:
-        """Tell the run; laps go first when it does not listen."""
+        """Send a report to the run; laps are dropped first when the run is busy."""
         report.cursor, report.cpu = self._queue.cursor, time.process_time()
         while not self._reports.put(pickle.dumps(report, 5)):
             report.news.left_out += len(report.news.laps)

@@ -16,7 +16,7 @@ from tirebench.live.kept import Kept
 from tirebench.wire.conditions import Conditions
 
 MOST_CRASHES_WHEN_LOADED = 3
-"""So often the FMU may crash when it is loaded."""
+"""Number of crashes while the FMU is loaded after which it is given up."""
 
 
 class Estimators:
@@ -78,7 +78,7 @@ class Estimators:
             self.kept[slot].look()
 
     def gather(self) -> News:
-        """Return what they have reported since the last time.
+        """Return their reports since the last call.
 
         Raises
         ------

@@ -20,14 +20,14 @@ from tirebench.live.kept import orphaned, settled
 from tirebench.live.priority import own_share
 
 LONGEST_READ_WAIT = 0.1
-"""The longest wait for bytes before it is looked whether the run goes on, [s]."""
+"""Longest wait for bytes before the process checks whether the run continues, [s]."""
 FULL_QUEUE_WAIT = 0.002
-"""Wait for a reader that is behind, [s]."""
+"""Wait while the reader's queue is full, [s]."""
 
 
 @dataclass(slots=True)
 class PortState:
-    """How a port is.
+    """State of a port.
 
     Attributes
     ----------
@@ -202,7 +202,7 @@ class GatheredLink:
         return read
 
     def _states(self) -> list[PortState]:
-        """Return how the ports are.
+        """Return the states of the ports.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Who goes first where processors are short: reader, estimators and recorder before what shows."""
+"""Priorities of the processes: reader, estimators and recorder before page and terminal."""
 
 import os
 
@@ -11,7 +11,7 @@ RIGHT = (
     "(then log in again)"
 )
 BELOW = 5
-"""Niceness of what only shows."""
+"""Niceness of page and terminal."""
 
 
 def realtime(asked: bool | None) -> str:
@@ -53,7 +53,7 @@ def realtime(asked: bool | None) -> str:
 
 
 def ordinary(said: str) -> bool:
-    """Tell whether a run has no other priority than all programs, from what `realtime` said."""
+    """Return whether a run has ordinary priority, from the answer of `realtime`."""
     return said.startswith("ordinary")
 
 

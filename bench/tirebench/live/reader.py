@@ -21,9 +21,9 @@ from tirebench.live.rings import ByteQueue
 from tirebench.setup.source_plan import SourcePlan, wheels_of
 
 LONGEST_READ_WAIT = 0.1
-"""The longest wait for bytes before it is looked whether the run goes on, [s]."""
+"""Longest wait for bytes before the process checks whether the run continues, [s]."""
 FULL_QUEUE_WAIT = 0.01
-"""Wait for those that are behind, [s]."""
+"""Wait while a queue behind the reader is full, [s]."""
 TRIES = 2
 TOO_LATE, CAUGHT_UP = 2.0, 0.2
 """Reads that have waited for the reader for longer are recorded and not decoded, until they wait
@@ -34,7 +34,7 @@ RAW_LOST = "raw bytes lost: "
 
 @dataclass(frozen=True, slots=True)
 class ReaderPlan:
-    """What is read, and what it means.
+    """The ports that are read, and the meaning of their bytes.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class ReaderPlan:
 
 @dataclass(slots=True)
 class LineState:
-    """How the line is; a reader that is started again goes on from it.
+    """State of the line, from which a restarted reader continues.
 
     Attributes
     ----------

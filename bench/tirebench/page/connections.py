@@ -1,4 +1,4 @@
-"""Connections that say nothing give way: who holds many open keeps nobody from the page."""
+"""Idle connections are closed, so that a client with many of them cannot block the page."""
 
 import asyncio
 from collections import Counter

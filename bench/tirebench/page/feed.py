@@ -41,7 +41,7 @@ NOTHING_KNOWN = Conditions((0,), (UNKNOWN,))
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """What the page says of the run.
+    """Facts about the run that the page shows.
 
     Attributes
     ----------
@@ -252,7 +252,7 @@ class Feed:
 
 
 def vitals(wheels: Wheels, number: int) -> dict[str, float | None]:
-    """Return what a wheel says of itself; null where it does not."""
+    """Return the values of a wheel's HEALTH frame; null where it sends none."""
     wheel, health = wheels.heard[number], wheels.health(number)
     return {
         "rssi_dbm": wheel.rssi,

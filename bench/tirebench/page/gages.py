@@ -1,4 +1,4 @@
-"""Zero and shunt of the gages from the page: what the standing wheel shows goes into a device file.
+"""Zero and shunt of the gages from the page, written into a device file.
 
 The run goes on with the device file that it began with, so that its recording stays of one piece;
 the new file is for the next run. Its name is the run's choice, never a viewer's.
@@ -21,7 +21,7 @@ from tirelib.arrays import FloatArray
 MEAN_SECONDS = 3.0
 """The mean is taken over the last so many seconds, [s]."""
 OLDEST = 2.0
-"""A wheel that was silent for longer shows nothing of this moment, [s]."""
+"""A wheel that was silent for longer has no present value, [s]."""
 
 
 class GageSetup:

@@ -1,4 +1,4 @@
-"""What the page remembers, and the messages that viewers get.
+"""The page's memory of past turns, and the messages to viewers.
 
 A message is a length (u32), a JSON header padded to 8 bytes, and the arrays that the header lists,
 each padded to 8 bytes, little-endian.
@@ -135,7 +135,7 @@ class History:
 
 @dataclass(slots=True, eq=False)
 class Viewer:
-    """How far one viewer is.
+    """Position of one viewer in the history.
 
     Attributes
     ----------

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 from tirebench.estimator.wheels import Wheel
 
 WINDOW_SECONDS = 5.0
-"""What is said of the last seconds is said of so many, [s]."""
+"""Length of the window of the recent counters, [s]."""
 SHORTEST_WINDOW = 1.0
-"""Before so much of it has passed, nothing is said, [s]."""
+"""Shortest window for which values are given, [s]."""
 
 
 class _Seen(NamedTuple):

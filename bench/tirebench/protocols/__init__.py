@@ -1,4 +1,4 @@
-"""What bytes mean: decoders from what a link brings to `tirebench.wire.frames.Frames`.
+"""Decoders from the bytes of a link to `tirebench.wire.frames.Frames`.
 
 ======================  =====================================================================
 encoding                bytes of a read
@@ -39,7 +39,7 @@ class Decoder(Protocol):
 
     @property
     def health(self) -> "Mapping[int, Health]":
-        """What each wheel said last of itself in frames of their own."""
+        """Content of the last HEALTH frame of each wheel."""
 
     def push(self, data: bytes, arrival: int = 0) -> "Sequence[Frames | Measured]":
         """Return the frames that `data` completes, in order, and the conditions sent between them.
@@ -51,7 +51,7 @@ class Decoder(Protocol):
         """
 
     def interrupt(self) -> None:
-        """Forget a half frame: the line was broken here."""
+        """Drop a half frame, because the line was interrupted here."""
 
 
 __all__ = ["CAN", "ENCODINGS", "LINE_MAP", "SERIAL", "SLCAN", "Decoder"]

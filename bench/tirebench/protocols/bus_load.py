@@ -41,7 +41,7 @@ BUSES = (
 
 @dataclass(frozen=True, slots=True)
 class LoadPlan:
-    """What is to go over a line.
+    """The traffic that is planned for a line.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class LoadPlan:
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """Load of a plan, relative to what the line carries.
+    """Load of a plan, relative to the capacity of the line.
 
     Attributes
     ----------
@@ -144,7 +144,7 @@ def highest_rate(plan: LoadPlan) -> float:
 
 
 def suggestions(plan: LoadPlan) -> list[str]:
-    """Return what would fit in place of a plan, the nearest first."""
+    """Return plans that would fit instead of a plan, the nearest first."""
     found = []
     rate = highest_rate(plan)
     if rate > 0.0:

@@ -94,7 +94,7 @@ class SerialDecoder:
 
 
 def _sound(body: bytes) -> bool:
-    """Tell whether period, number of samples and length of a strain frame can be true."""
+    """Return whether period, number of samples and length of a strain frame are plausible."""
     period = int.from_bytes(body[_PERIOD_AT : _PERIOD_AT + 2], "little")
     count = body[_COUNT_AT]
     return period >= SHORTEST_PERIOD and count > 0 and len(body) == frame_size(count)

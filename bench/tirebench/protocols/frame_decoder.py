@@ -1,4 +1,4 @@
-"""What the frames of a CAN bus mean: one protocol, a child for each kind of transmitter."""
+"""Decoding of CAN frames: one protocol class, an implementation for each transmitter."""
 
 from collections.abc import Mapping, Sequence
 from typing import Protocol
@@ -15,14 +15,14 @@ class FrameDecoder(Protocol):
 
     @property
     def health(self) -> Mapping[int, Health]:
-        """What each wheel said last of itself; nothing where there are no such frames."""
+        """Content of the last HEALTH frame of each wheel; empty where there are none."""
         return {}
 
     def push(self, batch: CanBatch, arrival: int) -> Sequence[Frames | Measured]:
         """Return the strain frames of a batch, those of each wheel in order."""
 
     def interrupt(self) -> None:
-        """Forget what waits for more: the line was broken here."""
+        """Drop incomplete data, because the line was interrupted here."""
 
 
 class PackedDecoder:
@@ -34,11 +34,11 @@ class PackedDecoder:
 
     @property
     def health(self) -> Mapping[int, Health]:
-        """What each wheel said last of itself."""
+        """Content of the last HEALTH frame of each wheel."""
         return self._frames.health
 
     def push(self, data: bytes, arrival: int = 0) -> Sequence[Frames | Measured]:
-        """Return the frames of one packed batch; what is no batch is counted."""
+        """Return the frames of one packed batch; a piece that is not a batch is counted."""
         if not data:
             return []
         self.counts.bytes += len(data)
@@ -49,5 +49,5 @@ class PackedDecoder:
         return self._frames.push(batch, arrival) if len(batch) else []
 
     def interrupt(self) -> None:
-        """Forget what waits for more."""
+        """Drop incomplete data."""
         self._frames.interrupt()

@@ -93,7 +93,7 @@ class Raw:
 
 @dataclass(frozen=True, slots=True)
 class Health:
-    """What a wheel says of itself, SI but where said.
+    """State that a wheel sends about itself, SI unless stated otherwise.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""A file as named columns of numbers, whatever its format; and what to say of a wrong name."""
+"""A file as named columns of numbers, whatever its format, and the message about a wrong name."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field

@@ -29,7 +29,7 @@ _SAME = 1e-9  # a set point's column varies by less within a run, relative
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Piece:
-    """One run, SI and ISO, before it stands in a campaign.
+    """One run, SI and ISO, before it is written into a campaign.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class _Conversion:
         self.found.append(Finding(f"{key} {where}", self.table.file, where, problem))
 
     def named(self, name: str, purpose: str) -> Column | None:
-        """Return a column by its name, or None after noting what is there instead."""
+        """Return a column by its name, or None after noting the existing names."""
         column = self.table.columns.get(name)
         if column is not None:
             return column
@@ -163,7 +163,7 @@ class _Conversion:
         return found
 
     def check_unit(self, rule: ChannelRule, column: Column) -> None:
-        """Note a unit that is given nowhere, or that file and map state differently."""
+        """Note a missing unit, or one that file and map state differently."""
         where = f"column {column.name!r} ({rule.quantity})"
         if not rule.unit:
             try:
@@ -185,7 +185,7 @@ class _Conversion:
     def times(
         self, columns: dict[str, Column], quantities: Sequence[str], clock: str
     ) -> FloatArray | None:
-        """Return the times of some quantities, [s], or None after noting why there are none."""
+        """Return the times of some quantities, [s], or None after noting the reason."""
         varying = [columns[q] for q in quantities if not columns[q].constant]
         own = sorted({column.clock for column in varying if column.clock})
         rule = self.rules.channels.get(clock)
@@ -349,7 +349,7 @@ class _Conversion:
         rig_time: FloatArray | None,
         gage_time: FloatArray | None,
     ) -> Piece:
-        """Return one run and note what is wrong with its clocks, signs and set points."""
+        """Return one run, and note the faults of its clocks, signs and set points."""
         source = self.table.file + (f", run {run}" if self.rules.run_column else "")
         before = len(self.found)
         for times in _distinct(rig_time, gage_time):
@@ -385,7 +385,7 @@ class _Conversion:
         return (times.size - 1) / float(times[-1] - times[0])
 
     def check_growth(self, source: str, span: slice, times: FloatArray) -> None:
-        """Note times that are no number, stand twice or fall."""
+        """Note times that are not a number, occur twice or decrease."""
         rows = np.arange(times.size, dtype=np.intp)[span]
         inside = times[span]
         steps = np.diff(inside)
@@ -437,7 +437,7 @@ class _Conversion:
 
 
 def _same_unit(stated: str, rule: ChannelRule) -> bool:
-    """Return whether a unit that a file states is that of the map, or says nothing."""
+    """Return whether a unit that a file states agrees with the map, or is missing."""
     if stated == "none" or not dimensions_of_unit(stated):
         return True
     if rule.dimension not in dimensions_of_unit(stated):

@@ -1,4 +1,4 @@
-"""Defects of recordings that a map decides upon: what is done with them, and what is said of it.
+"""Defects of recordings that a map decides upon: their treatment, and the notes on it.
 
 Without a choice in the map each of them is refused. A choice acts on the rows of a table before
 units and axes are looked at; what it did is noted, with the rows, in the report and the campaign.
@@ -20,12 +20,12 @@ CHOICES = {
     "missing": ("drop", "interpolate"),
     "text": ("missing",),
 }
-"""Key of a map, and what it may say."""
+"""Keys of a map, and their allowed values."""
 
 
 @dataclass(frozen=True, slots=True)
 class Defects:
-    """What a map wants done; empty where it says nothing and the defect is refused.
+    """Treatments that a map requests; empty where the defect is refused.
 
     Attributes
     ----------

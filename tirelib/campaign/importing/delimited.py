@@ -1,4 +1,4 @@
-"""Text tables (CSV and kin): separator, decimal sign and header lines are found and said.
+"""Text tables such as CSV: separator, decimal sign and header lines are detected and reported.
 
 An ambiguous layout is refused; the table ``[csv]`` of the map then states it.
 """
@@ -30,7 +30,7 @@ _UNIT_IN_NAME = re.compile(r".*\S\s*[\[(](?P<unit>[^\[\]()]+)[\])]")
 
 @dataclass(frozen=True, slots=True)
 class CsvOptions:
-    """What the map states of text tables; what it leaves open is found out.
+    """What the map states of text tables; the rest is detected.
 
     Attributes
     ----------
@@ -280,7 +280,7 @@ def _columns(
     layout: _Layout,
     text_is_missing: bool,
 ) -> tuple[dict[str, Column], dict[str, str], list[str]]:
-    """Return the columns of numbers, why others are none, and what was made of text."""
+    """Return the columns of numbers, the reasons for the others, and the treatment of text."""
     import pandas as pd
 
     frame = pd.read_csv(

@@ -40,7 +40,7 @@ _UNEVEN = 0.01  # samples that lie this share of a step off the uniform clock ar
 
 @dataclass(frozen=True, slots=True)
 class ImportReport:
-    """What an import did.
+    """Result of an import.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What stands in a file, and a first draft of its map for names that are known.
+"""Content of a file, and a first draft of its map for known names.
 
 The names are those of the tire test consortium (FX, SA, IA, ...), of TYDEX (FYW, SLIPANGL, ...)
 and of a campaign itself. What the file does not say, the draft leaves open.

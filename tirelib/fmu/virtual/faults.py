@@ -1,4 +1,4 @@
-"""What may be wrong with the gages and their link, on request."""
+"""Faults of the gages and their link, on request."""
 
 import math
 from dataclasses import dataclass
@@ -50,7 +50,7 @@ class Faults:
 
     @property
     def none(self) -> bool:
-        """Whether the strain is always as it is."""
+        """Whether there is no fault at all."""
         return not (self.dead_gage or self.saturation or self.drift)
 
     def of(self, strain: FloatArray, times: FloatArray) -> FloatArray:
@@ -74,7 +74,7 @@ class Faults:
         return seen
 
     def words(self, time: float) -> list[str]:
-        """Return the names of the faults that are there at a time."""
+        """Return the names of the faults that are active at a time."""
         if self.none and not self.dropped:
             return []
         given = {

@@ -1,4 +1,4 @@
-"""What a host sets before a virtual tire starts."""
+"""Parameters that a host sets before a virtual tire starts."""
 
 import math
 from dataclasses import dataclass, field

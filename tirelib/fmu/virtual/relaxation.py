@@ -1,4 +1,4 @@
-"""Slip that a tire feels: it follows the slip that is given over the way travelled."""
+"""Relaxation: the slip that acts on the tire follows the given slip over the distance travelled."""
 
 import math
 from typing import Any
@@ -25,7 +25,7 @@ class Relaxation:
     def __init__(self, lengths: tuple[float, float]) -> None:
         self._lengths = lengths
         self.slip: list[float] | None = None
-        """As it is felt now; None until the first that is a number."""
+        """The slip that acts now; None until the first finite value."""
         self._goal = [math.nan, math.nan]
         self._rest = [0.0, 0.0]
         self._rates = [0.0, 0.0]

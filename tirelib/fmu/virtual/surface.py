@@ -33,7 +33,7 @@ from tirelib.threads import one_thread
 
 FORMAT = "tirelib-virtual-tire/2"
 FORCES = ("Fx", "Fy", "Mz", "loaded_radius")
-"""What is interpolated beside the strain."""
+"""Quantities that are interpolated besides the strain."""
 _FORCE_MIRROR = np.array([1.0, -1.0, -1.0, 1.0])
 KERNEL: Final = "quintic"
 DEGREE: Final = 2
@@ -42,7 +42,7 @@ DEGREE: Final = 2
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Everything that a virtual tire knows, as it stands in a file.
+    """Data of a virtual tire, as stored in a file.
 
     Attributes
     ----------
@@ -123,7 +123,7 @@ class Surface:
 
     @one_thread()
     def warm(self) -> "Surface":
-        """Do now what would be done at the first use."""
+        """Compute now what the first use would compute."""
         _ = self._interpolator, self._waveforms
         return self
 

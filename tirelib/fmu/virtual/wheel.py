@@ -120,7 +120,7 @@ class VirtualWheel:
         return True
 
     def _go_on(self, run: SteadyRun, step: float, n: int) -> None:
-        """Move on with nothing changed: n samples."""
+        """Advance by n samples under unchanged conditions."""
         self._angle = run.go_on(step)
         if n and not self._lost():
             self._show(run.samples(self._count, n))
@@ -156,13 +156,13 @@ class VirtualWheel:
         return SteadyRun(self._found, inputs, self._omega, self._options.rate, **begin)
 
     def _found(self, angles: FloatArray, first: int) -> FloatArray:
-        """Return what the gages show of the last condition, with noise and faults."""
+        """Return the gages' signals at the last condition, with noise and faults."""
         if self._answer is None:  # a run begins with an answer
             return np.full((angles.size, self._surface.lateral.size), np.nan)
         return self._seen(self._surface.strain(self._answer, angles, self._waveform), first)
 
     def _stand(self, why: str, n: int) -> None:
-        """Hold the strain of the angle at which the wheel stopped; the noise goes on."""
+        """Hold the strain of the angle at which the wheel stopped; the noise continues."""
         if self._last is None:
             self._valid, self._status = False, why
             return
@@ -219,7 +219,7 @@ class VirtualWheel:
         self._last = answers[-1:]
 
     def _lost(self) -> bool:
-        """Tell whether the frame that begins with the next sample does not come."""
+        """Return whether the frame that begins with the next sample is lost."""
         faults = self._options.faults
         if not (faults.dropped > 0.0 and self._count / self._options.rate >= faults.start):
             return False
@@ -317,7 +317,7 @@ def _row(values: list[str] | None) -> FloatArray | None:
 
 
 def _still(given: list[float]) -> str:
-    """Return why the wheel does not turn, or nothing."""
+    """Return why the wheel does not turn; empty if it turns."""
     speed, kappa = given[_SPEED], given[_KAPPA]
     if speed == 0.0:
         return STANDSTILL
