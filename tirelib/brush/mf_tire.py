@@ -46,7 +46,7 @@ class Coefficients:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MagicTire:
-    """What the Magic Formula needs of one tire, in SI.
+    """Coefficients of one tire for the Magic Formula, in SI.
 
     Attributes
     ----------

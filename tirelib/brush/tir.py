@@ -42,7 +42,7 @@ class TirEntry:
 
 @dataclass(frozen=True, slots=True)
 class TirLine:
-    """A line that is no entry: blank, a comment, a table's head or row. Kept as it stands."""
+    """A line without an entry: blank, a comment, a table's head or row. It is kept unchanged."""
 
     text: str
 

@@ -1,4 +1,4 @@
-"""What the contact models check alike: given numbers, the tire's range, one patch, the tread."""
+"""Checks common to the contact models: given numbers, the tire's range, one patch, the tread."""
 
 from collections.abc import Callable
 from typing import Any, Protocol
@@ -27,7 +27,7 @@ ComplianceAt = Callable[[FloatArray], Compliance]
 
 
 class Pressed(Protocol):
-    """What is read of a contact, one row per operating point."""
+    """Results of a contact that are checked, one row per operating point."""
 
     @property
     def edges(self) -> FloatArray: ...  # noqa: D102
@@ -100,7 +100,7 @@ def carried(
 
 
 def range_text(at: ComplianceAt, tread: Tread, point: int, angle: float = LARGEST_ANGLE) -> str:
-    """Say which loads a tire carries."""
+    """Return a sentence on the loads that a tire carries."""
     most, deflection = carried(at, tread, point, angle)
     return (
         f"this tire carries 0 to about {most:.0f} N, at {1e3 * deflection:.3g} mm (half contact "

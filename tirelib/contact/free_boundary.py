@@ -51,7 +51,7 @@ class Constant:
 
 @dataclass(frozen=True)
 class Problem:
-    """What is pressed together: ring by deflection, tread, load if given, other belt loads."""
+    """The contact problem: ring by deflection, tread, load if given, other belt loads."""
 
     at: ComplianceAt
     tread: Tread
@@ -152,7 +152,7 @@ class Start:
 def solve(
     problem: Problem, deflection: FloatArray | None, n_nodes: int, start: Start | None = None
 ) -> Solution:
-    """Return where edges, deflection and compression settle, or where they stand at the limit.
+    """Return edges, deflection and compression on convergence, or at the iteration limit.
 
     A start nearby saves time and changes nothing beyond the tolerance; a useless one is left.
     """

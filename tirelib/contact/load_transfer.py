@@ -1,4 +1,4 @@
-r"""What tilts the contact across its width: crown, camber, and the roll moment of the side force.
+r"""Tilt of the contact across its width: crown, camber, and the roll moment of the side force.
 
 Strip i at the lateral position y (left positive) is pressed by
 

@@ -1,4 +1,4 @@
-"""What one tread element does: kinematics, springs and friction, Eq. (79)-(81).
+"""Law of one tread element: kinematics, springs and friction, Eq. (79)-(81).
 
 The element stands on the belt at wheel angle phi, along the normal of the deformed belt, which is
 declined by eta = phi + beta from the plumb line. With x along +phi at the road (rearward) and z

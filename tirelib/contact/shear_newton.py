@@ -1,4 +1,4 @@
-"""Newton's method for the contact with shear; the equations stand in `shear_system`.
+"""Newton's method for the contact with shear; the equations are in `shear_system`.
 
 Friction makes the equations piecewise smooth, so this is a semismooth Newton method: each element's
 derivative is that of the branch (sticking, sliding) that it is on. A step that makes the residual

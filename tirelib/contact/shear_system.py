@@ -28,7 +28,7 @@ LEAD, TRAIL, ROLL, HEIGHT, OFFSET = range(-5, 0)
 
 @dataclass(frozen=True)
 class ShearProblem:
-    """What is pressed together and what is given; of load, deflection, edges one is not None."""
+    """The contact problem; exactly one of load, deflection and edges is given, not None."""
 
     at: ComplianceAt
     tread: Tread

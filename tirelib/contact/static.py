@@ -26,7 +26,7 @@ from tirelib.errors import ConvergenceError, ParameterError
 from tirelib.ring.green import positive, pressed_shape, wrapped
 
 LARGEST_DEFLECTION = 0.25
-"""Largest deflection as a share of the free radius; beyond, the linear ring says nothing."""
+"""Largest deflection as a share of the free radius; beyond it the linear ring is not valid."""
 _CHUNK = 32
 _MARCH = 10
 _NEAR_MOST = 21

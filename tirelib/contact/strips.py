@@ -361,7 +361,7 @@ def _bend(
 
 
 def _line_loads(problem: _Problem, contact: StripContact, moment: ComplexArray) -> ComplexArray:
-    """Return what the road's forces put on the strips' belts beside the pressure, flat."""
+    """Return the loads of the road on the strips' belts besides the pressure, as a flat array."""
     n, strips, modes = len(contact), len(problem.layout), problem.n_modes
     along = _distribute(contact, problem.forces.longitudinal, problem.forces.longitudinal_shape)
     drive = load_harmonics(

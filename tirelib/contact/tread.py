@@ -21,7 +21,7 @@ from tirelib.parameters import Tire
 
 
 def numbers(where: str, value: Any, name: str) -> FloatArray:
-    """Return an array of floats, or refuse what is none."""
+    """Return an array of floats, or refuse the value."""
     try:
         return np.asarray(value, dtype=float)
     except (TypeError, ValueError) as error:

@@ -3,7 +3,8 @@
 from tirelib.effects.effect import State, effect
 
 LEAST_STRENGTH = 1e-6
-"""Strength below which it is none: beyond 1e12 N the stiffness would drown in round-off."""
+"""Strength below which the effect is left out: beyond 1e12 N the stiffness would drown in
+round-off."""
 
 
 @effect(

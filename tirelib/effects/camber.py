@@ -1,4 +1,4 @@
-"""Camber at gages beside the middle."""
+"""Camber at gages away from the middle."""
 
 import numpy as np
 

@@ -15,7 +15,7 @@ from tirelib.effects.effect import State, effect
     source="dissertation, Eq. (85) with the full tension p b R + rho A R^2 Omega^2",
 )
 def centrifugal(state: State, strength: float) -> State:
-    """Rotating inertia of the belt is less than what its centrifugal tension stands for.
+    """Rotating inertia of the belt is less than its centrifugal tension implies.
 
     In steady rolling the inertia and the tension rho A R^2 Omega^2 cancel in every harmonic of the
     inextensible ring. With 1 + s of the inertia the tension -s rho A R^2 Omega^2 is left over,

@@ -1,4 +1,4 @@
-"""What a physical effect is: a named change of the model's state with a strength."""
+"""A physical effect: a named change of the model's state with a strength."""
 
 import re
 import traceback
@@ -39,7 +39,7 @@ VARIES_WITH = frozenset(
 )
 
 UNITS = frozenset(row.unit for row in TABLE) | {"MN"}
-"""What a strength's unit may be made of, with blanks, `/` and `^`."""
+"""Parts of which a strength's unit may consist, with blanks, `/` and `^`."""
 
 State = Any
 """`tirelib.model.state.State`, which this layer does not know; the brush has its own."""
@@ -230,7 +230,7 @@ def _faults(before: State, after: State) -> list[str]:
 
 
 def _known_unit(unit: str) -> bool:
-    """Whether a unit is made of units that the library knows."""
+    """Whether a unit consists of known units."""
     if not isinstance(unit, str) or not unit.strip():
         return False
     if unit in UNITS:

@@ -15,7 +15,7 @@ from tirelib.effects.effect import State, effect
     source="zero of the bridge, hoop strain of inflation and speed",
 )
 def gage_offset(state: State, strength: float) -> State:
-    """Zero of the gage other than none.
+    """Offset of the gage's zero.
 
     s added to the strain everywhere.
     """

@@ -6,7 +6,7 @@ from tirelib.effects.effect import State, effect
 from tirelib.errors import ParameterError
 
 REFERENCE = 5e-3
-"""Strain at which the strength says what is lost, [-]."""
+"""Strain at which the strength is the lost share, [-]."""
 
 
 @effect(

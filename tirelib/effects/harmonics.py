@@ -1,4 +1,4 @@
-"""What acts on each harmonic of the waveform: lag, length and place of a gage."""
+"""Factors on each harmonic of the waveform: lag, length and place of a gage."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What effects in the contact share: its own coordinate, traction, and a second solution."""
+"""Common parts of effects in the contact: its own coordinate, traction, and a second solution."""
 
 import numpy as np
 

@@ -150,7 +150,7 @@ class CorrectionSlopes:
 
 @dataclass(frozen=True, slots=True)
 class Correction:
-    """What the rolling ring has and the linear one has not, at fixed parameters.
+    """Difference between the rolling and the linear ring, at fixed parameters.
 
     Attributes
     ----------

@@ -12,7 +12,7 @@ from tirelib.model.brush import BrushConditions, brush_forces, brush_state
 
 POINTS = 300
 REFERENCE = (4000.0, 2.0e5)
-"""Load and pressure at which laws change nothing, [N] and [Pa]."""
+"""Load and pressure at which the laws equal the base model, [N] and [Pa]."""
 SCALES = {"Fy": 3000.0, "Fx": 3000.0, "Mz": 80.0}
 """Typical forces: what is compared are forces over these."""
 COORDINATES = (
@@ -101,5 +101,5 @@ class BrushBench:
         return here, np.stack(rows)
 
     def words(self, size: float) -> str:
-        """Say on what an effect has no influence, and how small it is."""
+        """Return a sentence on the quantities that an effect hardly changes, with the change."""
         return f"Fy, Fx and Mz (rms {100.0 * size:.2g} % of typical forces"

@@ -107,7 +107,7 @@ def _changed(state: State, constants: Sequence[Change], depth: FloatArray) -> St
 
 
 def _alike(a: State, b: State) -> bool:
-    """Tell whether two states have the same constants, whatever their deflections."""
+    """Return whether two states have the same constants, whatever their deflections."""
     pairs = [(getattr(a, name), getattr(b, name)) for name in CONSTANTS]
     return all(x is y or np.array_equal(x, y, equal_nan=True) for x, y in pairs)
 

@@ -1,4 +1,4 @@
-"""What an effect must show before it may take part in a diagnosis.
+"""Tests that an effect must pass before it may take part in a diagnosis.
 
 On a plan that varies everything: strength zero is the base model bit for bit, the argument is left
 alone, the derivative at zero is finite, alive and linear, the whole range can be computed, no other
@@ -25,7 +25,7 @@ from tirelib.parameters import Tire, read_tire
 TWIN = 30.0
 """Angle below which two effects are twins, [deg]."""
 LINEAR = 0.02
-"""What halving a trial step may leave of exact halving."""
+"""Allowed deviation from exact halving when a trial step is halved."""
 RECOVERY = 0.2
 """Relative error of a planted strength that is found again."""
 _STEPS = 8
@@ -159,7 +159,7 @@ class Bench(Protocol):
         """Return the prediction with parameters moved by z and changes."""
 
     def words(self, size: float) -> str:
-        """Say on what an effect has no influence, and how small it is."""
+        """Return a sentence on the quantities that an effect hardly changes, with the change."""
 
 
 def _tangents(effect: Effect, bench: Bench) -> FloatArray:
@@ -256,7 +256,7 @@ def _twins(
 
 
 def _plant(effect: Effect, bench: Bench) -> tuple[float, float]:
-    """Return a planted strength and what Gauss-Newton finds beside the base parameters."""
+    """Return a planted strength, and the one found by Gauss-Newton with the base parameters."""
     trials = []
     for k in range(effect.components):
         planted = effect.toward / 3.0

@@ -26,7 +26,7 @@ Values = Mapping[str, float | FloatArray]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Made:
-    """What a waveform is made of: the ring's constants, and the gage's place.
+    """Parameters of a waveform: the ring's constants, and the gage's place.
 
     Attributes
     ----------

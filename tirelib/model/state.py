@@ -1,4 +1,4 @@
-"""What a model knows of every operating point on its way from tire to waveform.
+"""State of a model at every operating point, on the way from tire to waveform.
 
 An effect takes a state and a strength and returns a changed state (`State.but`); it never changes
 its argument. All arrays have one row per operating point, SI, ISO signs.

@@ -106,5 +106,5 @@ class StrainBench:
         return predict(move(self.values, z), self.plan.points, self.plan.changes(*changes)).wave
 
     def words(self, size: float) -> str:
-        """Say on what an effect has no influence, and how small it is."""
+        """Return a sentence on the quantities that an effect hardly changes, with the change."""
         return f"the strain (rms {1e6 * size:.2g} ustrain"

@@ -48,7 +48,7 @@ class Compared:
 
     @property
     def inside(self) -> BoolArray:
-        """Tell which turns have the truth in their 95 % interval."""
+        """Return which turns have the true value in their 95 % interval."""
         return np.abs(self.estimated - self.measured) <= WIDTH * self.std
 
     def means(self, values: FloatArray) -> FloatArray:
@@ -58,7 +58,7 @@ class Compared:
 
 @dataclass(frozen=True, slots=True)
 class Accuracy:
-    """One row of an accuracy table; `rmse` in `unit`, NaN where it cannot be said."""
+    """One row of an accuracy table; `rmse` in `unit`, NaN where it is undefined."""
 
     quantity: str
     title: str

@@ -58,7 +58,7 @@ class Agreement:
 
     @property
     def faults(self) -> list[str]:
-        """Say every difference that is not allowed."""
+        """Return a sentence on every difference that is not allowed."""
         if math.isnan(self.tolerance):
             return []
         limit = "exactly 0" if self.tolerance == 0.0 else f"below {self.tolerance:g}"
@@ -152,7 +152,7 @@ def agreement_table(agreements: Sequence[Agreement], note: str) -> Table:
 
 
 def difference(value: float) -> str:
-    """Say a difference with two digits, 0 only where it is none."""
+    """Return a difference with two digits; 0 only if the values are equal."""
     if not math.isfinite(value):
         return DASH
     return "0" if value == 0.0 else f"{value:.1e}"

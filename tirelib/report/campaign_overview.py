@@ -64,7 +64,7 @@ def save_figure(figure: Figure, file: Path) -> Path:
 
 
 def _row_points(rows: Sequence[RunRow]) -> dict[str, FloatArray]:
-    """Return measured means by quantity; the set point stands in for what was not measured."""
+    """Return measured means by quantity; the set point replaces a missing measurement."""
     points: dict[str, FloatArray] = {}
     for name in _BY_NAME:
         values = [

@@ -70,7 +70,7 @@ class Part:
 
 
 def answer_of(found: Comparison | ForceComparison) -> str:
-    """Say the result in a sentence."""
+    """Return the result as a sentence."""
     verdict = found.verdict if isinstance(found, ForceComparison) else found.fit.verdict
     error = found.error if isinstance(found, ForceComparison) else found.error.value
     left = _left(found)
@@ -102,7 +102,7 @@ def _left(found: Comparison | ForceComparison) -> str:
 
 
 def floor_text(found: Comparison) -> str:
-    """Say what is known of the structural floor."""
+    """Return a sentence on the structural floor."""
     floor, parts = found.floor, []
     if np.isfinite(floor.value):
         parts.append(
@@ -120,7 +120,7 @@ def floor_text(found: Comparison) -> str:
 
 
 def force_floor_text(found: ForceComparison) -> str:
-    """Say what is known of a force's floor."""
+    """Return a sentence on a force's floor."""
     if np.isfinite(found.floor):
         return (
             f"Noise and the brush's structure explain an error of {number(found.floor, 3)} (the "
@@ -199,7 +199,7 @@ class Shown:
 
 
 def summary_of(found: Comparison | ForceComparison) -> str:
-    """Say what was compared."""
+    """Return a sentence on the compared data."""
     if isinstance(found, ForceComparison):
         return f"Campaign {found.name}, model {found.model}; {found.measured.size} points."
     chosen = found.chosen

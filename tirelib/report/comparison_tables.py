@@ -176,7 +176,7 @@ def track_table(found: Comparison) -> Table:
 
 
 def point_table(found: Comparison) -> Table:
-    """Return what was taken out as set-point errors."""
+    """Return the table of estimated set-point errors."""
     scaled, tolerance = found.points.scaled, found.points.tolerance
     units = (("%", 100.0),) * 3 + (("mrad", 1e3),)
     rows = []

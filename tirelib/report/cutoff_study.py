@@ -1,4 +1,4 @@
-"""What the cut-off of the low-pass does to the features, at several speeds.
+"""Effect of the low-pass cut-off on the features, at several speeds.
 
 For each speed the same record is cut into turns with a row of cut-offs. **Scatter** is the
 standard deviation of a feature over the turns of the run, pooled over the gages: noise. **Shift**
@@ -29,7 +29,7 @@ SPOILT = int(TurnFlag.FIRST_TURN | TurnFlag.PERIOD_JUMP | TurnFlag.TOO_FEW_GAGES
 
 @dataclass(frozen=True, slots=True)
 class CutOffStudy:
-    """Features over the cut-off; arrays have shape (n_speeds, n_orders) where not said otherwise.
+    """Features over the cut-off; arrays have shape (n_speeds, n_orders) unless stated otherwise.
 
     Attributes
     ----------

@@ -37,7 +37,7 @@ METHOD_TEXT = (
 
 
 def answer_of(told: Assessment) -> str:
-    """Say the verdict in plain words."""
+    """Return the verdict in plain words."""
     names = ", ".join(told.named)
     fall = (
         f"the error falls from {number(told.before.value, 3)} to {number(told.after.value, 3)} "

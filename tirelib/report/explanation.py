@@ -19,7 +19,7 @@ TITLES = {
     "error": "The error",
     "next": "What to do next",
 }
-"""What each line is about, by its key in a document's `explanation`."""
+"""Title of each line, by its key in a document's `explanation`."""
 SENSE = 3
 """Significant digits of an error in a sentence."""
 SHOWN = 3
@@ -97,7 +97,7 @@ def _sure(told: Mapping[str, Any]) -> str:
 
 
 def _evidence(told: Mapping[str, Any]) -> list[str]:
-    """Say how far what is named stands out, by the p-value where the document has one."""
+    """Return how significant the named effects are, by the p-value where the document has one."""
     out, ratios = [], []
     for name in told["named"] if told["verdict"] != "unknown" else ():
         entry = _candidate(told, name)
@@ -133,7 +133,7 @@ def _evidence(told: Mapping[str, Any]) -> list[str]:
 
 
 def _alternatives(told: Mapping[str, Any]) -> list[str]:
-    """Say what else would explain the measurements as well."""
+    """Return a sentence on other effects that explain the measurements equally well."""
     if told["verdict"] == "indistinguishable":
         return ["They explain these measurements equally well."]
     sets = told.get("sets") or []
@@ -164,7 +164,7 @@ def _blind(told: Mapping[str, Any]) -> list[str]:
 
 
 def error_line(told: Mapping[str, Any]) -> str:
-    """Say the error before and after, and on what was held out of the fit.
+    """Return the error before and after, and that of the held-out data.
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ def journey_explained(
 
 
 def unmoved(told: Mapping[str, Any]) -> list[str]:
-    """Say which errors on what was held out of the fit did not fall.
+    """Return sentences on held-out errors that did not fall.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ def unmoved(told: Mapping[str, Any]) -> list[str]:
 
 
 def held_out_line(told: Mapping[str, Any]) -> str:
-    """Say whether the error fell where the fit has not looked; what did not fall is said so."""
+    """Return whether the held-out errors fell, and name those that did not."""
     before, after = told.get("heldout_error_before"), told.get("heldout_error_after")
     if not _known(before) or not _known(after):
         return "Nothing could be held out of the fit to check it."
@@ -254,7 +254,7 @@ def held_out_line(told: Mapping[str, Any]) -> str:
 
 
 def fold_name(fold: Mapping[str, Any]) -> str:
-    """Say what was left out of a fit."""
+    """Return the name of a held-out part."""
     names = {
         "time": f"part {fold['value']:.0f} of the time",
         "cell": f"part {fold['value']:.0f} of the conditions",
@@ -314,7 +314,7 @@ def _strength(told: Mapping[str, Any], name: str) -> str:
 
 
 def said_strength(entry: Mapping[str, Any]) -> str:
-    """Say a strength with its standard deviation and unit, of a candidate or an extension."""
+    """Return a strength with its standard deviation and unit as text."""
     value, std = (np.atleast_1d(entry[key]) for key in ("strength", "std"))
     unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
     size = " and ".join(
@@ -339,7 +339,7 @@ def _what(told: Mapping[str, Any]) -> str:
 
 
 def _said(value: float) -> str:
-    """Say an error as sentences do: 30, 6.7, 0.48."""
+    """Return an error with the digits that sentences use: 30, 6.7, 0.48."""
     return number(value, SENSE if abs(value) >= 10.0 else 2)
 
 

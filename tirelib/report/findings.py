@@ -1,4 +1,4 @@
-"""What pages of a diagnosis, of strain or of forces, show alike: scores, dead effects, advice."""
+"""Common parts of the diagnosis pages for strain and forces: scores, dead effects, advice."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
@@ -17,7 +17,7 @@ _LEVELS = {"alarm": RED, "hint": BLUE, "quiet": FAINT}
 
 
 class Finding(Protocol):
-    """A candidate as it stands in the end."""
+    """A candidate effect with its final result."""
 
     @property
     def effect(self) -> Effect:
@@ -82,7 +82,7 @@ def dead_effects(dead: Mapping[str, str]) -> list[Table]:
 
 
 def advice(step: Mapping[str, Any]) -> str:
-    """Say the next test of a document in words."""
+    """Return the next test of a document in words."""
     text = f"{step['what'][0].upper()}{step['what'][1:]}."
     revived = step["would_revive"]
     if revived:

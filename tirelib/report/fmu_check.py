@@ -24,7 +24,7 @@ _TITLES = {
 
 
 def verdict(document: Document) -> str:
-    """Say the result in a sentence."""
+    """Return the result as a sentence."""
     failed = [
         _TITLES.get(part["name"], part["name"]) for part in document["parts"] if not part["passed"]
     ]

@@ -29,7 +29,7 @@ METHOD_TEXT = (
 
 
 def answer_of(told: ForceAssessment) -> str:
-    """Say the verdict in plain words."""
+    """Return the verdict in plain words."""
     names, unit = ", ".join(told.named), told.case.unit
     before, after, floor = (number(e, 3) for e in (told.before, told.after, told.floor))
     fall = f"the error falls from {before} to {after} {unit} (floor {floor})"

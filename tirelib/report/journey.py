@@ -33,7 +33,7 @@ WORDS = {"noise": "noise", "ustrain": "microstrain"}
 
 @dataclass(frozen=True, slots=True)
 class Journey:
-    """What the steps of a journey found.
+    """Results of the steps of a journey.
 
     Attributes
     ----------

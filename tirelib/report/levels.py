@@ -84,7 +84,7 @@ def angle_levels(angle: FloatArray) -> list[Level]:
 
 
 def upright(means: Means) -> BoolArray:
-    """Tell which rows have no camber (or an unknown one)."""
+    """Return which rows have no camber, or an unknown one."""
     return ~(np.abs(means.camber) > 0.5)
 
 

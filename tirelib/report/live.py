@@ -1,4 +1,4 @@
-"""What went over the serial line, and what came of it: the section "Live" of the demonstration."""
+"""Traffic of the serial line and its estimates: the section "Live" of the demonstration."""
 
 import json
 import tomllib
@@ -26,12 +26,12 @@ from tirelib.report.page import Drawing, Table
 from tirelib.signal import LowPass, cut_turns
 
 IN_REPORT = {"Fz": 1.0, "alpha": 1.0, "kappa": 100.0, "Fy": 1.0}
-"""From the unit of the document to that of reports: a slip ratio is said in percent."""
+"""From the unit of the document to that of reports: a slip ratio is given in percent."""
 
 
 @dataclass(frozen=True, slots=True)
 class LiveFiles:
-    """What the steps of the demonstration wrote.
+    """Files that the steps of the demonstration wrote.
 
     `direct` (by the library itself), `fmu`, `live` and `replay` are JSON of estimates;
     `conditions` is the emulator's sidecar, `device` says what a count of the line is.
@@ -47,7 +47,7 @@ class LiveFiles:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """What the line did: frames, what it lost, and the largest rounding of the strain."""
+    """Counters of the line: frames, losses, and the largest rounding of the strain."""
 
     frames: int
     lost: int
@@ -75,7 +75,7 @@ def agreements(files: LiveFiles, rounding: float) -> list[Agreement]:
 
 
 def find_faults(files: LiveFiles, campaign: Campaign) -> list[str]:
-    """Say every difference between library, FMU and bench that is not allowed."""
+    """Return a sentence on every forbidden difference between library, FMU and bench."""
     rounding = read_line(files, campaign).rounding
     return [fault for one in agreements(files, rounding) for fault in one.faults]
 
@@ -119,7 +119,7 @@ def live_table(files: LiveFiles, line: Line) -> Table:
 
 
 def live_text(line: Line) -> str:
-    """Say what went over the line."""
+    """Return a sentence on the traffic of the line."""
     lost = "none was lost or damaged" if line.lost == 0 else f"{line.lost} were lost or damaged"
     return (
         f"Runs of the unseen day as {line.frames} SERIAL v1 frames through a pseudo-terminal, at "
@@ -129,7 +129,7 @@ def live_text(line: Line) -> str:
 
 
 def live_drawing(files: LiveFiles, campaign: Campaign, low_pass: LowPass) -> Drawing:
-    """Return the strip: the last turn's strain, and every estimate beside the rig."""
+    """Return the strip: the last turn's strain, and every estimate with the rig's value."""
     return Drawing(
         "live",
         "The live strip",
@@ -141,7 +141,7 @@ def live_drawing(files: LiveFiles, campaign: Campaign, low_pass: LowPass) -> Dra
 
 
 def read_strip(files: LiveFiles) -> Strip:
-    """Return the estimates of the live bench beside the rig, in the units of reports."""
+    """Return the estimates of the live bench with the rig's values, in the units of reports."""
     turns = read_turns(files.live)
     truth = {int(mark["run"]): mark["truth"] for mark in _json(files.conditions)["runs"]}
 

@@ -63,7 +63,7 @@ class Section:
 
 
 def number(value: float | None, digits: int = 4) -> str:
-    """Say a number with so many significant digits; a dash where there is none.
+    """Return a number with this many significant digits as text; a dash for NaN.
 
     Examples
     --------
@@ -89,7 +89,7 @@ def number(value: float | None, digits: int = 4) -> str:
 
 
 def p_value(value: float) -> str:
-    """Say a p-value as statistics tables do.
+    """Return a p-value in the form of statistics tables.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What `tirelib simulate` writes: the keys of its JSON, and the curves as CSV."""
+"""Output of `tirelib simulate`: the keys of its JSON, and the curves as CSV."""
 
 import csv
 from collections.abc import Mapping

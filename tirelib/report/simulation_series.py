@@ -20,7 +20,7 @@ LEAST_MODES = 200
 MOST_MODES = 1000
 """Beyond this a simulation is too slow; the belt then bends within 3 mm or less."""
 MODES_A_BEND = 8.0
-"""Harmonics times bending length over radius from which the strain rate stands, to 0.5 %."""
+"""Harmonics times bending length over radius from which the strain rate has converged to 0.5 %."""
 NODES_A_MODE = 0.6
 """More than half the contact angle, or the highest harmonics alias in the patch."""
 N_SERIES = 6000

@@ -101,7 +101,7 @@ def zero_line(axes: Axes) -> None:
 
 
 def signed_degrees(value: float) -> str:
-    """Say an angle in whole degrees with its sign; zero has none.
+    """Return an angle in whole degrees with its sign; zero has none.
 
     Examples
     --------
@@ -113,7 +113,7 @@ def signed_degrees(value: float) -> str:
 
 
 def millimetres(y: float) -> str:
-    """Say a lateral position in whole millimetres with its sign; zero has none."""
+    """Return a lateral position in whole millimetres with its sign; zero has none."""
     whole = round(1e3 * y)
     return f"{whole:+d} mm" if whole else "0 mm"
 

@@ -1,4 +1,4 @@
-"""Run a plan on the rig and write a campaign folder with its truth beside it."""
+"""Run a plan on the rig and write a campaign folder together with its true values."""
 
 import csv
 import os
@@ -31,7 +31,7 @@ from tirelib.rig.tire import NEW_DEPTH, Array, Condition, RigTire, on_road
 
 TRUTH_FILE = "truth.csv"
 TREAD_TEMPERATURE = 313.15
-"""The rig's rubber knows one temperature, [K]."""
+"""The single temperature of the rig's rubber, [K]."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """Environment of a process that shares the processors with others like it: one thread each."""
 

@@ -75,7 +75,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class Recording:
-    """What the loggers hold after a run, SI and ISO signs.
+    """Data of the loggers after a run, SI and ISO signs.
 
     `strain` has shape (5, n); `rig` maps channel names of a campaign to arrays.
     """

@@ -1,4 +1,4 @@
-"""What a solved state shows: forces, contact edges, and strain over the wheel angle."""
+"""Observables of a solved state: forces, contact edges, and strain over the wheel angle."""
 
 from dataclasses import dataclass
 

@@ -32,7 +32,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Ramp:
-    """A run whose conditions change; `about` says how, in a few words.
+    """A run whose conditions change; `about` describes the change in a few words.
 
     Raises
     ------

@@ -19,7 +19,7 @@ REUSE = 0.3
 """The factors are kept where a step with them cut the residual to this share: new ones cost as much
 as seven such steps."""
 SETTLED = 1e-6
-"""What is left of the right side where a derivative is found with old factors."""
+"""Allowed residual of the right side where a derivative is found with old factors."""
 FIRST_DEFLECTIONS = (0.002, 0.01)
 """Deflections on the way from the unloaded tire to the first load [m]."""
 LIMITS = {

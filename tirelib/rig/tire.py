@@ -46,7 +46,7 @@ _MAY_BE_ZERO = frozenset(
 
 @dataclass(frozen=True)
 class RigTire:
-    """Constants of the virtual tire, SI units, for the whole belt width unless said otherwise.
+    """Constants of the virtual tire, SI units, for the whole belt width unless stated otherwise.
 
     Attributes
     ----------
@@ -226,7 +226,7 @@ TREAD_DENSITY = 800.0
 
 
 def on_road(tire: RigTire, cond: Condition) -> RigTire:
-    """Return the tire with the friction of the road and the tread that is left of it.
+    """Return the tire with the road's friction and the remaining tread.
 
     The bristles' stiffness is a modulus over their height: a worn tread is stiffer, thinner and
     lighter.

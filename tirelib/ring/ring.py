@@ -159,7 +159,7 @@ _INFINITE = frozenset({"extension_stiffness", "shear_stiffness"})
 
 
 def _numbers(name: str, value: object) -> FloatArray:
-    """Return an array of floats with one axis at most, or refuse what is none."""
+    """Return an array of floats with one axis at most, or refuse the value."""
     try:
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError) as error:

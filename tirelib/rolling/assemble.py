@@ -58,7 +58,7 @@ class Unknowns:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contact:
-    """What the road does at its integration points (n_points, n_fine, n_road), and at the nodes.
+    """Forces of the road at its integration points (n_points, n_fine, n_road), and at the nodes.
 
     Attributes
     ----------

@@ -28,14 +28,14 @@ from tirelib.rolling.road import pressure, tip
 TOLERANCE = 1e-10
 """Last step, [m]."""
 SHARES = (0.1, 0.3, 1.0)
-"""Parts of the load in which a solution is found that starts from nothing."""
+"""Shares of the load through which a solution without a start is found."""
 TOUCH = 2e-3
 """Deflection to begin with, [m]: so little that the tread does not throw the belt off."""
 START_STEP = 1e-3
 """Last step of the frictionless ring from which one with friction starts, [m]."""
 LONGEST_STEP = 0.008
 TURN = np.array([1.0, 1.0, 0.05])
-"""What displacements count as in a step, and what a section's turn does, [m/rad]."""
+"""Weights of the displacements in a step, and of a section's rotation, [m/rad]."""
 MAX_ITERATIONS = 80
 PATIENT = 20
 """Iterations after which steps are halved: sticking and sliding may take turns."""
@@ -180,7 +180,7 @@ class OnTurn:
 
 
 Start = Rolling | Unknowns
-"""From which a solution is looked for: another one, or unknowns."""
+"""Start of a solution: another solution, or unknowns."""
 
 
 def solve(
@@ -258,7 +258,7 @@ def _newton(k: Constants, start: Unknowns, grid: Mesh, tolerance: float) -> tupl
 
 
 def _cold(k: Constants, grid: Mesh) -> tuple[Unknowns, int]:
-    """Return a start from nothing, and its iterations: frictionless, under a growing load."""
+    """Return a first start, and its iterations: frictionless, under a growing load."""
     n, total = len(k), 0
     x = Unknowns(np.zeros((n, grid.node.size, 4)), np.full(n, TOUCH), 0.98 * k.free_radius)
     for share in SHARES:

@@ -30,7 +30,7 @@ from tirelib.strain.innerliner import strain_harmonics
 from tirelib.traces import Conditions, StrainTrace
 
 PULSE_POINTS = 1440
-"""Points of the turn on which the pulse is looked for; its edges lie between them."""
+"""Points of the turn at which the pulse is searched; its edges lie between them."""
 OPPOSITE_POINTS = 101
 
 Reference = Literal["opposite", "mean"]

@@ -1,4 +1,4 @@
-"""What the interactive figures of a comparison share: one look, and their data as a table."""
+"""Common parts of a comparison's interactive figures: one look, and their data as a table."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

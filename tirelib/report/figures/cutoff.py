@@ -65,7 +65,7 @@ def figure_cut_off(study: CutOffStudy) -> Figure:
 
 
 def _at_fixed(angle: Axes, cp1: Axes, study: CutOffStudy) -> None:
-    """Say in the titles what a fixed cut-off means at each speed."""
+    """Add to the titles the order of a fixed cut-off at each speed."""
     orders = ", ".join(f"{FIXED / rate:.0f}" for rate in study.turn_rate)
     shifts = ", ".join(_signed(x, 2) for x in np.rad2deg(study.fixed_angle_shift))
     angle.set_title(
@@ -76,5 +76,5 @@ def _at_fixed(angle: Axes, cp1: Axes, study: CutOffStudy) -> None:
 
 
 def _signed(value: float, decimals: int) -> str:
-    """Say a shift; a cut-off that does not suit the turn rate is refused and has none."""
+    """Return a shift as text; a cut-off that does not suit the turn rate has none."""
     return f"{value:+.{decimals}f}" if np.isfinite(value) else "(refused)"

@@ -1,4 +1,4 @@
-"""What a fitted brush leaves of a force: slip over conditions, as a map."""
+"""Map of a force's residual after the brush fit: slip over conditions."""
 
 import numpy as np
 import plotly.graph_objects as go

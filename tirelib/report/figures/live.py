@@ -1,4 +1,4 @@
-"""The live strip: strain of the last turn, and estimates turn after turn beside the rig."""
+"""The live strip: strain of the last turn, and estimates turn after turn with the rig's values."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What the regression figures share: a curve with its data, and residuals beside it."""
+"""Common parts of the regression figures: a curve with its data, and its residuals."""
 
 from collections.abc import Callable, Sequence
 

@@ -84,22 +84,22 @@ def half_width(*several: Simulation) -> float:
 
 
 def load_labels(done: Simulation) -> list[str]:
-    """Say the loads."""
+    """Return labels of the loads."""
     return [f"{load:.0f} N" for load in done.load]
 
 
 def deflection_labels(done: Simulation) -> list[str]:
-    """Say the deflections."""
+    """Return labels of the deflections."""
     return [f"{1e3 * d0:g} mm" for d0 in np.round(done.deflection, 7)]
 
 
 def inflation_labels(done: Simulation) -> list[str]:
-    """Say the inflation pressures."""
+    """Return labels of the inflation pressures."""
     return [f"{1e-5 * p:g} bar" for p in done.inflation]
 
 
 def speed_labels(done: Simulation) -> list[str]:
-    """Say the speeds."""
+    """Return labels of the speeds."""
     speed = from_si(done.turn_rate * done.tire.ring_radius, "km/h", "speed")
     return [f"{v:.0f} km/h" for v in speed]
 
