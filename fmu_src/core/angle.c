@@ -2,7 +2,7 @@
 
 enum { NEWTON = 8 };
 
-static const double LARGEST_RATIO = 2.0;
+static const double LARGEST_RATIO = 2.0, ENDS = 17.0 / 240.0; /* ENDS: squared */
 static const double GRAVITY = 9.81, SLIP_STIFFNESS = 11.0;
 
 /* numpy.polynomial.polynomial.polyval */
@@ -126,7 +126,10 @@ AngleLaw angle_law(double middle, double turn, double ahead, const Course *omega
     } else if (speed->there && speed->known) {
         shape = speed->shape, terms = speed->terms, fit_std = speed->std, row = PAST_SPEED;
     }
+    double speed_slope = followed(&law.past, PAST_SPEED, turn, &speed_slope_std);
+    speed_slope_std = hypot(speed_slope_std, sqrt(ENDS) * speed_slope);
     double slope = followed(&law.past, row, turn, &slope_std);
+    if (row == PAST_SPEED) slope_std = speed_slope_std;
     if (law.past.n == 1 && !omega->there && !speed->there) slope_std = unknown;
     for (int k = 0; k < terms; k++) {
         rate[k] += shape[k] * (1.0 + 0.5 * slope);
@@ -140,7 +143,6 @@ AngleLaw angle_law(double middle, double turn, double ahead, const Course *omega
         fit_std = 1.0;
     }
     double contact_rate = rate[0] / turn;
-    double speed_slope = followed(&law.past, PAST_SPEED, turn, &speed_slope_std);
     double slip = slip_of(omega, speed, speed_slope, speed_slope_std, slope_std, &law.slip_std,
                           &law.late);
     if (!(slip > 1.0 / LARGEST_RATIO && slip < LARGEST_RATIO)) {

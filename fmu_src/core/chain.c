@@ -21,7 +21,7 @@ static void widen(Estimate *e, double more) {
     e->valid = e->valid && isfinite(more);
 }
 
-/* Reference: Chain._valid and Chain._carried */
+/* Reference: Chain._valid and STANDS_ON */
 static int valid(const Turned *t, int quantity, double value, double std) {
     const Chain *c = t->chain;
     if (!isfinite(value) || !isfinite(std)) return 0;
@@ -232,6 +232,8 @@ static void find_lateral(const Turned *t, double load, int calibrated, Predictio
     if (!told.there) return;
     double share = or_else(told.sliding, 1.0); /* any, where no slip angle fits */
     widen(e, k->sliding_force * share * fabs(force));
+    e->slid = 1;
+    e->sliding = told.sliding;
     if (fz->there) widen(fz, k->sliding_load * share * fabs(load));
 }
 
@@ -262,8 +264,7 @@ int chain_unlike(const Calibration *calibration, const Chain *c, double values[3
                  const Prediction *found, double angle_std) {
     const Constants *k = &calibration->constants;
     const Likeness *l = &c->likeness;
-    Turned t = {calibration, k, c, values[0]};
-    double here[NAMES], longer[NAMES], higher[NAMES], at[VALUES];
+    double here[NAMES], longer[NAMES], higher[NAMES];
     Look look;
     if (!l->there) return 0;
     likeness_rest(l, values[0], here);
@@ -273,16 +274,10 @@ int chain_unlike(const Calibration *calibration, const Chain *c, double values[3
         longer[i] = (longer[i] - here[i]) * (angle_std / k->angle_step);
         higher[i] -= here[i];
     }
-    memcpy(at, values[0], sizeof at);
     look.sliding = NAN;
-    if (found->of[FZ].there && found->of[FY].there) {
-        double force = found->of[FY].value, load = found->of[FZ].value;
-        at[V_LOAD] = load;
-        at[V_SLIP_RATIO] = found->of[KAPPA].there ? found->of[KAPPA].value : NAN;
-        at[V_SLIP_SIZE] = fabs(at[V_SLIP_RATIO]);
-        at[V_SLIP_STD] = 0.0 * force;
-        Told told = slid(&t, at, force, load);
-        if (told.there) look.sliding = (force > 0.0 ? -1.0 : 1.0) * or_else(told.sliding, 1.0);
+    if (found->of[FZ].there && found->of[FY].there && found->of[FY].slid) {
+        double side = found->of[FY].value > 0.0 ? -1.0 : 1.0;
+        look.sliding = side * or_else(found->of[FY].sliding, 1.0); /* any, where no angle fits */
     }
     look.values = values[0];
     look.laws = &c->laws;

@@ -5,10 +5,11 @@
 #include "any_road.h"
 #include "calibration.h"
 
-/* Estimate of the reference; `there` is 0 where the quantity is not calibrated. */
+/* Estimate of the reference; `there` is 0 where the quantity is not calibrated. `slid` is 0 where
+ * its `sliding` is None. */
 typedef struct {
-    int there, valid;
-    double value, std, by_camber;
+    int there, valid, slid;
+    double value, std, by_camber, sliding;
 } Estimate;
 
 /* What the chain says of one turn, Chain.predict's result. */

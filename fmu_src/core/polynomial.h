@@ -14,7 +14,7 @@ void design(const Form *form, const double *values, double *terms);
 /* Value and standard deviation. Reference: Polynomial.predict */
 double predicted(const Polynomial *p, const Constants *k, const double *values, double *std);
 
-/* Reference: Polynomial.within */
+/* Reference: Polynomial.judge */
 int within_data(const Polynomial *p, const double *values);
 
 /* Derivative by a value. Reference: Polynomial.slope */

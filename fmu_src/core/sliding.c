@@ -37,7 +37,7 @@ double curve_share(const SlidingCurve *c, const Constants *k, double used, doubl
         double fall = 2.0 * (a / at + b * n * rest / filled);
         t = minimum(t + maximum(a + b - 1.0, 0.0) / maximum(fall, k->tiny), 1.0);
     }
-    return t;
+    return pull > 0.0 ? t : alone;
 }
 
 double curve_across(const SlidingCurve *c, const Constants *k, double used, double t, double load) {

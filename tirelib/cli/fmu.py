@@ -19,10 +19,12 @@ from tirelib.cli.common import (
 from tirelib.cli.estimate import exit_code, print_document
 from tirelib.cli.fmu_virtual import virtual
 from tirelib.errors import FormatError
+from tirelib.estimators.calibration_file import read_calibration
 from tirelib.estimators.costs import costs_of
 from tirelib.estimators.result import estimate_document
 from tirelib.fmu.build import DEFAULT_RATE, build_fmu, embedded_calibration
 from tirelib.fmu.check import check_fmu
+from tirelib.fmu.native import build_native, core_file
 from tirelib.fmu.run import LoadedFmu, play_campaign
 from tirelib.observations import observe
 from tirelib.signal import LowPass
@@ -39,12 +41,20 @@ Examples:
   tirelib fmu build --calibration build/out/cal.toml --out build/out/StrainTire.fmu
   tirelib fmu build --calibration cal.toml --out X.fmu --samples-per-step 10      # 1 ms at 10 kHz
   tirelib fmu build --calibration cal.toml --out X.fmu --samples-per-step 32 --buffered
+  tirelib fmu build --calibration cal.toml --out X.fmu --native                 # needs no Python
 
 \b
-FMI 2.0 co-simulation, one wheel. Needs CPython with numpy and scipy where it runs; the rest is
-inside. The communication step is the samples per step divided by the sample rate. With --buffered
-the step is free, and the input `samples` gives the number of new samples in the frame; the
-estimates are the same.
+FMI 2.0 co-simulation, one wheel. Needs CPython with numpy and scipy where it runs, with --native
+nothing; the rest is inside. The communication step is the samples per step divided by the sample
+rate. With --buffered the step is free, and the input `samples` gives the number of new samples in
+the frame; the estimates are the same.
+"""
+_TABLE = """\b
+Example:
+  tirelib fmu table build/out/cal.toml --out build/out/cal.table
+
+\b
+An FMU built with --native reads no TOML; its parameter `calibration` takes the path of this file.
 """
 _RUN = """\b
 Example:
@@ -112,6 +122,11 @@ fmu.add_command(virtual)
     show_default="NaN",
     help="What an output shows where it has no value; see docs/fmu.md.",
 )
+@click.option(
+    "--native",
+    is_flag=True,
+    help="Pack the estimator compiled for Linux, Windows and macOS instead of the Python one.",
+)
 def build(
     calibration: Path,
     out: Path,
@@ -119,10 +134,11 @@ def build(
     sample_rate: float,
     buffered: bool,
     missing: float,
+    native: bool,
 ) -> None:
     """Write StrainTire.fmu with a calibration inside."""
     with progress_bar("building", 3) as progress:
-        path = build_fmu(
+        path = (build_native if native else build_fmu)(
             calibration,
             out,
             samples_per_step=samples_per_step,
@@ -140,6 +156,16 @@ def build(
     console.print(f"communication step {free if buffered else f'{step:g} ms'}")
     console.print(f"written: {path} ({path.stat().st_size / 1e3:.0f} kB)")
     console.print(f"next: tirelib fmu check {path}")
+
+
+@fmu.command(epilog=_TABLE)
+@click.argument("calibration", metavar="CAL.toml", type=FILE)
+@click.option("--out", metavar="X.table", type=NEW_FILE, required=True, help="File to write.")
+def table(calibration: Path, out: Path) -> None:
+    """Write a calibration for the parameter `calibration` of a native FMU."""
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_bytes(core_file(read_calibration(calibration)))
+    output().print(f"written: {out} ({out.stat().st_size / 1e3:.0f} kB)")
 
 
 @fmu.command(epilog=_RUN)

@@ -38,8 +38,11 @@ def strain_tire(
     sample_rate: float,
     buffered: bool,
     missing: float = math.nan,
+    native: bool = False,
 ) -> SlaveSpec:
     """Return what `tirelib.fmu.build.export` needs; see `tirelib.fmu.build.build_fmu`.
+
+    `native` says that the FMU needs no Python: its page speaks of the native core then.
 
     Raises
     ------
@@ -86,7 +89,7 @@ def strain_tire(
             "calibration.toml": text.encode(),
             **{f"{FOLDER}/{name}": data for name, data in reference.files(MODEL).items()},
         },
-        documentation={"index.html": _page(loaded, document, table, settings).encode()},
+        documentation={"index.html": _page(loaded, document, table, settings, native).encode()},
         icon=source_file("strain_tire.png").read_bytes(),
         start_depends_on=(MISSING,),
     )
@@ -97,6 +100,7 @@ def _page(
     document: Mapping[str, Any],
     table: list[Variable],
     settings: Mapping[str, Any],
+    native: bool,
 ) -> str:
     samples, rate = settings["samples_per_step"], settings["sample_rate"]
     lead = (
@@ -115,9 +119,11 @@ def _page(
         if calibration.cut_off is None
         else f"{calibration.cut_off:g} Hz",
         "axis systems": "iso (default), sae, adapted_sae (parameter axes)",
-        "needs": "CPython 3.11 or newer with numpy and scipy; linux64 or win64",
+        "needs": "nothing else; Linux (x86-64, AArch64), Windows (x86-64), macOS 11"
+        if native
+        else "CPython 3.11 or newer with numpy and scipy; linux64 or win64",
         "version": "{version}",
-        "licences": "documentation/licenses: MIT, tirelib and pythonfmu",
+        "licences": f"documentation/licenses: MIT, tirelib{'' if native else ' and pythonfmu'}",
     }
     drawing = source_file("conventions.svg").read_text(encoding="utf-8")
     sections = {
@@ -126,7 +132,7 @@ def _page(
         "Accuracy": _accuracy(document),
         "Calibrated range": _ranges(calibration),
         "Flags": _flags(),
-        "Limits": _LIMITS,
+        "Limits": _LIMITS if native else _LIMITS.replace("</ul>", _PATHS),
         "Check": _CHECK,
     }
     return page(MODEL, lead, facts, table, sections)
@@ -204,7 +210,8 @@ start or a gap is never valid.</li> <li>Without an estimate a Real output shows 
 <code>missing</code>, NaN by default; only <code>valid</code> states whether there is an
 estimate.</li> <li>Forward rolling on a flat road; a turn shorter than 3 s.</li> <li>The slip ratio
 needs <code>speed</code>; a calibration with pressure or camber needs those.</li> <li>Without
-contacts for two turns <code>valid</code> drops and the last values are held.</li> <li>The path of
-the unpacked FMU may hold spaces, but no percent-encoded character else.</li> </ul>"""
+contacts for two turns <code>valid</code> drops and the last values are held.</li> </ul>"""
+_PATHS = """<li>The path of the unpacked FMU may hold spaces, but no percent-encoded character
+else.</li> </ul>"""
 _CHECK = """<p><code>resources/reference</code> holds input and expected output in the FMI
 cross-check layout; <code>tirelib fmu check X.fmu</code> plays and compares them.</p>"""

@@ -1,0 +1,93 @@
+"""Time of a step of the native FMU in a C host, beside an FMU that does nothing.
+
+    python build/native_speed.py [--samples 10] [--repeat 50]
+
+A step is what an importer does: set frame and conditions, step, get the estimates. Needs gcc. The
+worst step holds what the operating system takes for itself, so the empty FMU stands beside it.
+"""
+
+import argparse
+import subprocess
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+
+import numpy as np
+from fmpy import read_model_description
+
+ROOT = Path(__file__).parents[1]
+sys.path[:0] = [str(ROOT)]
+
+from tests.fmu import live  # noqa: E402
+from tests.synthetic import record  # noqa: E402
+from tirelib.fmu.native import build_native  # noqa: E402
+from tirelib.held import HELD  # noqa: E402
+
+RATE = 1e4
+EMPTY = """
+#include <stddef.h>
+static int wheel;
+void *fmi2Instantiate(void) { return &wheel; }
+int fmi2ExitInitializationMode(void) { return 0; }
+int fmi2DoStep(void) { return 0; }
+int fmi2SetReal(void) { return 0; }
+int fmi2GetReal(void) { return 0; }
+"""
+
+
+def frames(samples: int) -> np.ndarray:
+    """Return strain of forty turns and the conditions, shape (steps, doubles of a step)."""
+    strain = record(turns=40.0, speed=live.SPEED, noise=4e-6, rate=RATE, tilt=0.05, dip=2.6e-3)[0]
+    n = strain.shape[1] // samples
+    known = {"speed": live.SPEED, "pressure": live.PRESSURE, "camber": 0.0}
+    held = np.tile([known.get(name, np.nan) for name in HELD], (n, 1))
+    return np.hstack((strain[:, : n * samples].T.reshape(n, -1), held))
+
+
+def main() -> None:
+    """Build, compile, run, print."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--samples", type=int, default=10)
+    options.add_argument("--repeat", type=int, default=50)
+    given = options.parse_args()
+    folder = Path(tempfile.mkdtemp())
+    fmu = build_native(
+        live.calibration_file(),
+        folder / "x.fmu",
+        samples_per_step=given.samples,
+        sample_rate=RATE,
+    )
+    with zipfile.ZipFile(fmu) as archive:
+        archive.extractall(folder / "x")
+    guid = read_model_description(str(folder / "x"), validate=False).guid
+    data = frames(given.samples)
+    data.tofile(folder / "frames")
+    (folder / "empty.c").write_text(EMPTY)
+    gcc = ["gcc", "-O2", "-std=c99"]
+    subprocess.run(
+        [*gcc, "-shared", "-fPIC", folder / "empty.c", "-o", folder / "empty.so"], check=True
+    )
+    host = folder / "host"
+    subprocess.run([*gcc, ROOT / "build" / "native_speed.c", "-ldl", "-o", host], check=True)
+    native = folder / "x" / "binaries" / "linux64" / "StrainTire.so"
+    for name, library in (("empty", folder / "empty.so"), ("native", native)):
+        told = subprocess.run(
+            [
+                *(host, library, guid, (folder / "x" / "resources").as_uri(), folder / "frames"),
+                *(str(data.shape[1]), repr(given.samples / RATE), str(given.repeat)),
+            ],
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout.split()
+        mean, median, most, worst = (1e6 * float(x) for x in told)
+        sys.stdout.write(
+            f"{name}: {data.shape[0] * given.repeat} steps of {given.samples} samples: mean "
+            f"{mean:.2f} us of CPU ({mean / given.samples:.3f} us a sample), median {median:.2f}, "
+            f"99.9 % {most:.0f}, worst {worst:.0f} us\n"
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,322 @@
+"""The FMU without Python: valid, of the sources' hash, and step by step what the library shows."""
+
+import importlib.util
+import math
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fmpy import read_model_description
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave, fmi2CoSimulation, fmi2ModelExchange
+from fmpy.validation import validate_fmu
+
+from tests.fmu import live
+from tirelib.fmu.native import BINARIES, build_native, core_file
+from tirelib.fmu.run import keeping
+from tirelib.fmu.wheel import Wheel
+from tirelib.held import HELD
+
+ROOT = Path(__file__).parents[2]
+SAMPLES = 20
+STEP = SAMPLES / live.RATE
+
+
+@pytest.fixture(scope="session")
+def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("native") / "StrainTire.fmu"
+    return build_native(
+        live.calibration_file(), out, samples_per_step=SAMPLES, sample_rate=live.RATE
+    )
+
+
+@pytest.fixture(scope="session")
+def folder(fmu: Path) -> Path:
+    place = fmu.parent / "50% Prüfstand #1"
+    with zipfile.ZipFile(fmu) as archive:
+        archive.extractall(place)
+    return place
+
+
+class Host:
+    """An instance, its variables by name, and what it said."""
+
+    def __init__(self, folder: Path, **changed: Any) -> None:
+        about = read_model_description(str(folder), validate=False)
+        self.said: list[str] = []
+        self.at = {v.name: v.valueReference for v in about.modelVariables}
+        self.outputs = [v for v in about.modelVariables if v.causality == "output"]
+        self.slave = FMU2Slave(
+            guid=about.guid,
+            unzipDirectory=str(folder),
+            instanceName="w",
+            modelIdentifier="StrainTire",
+        )
+        self.slave.callbacks = keeping(self.said)
+        given = {
+            "type": fmi2CoSimulation,
+            "guid": about.guid,
+            "place": (folder / "resources").as_uri(),
+        } | changed
+        texts = [None if given[k] is None else given[k].encode() for k in ("guid", "place")]
+        self.slave.component = self.slave.fmi2Instantiate(
+            b"w", given["type"], *texts, self.slave.callbacks, 0, 0
+        )
+
+    def start(self, **parameters: str | float) -> "Host":
+        for name, value in parameters.items():
+            put = self.slave.setString if isinstance(value, str) else self.slave.setReal
+            put([self.at[name]], [value])
+        self.slave.setupExperiment()
+        self.slave.enterInitializationMode()
+        self.slave.exitInitializationMode()
+        return self
+
+    def step(self, frame: np.ndarray, conditions: np.ndarray, *, step: float = STEP) -> None:
+        first = self.at["strain_1_1"]
+        values = [*frame.T.ravel().tolist(), *conditions.tolist()]
+        self.slave.setReal([first + i for i in range(len(values))], values)
+        self.slave.doStep(0.0, step)
+
+    def show(self) -> tuple[list[float], list[Any]]:
+        """Return Real outputs and the others."""
+        get = {
+            "Real": self.slave.getReal,
+            "Integer": self.slave.getInteger,
+            "Boolean": lambda r: [bool(x) for x in self.slave.getBoolean(r)],
+            "String": lambda r: [x.decode() for x in self.slave.getString(r)],
+        }
+        shown = [(v.type, get[v.type]([v.valueReference])[0]) for v in self.outputs]
+        reals = [value for kind, value in shown if kind == "Real"]
+        return reals, [value for kind, value in shown if kind != "Real"]
+
+
+def frames(kind: str = "well") -> list[tuple[np.ndarray, np.ndarray]]:
+    strain = live.strain_of(4e3, 0.1, turns=4.4)[0]
+    if kind == "frozen":
+        strain[1, 1200:] = strain[1, 1200]
+    found = []
+    for start in range(0, strain.shape[1] - SAMPLES, SAMPLES):
+        known = {"speed": live.SPEED, "pressure": live.PRESSURE, "camber": 0.0}
+        if start > 1600:
+            known["friction"] = 0.8
+        conditions = np.array([known.get(name, math.nan) for name in HELD])
+        found.append((strain[:, start : start + SAMPLES], conditions))
+    return found
+
+
+def same(shown: tuple[Any, Any], wanted: tuple[Any, Any]) -> None:
+    np.testing.assert_allclose(shown[0], wanted[0], rtol=1e-9, atol=1e-9)
+    assert shown[1] == list(wanted[1])
+
+
+def test_it_is_valid_and_the_same_bytes_again(fmu: Path, tmp_path: Path) -> None:
+    assert validate_fmu(str(fmu)) == []
+    again = build_native(
+        live.calibration_file(),
+        tmp_path / "again.fmu",
+        samples_per_step=SAMPLES,
+        sample_rate=live.RATE,
+    )
+    assert again.read_bytes() == fmu.read_bytes()
+    assert fmu.stat().st_size < 1e6
+
+
+def test_its_variables_are_those_of_the_python_fmu(fmu: Path) -> None:
+    native, python = (read_model_description(str(path)) for path in (fmu, live.fmu_file(SAMPLES)))
+    for own, other in zip(native.modelVariables, python.modelVariables, strict=True):
+        for name in (
+            *("name", "valueReference", "type", "causality", "variability", "description"),
+            *("unit", "displayUnit", "min", "max", "nominal", "start"),
+        ):
+            assert getattr(own, name) == getattr(other, name), (own.name, name)
+
+
+@pytest.mark.parametrize("axes", ["iso", "sae"])
+def test_it_shows_what_the_library_shows(folder: Path, axes: str) -> None:
+    host = Host(folder).start(axes=axes)
+    wheel = Wheel(live.calibration(), live.RATE, SAMPLES, axes)
+    same(host.show(), wheel.outputs())
+    for frame, conditions in frames():
+        host.step(frame, conditions)
+        wheel.step(frame.T.ravel().tolist(), STEP, True, *conditions.tolist())
+        same(host.show(), wheel.outputs())
+    assert wheel.outputs()[1][2]
+    assert host.said == []
+
+
+def test_states_go_back_and_forth_and_instances_do_not_meet(folder: Path) -> None:
+    host, other = Host(folder).start(), Host(folder).start(axes="sae")
+    shown, states = [], []
+    for well, frozen in zip(frames(), frames("frozen"), strict=True):
+        states.append(host.slave.serializeFMUstate(host.slave.getFMUstate()))
+        host.step(*well)
+        other.step(*frozen)
+        shown.append(repr(host.show()))
+    late = Host(folder)  # another instance, not even started
+    for at in (70, 5, 30):
+        late.slave.setFMUState(late.slave.deSerializeFMUstate(states[at]))
+        for number, frame in enumerate(frames()[at : at + 40], start=at):
+            late.step(*frame)
+            assert repr(late.show()) == shown[number]
+    damaged = bytearray(states[50])
+    damaged[-100] ^= 1
+    with pytest.raises(FMICallException):
+        late.slave.setFMUState(late.slave.deSerializeFMUstate(bytes(damaged)))
+    assert "not a saved state of this FMU" in late.said[-1]
+    host.slave.reset()
+    host.start()
+    host.step(*frames()[0])
+    assert repr(host.show()) == shown[0]
+
+
+REFUSED = {
+    "axes": ("iso8855", "allowed are adapted_sae, iso, sae"),
+    "tire": ("another", "calibrate on a campaign of this tire"),
+    "calibration": ("/nowhere/100%.table", "/nowhere/100%.table: cannot be read"),
+    "filter_order": (30.0, "another low-pass would bias it"),
+    "missing": (math.inf, "allowed are NaN and finite numbers"),
+    "sample_rate": (10.0, "allowed are 100 .. 100000 Hz"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_parameter_that_cannot_be_is_refused_and_a_reset_heals(folder: Path, name: str) -> None:
+    value, said = REFUSED[name]
+    host = Host(folder)
+    with pytest.raises(FMICallException):
+        host.start(**{name: value})
+    assert said in host.said[-1].replace("%%", "%")
+    host.slave.reset()
+    host.start()
+
+
+def test_what_cannot_be_done_is_an_error_and_the_instance_lives(folder: Path) -> None:
+    host, frame = Host(folder), frames()[0]
+    with pytest.raises(FMICallException):
+        host.step(*frame)
+    assert "call exitInitializationMode first" in host.said[-1]
+    assert host.show()[1][-1].startswith("step_refused: the FMU is not initialised")
+    host.start(missing=0.0)
+    assert set(host.show()[0]) == {0.0}
+    for step in (0.0, 1.5 / live.RATE, 4.0, math.nan):
+        with pytest.raises(FMICallException):
+            host.step(*frame, step=step)
+        assert host.show()[1][-1].startswith("step_refused: communication step = ")
+    for act in (
+        lambda: host.slave.setReal([host.at["Fz"]], [1.0]),
+        lambda: host.slave.setReal([host.at["sample_rate"]], [1.0]),
+        lambda: host.slave.getReal([host.at["turn"]]),
+        lambda: host.slave.getReal([10**6]),
+    ):
+        with pytest.raises(FMICallException):
+            act()
+    told = len(host.said)
+    for _ in range(200):
+        with pytest.raises(FMICallException):
+            host.step(*frame, step=0.0)
+    assert len(host.said) - told == 2  # the 10th and the 100th time
+    host.step(*frame)
+    assert host.show()[1][-1] == "first_turn"
+    host.slave.terminate()
+    with pytest.raises(FMICallException):
+        host.step(*frame)
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"guid": "{0}"}, "come from different builds"),
+        ({"guid": None}, "fmuGUID = missing"),
+        ({"type": fmi2ModelExchange}, "fmuType is model exchange"),
+        ({"place": None}, "fmuResourceLocation is missing"),
+        ({"place": "file:///nowhere"}, "unpack the whole FMU"),
+    ],
+)
+def test_what_is_not_this_fmu_is_not_instantiated(
+    folder: Path, changed: dict[str, Any], said: str
+) -> None:
+    host = Host(folder, **changed)
+    assert not host.slave.component
+    assert said in host.said[-1]
+
+
+def test_another_calibration_of_the_tire_can_be_given(folder: Path, tmp_path: Path) -> None:
+    table = tmp_path / "another.table"
+    table.write_bytes(core_file(live.calibration()))
+    host = Host(folder).start(calibration=str(table))
+    for frame in frames():
+        host.step(*frame)
+    assert host.show()[1][2]
+    table.write_bytes(table.read_bytes()[:-8])
+    with pytest.raises(FMICallException):
+        Host(folder).start(calibration=str(table))
+
+
+def maker() -> Any:
+    spec = importlib.util.spec_from_file_location("native_fmu", ROOT / "build" / "native_fmu.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("name", BINARIES)
+def test_the_binaries_were_made_from_the_sources(name: str) -> None:
+    said = f"source sha256 {maker().source_hash()}".encode()
+    binary = (ROOT / "fmu_src" / "binaries" / name).read_bytes()
+    assert said in binary, "run python build/native_fmu.py"
+
+
+def test_the_compiler_makes_the_same_binary_again() -> None:
+    if importlib.util.find_spec("ziglang") is None:
+        pytest.skip("ziglang is not installed: only who makes the binaries needs it")
+    name = BINARIES[0]
+    assert maker().compiled(name) == (ROOT / "fmu_src" / "binaries" / name).read_bytes()
+
+
+def test_a_process_without_python_needs_nothing(folder: Path, tmp_path: Path) -> None:
+    """The library needs the C library alone; a C program loads, steps and leaves it."""
+    library = folder / "binaries" / "linux64" / "StrainTire.so"
+    if sys.platform != "linux":
+        pytest.skip("the host is for Linux")
+    source = tmp_path / "host.c"
+    source.write_text(_HOST)
+    subprocess.run(["gcc", "-O1", str(source), "-ldl", "-o", str(tmp_path / "host")], check=True)
+    guid = read_model_description(str(folder), validate=False).guid
+    place = (folder / "resources").as_uri()
+    done = subprocess.run(
+        [tmp_path / "host", library, guid, place], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "0 0 0\n", "")
+
+
+_HOST = """
+#include <dlfcn.h>
+#include <stdio.h>
+typedef struct { void *log, *take, *give, *done, *environment; } Callbacks;
+int main(int n, char **argument) {
+    Callbacks none = {0};
+    void *library = dlopen(argument[1], RTLD_NOW);
+    if (n < 4 || !library) return fprintf(stderr, "%s", dlerror()), 1;
+    void *(*make)(const char *, int, const char *, const char *, void *, int, int);
+    int (*start)(void *), (*step)(void *, double, double, int);
+    void (*leave)(void *);
+    *(void **)&make = dlsym(library, "fmi2Instantiate");
+    *(void **)&start = dlsym(library, "fmi2ExitInitializationMode");
+    *(void **)&step = dlsym(library, "fmi2DoStep");
+    *(void **)&leave = dlsym(library, "fmi2FreeInstance");
+    void *wheel = make("w", 1, argument[2], argument[3], &none, 0, 0);
+    if (!wheel) return 2;
+    printf("%d ", start(wheel));
+    printf("%d ", step(wheel, 0.0, 0.004, 0));
+    printf("%d\\n", step(wheel, 0.004, 0.004, 0));
+    leave(wheel);
+    return dlclose(library);
+}
+"""
