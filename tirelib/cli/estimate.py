@@ -17,7 +17,7 @@ from tirelib.cli.common import (
     progress_bar,
     write_json,
 )
-from tirelib.cli.limits import not_checked, not_given
+from tirelib.cli.limits import not_checked, not_given, weakly_checked
 from tirelib.errors import CalibrationError
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration
@@ -121,7 +121,8 @@ def print_document(name: str, document: dict[str, Any], calibration: Calibration
             "in a thousand would); check whether this tire is on the wheel, and whether it is "
             "worn or soft; otherwise calibrate again"
         )
-    for sentence in (not_given(document["not_given"]), *not_checked(calibration)):
+    limits = (weakly_checked(other), *not_checked(calibration))
+    for sentence in (not_given(document["not_given"]), *limits):
         if sentence:
             console.print(sentence)
 

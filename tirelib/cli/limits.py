@@ -7,6 +7,9 @@ from tirelib.estimators.calibration import Calibration
 
 REPORTED_STD_RATIO = 1.2
 """Ratio of standard deviations from which an unknown condition is reported."""
+WEAKLY_CHECKED = 0.5
+"""Share of turns at uncalibrated pressures or speeds from which the check of the tire is reported
+as weak; half and double change only for which mixed campaigns the sentence is printed."""
 REPORTED_LOSS = 0.05
 """Share of turns made invalid by it from which that is reported."""
 
@@ -67,3 +70,24 @@ def not_checked(calibration: Calibration) -> list[str]:
             )
         )
     return found
+
+
+def weakly_checked(other_tire: Mapping[str, Any] | None) -> str:
+    """Return a sentence where another tire would hardly be detected; empty if it would be.
+
+    Parameters
+    ----------
+    other_tire : mapping or None
+        ``other_tire`` of an estimate document.
+    """
+    if not other_tire or other_tire["suspected"]:
+        return ""
+    judged, away = other_tire["judged"], other_tire["extrapolated"]
+    if away <= WEAKLY_CHECKED * judged:
+        return ""
+    return (
+        f"Another tire may go undetected: {away} of {judged} turns in range have a pressure or "
+        "speed that was not calibrated, and there the strain cannot be held closely against that "
+        "of the calibrated tire; calibrate at these pressures and speeds, and check the tire by "
+        "its name and dimensions"
+    )

@@ -50,11 +50,25 @@ def estimate_document(
 
 
 def _other_tire(estimates: Estimates) -> dict[str, Any]:
-    """Return how many turns in range show another tire's strain, and whether that is no chance."""
+    """Return how many turns in range show another tire's strain, and whether that is no chance.
+
+    `extrapolated` counts the turns in range at a pressure or speed that was not calibrated: there
+    the doubt of how the strain shifts with both hides most other tires.
+    """
     unlike = (estimates.flags & int(TurnFlag.OTHER_TIRE)) != 0
-    judged = int((estimates.turn_valid | unlike).sum())
-    turns = int(unlike.sum())
-    return {"turns": turns, "judged": judged, "suspected": suspected(turns, judged)}
+    in_range = estimates.turn_valid | unlike
+    judged, turns = int(in_range.sum()), int(unlike.sum())
+    away = [
+        "condition_extrapolated" in notes
+        for notes, use in zip(estimates.notes, in_range, strict=True)
+        if use
+    ]
+    return {
+        "turns": turns,
+        "judged": judged,
+        "suspected": suspected(turns, judged),
+        "extrapolated": sum(away),
+    }
 
 
 def cost_rows(costs: Sequence[Cost]) -> list[dict[str, Any]]:

@@ -105,7 +105,7 @@ def test_a_calibration_that_cannot_notice_another_tire_says_so(
     assert "17 are needed" in line
     first, second = not_checked(replace(few, version=1))
     assert "earlier version" in first
-    assert second.startswith("Another tire would not be noticed")
+    assert second.startswith("Another tire would not be detected")
 
 
 def test_a_file_keeps_its_version(trained: Trained) -> None:

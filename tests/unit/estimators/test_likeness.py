@@ -10,6 +10,7 @@ import pytest
 from tests.synthetic import LATERAL, header, synthetic_run
 from tirelib.arrays import FloatArray
 from tirelib.campaign import Campaign
+from tirelib.cli.limits import weakly_checked
 from tirelib.errors import CalibrationError
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
@@ -44,6 +45,24 @@ def test_another_day_of_the_same_tire_is_not_taken_for_another_tire(
     found = trained.calibration.estimate(day.features)
     assert flagged(found).sum() <= 1
     assert not estimate_document(day, found, trained.calibration)["other_tire"]["suspected"]
+
+
+def test_an_estimate_says_where_another_tire_may_go_undetected(
+    trained: Trained, another_day: Campaign
+) -> None:
+    day = observe([another_day])
+    softer = replace(day.features, pressure=0.9 * day.features.pressure)
+    told = []
+    for features in (day.features, softer):
+        found, seen = trained.calibration.estimate(features), replace(day, features=features)
+        told.append(estimate_document(seen, found, trained.calibration)["other_tire"])
+    own, away = told
+    assert own["extrapolated"] == 0
+    assert weakly_checked(own) == ""
+    assert away["extrapolated"] == away["judged"] > 20
+    assert "may go undetected" in weakly_checked(away)
+    assert weakly_checked(away | {"suspected": True}) == ""  # then it is said to be another tire
+    assert weakly_checked(None) == ""  # and that nothing is checked stands in `not_checked`
 
 
 def test_another_shape_of_the_contact_is_another_tire(
