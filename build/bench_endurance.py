@@ -1,4 +1,4 @@
-"""What the bench stands: ten minutes at full rate, a cable in and out, processes that are killed.
+"""Endurance of the bench: ten minutes at full rate, a cable in and out, processes that are killed.
 
 ``make endurance``, or ``python build/bench_endurance.py --part plug --cycles 20``. The programs run
 as a user starts them and are measured from outside. Results land in ``build/out/bench-endurance``;

@@ -43,7 +43,7 @@ class SineFit:
         Peak lateral force F_yp = D (C >= 1), offset S_v left out.
     reach : float
         Largest offset-free force in the data, as a share of the peak.
-    peak_told : bool
+    peak_determined : bool
         The data reach at least 0.9 of the peak and determine it within 5 %.
     residual_std : float, [N]
         Residual standard deviation of the fit.
@@ -58,7 +58,7 @@ class SineFit:
     peak: float
     peak_std: float
     reach: float
-    peak_told: bool
+    peak_determined: bool
     residual_std: float
     at_limit: tuple[str, ...]
 

@@ -23,7 +23,7 @@ def test_noise_free_curve_is_recovered() -> None:
     fit = fit_sine(alpha, lateral_curve(alpha, TRUE))
     for name, value in TRUE.items():
         assert fit.coefficients[name] == pytest.approx(value, rel=1e-4), name
-    assert fit.peak_told
+    assert fit.peak_determined
     assert fit.at_limit == ()
 
 
@@ -45,7 +45,7 @@ def test_curve_that_stops_early_does_not_tell_the_peak() -> None:
     rng = np.random.default_rng(5)
     alpha = np.linspace(-0.04, 0.04, 41)
     fit = fit_sine(alpha, lateral_curve(alpha, TRUE) + rng.normal(0, 20.0, alpha.size))
-    assert not fit.peak_told
+    assert not fit.peak_determined
     assert fit.peak_std > 0.05 * fit.peak or fit.reach < 0.9
     assert fit.stiffness == pytest.approx(9e4, abs=5 * fit.stiffness_std)
 
