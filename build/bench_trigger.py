@@ -19,9 +19,9 @@ import numpy as np
 from tirebench.estimator.wheels import Line, Wheels
 from tirebench.links import Read
 from tirebench.live.exchange import FINISH, STOP, Exchange
-from tirebench.live.kept import CONTEXT, Kept
 from tirebench.live.recorder import record
 from tirebench.live.recording_state import Order, RecorderState, RecordingRule
+from tirebench.live.supervised import CONTEXT, Supervised
 from tirebench.protocols.decoder import SerialDecoder
 from tirebench.recording.header import RecordingHeader
 from tirebench.recording.recorder import alarm_event
@@ -68,7 +68,7 @@ class Bench:
         self._order("start", str(file))
         rule = RecordingRule(around=(before, 1.0))
         header = RecordingHeader({}, more=({},) * (WHEELS - 1))
-        self.recorder = Kept(
+        self.recorder = Supervised(
             record, lambda _: (header, Conditions.constant(), rule, exchange.address)
         )
         self._wheels = Wheels([Line(SerialDecoder(), {}, wheel=n) for n in range(WHEELS)])

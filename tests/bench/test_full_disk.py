@@ -11,9 +11,9 @@ import pytest
 from tirebench.errors import RecordingError
 from tirebench.links import BACK, LOST, PASSED, RESUMED, Read
 from tirebench.live.exchange import Exchange
-from tirebench.live.kept import CONTEXT
 from tirebench.live.recorder import _Recorder
 from tirebench.live.recording_state import Order, RecorderState, RecordingRule
+from tirebench.live.supervised import CONTEXT
 from tirebench.recording.header import RecordingHeader
 from tirebench.recording.mcap_log import McapLog
 from tirebench.recording.recorder import Recorder

@@ -10,14 +10,14 @@ from pathlib import Path
 import pytest
 
 from tirebench.live.exchange import Exchange
-from tirebench.live.kept import CONTEXT
+from tirebench.live.supervised import CONTEXT
 from tirebench.owned import SHARED, prefix, sweep
 
 pytestmark = pytest.mark.skipif(not SHARED.is_dir(), reason="no /dev/shm on this system")
 OWNER = """
 import tempfile, time
 from tirebench.live.exchange import Exchange
-from tirebench.live.kept import CONTEXT
+from tirebench.live.supervised import CONTEXT
 from tirebench.owned import prefix
 exchange, folder = Exchange.create(CONTEXT, 1), tempfile.mkdtemp(prefix=prefix())
 print(prefix(), flush=True)

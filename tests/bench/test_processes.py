@@ -32,11 +32,11 @@ from tirebench.links.opening import PortPlan
 from tirebench.live.chain import LiveChain, LivePlan
 from tirebench.live.estimator import EstimatorPlan, Report, _Estimator
 from tirebench.live.exchange import Address, Exchange
-from tirebench.live.kept import CONTEXT
 from tirebench.live.reader import ReaderPlan, load
 from tirebench.live.recorder import _Recorder
 from tirebench.live.recording_state import Order, RecorderState, RecordingRule
 from tirebench.live.run_alarms import RECORDED_AGAIN
+from tirebench.live.supervised import CONTEXT
 from tirebench.protocols.decoder import SerialDecoder
 from tirebench.recording.document import flags, turn_document
 from tirebench.recording.header import parts_of

@@ -17,8 +17,8 @@ from tirebench.estimator.wheels import Block, Wheels
 from tirebench.links import DECODED, PASSED, RESUMED, Read
 from tirebench.links.opening import PortPlan
 from tirebench.live.exchange import Exchange
-from tirebench.live.kept import CONTEXT
 from tirebench.live.reader import ReaderPlan, _Reader
+from tirebench.live.supervised import CONTEXT
 from tirebench.protocols.decoder import SerialDecoder
 from tirebench.recording.header import RecordingHeader
 from tirebench.recording.link import ReplayLink

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from tirebench.errors import LinkError
 from tirebench.live.board import SIZE
 from tirebench.live.exchange import LEAST, SAMPLES, Exchange
-from tirebench.live.kept import CONTEXT
 from tirebench.live.rings import _CONTROL, ByteQueue, Cell, _stride, memory
+from tirebench.live.supervised import CONTEXT
 
 ROOM = 256
 

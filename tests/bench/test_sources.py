@@ -24,7 +24,7 @@ from tests.bench.programs import PATIENCE
 from tests.bench.servers import Server
 from tests.bench.test_processes import Turns
 from tirebench.cli import program
-from tirebench.cli.given import given_replayed
+from tirebench.cli.run_inputs import given_replayed
 from tirebench.deadline import Deadline
 from tirebench.emulator.emulator import write_script
 from tirebench.emulator.faults import Faults
@@ -40,9 +40,9 @@ from tirebench.links import Read
 from tirebench.links.opening import PortPlan
 from tirebench.live.chain import LiveChain, LivePlan
 from tirebench.live.exchange import Exchange
-from tirebench.live.kept import CONTEXT
 from tirebench.live.ports import GatheredLink, PortState
 from tirebench.live.reader import ReaderPlan
+from tirebench.live.supervised import CONTEXT
 from tirebench.protocols import SLCAN, slcan
 from tirebench.protocols.decoder import SerialDecoder
 from tirebench.protocols.plan import ProtocolPlan

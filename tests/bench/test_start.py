@@ -15,7 +15,7 @@ from tests.bench.programs import A_TURN, PATIENCE
 from tests.bench.test_sources import serial, vehicle
 from tests.bench.test_user_line import THREE, plan_of
 from tirebench.cli import program
-from tirebench.cli.given import Given, conditions_of, port_of_file, say_missing
+from tirebench.cli.run_inputs import RunInputs, conditions_of, port_of_file, say_missing
 from tirebench.deadline import Deadline
 from tirebench.errors import DeviceError, LinkError, UnpluggedError
 from tirebench.estimator.chain import Outputs
@@ -30,7 +30,7 @@ from tirelib.held import HELD
 from tirelib.units import to_si
 
 
-def said(given: Given, *needed: str, knows_tire: bool = True) -> str:
+def said(given: RunInputs, *needed: str, knows_tire: bool = True) -> str:
     calibration: Any = SimpleNamespace(needed=needed, knows_tire=knows_tire)
     console = Console(record=True, width=400, quiet=False, file=None)
     with console.capture() as captured:
@@ -40,7 +40,7 @@ def said(given: Given, *needed: str, knows_tire: bool = True) -> str:
 
 def test_a_condition_that_the_calibration_needs_is_missed_before_the_first_turn() -> None:
     sources: tuple[SourcePlan, ...] = (serial("a", 0),)
-    text = said(Given(sources, Conditions.constant(18.0), ()), "pressure", "camber")
+    text = said(RunInputs(sources, Conditions.constant(18.0), ()), "pressure", "camber")
     assert "WARNING: no camber: the calibration needs it, so NO TURN WILL BE VALID" in text
     assert "give --camber DEG, --conditions FILE, or a map with [camber]" in text
     assert "WARNING: no pressure" in text
@@ -48,13 +48,13 @@ def test_a_condition_that_the_calibration_needs_is_missed_before_the_first_turn(
 
 
 def test_what_only_makes_it_worse_is_a_note() -> None:
-    text = said(Given((serial("a", 0),), Conditions.constant(pressure=2e5, camber=0.0), ()))
+    text = said(RunInputs((serial("a", 0),), Conditions.constant(pressure=2e5, camber=0.0), ()))
     assert text.startswith("note: no speed: the slip ratio cannot be estimated; give --speed KMH")
     assert text.count("\n") == 1
 
 
 def test_a_camber_that_nobody_gives_is_said_with_what_it_costs() -> None:
-    text = said(Given((serial("a", 0),), Conditions.constant(18.0, pressure=2e5), ()))
+    text = said(RunInputs((serial("a", 0),), Conditions.constant(18.0, pressure=2e5), ()))
     assert text.startswith("note: no camber: standard deviations of Fy and alpha grow by the")
     assert "turns where camber dominates carry the flag camber_unknown; give --camber DEG" in text
     assert text.count("\n") == 1
@@ -62,7 +62,7 @@ def test_a_camber_that_nobody_gives_is_said_with_what_it_costs() -> None:
 
 def test_a_calibration_that_cannot_notice_another_tire_is_said() -> None:
     everything = Conditions.constant(18.0, pressure=2e5, camber=0.0)
-    given = Given((serial("a", 0),), everything, ())
+    given = RunInputs((serial("a", 0),), everything, ())
     assert said(given) == ""
     text = said(given, knows_tire=False)
     assert text.startswith("note: this calibration cannot detect that another tire is on the wheel")
@@ -70,10 +70,10 @@ def test_a_calibration_that_cannot_notice_another_tire_is_said() -> None:
 
 def test_what_a_bus_tells_is_not_missed_but_for_the_wheels_it_leaves_out() -> None:
     sources = (serial("a", 0), serial("b", 3), vehicle("c"))  # pressure of wheel 3, speed of all
-    text = said(Given(sources, Conditions.constant(camber=0.0), ()), "pressure")
+    text = said(RunInputs(sources, Conditions.constant(camber=0.0), ()), "pressure")
     assert "WARNING: no pressure of wheel 0: the calibration" in text
     assert "speed" not in text
-    assert said(Given(sources[1:], Conditions.constant(camber=0.0), ()), "pressure") == ""
+    assert said(RunInputs(sources[1:], Conditions.constant(camber=0.0), ()), "pressure") == ""
 
 
 def test_a_port_file_is_waited_for_and_so_is_its_port(
@@ -87,7 +87,7 @@ def test_a_port_file_is_waited_for_and_so_is_its_port(
         next(steps, lambda: None)()
 
     with monkeypatch.context() as patch:
-        for module in ("tirebench.cli.given", "tirebench.deadline"):
+        for module in ("tirebench.cli.run_inputs", "tirebench.deadline"):
             patch.setattr(f"{module}.time", clock)
         patch.setattr(clock, "sleep", sleep)
         quiet = Console(quiet=True)

@@ -13,7 +13,7 @@ from pythonfmu import FmuBuilder
 
 from tests.bench.campaigns import tiny_runs
 from tests.bench.conftest import TOY
-from tirebench.cli.given import Given
+from tirebench.cli.run_inputs import RunInputs
 from tirebench.errors import DeviceError
 from tirebench.estimator.estimation import Estimation
 from tirebench.estimator.fmu_archive import read_fmu
@@ -326,7 +326,7 @@ def test_three_gages_where_the_estimator_has_three(toy_of_three: Path) -> None:
 
 
 def test_wheels_with_other_gages_than_the_calibration_are_refused() -> None:
-    given = Given((SourcePlan(PortPlan("p"), plan_of(THREE)),), Conditions.constant(), ())
+    given = RunInputs((SourcePlan(PortPlan("p"), plan_of(THREE)),), Conditions.constant(), ())
     given.check_layout((0.03, 0.0, -0.03), "X.fmu")
     with pytest.raises(
         DeviceError, match=r"X.fmu: its gages are at .*, but the device 'map' has 3 of"

@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 import tomli_w
 
-from tirebench.cli.given import recorded_sources
 from tirebench.cli.options import devices_of
+from tirebench.cli.run_inputs import recorded_sources
 from tirebench.errors import RecordingError
 from tirebench.recording.export import (
     CAN_LOGS,

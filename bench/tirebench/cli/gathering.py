@@ -8,8 +8,8 @@ from typing import Any, TypeVar
 
 import click
 
-from tirebench.cli.given import given_replayed, live_sources
 from tirebench.cli.options import PORTS, devices_of, port_options
+from tirebench.cli.run_inputs import given_replayed, live_sources
 from tirebench.deadline import Deadline
 from tirebench.errors import DeviceError
 from tirebench.estimator.standing import LARGEST_STANDING_RANGE, Level, Levels, standing_mean

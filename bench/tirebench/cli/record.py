@@ -5,10 +5,10 @@ from typing import Any
 
 import click
 
-from tirebench.cli.given import given_live, live_sources
 from tirebench.cli.live import counters
 from tirebench.cli.options import PORTS, devices_of, port_options
 from tirebench.cli.recording import at_start, recording_options
+from tirebench.cli.run_inputs import given_live, live_sources
 from tirebench.cli.stop import start_in_order
 from tirebench.estimator.estimation import News
 from tirebench.estimator.session import Limits, Session

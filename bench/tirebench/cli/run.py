@@ -9,8 +9,12 @@ import numpy as np
 from rich.console import Console
 
 from tirebench.cli.bridges import Bridges, bridge_options
-from tirebench.cli.given import (
-    Given,
+from tirebench.cli.live import Screen, counters
+from tirebench.cli.options import PORTS, devices_of, port_options
+from tirebench.cli.page import Shown, page_choice, page_options
+from tirebench.cli.recording import at_start, recording_options
+from tirebench.cli.run_inputs import (
+    RunInputs,
     conditions_of,
     given_live,
     given_replayed,
@@ -18,10 +22,6 @@ from tirebench.cli.given import (
     port_of_file,
     say_missing,
 )
-from tirebench.cli.live import Screen, counters
-from tirebench.cli.options import PORTS, devices_of, port_options
-from tirebench.cli.page import Shown, page_choice, page_options
-from tirebench.cli.recording import at_start, recording_options
 from tirebench.cli.stop import start_in_order
 from tirebench.estimator.chain import Estimator
 from tirebench.estimator.estimation import Estimation, News
@@ -357,7 +357,7 @@ def run(
 
 
 def _in_process(
-    link: ReplayLink, file: FmuFile, known: Given, stack: ExitStack, *, laps: bool
+    link: ReplayLink, file: FmuFile, known: RunInputs, stack: ExitStack, *, laps: bool
 ) -> ReplayChain:
     """Return a recording through an instance of the FMU for each wheel, in this process."""
 

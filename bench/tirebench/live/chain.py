@@ -14,19 +14,19 @@ from tirebench import errors
 from tirebench.deadline import Deadline
 from tirebench.errors import LinkTimeoutError, RecordingError
 from tirebench.estimator.chain import Jump
+from tirebench.estimator.checked_turns import CheckedTurns
 from tirebench.estimator.estimation import News, skipped
 from tirebench.estimator.fmu_model import FmuFile
-from tirebench.estimator.judged import JudgedTurns
 from tirebench.estimator.wheels import MOST_WHEELS, Wheels
 from tirebench.live.board import SIZE
 from tirebench.live.estimators import Estimators
 from tirebench.live.exchange import FINISH, STOP, Exchange, woken
-from tirebench.live.kept import CONTEXT, Kept
 from tirebench.live.ports import PortState, read_source
 from tirebench.live.reader import LineState, ReaderPlan, load, read_port
 from tirebench.live.recorder import record
 from tirebench.live.recording_state import Order, RecorderState, RecordingRule
 from tirebench.live.run_alarms import TOO_BUSY, RunAlarms
+from tirebench.live.supervised import CONTEXT, Supervised
 from tirebench.recording.document import turn_document
 from tirebench.recording.header import RecordingHeader, part_path
 from tirebench.recording.recorder import jump_event
@@ -104,9 +104,9 @@ class LiveChain:
         self._orders = 0
         self._pending = News()
         self._next_look = 0.0
-        self._ports: list[Kept] = []
-        self._reader: Kept | None = None
-        self._recorder: Kept | None = None
+        self._ports: list[Supervised] = []
+        self._reader: Supervised | None = None
+        self._recorder: Supervised | None = None
         self._estimators = Estimators(
             plan.file,
             plan.conditions,
@@ -116,7 +116,7 @@ class LiveChain:
             every=plan.reader.every_turn,
         )
         self._finished = False
-        self._judged = JudgedTurns()
+        self._judged = CheckedTurns()
         self._alarms = RunAlarms(
             [source.port.port for source in plan.reader.sources],
             estimated=plan.file is not None,
@@ -129,7 +129,7 @@ class LiveChain:
                 self.order("start", str(self._plan.record))
             if self._plan.reader.recorded:
                 plan, address = self._plan, self._exchange.address
-                self._recorder = Kept(
+                self._recorder = Supervised(
                     record, lambda _: (plan.header, plan.conditions, plan.rule, address)
                 )
             if self._plan.file is not None:
@@ -143,7 +143,7 @@ class LiveChain:
             # ports are opened last: from then on bytes come
             for number in range(self._plan.reader.ports):
                 self._start_port(number)
-            self._reader = Kept(
+            self._reader = Supervised(
                 read_port, lambda _: (self._plan.reader, self._exchange.address), stand_by=load
             )
             self._wait(lambda: bool(self._state.name), self._opening)
@@ -299,7 +299,7 @@ class LiveChain:
             self._let_write(self._recorder)
         return news
 
-    def _let_write(self, recorder: Kept) -> None:
+    def _let_write(self, recorder: Supervised) -> None:
         """Wait for the recorder as long as its file grows, and say so where that takes long."""
         end, due, before = Deadline.after(LEAVE), Deadline.after(FIRST_REPORT_AFTER), -1
         while recorder.alive and not end.expired:
@@ -314,7 +314,7 @@ class LiveChain:
         recorder.wait(AT_ONCE)
         self._see()
 
-    def _processes(self) -> dict[str, Kept]:
+    def _processes(self) -> dict[str, Supervised]:
         named = {"reader": self._reader, "recorder": self._recorder}
         named |= {f"port {number}": kept for number, kept in enumerate(self._ports)}
         named |= {f"estimator {slot}": kept for slot, kept in self._estimators.kept.items()}
@@ -329,7 +329,7 @@ class LiveChain:
             reader.wait,
             self._exchange.address,
         )
-        self._ports.append(Kept(read_source, lambda _: plan))
+        self._ports.append(Supervised(read_source, lambda _: plan))
 
     def _opening(self) -> str:
         """Say which ports are awaited."""

@@ -10,7 +10,7 @@ from tirebench.estimator.estimation import News, WheelEstimation
 from tirebench.estimator.fmu_model import FmuFile, FmuModel
 from tirebench.estimator.wheels import Block
 from tirebench.live.exchange import FINISH, Address, Exchange, woken
-from tirebench.live.kept import orphaned, settled
+from tirebench.live.supervised import orphaned, settled
 from tirebench.wire.conditions import Conditions
 from tirebench.wire.timeline import Samples
 

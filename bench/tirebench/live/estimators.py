@@ -12,7 +12,7 @@ from tirebench.estimator.estimation import News
 from tirebench.estimator.fmu_model import FmuFile
 from tirebench.live.estimator import EstimatorPlan, Report, estimate
 from tirebench.live.exchange import Exchange
-from tirebench.live.kept import Kept
+from tirebench.live.supervised import Supervised
 from tirebench.wire.conditions import Conditions
 
 MOST_CRASHES_WHEN_LOADED = 3
@@ -35,7 +35,7 @@ class Estimators:
 
     Attributes
     ----------
-    kept : dict of slot to Kept
+    kept : dict of slot to Supervised
     ready, done : set of int
         Slots whose FMU is loaded; slots that have ended and reported everything.
     cpu : dict of slot to float, [s]
@@ -52,7 +52,7 @@ class Estimators:
         laps: bool,
         every: bool,
     ) -> None:
-        self.kept: dict[int, Kept] = {}
+        self.kept: dict[int, Supervised] = {}
         self.ready: set[int] = set()
         self.done: set[int] = set()
         self.cpu: dict[int, float] = {}
@@ -70,7 +70,7 @@ class Estimators:
         if file is None:
             return
         for slot in range(len(self.kept), slots):
-            self.kept[slot] = Kept(estimate, partial(self._given, file, slot))
+            self.kept[slot] = Supervised(estimate, partial(self._given, file, slot))
 
     def look(self) -> None:
         """Start again what has ended too early."""

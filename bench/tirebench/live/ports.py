@@ -16,8 +16,8 @@ from tirebench.links import RESUMED, Read
 from tirebench.links.opening import PortPlan
 from tirebench.links.reconnecting import ReconnectingLink
 from tirebench.live.exchange import STOP, Address, Exchange, woken
-from tirebench.live.kept import orphaned, settled
 from tirebench.live.priority import own_share
+from tirebench.live.supervised import orphaned, settled
 
 LONGEST_READ_WAIT = 0.1
 """Longest wait for bytes before the process checks whether the run continues, [s]."""

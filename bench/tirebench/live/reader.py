@@ -14,10 +14,10 @@ from tirebench.estimator.wheels import MOST_WHEELS, Wheels
 from tirebench.links import BACK, DECODED, LOST, PASSED, RESUMED, Link, Read
 from tirebench.links.reconnecting import ReconnectingLink
 from tirebench.live.exchange import RAW, STOP, Address, Exchange
-from tirebench.live.kept import orphaned, settled
 from tirebench.live.ports import GatheredLink
 from tirebench.live.priority import own_share
 from tirebench.live.rings import ByteQueue
+from tirebench.live.supervised import orphaned, settled
 from tirebench.setup.source_plan import SourcePlan, wheels_of
 
 LONGEST_READ_WAIT = 0.1

@@ -15,11 +15,11 @@ from uuid import uuid4
 
 from tirebench.errors import RecordingError
 from tirebench.links import LOST
-from tirebench.live.before import Before
 from tirebench.live.exchange import Address, Exchange
-from tirebench.live.kept import orphaned, settled
+from tirebench.live.pre_trigger import PreTrigger
 from tirebench.live.recording_state import Order, RecorderState, RecordingRule, triggers
 from tirebench.live.space import Space
+from tirebench.live.supervised import orphaned, settled
 from tirebench.live.unfinished import Unfinished
 from tirebench.recording.document import line_document, wheel_document
 from tirebench.recording.header import RecordingHeader, numbered, part_path
@@ -72,7 +72,7 @@ class _Recorder:
         self._unfinished = Unfinished()
         self._events: deque[tuple[dict[str, Any], int]] = deque(maxlen=MOST_EVENTS)
         self._last = ""  # why the run ends, once it does
-        self._kept = None if rule.around is None else Before(rule.around[0])
+        self._kept = None if rule.around is None else PreTrigger(rule.around[0])
         self._part_began = self._published = time.monotonic()
         self._next_trial = self._next_link = 0.0
         self._go_back()
@@ -220,7 +220,7 @@ class _Recorder:
             self._link()
         return busy
 
-    def _write_kept(self, recorder: Recorder, kept: Before) -> None:
+    def _write_kept(self, recorder: Recorder, kept: PreTrigger) -> None:
         """Write a piece of what was before the trigger, and take in what comes meanwhile."""
         _, lost = kept.take(self._exchange, forget=False)
         if lost:

@@ -14,7 +14,7 @@ from tirebench.errors import DeviceError
 from tirebench.estimator.estimation import News
 from tirebench.estimator.session import Source
 from tirebench.live.board import Board
-from tirebench.live.kept import CONTEXT, Kept
+from tirebench.live.supervised import CONTEXT, Supervised
 from tirebench.page.address import listener, new_token
 from tirebench.page.alarms import RULES, Rule
 from tirebench.page.commands import CommandDesk, Switch
@@ -116,7 +116,7 @@ class LivePage:
         self.desk = CommandDesk(switch, self._gages if source.live else None)
         self._choice = choice
         self._stack = ExitStack()
-        self._kept: list[Kept] = []
+        self._kept: list[Supervised] = []
         self._next_look = 0.0
         self._writing: Connection | None = None
         self._source = source
@@ -223,7 +223,7 @@ class LivePage:
     def _keep(
         self, target: Callable[..., None], arguments: Callable[[int], tuple[Any, ...]]
     ) -> None:
-        kept = Kept(target, arguments, lambda: self._board.silence > HANGS)
+        kept = Supervised(target, arguments, lambda: self._board.silence > HANGS)
         self._kept.append(kept)
         self._stack.callback(kept.wait, 0.0)
 

@@ -4,8 +4,8 @@ import time
 from typing import Any
 
 from tirebench.deadline import Deadline
+from tirebench.estimator.checked_turns import CheckedTurns
 from tirebench.estimator.estimation import Estimation, News, skipped
-from tirebench.estimator.judged import JudgedTurns
 from tirebench.estimator.wheels import Wheels
 from tirebench.links import BACK, DECODED, PASSED, RESUMED, Link
 
@@ -33,7 +33,7 @@ class ReplayChain:
         self._link = link
         self._passing = False
         self._estimation = estimation
-        self._judged = JudgedTurns()
+        self._judged = CheckedTurns()
 
     def poll(self, deadline: Deadline) -> News:
         """Return what the next read brings."""

@@ -9,7 +9,7 @@ from tirebench.links import LOST
 from tirebench.live.exchange import Exchange
 
 
-class Before:
+class PreTrigger:
     """What has come in the last seconds; what is older is forgotten.
 
     After a trigger it is written piece by piece, and what comes meanwhile is taken in behind it:

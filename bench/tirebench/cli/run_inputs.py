@@ -34,7 +34,7 @@ _WITHOUT = {
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class RunInputs:
     """The sources of a run, and the conditions that are known besides them.
 
     Attributes
@@ -170,7 +170,7 @@ def _is_number(text: str) -> bool:
 
 def given_live(
     sources: tuple[SourcePlan, ...], conditions: Conditions | None, wheels: tuple[int, ...]
-) -> Given:
+) -> RunInputs:
     """Return the sources and conditions that the options of a live run give.
 
     Raises
@@ -179,7 +179,7 @@ def given_live(
         If sources contradict each other or the conditions.
     """
     check_sources(sources, conditions)
-    return Given(sources, conditions or Conditions.constant(), wheels)
+    return RunInputs(sources, conditions or Conditions.constant(), wheels)
 
 
 def recorded_sources(
@@ -214,7 +214,7 @@ def given_replayed(
     devices: Mapping[int | None, Device],
     wheels: tuple[int, ...],
     console: Console,
-) -> Given:
+) -> RunInputs:
     """Return what a recording states; given options replace it, with a note."""
     header = link.recording.header
     if devices or conditions is not None:
@@ -225,10 +225,10 @@ def given_replayed(
     sources = recorded_sources(header, link.name, devices)
     if not wheels:
         wheels = tuple(header.settings.get("wheels") or ())
-    return Given(sources, conditions or link.recording.conditions, wheels)
+    return RunInputs(sources, conditions or link.recording.conditions, wheels)
 
 
-def missing(given: Given, calibration: Calibration) -> tuple[dict[str, str], dict[str, str]]:
+def missing(given: RunInputs, calibration: Calibration) -> tuple[dict[str, str], dict[str, str]]:
     """Return the unknown conditions in words: those that the calibration needs, and useful ones."""
     told = [place for source in given.sources for place in source.conditions_sent]
     wheels = {*given.wheels, *(w for source in given.sources for w in source.known_wheels)}
@@ -248,7 +248,7 @@ def _option(name: str) -> str:
     return _OPTIONS.get(name, f"--condition {name}=VALUE, ")
 
 
-def say_missing(given: Given, calibration: Calibration, console: Console) -> None:
+def say_missing(given: RunInputs, calibration: Calibration, console: Console) -> None:
     """Print which conditions are unknown, and what cannot be detected, before the first turn."""
     needed, useful = missing(given, calibration)
     for name, words in needed.items():

@@ -28,7 +28,7 @@ RUN_ONLY = [getattr(signal, name) for name in ("SIGINT", "SIGHUP") if hasattr(si
 CONTEXT: SpawnContext = get_context("spawn")
 
 
-class Kept:
+class Supervised:
     """A process beside the run. `look` is called often and never waits.
 
     Parameters

@@ -6,7 +6,7 @@ from tirebench.estimator.chain import Turn
 from tirebench.estimator.wheels import Wheels
 
 
-class JudgedTurns:
+class CheckedTurns:
     """Turns on their way from the estimators to the screen, the page and the recording.
 
     A turn of a wheel whose rate is not judged yet is kept back. These are few, because a judgement

@@ -12,9 +12,9 @@ import pytest
 from tests.bench.programs import PATIENCE
 from tirebench.deadline import Deadline
 from tirebench.errors import DeviceError
-from tirebench.live import kept as kept_module
-from tirebench.live.kept import CONTEXT, Kept
+from tirebench.live import supervised as kept_module
 from tirebench.live.priority import BELOW, PRIORITY, as_parent, below, realtime
+from tirebench.live.supervised import CONTEXT, Supervised
 
 
 def tell(news: Any, number: int) -> None:
@@ -31,7 +31,7 @@ def load(news: Any, number: int) -> None:
     os.environ["LOADED"] = str(number)
 
 
-def until(true: Callable[[], bool], kept: Kept) -> None:
+def until(true: Callable[[], bool], kept: Supervised) -> None:
     end = Deadline.after(PATIENCE)
     while not true():
         kept.look()
@@ -40,18 +40,18 @@ def until(true: Callable[[], bool], kept: Kept) -> None:
 
 
 @pytest.fixture
-def told(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Any, Kept]]:
+def told(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Any, Supervised]]:
     """What processes say, and one of them with another that stands by at once."""
     monkeypatch.setattr(kept_module, "STAND_BY", 0.0)
     news, telling = CONTEXT.Pipe(duplex=False)
-    kept = Kept(tell, lambda starts: (telling, starts), stand_by=load)
+    kept = Supervised(tell, lambda starts: (telling, starts), stand_by=load)
     with news, telling:
         yield news, kept
         kept.wait(0.0)
         assert not kept.alive
 
 
-def test_one_that_stands_by_takes_over_and_gets_a_successor(told: tuple[Any, Kept]) -> None:
+def test_one_that_stands_by_takes_over_and_gets_a_successor(told: tuple[Any, Supervised]) -> None:
     news, kept = told
     assert kept._spare_alive
     assert kept._spare_begun <= kept._started  # before there is anything to lose
@@ -70,7 +70,7 @@ def test_one_that_stands_by_takes_over_and_gets_a_successor(told: tuple[Any, Kep
 
 
 def test_where_the_one_that_stands_by_has_died_a_new_one_is_started(
-    told: tuple[Any, Kept], monkeypatch: pytest.MonkeyPatch
+    told: tuple[Any, Supervised], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     news, kept = told
     monkeypatch.setattr(kept_module, "LIVED", PATIENCE)
