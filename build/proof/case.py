@@ -136,6 +136,9 @@ def definition(tire: RigTire, pressure: float) -> dict[str, float]:
         "shear_stiffness": tire.shear,
         "rotary_inertia": 0.0,
         "section_pull": grown_pull(tire, pressure),
+        "liner_share": 0.0,
+        "tread_poisson": 0.0,
+        "contact_crown": 0.0,
         "tread_shear_stiffness": tire.tread_shear_x * tire.belt_width * (tire.friction > 0.0),
         "tread_hardening": tire.tread_hardening,
     }

@@ -14,6 +14,7 @@ from structure.gages import GAGES
 from structure.rig import shown_by_gages
 from tirelib.campaign import TireGeometry
 from tirelib.rolling.constants import Constants
+from tirelib.rolling.gage import Gage
 from tirelib.rolling.solve import solve
 
 BAR = 1e5
@@ -160,9 +161,9 @@ class Ring:
             more = solve(
                 _constants(tire, settings, load + NUDGE, omega, more.deflection), start=more
             )
-        offset = np.full(load.size, tire.innerliner_offset)
-        strain = found.strain(offset, POINTS)
-        by_load = (more.strain(offset, POINTS) - strain) / NUDGE
+        gage = Gage(np.full(load.size, tire.innerliner_offset), np.zeros(load.size))
+        strain = found.strain(gage, POINTS)
+        by_load = (more.strain(gage, POINTS) - strain) / NUDGE
         stiffness = NUDGE / (more.deflection - found.deflection)
         delta = found.on_turn(POINTS).delta
         return [
@@ -204,6 +205,7 @@ def _constants(
         crown=tire.crown,
         half_width=tire.half_width,
         k_s=tire.k_s,
+        poisson=0.0,
         friction=tire.friction,
         omega=omega,
         load=load,

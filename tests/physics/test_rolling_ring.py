@@ -15,11 +15,13 @@ from tirelib.ring.ring import Ring
 from tirelib.rolling import belt
 from tirelib.rolling.assemble import Unknowns, matrix, residual
 from tirelib.rolling.constants import Constants
+from tirelib.rolling.gage import Gage
 from tirelib.rolling.mesh import mesh
 from tirelib.rolling.solve import Rolling, _column, solve
 
 LOADS = np.array([1500.0, 4000.0, 7000.0])
-OFFSET = np.full(3, -0.003)
+GAGE = Gage(np.full(3, -0.003), np.zeros(3))
+LINED = Gage(np.full(3, -0.003), np.full(3, 0.6))
 N = 360
 BARE: dict[str, Any] = {
     "radius": 0.303,
@@ -40,6 +42,7 @@ BARE: dict[str, Any] = {
     "crown": 0.0,
     "half_width": 0.084,
     "k_s": 0.0,
+    "poisson": 0.0,
     "friction": 0.0,
     "omega": 1.0,
     "load": LOADS,
@@ -55,6 +58,7 @@ WHOLE = {
     "dashpots": 0.05,
     "omega": 70.0,
     "crown": 0.5,
+    "poisson": 0.6,
     "tension": -500.0,
 }
 
@@ -64,7 +68,7 @@ def ring(base: dict[str, Any] = BARE, **values: Any) -> Constants:
 
 
 def strain(found: Rolling, n: int = N) -> FloatArray:
-    return smooth(found.strain(OFFSET, n))
+    return smooth(found.strain(GAGE, n))
 
 
 def smooth(values: FloatArray) -> FloatArray:
@@ -145,6 +149,41 @@ def test_sidewalls_that_pull_leave_the_belt_round_and_keep_their_direction(
     virtual = -pulled[belt.U] * np.sin(turn) + pulled[belt.V] * np.cos(turn)
     moment = virtual * radius - pulled[belt.PSI]
     np.testing.assert_allclose(moment, -pull * radius**2 * np.sin(turn), atol=1e-9)
+
+
+def test_a_gage_on_a_thick_liner_turns_with_the_belts_line() -> None:
+    """Its fibre follows the curve (u, v), whatever the sections of the belt do."""
+    found = solve(ring(WHOLE), fine=40, coarse=14)
+    wholly = Gage(LINED.offset, np.ones(3))
+    turn = found.on_turn(1440)
+    slope = 1j * np.arange(721)
+
+    def by_angle(values: FloatArray) -> FloatArray:
+        return np.asarray(np.fft.irfft(np.fft.rfft(values) * slope, n=1440))
+
+    along = BARE["radius"] + turn.u + by_angle(turn.v)
+    across = by_angle(turn.u) - turn.v
+    stretch = along * np.cos(turn.psi) + across * np.sin(turn.psi) - BARE["radius"]
+    curved = by_angle(np.arctan2(across, along))
+    expected = smooth((stretch + 0.003 * curved) / (BARE["radius"] - 0.003))
+    shown = smooth(found.strain(wholly, 1440))
+    assert rms(shown - expected) < 1e-3 * rms(expected)
+    assert rms(strain(found, 1440) - expected) > 0.05 * rms(expected), "the belt shears"
+
+
+def test_a_belt_that_does_not_shear_shows_the_same_on_every_liner() -> None:
+    found = solve(ring(WHOLE, GA=np.inf))
+    lined = smooth(found.strain(LINED, N))
+    assert rms(lined - strain(found)) < 1e-3 * rms(lined)
+
+
+def test_a_tread_that_keeps_its_volume_lifts_the_axle_by_what_it_grows_thicker() -> None:
+    """On a flat road the bend is 1: a tread too stiff for the road to press it stands T higher."""
+    stiff = {"k_t": 3e9, "mass": 0.1}
+    flat, thick = (solve(ring(**stiff, poisson=nu, load=LOADS[2:])) for nu in (0.0, 0.3))
+    lever = 0.316 - 0.303 - 0.5 * 0.0125
+    grown = 0.3 * 0.0125 * lever / (0.303 + lever)
+    np.testing.assert_allclose(flat.deflection - thick.deflection, grown, rtol=0.1)
 
 
 def test_the_road_carries_the_load_and_no_torque() -> None:
@@ -234,9 +273,10 @@ def test_it_is_solved_for_every_tire(
 
 
 def test_one_point_does_not_depend_on_those_solved_beside_it() -> None:
-    together = solve(ring(WHOLE)).strain(OFFSET, N)
+    together = solve(ring(WHOLE)).strain(LINED, N)
     for k, load in enumerate(LOADS):
-        alone = solve(ring(WHOLE, load=np.array([load]))).strain(OFFSET[:1], N)
+        gage = Gage(LINED.offset[:1], LINED.liner[:1])
+        alone = solve(ring(WHOLE, load=np.array([load]))).strain(gage, N)
         np.testing.assert_allclose(alone[0], together[k], atol=1e-9)
 
 

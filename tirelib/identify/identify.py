@@ -43,6 +43,9 @@ _PLAIN: Mapping[str, tuple[float, float, str]] = {
     "tread_shear_stiffness": (2.5e7, 1.0, "k_t / 3, for rubber keeps its volume"),
     "tread_hardening": (1.0, 0.7, "assumed: blocks bulge into their grooves"),
     "section_pull": (0.03, 1.5, "assumed: growth of the belt and ply arches, 1 to 7 %"),
+    "liner_share": (0.3, 1.3, "0 of a gage on the belt itself, .8 under a thick liner"),
+    "tread_poisson": (0.3, 1.0, "0 of narrow blocks, .8 of solid rubber"),
+    "contact_crown": (0.12, 1.3, "assumed: crowns of .2 to 1.2 1/m, of which a belt keeps some"),
 }
 """Value, relative standard deviation and source of what no campaign header holds."""
 BASES = ("plain", "dissertation")

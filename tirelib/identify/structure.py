@@ -27,6 +27,9 @@ STRUCTURE_STD: Mapping[str, float] = MappingProxyType(
         "tread_shear_stiffness": 0.3,
         "tread_hardening": 0.6,
         "section_pull": 0.5,
+        "liner_share": 1.0,
+        "tread_poisson": 1.0,
+        "contact_crown": 1.3,
     }
 )
 """Relative standard deviation by parameter, in units of the value (slopes: of a typical slope)."""

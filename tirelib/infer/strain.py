@@ -47,6 +47,9 @@ WIDTH = {
     "tread_shear_stiffness": 1.0,
     "tread_hardening": 0.7,
     "section_pull": 1.5,
+    "liner_share": 1.0,
+    "tread_poisson": 1.0,
+    "contact_crown": 1.3,
 }
 """Prior standard deviations of the base's coordinates: wide, the campaign informs them."""
 IN_BASE = {

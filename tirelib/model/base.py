@@ -65,9 +65,13 @@ PLAIN: tuple[Coordinate, ...] = (
     Coordinate("tread_shear_stiffness"),
     Coordinate("tread_hardening"),
     Coordinate("section_pull", 0.03),
+    Coordinate("liner_share", 0.4),
+    Coordinate("tread_poisson", 0.3),
+    Coordinate("contact_crown"),
 )
-"""Those of the plain tire: every belt shears and has section inertia, every tread sticks to the
-road and hardens when it is pressed."""
+"""Those of the plain tire: every belt shears and has section inertia, every gage sits on layers
+that the shear force leaves alone, every tread sticks to the road, hardens and grows wider when it
+is pressed, and its strips meet the road one after the other."""
 
 
 def coordinates(values: Mapping[str, float | FloatArray]) -> tuple[Coordinate, ...]:
@@ -233,7 +237,7 @@ def large_displacements(
     state = waveform(State.of(still, points, phi), low_pass=low_pass)
     made = made_of(values, points)
     solved = solve(made.constants, start=start)
-    strain = smoothed(solved.strain(made.offset, phi.size), points, low_pass)
+    strain = smoothed(solved.strain(made.gage, phi.size), points, low_pass)
     return Correction(
         strain - state.wave,
         solved.deflection - state.deflection,

@@ -7,10 +7,9 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.model.state import Operating
-from tirelib.rolling import belt
 from tirelib.rolling.assemble import Unknowns, by_element, fields, residual
 from tirelib.rolling.constants import Constants
-from tirelib.rolling.mesh import to_grid
+from tirelib.rolling.gage import Gage, strain
 from tirelib.rolling.solve import Rolling, slopes
 
 STEP = 1e-6
@@ -31,20 +30,18 @@ class Made:
     Attributes
     ----------
     constants : Constants
-    offset : shape (n_points,), [m]
-        y < 0 of the gage from the neutral line.
+    gage : Gage
     """
 
     constants: Constants
-    offset: FloatArray
+    gage: Gage
 
 
 def made_of(values: Values, points: Operating) -> Made:
     """Return the constants of a tire's values (names of `Tire`; arrays allowed) at points.
 
     A tire's damping is that of every mode, Eq. (107); the linear ring adds what it changes. The
-    crown's curvature changes which strips touch first; a ring in one plane cannot separate it from
-    a softer tread, so that it has none here.
+    crown is what the belt keeps of it: most of its curvature a belt loses by bending across.
     """
     v, width = values, np.asarray(values["belt_width"])
     above = points.pressure - v["pressure"]
@@ -64,16 +61,20 @@ def made_of(values: Values, points: Operating) -> Made:
         k_t=v["tread_stiffness"],
         hardening=v["tread_hardening"],
         thickness=v["tread_thickness"],
-        crown=0.0,
+        crown=v["contact_crown"],
         half_width=0.5 * width,
         k_s=v["tread_shear_stiffness"],
+        poisson=v["tread_poisson"],
         friction=FRICTION,
         omega=points.omega,
         load=points.load,
         torque=0.0,
     )
-    offset = np.broadcast_to(np.asarray(v["innerliner_offset"], dtype=float), (len(points),))
-    return Made(constants, offset)
+    offset, liner = (
+        np.broadcast_to(np.asarray(v[name], dtype=float), (len(points),))
+        for name in ("innerliner_offset", "liner_share")
+    )
+    return Made(constants, Gage(offset, liner))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,16 +111,14 @@ def rolled_slopes(
     at = residual(found.x, here.constants, found.mesh)[0]
     off = [residual(found.x, each.constants, found.mesh)[0] for each in there]
     moved = slopes(found, [each.less(at, step) for each in off])
-    base = belt.strain(found.z, here.constants, here.offset)
+
+    def shown(z: FloatArray, made: Made) -> FloatArray:
+        return strain(z, made.constants, made.gage, found.size, n_phi)
+
+    base = shown(found.z, here)
     rows = []
     for each, by in zip(there, moved, strict=True):
-        dz = fields(by_element(by.node), found.mesh.belt)
-        ends = [
-            belt.strain(found.z + side * ALONG * dz, here.constants, here.offset)
-            for side in (1.0, -1.0)
-        ]
-        own = belt.strain(found.z, each.constants, each.offset) - base
-        rows.append((ends[0] - ends[1]) / (2.0 * ALONG) + own / step)
-    grid = to_grid(*found.size, n_phi)
-    strain = np.stack(rows).reshape(len(there), len(base), -1) @ grid.T
-    return RolledSlopes(strain, np.stack([by.depth for by in moved]), moved)
+        dz = ALONG * fields(by_element(by.node), found.mesh.belt)
+        along = (shown(found.z + dz, here) - shown(found.z - dz, here)) / (2.0 * ALONG)
+        rows.append(along + (shown(found.z, each) - base) / step)
+    return RolledSlopes(np.stack(rows), np.stack([by.depth for by in moved]), moved)

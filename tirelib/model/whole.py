@@ -104,7 +104,7 @@ def solve_whole(
         return Whole(state.wave, state.deflection, None)
     made = made_of(values, points)
     solved = solve(made.constants, start=start)
-    wave = smoothed(solved.strain(made.offset, GRID.size), points, low_pass)
+    wave = smoothed(solved.strain(made.gage, GRID.size), points, low_pass)
     depth = solved.deflection
     if _lively(values, changes):
         full = predict(values, points, changes, low_pass=low_pass)

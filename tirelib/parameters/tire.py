@@ -45,6 +45,9 @@ FIELDS: Mapping[str, Field] = MappingProxyType(
             "belt", "N", "force", 1e3, _ANY, "GA; inf is the Bernoulli-Euler belt"
         ),
         "rotary_inertia": Field("belt", "kg m", "rotary_inertia", 0.0, 1.0, "rho I"),
+        "liner_share": Field(
+            "belt", "1", "ratio", -2.0, 2.0, "part of y in layers that carry no shear force"
+        ),
         "section_pull": Field(
             "sidewall", "1", "ratio", -0.3, 0.5, "share of p b that the sidewalls take inward"
         ),
@@ -66,6 +69,12 @@ FIELDS: Mapping[str, Field] = MappingProxyType(
         "tread_stiffness": Field("tread", "N/m^2", "line_stiffness", 1e4, 1e11, "k_t, normal"),
         "tread_hardening": Field("tread", "1", "ratio", 0.0, 50.0, "growth of k_t over h0"),
         "tread_shear_stiffness": Field("tread", "N/m^2", "line_stiffness", 0.0, 1e11, "k_Gt"),
+        "tread_poisson": Field(
+            "tread", "1", "ratio", -1.0, 2.0, "nu / (1 - nu): thicker where the belt is bent flat"
+        ),
+        "contact_crown": Field(
+            "tread", "1/m", "curvature", 0.0, 20.0, "curvature across that the belt keeps on a road"
+        ),
         "friction": Field("tread", "1", "ratio", 0.0, 5.0, "mu, tread on road"),
         "crown_curvature": Field(
             "lateral", "1/m", "curvature", -20.0, 20.0, "curvature of the tread's crown"
@@ -141,6 +150,7 @@ class Tire:
     extension_stiffness: float = math.inf
     shear_stiffness: float = math.inf
     rotary_inertia: float = 0.0
+    liner_share: float = 0.0
     section_pull: float = 0.0
     radial_pressure_slope: float = 0.0
     radial_deflection_rate: float = 0.0
@@ -148,6 +158,8 @@ class Tire:
     damping: float = 0.0
     tread_hardening: float = 0.0
     tread_shear_stiffness: float = 0.0
+    tread_poisson: float = 0.0
+    contact_crown: float = 0.0
     friction: float = 1.0
     crown_curvature: float = 0.7
     lateral_bending: float = 8000.0

@@ -23,6 +23,7 @@ from tirelib.report.simulation import (
     points_of,
 )
 from tirelib.ring.ring import ComplexArray
+from tirelib.rolling.gage import Gage
 from tirelib.signal import LowPass
 from tirelib.threads import one_thread
 
@@ -237,7 +238,8 @@ def _simulation(
         turn = rolling.on_turn(TURN.size)
         u = u - _on_turn(plain.belt[..., 0]) + turn.u
         v = v - _on_turn(plain.belt[..., 1]) + turn.v
-        strain = strain - _on_turn(plain.strain) + rolling.strain(state.offset, TURN.size)
+        gage = Gage(state.offset, np.full(state.offset.shape, tire.liner_share))
+        strain = strain - _on_turn(plain.strain) + rolling.strain(gage, TURN.size)
         edges = edges - plain.contact.edges + turn.edges
         pressure = pressure - plain.contact.pressure_at(TURN) + turn.pressure
         pressure = np.where(_inside(edges), np.maximum(pressure, 0.0), 0.0)

@@ -106,17 +106,29 @@ def fields(local: FloatArray, points: Points) -> FloatArray:
     return np.concatenate([value, slope])
 
 
+def slopes_of(psi: FloatArray, mesh: Mesh) -> FloatArray:
+    """Return psi' at the road's points for nodal values (n_points, n_fine, 4)."""
+    return np.asarray(np.einsum("egi,pei->peg", mesh.road.slope, psi))
+
+
+def nodal_slopes(psi: FloatArray, mesh: Mesh) -> FloatArray:
+    """Return psi' at the fine elements' four nodes."""
+    return np.asarray(np.einsum("emi,pei->pem", mesh.at_nodes, psi))
+
+
 def contact(x: Unknowns, local: FloatArray, k: Constants, mesh: Mesh) -> Contact:
     """Return the state of the contact."""
     fine = local[:, mesh.fine]
     u, v, psi = np.moveaxis(mesh.road.value @ fine[..., :3], -1, 0)
-    at = road.tip(u, v, psi, mesh.road.phi, k)
+    bend = slopes_of(fine[..., 2], mesh)
+    at = road.tip(u, v, psi, bend, mesh.road.phi, k)
     height = (k.free_radius - x.depth)[:, None, None]
     delta = at.down - height
     push, slope = road.pressure(delta, k)
     shear = k.k_s[:, None, None] * (mesh.road.linear @ fine[..., Q, None])[..., 0]
     angle = mesh.node_angles
-    tips = road.tip(fine[..., 0], fine[..., 1], fine[..., 2], angle, k)
+    bent = nodal_slopes(fine[..., 2], mesh)
+    tips = road.tip(fine[..., 0], fine[..., 1], fine[..., 2], bent, angle, k)
     over = tips.down - height
     most, by_overlap = road.pressure(over[..., 1:], k)
     entered, by_before, by_after = road.entered(over[..., :-1], over[..., 1:])
@@ -144,11 +156,13 @@ def residual(x: Unknowns, k: Constants, mesh: Mesh) -> tuple[Unknowns, FloatArra
     for f in range(3):
         pull = area * (c.pressure * c.tip.by_down[f] - c.shear * c.tip.by_along[f])
         out[:, mesh.fine, :, f] += pull @ mesh.road.value
+    pull = area * c.pressure * c.tip.by_down[3]
+    out[:, mesh.fine, :, 2] += np.einsum("peg,egi->pei", pull, mesh.road.slope)
     law = local[..., 1:, Q].copy()
     law[:, mesh.fine] -= c.q
     out[..., 1:, Q] = law
     load = (area * c.pressure).sum(axis=(1, 2)) - k.load
-    grip = (area * (c.pressure * c.tip.along + c.shear * c.tip.down)).sum(axis=(1, 2))
+    grip = (area * (c.pressure * c.tip.along + c.shear * c.tip.arm)).sum(axis=(1, 2))
     torque = np.where(k.grips, grip + k.torque, x.rolling - k.free_radius)
     return Unknowns(gathered(out), load, torque), z, c
 
@@ -206,7 +220,8 @@ def matrix(x: Unknowns, z: FloatArray, c: Contact, k: Constants, mesh: Mesh) -> 
         turned = c.slope * c.tip.by_down[i] * c.tip.along + c.pressure * c.tip.by_along[i]
         turned = turned + c.shear * c.tip.by_down[i]
         rows[:, 1, fine, :, i] += (area * turned) @ value
-    rows[:, 1, fine, :, Q] += k.k_s[:, None, None] * ((area * c.tip.down) @ linear)
+    rows[:, 1, fine, :, Q] += k.k_s[:, None, None] * ((area * c.tip.arm) @ linear)
+    _thickening(element, sides, rows, area, c, mesh)
     _bristle_rows(element, sides, c, mesh)
     corner = np.zeros((n, BORDER, BORDER))
     corner[:, 4, 4] = (area * c.slope).sum(axis=(1, 2))
@@ -215,6 +230,30 @@ def matrix(x: Unknowns, z: FloatArray, c: Contact, k: Constants, mesh: Mesh) -> 
     corner[:, 5, 4] *= k.grips
     corner[:, 5, 5] = ~k.grips
     return _banded(element, sides, rows, corner)
+
+
+def _thickening(
+    element: FloatArray,
+    sides: FloatArray,
+    rows: FloatArray,
+    area: FloatArray,
+    c: Contact,
+    mesh: Mesh,
+) -> None:
+    """Add the derivatives that go through psi', by which the tread grows thicker."""
+    slope, value = mesh.road.slope, mesh.road.value
+    fine, by = mesh.fine, c.tip.by_down[3]
+    each = area * c.slope * by
+    element[:, fine, :, 2, :, 2] += np.einsum("peg,egi,egj->peij", each * by, slope, slope)
+    for f in range(3):
+        cross = np.einsum("peg,egi,gj->peij", each * c.tip.by_down[f], slope, value)
+        element[:, fine, :, 2, :, f] += cross
+        element[:, fine, :, f, :, 2] += np.swapaxes(cross, 2, 3)
+    pushed = np.einsum("peg,egi->pei", each, slope)
+    sides[:, fine, :, 2, 0] += pushed
+    rows[:, 0, fine, :, 2] += pushed
+    turned = each * c.tip.along
+    rows[:, 1, fine, :, 2] += np.einsum("peg,egi->pei", turned, slope)
 
 
 def _second(c: Contact, i: int, j: int) -> FloatArray | float:
@@ -239,6 +278,10 @@ def _bristle_rows(element: FloatArray, sides: FloatArray, c: Contact, mesh: Mesh
             down, along = c.node.by_down[f], c.node.by_along[f]
             rows[:, :, after, Q, m, f] -= on * along[..., m] + by_before * down[..., m]
             rows[:, :, after, Q, after, f] += on * along[..., after] - by_after * down[..., after]
+        thicker = c.node.by_down[3]
+        moved = by_before[..., None] * thicker[..., m, None] * mesh.at_nodes[:, m]
+        moved = moved + by_after[..., None] * thicker[..., after, None] * mesh.at_nodes[:, after]
+        rows[:, :, after, Q, :, 2] -= moved
         sides[:, mesh.fine, after, Q, 0] -= by_before + by_after
         sides[:, mesh.fine, after, Q, 1] -= on * angle[:, m]
 

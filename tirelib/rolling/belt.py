@@ -102,6 +102,13 @@ def strain(z: FloatArray, k: Constants, offset: FloatArray) -> FloatArray:
     return out
 
 
+def shear_angle(z: FloatArray, k: Constants) -> FloatArray:
+    """Return by how much the belt's line is turned against its sections, (n_points, ...), [rad]."""
+    belt = _Belt(z, _columns(k, z.ndim - 2))
+    out: FloatArray = np.arctan2(belt.across, belt.along)
+    return out
+
+
 class _Belt:
     """Measures and section forces; `along` = R (1 + Gamma_1), `across` = R Gamma_2."""
 

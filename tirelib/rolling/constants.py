@@ -11,7 +11,7 @@ from tirelib.errors import ParameterError
 _POSITIVE = frozenset(
     {"radius", "free_radius", "EA", "GA", "EI", "mass", "k_t", "thickness", "half_width", "load"}
 )
-_SIGNED = frozenset({"tension", "torque", "hardening", "omega"})
+_SIGNED = frozenset({"tension", "torque", "hardening", "omega", "poisson"})
 STIFFEST = 1e8
 """EA and GA that stand for infinite ones, [N]: strains below 1e-4."""
 
@@ -43,6 +43,9 @@ class Constants:
         Curvature of the tread across the width; half of the width.
     k_s : [N/m^2]
         Tread, in shear.
+    poisson : [-]
+        nu / (1 - nu) of the tread: what it grows thicker as the belt compresses it along the
+        circumference, and what it pushes along the belt as the road compresses it.
     friction : [-]
     omega, load, torque : [rad/s], [N], [N m]
         Values of the wheel; a torque that drives is positive.
@@ -66,6 +69,7 @@ class Constants:
     crown: FloatArray
     half_width: FloatArray
     k_s: FloatArray
+    poisson: FloatArray
     friction: FloatArray
     omega: FloatArray
     load: FloatArray
@@ -124,6 +128,12 @@ class Constants:
                 f"{1e3 * (self.free_radius - self.radius)[point]:.2f} mm; the tread must stand "
                 "outside the belt; check both radii"
             )
+
+    @property
+    def thickening(self) -> FloatArray:
+        """Growth of the tread's thickness with the sections' turn psi', (n_points,), [m]."""
+        lever = self.free_radius - self.radius - 0.5 * self.thickness
+        return self.poisson * self.thickness * lever / (self.radius + lever)
 
     @property
     def grips(self) -> BoolArray:

@@ -59,6 +59,12 @@ class Mesh:
         out: FloatArray = start[:, None] + (end - start)[:, None] * np.arange(4) / ORDER
         return out
 
+    @property
+    def at_nodes(self) -> FloatArray:
+        """Slopes of the basis at the fine elements' nodes, (n_fine, 4, 4), [1/rad]."""
+        size = np.diff(self.ends)[self.fine]
+        return np.asarray(_lagrange(np.arange(4.0) / ORDER)[1] / size[:, None, None])
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Points:
@@ -157,3 +163,13 @@ def to_grid(fine: int, coarse: int, n: int) -> FloatArray:
         return np.asarray(dense)
     kept = np.fft.rfft(dense, axis=0)[: (n + 1) // 2]
     return np.asarray(np.fft.irfft(kept, n=n, axis=0) * (n / many))
+
+
+@cache
+def to_grid_slope(fine: int, coarse: int, n: int) -> FloatArray:
+    """Return the matrix from values at the belt's points to slopes by the angle on `to_grid`."""
+    dense = to_grid(fine, coarse, n)
+    order = 1j * np.arange(n // 2 + 1)
+    if n % 2 == 0:
+        order[-1] = 0.0
+    return np.asarray(np.fft.irfft(np.fft.rfft(dense, axis=0) * order[:, None], n=n, axis=0))

@@ -7,6 +7,17 @@ width, so that the strip at y meets the road later, by C y^2 / 2; per length of 
 .. math:: P = k_t \int_{-B}^{B}\left[\delta_y + s\,\delta_y^2 / h_0\right] \frac{dy}{2 B},
           \qquad \delta_y = \max(\delta - C y^2 / 2, 0).
 
+Tread rubber keeps its volume. Where the belt is bent flat its fibres outside are pressed together
+along the circumference, and it grows thicker: with the bend psi' the tip of a tread of thickness
+h_0, whose middle lies at h_m from the belt's neutral line, moves out by T psi',
+
+.. math:: T = \bar\nu\,h_0\,\frac{h_m}{R + h_m}, \qquad \bar\nu = \frac{\nu}{1 - \nu},
+
+straight down, which within the contact is its own direction. The same coupling is the moment P T
+with which rubber that is compressed by the road, and pushes along the belt outside its neutral
+line, bends the belt (a layer bonded to the belt, in plane strain; blocks with grooves around have
+less).
+
 Under the contact the road runs with V = rho Omega. A bristle that sticks is sheared by
 dq / dphi = rho - X', X the place of its tip along the road, and slides where k_s |q| > mu P.
 rho, the rolling radius, follows from the wheel's torque.
@@ -26,37 +37,50 @@ everything slides."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tip:
-    """Place of the tread's tip and its slopes by (u, v, psi); arrays (n_points, ...) each.
+    """Place of the tread's tip and its slopes by (u, v, psi, psi'); arrays (n_points, ...) each.
 
     Attributes
     ----------
     down, along : [m]
         Y downwards from the axle and X along the road's motion.
-    by_down, by_along : tuple of three
+    arm : [m]
+        Of the road's shear about the axle: Y less what the tread has grown thicker.
+    by_down, by_along : tuple of four
     lever_down, lever_along : [m]
         Minus the second derivatives by psi.
     """
 
     down: FloatArray
     along: FloatArray
-    by_down: tuple[FloatArray, FloatArray, FloatArray]
-    by_along: tuple[FloatArray, FloatArray, FloatArray]
+    arm: FloatArray
+    by_down: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+    by_along: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
     lever_down: FloatArray
     lever_along: FloatArray
 
 
-def tip(u: FloatArray, v: FloatArray, psi: FloatArray, phi: FloatArray, k: Constants) -> Tip:
-    """Return the tip for displacements (n_points, ...) at angles (...)."""
+def tip(
+    u: FloatArray,
+    v: FloatArray,
+    psi: FloatArray,
+    bend: FloatArray,
+    phi: FloatArray,
+    k: Constants,
+) -> Tip:
+    """Return the tip for displacements (n_points, ...) and bend = psi' at angles (...)."""
     shape = (-1, *[1] * (u.ndim - 1))
     radius, h = k.radius.reshape(shape), (k.free_radius - k.radius).reshape(shape)
     sin, cos = np.sin(phi), np.cos(phi)
     lean_sin, lean_cos = h * np.sin(phi - psi), h * np.cos(phi - psi)
     ones = np.ones_like(u)
+    thicker = k.thickening.reshape(shape) * ones
+    arm = (radius + u) * cos - v * sin + lean_cos
     return Tip(
-        (radius + u) * cos - v * sin + lean_cos,
+        arm + thicker * bend,
         (radius + u) * sin + v * cos + lean_sin,
-        (cos * ones, -sin * ones, lean_sin),
-        (sin * ones, cos * ones, -lean_cos),
+        arm,
+        (cos * ones, -sin * ones, lean_sin, thicker),
+        (sin * ones, cos * ones, -lean_cos, 0.0 * ones),
         lean_cos,
         lean_sin,
     )

@@ -9,7 +9,6 @@ from scipy.linalg import lapack
 
 from tirelib.arrays import FloatArray
 from tirelib.errors import ConvergenceError, ParameterError
-from tirelib.rolling import belt
 from tirelib.rolling.assemble import (
     BAND,
     BORDER,
@@ -22,6 +21,7 @@ from tirelib.rolling.assemble import (
     residual,
 )
 from tirelib.rolling.constants import Constants
+from tirelib.rolling.gage import Gage, strain
 from tirelib.rolling.mesh import COARSE, FINE, PATCH, Mesh, mesh, to_grid
 from tirelib.rolling.road import pressure, tip
 
@@ -120,14 +120,14 @@ class Rolling:
         by: FloatArray = sum(
             (tip.by_along[f] * slope[f] for f in range(3)), start=np.zeros_like(tip.along)
         )
-        return by + tip.down
+        return by + tip.arm
 
     def on_turn(self, n: int) -> "OnTurn":
         """Return belt and road over n angles from -pi."""
         grid = to_grid(*self.size, n)
-        u, v, psi = (f.reshape(len(self), -1) @ grid.T for f in self.z[:3])
+        u, v, psi, bend = (f.reshape(len(self), -1) @ grid.T for f in self.z[[0, 1, 2, 5]])
         phi = -np.pi + 2.0 * np.pi * np.arange(n) / n
-        at = tip(u, v, psi, phi, self.constants)
+        at = tip(u, v, psi, bend, phi, self.constants)
         delta = at.down - (self.constants.free_radius - self.deflection)[:, None]
         push = pressure(delta, self.constants)[0]
         angle, q = self.mesh.node, self.constants.k_s[:, None] * self.x.node[..., 3]
@@ -135,11 +135,9 @@ class Rolling:
         touches = delta > 0.0
         return OnTurn(phi, u, v, psi, delta, push, np.where(touches, shear, 0.0))
 
-    def strain(self, offset: FloatArray, n: int) -> FloatArray:
-        """Return the strain at gages y < 0 from the neutral line over n angles from -pi."""
-        at = belt.strain(self.z, self.constants, offset)
-        out: FloatArray = at.reshape(len(self), -1) @ to_grid(*self.size, n).T
-        return out
+    def strain(self, gage: Gage, n: int) -> FloatArray:
+        """Return the strain at gages over n angles from -pi."""
+        return strain(self.z, self.constants, gage, self.size, n)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -29,6 +29,9 @@ GRIPPING = {
     "tread_shear_stiffness": 2e7,
     "tread_hardening": 1.0,
     "section_pull": 0.03,
+    "liner_share": 0.4,
+    "tread_poisson": 0.5,
+    "contact_crown": 0.3,
 }
 CASES: dict[str, tuple[Mapping[str, float | FloatArray], Changes]] = {
     "plain": (VALUES, ()),
