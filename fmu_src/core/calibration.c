@@ -201,6 +201,7 @@ size_t calibration_read(Calibration *c, const double *table, size_t n) {
     c->rolling_centre = number(&r);
     c->rolling_threshold = number(&r);
     numbers(&r, (double *)(void *)&c->constants, sizeof c->constants / sizeof(double));
+    if (!(c->constants.newton >= 0.0 && c->constants.newton <= 100.0)) r.bad = 1;
     c->node = taken(&r, NODES);
     c->weight = taken(&r, NODES);
     int chains = whole(&r, 1, c->gages + 1);

@@ -356,7 +356,7 @@ FMI2_EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2St
     const char *wrong = resources_read(&s->own, s->folder);
     if (!wrong && calibration_read(s->calibration, s->own.table, s->own.numbers))
         wrong = "is damaged";
-    if (!wrong && (s->own.samples < 1.0 || s->own.samples > 256.0 || !placed(s)))
+    if (!wrong && (!(s->own.samples >= 1.0 && s->own.samples <= 256.0) || !placed(s)))
         wrong = "does not fit the calibration";
     if (wrong)
         return refused(s, "fmuResourceLocation = %s: StrainTire.core %s; unpack the whole FMU and "
