@@ -157,7 +157,7 @@ def _strain_missing(header: CampaignHeader, strained: list[bool]) -> list[Proble
             f"[gages] declares {len(header.gage_lateral)} gages, but {missing} of "
             f"{len(strained)} runs have no strain",
             "runs without strain serve forces only",
-            "drop [gages] for a campaign without strain, or add the recordings",
+            "remove [gages] for a campaign without strain, or add the recordings",
             "warning",
         )
     ]

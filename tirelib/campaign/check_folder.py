@@ -62,8 +62,8 @@ def repeat_problems(plans: Sequence[RunPlan]) -> list[Problem]:
         Problem(
             plan_file.FILE,
             f"none of the {len(points)} set points was measured twice",
-            "a few repeats tell the noise",
-            "repeat some runs; without them no noise is known and diagnosis gives hints only",
+            "a few repeats are needed to measure the noise",
+            "repeat some runs; without repeats the noise is unknown and diagnosis gives hints only",
             "warning",
         )
     ]
@@ -85,7 +85,7 @@ def copy_problems(digests: Sequence[tuple[str, str]]) -> list[Problem]:
                     file,
                     f"duplicate run: its samples are those of {first[digest]}",
                     "a repeat is a new measurement with its own noise",
-                    "name the right file, or drop the copy",
+                    "name the right file, or remove the copy",
                 )
             )
         first.setdefault(digest, file)

@@ -167,7 +167,7 @@ def _rails(run: Run, gage: int, samples: FloatArray, header: CampaignHeader) -> 
                 header,
                 "saturated",
                 f"saturated: flat {top}",
-                f"{lengths[longest]} samples on end, {flat.size} time(s)",
+                f"{lengths[longest]} consecutive samples, {flat.size} time(s)",
                 again,
                 "widen the amplifier's range and record again",
             )
@@ -181,8 +181,8 @@ def _rails(run: Run, gage: int, samples: FloatArray, header: CampaignHeader) -> 
                 int(begins[longest]),
                 header,
                 "stuck",
-                "dropout: it stays",
-                f"{lengths[longest]} samples on end, {stuck.size} time(s)",
+                "dropout: the signal stays",
+                f"{lengths[longest]} consecutive samples, {stuck.size} time(s)",
                 stays,
                 "check cable and transmitter, or drop the run",
             )
@@ -224,7 +224,7 @@ def _held(
         run.plan.file,
         f"strain_{gage + 1}",
         f"{what} at {_shown(value, header)} for {how_long}",
-        f"at most {normal:.0f} equal samples on end are normal",
+        f"at most {normal:.0f} equal consecutive samples are normal",
         remedy,
         at=f"sample {begin} (t = {run.time()[begin]:.4f} s)",
     )

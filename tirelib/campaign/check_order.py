@@ -256,7 +256,7 @@ def _lateral_order(
             f"campaign.toml, [gages] lateral_m, channels {names}",
             "swapped gages: the lowest strain changes with the lateral force by, across the tire, "
             f"{slopes} microstrain a kN",
-            "it must grow or fall steadily from one side of the tire to the other",
+            "it must increase or decrease monotonically from one side of the tire to the other",
             "correct lateral_m, or exchange these channels; seen from the other side of the tire, "
             "it may be the other ones",
         )
@@ -268,7 +268,7 @@ def _unchecked(held: str) -> Problem:
     return Problem(
         "campaign.toml, [gages] lateral_m",
         f"the order of the gages was not checked: the campaign holds {held}",
-        "lateral force tells the sides apart, by its sign in four runs or more",
+        "lateral forces of both signs in at least four runs are needed to distinguish the sides",
         "add runs with slip angles to both sides, or make sure of the wiring",
         "warning",
     )

@@ -168,7 +168,7 @@ def _wrong_fz_sign(run: Run, header: CampaignHeader) -> list[Finding]:
             "sign",
             run.plan.file,
             "Fz",
-            f"wrong sign: {shown('Fz', middle, header.axes)} in the middle, axes = {header.axes!r}",
+            f"wrong sign: {shown('Fz', middle, header.axes)} in the median, axes = {header.axes!r}",
             f"Fz of a loaded tire is {right} in these axes",
             "correct axes in campaign.toml or the sign of the channel",
         )
@@ -231,7 +231,7 @@ def _spikes(run: Run, quantity: str) -> list[Finding]:
             quantity,
             f"{spikes.size} sample(s) in spikes",
             f"at most {SPIKE:.0f} sigma from the neighbours is normal",
-            "look at the rig's recording there",
+            "check the rig's recording there",
             at=f"sample {first} (t = {run.rig_time[first]:.4f} s)",
             warning=True,
         )

@@ -231,8 +231,8 @@ def _gages(
     if len(set(lateral)) < len(lateral):
         reader.fault(
             "[gages] lateral_m",
-            f"{list(lateral)} holds one position twice",
-            "each gage needs its own",
+            f"{list(lateral)} holds a position twice",
+            "each gage needs its own position",
             "gages are named by their position: correct the list",
         )
     width = tire.belt_width if tire else None
@@ -240,7 +240,7 @@ def _gages(
     if outside:
         reader.fault(
             "[gages] lateral_m",
-            f"{outside} lie beside the belt, which is {width:g} m wide",
+            f"{outside} lie outside the belt, which is {width:g} m wide",
             "positions on the belt are allowed, middle = 0",
             "correct the list or belt_width_m",
         )
@@ -278,9 +278,9 @@ def _check_keys(reader: _Reader) -> None:
                 reader.problems.append(
                     Problem(
                         f"{FILE}, {where}",
-                        "the key is unknown and nobody reads it",
-                        f"{', '.join(sorted(known))} are known",
-                        "correct its spelling or drop it",
+                        "the key is unknown and is ignored",
+                        f"known keys are {', '.join(sorted(known))}",
+                        "correct its spelling or remove it",
                         "warning",
                     )
                 )

@@ -123,8 +123,8 @@ def _column_problems(columns: list[str]) -> list[Problem]:
     problems += [
         Problem(
             f"{FILE}, line 1",
-            f"column {name!r} stands there twice",
-            "once is allowed",
+            f"column {name!r} occurs twice",
+            "each column may occur once",
             "rename or drop one",
         )
         for name in dict.fromkeys(columns)
@@ -285,7 +285,7 @@ def _duplicates(table: list[list[str]], columns: list[str]) -> list[Problem]:
                 f"{FILE}, lines {', '.join(map(str, where))}",
                 f"{name} {value} is listed {len(where)} times",
                 allowed,
-                "renumber or drop the copy" if name == "run" else "name the file of each run",
+                "renumber or remove the copy" if name == "run" else "name the file of each run",
             )
             for value, where in lines.items()
             if len(where) > 1

@@ -86,7 +86,7 @@ class _RunFile:
             if len(several) > 1:
                 self.fault(
                     "",
-                    f"{what} stand in {len(several)} groups",
+                    f"{what} are in {len(several)} groups",
                     "one group, one clock is allowed",
                     "bring them into one group with `tirelib import`",
                 )
@@ -100,7 +100,9 @@ class _RunFile:
         for group in (*gage[:1], *others[:1]):
             names = [channel.name for channel in group.channels]
             for name in sorted({n for n in names if names.count(n) > 1}):
-                self.fault(name, "the channel is there twice", "each name once", "rename one")
+                self.fault(
+                    name, "the channel occurs twice", "each name may occur once", "rename one"
+                )
         if gage and others:
             self.unread_at_gage_rate(gage[0])
         if not gage or others:
@@ -114,7 +116,7 @@ class _RunFile:
             Problem(
                 f"{self.plan.file}, channel {channel.name}",
                 "it is recorded at the rate of the gages, so it is left out",
-                "strain_N and trigger stand there; rig quantities have a group of their own",
+                "only strain_N and trigger belong there; rig quantities need their own group",
                 "move it to the rig's group or drop it",
                 "warning",
             )
@@ -225,7 +227,7 @@ class _RunFile:
         self.problems.append(
             Problem(
                 f"{self.plan.file}, channel {channel.name}",
-                f"nobody knows its unit {channel.unit!r}, so the channel is left out",
+                f"its unit {channel.unit!r} is unknown, so the channel is left out",
                 "a unit of tirelib.units is needed",
                 "convert it or drop the channel",
                 "warning",

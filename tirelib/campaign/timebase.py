@@ -91,9 +91,9 @@ def _growth_problems(where: str, times: FloatArray) -> list[Problem]:
     return [
         Problem(
             where,
-            f"the time does not grow after sample {first} ({times[first]:.6g} s, then "
+            f"the time does not increase after sample {first} ({times[first]:.6g} s, then "
             f"{times[first + 1]:.6g} s), {back.size} time(s) in all",
-            "time must grow from sample to sample",
+            "time must increase from sample to sample",
             "sort out the clock at its source",
         )
     ]

@@ -99,18 +99,23 @@ def _make_room(folder: Path, overwrite: bool) -> None:
 def _check_run(run: Run, header: CampaignHeader, before: list[RunPlan]) -> None:
     where = f"run {run.plan.run}"
     if any(plan.run == run.plan.run for plan in before):
-        raise ParameterError(f"{where} comes twice; each run has its own number; renumber one")
+        raise ParameterError(f"{where} occurs twice; each run needs its own number; renumber one")
     if run.strain is not None:
         _check_strain(where, run, run.strain, header)
     elif run.trigger is not None:
-        raise ShapeError(f"{where} has a trigger but no strain; both or none; drop the trigger")
+        raise ShapeError(
+            f"{where} has a trigger but no strain; a trigger needs strain; remove the trigger"
+        )
     if run.rig and run.rig_time is None:
-        raise ShapeError(f"{where} has rig quantities without rig_time; both or none; add it")
+        raise ShapeError(
+            f"{where} has rig quantities without rig_time; rig quantities need their "
+            "times; add rig_time"
+        )
     for name, samples in run.rig.items():
         if run.rig_time is not None and samples.shape != run.rig_time.shape:
             raise ShapeError(
-                f"{where}: {name} has shape {samples.shape} but rig_time has "
-                f"{run.rig_time.shape}; both need the same; give every sample its time"
+                f"{where}: {name} has shape {samples.shape} but rig_time has {run.rig_time.shape}; "
+                "both need the same; give each sample its time"
             )
 
 

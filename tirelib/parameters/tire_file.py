@@ -175,13 +175,15 @@ def _numbers(document: Mapping[str, Any]) -> tuple[dict[str, Number], list[str]]
     for name in document:
         near = get_close_matches(name, _GROUPS, n=1, cutoff=0.75)
         if name in NUMBERS:
-            faults.append(f"{name} stands at the top; move it to [{NUMBERS[name].group}]")
+            faults.append(
+                f"{name} is at the top level of the file; move it to [{NUMBERS[name].group}]"
+            )
         elif near and name not in _GROUPS:
-            faults.append(f"[{name}] is no table of a tire; did you mean [{near[0]}]?")
+            faults.append(f"[{name}] is not a table of a tire file; did you mean [{near[0]}]?")
     for group in _GROUPS:
         table = document.get(group, {})
         if not isinstance(table, dict):
-            faults.append(f"[{group}] is no table; write [{group}.name] with value and unit")
+            faults.append(f"[{group}] is not a table; write [{group}.name] with value and unit")
             continue
         for name, entry in table.items():
             if name not in NUMBERS or NUMBERS[name].group != group:

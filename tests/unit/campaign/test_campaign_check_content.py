@@ -69,7 +69,7 @@ GAGE_FAULTS = {
         spikes,
         "channel strain_3, sample 300 (t = 0.0600 s): 2 sample(s) in spikes, the first of",
     ),
-    "stuck": (freeze, "strain_4, sample 200 (t = 0.0400 s): dropout: it stays at"),
+    "stuck": (freeze, "strain_4, sample 200 (t = 0.0400 s): dropout: the signal stays at"),
     "constant": (put(2, slice(None), 0.0025), "strain_3: dead: every sample is 2500 ustrain"),
     "noise": (noise, "channel strain_5: dead: only noise of"),
     "inverted": (upside_down, "channel strain_1: inverted: the contact peak is compressive"),
@@ -100,7 +100,12 @@ def test_equal_samples_of_a_coarse_converter_are_no_rail(
 
 def test_saturation_says_rail_value_and_length(write: Write, sound_runs: Runs) -> None:
     text = the_one(check_campaign(write(changed(sound_runs, 9, with_strain(clip)))))
-    says(text, "saturated: flat maximum at", "samples on end", "equal samples on end are normal")
+    says(
+        text,
+        "saturated: flat maximum at",
+        "consecutive samples",
+        "equal consecutive samples are normal",
+    )
 
 
 def test_strain_inverted_everywhere_is_one_line(write: Write, sound_runs: Runs) -> None:
@@ -217,7 +222,7 @@ RIG_FAULTS = {
     ),
     "negative Fz": (
         with_rig(Fz=minus),
-        "channel Fz: wrong sign: -2999 N in the middle, axes = 'adapted_sae'; Fz of a loaded",
+        "channel Fz: wrong sign: -2999 N in the median, axes = 'adapted_sae'; Fz of a loaded",
     ),
     "negative Fy": (with_rig(Fy=minus), "channel Fy: wrong sign: Fy against slip angle is not as"),
     "nan": (

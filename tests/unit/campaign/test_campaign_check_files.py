@@ -39,8 +39,8 @@ HEADER_FAULTS = {
     "lateral in mm": ("0.03,", "30.0,", "[gages] lateral_m[1]: -30 m is not plausible"),
     "positive offset": ("-0.0033", "0.0033", "its sign looks wrong: write -0.0033"),
     "ring outside": ("ring_radius_m = 0.305", "ring_radius_m = 0.33", "does not fit the free"),
-    "gage beside the belt": ("belt_width_m = 0.165", "belt_width_m = 0.08", "lie beside the belt"),
-    "one place twice": ("0.03,", "0.06,", "holds one position twice"),
+    "gage beside the belt": ("belt_width_m = 0.165", "belt_width_m = 0.08", "lie outside the belt"),
+    "one place twice": ("0.03,", "0.06,", "holds a position twice"),
     "no strain unit": (
         'unit = "ustrain"',
         'unit = "mV"',
@@ -258,7 +258,7 @@ CHANNEL_FAULTS = {
         without("strain_5"),
         "4 strain channels (strain_1, strain_2, strain_3, strain_4); [gages] lateral_m declares 5",
     ),
-    "a name twice": (channel("Fx", name="Fy"), "channel Fy: the channel is there twice"),
+    "a name twice": (channel("Fx", name="Fy"), "channel Fy: the channel occurs twice"),
 }
 
 
@@ -301,7 +301,7 @@ def test_an_unknown_channel_in_an_unknown_unit_is_left_out_with_a_warning(write:
     rewrite(folder / "runs" / "003.mf4", add)
     says(
         the_one(check_campaign(folder), "warning"),
-        "runs/003.mf4, channel humour: nobody knows its unit 'grin'",
+        "runs/003.mf4, channel humour: its unit 'grin'",
     )
     campaign = read_campaign(folder)
     assert "humour" not in campaign.load(campaign.plans[3]).rig
@@ -389,7 +389,7 @@ CLOCK_FAULTS = {
     ),
     "backwards": (
         lambda t: np.where(np.arange(t.size) == 700, 0.0, t),
-        "the time does not grow after sample 699 (0.1398 s, then 0 s), 1 time(s)",
+        "the time does not increase after sample 699 (0.1398 s, then 0 s), 1 time(s)",
     ),
     "jitter": (
         lambda t: t - 1.2e-4 * (np.arange(t.size) >= 700),

@@ -257,7 +257,7 @@ def test_arrays_that_do_not_match_are_refused(tmp_path: Path, sound_runs: tuple[
         write_campaign(tmp_path / "b", HEADER, [replace(run, rig_time=None)])
     with pytest.raises(ShapeError, match=r"trigger has shape \(7,\)"):
         write_campaign(tmp_path / "c", HEADER, [replace(run, trigger=np.zeros(7, dtype=bool))])
-    with pytest.raises(ParameterError, match="run 0 comes twice"):
+    with pytest.raises(ParameterError, match="run 0 occurs twice"):
         write_campaign(tmp_path / "d", HEADER, [run, run])
     with pytest.raises(ParameterError, match="axes = 'din'"):
         write_campaign(tmp_path / "e", HEADER, [run], axes="din")

@@ -125,7 +125,7 @@ def test_all_faults_of_all_files_come_at_once(refused: Refused, tmp_path: Path) 
     says(lines, "one.parquet", "'FX' (Fx)", "1 value(s) are NaN or infinite, in row 3")
     says(lines, "two.parquet", "column 'FY' (Fy)", "no such column", "did you mean 'Fy'")
     says(lines, "three.parquet", "'FZ' (Fz)", "wrong sign: positive throughout")
-    says(lines, "two.parquet, time", "the time of the row before stands again in row 8")
+    says(lines, "two.parquet, time", "the time of the preceding row occurs again in row 8")
     says(lines, "four.csv: the file is empty")
     assert len(lines) == 6, "\n".join(lines)
 
@@ -171,8 +171,11 @@ def put(index: int, value: float) -> Callable[[Any], Any]:
 @pytest.mark.parametrize(
     ("columns", "parts"),
     [
-        (changed("ET", put(7, 10.06)), ["time: the time of the row before stands again in row 8"]),
-        (changed("ET", put(7, 1.0)), ["time: the time falls in row 8 (t = 1 s)"]),
+        (
+            changed("ET", put(7, 10.06)),
+            ["time: the time of the preceding row occurs again in row 8"],
+        ),
+        (changed("ET", put(7, 1.0)), ["time: the time decreases in row 8 (t = 1 s)"]),
         (changed("ET", put(7, np.nan)), ["time: no finite time in row 8"]),
         (
             changed("FZ", np.negative),
@@ -270,7 +273,7 @@ def test_channels_on_several_clocks_are_refused(refused: Refused, tmp_path: Path
     ]
     write_mdf(tmp_path / "a.mf4", groups)
     document = sae_map(channels={"Fz": FZ, "Fx": {"column": "FX", "unit": "N"}})
-    says(refused(tmp_path / "a.mf4", by=document), "stand on 2 clocks (1/time, 2/time)")
+    says(refused(tmp_path / "a.mf4", by=document), "have 2 clocks (1/time, 2/time)")
 
 
 def gage_file(path: Path, times: Any) -> tuple[Path, dict[str, Any]]:

@@ -143,7 +143,7 @@ def test_an_empty_cell_is_no_number(tmp_path: Path) -> None:
         ("**END\n", "", "**END is missing: the file is truncated"),
         ("**MEASURDATA", "**MEASDATA", "**MEASURDATA is missing"),
         ("**MEASURCHANNELS", "**CHANNELS", "**MEASURCHANNELS is missing"),
-        ("**COMMENTS", "**HEADER", "line 6: **HEADER comes again"),
+        ("**COMMENTS", "**HEADER", "line 6: **HEADER occurs again"),
         (
             "0.02       1.0",
             "0.02       1,0",
@@ -151,7 +151,7 @@ def test_an_empty_cell_is_no_number(tmp_path: Path) -> None:
         ),
         ("       0.0      -1.0     820.0", "       0.0      -1.0", "line 17: 3 values"),
         ("kN        0.001", "kN      0.001  ", "line 14: the channel 'FYW'"),
-        ("SLIPANGL", "RUNTIME ", "line 13: channel RUNTIME comes again"),
+        ("SLIPANGL", "RUNTIME ", "line 13: channel RUNTIME occurs again"),
     ],
 )
 def test_each_fault_is_named_with_its_line(old: str, new: str, said: str, tmp_path: Path) -> None:

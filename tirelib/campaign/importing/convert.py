@@ -199,7 +199,7 @@ class _Conversion:
         if rule is None:
             what = "the strain" if clock == GAGE_TIME else "the rig quantities"
             given = (
-                f"{what} stand on {len(own)} clocks ({', '.join(own)})"
+                f"{what} have {len(own)} clocks ({', '.join(own)})"
                 if own
                 else f"no time is mapped for {what}"
             )
@@ -295,8 +295,8 @@ class _Conversion:
                     "run",
                     where,
                     f"run {run} comes again in row {span.start + 1}",
-                    "the rows of a run stand together",
-                    "sort the rows, or number the runs anew",
+                    "the rows of a run must be consecutive",
+                    "sort the rows, or renumber the runs",
                 )
             seen.add(run)
         return [item for item in spans if item[0] not in skipped]
@@ -393,12 +393,12 @@ class _Conversion:
             (~np.isfinite(inside), "no finite time", 'missing = "drop"'),
             (
                 np.append(False, steps == 0.0),
-                "the time of the row before stands again",
+                "the time of the preceding row occurs again",
                 'repeated_time = "drop"',
             ),
             (
                 np.append(False, steps < 0.0),
-                "the time falls",
+                "the time decreases",
                 'backward_time = "drop" or, for segments on end, "join"',
             ),
         ):
@@ -409,7 +409,7 @@ class _Conversion:
                     f"{source}, time",
                     f"{given} in {row_list(rows[wrong])} (t = {inside[first]:.6g} s"
                     + (f", {count} in all)" if count > 1 else ")"),
-                    "time must grow from row to row",
+                    "time must increase from row to row",
                     f"sort out the clock at its source, or say {choice} in the map",
                 )
                 self.found.append(Finding(given, source, "time", problem))

@@ -31,7 +31,7 @@ class MapReader:
         value = self.document.get(key, {})
         if isinstance(value, dict):
             return value
-        self.fault(f"[{key}]", f"{value!r} is no table", "a table is needed", f"write [{key}]")
+        self.fault(f"[{key}]", f"{value!r} is not a table", "a table is needed", f"write [{key}]")
         return {}
 
     def known(self, where: str, keys: Mapping[str, Any], allowed: tuple[str, ...]) -> None:

@@ -134,7 +134,12 @@ def _blocks(lines: list[str], parsed: _Parsed) -> dict[str, list[tuple[int, str]
         if line.startswith("**"):
             name = line[2:].strip().upper()
             if name in blocks and name != "END":
-                parsed.fault(number, f"**{name} comes again", "each block once", "merge the blocks")
+                parsed.fault(
+                    number,
+                    f"**{name} occurs again",
+                    "each block may occur once",
+                    "merge the blocks",
+                )
             current = blocks.setdefault(name, [])
             if name == "END":
                 break
@@ -191,7 +196,10 @@ def _channels(lines: list[tuple[int, str]], parsed: _Parsed) -> tuple[TydexChann
         entry = _entry(line)
         if any(channel.name == entry.name for channel in channels):
             parsed.fault(
-                number, f"channel {entry.name} comes again", "each name once", "rename one"
+                number,
+                f"channel {entry.name} occurs again",
+                "each name may occur once",
+                "rename one",
             )
         channels.append(TydexChannel(entry.name, entry.comment, entry.unit, *numbers))
     return tuple(channels)
