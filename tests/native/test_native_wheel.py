@@ -195,3 +195,13 @@ def test_two_wheels_do_not_meet(core: ctypes.CDLL) -> None:
     for number, start in enumerate(range(0, first.shape[1] - 30, 30)):
         one.step(first[:, start : start + 30], 30 / live.RATE, conditions_at(number))
         other.step(second[:, start : start + 30], 30 / live.RATE, conditions_at(number))
+
+
+def test_with_a_gage_out_the_others_estimate_and_all_is_not_well(core: ctypes.CDLL) -> None:
+    both, strain = Both(core, 20), live.strain_of(4e3, 0.1, turns=5.4)[0]
+    strain[1, 2 * TURN :] = strain[1, 2 * TURN]
+    for start in range(0, strain.shape[1] - 20, 20):
+        both.step(strain[:, start : start + 20], 20 / live.RATE, conditions_at(1))
+    valid, load_valid = both.wanted.outputs()[1][2:4]
+    assert load_valid
+    assert not valid
