@@ -10,9 +10,15 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 settings.register_profile(
-    "default", deadline=None, suppress_health_check=[HealthCheck.too_slow], max_examples=40
+    "same",
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+    max_examples=40,
+    derandomize=True,
+    database=None,
 )
-settings.load_profile("default")
+settings.register_profile("new", settings.get_profile("same"), derandomize=False)
+settings.load_profile(os.environ.get("TIRELIB_EXAMPLES", "same"))
 os.environ["TIRELIB_CACHE"] = "off"  # no ensemble of an earlier version, none left behind
 ROOT = Path(__file__).parents[1]
 os.environ["PYTHONPATH"] = os.pathsep.join(  # what tests start imports this checkout as well

@@ -19,7 +19,7 @@ from tirelib.infer.normal import Normal, Weighed
 from tirelib.infer.plain import BASE, ROUGHLY
 from tirelib.infer.problem import Point, Problem
 
-MOST_STEPS = 15
+MOST_STEPS = 30
 SETTLED = 0.1
 """Step, in posterior standard deviations, below which a fit has settled."""
 GAINS = 0.1

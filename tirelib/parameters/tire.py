@@ -22,6 +22,8 @@ class Field(NamedTuple):
 
 
 _ANY = math.inf
+ROUNDING = 1e-12
+"""Relative difference by which a value at a limit may leave it: a unit's conversion rounds."""
 
 FIELDS: Mapping[str, Field] = MappingProxyType(
     {
@@ -211,9 +213,11 @@ def range_fault(name: str, value: float) -> str | None:
     field = NUMBERS[name]
     if not isinstance(value, int | float) or math.isnan(value):
         return f"{name} = {value!r} is not a number; give it in {field.unit} ({field.meaning})"
-    if not field.lowest <= value <= field.highest or (
-        math.isinf(value) and not math.isinf(field.highest)
-    ):
+    at_limit = any(
+        math.isclose(value, limit, rel_tol=ROUNDING) for limit in (field.lowest, field.highest)
+    )
+    inside = at_limit or field.lowest <= value <= field.highest
+    if not inside or (math.isinf(value) and not math.isinf(field.highest)):
         return (
             f"{name} = {value:g} (SI) is outside {field.lowest:g} to {field.highest:g}; "
             f"check value and unit ({field.unit}, {field.meaning})"
