@@ -1,7 +1,6 @@
 """Tire files: the ones that come along, exact round trips, and a message for every fault."""
 
 import math
-import string
 import tomllib
 from dataclasses import asdict
 from pathlib import Path
