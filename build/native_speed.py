@@ -23,6 +23,7 @@ from tests.fmu import live  # noqa: E402
 from tests.synthetic import record  # noqa: E402
 from tirelib.fmu.native import build_native  # noqa: E402
 from tirelib.held import HELD  # noqa: E402
+from tirelib.threads import one_thread  # noqa: E402
 
 RATE = 1e4
 EMPTY = """
@@ -90,4 +91,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

@@ -146,7 +146,7 @@ def test_what_the_plan_cannot_show_is_said_before(told: dict[str, Any]) -> None:
 
 def test_the_report_is_one_file_with_its_figures(place: Path, told: dict[str, Any]) -> None:
     page = (place / "D/diagnosis.html").read_text()
-    assert "The named effects one after the other" in page
+    assert "Error as the named effects are added one after the other" in page
     assert "https://" not in page.split("plotly.js v")[0]
     words = (place / "D/diagnosis.md").read_text()
     assert words.startswith("# Which effect is missing: Fy")
@@ -362,7 +362,9 @@ def test_a_users_effect_joins_and_a_strength_out_of_range_is_flagged(
     added = json.loads((tmp_path / "A.json").read_text())
     # friction falls with load there: the law would need a strength below zero
     assert added["flags"][0] == "out_of_range"
-    assert "lies outside the plausible 0 to 1" in found.output
+    assert "the fitted strength lies outside the plausible range 0 to 1" in " ".join(
+        found.output.split()
+    )
     # a model with it needs the file again
     words = ("compare", place / "steady", "--model", tmp_path / "M2.toml")
     assert "effect 'mine' is not known" in refused(*words)
