@@ -37,7 +37,8 @@ def test_nothing_more_is_named_on_the_rig() -> None:
     first, second = twice(straight_runs(case.waves.take(~case.held_out)), 16)
     assert first.named == ("temperature",)
     assert (second.verdict, second.named) == ("none", ())
-    assert second.base.error == pytest.approx(first.final.error, rel=0.02)
+    # in units of the noise; the second fit's priors lie about the first one's numbers
+    assert second.base.error == pytest.approx(first.final.error, abs=0.01)
 
 
 @pytest.mark.xfail(

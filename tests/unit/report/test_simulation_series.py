@@ -42,7 +42,7 @@ def test_peaks_with_shear_stand_although_f_t_has_a_kink(monkeypatch: pytest.Monk
     monkeypatch.setattr(simulation, "N_SHEAR_NODES", 200)
     monkeypatch.setattr(simulation, "N_SERIES", 12_000)
     for module in (simulation, simulation_series):
-        monkeypatch.setattr(module, "FINE", 96)
+        monkeypatch.setattr(module, "FINE_ANGLES_PER_ANGLE", 96)
     better = simulate(TIRE, load=loads, turn_rate=60.0, contact="shear")
     check_peaks(found.peaks, better.peaks)
     np.testing.assert_allclose(found.strain, better.strain, atol=1e-4 * found.strain.max())
