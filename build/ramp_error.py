@@ -209,7 +209,7 @@ def slips() -> None:
 
 
 def turning() -> None:
-    """Print how a slip ratio is told that begins to grow and turns round, from `speed` alone."""
+    """Print the estimates of a slip ratio that grows and turns round, from `speed` alone."""
     rows: dict[tuple[str, float], list[tuple[float, float]]] = {}
     for speed, phase in product((12.0, 20.0), np.linspace(0.0, 1.0, 9)[:-1]):
         begins = 0.4 + phase * 1.92 / speed

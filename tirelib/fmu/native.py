@@ -113,7 +113,7 @@ def core_file(
     ----------
     calibration : Calibration
     guid : str
-        Of the FMU.
+        Identifier of the FMU, as in the model description, in braces.
     table : sequence of Variable
         Its variables.
     numbers : four floats

@@ -140,7 +140,7 @@ class Cost:
     prior_std : shape (n_free,)
     whiten : Whitening
     shapes : shape (n_shapes, n_runs, n_phi), [-]
-        Of the delay first, then of the structural misfit, each for one standard deviation.
+        Rows of the delay, then of the structural misfit, each for one standard deviation.
     white_shapes : shape (n_shapes, n_rows)
         Whitened as `rows` does.
     inner : shape (n_shapes, n_shapes)
