@@ -3,7 +3,7 @@
     python build/native_speed.py [--samples 10] [--repeat 50]
 
 A step is what an importer does: set frame and conditions, step, get the estimates. Needs gcc. The
-worst step holds what the operating system takes for itself, so the empty FMU stands beside it.
+worst step includes pauses by the operating system; the empty FMU shows how long these are.
 """
 
 import argparse

@@ -126,7 +126,8 @@ class Rig:
         hard = tire.tread_hardening / tire.tread_thickness
         soft = 2.0 * BAR / tire.tread_normal
         deep = soft if hard == 0.0 else (np.sqrt(1.0 + 4.0 * hard * soft) - 1.0) / (2.0 * hard)
-        turned = tire.belt_laws[0].strength if tire.belt_laws else 0.0  # type: ignore[attr-defined]
+        inertias = [law.strength for law in tire.belt_laws if isinstance(law, SectionInertia)]
+        turned = sum(inertias, 0.0)
         return {
             "EI": tire.bending,
             "EA": tire.extension,

@@ -209,7 +209,7 @@ def test_every_fault_is_told_alike(core: ctypes.CDLL, fault: str) -> None:
 
 @pytest.mark.parametrize(("length", "apart"), [(1, 2), (4, 7)])
 def test_a_gap_anywhere_in_a_turn(core: ctypes.CDLL, length: int, apart: int) -> None:
-    """At every distance from the contact's edges, and from the extremes beside it."""
+    """A gap at every distance from the contact's edges and from the strain's extremes near it."""
     clean, _, _ = record(turns=4.2, noise=4e-6, rate=2e3, start=0.5)
     turn = int(2.0 * np.pi * 0.305 / SPEED * 2e3)
     said = set()

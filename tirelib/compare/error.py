@@ -49,7 +49,7 @@ class ModelError:
     rms : float, [-]
         Of model less measured, the delay taken out, set points left in.
     delay, delay_std : float, [s]
-        Of the gages against the trigger.
+        Delay of the gages against the trigger.
     prediction : Prediction
         With the delay.
     rest : shape (n_runs, n_phi), [-]

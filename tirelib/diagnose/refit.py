@@ -52,7 +52,7 @@ class Refit:
     strengths : tuple of array
         One array of components per effect.
     delay : float, [s]
-        Of the gages against the trigger.
+        Delay of the gages against the trigger.
     waveform : shape (n_runs, n_phi), [-]
     slopes : shape (n_free, n_runs, n_phi)
         By base coordinates, the delay last of them, and by strengths in units of their range.

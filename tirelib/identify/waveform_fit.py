@@ -65,7 +65,7 @@ class WaveformFit:
     misfit : shape (n_runs, n_phi), [-]
         The structural misfit that was fitted.
     delay : float, [s]
-        Of the gages against the trigger.
+        Delay of the gages against the trigger.
     interval : shape (n_free, 2)
         95 % interval of each coordinate, relative to the solution, along the ridge that the other
         coordinates follow.

@@ -102,7 +102,7 @@ class Whitened:
     own : float
     normal : Normal
     log_volume : float
-        Of the whitening, by which likelihoods at several sizes compare.
+        Logarithm of the whitening's determinant: likelihoods at several sizes compare with it.
     """
 
     own: float

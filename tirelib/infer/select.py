@@ -187,7 +187,7 @@ class Null:
         return self._of(None, self.normal.right[:, None], self.names)[:, 0]
 
     def beside(self, name: str) -> float:
-        """Return the largest log evidence of anything beside the hypothesis and one more effect."""
+        """Return the largest evidence against the hypothesis with one more effect, [nats]."""
         block = self.normal.blocks[name]
         more = {name: np.full(block.stop - block.start, PRIOR**2)}
         names = [each for each in self.names if each != name]
