@@ -33,7 +33,8 @@ from rich.rule import Rule
 from tirelib.threads import one_thread
 
 if TYPE_CHECKING:
-    from tirelib.report.live import LiveFiles
+    from pages.live import LiveFiles
+
     from tirelib.rig.plans import Plan
 
 DAYS = {"calibrated": (11, 5.1), "played": (12, 15.1)}
@@ -166,8 +167,9 @@ def play(
 
     The day begins when the page is open, and the bench ends when it has read all of it.
     """
+    from pages.live import LiveFiles
+
     from tirelib.campaign import read_campaign
-    from tirelib.report.live import LiveFiles
 
     library, fmu_run, live, replay = (out / f"{name}.json" for name in ESTIMATES)
     files = LiveFiles(library, fmu_run, live, replay, out / "conditions.json", out / "device.toml")
@@ -251,9 +253,11 @@ def use(steps: Steps, out: Path, fmu: Path, files: "LiveFiles", model: Path | st
 
 def draw(steps: Steps, out: Path, day: Path, files: "LiveFiles", seen: Seen) -> Path:
     """Write the page of the demonstration."""
+    from pages import DEMO
+    from pages.live import live_drawing, live_table, live_text, read_line
+
     from tirelib.campaign import read_campaign
     from tirelib.estimators.calibration_file import read_calibration
-    from tirelib.report.live import live_drawing, live_table, live_text, read_line
     from tirelib.report.page import Picture, Section, draw_all, write_page
     from tirelib.signal import LowPass
 
@@ -283,7 +287,7 @@ def draw(steps: Steps, out: Path, day: Path, files: "LiveFiles", seen: Seen) -> 
     reports = [("where the model fails", "compared/index.html")]
     return write_page(
         out,
-        "demo.html",
+        DEMO,
         title="From a wheel transmitter to a model",
         lead=f"{len(campaign.plans)} runs of a tire ({calibration.tire}) went over a serial line "
         "to the bench, live, and came back as a campaign.",

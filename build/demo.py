@@ -40,7 +40,8 @@ from demo_live import (
 from tirelib.threads import one_thread
 
 if TYPE_CHECKING:
-    from tirelib.report.live import LiveFiles
+    from pages.live import LiveFiles
+
     from tirelib.rig.plans import Plan
 
 __all__ = [
@@ -411,8 +412,9 @@ def draw(
     reports: list[tuple[str, str]],
 ) -> Path:
     """Draw every figure of chapter 4 and the live strip, and write the page."""
+    from pages.demo import write_demo_page
+
     from tirelib.estimators.calibration_file import read_calibration
-    from tirelib.report.demo import write_demo_page
 
     console.print(Rule("Draw the figures of chapter 4", align="left", style="dim"))
     with console.status("drawing") as status:

@@ -20,9 +20,9 @@ from rich.rule import Rule
 
 if TYPE_CHECKING:
     from demo import Steps
+    from pages.live import LiveFiles
 
     from tirelib.campaign import RunPlan
-    from tirelib.report.live import LiveFiles
 
 LIVE_ANGLES = (-3.0, 4.0, 0.0, -5.0, 2.0, -4.0)
 """Slip angles [deg] of the runs that go over the line, the loads growing from one to the next."""
@@ -54,8 +54,9 @@ def choose_runs(plans: "Sequence[RunPlan]") -> list[int]:
 
 def go_live(steps: "Steps", out: Path, data: Path, fmu: Path, library: Path) -> "LiveFiles":
     """Send runs of a campaign over a serial line to the bench, which steps the FMU and records."""
+    from pages.live import LiveFiles
+
     from tirelib.campaign import read_campaign
-    from tirelib.report.live import LiveFiles
 
     folder = out / "live"
     folder.mkdir(parents=True, exist_ok=True)
@@ -171,8 +172,9 @@ def require_terminal() -> None:
 
 def judge(console: Console, live: "LiveFiles", data: Path) -> None:
     """Stop loudly if library, FMU and bench do not tell the same numbers."""
+    from pages.live import find_faults
+
     from tirelib.campaign import read_campaign
-    from tirelib.report.live import find_faults
 
     faults = find_faults(live, read_campaign(data))
     if faults:

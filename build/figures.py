@@ -10,16 +10,10 @@ from functools import cache
 from pathlib import Path
 
 from rich.console import Console
+from ring_figures import cases, contact, lateral, speed, static
+from ring_figures import loads as over_load
 
 from tirelib.parameters import Tire, read_tire
-from tirelib.report.figures import ring_cases as cases
-from tirelib.report.figures import (
-    ring_contact,
-    ring_lateral,
-    ring_loads,
-    ring_speed,
-    ring_static,
-)
 from tirelib.report.page import Drawing, Section, draw_all, write_page
 from tirelib.report.simulation import Simulation
 from tirelib.threads import one_thread
@@ -79,31 +73,31 @@ def chapter_5() -> list[Drawing]:
             "5-10",
             "Figure 5-10",
             f"Radial deformation from the ring's own strain. {stiff}",
-            lambda: ring_static.figure_5_10(standing(lumped)),
+            lambda: static.figure_5_10(standing(lumped)),
         ),
         Drawing(
             "5-22",
             "Figure 5-22 (a)",
             f"Static contact pressure by load. {stiff}",
-            lambda: ring_static.figure_5_22(standing(lumped)),
+            lambda: static.figure_5_22(standing(lumped)),
         ),
         Drawing(
             "5-22-soft",
             "Figure 5-22 (a), soft belt",
             f"Static contact pressure. {soft}",
-            lambda: ring_static.figure_5_22(standing()),
+            lambda: static.figure_5_22(standing()),
         ),
         Drawing(
             "5-24",
             "Figure 5-24 (b)",
             f"Static strain by load. {stiff}",
-            lambda: ring_static.figure_5_24(standing(lumped)),
+            lambda: static.figure_5_24(standing(lumped)),
         ),
         Drawing(
             "5-24-soft",
             "Figure 5-24 (b), soft belt",
             f"Static strain by load. {soft}",
-            lambda: ring_static.figure_5_24(standing()),
+            lambda: static.figure_5_24(standing()),
         ),
     ]
 
@@ -117,7 +111,7 @@ def section_6_4() -> list[Drawing]:
             "Figure 6-7",
             "Contact pressure by deflection (Gong's tire) and by "
             "inflation at one deflection (Jenkins' tire), Table 6-3.",
-            lambda: ring_contact.figure_6_7(
+            lambda: contact.figure_6_7(
                 cases.by_deflection(tire(LITERATURE_A)),
                 cases.by_inflation_at_equal_deflection(tire(LITERATURE_B)),
             ),
@@ -126,19 +120,19 @@ def section_6_4() -> list[Drawing]:
             "6-9",
             "Figure 6-9",
             "Normal and horizontal traction of both contacts; Table 6-1 at 59 rad/s.",
-            lambda: ring_contact.figure_6_9(*map(deflections, both)),
+            lambda: contact.figure_6_9(*map(deflections, both)),
         ),
         Drawing(
             "6-10",
             "Figure 6-10",
             "Strain with both contacts; Table 6-1 at 59 rad/s.",
-            lambda: ring_contact.figure_6_10(*map(deflections, both)),
+            lambda: contact.figure_6_10(*map(deflections, both)),
         ),
         Drawing(
             "6-12",
             "Figure 6-12",
             "Peaks of the strain rate and edges of the contact; Table 6-1 at 59 rad/s.",
-            lambda: ring_contact.figure_6_12(*map(deflections, both)),
+            lambda: contact.figure_6_12(*map(deflections, both)),
         ),
     ]
 
@@ -150,32 +144,32 @@ def section_6_5() -> list[Drawing]:
             "6-22",
             "Figure 6-22",
             "Traction by load, no damping; Table 6-2.",
-            lambda: ring_loads.figure_6_22(loads("radial", 0.0, 0.0)),
+            lambda: over_load.figure_6_22(loads("radial", 0.0, 0.0)),
         ),
         Drawing(
             "6-23",
             "Figure 6-23",
             "Traction by inflation, no damping; Table 6-2.",
-            lambda: ring_loads.figure_6_23(inflations(0.0, 0.0)),
+            lambda: over_load.figure_6_23(inflations(0.0, 0.0)),
         ),
         Drawing(
             "6-24",
             "Figure 6-24",
             "Traction by load with tread shear, no damping; Table 6-2.",
-            lambda: ring_loads.figure_6_24(loads("shear", 0.0, 0.0)),
+            lambda: over_load.figure_6_24(loads("shear", 0.0, 0.0)),
         ),
         Drawing(
             "6-26",
             "Figure 6-26",
             "Strain and strain rate by load; Table 6-2. Fig. 6-25 is the measured counterpart.",
-            lambda: ring_loads.figure_6_26(loads("radial", 0.0, 0.0)),
+            lambda: over_load.figure_6_26(loads("radial", 0.0, 0.0)),
         ),
         Drawing(
             "6-28",
             "Figure 6-28",
             "Strain and strain rate by inflation; Table 6-2. Fig. 6-27 "
             "is the measured counterpart.",
-            lambda: ring_loads.figure_6_28(inflations(0.0, 0.0)),
+            lambda: over_load.figure_6_28(inflations(0.0, 0.0)),
         ),
     ]
 
@@ -188,38 +182,38 @@ def damping() -> list[Drawing]:
             "6-29",
             "Figure 6-29",
             "Damping and speed; Table 6-2.",
-            lambda: ring_speed.figure_6_29(speeds()),
+            lambda: speed.figure_6_29(speeds()),
         ),
         Drawing(
             "6-33",
             "Figure 6-33",
             "What moves with speed, and what Eq. (113) makes of it; Table 6-2.",
-            lambda: ring_speed.figure_6_33(speeds()),
+            lambda: speed.figure_6_33(speeds()),
         ),
         Drawing(
             "6-34",
             "Figure 6-34",
             "Traction by load, damped; Table 6-2.",
-            lambda: ring_loads.figure_6_34(loads("radial", *rolling)),
+            lambda: over_load.figure_6_34(loads("radial", *rolling)),
         ),
         Drawing(
             "6-35",
             "Figure 6-35",
             "Traction by inflation at one load, damped; Table 6-2.",
-            lambda: ring_loads.figure_6_35(inflations(*rolling)),
+            lambda: over_load.figure_6_35(inflations(*rolling)),
         ),
         Drawing(
             "6-36",
             "Figure 6-36",
             "Traction by load with tread shear, damped; Table 6-2.",
-            lambda: ring_loads.figure_6_36(loads("shear", *rolling)),
+            lambda: over_load.figure_6_36(loads("shear", *rolling)),
         ),
         Drawing(
             "6-40",
             "Figure 6-40, 6-41",
             "Lateral traction and force at slip angles: pressure "
             "of the ring against a parabola; Table 6-2, damped.",
-            lambda: ring_lateral.figure_6_40(loads("radial", *rolling)),
+            lambda: lateral.figure_6_40(loads("radial", *rolling)),
         ),
     ]
 

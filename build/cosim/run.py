@@ -21,6 +21,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from pages.cosim import Series, write_cosim
 from rich.console import Console
 
 from cosim import (
@@ -42,7 +43,6 @@ from cosim.score import COVERED, LIMITS, score, turns_of
 from cosim.wheels import WHEELS, FourWheels
 from tirelib import __version__
 from tirelib.cli.common import progress_bar
-from tirelib.report.cosim import Series, write_cosim
 from tirelib.rig.campaign import THREADS
 from tirelib.threads import one_thread
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from pages.agreement import agreement, read_turns
 from rich.console import Console
 
 import tirebench.cli
@@ -28,7 +29,6 @@ from tirebench.links import Read
 from tirebench.protocols.plan import ProtocolPlan
 from tirebench.wire.device import Device
 from tirelib.campaign import Run, check_campaign, read_campaign
-from tirelib.report.agreement import agreement, read_turns
 from tirelib.rig.measure import Chain
 
 
@@ -149,7 +149,7 @@ def test_everything_that_was_promised_is_there_and_on_the_page(out: Path) -> Non
 def test_a_number_that_differs_ends_the_demonstration(
     demo_module: Any, out: Path, tmp_path: Path
 ) -> None:
-    from tirelib.report.live import LiveFiles
+    from pages.live import LiveFiles
 
     changed = document(out / "replay.json")
     next(turn for turn in changed["turns"] if turn["valid"])["Fz"] += 1e-9

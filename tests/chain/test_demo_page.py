@@ -139,7 +139,7 @@ def demo_module() -> ModuleType:
 def test_a_difference_makes_the_demonstration_fail(
     made: tuple[Path, str], campaigns: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from tirelib.report.live import LiveFiles
+    from pages.live import LiveFiles
 
     out, _ = made
     live = out / "live"
@@ -209,11 +209,12 @@ def test_a_missing_campaign_is_named(campaigns: Path, tmp_path: Path) -> None:
 
 
 def test_the_library_refuses_another_tire(campaigns: Path, tmp_path: Path) -> None:
+    from pages.demo import write_demo_page
+
     from tirelib.campaign import read_campaign
     from tirelib.errors import CalibrationError
     from tirelib.estimators.train import train
     from tirelib.observations import observe
-    from tirelib.report.demo import write_demo_page
 
     runs = [run for run in cornering_runs() if np.isclose(run.plan.load, 4500.0)]
     calibration = train(observe([read_campaign(campaigns / "set1")])).calibration

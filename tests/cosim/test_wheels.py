@@ -18,12 +18,12 @@ from cosim.score import LIMITS, in_range, score, turns_of
 from cosim.vehicle import Controls, G, Motion, Vehicle
 from cosim.water import WaterTable
 from cosim.wheels import NAMES, OWN_FRICTION, WHEELS, FourWheels, WheelStates
+from pages.cosim import write_cosim
 
 from tests.fmu import live, virtual_host
 from tirelib.errors import ParameterError
 from tirelib.flags import TurnFlag
 from tirelib.held import HELD
-from tirelib.report.cosim import write_cosim
 
 
 def _steer(side: float) -> Manoeuvre:

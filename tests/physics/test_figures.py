@@ -6,6 +6,8 @@ what does; such tests say so.
 
 import numpy as np
 import pytest
+from ring_figures import cases
+from ring_figures.static import deformation_from_strain
 
 from tests.physics.figure_cases import (
     CASE,
@@ -23,8 +25,6 @@ from tests.physics.figure_cases import (
     standing,
     tire,
 )
-from tirelib.report.figures import ring_cases as cases
-from tirelib.report.figures.ring_static import deformation_from_strain
 from tirelib.report.simulation import simulate
 
 # Section 5: the standing ring

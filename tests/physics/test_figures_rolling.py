@@ -6,6 +6,9 @@ what does; such tests say so.
 
 import numpy as np
 import pytest
+from ring_figures import cases
+from ring_figures.lateral import parabolic_profile, ring_profile
+from ring_figures.speed import compression_to_edge
 
 from tests.physics.figure_cases import (
     CASE,
@@ -20,9 +23,6 @@ from tests.physics.figure_cases import (
 )
 from tirelib.brush.forces import brush_forces
 from tirelib.brush.parameters import BrushParameters
-from tirelib.report.figures import ring_cases as cases
-from tirelib.report.figures.ring_lateral import parabolic_profile, ring_profile
-from tirelib.report.figures.ring_speed import compression_to_edge
 from tirelib.report.simulation import Simulation
 
 # Section 6.5.2.2: damping and speed

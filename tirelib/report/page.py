@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import ChoiceLoader, Environment, FileSystemLoader, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from tirelib import __version__
@@ -123,16 +123,30 @@ def draw_all(folder: Path, drawings: Sequence[Drawing]) -> list[Picture]:
     return pictures
 
 
-def write_page(folder: Path, template: str, **content: Any) -> Path:
-    """Fill a template and write it as ``index.html`` of the folder."""
+def write_page(folder: Path, template: str | Path, **content: Any) -> Path:
+    """Fill a template and write it as ``index.html`` of the folder.
+
+    Parameters
+    ----------
+    folder : Path
+    template : str or Path
+        The name of a template of this package, or the path of a template that extends one of them.
+    **content
+        Values that the template names.
+    """
+    template = Path(template)
     environment = Environment(
-        loader=PackageLoader("tirelib.report", "templates"),
+        loader=ChoiceLoader(
+            [FileSystemLoader(template.parent), PackageLoader("tirelib.report", "templates")]
+        ),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    text = environment.get_template(template).render(axes=AXES_NAME, version=__version__, **content)
+    text = environment.get_template(template.name).render(
+        axes=AXES_NAME, version=__version__, **content
+    )
     folder.mkdir(parents=True, exist_ok=True)
     page = folder / "index.html"
     page.write_text(text, encoding="utf-8")

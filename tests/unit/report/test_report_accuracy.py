@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pages.cutoff_study import nearest_runs, study_cut_off
 
 from tests.unit.report.conftest import World
 from tirelib.report.accuracy import Compared, accuracies, accuracy, compare
-from tirelib.report.cutoff_study import nearest_runs, study_cut_off
 from tirelib.report.levels import camber_levels, find_levels, load_levels, reference_level
 from tirelib.signal.lowpass import DEFAULT_ORDER
 

@@ -9,17 +9,21 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from pages.cutoff_study import nearest_runs, study_cut_off
+from pages.figures.camber import figure_4_16
+from pages.figures.cutoff import figure_cut_off
+from pages.figures.live import LastTurn, Strip, figure_live
+from pages.figures.slip_ratio import figure_4_17, figure_4_18
+from pages.figures.strain import figure_3_7, figure_4_1
+from pages.turns import TypicalTurns, typical_turns
 
 from tests.unit.report.conftest import World
 from tirelib.errors import CalibrationError
 from tirelib.estimators.cornering import CorneringTrend
 from tirelib.report import figures
 from tirelib.report.accuracy import QUANTITIES
-from tirelib.report.cutoff_study import nearest_runs, study_cut_off
 from tirelib.report.figures.contact import contact_area
 from tirelib.report.figures.cornering import bend_factor
-from tirelib.report.figures.live import LastTurn, Strip
-from tirelib.report.turns import TypicalTurns, typical_turns
 
 
 def trend(world: World) -> CorneringTrend:
@@ -45,12 +49,12 @@ def live(world: World) -> Figure:
         truth={name: np.full(8, 3.0) for name in QUANTITIES},
     )
     trace = turns(world, "set1", 1).trace
-    return figures.figure_live(LastTurn(7, trace.phi, trace.strain[0], trace.lateral), strip)
+    return figure_live(LastTurn(7, trace.phi, trace.strain[0], trace.lateral), strip)
 
 
 DRAW: dict[str, Callable[[World], Figure]] = {
-    "3_7": lambda w: figures.figure_3_7(turns(w, "set1", 3)),
-    "4_1": lambda w: figures.figure_4_1(turns(w, "set1", 1)),
+    "3_7": lambda w: figure_3_7(turns(w, "set1", 3)),
+    "4_1": lambda w: figure_4_1(turns(w, "set1", 1)),
     "4_2": lambda w: figures.figure_4_2(w.observations["set1"], w.estimates["set1"]),
     "4_3": lambda w: figures.figure_4_3(w.trained.means),
     "4_4": lambda w: figures.figure_4_4(w.trained),
@@ -59,19 +63,17 @@ DRAW: dict[str, Callable[[World], Figure]] = {
     "4_8": lambda w: figures.figure_4_8(w.observations["set1"], w.estimates["set1"]),
     "4_12": lambda w: figures.figure_4_12(w.trained),
     "4_14": lambda w: figures.figure_4_14(w.trained),
-    "4_16": lambda w: figures.figure_4_16(w.trained.means),
-    "4_17": lambda w: figures.figure_4_17(
+    "4_16": lambda w: figure_4_16(w.trained.means),
+    "4_17": lambda w: figure_4_17(
         turns(w, "brake_drive", 3), w.observations["brake_drive"], w.calibration.rolling
     ),
-    "4_18": lambda w: figures.figure_4_18(
-        w.observations["brake_drive"], w.estimates["brake_drive"]
-    ),
+    "4_18": lambda w: figure_4_18(w.observations["brake_drive"], w.estimates["brake_drive"]),
     "4_20": lambda w: figures.figure_4_20(w.trained.means, trend(w)),
     "4_23": lambda w: figures.figure_4_23(trend(w)),
     "accuracy": lambda w: figures.figure_accuracy(w.observations["set1"], w.estimates["set1"]),
     "residuals": lambda w: figures.figure_residuals(w.trained, "alpha"),
     "live": live,
-    "cut_off": lambda w: figures.figure_cut_off(
+    "cut_off": lambda w: figure_cut_off(
         study_cut_off(w.campaigns["set3"], nearest_runs(w.campaigns["set3"]))
     ),
 }

@@ -8,12 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from tests.unit.report.conftest import World
-from tirelib.errors import CalibrationError
-from tirelib.estimators.result import estimate_document
-from tirelib.report.agreement import agreement, agreement_table, difference, read_turns
-from tirelib.report.live import (
+from pages.agreement import agreement, agreement_table, difference, read_turns
+from pages.live import (
     LiveFiles,
     find_faults,
     last_turn,
@@ -22,6 +18,10 @@ from tirelib.report.live import (
     read_line,
     read_strip,
 )
+
+from tests.unit.report.conftest import World
+from tirelib.errors import CalibrationError
+from tirelib.estimators.result import estimate_document
 from tirelib.signal import LowPass
 
 RUNS = (2, 5)

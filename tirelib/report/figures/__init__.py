@@ -1,21 +1,14 @@
 """The figures of the dissertation's chapter 4, redrawn from our data, and a few of our own."""
 
-from tirelib.report.figures.camber import figure_4_16
 from tirelib.report.figures.contact import figure_4_2, figure_4_3
 from tirelib.report.figures.cornering import figure_4_20, figure_4_23
-from tirelib.report.figures.cutoff import figure_cut_off
 from tirelib.report.figures.lateral_force import figure_4_12, figure_4_14
-from tirelib.report.figures.live import figure_live
 from tirelib.report.figures.load import figure_4_4
 from tirelib.report.figures.overview import figure_accuracy
 from tirelib.report.figures.residuals import figure_residuals
 from tirelib.report.figures.slip_angle import figure_4_5, figure_4_7, figure_4_8
-from tirelib.report.figures.slip_ratio import figure_4_17, figure_4_18
-from tirelib.report.figures.strain import figure_3_7, figure_4_1
 
 __all__ = [
-    "figure_3_7",
-    "figure_4_1",
     "figure_4_2",
     "figure_4_3",
     "figure_4_4",
@@ -24,13 +17,8 @@ __all__ = [
     "figure_4_8",
     "figure_4_12",
     "figure_4_14",
-    "figure_4_16",
-    "figure_4_17",
-    "figure_4_18",
     "figure_4_20",
     "figure_4_23",
     "figure_accuracy",
-    "figure_cut_off",
-    "figure_live",
     "figure_residuals",
 ]

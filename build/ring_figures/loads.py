@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from tirelib.report.figures.ring_contact import NAMES
+from ring_figures.contact import NAMES
 from tirelib.report.figures.ring_panels import (
     ANGLE,
     NORMAL,

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tirelib.report.figures.ring_cases import StaticRing
+from ring_figures.cases import StaticRing
 from tirelib.report.figures.ring_panels import ANGLE, PRESSURE, RADIAL, STRAIN
 from tirelib.report.simulation import MICRO
 from tirelib.report.style import (

@@ -3,12 +3,13 @@
 import numpy as np
 from matplotlib.figure import Figure
 
+from pages.figures.strain import figure_4_17_turns
+from pages.turns import TypicalTurns
 from tirelib.estimators.calibration import Estimates, Rolling
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.observations import Observations
 from tirelib.report.accuracy import WIDTH, accuracy, compare
 from tirelib.report.figures.regression import RESIDUAL
-from tirelib.report.figures.strain import figure_4_17_turns
 from tirelib.report.style import (
     BLUE,
     FAINT,
@@ -22,7 +23,6 @@ from tirelib.report.style import (
     styled,
     zero_line,
 )
-from tirelib.report.turns import TypicalTurns
 
 SLIP = label("slip ratio", "%", signed=True)
 TICKS = (-100, -50, -20, -10, -5, -2, -1, 0, 1, 2, 5, 10, 20, 50, 100)

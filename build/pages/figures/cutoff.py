@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tirelib.report.cutoff_study import CutOffStudy
+from pages.cutoff_study import CutOffStudy
 from tirelib.report.style import (
     BLACK,
     BLUE,

@@ -6,6 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
+from pages import DEMO
+from pages.cutoff_study import nearest_runs, study_cut_off
+from pages.figures.camber import figure_4_16
+from pages.figures.cutoff import figure_cut_off
+from pages.figures.slip_ratio import figure_4_17, figure_4_18
+from pages.figures.strain import figure_3_7, figure_4_1
+from pages.live import LiveFiles, live_drawing, live_table, live_text, read_line
+from pages.turns import TypicalTurns, typical_turns
 from tirelib.campaign import Campaign, RunPlan, read_campaign
 from tirelib.errors import CalibrationError
 from tirelib.estimators.calibration import Calibration, Estimates
@@ -14,12 +22,9 @@ from tirelib.observations import Observations, observe
 from tirelib.report import figures
 from tirelib.report.accuracy import QUANTITIES, Accuracy, accuracy, compare
 from tirelib.report.calibration import regression_drawings
-from tirelib.report.cutoff_study import nearest_runs, study_cut_off
 from tirelib.report.estimate import accuracy_table
 from tirelib.report.figures.regression import find_regression, in_use, rms
-from tirelib.report.live import LiveFiles, live_drawing, live_table, live_text, read_line
 from tirelib.report.page import DASH, Drawing, Section, Table, draw_all, number, write_page
-from tirelib.report.turns import TypicalTurns, typical_turns
 from tirelib.signal import LowPass
 
 NEEDED = ("set1", "set1-unseen")
@@ -95,7 +100,7 @@ def write_demo_page(
         sections.insert(1, _live(folder, live, seen["set1-unseen"].campaign, low_pass))
     return write_page(
         folder,
-        "demo.html",
+        DEMO,
         title="From innerliner strain to load, slip and lateral force",
         lead=_lead(seen, calibration),
         headline=[_accuracy(seen), _comparison(trained)],
@@ -289,14 +294,14 @@ def _strain(part: Seen) -> list[Drawing]:
             "Time runs to the right. The innerliner is compressed before the contact (CP1), "
             "stretched in it (TP), compressed after it (CP2). A turn is evaluated up to 20 "
             "degrees after its contact.",
-            lambda: figures.figure_3_7(free_turns()),
+            lambda: figure_3_7(free_turns()),
         ),
         Drawing(
             "figure_4_1",
             "All gages under slip, and the slope of their peak rates (Fig. 4-1, 4-6)",
             "CP1 and the peak rates differ across the tire. The slope of the peak rates over the "
             "three middle gages is the dissertation's regressor for the slip angle.",
-            lambda: figures.figure_4_1(slipping()),
+            lambda: figure_4_1(slipping()),
         ),
     ]
 
@@ -329,7 +334,7 @@ def _camber(camber: Trained | None) -> list[Drawing]:
             "Slip and camber together (Fig. 4-16)",
             "Contact lengths at the outer gages stop changing after a few degrees (saturation). "
             "CP1 changes a little longer, because it follows the lateral force.",
-            lambda: figures.figure_4_16(camber.means),
+            lambda: figure_4_16(camber.means),
         ),
     ]
 
@@ -354,14 +359,14 @@ def _braking(seen: Mapping[str, Seen], calibration: Calibration) -> list[Drawing
             "Braking deepens CP2, driving CP1. Below: the balance of every turn; turns inside the "
             "band count as free rolling. The slip axis is linear up to 2 % and logarithmic "
             "beyond.",
-            lambda: figures.figure_4_17(turns(), part.observations, calibration.rolling),
+            lambda: figure_4_17(turns(), part.observations, calibration.rolling),
         ),
         Drawing(
             "figure_4_18",
             "Slip ratio (Fig. 4-18)",
             "From the turn rate in the strain, the rolling radius and the travel speed. "
             + ("Unseen day." if unseen else "The calibration was fitted to this campaign."),
-            lambda: figures.figure_4_18(part.observations, part.estimates),
+            lambda: figure_4_18(part.observations, part.estimates),
         ),
     ]
 
@@ -375,5 +380,5 @@ def _cut_off(part: Seen) -> Drawing:
         "carries over. At a fixed 300 Hz (right) fast rolling is smeared and CP1 loses depth; "
         "slow rolling would hardly be filtered, and the cut-off is refused where its order leaves "
         "the allowed range.",
-        lambda: figures.figure_cut_off(study_cut_off(part.campaign, nearest_runs(part.campaign))),
+        lambda: figure_cut_off(study_cut_off(part.campaign, nearest_runs(part.campaign))),
     )

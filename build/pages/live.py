@@ -9,19 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray, IntArray
-from tirelib.campaign import Campaign
-from tirelib.errors import CalibrationError
-from tirelib.report import figures
-from tirelib.report.accuracy import QUANTITIES
-from tirelib.report.agreement import (
+from pages.agreement import (
     TOLERANCE,
     Agreement,
     agreement,
     agreement_table,
     read_turns,
 )
-from tirelib.report.figures.live import LastTurn, Strip
+from pages.figures.live import LastTurn, Strip, figure_live
+from tirelib.arrays import FloatArray, IntArray
+from tirelib.campaign import Campaign
+from tirelib.errors import CalibrationError
+from tirelib.report.accuracy import QUANTITIES
 from tirelib.report.page import Drawing, Table
 from tirelib.signal import LowPass, cut_turns
 
@@ -136,7 +135,7 @@ def live_drawing(files: LiveFiles, campaign: Campaign, low_pass: LowPass) -> Dra
         "Top: strain of the last turn on the line. Below: estimates of the bench, turn after turn "
         "and run after run, with their 95 % bands and the mean that the rig measured in the run; "
         "right: their difference. The first turn of a run has no estimate.",
-        lambda: figures.figure_live(last_turn(files, campaign, low_pass), read_strip(files)),
+        lambda: figure_live(last_turn(files, campaign, low_pass), read_strip(files)),
     )
 
 

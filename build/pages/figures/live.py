@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pages.figures.strain import ANGLE, STRAIN
 from tirelib.arrays import FloatArray, IntArray
 from tirelib.report.accuracy import QUANTITIES, SIGNED, TITLE, UNIT, WIDTH
-from tirelib.report.figures.strain import ANGLE, STRAIN
 from tirelib.report.style import (
     BLACK,
     BLUE,

@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pages.turns import TypicalTurns
 from tirelib.report.style import (
     BLACK,
     BLUE,
@@ -18,7 +19,6 @@ from tirelib.report.style import (
     styled,
     zero_line,
 )
-from tirelib.report.turns import TypicalTurns
 
 ANGLE = label("wheel angle from the middle of the contact", "deg")
 STRAIN = label("strain", "microstrain")

@@ -1,6 +1,0 @@
-"""The co-simulations live beside the library, in `build`."""
-
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "build"))
