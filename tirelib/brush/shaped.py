@@ -35,6 +35,8 @@ LOWEST, HIGHEST = -0.9, 2.9
 ONE_END = -0.2
 """Flatness below which the contact may slide at the leading end as well, where pressure is low."""
 _STEPS = 60
+_SAME = 1e-15
+"""Change of a share at which its Newton steps end."""
 
 
 def predict_shaped(
@@ -111,9 +113,11 @@ def _ends(t: FloatArray, c: FloatArray) -> tuple[FloatArray, FloatArray]:
     flat = np.where(peaked, c, -1.0)
     peak = np.where(peaked, 1.0 / 3.0 - np.sqrt(flat**2 - 3.0 * flat) / (6.0 * flat), 1.0)
     whole = t >= _reach(peak, c)
-    trailing = np.where(whole, 1.0, np.where(t > 0.0, _root(t, c, np.zeros_like(peak), peak), 0.0))
+    part = ~whole & (t > 0.0)
     both = peaked & ~whole & (t > _reach(np.ones_like(peak), c))
-    leading = np.where(both, _root(t, c, np.ones_like(peak), peak), 1.0)
+    trailing, leading = np.where(whole, 1.0, 0.0), np.ones(t.shape)
+    trailing[part] = _root(t[part], c[part], np.zeros(t.shape)[part], peak[part])
+    leading[both] = _root(t[both], c[both], np.ones(t.shape)[both], peak[both])
     return trailing, leading
 
 
@@ -134,8 +138,9 @@ def _root(t: FloatArray, c: FloatArray, below: FloatArray, above: FloatArray) ->
         with np.errstate(invalid="ignore", divide="ignore"):
             step = y - rest / slope
         inside = (step > np.minimum(below, above)) & (step < np.maximum(below, above))
-        new = np.where(inside, step, 0.5 * (below + above))
-        if np.all(np.abs(new - y) < 1e-15):
+        there = np.abs(step - y) < _SAME
+        new = np.where(inside | there, step, 0.5 * (below + above))
+        if there.all():
             return new
         y = new
     return y
