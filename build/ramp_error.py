@@ -175,6 +175,16 @@ def back(speed: float, begins: float, t: float) -> dict[str, float]:
     return {"Fz": 3500.0, "speed": speed, "kappa": -0.12 * max(min(x, 0.8 - x), 0.0)}
 
 
+def begin(speed: float, begins: float, t: float) -> dict[str, float]:
+    """Return the inputs of a slip ratio that begins to grow; the speed is held."""
+    return {"Fz": 3500.0, "speed": speed, "kappa": -0.12 * min(max(t - begins, 0.0), 0.4)}
+
+
+def leap(speed: float, begins: float, t: float) -> dict[str, float]:
+    """Return the inputs of a slip ratio that jumps; the speed is held."""
+    return {"Fz": 3500.0, "speed": speed, "kappa": 0.0 if t < begins else -0.03}
+
+
 def press(speed: float, begins: float, t: float) -> dict[str, float]:
     """Return the inputs of a load that jumps."""
     return {"Fz": 3000.0 if t < begins else 4000.0, "speed": speed}
@@ -182,21 +192,20 @@ def press(speed: float, begins: float, t: float) -> dict[str, float]:
 
 def slips() -> None:
     """Print the worst error of the slip ratio, itself and over its standard deviation."""
-    for law in (brake, pulses, press):
+    for law in (brake, pulses, begin, leap, press):
         for told in (("speed", "omega"), ("speed",)):
             rows = []
             for speed, phase in product((12.0, 20.0), np.linspace(0.0, 1.0, 9)[:-1]):
                 made = play(0.9, partial(law, speed, 0.4 + phase * 1.92 / speed))
                 made |= {name: np.full(made["Fz"].size, x) for name, x in ROAD.items()}
-                for stiffness in (0.5, 1.0, 2.0):
-                    known = stiffness * slip.SLIP_STIFFNESS
-                    with mock.patch.object(slip, "SLIP_STIFFNESS", known):
+                for factor in (0.5, 1.0, 2.0):
+                    with mock.patch.object(slip, "PULL_SLIP", factor * slip.PULL_SLIP):
                         features, found = estimate(made, *told, *ROAD)
                     here = np.minimum((features.time * RATE).astype(int), made["Fz"].size - 1)
                     good = found.turn_valid & (np.arange(here.size) > 0)
                     error = np.abs(found.value["kappa"] - made["kappa"][here])[good]
                     over = error / found.std["kappa"][good]
-                    rows.append((stiffness, error.max(), over.max()))
+                    rows.append((factor, error.max(), over.max()))
             table = np.array(rows)
             half, one, double = (table[table[:, 0] == x] for x in (0.5, 1.0, 2.0))
             cells = (

@@ -3,7 +3,6 @@
 enum { NEWTON = 8 };
 
 static const double LARGEST_RATIO = 2.0, ENDS = 17.0 / 240.0; /* ENDS: squared */
-static const double GRAVITY = 9.81, SLIP_STIFFNESS = 11.0;
 
 /* numpy.polynomial.polynomial.polyval */
 static double polynomial(const double *c, int terms, double x) {
@@ -155,10 +154,4 @@ AngleLaw angle_law(double middle, double turn, double ahead, const Course *omega
     law.std = hypot(fit_std, slope_std);
     law.speed = contact_rate / (law.past.row[law.past.n - 1][PAST_SPEED] * slip);
     return law;
-}
-
-double unseen_change(const Course *speed, double seconds, double here, double before) {
-    double load = 0.5 / sqrt(3.0) * (here * here - before * before);
-    double surge = speed->there ? speed->surge : 0.0;
-    return hypot(load, surge / seconds / (GRAVITY * SLIP_STIFFNESS));
 }

@@ -1,4 +1,4 @@
-/* Wheel angle over time within a turn. Reference: tirelib.signal.angle, tirelib.signal.slip. */
+/* Wheel angle over time within a turn. Reference: tirelib.signal.angle. */
 #ifndef TIRE_ANGLE_H
 #define TIRE_ANGLE_H
 
@@ -34,9 +34,5 @@ double law_sample(const AngleLaw *law, double phi);
 
 /* Reference: minmod. */
 double minmod(double a, double b);
-
-/* By how much the slip ratio at the contact may differ from the turn's.
- * Reference: tirelib.signal.slip.unseen_change. */
-double unseen_change(const Course *speed, double seconds, double here, double before);
 
 #endif

@@ -6,12 +6,10 @@
 
 enum { DEGREE = 3, FEWEST = 3, BINS = 64 };
 
-/* Rows: Legendre polynomials by their powers; means of the powers from -1 to 0; slope at 0 less the
- * mean slope from -1 to 0. */
+/* Rows: Legendre polynomials by their powers; means of the powers from -1 to 0. */
 static const double LEGENDRE[4][4] = {
     {1.0, 0.0, 0.0, 0.0}, {0.0, 1.0, 0.0, 0.0}, {-0.5, 0.0, 1.5, 0.0}, {0.0, -1.5, 0.0, 2.5}};
 static const double MEANS[4] = {1.0, -1.0 / 2.0, 1.0 / 3.0, -1.0 / 4.0};
-static const double BENT[4] = {0.0, 0.0, 1.0, -1.0};
 
 static int smaller(int a, int b) { return a < b ? a : b; }
 
@@ -84,7 +82,7 @@ static double fit(const double *z, double *y, int n, int size, double *fitted) {
 }
 
 static Course no_course(const double *samples, size_t n, double first, int told) {
-    Course c = {1, 0, 1, {0.0}, 0.0, 0.0, 0.0};
+    Course c = {1, 0, 1, {0.0}, 0.0, 0.0};
     double wanted = rint(-first);
     size_t part = wanted < 1.0 ? 1 : wanted < (double)n ? (size_t)wanted : n;
     for (size_t i = 0; i < part; i++) c.mean += samples[i];
@@ -94,7 +92,7 @@ static Course no_course(const double *samples, size_t n, double first, int told)
 }
 
 Course course(const double *samples, size_t n, double first, double turn) {
-    Course c = {0, 0, 0, {0.0}, NAN, 0.0, 0.0};
+    Course c = {0, 0, 0, {0.0}, NAN, 0.0};
     double low = INFINITY, high = -INFINITY, y[BINS], z[BINS], fitted[4], terms[4][4];
     size_t changes = 0;
     for (size_t i = 0; i < n; i++) {
@@ -113,28 +111,24 @@ Course course(const double *samples, size_t n, double first, double turn) {
     for (int i = 0; i < bins; i++) z[i] = (z[i] - late + first + turn) / (turn * half) - 1.0;
     double scatter = fit(z, y, bins, size, fitted) / (1.0 - (double)size / told);
     double independent = told / alike(y, bins, (bins + told - 1) / told);
-    double variance[4], kept[4], noise = 0.0, spread = 0.0;
+    double variance[4], kept[4], spread = 0.0;
     terms_of(1.0 / half, 1.0 / half - 1.0, size, terms);
     c.there = c.known = 1;
     c.terms = size;
     c.mean = 0.0;
     for (int k = 0; k < size; k++) {
-        double square = fitted[k] * fitted[k], mean = 0.0, bent = 0.0;
+        double square = fitted[k] * fitted[k], mean = 0.0;
         variance[k] = scatter * (2.0 * k + 1.0) / independent;
         if (square < DBL_MIN) square = DBL_MIN;
         double share = 1.0 - variance[k] / square;
         kept[k] = k == 0 ? fitted[0] : share > 0.0 ? share * fitted[k] : 0.0;
         for (int j = 0; j < size; j++) {
             mean += terms[k][j] * MEANS[j];
-            bent += terms[k][j] * BENT[j];
             c.shape[j] += kept[k] * terms[k][j];
         }
         c.mean += fitted[k] * mean;
-        c.surge += kept[k] * bent;
-        noise += bent * bent * variance[k];
         spread += (terms[k][0] - mean) * (terms[k][0] - mean) * variance[k];
     }
     c.std = sqrt(spread) / fabs(c.mean);
-    c.surge = c.surge * c.surge > noise ? c.surge - noise / c.surge : 0.0;
     return c;
 }

@@ -12,7 +12,7 @@ typedef struct {
     int known; /* the source told enough values to have a course; else it is its mean */
     int terms;
     double shape[COURSE_TERMS]; /* by the powers of turns from the contact's middle */
-    double mean, std, surge;
+    double mean, std;
 } Course;
 
 /* Return how a source runs from one contact to beyond the next.

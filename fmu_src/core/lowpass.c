@@ -44,10 +44,14 @@ int filter_start(Filter *filter, const double *angle, size_t n, double sigma, do
     filter->n = n;
     filter->sigma = sigma;
     for (size_t i = 0; i + 1 < n; i++) scratch[i] = angle[i + 1] - angle[i];
-    double reach = SUPPORT * sigma / median(scratch, n - 1);
+    double width = lowpass_half_width(sigma), reach = width / median(scratch, n - 1);
     if (!(reach < (double)n)) return 0;
     filter->reach = reach < 1.0 ? 1 : (size_t)reach;
-    return nearest(filter, first) >= filter->reach && nearest(filter, last) + filter->reach < n;
+    size_t before = nearest(filter, first), behind = n - 1 - nearest(filter, last);
+    size_t room = before < behind ? before : behind;
+    if (room >= filter->reach) return 1;
+    filter->reach = room; /* as wide where the wheel is fastest */
+    return angle[0] <= first - width && angle[n - 1] >= last + width;
 }
 
 void filter_at(const Filter *filter, double phi, const double *samples, size_t stride, int gages,

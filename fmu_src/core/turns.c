@@ -48,6 +48,7 @@ Cutter *cutter_start(void *memory, int gages, const double *lateral, double rate
     c->missing = (unsigned char *)(c->waiting + c->places);
     finder_start(&c->finder, longest_turn(rate), c->centre);
     c->previous_period = NAN;
+    c->rolled.ratio = c->rolled.pull = NAN;
     return c;
 }
 
@@ -102,9 +103,6 @@ static void find_law(Cutter *c, const Contact *contact, const Contact *before) {
     Course omega = course_of(c, OMEGA, first, stop, middle, turn);
     Course speed = course_of(c, SPEED, first, stop, middle, turn);
     c->law = angle_law(middle, turn, (double)stop - middle, &omega, &speed, &c->past, unknown);
-    double unseen =
-        unseen_change(&speed, seconds, pulse_of(contact, &c->law), pulse_of(before, &c->law));
-    c->law.slip_std = hypot(c->law.slip_std, c->law.late * unseen);
     int64_t end = stop_of(c, contact, &c->law);
     if (end > c->stop || end < 0) c->stop = end;
 }
@@ -277,6 +275,17 @@ static void take_strain(Cutter *c, double start, double stop, Turn *turn) {
         turn->flags |= REDUCED_GAGES;
 }
 
+/* Relative standard deviation of turn rate over speed in the contact.
+ * Reference: TurnCutter._slip_std */
+static void take_slip(Cutter *c, const Contact *before, Turn *turn) {
+    Rolled here = {c->law.step / c->law.speed, pull_of(turn->strain + c->centre * ANGLES)};
+    double load = unseen_by_load(turn->pulse, pulse_of(before, &c->law));
+    double traction = unseen_by_traction(&here, &c->rolled, turn->pulse);
+    turn->slip_std = hypot(c->law.slip_std, c->law.late * hypot(load, traction));
+    if (isfinite(here.ratio) && isfinite(here.pull) && !(turn->flags & FIRST_TURN))
+        c->rolled = here;
+}
+
 /* Reference: TurnCutter._full_turn */
 static int full_turn(Cutter *c, const Contact *contact, const Contact *before, Turn *turn) {
     double start = contact_middle(before), stop = contact_middle(contact), period = stop - start;
@@ -294,10 +303,10 @@ static int full_turn(Cutter *c, const Contact *contact, const Contact *before, T
     turn->period = period / c->rate;
     turn->omega = c->law.step * c->rate;
     turn->angle_std = c->law.std;
-    turn->slip_std = c->law.slip_std;
     turn->pulse = pulse_of(contact, &c->law);
     if (!isnan(sigma) && !window_of(c, turn, sigma)) return 0;
     take_strain(c, start, stop, turn);
+    take_slip(c, before, turn);
     take_conditions(c, contact, start, stop, turn);
     look_at_trigger(c, start, stop, turn);
     return 1;
@@ -330,6 +339,7 @@ int cutter_next(Cutter *c, Turn *turn) {
         c->previous_period = NAN;
         c->opposites = 0;
         c->past.n = 0;
+        c->rolled.ratio = c->rolled.pull = NAN;
         first_turn(c, &c->previous, turn);
         return 1;
     }

@@ -6,6 +6,7 @@
 #include "angle.h"
 #include "contacts.h"
 #include "lowpass.h"
+#include "slip.h"
 
 /* Turn of the reference, same names and units; arrays over gages, and over wheel angles. */
 typedef struct {
@@ -39,6 +40,7 @@ typedef struct {
     int opposites; /* how many of the last two turns are known */
     Opposite opposite[2];
     Past past;
+    Rolled rolled; /* in the contact before */
     int stage;
     int64_t stop; /* the sample before which the law, or the turn, has all it needs */
     AngleLaw law;

@@ -188,6 +188,11 @@ def pulse(speed: float, phase: float, t: float) -> dict[str, float]:
     return steadily(3500.0, speed - 2.0 * (x - np.sin(w * x) / w), -0.05 * slip)
 
 
+def begin(speed: float, phase: float, t: float) -> dict[str, float]:
+    """A slip ratio that grows by 0.12 a second while the speed is held."""
+    return steadily(3500.0, speed, -0.12 * max(t - 0.4 - phase * 1.92 / speed, 0.0))
+
+
 def press(speed: float, phase: float, t: float) -> dict[str, float]:
     """A load that jumps."""
     return steadily(3000.0 if t < 0.4 + phase * 1.92 / speed else 4000.0, speed)
@@ -198,7 +203,7 @@ def transient(law: Any, speed: float, phase: float) -> dict[str, Any]:
     return play(0.85, partial(law, speed, phase))
 
 
-@pytest.mark.parametrize("law", [brake, pulse, press])
+@pytest.mark.parametrize("law", [brake, pulse, begin, press])
 @pytest.mark.parametrize("source", ["omega", "speed"])
 def test_the_interval_of_the_slip_ratio_holds_while_slip_or_load_change(
     source: str, law: Any

@@ -45,15 +45,12 @@ class Course:
         Relative standard deviation of the shape at the contact over its mean.
     known : bool
         Whether the source has enough values for a course; otherwise its mean is used.
-    surge : float
-        Slope at the contact less the turn's mean slope, in the source's unit a turn.
     """
 
     shape: FloatArray
     mean: float
     std: float
     known: bool
-    surge: float = 0.0
 
 
 def course(samples: FloatArray, first: float, turn: float) -> Course | None:
@@ -107,11 +104,7 @@ def course(samples: FloatArray, first: float, turn: float) -> Course | None:
     means = terms @ _MEANS[:size]
     mean = float(fitted @ means)
     std = float(np.sqrt((terms[:, 0] - means) ** 2 @ variance)) / abs(mean)
-    bent = terms @ _BENT[:size]
-    surge = float(kept @ bent)
-    noise = float(bent**2 @ variance)
-    surge = surge - noise / surge if surge**2 > noise else 0.0
-    return Course(kept @ terms, mean, std, known=True, surge=surge)
+    return Course(kept @ terms, mean, std, known=True)
 
 
 def _alike(left: FloatArray, lag: int) -> float:
@@ -135,8 +128,6 @@ _LEGENDRE = np.array(
 """Rows: Legendre polynomials by their powers."""
 _MEANS = np.array([1.0, -1.0 / 2.0, 1.0 / 3.0, -1.0 / 4.0])
 """Means of the powers from -1 to 0."""
-_BENT = np.array([0.0, 0.0, 1.0, -1.0])
-"""Weights of the powers: slope at 0 less the mean slope from -1 to 0."""
 
 
 def _moved(gain: float, shift: float) -> FloatArray:

@@ -121,12 +121,15 @@ def smooth_to_angle(
     """
     place = np.clip(np.searchsorted(angle, phi), 1, angle.size - 1)
     nearest = place - (phi - angle[place - 1] <= angle[place] - phi)
-    reach = max(1, int(SUPPORT * sigma / np.median(np.diff(angle))))
-    if nearest[0] - reach < 0 or nearest[-1] + reach >= samples.shape[1]:
+    reach = max(1, int(half_width(sigma) / np.median(np.diff(angle))))
+    room = int(min(nearest[0], samples.shape[1] - 1 - nearest[-1]))
+    first, last = phi[0] - half_width(sigma), phi[-1] + half_width(sigma)
+    if room < reach and not (angle[0] <= first and angle[-1] >= last):
         raise ParameterError(
             f"filter needs samples {nearest[0] - reach} .. {nearest[-1] + reach}; "
             f"given are 0 .. {samples.shape[1] - 1}"
         )
+    reach = min(reach, room)  # fewer samples are as wide where the wheel is fastest
     distance = sliding_window_view(angle, 2 * reach + 1)[nearest - reach] - phi[:, None]
     weight = distance * distance
     weight *= -0.5 / sigma**2

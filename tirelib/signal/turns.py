@@ -30,7 +30,7 @@ from tirelib.signal.contacts import Contact, ContactFinder
 from tirelib.signal.course import course
 from tirelib.signal.lowpass import LowPass, half_width, smooth_to_angle
 from tirelib.signal.quality import UNUSABLE, inspect, without_contact
-from tirelib.signal.slip import unseen_change
+from tirelib.signal.slip import NOTHING, Rolled, pull, unseen_by_load, unseen_by_traction
 from tirelib.signal.turn import PHI, Turn, Turns, stack_turns
 
 __all__ = ["PHI", "Turn", "TurnCutter", "Turns", "cut_turns", "stack_turns"]
@@ -95,6 +95,7 @@ class TurnCutter:
         self._previous_period = np.nan
         self._offsets: tuple[tuple[float, FloatArray], ...] = ()  # of two turns, with their times
         self._past: Past = ()
+        self._rolled: Rolled = NOTHING  # in the contact before
 
     def push(
         self,
@@ -169,6 +170,7 @@ class TurnCutter:
             self._waiting.popleft()
             self._previous = replace(contact, damaged=self._damaged(contact))
             self._previous_period, self._offsets, self._past = np.nan, (), ()
+            self._rolled = NOTHING
             return self._first_turn(contact)
         law, stop = self._needs(contact, before)
         if law is None or stop > self._base + self._filled:
@@ -209,19 +211,14 @@ class TurnCutter:
             )
             for name in SOURCES
         }
-        seconds = turn / self.rate
         law = angle_law(
             contact.middle,
             turn,
             stop - contact.middle,
             courses,
             self._past,
-            unknown=0.5 * USUAL_CHANGE * seconds**2,
+            unknown=0.5 * USUAL_CHANGE * (turn / self.rate) ** 2,
         )
-        unseen = unseen_change(
-            courses["speed"], turn / self.rate, _pulse(contact, law), _pulse(before, law)
-        )
-        law = replace(law, slip_std=float(np.hypot(law.slip_std, law.late * unseen)))
         return law, max(stop, self._stop(contact, law))
 
     def _sigma(self, law: AngleLaw) -> float | None:
@@ -321,6 +318,9 @@ class TurnCutter:
         else:
             flags |= TurnFlag.REVERSED if speed < 0.0 else 0
             speed = law.speed if np.isfinite(law.speed) else speed
+        slip_std = self._slip_std(
+            law, pulse, _pulse(before, law), pull(strain[self._centre]), flags
+        )
         axis_shift, once = self._trigger(before.middle, contact.middle, law)
         if not once:
             flags |= TurnFlag.TRIGGER_MISMATCH
@@ -335,7 +335,7 @@ class TurnCutter:
             period=period / self.rate,
             omega=law.step * self.rate,
             angle_std=law.std,
-            slip_std=law.slip_std,
+            slip_std=slip_std,
             pulse=pulse,
             axis_shift=axis_shift,
             speed=speed,
@@ -352,6 +352,18 @@ class TurnCutter:
             gage_flags=gage_flags,
             flags=int(flags),
         )
+
+    def _slip_std(
+        self, law: AngleLaw, here: float, before: float, pulled: float, flags: TurnFlag
+    ) -> float:
+        """Return the relative standard deviation of turn rate over speed in the contact."""
+        rolled = (law.step / law.speed, pulled)
+        unseen = np.hypot(
+            unseen_by_load(here, before), unseen_by_traction(rolled, self._rolled, here)
+        )
+        if np.isfinite(rolled).all() and not flags & TurnFlag.FIRST_TURN:
+            self._rolled = rolled
+        return float(np.hypot(law.slip_std, law.late * unseen))
 
     def _offset(
         self, opposite: FloatArray, law: AngleLaw

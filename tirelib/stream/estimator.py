@@ -19,7 +19,7 @@ from tirelib.signal.turns import LONGEST_TURN, Turn, TurnCutter, stack_turns
 from tirelib.stream.backlog import Backlog
 from tirelib.stream.snapshot import from_plain, restore_cutter, snapshot_cutter, to_plain
 
-STATE_FORMAT = "tirelib-stream-state/5"
+STATE_FORMAT = "tirelib-stream-state/6"
 WATCHDOG_TURNS = 2.0
 """Turns after the middle of the last contact at which an estimate ceases to be valid."""
 STANDSTILL = 0.05

@@ -153,6 +153,19 @@ def test_what_cannot_be_followed_is_flagged() -> None:
     assert not any("accelerating" in flags for flags in names[:late])
 
 
+@pytest.mark.parametrize("change", [-26.0, 26.0])
+def test_a_wheel_that_stops_or_starts_hard_is_cut_into_turns(change: float) -> None:
+    time = np.arange(int(1.45 * RATE)) / RATE
+    first = 40.0 if change < 0.0 else 2.3
+    phi = first * time + 0.5 * change * time**2
+    strain = np.tile(waveform(np.pi + phi), (5, 1)) + 2.7e-3
+    held = np.repeat((first + change * time)[::20], 20)[: time.size]
+    turns = cut_turns(strain, RATE, LATERAL, speed=RADIUS * held, omega=held)
+    contacts = 1 + int(phi[-1] / (2.0 * np.pi))
+    assert len(turns.time) == contacts
+    assert np.isfinite(turns.trace.strain[2:, :, 200]).all()
+
+
 @pytest.mark.parametrize("source", SOURCES)
 def test_frames_give_the_turns_of_the_whole_record_while_braking(source: str) -> None:
     held = BRAKING.held(source)

@@ -1,4 +1,4 @@
-"""What a slip ratio may change by within a turn: by the load and by the acceleration."""
+"""What a slip ratio may change by within a turn: by the load and by the traction."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tirelib.signal.course import Course, course
-from tirelib.signal.slip import GRAVITY, SLIP_STIFFNESS, unseen_change
+from tirelib.signal.slip import NOTHING, PULL_SLIP, pull, unseen_by_load, unseen_by_traction
+from tirelib.signal.turn import PHI
 
 TURN, RATE = 1000.0, 1e4
 
@@ -21,32 +22,53 @@ def after_the_last_contact() -> np.ndarray:
     return np.arange(-1000, 100) / RATE
 
 
-@given(acceleration=st.floats(-9.0, 9.0), half=st.floats(0.05, 0.3))
-def test_even_braking_at_a_held_load_leaves_nothing_unseen(
-    acceleration: float, half: float
-) -> None:
-    speed = told(20.0 + acceleration * after_the_last_contact())
-    assert unseen_change(speed, TURN / RATE, half, half) == pytest.approx(0.0, abs=1e-9)
+def strained(before: float, behind: float) -> np.ndarray:
+    """Tension of 4e-3 in the contact between two dips."""
+    dips = before * np.exp(-(((PHI + 0.3) / 0.1) ** 2)) + behind * np.exp(
+        -(((PHI - 0.3) / 0.1) ** 2)
+    )
+    return np.where(np.abs(PHI) < 0.15, 4e-3, -dips)
 
 
-def test_a_brake_that_comes_within_the_turn_is_slip_at_its_end() -> None:
-    time = after_the_last_contact()
-    speed = told(20.0 - 0.5 * 80.0 * (time + 0.1) ** 2)  # 0 to -8 m/s2, its mean -4
-    expected = 4.0 / (GRAVITY * SLIP_STIFFNESS)
-    assert unseen_change(speed, TURN / RATE, 0.2, 0.2) == pytest.approx(expected, rel=1e-6)
+def test_a_held_load_leaves_nothing_unseen() -> None:
+    assert unseen_by_load(0.2, 0.2) == 0.0
 
 
 def test_a_load_that_changes_between_contacts_moves_the_rolling_radius() -> None:
     free_to_loaded = np.cos(0.15) - np.cos(0.2)  # the most that the radius can change
-    change = unseen_change(None, TURN / RATE, 0.2, 0.15)
-    assert change == pytest.approx(free_to_loaded / np.sqrt(3.0), rel=0.02)
+    assert unseen_by_load(0.2, 0.15) == pytest.approx(free_to_loaded / np.sqrt(3.0), rel=0.02)
+    assert unseen_by_load(0.15, 0.2) == unseen_by_load(0.2, 0.15)
 
 
-def test_noise_of_the_speed_is_no_braking() -> None:
-    rng = np.random.default_rng(3)
-    rows = np.repeat(20.0 + 0.02 * rng.standard_normal((200, 55)), 20, axis=1)
-    slips = np.array([unseen_change(told(row), TURN / RATE, 0.2, 0.2) for row in rows])
-    assert np.mean(slips > 0.0) < 0.32  # less often than noise exceeds its standard deviation
+@given(gain=st.floats(0.2, 5.0), dip=st.floats(2e-4, 2e-3), more=st.floats(0.0, 1e-3))
+def test_the_pull_is_that_of_the_deeper_dip_whatever_the_gain(
+    gain: float, dip: float, more: float
+) -> None:
+    braked = pull(gain * strained(dip, dip + more))
+    assert braked == pytest.approx(more / 4e-3, rel=1e-3, abs=1e-6)
+    assert pull(gain * strained(dip + more, dip)) == pytest.approx(-braked, rel=1e-3, abs=1e-6)
+
+
+def test_the_pull_is_unknown_where_the_strain_is() -> None:
+    assert np.isnan(pull(np.full(PHI.size, np.nan)))
+    partly = np.where(PHI > 0.7, np.nan, strained(1e-3, 2e-3))
+    assert pull(partly) == pytest.approx(0.25, rel=1e-3)
+
+
+@given(slip=st.floats(-0.03, 0.03), half=st.floats(0.05, 0.2), at=st.floats(0.9, 1.1))
+def test_what_the_pull_tells_of_a_slip_is_what_the_turns_have_missed(
+    slip: float, half: float, at: float
+) -> None:
+    before, pulled = (at, 0.02), 0.02 - slip * half**1.5 / PULL_SLIP
+    followed = unseen_by_traction((at * (1.0 + slip), pulled), before, half)
+    assert followed == pytest.approx(0.0, abs=1e-12)
+    missed = unseen_by_traction((at, pulled), before, half)
+    assert missed == pytest.approx(abs(slip), abs=1e-12)
+
+
+def test_without_a_contact_before_nothing_is_said_of_traction() -> None:
+    assert unseen_by_traction((1.0, 0.1), NOTHING, 0.1) == 0.0
+    assert unseen_by_traction((1.0, np.nan), (1.0, 0.1), 0.1) == 0.0
 
 
 def test_what_a_cubic_cannot_follow_is_more_uncertain_than_noise_of_its_size() -> None:
