@@ -9,13 +9,13 @@ import click
 from tirelib.campaign import read_campaign
 from tirelib.cli.common import (
     CAMPAIGN,
-    FILE,
     NEW_FILE,
     NEW_FOLDER,
     output,
     progress_bar,
     write_json,
 )
+from tirelib.cli.options import effects_option, json_option, model_option
 from tirelib.errors import ParameterError
 from tirelib.journey import QUANTITIES
 
@@ -43,24 +43,11 @@ FORMAT = "tirelib-model/1"
 
 @click.command(epilog=_EXAMPLE)
 @click.argument("effect_name", metavar="EFFECT", required=False)
-@click.option(
-    "--model",
-    "model_name",
-    metavar="M.toml|NAME",
-    required=True,
-    help="Model that `tirelib identify` or `tirelib add` wrote.",
-)
+@model_option
 @click.option(
     "--data", "folder", metavar="CAMPAIGN", type=CAMPAIGN, help="Campaign to fit (not for --undo)."
 )
-@click.option(
-    "--effects",
-    "effect_files",
-    metavar="FILE.py",
-    type=FILE,
-    multiple=True,
-    help="Python file with effects of your own; may be given several times.",
-)
+@effects_option
 @click.option("--remove", is_flag=True, help="Remove EFFECT from the model instead, and fit again.")
 @click.option(
     "--undo",
@@ -84,9 +71,7 @@ FORMAT = "tirelib-model/1"
     help="Folder for extension.html and extension.md: a waterfall of the error, each run, and the "
     "held-out errors.",
 )
-@click.option(
-    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
-)
+@json_option()
 def add(
     effect_name: str | None,
     model_name: str,

@@ -16,13 +16,13 @@ from tirelib.cli.common import (
     CAMPAIGN,
     NEW_FILE,
     NEW_FOLDER,
-    low_pass_options,
     output,
     progress_bar,
     write_json,
 )
 from tirelib.cli.features import make_low_pass
 from tirelib.cli.limits import not_checked, not_given
+from tirelib.cli.options import json_option, low_pass_options
 from tirelib.errors import CalibrationError
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.estimators.chain import QUANTITIES
@@ -74,9 +74,7 @@ camber, slip ratio) make the calibration hold for them.
 )
 @click.option("--quick", is_flag=True, help="Skip the cross-validation by level.")
 @low_pass_options
-@click.option(
-    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write statistics as JSON."
-)
+@json_option("statistics")
 def calibrate(
     folders: tuple[Path, ...],
     target: Path,

@@ -14,7 +14,8 @@ from rich.table import Table
 
 from tirelib.campaign.problem import Problem
 from tirelib.campaign.read import Campaign, read_campaign
-from tirelib.cli.common import NEW_FILE, NEW_FOLDER
+from tirelib.cli.common import NEW_FOLDER
+from tirelib.cli.options import json_option
 from tirelib.errors import FormatError
 
 CHECK_FORMAT = "tirelib-campaign-check/1"
@@ -56,9 +57,7 @@ Exit code: 0 no error (warnings are allowed), 1 errors were found,
 
 @campaign.command(epilog=_CHECK_EXAMPLE)
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-@click.option(
-    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the problems as JSON."
-)
+@json_option("the problems")
 @click.pass_context
 def check(context: click.Context, folder: Path, json_file: Path | None) -> None:
     """List all problems of the campaign in DIR at once."""
@@ -133,9 +132,7 @@ Example:
     type=NEW_FOLDER,
     help="Folder for the overview plot. Default: build/out/show-NAME.",
 )
-@click.option(
-    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write header and runs as JSON."
-)
+@json_option("header and runs")
 def show(folder: Path, out: Path | None, json_file: Path | None) -> None:
     """Show header, runs with set points and measured means, and an overview plot of DIR."""
     from tirelib.campaign.overview import RunRow, representative_plans, run_row

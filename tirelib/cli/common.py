@@ -77,21 +77,3 @@ def progress_bar(what: str, total: int | None = None) -> Iterator[Callable[[str]
             bar.update(task, advance=1, label=label)
 
         yield advance
-
-
-def low_pass_options(function: Callable[..., None]) -> Callable[..., None]:
-    """Add the options that choose the low-pass."""
-    function = click.option(
-        "--cut-off",
-        type=float,
-        metavar="HZ",
-        default=None,
-        help="Fixed cut-off frequency instead; turns whose speed it does not suit are flagged.",
-    )(function)
-    return click.option(
-        "--order",
-        type=float,
-        metavar="N",
-        default=None,
-        help="Cut-off of the low-pass filter in cycles per turn (default 24: 225 Hz at 65 km/h).",
-    )(function)

@@ -7,13 +7,12 @@ import click
 from tirelib.campaign import read_campaign
 from tirelib.cli.common import (
     CAMPAIGN,
-    FILE,
-    NEW_FILE,
     NEW_FOLDER,
     output,
     progress_bar,
     write_json,
 )
+from tirelib.cli.options import effects_option, json_option, model_option, quantity_option
 
 _EXAMPLE = """\b
 Examples:
@@ -30,26 +29,9 @@ text and as numbers. Errors are in units of the noise between repeated runs. Exi
 
 @click.command(epilog=_EXAMPLE)
 @click.argument("folder", metavar="CAMPAIGN", type=CAMPAIGN)
-@click.option(
-    "--model",
-    metavar="M.toml|NAME",
-    required=True,
-    help="Model file, tire file, or the name of a tire that tirelib ships.",
-)
-@click.option(
-    "--quantity",
-    metavar="strain|Fy|Fx|Mz",
-    help="Measured quantity to compare. Default: strain where the campaign has it, else the force "
-    "with the largest error.",
-)
-@click.option(
-    "--effects",
-    "effect_files",
-    metavar="FILE.py",
-    type=FILE,
-    multiple=True,
-    help="Python file with your own effects that the model contains; may be given several times.",
-)
+@model_option
+@quantity_option
+@effects_option
 @click.option(
     "--out",
     "out",
@@ -57,12 +39,10 @@ text and as numbers. Errors are in units of the noise between repeated runs. Exi
     type=NEW_FOLDER,
     help="Folder for index.html, comparison.md and comparison.json.",
 )
-@click.option(
-    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
-)
+@json_option()
 def compare(
     folder: Path,
-    model: str,
+    model_name: str,
     quantity: str | None,
     effect_files: tuple[Path, ...],
     out: Path | None,
@@ -75,7 +55,7 @@ def compare(
     from tirelib.parameters import read_tire
 
     catalogue = registered_effects(effect_files)
-    file = read_tire(model)
+    file = read_tire(model_name)
     campaign = read_campaign(folder)
     with progress_bar("comparing") as progress:
         found = compare_model(campaign, file, quantity, effects=catalogue, progress=progress)

@@ -13,12 +13,18 @@ from rich.table import Table
 from tirelib.campaign import Campaign, read_campaign
 from tirelib.cli.common import (
     CAMPAIGN,
-    FILE,
-    NEW_FILE,
-    NEW_FOLDER,
     output,
     progress_bar,
     write_json,
+)
+from tirelib.cli.options import (
+    effects_option,
+    json_option,
+    members_option,
+    model_option,
+    quantity_option,
+    report_option,
+    seed_option,
 )
 from tirelib.errors import TirelibError
 from tirelib.journey import explains_forces
@@ -47,52 +53,13 @@ SHOWN = 8
 
 @click.command(epilog=_EXAMPLE)
 @click.argument("folder", metavar="CAMPAIGN", type=CAMPAIGN)
-@click.option(
-    "--model",
-    "model_name",
-    metavar="M.toml|NAME",
-    required=True,
-    help="Model that `tirelib identify` or `tirelib add` wrote.",
-)
-@click.option(
-    "--quantity",
-    metavar="strain|Fy|Fx|Mz",
-    help="Default: strain where the campaign has it, else the force that fits worst.",
-)
-@click.option(
-    "--effects",
-    "effect_files",
-    metavar="FILE.py",
-    type=FILE,
-    multiple=True,
-    help="Effects of your own; may be given again.",
-)
-@click.option(
-    "--members",
-    metavar="N",
-    type=click.IntRange(min=4),
-    default=100,
-    show_default=True,
-    help="Variants of the model that the threshold is from.",
-)
-@click.option(
-    "--seed",
-    metavar="N",
-    type=click.IntRange(min=0),
-    default=0,
-    show_default=True,
-    help="Of the variants.",
-)
-@click.option(
-    "--out",
-    "out",
-    metavar="DIR",
-    type=NEW_FOLDER,
-    help="Write diagnosis.html, diagnosis.md and diagnosis.json.",
-)
-@click.option(
-    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
-)
+@model_option
+@quantity_option
+@effects_option
+@members_option
+@seed_option
+@report_option("diagnosis")
+@json_option()
 def diagnose(
     folder: Path,
     model_name: str,

@@ -7,7 +7,8 @@ import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from tirelib.cli.common import FILE, output, progress_bar
+from tirelib.cli.common import output, progress_bar
+from tirelib.cli.options import effects_option
 from tirelib.errors import FormatError
 
 _EXAMPLE = """\b
@@ -23,14 +24,7 @@ again. Exit code: 0 all passed, 2 one did not.
 
 
 @click.command(epilog=_EXAMPLE)
-@click.option(
-    "--effects",
-    "effect_files",
-    metavar="FILE.py",
-    type=FILE,
-    multiple=True,
-    help="Python file with effects of your own; may be given several times.",
-)
+@effects_option
 def effects(effect_files: tuple[Path, ...]) -> None:
     """List the effects of the catalogue, or register effects of your own."""
     from tirelib.effects import CATALOGUE

@@ -11,13 +11,13 @@ from tirelib.campaign import read_campaign
 from tirelib.cli.common import (
     CAMPAIGN,
     FILE,
-    NEW_FILE,
     NEW_FOLDER,
     output,
     progress_bar,
     write_json,
 )
 from tirelib.cli.limits import not_checked, not_given, weakly_checked
+from tirelib.cli.options import json_option
 from tirelib.errors import CalibrationError
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration
@@ -51,9 +51,7 @@ probably another one.
 @click.option(
     "--report", metavar="FOLDER", type=NEW_FOLDER, help="Write the accuracy with figures as HTML."
 )
-@click.option(
-    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write every turn as JSON."
-)
+@json_option("every turn")
 @click.pass_context
 def estimate(
     context: click.Context,

@@ -13,12 +13,11 @@ import click
 from tirelib.campaign import read_campaign
 from tirelib.cli.common import (
     CAMPAIGN,
-    FILE,
-    NEW_FILE,
     NEW_FOLDER,
     output,
     write_json,
 )
+from tirelib.cli.options import effects_option, json_option, members_option, quantity_option
 from tirelib.errors import CalibrationError, ParameterError, TirelibError
 from tirelib.journey import QUANTITIES, explains_forces
 
@@ -54,27 +53,9 @@ be run one by one. Exit code: 0 whatever the verdict, 2 bad input or no model co
     metavar="M.toml|NAME",
     help="Start from this model instead of identifying one.",
 )
-@click.option(
-    "--quantity",
-    metavar="strain|Fy|Fx|Mz",
-    help="Default: strain where the campaign has it, else the force that fits worst.",
-)
-@click.option(
-    "--effects",
-    "effect_files",
-    metavar="FILE.py",
-    type=FILE,
-    multiple=True,
-    help="Effects of your own; may be given again.",
-)
-@click.option(
-    "--members",
-    metavar="N",
-    type=click.IntRange(min=4),
-    default=100,
-    show_default=True,
-    help="Variants of the model that diagnose judges by.",
-)
+@quantity_option
+@effects_option
+@members_option
 @click.option(
     "--out",
     "out",
@@ -83,9 +64,7 @@ be run one by one. Exit code: 0 whatever the verdict, 2 bad input or no model co
     required=True,
     help="Write the page, the models and the page of each step.",
 )
-@click.option(
-    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
-)
+@json_option()
 def explain(
     folder: Path,
     model_name: str | None,

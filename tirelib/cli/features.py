@@ -9,11 +9,11 @@ from tirelib.campaign import read_campaign
 from tirelib.cli.common import (
     CAMPAIGN,
     NEW_FILE,
-    low_pass_options,
     output,
     progress_bar,
     write_json,
 )
+from tirelib.cli.options import json_option, low_pass_options
 from tirelib.errors import FormatError
 from tirelib.flags import TurnFlag
 from tirelib.observations import Observations, observe
@@ -42,7 +42,7 @@ gage's contact, ISO 8855 axes. FILE may end in .parquet or .csv.
     help="Table to write, .parquet or .csv.",
 )
 @low_pass_options
-@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write a summary as JSON.")
+@json_option("a summary")
 def features(
     folder: Path, target: Path, order: float | None, cut_off: float | None, json_file: Path | None
 ) -> None:

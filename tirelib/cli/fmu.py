@@ -18,6 +18,7 @@ from tirelib.cli.common import (
 )
 from tirelib.cli.estimate import exit_code, print_document
 from tirelib.cli.fmu_virtual import virtual
+from tirelib.cli.options import json_option
 from tirelib.errors import FormatError
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.estimators.costs import costs_of
@@ -171,9 +172,7 @@ def table(calibration: Path, out: Path) -> None:
 @fmu.command(epilog=_RUN)
 @click.argument("file", metavar="X.fmu", type=FILE)
 @click.argument("folder", metavar="DIR", type=CAMPAIGN)
-@click.option(
-    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write every turn as JSON."
-)
+@json_option("every turn")
 @click.pass_context
 def run(context: click.Context, file: Path, folder: Path, json_file: Path | None) -> None:
     """Step the FMU through every run of DIR with FMPy, and compare with the rig."""
@@ -200,9 +199,7 @@ def run(context: click.Context, file: Path, folder: Path, json_file: Path | None
     help="Folder of reference signals, where the FMU holds none.",
 )
 @click.option("--out", metavar="REPORT", type=NEW_FOLDER, help="Folder for the page.")
-@click.option(
-    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the result as JSON."
-)
+@json_option("the result")
 @click.pass_context
 def check(
     context: click.Context,

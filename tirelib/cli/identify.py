@@ -11,6 +11,7 @@ from rich.table import Table
 
 from tirelib.campaign import Campaign, read_campaign
 from tirelib.cli.common import CAMPAIGN, NEW_FILE, output, progress_bar, write_json
+from tirelib.cli.options import json_option
 
 if TYPE_CHECKING:
     from tirelib.identify.whole import Whole
@@ -47,7 +48,7 @@ whose interval is wider than 25 % to either side, with the test that would deter
     type=click.Choice(BASES),
     default="plain",
     show_default=True,
-    help="Base model: `tire` includes belt shear, section inertia and a tread that sticks and "
+    help="Base model: `plain` includes belt shear, section inertia and a tread that sticks and "
     "hardens; in the dissertation's ring these are effects to be found.",
 )
 @click.option(
@@ -58,9 +59,7 @@ whose interval is wider than 25 % to either side, with the test that would deter
     required=True,
     help="File for the identified model, which the other commands read.",
 )
-@click.option(
-    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
-)
+@json_option()
 @click.pass_context
 def identify(
     context: click.Context,

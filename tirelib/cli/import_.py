@@ -12,7 +12,8 @@ from tirelib.campaign.importing.delimited import CsvOptions
 from tirelib.campaign.importing.importer import ImportReport, import_campaign
 from tirelib.campaign.importing.mapfile import parse_map
 from tirelib.campaign.importing.suggest import list_columns, suggest_map
-from tirelib.cli.common import FILE, NEW_FILE, NEW_FOLDER, output, progress_bar, write_json
+from tirelib.cli.common import FILE, NEW_FOLDER, output, progress_bar, write_json
+from tirelib.cli.options import json_option
 
 FORMAT = "tirelib-import/1"
 LIST_FORMAT = "tirelib-import-list/1"
@@ -49,7 +50,7 @@ Exit code: 0 done, 2 bad input (all faults are listed, nothing is written).
 @click.option("--force", is_flag=True, help="Replace a campaign that already exists in DIR.")
 @click.option("--list", "show_list", is_flag=True, help="List the columns of each FILE and stop.")
 @click.option("--suggest", is_flag=True, help="Print a draft of the map for FILE and stop.")
-@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write a summary as JSON.")
+@json_option("a summary")
 def import_(
     files: tuple[Path, ...],
     map_file: Path | None,

@@ -14,13 +14,20 @@ from tirelib.campaign import read_campaign
 from tirelib.cli.common import (
     CAMPAIGN,
     FILE,
-    NEW_FILE,
-    NEW_FOLDER,
     output,
     progress_bar,
     write_json,
 )
 from tirelib.cli.diagnose import of_forces
+from tirelib.cli.options import (
+    effects_option,
+    json_option,
+    members_option,
+    model_option,
+    quantity_option,
+    report_option,
+    seed_option,
+)
 from tirelib.errors import FormatError, ParameterError
 from tirelib.journey import explains_forces
 
@@ -73,18 +80,8 @@ DIAGNOSIS = "tirelib-diagnosis/1"
 
 @click.command("next-test", epilog=_EXAMPLE)
 @click.argument("folder", metavar="CAMPAIGN", type=CAMPAIGN)
-@click.option(
-    "--model",
-    "model_name",
-    metavar="M.toml|NAME",
-    required=True,
-    help="Model that `tirelib identify` or `tirelib add` wrote.",
-)
-@click.option(
-    "--quantity",
-    metavar="strain|Fy|Fx|Mz",
-    help="Default: strain where the campaign has it, else the force that fits worst.",
-)
+@model_option
+@quantity_option
 @click.option(
     "--diagnosis",
     "diagnosis_file",
@@ -115,40 +112,11 @@ DIAGNOSIS = "tirelib-diagnosis/1"
     show_default=True,
     help="Separation for which repeats are counted.",
 )
-@click.option(
-    "--effects",
-    "effect_files",
-    metavar="FILE.py",
-    type=FILE,
-    multiple=True,
-    help="Effects of your own; may be given again.",
-)
-@click.option(
-    "--members",
-    metavar="N",
-    type=click.IntRange(min=4),
-    default=100,
-    show_default=True,
-    help="Variants of the model, if diagnosed here.",
-)
-@click.option(
-    "--seed",
-    metavar="N",
-    type=click.IntRange(min=0),
-    default=0,
-    show_default=True,
-    help="Of the variants.",
-)
-@click.option(
-    "--out",
-    "out",
-    metavar="DIR",
-    type=NEW_FOLDER,
-    help="Write next_test.html, next_test.md and next_test.json.",
-)
-@click.option(
-    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
-)
+@effects_option
+@members_option
+@seed_option
+@report_option("next_test")
+@json_option()
 def next_test(
     folder: Path,
     model_name: str,

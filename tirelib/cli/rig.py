@@ -7,7 +7,8 @@ import click
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from tirelib.cli.common import NEW_FILE, NEW_FOLDER, output, progress_bar, write_json
+from tirelib.cli.common import NEW_FOLDER, output, progress_bar, write_json
+from tirelib.cli.options import json_option
 
 if TYPE_CHECKING:
     from tirelib.rig.campaign import Truth
@@ -72,7 +73,7 @@ in SI and ISO signs.
 @click.option("--jobs", default=2, show_default=True, type=click.IntRange(min=1), help="Processes.")
 @click.option("--force", is_flag=True, help="Write into a folder that is not empty.")
 @click.option("--list", "show_list", is_flag=True, help="List plans and tires, and stop.")
-@click.option("--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write a summary as JSON.")
+@json_option("a summary")
 def rig(
     plan_name: str | None,
     out: Path | None,

@@ -11,12 +11,17 @@ from rich.table import Table
 from tirelib.campaign import read_campaign
 from tirelib.cli.common import (
     CAMPAIGN,
-    FILE,
-    NEW_FILE,
-    NEW_FOLDER,
     output,
     progress_bar,
     write_json,
+)
+from tirelib.cli.options import (
+    effects_option,
+    json_option,
+    members_option,
+    model_option,
+    report_option,
+    seed_option,
 )
 from tirelib.errors import ParameterError
 
@@ -36,21 +41,8 @@ Exit code: 0 done, 2 bad input.
 
 @click.command(epilog=_EXAMPLE)
 @click.argument("folder", metavar="CAMPAIGN", type=CAMPAIGN)
-@click.option(
-    "--model",
-    "model_name",
-    metavar="M.toml|NAME",
-    required=True,
-    help="Model that `tirelib identify` or `tirelib add` wrote.",
-)
-@click.option(
-    "--effects",
-    "effect_files",
-    metavar="FILE.py",
-    type=FILE,
-    multiple=True,
-    help="Effects of your own; may be given again.",
-)
+@model_option
+@effects_option
 @click.option("--effects-of", "names", metavar="A,B", help="Plant these only.")
 @click.option(
     "--ratio",
@@ -70,32 +62,10 @@ Exit code: 0 done, 2 bad input.
     show_default=True,
     help="Tires in which each effect is planted.",
 )
-@click.option(
-    "--members",
-    metavar="N",
-    type=click.IntRange(min=4),
-    default=100,
-    show_default=True,
-    help="Variants that the thresholds are from.",
-)
-@click.option(
-    "--seed",
-    metavar="N",
-    type=click.IntRange(min=0),
-    default=0,
-    show_default=True,
-    help="Of the variants.",
-)
-@click.option(
-    "--out",
-    "out",
-    metavar="DIR",
-    type=NEW_FOLDER,
-    help="Write selftest.html, selftest.md and selftest.json.",
-)
-@click.option(
-    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the numbers as JSON."
-)
+@members_option
+@seed_option
+@report_option("selftest")
+@json_option()
 def selftest(
     folder: Path,
     model_name: str,

@@ -11,7 +11,8 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from tirelib.arrays import FloatArray
-from tirelib.cli.common import FILE, NEW_FILE, NEW_FOLDER, output, write_json
+from tirelib.cli.common import NEW_FOLDER, output, write_json
+from tirelib.cli.options import effects_option, json_option
 from tirelib.compare.model import Model, UsedEffect, model_of
 from tirelib.errors import ConvergenceError, ParameterError
 from tirelib.model.registration import registered_effects
@@ -120,23 +121,14 @@ def _numbers(
     callback=_numbers,
     help="Tread temperature, used by effects that depend on it. Default: unknown.",
 )
-@click.option(
-    "--effects",
-    "effect_files",
-    metavar="FILE.py",
-    type=FILE,
-    multiple=True,
-    help="Python file with your own effects that the model contains; may be given several times.",
-)
+@effects_option
 @click.option(
     "--damping",
     metavar="LAMBDA",
     type=float,
     help="Damping ratio lambda in c_n = 2 lambda sqrt(m_n k_n). Default: that of the tire.",
 )
-@click.option(
-    "--json", "json_file", metavar="FILE", type=NEW_FILE, help="Write the results as JSON."
-)
+@json_option("the results")
 @click.option(
     "--out",
     "folder",
