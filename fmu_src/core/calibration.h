@@ -8,7 +8,8 @@
 
 #include "values.h"
 
-enum { VARIABLES = 12, TERMS = 80, NAMES = 24, NODES = 64, WHOLE = 6 };
+/* Sizes of tirelib.fmu.calibration_table. */
+enum { VARIABLES = 32, TERMS = 256, NAMES = 24, NODES = 64, WHOLE = 6 };
 enum { FZ, ALPHA, KAPPA, FY, QUANTITIES };
 enum { ALL_GAGES = GAGES }; /* place of the chain without a missing gage */
 

@@ -212,11 +212,22 @@ static void start_values(Slave *s) {
     s->wheel = NULL;
 }
 
+/* Write where gages lie. Reference: tirelib.estimators.calibration._millimetres */
+static const char *millimetres(const double *lateral, int gages, char text[GAGES * 16]) {
+    text[0] = 0;
+    for (int g = 0; g < gages; g++) {
+        size_t n = strlen(text);
+        snprintf(text + n, GAGES * 16 - n, "%s%+g", g ? ", " : "", 1e3 * lateral[g]);
+    }
+    return text;
+}
+
 /* Take up another calibration; tells what is wrong with it. Reference: load_wheel */
 static int override(Slave *s) {
     const char *path = s->text[P_CALIBRATION];
     Calibration *known = malloc(sizeof *known);
     double lateral[GAGES];
+    char here[GAGES * 16], there[GAGES * 16];
     int gages = s->calibration->gages, same;
     resources_free(&s->other);
     const char *wrong = known ? resources_read(&s->other, path) : "needs more memory";
@@ -232,8 +243,10 @@ static int override(Slave *s) {
     memcpy(s->calibration, known, sizeof *known);
     free(known);
     if (!same)
-        failed(s, "CalibrationError: StrainTire.fmu: %s: its gages lie elsewhere; "
-                  "calibrate with this layout", path);
+        failed(s, "CalibrationError: StrainTire.fmu: %s: gages lie at %s mm (ISO), the calibration "
+                  "has them at %s mm; calibrate with this layout",
+               path, millimetres(lateral, gages, here),
+               millimetres(s->calibration->lateral, s->calibration->gages, there));
     return same;
 }
 
@@ -272,9 +285,12 @@ static int started(Slave *s) {
         if (!s->memory) return failed(s, "MemoryError: %lu bytes", (unsigned long)size), 0;
     }
     s->wheel = wheel_start(s->memory, s->calibration, rate, s->samples, axes);
-    if (!s->wheel)
-        failed(s, "ParameterError: axes = '%s': the gages have no mirror image; use axes = 'iso' "
-                  "with this layout", s->text[P_AXES]);
+    if (!s->wheel) {
+        char lateral[GAGES * 16];
+        failed(s, "ParameterError: axes = '%s': gages at %s mm (ISO) have no mirror image; use "
+                  "axes = 'iso' with this layout", s->text[P_AXES],
+               millimetres(s->calibration->lateral, s->gages, lateral));
+    }
     return s->wheel != NULL;
 }
 

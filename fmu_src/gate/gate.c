@@ -15,7 +15,7 @@
  * - releases the interpreter once, at exit, before pythonfmu's own static objects are destroyed.
  *
  * The library that it hands on to is resources/binaries/linux64/pythonfmu.so.
- * `build/fmu_gate.py` compiles this file.
+ * `build/native_fmu.py` compiles this file.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -24,23 +24,7 @@
 #include <string.h>
 #include <unistd.h>
 
-typedef void *fmi2Component, *fmi2Environment, *fmi2FMUstate;
-typedef unsigned int fmi2ValueReference;
-typedef double fmi2Real;
-typedef int fmi2Integer, fmi2Boolean;
-typedef const char *fmi2String;
-typedef char fmi2Byte;
-typedef enum { fmi2OK, fmi2Warning, fmi2Discard, fmi2Error, fmi2Fatal, fmi2Pending } fmi2Status;
-typedef enum { fmi2ModelExchange, fmi2CoSimulation } fmi2Type;
-typedef enum { fmi2DoStepStatus, fmi2PendingStatus, fmi2LastSuccessfulTime, fmi2Terminated } fmi2StatusKind;
-
-typedef struct {
-    void (*logger)(fmi2Environment, fmi2String, fmi2Status, fmi2String, fmi2String, ...);
-    void *(*allocate)(size_t, size_t);
-    void (*release)(void *);
-    void (*finished)(fmi2Environment, fmi2Status);
-    fmi2Environment environment;
-} fmi2CallbackFunctions;
+#include "../fmi2/fmi2.h"
 
 /* Calls that are handed on as they are: name, parameters, arguments. */
 #define HANDED_ON(X) \

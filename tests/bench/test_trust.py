@@ -3,6 +3,7 @@
 import shutil
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
@@ -28,6 +29,20 @@ def test_what_this_tirelib_builds_is_known(ours: Path) -> None:
     assert how_known(read_fmu(ours)) == "identical to what this version of tirelib builds"
 
 
+@pytest.mark.parametrize("options", [{"missing": 0.0, "buffered": True}, {"python": True}])
+def test_whatever_options_it_was_built_with(
+    ours: Path, tmp_path: Path, options: dict[str, Any]
+) -> None:
+    fmu = build_fmu(ours.parent / "cal.toml", tmp_path / "x.fmu", samples_per_step=4, **options)
+    assert how_known(read_fmu(fmu)) == "identical to what this version of tirelib builds"
+
+
+def test_a_sealed_one_must_be_trusted_by_name(ours: Path, tmp_path: Path) -> None:
+    fmu = build_fmu(ours.parent / "cal.toml", tmp_path / "x.fmu", sealed=True)
+    with pytest.raises(FmuError, match="add --trust once"):
+        check_trust(read_fmu(fmu), trust=False)
+
+
 def altered(fmu: Path, out: Path, name: str, data: bytes) -> Path:
     """Return a copy with one file changed or added."""
     with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(out, "w") as target:
@@ -42,8 +57,9 @@ def altered(fmu: Path, out: Path, name: str, data: bytes) -> Path:
     "name",
     [
         "binaries/linux64/StrainTire.so",
-        "resources/slavemodule.txt",
-        "resources/evil.py",
+        "resources/StrainTire.core",
+        "resources/evil.so",
+        "sources/core/wheel.c",
         "resources/settings.json",
         "resources/calibration.toml",
         "modelDescription.xml",

@@ -17,6 +17,8 @@ from tirelib.estimators.calibration_file import read_calibration, write_calibrat
 from tirelib.estimators.train import train
 from tirelib.estimators.typical import typical_turn
 from tirelib.fmu.build import build_fmu
+from tirelib.fmu.native import core_file
+from tirelib.fmu.run import LoadedFmu
 from tirelib.observations import observe
 
 RATE = 5000.0
@@ -136,10 +138,34 @@ def calibration() -> Calibration:
     return read_calibration(calibration_file())
 
 
+def kind(case: tuple[int, bool]) -> str:
+    """Name a case of samples and whether Python computes."""
+    return f"{'python' if case[1] else 'native'}-{case[0]}"
+
+
 @cache
-def fmu_file(samples: int, *, buffered: bool = False) -> Path:
+def fmu_file(samples: int, *, buffered: bool = False, python: bool = False) -> Path:
     """Return an FMU that takes frames of so many samples."""
-    path = folder() / f"StrainTire_{samples}{'_buffered' if buffered else ''}.fmu"
+    kind = ("_buffered" if buffered else "") + ("_python" if python else "")
     return build_fmu(
-        calibration_file(), path, samples_per_step=samples, sample_rate=RATE, buffered=buffered
+        calibration_file(),
+        folder() / f"StrainTire_{samples}{kind}.fmu",
+        samples_per_step=samples,
+        sample_rate=RATE,
+        buffered=buffered,
+        python=python,
     )
+
+
+def is_python(fmu: LoadedFmu) -> bool:
+    """Tell whether Python computes in an FMU."""
+    return (Path(fmu.slave.unzipDirectory) / "resources" / "slavemodule.txt").is_file()
+
+
+def write_other(known: Calibration, path: Path, fmu: LoadedFmu) -> str:
+    """Write a calibration as the FMU's parameter takes it; return the path."""
+    if is_python(fmu):
+        write_calibration(known, path)
+    else:
+        path.write_bytes(core_file(known))
+    return str(path)

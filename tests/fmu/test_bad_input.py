@@ -1,10 +1,9 @@
 """Every kind of bad input has its defined answer, and the importer lives."""
 
 import math
-import shutil
 import sys
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,9 +16,9 @@ from tests.fmu import live
 from tests.fmu.player import held
 from tests.synthetic import LATERAL
 from tirelib.errors import FormatError
-from tirelib.estimators.calibration_file import write_calibration
 from tirelib.flags import TurnFlag
-from tirelib.fmu import build
+from tirelib.fmu import export
+from tirelib.fmu.build import build_fmu
 from tirelib.fmu.run import LoadedFmu
 
 GOOD = held()
@@ -29,9 +28,8 @@ ONSET = int(3.1 * TURN) // 10 * 10
 
 
 @pytest.fixture(scope="module")
-def fmu() -> Iterator[LoadedFmu]:
-    with LoadedFmu(live.fmu_file(10)) as loaded:
-        yield loaded
+def fmu(ten: LoadedFmu) -> LoadedFmu:
+    return ten
 
 
 @pytest.fixture(scope="module")
@@ -263,28 +261,34 @@ def test_a_wrong_parameter_fails_the_start_and_a_reset_heals_it(
 def test_a_calibration_must_be_there_and_of_the_tire_on_the_wheel(
     fmu: LoadedFmu, strain: np.ndarray, tmp_path: Path
 ) -> None:
-    other, layout, junk = (tmp_path / name for name in ("other.toml", "layout.toml", "junk.toml"))
-    write_calibration(replace(live.calibration(), tire="winter tire"), other)
-    write_calibration(replace(live.calibration(), lateral=tuple(1.1 * y for y in LATERAL)), layout)
+    known, junk = live.calibration(), tmp_path / "junk"
+    other = live.write_other(replace(known, tire="winter tire"), tmp_path / "other", fmu)
+    wider = replace(known, lateral=tuple(1.1 * y for y in LATERAL))
+    layout = live.write_other(wider, tmp_path / "layout", fmu)
     junk.write_bytes(b"\xff\x00 no calibration")
+    no_file = "is not TOML" if live.is_python(fmu) else "give a file made by `tirelib fmu table`"
     for texts, cause in (
         ({"calibration": str(tmp_path / "none.toml")}, "none.toml: cannot be read"),
         ({"calibration": str(tmp_path)}, "cannot be read"),
-        ({"calibration": str(junk)}, "is not TOML"),
-        ({"calibration": str(other)}, "the tire is 'live tire', the calibration is of 'winter"),
+        ({"calibration": str(junk)}, no_file),
+        ({"calibration": other}, "the tire is 'live tire', the calibration is of 'winter"),
         ({"tire": "winter tire"}, "the tire is 'winter tire', the calibration is of 'live tire'"),
-        ({"calibration": str(layout)}, "gages lie at"),
+        (
+            {"calibration": layout},
+            r"gages lie at \+60, \+30, \+0, -30, -60 mm \(ISO\), the calibration has them at "
+            r"\+66, \+33, \+0, -33, -66 mm; calibrate with this layout",
+        ),
     ):
         with pytest.raises(FormatError, match=cause):
             fmu.start(live.RATE, **texts)
-    fmu.start(live.RATE, calibration=str(other), tire="winter tire")
+    fmu.start(live.RATE, calibration=other, tire="winter tire")
     assert play(fmu, strain[:, :ONSET])[-1]["valid"]
 
 
 def test_two_versions_in_one_process_each_run_their_own_code(
-    fmu: LoadedFmu, strain: np.ndarray, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    python_ten: LoadedFmu, strain: np.ndarray, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    honest = build.collect
+    fmu, honest = python_ten, export.collect
 
     def doubled(slave: Path) -> dict[str, str]:
         sources = honest(slave)
@@ -292,14 +296,15 @@ def test_two_versions_in_one_process_each_run_their_own_code(
         assert old in sources["fmu/wheel.py"]
         return {**sources, "fmu/wheel.py": sources["fmu/wheel.py"].replace(old, f"2.0 * {old}")}
 
-    monkeypatch.setattr(build, "collect", doubled)
-    second = build.build_fmu(
+    monkeypatch.setattr(export, "collect", doubled)
+    second = build_fmu(
         live.calibration_file(),
         tmp_path / "second.fmu",
         samples_per_step=10,
         sample_rate=live.RATE,
+        python=True,
     )
-    with LoadedFmu(second) as other, LoadedFmu(live.fmu_file(10)) as third:
+    with LoadedFmu(second) as other, LoadedFmu(live.fmu_file(10, python=True)) as third:
         for one in (fmu, other, third):
             one.start(live.RATE)
         for first in range(0, ONSET, 10):
@@ -311,7 +316,7 @@ def test_two_versions_in_one_process_each_run_their_own_code(
 
 
 def test_no_module_of_the_fmu_has_a_name_that_another_could_have() -> None:
-    with zipfile.ZipFile(live.fmu_file(10)) as archive:
+    with zipfile.ZipFile(live.fmu_file(10, python=True)) as archive:
         modules = {n.split("/")[1] for n in archive.namelist() if n.endswith(".py")}
         digest = archive.read("resources/slavemodule.txt").decode()[-12:]
     assert len(modules) == 2
@@ -319,8 +324,9 @@ def test_no_module_of_the_fmu_has_a_name_that_another_could_have() -> None:
 
 
 def test_a_fault_at_every_step_is_logged_a_few_times_and_the_values_are_held(
-    fmu: LoadedFmu, strain: np.ndarray, monkeypatch: pytest.MonkeyPatch
+    python_ten: LoadedFmu, strain: np.ndarray, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    fmu = python_ten
     fmu.start(live.RATE)
     before = play(fmu, strain[:, :ONSET])[-1]
     package = next((Path(fmu.slave.unzipDirectory) / "resources").glob("tirelib_*")).name
@@ -349,12 +355,17 @@ def test_a_fault_at_every_step_is_logged_a_few_times_and_the_values_are_held(
     assert last["status"].endswith("fault: RuntimeError: number 300")
 
 
-def test_a_damaged_fmu_does_not_start_and_says_why(tmp_path: Path) -> None:
-    path = tmp_path / "damaged.fmu"
-    shutil.copy(live.fmu_file(10), path)
-    with zipfile.ZipFile(live.fmu_file(10)) as old, zipfile.ZipFile(path, "w") as new:
+@pytest.mark.parametrize(
+    ("python", "file", "cause"),
+    [(True, "guid.txt", "come from different builds"), (False, "StrainTire.core", "is cut off")],
+)
+def test_a_damaged_fmu_does_not_start_and_says_why(
+    tmp_path: Path, python: bool, file: str, cause: str
+) -> None:
+    path, whole = tmp_path / "damaged.fmu", live.fmu_file(10, python=python)
+    with zipfile.ZipFile(whole) as old, zipfile.ZipFile(path, "w") as new:
         for name in old.namelist():
-            text = old.read(name)
-            new.writestr(name, text[:-2] if name.endswith("settings.json") else text)
-    with pytest.raises(FormatError, match=r"(?s)cannot be instantiated: .*JSONDecodeError"):
+            data = old.read(name)
+            new.writestr(name, data[:-2] if name.endswith(file) else data)
+    with pytest.raises(FormatError, match=rf"(?s)cannot be instantiated: .*{cause}"):
         LoadedFmu(path)

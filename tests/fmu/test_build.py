@@ -5,6 +5,7 @@ import subprocess
 import sys
 import zipfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree as Xml
 
@@ -17,8 +18,9 @@ from tests.fmu import live, virtual_host
 from tests.fmu.player import CONDITIONS
 from tirelib.errors import FormatError, ParameterError
 from tirelib.flags import TurnFlag
-from tirelib.fmu.build import build_fmu, embedded_calibration, source_file
+from tirelib.fmu.build import build_fmu, embedded_calibration
 from tirelib.fmu.bundle import collect, content_hash, renamed
+from tirelib.fmu.parts import source_file
 from tirelib.fmu.run import LoadedFmu
 from tirelib.stream.estimator import RATES
 from tirelib.units import TABLE
@@ -40,14 +42,18 @@ GIVEN = {
 }
 
 
-@pytest.mark.parametrize("samples", [1, 10])
-def test_fmpy_finds_no_problem(samples: int) -> None:
-    assert validate_fmu(str(live.fmu_file(samples))) == []
+KINDS = pytest.mark.parametrize("python", [False, True], ids=["native", "python"])
 
 
+@KINDS
+def test_fmpy_finds_no_problem(python: bool) -> None:
+    assert validate_fmu(str(live.fmu_file(10, python=python))) == []
+
+
+@KINDS
 @pytest.mark.parametrize("samples", [1, 10])
-def test_inputs_and_outputs_are_those_of_the_contract(samples: int) -> None:
-    description = read_model_description(str(live.fmu_file(samples)))
+def test_inputs_and_outputs_are_those_of_the_contract(samples: int, python: bool) -> None:
+    description = read_model_description(str(live.fmu_file(samples, python=python)))
     names = {v.name: v.causality for v in description.modelVariables}
     strains = (
         [f"strain_{g}" for g in range(1, 6)]
@@ -75,7 +81,9 @@ def test_friction_and_tread_end_where_the_library_ends_them() -> None:
         assert tuple(map(float, found[name])) == pytest.approx(pair, rel=1e-12), name
 
 
-@pytest.mark.parametrize("file", [live.fmu_file, virtual_host.file])
+@pytest.mark.parametrize(
+    "file", [live.fmu_file, partial(live.fmu_file, python=True), virtual_host.file]
+)
 def test_every_real_has_a_unit_and_display_units_convert_as_the_library_does(
     file: Callable[[int], Path],
 ) -> None:
@@ -101,7 +109,12 @@ def test_every_real_has_a_unit_and_display_units_convert_as_the_library_does(
 
 
 @pytest.mark.parametrize(
-    ("file", "known"), [(live.fmu_file, ["missing"]), (virtual_host.file, None)]
+    ("file", "known"),
+    [
+        (live.fmu_file, ["missing"]),
+        (partial(live.fmu_file, python=True), ["missing"]),
+        (virtual_host.file, None),
+    ],
 )
 def test_all_outputs_are_unknown_at_the_start_and_say_what_they_depend_on_then(
     file: Callable[[int], Path], known: list[str] | None
@@ -137,14 +150,15 @@ def test_every_real_has_a_type_a_nominal_and_limits_that_hold_the_start() -> Non
     assert [float(x) for x in limits["sample_rate"]] == list(RATES)
 
 
-def test_it_brings_icon_page_licences_and_default_experiment() -> None:
-    with zipfile.ZipFile(live.fmu_file(10)) as archive:
+@KINDS
+def test_it_brings_icon_page_licences_and_default_experiment(python: bool) -> None:
+    with zipfile.ZipFile(live.fmu_file(10, python=python)) as archive:
         names = set(archive.namelist())
         assert archive.read("model.png")[:8] == b"\x89PNG\r\n\x1a\n"
         page = archive.read("documentation/index.html").decode()
         licenses = [
             archive.read(f"documentation/licenses/{n}.txt").decode()
-            for n in ("license", "pythonfmu")
+            for n in ("license", *(["pythonfmu"] if python else []))
         ]
         description = Xml.fromstring(archive.read("modelDescription.xml"))
     assert {"resources/settings.json", "resources/calibration.toml"} <= names
@@ -171,15 +185,16 @@ def test_it_brings_icon_page_licences_and_default_experiment() -> None:
 
 
 def test_a_fmu_loaded_in_this_process_does_not_disturb_its_own_rebuild(tmp_path: Path) -> None:
-    with LoadedFmu(live.fmu_file(10)) as fmu:
+    with LoadedFmu(live.fmu_file(10, python=True)) as fmu:
         fmu.start(live.RATE)
         twin = build_fmu(
             live.calibration_file(),
             tmp_path / "twin.fmu",
             samples_per_step=10,
             sample_rate=live.RATE,
+            python=True,
         )
-        assert twin.read_bytes() == live.fmu_file(10).read_bytes()
+        assert twin.read_bytes() == live.fmu_file(10, python=True).read_bytes()
         fmu.step(np.zeros((5, 10)), CONDITIONS)
 
 
@@ -204,7 +219,7 @@ def test_same_calibration_same_bytes(tmp_path: Path) -> None:
 
 def test_the_build_leaves_no_trace_in_the_process(tmp_path: Path) -> None:
     path, modules = list(sys.path), set(sys.modules)
-    build_fmu(live.calibration_file(), tmp_path / "x.fmu", samples_per_step=3)
+    build_fmu(live.calibration_file(), tmp_path / "x.fmu", samples_per_step=3, python=True)
     assert sys.path == path
     assert not [n for n in set(sys.modules) - modules if n.startswith(("tirelib", "strain_tire"))]
 
@@ -221,7 +236,7 @@ def test_the_bundle_is_named_by_its_content_and_holds_the_core_only() -> None:
         assert absent not in sources
     changed = {**sources, "flags.py": sources["flags.py"] + "\n"}
     assert content_hash(changed) != content_hash(sources)
-    with zipfile.ZipFile(live.fmu_file(1)) as archive:
+    with zipfile.ZipFile(live.fmu_file(10, python=True)) as archive:
         names = archive.namelist()
     assert not any(name.startswith("resources/tirelib/") for name in names)
 
@@ -258,14 +273,14 @@ module = import_module(open({resources!r} + "/slavemodule.txt").read())
 slave = module.StrainTire(instance_name="alone", resources={resources!r})
 slave.exit_initialization_mode()
 for step in range(5):
-    slave.set_real([slave.reference[f'strain_{{g}}'] for g in range(1, 6)], [1e-3] * 5)
-    done = slave.do_step(step * 2e-4, 2e-4)
+    slave.set_real([slave.reference[f'strain_1_{{g}}'] for g in range(1, 6)], [1e-3] * 5)
+    done = slave.do_step(step * 2e-3, 2e-3)
 print(json.dumps([done, sorted({{name.split(".")[0] for name in sys.modules}})]))
 """
 
 
 def test_it_runs_without_the_repository_and_with_numpy_and_scipy_only(tmp_path: Path) -> None:
-    folder = extract(str(live.fmu_file(1)), unzipdir=str(tmp_path))
+    folder = extract(str(live.fmu_file(10, python=True)), unzipdir=str(tmp_path))
     resources = str(Path(folder) / "resources")
     blocked = [
         "tirelib",

@@ -38,10 +38,17 @@ class Foreign(Fmi2Slave):
 
 
 def changed(
-    path: Path, change: Callable[[str, bytes], bytes | None], more: dict[str, bytes] | None = None
+    path: Path,
+    change: Callable[[str, bytes], bytes | None],
+    more: dict[str, bytes] | None = None,
+    *,
+    python: bool = False,
 ) -> Path:
     """Write the FMU with some of its files changed, left out or added."""
-    with zipfile.ZipFile(live.fmu_file(10)) as old, zipfile.ZipFile(path, "w") as new:
+    with (
+        zipfile.ZipFile(live.fmu_file(10, python=python)) as old,
+        zipfile.ZipFile(path, "w") as new,
+    ):
         for name in old.namelist():
             data = change(name, old.read(name))
             if data is not None:
@@ -66,11 +73,13 @@ def run(*arguments: str) -> tuple[int, str]:
     return result.exit_code, result.output
 
 
-@pytest.mark.parametrize(("samples", "buffered"), [(10, False), (100, True)])
+@pytest.mark.parametrize(
+    ("samples", "buffered", "python"), [(10, False, True), (10, False, False), (100, True, False)]
+)
 def test_what_was_built_passes_and_leaves_a_page_and_json(
-    samples: int, buffered: bool, tmp_path: Path
+    samples: int, buffered: bool, python: bool, tmp_path: Path
 ) -> None:
-    file = live.fmu_file(samples, buffered=buffered)
+    file = live.fmu_file(samples, buffered=buffered, python=python)
     code, told = run(str(file), "--json", str(tmp_path / "c.json"), "--out", str(tmp_path / "p"))
     assert code == 0, told
     assert "Passed: the FMU is valid, runs, and reproduces its reference signals." in told
@@ -153,7 +162,7 @@ def test_a_broken_description_and_a_broken_slave_are_named(tmp_path: Path) -> No
             return data.replace(b'unit="N"', b'unit="stone"')
         return data.replace(b"advance", b"advanced") if name.endswith("strain_tire.py") else data
 
-    document = check_fmu(changed(tmp_path / "x.fmu", change))
+    document = check_fmu(changed(tmp_path / "x.fmu", change, python=True))
     found = parts(document)
     assert not found["validation"][0]
     assert "stone" in found["validation"][1]

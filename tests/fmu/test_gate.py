@@ -1,10 +1,10 @@
 """What stands before pythonfmu's library: places, texts, identity, and what a refusal ends."""
 
-import hashlib
 import os
 import subprocess
 import sys
 import zipfile
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,6 @@ from fmpy.fmi2 import FMU2Slave, fmi2CoSimulation, fmi2ModelExchange, fmi2Termin
 from fmpy.validation import validate_fmu
 
 from tests.fmu import live, virtual_host
-from tirelib.fmu.build import source_file
 from tirelib.fmu.run import LoadedFmu, keeping
 
 HOST = """
@@ -45,15 +44,21 @@ def hosted(code: str, *arguments: object) -> str:
     return done.stdout
 
 
+KINDS = pytest.mark.parametrize("python", [False, True], ids=["native", "python"])
+
+
 def unpacked(fmu: Path, folder: Path) -> Path:
     with zipfile.ZipFile(fmu) as archive:
         archive.extractall(folder)
     return folder
 
 
-def test_an_fmu_runs_from_a_folder_of_any_name(tmp_path: Path) -> None:
-    names = ("Prüfstand", "50%", "a+b", "a#b", "a b", "100%41 (x)", "轮胎", "%s%n")
-    folders = [unpacked(live.fmu_file(10), tmp_path / name) for name in names]
+@KINDS
+def test_an_fmu_runs_from_a_folder_of_any_name(tmp_path: Path, python: bool) -> None:
+    names = ["Prüfstand", "50%", "a+b", "a#b", "a b", "100%41 (x)", "轮胎", "%s%n"]
+    names += [] if python else ["a%20b", "file:__x"]
+    fmu = live.fmu_file(10, python=python)
+    folders = [unpacked(fmu, tmp_path / name) for name in names]
     said = hosted(
         """
 for folder in sys.argv[1:]:
@@ -70,7 +75,8 @@ for folder in sys.argv[1:]:
     assert said.splitlines() == [f"[0] {name.encode()}" for name in names]
 
 
-def test_a_percent_sign_in_a_text_is_shown_and_nothing_else(tmp_path: Path) -> None:
+@KINDS
+def test_a_percent_sign_in_a_text_is_shown_and_nothing_else(tmp_path: Path, python: bool) -> None:
     text = "%s%n%s%n%d 100%.toml"
     said = hosted(
         """
@@ -85,7 +91,7 @@ except Exception as error:
 slave.reset()
 slave.freeInstance()
 """,
-        unpacked(live.fmu_file(10), tmp_path / "x"),
+        unpacked(live.fmu_file(10, python=python), tmp_path / "x"),
         text,
     )
     assert text in said
@@ -129,9 +135,10 @@ def instantiated(folder: Path, **changed: Any) -> tuple[FMU2Slave, list[str]]:
     return slave, messages
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return unpacked(live.fmu_file(10), tmp_path_factory.mktemp("gate") / "x")
+@pytest.fixture(scope="module", params=[False, True], ids=["native", "python"])
+def folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    fmu = live.fmu_file(10, python=request.param)
+    return unpacked(fmu, tmp_path_factory.mktemp("gate") / "x")
 
 
 def test_a_place_that_is_a_plain_path_or_has_a_host_will_do(folder: Path) -> None:
@@ -148,7 +155,7 @@ def test_a_place_that_is_a_plain_path_or_has_a_host_will_do(folder: Path) -> Non
         ({"guid": "{00000000-0000-0000-0000-000000000000}"}, "come from different builds"),
         ({"guid": None}, "fmuGUID = missing"),
         ({"type": fmi2ModelExchange}, "fmuType is model exchange; this FMU is for co-simulation"),
-        ({"place": "file:///no/such/50%25"}, "file:///no/such/50%25; it holds no slave"),
+        ({"place": "file:///no/such/50%25"}, "unpack the whole FMU and give the URI of its folder"),
         ({"place": None}, "fmuResourceLocation is missing"),
     ],
 )
@@ -160,15 +167,18 @@ def test_what_is_not_this_fmu_is_refused(folder: Path, changed: dict[str, Any], 
 
 
 def test_a_folder_that_pythonfmu_cannot_read_is_refused(tmp_path: Path) -> None:
-    slave, messages = instantiated(unpacked(live.fmu_file(10), tmp_path / "a%20b"))
+    fmu = live.fmu_file(10, python=True)
+    slave, messages = instantiated(unpacked(fmu, tmp_path / "a%20b"))
     assert not slave.component
     assert "a%2520b/resources; pythonfmu 0.7.0 cannot read a folder with %20" in messages[0]
 
 
-def test_a_refused_step_is_loud_and_no_wish_to_end() -> None:
+@KINDS
+def test_a_refused_step_is_loud_and_no_wish_to_end(python: bool) -> None:
+    file = live.fmu_file(10, python=python)
     with pytest.raises(FMICallException, match=r"fmi2DoStep failed with status 3 \(error\)"):
-        simulate_fmu(str(live.fmu_file(10)), stop_time=0.1, output_interval=1.5e-4)
-    with LoadedFmu(live.fmu_file(10)) as fmu:
+        simulate_fmu(str(file), stop_time=0.1, output_interval=1.5e-4)
+    with LoadedFmu(file) as fmu:
         fmu.start(live.RATE)
         with pytest.raises(FMICallException, match="status 3"):
             fmu.slave.doStep(0.0, 1.5 / live.RATE)
@@ -178,10 +188,12 @@ def test_a_refused_step_is_loud_and_no_wish_to_end() -> None:
         fmu.slave.doStep(0.0, 10 / live.RATE)
 
 
-def test_each_instance_tells_its_own_importer() -> None:
-    with LoadedFmu(live.fmu_file(10)) as first:
+@KINDS
+def test_each_instance_tells_its_own_importer(python: bool) -> None:
+    file = live.fmu_file(10, python=python)
+    with LoadedFmu(file) as first:
         first.start(live.RATE)
-        with LoadedFmu(live.fmu_file(10)) as second:
+        with LoadedFmu(file) as second:
             second.start(live.RATE)
             with pytest.raises(FMICallException):
                 first.slave.doStep(0.0, 1.5 / live.RATE)
@@ -191,7 +203,14 @@ def test_each_instance_tells_its_own_importer() -> None:
         assert len(first.messages) == 2
 
 
-@pytest.mark.parametrize("file", [live.fmu_file, virtual_host.file])
+FILES = pytest.mark.parametrize(
+    "file",
+    [live.fmu_file, partial(live.fmu_file, python=True), virtual_host.file],
+    ids=["native", "python", "virtual"],
+)
+
+
+@FILES
 def test_outputs_say_that_no_input_reaches_them_within_a_step(file: Any) -> None:
     assert validate_fmu(str(file(10))) == []
     outputs = read_model_description(str(file(10))).outputs
@@ -199,14 +218,14 @@ def test_outputs_say_that_no_input_reaches_them_within_a_step(file: Any) -> None
     assert all(unknown.dependencies == [] for unknown in outputs)
 
 
-@pytest.mark.parametrize("file", [live.fmu_file, virtual_host.file])
+@FILES
 def test_outputs_stand_still_while_inputs_are_set(file: Any, tmp_path: Path) -> None:
     slave, _ = instantiated(unpacked(file(10), tmp_path / "x"))
     variables = read_model_description(str(file(10))).modelVariables
     slave.setupExperiment()
     slave.enterInitializationMode()
     slave.exitInitializationMode()
-    step = 10 / (live.RATE if file is live.fmu_file else virtual_host.RATE)
+    step = 10 / (virtual_host.RATE if file is virtual_host.file else live.RATE)
     reals = [v for v in variables if v.type == "Real"]
     taken = [v.valueReference for v in reals if v.causality == "output"]
     given = [v for v in reals if v.causality == "input"]
@@ -238,7 +257,7 @@ def test_an_importer_ends_in_order_whatever_becomes_of_freed_memory(tmp_path: Pa
     source, library = tmp_path / "reused.c", tmp_path / "reused.so"
     source.write_text(REUSED)
     subprocess.run(["gcc", "-shared", "-fPIC", "-o", library, source], check=True)
-    folder = unpacked(live.fmu_file(10), tmp_path / "fmu")
+    folder = unpacked(live.fmu_file(10, python=True), tmp_path / "fmu")
     code = HOST + "slave, _ = instance(Path(sys.argv[1])); slave.freeInstance(); print('freed')"
     done = subprocess.run(
         [sys.executable, "-c", code, folder],
@@ -247,8 +266,3 @@ def test_an_importer_ends_in_order_whatever_becomes_of_freed_memory(tmp_path: Pa
         env=os.environ | {"LD_PRELOAD": str(library)},
     )
     assert (done.returncode, done.stdout) == (0, "freed\n"), done.stderr
-
-
-def test_the_gate_was_compiled_from_its_source() -> None:
-    digest = hashlib.sha256(source_file("gate/gate.c").read_bytes()).hexdigest()
-    assert f"source sha256 {digest}".encode() in source_file("gate/linux64.so").read_bytes()

@@ -69,7 +69,11 @@ def test_a_state_rolls_back_exactly_and_survives_reset_and_serialisation(fmu: Lo
         fmu.slave.freeFMUState(used)
 
 
-@pytest.mark.parametrize("file", [live.fmu_file, virtual_host.file])
+def python_file(samples: int) -> Path:
+    return live.fmu_file(samples, python=True)
+
+
+@pytest.mark.parametrize("file", [python_file, virtual_host.file])
 def test_instances_come_and_go_without_growth(file: Callable[[int], Path]) -> None:
     description = read_model_description(str(file(10)))
     folder = extract(str(file(10)))
@@ -116,7 +120,7 @@ def test_a_freed_instance_leaves_at_once_with_its_memory() -> None:
     gc.collect()
     gc.disable()
     try:
-        with LoadedFmu(live.fmu_file(10), name="gone") as fmu:
+        with LoadedFmu(python_file(10), name="gone") as fmu:
             fmu.start(live.RATE)
             play(fmu, strain(turns=1.0))
             assert alive() >= 1

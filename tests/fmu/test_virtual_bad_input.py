@@ -12,7 +12,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 
 from tests.fmu.virtual_host import RATE, TYPICAL, Host, file
-from tirelib.fmu import build
+from tirelib.fmu import export
 from tirelib.fmu.virtual.spec import build_virtual
 
 
@@ -207,7 +207,7 @@ def test_a_surface_that_is_missing_or_damaged_fails_the_instance_and_says_why(
 def test_two_versions_in_one_process_each_run_their_own_code(
     ten: Host, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    honest = build.collect
+    honest = export.collect
 
     def doubled(slave: Path) -> dict[str, str]:
         sources = honest(slave)
@@ -217,7 +217,7 @@ def test_two_versions_in_one_process_each_run_their_own_code(
         new = old.replace("forces_of(answers)", "forces_of(2.0 * answers)")
         return {**sources, "fmu/virtual/wheel.py": text.replace(old, new)}
 
-    monkeypatch.setattr(build, "collect", doubled)
+    monkeypatch.setattr(export, "collect", doubled)
     second = Host(build_virtual(tmp_path / "second.fmu", samples_per_step=10))
     third = Host(file(10))
     try:

@@ -1,8 +1,10 @@
 """The native core, compiled for the tests and called through ctypes."""
 
 import ctypes as c
+import importlib.util
 import shutil
 import subprocess
+import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,17 +18,28 @@ from tirelib.signal import LowPass, Turn
 from tirelib.signal.turns import PHI
 
 SOURCE = Path(__file__).parents[2] / "fmu_src" / "core"
+
+
+def _maker() -> Any:
+    """Return the script that makes the binaries."""
+    file = SOURCE.parents[1] / "build" / "native_fmu.py"
+    spec = importlib.util.spec_from_file_location("native_fmu", file)
+    assert spec is not None
+    assert spec.loader is not None
+    module = sys.modules.setdefault(spec.name, importlib.util.module_from_spec(spec))
+    spec.loader.exec_module(module)
+    return module
+
+
+MAKER = _maker()
 FLAGS = (
-    *(
-        "-std=c99",
-        "-pedantic",
-        "-Wall",
-        "-Wextra",
-        "-Werror",
-        "-Wconversion",
-        "-Wno-sign-conversion",
-    ),
-    *("-O2", "-ffp-contract=off", "-shared", "-fPIC"),
+    *MAKER.C99,
+    *MAKER.STRICT,
+    "-Wconversion",
+    "-Wno-sign-conversion",
+    "-O2",
+    "-shared",
+    "-fPIC",
 )
 GAGES = 16
 REAL = c.c_double

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.fmu import live
-from tests.native.core import NativeCutter
+from tests.native.core import SOURCE, NativeCutter
 from tests.native.estimates import NativeCalibration, assert_same_estimates
 from tests.synthetic import LATERAL, synthetic_run, write
 from tirelib.campaign import read_campaign
@@ -19,6 +19,7 @@ from tirelib.estimators.train import train
 from tirelib.estimators.unknowns import Road
 from tirelib.features import Features, extract_features
 from tirelib.flags import TurnFlag
+from tirelib.fmu import calibration_table
 from tirelib.fmu.calibration_table import flat_table
 from tirelib.observations import observe
 from tirelib.signal import cut_turns
@@ -246,3 +247,31 @@ def test_a_regressor_that_the_core_does_not_know_is_refused() -> None:
     odd = replace(MOMENT, variables=(Variable("cp3", 0.0, 1.0), MOMENT.variables[1]))
     with pytest.raises(FormatError, match="knows no regressor 'cp3'"):
         flat_table(without(live.calibration(), moment=odd))
+
+
+def test_the_table_knows_the_sizes_that_the_core_was_compiled_with() -> None:
+    header = (SOURCE / "calibration.h").read_text()
+    for name in ("VARIABLES", "TERMS", "NAMES", "NODES", "WHOLE"):
+        assert f" {name} = {getattr(calibration_table, name)}" in header, name
+
+
+@pytest.mark.parametrize("terms", [calibration_table.TERMS, calibration_table.TERMS + 1])
+def test_a_polynomial_fills_its_room_and_a_larger_one_is_refused(
+    core: ctypes.CDLL, terms: int
+) -> None:
+    """Each term is an exponent in one of as many regressors as there is room for."""
+    room = calibration_table.VARIABLES
+    names = [calibration_table.VALUES[n % len(calibration_table.VALUES)] for n in range(room)]
+    large = replace(
+        MOMENT,
+        variables=tuple(Variable(name, 0.0, 1.0) for name in names),
+        terms=tuple(tuple(t // room * (v == t % room) for v in range(room)) for t in range(terms)),
+        coefficients=np.zeros(terms),
+        covariance=np.zeros((terms, terms)),
+    )
+    known = without(live.calibration(), moment=large)
+    if terms > calibration_table.TERMS:
+        with pytest.raises(FormatError, match="32 and 256 are allowed; calibrate with fewer"):
+            flat_table(known)
+    else:
+        assert NativeCalibration(core, known)

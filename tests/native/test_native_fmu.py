@@ -16,12 +16,15 @@ from fmpy.fmi2 import FMU2Slave, fmi2CoSimulation, fmi2ModelExchange
 from fmpy.validation import validate_fmu
 
 from tests.fmu import live
-from tirelib.fmu.native import BINARIES, build_native, core_file
+from tests.native.core import MAKER
+from tirelib.fmu.build import build_fmu
+from tirelib.fmu.native import BINARIES, core_file
 from tirelib.fmu.run import keeping
 from tirelib.fmu.wheel import Wheel
 from tirelib.held import HELD
 
 ROOT = Path(__file__).parents[2]
+GATE = "gate/linux64.so"
 SAMPLES = 20
 STEP = SAMPLES / live.RATE
 
@@ -29,9 +32,7 @@ STEP = SAMPLES / live.RATE
 @pytest.fixture(scope="session")
 def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("native") / "StrainTire.fmu"
-    return build_native(
-        live.calibration_file(), out, samples_per_step=SAMPLES, sample_rate=live.RATE
-    )
+    return build_fmu(live.calibration_file(), out, samples_per_step=SAMPLES, sample_rate=live.RATE)
 
 
 @pytest.fixture(scope="session")
@@ -116,7 +117,7 @@ def same(shown: tuple[Any, Any], wanted: tuple[Any, Any]) -> None:
 
 def test_it_is_valid_and_the_same_bytes_again(fmu: Path, tmp_path: Path) -> None:
     assert validate_fmu(str(fmu)) == []
-    again = build_native(
+    again = build_fmu(
         live.calibration_file(),
         tmp_path / "again.fmu",
         samples_per_step=SAMPLES,
@@ -127,7 +128,9 @@ def test_it_is_valid_and_the_same_bytes_again(fmu: Path, tmp_path: Path) -> None
 
 
 def test_its_variables_are_those_of_the_python_fmu(fmu: Path) -> None:
-    native, python = (read_model_description(str(path)) for path in (fmu, live.fmu_file(SAMPLES)))
+    native, python = (
+        read_model_description(str(path)) for path in (fmu, live.fmu_file(SAMPLES, python=True))
+    )
     for own, other in zip(native.modelVariables, python.modelVariables, strict=True):
         for name in (
             *("name", "valueReference", "type", "causality", "variability", "description"),
@@ -257,27 +260,17 @@ def test_another_calibration_of_the_tire_can_be_given(folder: Path, tmp_path: Pa
         Host(folder).start(calibration=str(table))
 
 
-def maker() -> Any:
-    spec = importlib.util.spec_from_file_location("native_fmu", ROOT / "build" / "native_fmu.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+@pytest.mark.parametrize("place", [*(f"binaries/{name}" for name in BINARIES), GATE])
+def test_the_binaries_were_made_from_the_sources(place: str) -> None:
+    said = f"source sha256 {MAKER.BINARIES[place].source_hash()}".encode()
+    assert said in (ROOT / "fmu_src" / place).read_bytes(), "run python build/native_fmu.py"
 
 
-@pytest.mark.parametrize("name", BINARIES)
-def test_the_binaries_were_made_from_the_sources(name: str) -> None:
-    said = f"source sha256 {maker().source_hash()}".encode()
-    binary = (ROOT / "fmu_src" / "binaries" / name).read_bytes()
-    assert said in binary, "run python build/native_fmu.py"
-
-
-def test_the_compiler_makes_the_same_binary_again() -> None:
+@pytest.mark.parametrize("place", [f"binaries/{BINARIES[0]}", GATE])
+def test_the_compiler_makes_the_same_binary_again(place: str) -> None:
     if importlib.util.find_spec("ziglang") is None:
         pytest.skip("ziglang is not installed: only who makes the binaries needs it")
-    name = BINARIES[0]
-    assert maker().compiled(name) == (ROOT / "fmu_src" / "binaries" / name).read_bytes()
+    assert MAKER.BINARIES[place].compiled() == (ROOT / "fmu_src" / place).read_bytes()
 
 
 def test_a_process_without_python_needs_nothing(folder: Path, tmp_path: Path) -> None:

@@ -99,7 +99,7 @@ def test_a_step_against_an_empty_slave(benchmark: Any, tmp_path: Path) -> None:
         [*strain[:, i * SAMPLES : (i + 1) * SAMPLES].T.ravel(), live.SPEED, live.PRESSURE, 0.0]
         for i in range(n)
     ]
-    with LoadedFmu(live.fmu_file(SAMPLES)) as fmu:
+    with LoadedFmu(live.fmu_file(SAMPLES, python=True)) as fmu:
         fmu.start(RATE)
         full = stepper(fmu.slave, fmu.references, lateral)
         taken: dict[str, list[float]] = {"empty": [], "full": []}
@@ -150,7 +150,7 @@ def looped(samples: int) -> tuple[np.ndarray, int]:
 def test_four_wheels_against_real_time(benchmark: Any, samples: int, lists: bool) -> None:
     frames, n = looped(samples)
     rows: Any = frames.tolist() if lists else frames
-    fmus = [LoadedFmu(live.fmu_file(samples), name=f"wheel_{w}") for w in range(4)]
+    fmus = [LoadedFmu(live.fmu_file(samples, python=True), name=f"wheel_{w}") for w in range(4)]
     given = [
         v.name
         for v in inputs(live.calibration().lateral, samples)
@@ -244,7 +244,7 @@ def test_memory_over_steps_and_instances(benchmark: Any) -> None:
     told: dict[str, list[float]] = {"steps": [], "instances": []}
 
     def run() -> None:
-        with LoadedFmu(live.fmu_file(1)) as fmu:
+        with LoadedFmu(live.fmu_file(1, python=True)) as fmu:
             fmu.start(RATE)
             references, size, values = fmu._frame
             view, slave = np.ctypeslib.as_array(values), fmu.slave
@@ -256,7 +256,7 @@ def test_memory_over_steps_and_instances(benchmark: Any) -> None:
                     told["steps"].append(round(resident(), 1))
             told["steps"].append(round(resident(), 1))
         for number in range(CYCLES):
-            with LoadedFmu(live.fmu_file(10), name=f"wheel_{number}") as fmu:
+            with LoadedFmu(live.fmu_file(10, python=True), name=f"wheel_{number}") as fmu:
                 fmu.start(RATE)
                 fmu.step(np.zeros((5, 10)), np.array([live.SPEED, live.PRESSURE, 0.0]))
             if number % (CYCLES // 5) == 0:

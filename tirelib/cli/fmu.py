@@ -23,9 +23,10 @@ from tirelib.errors import FormatError
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.estimators.costs import costs_of
 from tirelib.estimators.result import estimate_document
-from tirelib.fmu.build import DEFAULT_RATE, build_fmu, embedded_calibration
+from tirelib.fmu.build import build_fmu
 from tirelib.fmu.check import check_fmu
-from tirelib.fmu.native import build_native, core_file
+from tirelib.fmu.native import core_file
+from tirelib.fmu.parts import DEFAULT_RATE
 from tirelib.fmu.run import LoadedFmu, play_campaign
 from tirelib.observations import observe
 from tirelib.signal import LowPass
@@ -42,20 +43,22 @@ Examples:
   tirelib fmu build --calibration build/out/cal.toml --out build/out/StrainTire.fmu
   tirelib fmu build --calibration cal.toml --out X.fmu --samples-per-step 10      # 1 ms at 10 kHz
   tirelib fmu build --calibration cal.toml --out X.fmu --samples-per-step 32 --buffered
-  tirelib fmu build --calibration cal.toml --out X.fmu --native                 # needs no Python
+  tirelib fmu build --calibration cal.toml --out X.fmu --sealed     # to hand over
+  tirelib fmu build --calibration cal.toml --out X.fmu --python     # computes in Python
 
 \b
-FMI 2.0 co-simulation, one wheel. Needs CPython with numpy and scipy where it runs, with --native
-nothing; the rest is inside. The communication step is the samples per step divided by the sample
-rate. With --buffered the step is free, and the input `samples` gives the number of new samples in
-the frame; the estimates are the same.
+FMI 2.0 co-simulation, one wheel. Inside is the estimator compiled for Linux, Windows and macOS; it
+needs nothing else where it runs (with --python: CPython with numpy and scipy). The communication
+step is the samples per step divided by the sample rate. With --buffered the step is free, and the
+input `samples` gives the number of new samples in the frame; the estimates are the same.
 """
 _TABLE = """\b
 Example:
   tirelib fmu table build/out/cal.toml --out build/out/cal.table
 
 \b
-An FMU built with --native reads no TOML; its parameter `calibration` takes the path of this file.
+The FMU reads no TOML; its parameter `calibration` takes the path of this file. (One built with
+--python takes CAL.toml itself.)
 """
 _RUN = """\b
 Example:
@@ -124,10 +127,16 @@ fmu.add_command(virtual)
     help="What an output shows where it has no value; see docs/fmu.md.",
 )
 @click.option(
-    "--native",
+    "--python",
     is_flag=True,
-    help="Pack the estimator compiled for Linux, Windows and macOS instead of the Python one.",
+    help="Pack the Python estimator instead of the compiled one.",
 )
+@click.option(
+    "--sealed",
+    is_flag=True,
+    help="Leave out the calibration file: campaign names, statistics and a measured turn.",
+)
+@click.option("--native", is_flag=True, hidden=True, expose_value=False)
 def build(
     calibration: Path,
     out: Path,
@@ -135,20 +144,23 @@ def build(
     sample_rate: float,
     buffered: bool,
     missing: float,
-    native: bool,
+    python: bool,
+    sealed: bool,
 ) -> None:
     """Write StrainTire.fmu with a calibration inside."""
     with progress_bar("building", 3) as progress:
-        path = (build_native if native else build_fmu)(
+        path = build_fmu(
             calibration,
             out,
             samples_per_step=samples_per_step,
             sample_rate=sample_rate,
             buffered=buffered,
             missing=missing,
+            python=python,
+            sealed=sealed,
             progress=progress,
         )
-    loaded = embedded_calibration(path)
+    loaded = read_calibration(calibration)
     gages = ", ".join(f"{1e3 * y:+g}" for y in loaded.lateral)
     step = 1e3 * samples_per_step / sample_rate
     console = output()
@@ -163,7 +175,7 @@ def build(
 @click.argument("calibration", metavar="CAL.toml", type=FILE)
 @click.option("--out", metavar="X.table", type=NEW_FILE, required=True, help="File to write.")
 def table(calibration: Path, out: Path) -> None:
-    """Write a calibration for the parameter `calibration` of a native FMU."""
+    """Write a calibration for the parameter `calibration` of an FMU."""
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_bytes(core_file(read_calibration(calibration)))
     output().print(f"written: {out} ({out.stat().st_size / 1e3:.0f} kB)")

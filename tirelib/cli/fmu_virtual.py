@@ -6,7 +6,7 @@ import click
 
 from tirelib.cli.common import FILE, NEW_FILE, output, progress_bar
 from tirelib.errors import ParameterError
-from tirelib.fmu.build import DEFAULT_RATE
+from tirelib.fmu.parts import DEFAULT_RATE
 from tirelib.fmu.virtual.spec import build_virtual, default_surface, friction_surface
 
 _EPILOG = """\b

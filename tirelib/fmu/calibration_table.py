@@ -64,8 +64,8 @@ CONSTANTS = (
     *(contact_length.LEAST_STD, contact_length.SHORT_STD, contact_length.SHORT_WIDTH),
 )
 """In the order of ``Constants`` in ``calibration.h``."""
-NODES, WHOLE = 64, 6
-"""Sizes that the core was compiled with."""
+VARIABLES, TERMS, NAMES, NODES, WHOLE = 32, 256, 24, 64, 6
+"""Sizes that the core was compiled with, in ``calibration.h``."""
 
 
 def flat_table(known: Calibration) -> FloatArray:
@@ -74,7 +74,8 @@ def flat_table(known: Calibration) -> FloatArray:
     Raises
     ------
     FormatError
-        If the calibration holds a regressor that the core does not know.
+        If the calibration holds a regressor that the core does not know, or more of them than it
+        has room for.
     """
     if (any_road.NODES, any_road.WHOLE) != (NODES, WHOLE):
         raise FormatError(
@@ -99,7 +100,8 @@ def _number(name: str) -> float:
     """Return the number of a regressor."""
     if name not in VALUES:
         raise FormatError(
-            f"native core: it knows no regressor {name!r}, only {', '.join(VALUES)}; calibrate anew"
+            f"native core: it knows no regressor {name!r}, only {', '.join(VALUES)}; calibrate "
+            "anew, or build the FMU with --python"
         )
     return float(VALUES.index(name))
 
@@ -156,6 +158,12 @@ def _road(road: unknowns.Road) -> Iterator[float]:
 
 
 def _form(variables: Sequence[Variable], terms: Sequence[Term]) -> Iterator[float]:
+    if len(variables) > VARIABLES or len(terms) > TERMS:
+        raise FormatError(
+            f"native core: a polynomial has {len(variables)} regressors and {len(terms)} terms; "
+            f"{VARIABLES} and {TERMS} are allowed; calibrate with fewer, or build the FMU with "
+            "--python"
+        )
     yield from (float(len(variables)), float(len(terms)))
     for variable in variables:
         yield from (_number(variable.name), variable.centre, variable.scale)
@@ -207,6 +215,11 @@ def _likeness(known: likeness.Likeness | None) -> Iterator[float]:
         yield 0.0
         return
     names = known.names
+    if len(names) > NAMES:
+        raise FormatError(
+            f"native core: a tire is told by {len(names)} features; {NAMES} are allowed; build the "
+            "FMU with --python"
+        )
     yield 1.0
     yield from _form(known.variables, known.terms)
     yield float(len(names))

@@ -32,6 +32,8 @@ LARGEST_UNPACKED = 2_000_000_000
 MOST_FILES = 20_000
 TIME_LIMIT = 600.0
 """Seconds for one FMU."""
+OWN = {"resources/slavemodule.txt", "resources/StrainTire.core"}
+"""What FMUs of this library hold beside ``resources/settings.json``: one of these."""
 _PARTS = ("archive", "validation", "run", "reference")
 
 
@@ -70,7 +72,7 @@ def check_fmu(
             "fmu check: the package fmpy, which runs the FMU, is not installed; install it with "
             "pip install 'tirelib[fmu]'"
         )
-    own = "resources/settings.json" in names and "resources/slavemodule.txt" in names
+    own = "resources/settings.json" in names and bool(OWN & set(names))
     document: dict[str, Any] = {
         "format": FORMAT,
         "file": path.name,

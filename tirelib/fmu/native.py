@@ -8,7 +8,6 @@ import json
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from uuid import uuid5
 from xml.etree import ElementTree as Xml
 
 import numpy as np
@@ -16,19 +15,9 @@ import numpy as np
 from tirelib import __version__
 from tirelib.errors import FormatError
 from tirelib.estimators.calibration import Calibration
-from tirelib.estimators.calibration_file import read_calibration
-from tirelib.fmu.build import (
-    _NAMESPACE,
-    _check_writable,
-    _installed_license,
-    _unwritable,
-    source_file,
-)
-from tirelib.fmu.bundle import content_hash
 from tirelib.fmu.calibration_table import flat_table
-from tirelib.fmu.describe import described, repack
+from tirelib.fmu.parts import Identity, check_writable, identity_of, source_file, write_fmu
 from tirelib.fmu.spec import SlaveSpec
-from tirelib.fmu.strain_spec import strain_tire
 from tirelib.fmu.variables import Variable
 
 FORMAT = "tirelib-core/1"
@@ -41,63 +30,56 @@ BINARIES = (
 """By platform, as FMI names it."""
 
 
-def build_native(
-    calibration: str | Path,
+def pack(
+    spec: SlaveSpec,
+    calibration: Calibration,
     out: str | Path,
-    *,
-    samples_per_step: int = 1,
-    sample_rate: float = 1e4,
-    buffered: bool = False,
-    missing: float = math.nan,
     progress: Callable[[str], None] | None = None,
 ) -> Path:
-    """Write the FMU; parameters and errors as `tirelib.fmu.build.build_fmu`."""
+    """Write the FMU of `spec` around the core.
+
+    Raises
+    ------
+    FormatError
+        If the core does not know a regressor of the calibration, or the FMU cannot be written.
+    """
     tell = progress or (lambda _: None)
     target = Path(out)
-    _check_writable(target)
-    spec = strain_tire(
-        calibration,
-        samples_per_step=samples_per_step,
-        sample_rate=sample_rate,
-        buffered=buffered,
-        missing=missing,
-        native=True,
-    )
+    check_writable(target)
     tell("described")
-    binaries = {name: source_file(f"binaries/{name}").read_bytes() for name in BINARIES}
-    parts = {f"binaries/{name}": data for name, data in binaries.items()}
-    parts |= {f"resources/{name}": data for name, data in spec.resources.items()}
-    parts |= {f"documentation/{name}": data for name, data in spec.documentation.items()}
-    settings = json.dumps({**spec.settings, "description": spec.description})
-    texts = {name: data.hex() for name, data in parts.items()}
-    digest = content_hash({**texts, "settings": settings, "icon": spec.icon.hex()})
-    guid, version = f"{{{uuid5(_NAMESPACE, digest)}}}", f"{__version__}+{digest}"
+    sources = core_sources()
+    computing = {
+        f"binaries/{name}": source_file(f"binaries/{name}").read_bytes() for name in BINARIES
+    }
+    computing |= {f"sources/{name}": source_file(name).read_bytes() for name in sources}
+    identity = identity_of(spec, computing)
     core = core_file(
-        read_calibration(calibration),
-        guid=guid,
+        calibration,
+        guid=identity.guid,
         table=spec.table,
-        numbers=(samples_per_step, buffered, sample_rate, missing),
+        numbers=[
+            float(spec.settings[name])
+            for name in ("samples_per_step", "buffered", "sample_rate", "missing")
+        ],
     )
     files = {
-        **{name: data.replace(b"{version}", version.encode()) for name, data in parts.items()}
-        | {name: data for name, data in parts.items() if name.startswith("binaries/")},
+        **computing,
+        **{f"resources/{name}": data for name, data in spec.resources.items()},
+        "resources/settings.json": json.dumps(dict(spec.settings), indent=1).encode(),
         "resources/StrainTire.core": core,
-        "modelDescription.xml": described(
-            _description(spec, guid, version), spec.table, spec.start_depends_on
-        ),
-        "model.png": spec.icon,
+        "modelDescription.xml": _description(spec, identity, sources),
     }
-    own = Path(__file__).parents[2] / "LICENSE"
-    files["documentation/licenses/license.txt"] = (
-        own.read_bytes() if own.is_file() else _installed_license("tirelib")
-    )
     tell("collected")
-    try:
-        repack(files, target)
-    except OSError as error:
-        raise _unwritable(target, error) from None
+    write_fmu(files, spec, identity, target)
     tell("packed")
     return target
+
+
+def core_sources() -> list[str]:
+    """Return the C files of the FMU, relative to ``fmu_src``, in the order of their names."""
+    folder = source_file("core/wheel.c").parents[1]
+    found = (path for room in ("core", "fmi2") for path in (folder / room).glob("*.[ch]"))
+    return sorted(path.relative_to(folder).as_posix() for path in found)
 
 
 def core_file(
@@ -135,23 +117,23 @@ def core_file(
     return "\n".join((*lines, "")).encode() + values.astype("<f8").tobytes()
 
 
-def _description(spec: SlaveSpec, guid: str, version: str) -> bytes:
+def _description(spec: SlaveSpec, identity: Identity, sources: Sequence[str]) -> bytes:
     """Return the model description without what `described` adds."""
     root = Xml.Element(
         "fmiModelDescription",
         {
             "fmiVersion": "2.0",
             "modelName": spec.model,
-            "guid": guid,
+            "guid": identity.guid,
             "description": spec.description,
             "author": "The tirelib developers",
-            "version": version,
+            "version": identity.version,
             "license": "MIT",
             "generationTool": f"tirelib {__version__}",
             "variableNamingConvention": "flat",
         },
     )
-    Xml.SubElement(
+    simulation = Xml.SubElement(
         root,
         "CoSimulation",
         {
@@ -164,6 +146,10 @@ def _description(spec: SlaveSpec, guid: str, version: str) -> bytes:
             "canSerializeFMUstate": "true",
         },
     )
+    listed = Xml.SubElement(simulation, "SourceFiles")
+    for name in sources:
+        if name.endswith(".c"):
+            Xml.SubElement(listed, "File", {"name": name})
     Xml.SubElement(
         root,
         "DefaultExperiment",

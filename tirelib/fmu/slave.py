@@ -70,7 +70,7 @@ class GuardedSlave:
     """Reals live in one list by value reference, so that a frame is one slice of it.
 
     The folder of resources holds ``settings.json`` with ``guid``, ``version``, ``description`` and
-    ``step_size`` [s], written by `tirelib.fmu.build.export`, and whatever the slave needs.
+    ``step_size`` [s], written by `tirelib.fmu.export.export`, and whatever the slave needs.
     """
 
     fmi: ClassVar[Any]

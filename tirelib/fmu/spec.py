@@ -1,4 +1,4 @@
-"""Description of a slave from which `tirelib.fmu.build.export` makes an FMU."""
+"""Description of a slave from which `tirelib.fmu.export.export` makes an FMU."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

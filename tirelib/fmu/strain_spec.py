@@ -3,15 +3,14 @@
 import math
 import tomllib
 from collections.abc import Mapping
-from pathlib import Path
+from dataclasses import replace
 from typing import Any
 
 from tirelib.errors import ParameterError
 from tirelib.estimators.calibration import Calibration
-from tirelib.estimators.calibration_file import read_calibration
 from tirelib.flags import INVALIDATING, TurnFlag
-from tirelib.fmu.build import source_file
 from tirelib.fmu.handbook import html_table, page
+from tirelib.fmu.parts import source_file
 from tirelib.fmu.reference import FOLDER
 from tirelib.fmu.spec import SlaveSpec
 from tirelib.fmu.strain_reference import strain_reference
@@ -20,6 +19,8 @@ from tirelib.fmu.wheel import check_missing
 from tirelib.stream.estimator import RATES
 
 MODEL = "StrainTire"
+CALIBRATION = "calibration.toml"
+"""Name of the calibration among the resources."""
 DESCRIPTION = "Load, slip angle, slip ratio and lateral force from innerliner strain"
 MOST_SAMPLES = 256
 """Largest frame: a turn must be longer than a frame, or its estimate would be overwritten."""
@@ -32,24 +33,28 @@ _SHOWN = {
 
 
 def strain_tire(
-    calibration: str | Path,
+    loaded: Calibration,
+    text: str,
     *,
     samples_per_step: int,
     sample_rate: float,
     buffered: bool,
     missing: float = math.nan,
-    native: bool = False,
+    python: bool = False,
+    sealed: bool = False,
 ) -> SlaveSpec:
-    """Return what `tirelib.fmu.build.export` needs; see `tirelib.fmu.build.build_fmu`.
+    """Return what the FMU of a calibration consists of; see `tirelib.fmu.build.build_fmu`.
 
-    `native` says that the FMU needs no Python: its page speaks of the native core then.
+    Parameters
+    ----------
+    loaded : Calibration
+    text : str
+        The calibration's file.
 
     Raises
     ------
     ParameterError
         If a number is out of range.
-    FormatError
-        If the calibration cannot be read.
     """
     if not 1 <= samples_per_step <= MOST_SAMPLES:
         raise ParameterError(
@@ -63,20 +68,23 @@ def strain_tire(
             "the gages"
         )
     check_missing(missing)
-    loaded = read_calibration(calibration)
-    text = Path(calibration).read_text(encoding="utf-8")
     table = [
         *parameters(sample_rate, RATES, missing),
         *inputs(loaded.lateral, samples_per_step, buffered=buffered, road=loaded.chains[-1].road),
         *outputs(loaded.lateral),
     ]
-    reference = strain_reference(loaded, sample_rate, samples_per_step, buffered=buffered)
+    shown = replace(loaded, reference=None) if sealed else loaded
+    reference = strain_reference(shown, sample_rate, samples_per_step, buffered=buffered)
     document = tomllib.loads(text)
+    if sealed:
+        document.pop("data", None)
     settings: dict[str, int | float | str | bool] = {
         "samples_per_step": samples_per_step,
         "sample_rate": sample_rate,
         "buffered": buffered,
         "missing": str(missing),
+        "python": python,
+        "sealed": sealed,
     }
     return SlaveSpec(
         model=MODEL,
@@ -86,10 +94,10 @@ def strain_tire(
         step_size=samples_per_step / sample_rate,
         settings=settings,
         resources={
-            "calibration.toml": text.encode(),
+            **({} if sealed else {CALIBRATION: text.encode()}),
             **{f"{FOLDER}/{name}": data for name, data in reference.files(MODEL).items()},
         },
-        documentation={"index.html": _page(loaded, document, table, settings, native).encode()},
+        documentation={"index.html": _page(loaded, document, table, settings).encode()},
         icon=source_file("strain_tire.png").read_bytes(),
         start_depends_on=(MISSING,),
     )
@@ -100,9 +108,8 @@ def _page(
     document: Mapping[str, Any],
     table: list[Variable],
     settings: Mapping[str, Any],
-    native: bool,
 ) -> str:
-    samples, rate = settings["samples_per_step"], settings["sample_rate"]
+    samples, rate, python = (settings[k] for k in ("samples_per_step", "sample_rate", "python"))
     lead = (
         "Estimates of one wheel, after every turn, from the strain of gages on the innerliner: "
         "vertical load, slip angle, slip ratio and lateral force, each with its standard deviation."
@@ -119,11 +126,11 @@ def _page(
         if calibration.cut_off is None
         else f"{calibration.cut_off:g} Hz",
         "axis systems": "iso (default), sae, adapted_sae (parameter axes)",
-        "needs": "nothing else; Linux (x86-64, AArch64), Windows (x86-64), macOS 11"
-        if native
-        else "CPython 3.11 or newer with numpy and scipy; linux64 or win64",
+        "needs": "CPython 3.11 or newer with numpy and scipy; linux64 or win64"
+        if python
+        else "nothing else; Linux (x86-64, AArch64), Windows (x86-64), macOS 11",
         "version": "{version}",
-        "licences": f"documentation/licenses: MIT, tirelib{'' if native else ' and pythonfmu'}",
+        "licences": f"documentation/licenses: MIT, tirelib{' and pythonfmu' if python else ''}",
     }
     drawing = source_file("conventions.svg").read_text(encoding="utf-8")
     sections = {
@@ -132,7 +139,7 @@ def _page(
         "Accuracy": _accuracy(document),
         "Calibrated range": _ranges(calibration),
         "Flags": _flags(),
-        "Limits": _LIMITS if native else _LIMITS.replace("</ul>", _PATHS),
+        "Limits": _LIMITS.replace("</ul>", _PATHS) if python else _LIMITS,
         "Check": _CHECK,
     }
     return page(MODEL, lead, facts, table, sections)
@@ -158,9 +165,10 @@ def _accuracy(document: Mapping[str, Any]) -> str:
     if not rows:
         return "<p>The calibration holds no statistics.</p>"
     head = ("quantity", "cross-validated error (rms)", "R2", "runs", "conditions")
+    made = f", made on: {_plain(data)}" if data else ""
     return (
-        f"{html_table(head, rows)}\n<p>These are the errors of the calibration, made on: "
-        f"{_plain(data)}. In use every estimate carries its own standard deviation. They hold for "
+        f"{html_table(head, rows)}\n<p>These are the errors of the calibration{made}. In "
+        "use every estimate carries its own standard deviation. They hold for "
         "steady parts of a manoeuvre, because an estimate covers one turn of the wheel.</p>"
     )
 

@@ -22,7 +22,8 @@ from tirelib.errors import TirelibError
 FOLDER = "tirebench"
 LIST = "trusted_fmus"
 _PARTS = ("resources/calibration.toml", "resources/settings.json")
-_LARGEST_PART = 2**20
+_LARGEST_PART = 2**25
+"""Bytes of a file that is read; a calibration of some hundred runs has two million."""
 
 
 def trust_list() -> Path:
@@ -107,6 +108,7 @@ def _rebuilt(archive: FmuArchive) -> bytes | None:
                     return None
             calibration, settings = (file.read(name) for name in _PARTS)
         said = dict(json.loads(settings))
+        missing = float(said.get("missing", "nan"))
     except Exception:  # whatever a foreign archive provokes: then it is not one of ours
         return None
     from tirelib.fmu.build import build_fmu
@@ -115,13 +117,15 @@ def _rebuilt(archive: FmuArchive) -> bytes | None:
     options: dict[str, Any] = {
         name: value
         for name, value in said.items()
-        if name in known and isinstance(value, bool | int | float)
+        if name in known - {"missing"} and isinstance(value, bool | int | float)
     }
     with tempfile.TemporaryDirectory(prefix=prefix()) as name:
         folder = Path(name)
         (folder / "calibration.toml").write_bytes(calibration)
         try:
-            built = build_fmu(folder / "calibration.toml", folder / "x.fmu", **options)
+            built = build_fmu(
+                folder / "calibration.toml", folder / "x.fmu", missing=missing, **options
+            )
             return read_fmu(built).content
         except (TirelibError, FmuError, OSError, TypeError, ValueError):
             return None

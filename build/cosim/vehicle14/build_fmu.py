@@ -13,9 +13,10 @@ import numpy as np
 from cosim.vehicle14 import port
 from cosim.vehicle14.files import TIRE_FILE, usual_tires
 from tirelib.arrays import FloatArray
-from tirelib.fmu.build import export, source_file
 from tirelib.fmu.bundle import content_hash
+from tirelib.fmu.export import export
 from tirelib.fmu.handbook import page
+from tirelib.fmu.parts import source_file
 from tirelib.fmu.reference import FOLDER, Reference
 from tirelib.fmu.spec import SlaveSpec
 from tirelib.fmu.variables import Variable
@@ -43,7 +44,7 @@ change but that of the body; roll centres lie on the road.</li>
 
 
 def vehicle_spec() -> SlaveSpec:
-    """Return what `tirelib.fmu.build.export` needs."""
+    """Return what `tirelib.fmu.export.export` needs."""
     here = Path(__file__).parent
     parts = {name: (here / name).read_text(encoding="utf-8") for name in PARTS}
     library = f"vehicle14_{content_hash(parts)}"

@@ -9,8 +9,9 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.errors import ParameterError
-from tirelib.fmu.build import DEFAULT_RATE, export, source_file
+from tirelib.fmu.export import export
 from tirelib.fmu.handbook import html_table, page
+from tirelib.fmu.parts import DEFAULT_RATE, source_file
 from tirelib.fmu.reference import FOLDER, Reference
 from tirelib.fmu.spec import SlaveSpec
 from tirelib.fmu.virtual.coordinates import FRICTION
@@ -72,7 +73,7 @@ def friction_surface() -> Path:
 
 
 def virtual_tire(surface: str | Path, samples_per_step: int, sample_rate: float) -> SlaveSpec:
-    """Return what `tirelib.fmu.build.export` needs; see `build_virtual`."""
+    """Return what `tirelib.fmu.export.export` needs; see `build_virtual`."""
     if not 1 <= samples_per_step <= MOST_SAMPLES:
         raise ParameterError(
             f"samples per step = {samples_per_step}; allowed are 1 .. {MOST_SAMPLES}; take a "
