@@ -1,14 +1,13 @@
 """The native core, compiled for the tests and called through ctypes."""
 
 import ctypes as c
-import importlib.util
 import shutil
 import subprocess
-import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import native_fmu
 import numpy as np
 import pytest
 
@@ -18,29 +17,7 @@ from tirelib.signal import LowPass, Turn
 from tirelib.signal.turns import PHI
 
 SOURCE = Path(__file__).parents[2] / "fmu_src" / "core"
-
-
-def _maker() -> Any:
-    """Return the script that makes the binaries."""
-    file = SOURCE.parents[1] / "build" / "native_fmu.py"
-    spec = importlib.util.spec_from_file_location("native_fmu", file)
-    assert spec is not None
-    assert spec.loader is not None
-    module = sys.modules.setdefault(spec.name, importlib.util.module_from_spec(spec))
-    spec.loader.exec_module(module)
-    return module
-
-
-MAKER = _maker()
-FLAGS = (
-    *MAKER.C99,
-    *MAKER.STRICT,
-    "-Wconversion",
-    "-Wno-sign-conversion",
-    "-O2",
-    "-shared",
-    "-fPIC",
-)
+FLAGS = (*native_fmu.C99, *native_fmu.STRICT, "-Wconversion", "-Wno-sign-conversion")
 GAGES = 16
 REAL = c.c_double
 ROW = REAL * GAGES
@@ -92,7 +69,18 @@ def compiled(folder: Path, *flags: str) -> c.CDLL:
         pytest.skip("no C compiler on this machine")
     library = folder / "core.so"
     sources = sorted(map(str, SOURCE.glob("*.c")))
-    command = [compiler, *FLAGS, *flags, *sources, "-lm", "-o", str(library)]
+    command = [
+        compiler,
+        *FLAGS,
+        "-O2",
+        "-shared",
+        "-fPIC",
+        *flags,
+        *sources,
+        "-lm",
+        "-o",
+        str(library),
+    ]
     subprocess.run(command, check=True)
     core = c.CDLL(str(library))
     core.cutter_size.restype = c.c_size_t

@@ -8,6 +8,7 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
+import native_fmu
 import numpy as np
 import pytest
 from fmpy import read_model_description
@@ -16,7 +17,6 @@ from fmpy.fmi2 import FMU2Slave, fmi2CoSimulation, fmi2ModelExchange
 from fmpy.validation import validate_fmu
 
 from tests.fmu import live
-from tests.native.core import MAKER
 from tirelib.fmu.build import build_fmu
 from tirelib.fmu.native import BINARIES, core_file
 from tirelib.fmu.run import keeping
@@ -262,7 +262,7 @@ def test_another_calibration_of_the_tire_can_be_given(folder: Path, tmp_path: Pa
 
 @pytest.mark.parametrize("place", [*(f"binaries/{name}" for name in BINARIES), GATE])
 def test_the_binaries_were_made_from_the_sources(place: str) -> None:
-    said = f"source sha256 {MAKER.BINARIES[place].source_hash()}".encode()
+    said = f"source sha256 {native_fmu.BINARIES[place].source_hash()}".encode()
     assert said in (ROOT / "fmu_src" / place).read_bytes(), "run python build/native_fmu.py"
 
 
@@ -270,7 +270,7 @@ def test_the_binaries_were_made_from_the_sources(place: str) -> None:
 def test_the_compiler_makes_the_same_binary_again(place: str) -> None:
     if importlib.util.find_spec("ziglang") is None:
         pytest.skip("ziglang is not installed: only who makes the binaries needs it")
-    assert MAKER.BINARIES[place].compiled() == (ROOT / "fmu_src" / place).read_bytes()
+    assert native_fmu.BINARIES[place].compiled() == (ROOT / "fmu_src" / place).read_bytes()
 
 
 def test_a_process_without_python_needs_nothing(folder: Path, tmp_path: Path) -> None:
