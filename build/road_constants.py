@@ -25,6 +25,7 @@ from tirelib.estimators.calibration_file import read_calibration
 from tirelib.estimators.edge import EDGE_UNIT
 from tirelib.estimators.likeness import DRIFT
 from tirelib.estimators.regressors import ODD, compute_regressors
+from tirelib.estimators.unknowns import UNDER_GROOVES
 from tirelib.observations import Observations, mean_by, observe
 from tirelib.rig.plans import Plan
 from tirelib.rig.tire import NEW_DEPTH, Condition
@@ -117,8 +118,8 @@ def measure(name: str, seed: int, out: Path, jobs: int) -> list[str]:
     contact = mean(regressors["contact_angle"])
     radius = mean(regressors["speed"] / regressors["omega"])
     worn = NEW_DEPTH - mean(seen.features.tread_depth)
-    under = own.tread_thickness - NEW_DEPTH
-    harder = np.log(own.tread_thickness / (own.tread_thickness - worn))
+    thick = UNDER_GROOVES + NEW_DEPTH
+    harder = np.log(thick / (thick - worn))
     x = np.log(load / 4000.0)
     curve = np.stack((np.ones_like(x), x, x**2), axis=1)
     straight = np.abs(angle) < np.deg2rad(0.5)
@@ -134,7 +135,7 @@ def measure(name: str, seed: int, out: Path, jobs: int) -> list[str]:
     bent, bent_std = fitted(-radius, worn / contact, straight)
     corner, corner_std = fitted(np.log(np.abs(force / np.tan(angle))), harder, ~straight)
     return [
-        f"{own.name}: under the grooves {1e3 * under:.1f} mm; "
+        f"{own.name}: under the grooves {1e3 * (own.tread_thickness - NEW_DEPTH):.1f} mm; "
         f"EDGE {1e3 * edge:.1f} +- {1e3 * edge_std:.1f} mm; BENT {bent:.3f} +- {bent_std:.3f} rad; "
         f"CORNERING {corner:.3f} +- {corner_std:.3f}"
     ]

@@ -3,6 +3,7 @@
 The rig shares no model with the library, so nothing here was made by what is being tested.
 """
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,9 +12,10 @@ import pandas as pd
 import pytest
 
 from tirelib.campaign import read_campaign
+from tirelib.cli.limits import outside
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.result import estimate_document
-from tirelib.estimators.train import Trained, train
+from tirelib.estimators.train import Trained, take, train
 from tirelib.flags import TurnFlag
 from tirelib.observations import Observations, observe
 from tirelib.rig.campaign import run_plan
@@ -73,6 +75,26 @@ def test_conditions_between_the_calibrated_ones_on_another_day(
     assert summary["Fy"]["rmse"] < 0.015 * 4000.0
     assert summary["kappa"]["rmse"] < 1e-3
     assert all(summary[quantity]["n"] == 9 for quantity in summary)
+
+
+def test_a_load_beyond_the_calibrated_ones_is_said_to_be_beyond(
+    days: dict[str, Path], second: tuple[Observations, Estimates], trained: Trained
+) -> None:
+    """Calibrated without the highest load, and estimated at it: every turn is out of range."""
+    observed = observe([read_campaign(days["first"])])
+    highest = observed.nominal["load"] > 7000.0
+    fitted = train(take(observed, ~highest & observed.usable)).calibration
+    left_out = take(observed, highest & observed.usable)
+    found = fitted.estimate(left_out.features)
+    assert ((found.flags & int(TurnFlag.OUT_OF_RANGE)) != 0).all()
+    assert not found.valid["Fz"].any()
+    assert not found.valid["Fy"].any()
+    document = estimate_document(left_out, found, fitted)
+    said = outside(document["turns"], fitted)
+    assert said.startswith(f"{len(left_out)} of {len(left_out)} turns lie beyond")
+    assert re.search(r"Fz from 1,[45]\d\d to (5,9|6,0)\d\d N", said)
+    own = estimate_document(*second, trained.calibration)
+    assert outside(own["turns"], trained.calibration) == ""
 
 
 def blind(observed: Observations, trained: Trained) -> Estimates:

@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tirelib.estimators.calibration import Calibration
+from tirelib.estimators.chain import QUANTITIES
+from tirelib.estimators.edge import EDGE_UNIT
 
 REPORTED_STD_RATIO = 1.2
 """Ratio of standard deviations from which an unknown condition is reported."""
@@ -50,6 +52,39 @@ def _cost(row: Mapping[str, Any]) -> str:
 
 def _words(name: str) -> str:
     return name.replace("_", " ")
+
+
+def outside(turns: Sequence[Mapping[str, Any]], calibration: Calibration) -> str:
+    """Return a sentence on the turns beyond what was calibrated; empty if there are none.
+
+    Parameters
+    ----------
+    turns : sequence of mappings
+        ``turns`` of an estimate document.
+    calibration : Calibration
+    """
+    beyond = [turn for turn in turns if "out_of_range" in turn["flags"]]
+    if not beyond:
+        return ""
+    counts = {q: sum(f"{q}_out_of_range" in turn["flags"] for turn in beyond) for q in QUANTITIES}
+    affected = ", ".join(f"{q} of {count}" for q, count in counts.items() if count)
+    return (
+        f"{len(beyond)} of {len(turns)} turns lie beyond what was calibrated ({affected}): their "
+        "values are extrapolated and not valid. Calibrated are "
+        f"{', '.join(_calibrated(calibration, counts))}, and the combinations of these that were "
+        "measured; calibrate with runs like these, or leave these turns out"
+    )
+
+
+def _calibrated(calibration: Calibration, counts: Mapping[str, int]) -> list[str]:
+    """Return the calibrated ranges of the quantities that are out of range, in words."""
+    found = []
+    for quantity, (unit, factor) in EDGE_UNIT.items():
+        own = [r for r in calibration.chains[-1].guards[quantity] if r.name == quantity]
+        if counts[quantity] and own:
+            low, high = (f"{factor * end:,.4g}" for end in (own[0].low, own[0].high))
+            found.append(f"{quantity} from {low} to {high}{'' if unit == '1' else f' {unit}'}")
+    return found or ["the conditions of its runs"]
 
 
 def not_checked(calibration: Calibration) -> list[str]:

@@ -77,7 +77,7 @@ def tell(curve: SlidingCurve, seen: Seen, widest: float) -> Told:
     room = np.maximum(np.minimum(np.tan(widest), slippery) - begin, 0.0)
     room = np.where(np.isfinite(begin), room, 0.0)
     beyond = np.where(room > 0.0, begin, 0.0) + room * (np.arange(WHOLE) + 0.5) / WHOLE
-    across, _ = curve.lateral(used, curve.friction, load, along)  # on the calibrated road
+    across = curve.lateral_at(share[:, 2:], used, curve.friction, load, along)  # calibrated road
     slip = np.concatenate((slip, np.maximum(beyond, TINY), across), axis=1)
     t = np.concatenate((t, np.ones_like(beyond), share[:, 2:]), axis=1)
     weight = np.concatenate((weight, room / WHOLE + 0.0 * beyond, 0.0 * used), axis=1)

@@ -212,7 +212,7 @@ def _products(
     n, count = next(iter(values.values())).shape[0], len(variables)
     powers = np.ones((n, count, int(powers_of.max(initial=0)) + 1))
     if count:
-        x = np.stack([values[variable.name] for variable in variables], axis=1)
+        x = np.array([values[variable.name] for variable in variables]).T
         centre = np.array([variable.centre for variable in variables])
         scale = np.array([variable.scale for variable in variables])
         powers[:, :, 1:] = ((x - centre) / scale)[:, :, None]

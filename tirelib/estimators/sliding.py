@@ -171,7 +171,10 @@ class SlidingCurve:
             filled = np.maximum(1.0 - rest * (1.0 - at), TINY)
             a, b = (pull / at) ** 2, (across / filled) ** 2
             fall = 2.0 * (a / at + b * n * rest / filled)
+            before = t
             t = np.minimum(t + np.maximum(a + b - 1.0, 0.0) / np.maximum(fall, TINY), 1.0)
+            if (t == before).all():  # every further step would say the same
+                break
         return np.where(pull > 0.0, t, alone)
 
     def across(self, used: FloatArray, t: FloatArray, load: FloatArray) -> FloatArray:
@@ -192,9 +195,20 @@ class SlidingCurve:
         A utilisation above the friction has the slip of the begin of full sliding.
         """
         t = self.share(used, friction, load, along)
+        return self.lateral_at(t, used, friction, load, along), t
+
+    def lateral_at(
+        self,
+        t: FloatArray,
+        used: FloatArray,
+        friction: FloatArray | float,
+        load: FloatArray,
+        along: FloatArray | float,
+    ) -> FloatArray:
+        """Return s_y where the sliding share t of `share` is known."""
         within = self.across(used, t, load)
         lost = lost_slip(used, self.grip * np.asarray(friction), np.abs(along))
-        return np.where(np.isfinite(lost), np.maximum(within, lost), within), t
+        return np.where(np.isfinite(lost), np.maximum(within, lost), within)
 
     def forward(
         self,

@@ -19,10 +19,11 @@ grows as :math:`C \propto k^{0.22}`.
 
 **Friction** acts through sliding: `tirelib.estimators.sliding`.
 
-`EDGE`, `BENT` and `CORNERING` were measured on two tires of the numerical rig by
-``python build/road_constants.py --measure reference`` (and ``soft``), `FORCE` was chosen on runs of
-one; `UNDER_GROOVES`, `SOFTENING` and `TEMPERATURE` are assumed. ``python build/road_coverage.py``
-holds them against any tire; `docs/estimators.md` shows half and double of each.
+`EDGE`, `BENT` and `CORNERING` were measured on tires of the numerical rig by
+``python build/road_constants.py --measure reference`` (``soft``, ``stiff``), `FORCE` was chosen on
+runs of one; `UNDER_GROOVES`, `SOFTENING` and `TEMPERATURE` are assumed. ``python
+build/road_coverage.py`` holds them against any tire; `docs/estimators.md` shows half and double of
+each.
 """
 
 from collections.abc import Mapping
@@ -45,8 +46,10 @@ UNDER_GROOVES = 0.0035
 """Rubber between the grooves' bottom and the belt, [m]."""
 SOFTENING = 0.004
 """Relative loss of the tread's modulus per kelvin, [1/K]."""
-EDGE = 0.0117
-"""Contact length that a tread of e times the stiffness loses, both ends together, [m]."""
+EDGE = 0.0108
+"""Contact length that a tread of e times the stiffness loses, both ends together, [m]; with L taken
+over `UNDER_GROOVES`, whatever rubber the tire has there. Three tires of the rig have 0.0105 to
+0.0111, their own rubber 1.5 to 5 mm."""
 BENT = 0.115
 """Contact angle over which the belt is still bent, [rad]."""
 CORNERING = 0.22
@@ -54,8 +57,8 @@ CORNERING = 0.22
 FORCE = 0.08
 """Relative standard deviation of Fy per unit of L."""
 LAW_DOUBT = 0.15
-"""Relative standard deviation of a correction for a known tread: `EDGE`, `BENT` and `CORNERING` of
-three tires of the rig differ from those above by as much (root mean square)."""
+"""Relative standard deviation of a correction for a known tread: `EDGE` of three tires of the rig
+differs from that above by 0.02, `BENT` by 0.1 and `CORNERING` by 0.4 (root mean squares)."""
 TWO_SIGMA = 1.96
 PLAUSIBLE: Mapping[str, Pair] = {
     "friction": (0.05, 1.8),

@@ -13,7 +13,7 @@ from tirelib.estimators.calibration import LARGEST_ANGLE_STD
 from tirelib.estimators.fit_sliding import Runs, fit_sliding
 from tirelib.estimators.sliding import SlidingCurve, Told
 from tirelib.estimators.train import Trained
-from tirelib.estimators.unknowns import DEPTH, FRICTION, TWO_SIGMA, Road, spread
+from tirelib.estimators.unknowns import DEPTH, EDGE, FRICTION, TWO_SIGMA, Road, spread
 from tirelib.flags import TurnFlag
 from tirelib.observations import Observations
 
@@ -242,6 +242,16 @@ def test_an_unknown_tread_holds_95_percent_of_those_that_may_be() -> None:
     lost = DEPTH[1] - np.random.default_rng(1).uniform(*DEPTH, 20_000)
     assert np.mean(lost <= TWO_SIGMA * std[0]) == pytest.approx(0.95, abs=0.01)
     assert spread(np.array([-1.0, 1.0])) == pytest.approx(1.0 / TWO_SIGMA)
+
+
+@pytest.mark.parametrize("own", [0.0105, 0.0107, 0.0111])
+def test_the_load_that_an_unknown_tread_hides_is_held_by_90_to_99_percent(own: float) -> None:
+    """`own` is `EDGE` of one tire of the rig, straight runs on treads of 8, 6 and 4 mm."""
+    road, none = Road(tread_temperature=(300.0, 300.0)), conditions(tread_temperature=300.0)
+    depth = np.linspace(*DEPTH, 2001)
+    harder, _ = road.hardened({**none, "tread_depth": depth})
+    held = np.mean(own * harder <= TWO_SIGMA * EDGE * road.hardened(none)[1][0])
+    assert 0.90 < held < 0.99
 
 
 def test_a_calibration_that_varied_the_tread_knows_more_of_it() -> None:
