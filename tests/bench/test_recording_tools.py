@@ -182,6 +182,46 @@ def test_a_recording_without_its_end_is_repaired(
     assert invoke("repair", broken, "--out", whole)[0] == 2
 
 
+def test_what_follows_a_damaged_chunk_is_repaired(tmp_path: Path) -> None:
+    """One chunk in the middle is damaged: its bytes are lost, and no others."""
+    broken, whole = tmp_path / "b.mcap", tmp_path / "whole.mcap"
+    recorder = Recorder(broken, RecordingHeader({}), Conditions.constant())
+    pieces = [bytes([number]) * 40 + bytes(range(256)) for number in range(9)]
+    for data in pieces:
+        recorder.read(Read(5, data))
+        recorder.flush()
+    recorder.close("closed")
+    with broken.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    middle = sorted(summary.chunk_indexes, key=lambda chunk: chunk.chunk_start_offset)[4]
+    content = bytearray(broken.read_bytes())
+    content[middle.chunk_start_offset + middle.chunk_length // 2] ^= 1
+    broken.write_bytes(content)
+    code, said = invoke("repair", broken, "--out", whole)
+    assert code == 0
+    assert "1 chunk is left out" in said
+    again = Recording(whole)
+    kept = [data for _, data in again.raw()]
+    assert len(kept) == 8
+    assert kept == [data for data in pieces if data in kept]
+    assert again.complete
+    again.close()
+
+
+def test_options_of_a_line_are_refused_where_a_recording_is_replayed(
+    recording: Path, tmp_path: Path
+) -> None:
+    """The recording holds how its lines were read; a map would be passed over in silence."""
+    (tmp_path / "map.toml").write_text('format = "tirebench-map/1"\n[seed]\n')
+    (tmp_path / "x.fmu").write_bytes(b"")
+    words = ("run", "--replay", recording, "--fmu", tmp_path / "x.fmu", "--no-page")
+    for option, value in (("--map", tmp_path / "map.toml"), ("--baud", "115200")):
+        code, said = invoke(*words, option, value)
+        assert code == 2
+        assert f"{option} cannot be used with --replay" in said
+
+
 def contents_of_raw(path: Path, topic: str) -> list[tuple[Any, bytes]]:
     with path.open("rb") as file:
         return [(m, m.data) for _, c, m in make_reader(file).iter_messages() if c.topic == topic]

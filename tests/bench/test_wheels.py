@@ -62,6 +62,7 @@ def test_a_line_without_a_frame_says_what_to_look_at() -> None:
     assert counters(wheels).endswith(
         "0 frames; no byte was received: check that the transmitter is on and that this is its port"
     )
+    assert counters(wheels, live=False) == "0 frames; the recording holds no valid frame"
     wheels.push(b"temperature 23.1\r\n" * 9)  # text: not even a bad frame
     assert "--baud" in counters(wheels)
     wheels, _ = played((0, 2), (5,))

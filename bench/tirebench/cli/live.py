@@ -95,13 +95,14 @@ class Screen:
             table.add_column(Text(heading), justify="left" if heading == "flags" else "right")
         for turn in self._turns:
             table.add_row(*_cells(turn), style=None if turn.valid else "dim")
-        return Group(table, Text(counters(self._source.wheels)))
+        return Group(table, Text(counters(self._source.wheels, live=self._source.live)))
 
 
-def counters(wheels: Wheels) -> str:
+def counters(wheels: Wheels, *, live: bool = True) -> str:
     """Return the line's counters as one line of text; zero counters are left out except the frames.
 
-    Where no frame came of a line or of a wheel that is known beforehand, it says so.
+    Where no frame came of a line or of a wheel that is known beforehand, it says so, and what to
+    look at where the line is `live`.
     """
     counts = line_document(*wheels.counts)
     parts = [f"{counts['frames']} frames"]
@@ -109,6 +110,8 @@ def counters(wheels: Wheels) -> str:
     saturated = {f"gage {i}": n for i, n in enumerate(counts["saturated_samples"], 1) if n}
     parts += [f"{n} saturated samples of {gage}" for gage, n in saturated.items()]
     hints = list(wheels.hints().values())
+    if hints and not live:
+        hints = ["the recording holds no valid frame"]
     if counts["frames"]:
         hints += [f"wheel {number}: no frame came" for number in wheels.missing]
     return "; ".join([", ".join(parts), *hints])

@@ -19,6 +19,7 @@ Examples:
 \b
 The new file has an index, so that readers which need one (Foxglove) can open it; the old file is
 not changed. From JSON the turns are recovered; replay the recording to get the summary too.
+A damaged chunk of a recording is left out and its frames are lost; what follows it is kept.
 Each part of a recording is repaired by itself.
 Exit code: 0 done, also where the file was complete; 2 nothing can be read.
 """

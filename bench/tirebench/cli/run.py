@@ -20,6 +20,7 @@ from tirebench.cli.run_inputs import (
     given_replayed,
     live_sources,
     port_of_file,
+    refuse_line_options,
     say_missing,
 )
 from tirebench.cli.stop import start_in_order
@@ -235,6 +236,8 @@ def run(
         raise click.UsageError(
             "--record cannot be used with --replay: the data are already recorded"
         )
+    if replay is not None:
+        refuse_line_options(context)
     keep_recordings(json_file, record, replay)
     priority = realtime(asked) if replay is None else ""
     paced = replay is None or pace is not None
@@ -426,7 +429,7 @@ def _summary(
         console.print(f"unplugged: {outcome.message}", soft_wrap=True, markup=False)
     console.print(
         f"ended: {outcome.reason}; {outcome.count} turns, {outcome.valid} valid (ISO 8855 axes); "
-        f"{counters(source.wheels)}",
+        f"{counters(source.wheels, live=source.live)}",
         soft_wrap=True,
     )
     if link is not None and link.recording.complete is False:

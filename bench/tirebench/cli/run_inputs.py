@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import click
+from click.core import ParameterSource
 from rich.console import Console
 
 from tirebench.cli.options import devices_of_text, wheel_of
@@ -30,6 +32,16 @@ _WITHOUT = {
     "pressure": "standard deviations grow by the possible effect of the pressure",
     "camber": "standard deviations of Fy and alpha grow by the possible effect of camber, and "
     "turns where camber dominates carry the flag camber_unknown",
+}
+
+
+_LINE_OPTIONS = {
+    "baud": "--baud",
+    "bitrate": "--bitrate",
+    "data_bitrate": "--data-bitrate",
+    "bus_options": "--bus-option",
+    "rate": "--rate",
+    "map_file": "--map",
 }
 
 
@@ -206,6 +218,22 @@ def recorded_sources(
             )
         sources.append(SourcePlan(port, protocol, devices or own, wheel, text))
     return tuple(sources)
+
+
+def refuse_line_options(context: click.Context) -> None:
+    """Refuse options that a replay does not use, because the recording holds them.
+
+    Raises
+    ------
+    click.UsageError
+        With the first that was given.
+    """
+    for name, option in _LINE_OPTIONS.items():
+        if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+            raise click.UsageError(
+                f"{option} cannot be used with --replay: the recording holds the settings of its "
+                "lines"
+            )
 
 
 def given_replayed(

@@ -25,8 +25,10 @@ LARGEST_RATIO = 100
 memory and time. The first `LARGEST_RECORD` bytes are free."""
 
 
-def records(file: BinaryIO) -> Iterator[McapRecord]:
+def records(file: BinaryIO, left_out: list[str] | None = None) -> Iterator[McapRecord]:
     """Yield the records of a file; those of a chunk in the chunk's place.
+
+    A chunk that cannot be unpacked ends them, or is left out where `left_out` takes the reason.
 
     Raises
     ------
@@ -40,7 +42,13 @@ def records(file: BinaryIO) -> Iterator[McapRecord]:
         if not isinstance(record, Chunk):
             yield record
             continue
-        content = _unpacked(record)
+        try:
+            content = _unpacked(record)
+        except Exception as error:  # whatever a damaged chunk provokes in its decompressor
+            if left_out is None:
+                raise
+            left_out.append(str(error) or type(error).__name__)
+            continue
         taken, unpacked = taken + len(record.data), unpacked + len(content)
         if unpacked > LARGEST_RECORD + LARGEST_RATIO * taken:
             raise RecordingError(

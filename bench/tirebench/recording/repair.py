@@ -1,4 +1,4 @@
-"""A recording without its end, or one that breaks off, as a whole file with an index."""
+"""A recording without its end, or with damaged chunks, as a whole file with an index."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ class Repaired:
     messages : int
     topics : tuple of str
     damage : str
-        Where the file breaks off; empty if it is whole.
+        Where the file breaks off, and which chunks are left out; empty if it is whole.
     """
 
     messages: int
@@ -49,7 +49,8 @@ def _repaired(path: Path, new: Path) -> Repaired:
         with path.open("rb") as file, new.open("xb") as target:
             writer = Writer(target, CHUNK, CompressionType.ZSTD)
             writer.start("", "tirebench")
-            found = _copied(records(file), writer)
+            left_out: list[str] = []
+            found = _copied(records(file, left_out), writer, left_out)
             finish: Callable[[], None] = writer.finish  # mcap has no annotation here
             finish()
     except OSError as error:
@@ -66,8 +67,8 @@ def _repaired(path: Path, new: Path) -> Repaired:
     return found
 
 
-def _copied(found: Iterator[McapRecord], writer: Writer) -> Repaired:
-    """Copy records up to the end, or up to the first that is broken."""
+def _copied(found: Iterator[McapRecord], writer: Writer, left_out: list[str]) -> Repaired:
+    """Copy records up to the end, or up to the first that is broken outside a chunk left out."""
     schemas: dict[int, int] = {0: 0}
     channels: dict[int, int] = {}
     topics: dict[str, None] = {}
@@ -86,6 +87,8 @@ def _copied(found: Iterator[McapRecord], writer: Writer) -> Repaired:
                     record.metadata,
                 )
             elif isinstance(record, Message):
+                if left_out and record.channel_id not in channels:
+                    continue  # its channel stood in a chunk that is left out
                 count += 1
                 writer.add_message(
                     channels[record.channel_id],
@@ -100,4 +103,9 @@ def _copied(found: Iterator[McapRecord], writer: Writer) -> Repaired:
         raise
     except Exception as error:  # whatever a damaged file provokes in mcap
         damage = str(error) or type(error).__name__
+    if left_out:
+        chunks = "chunk is" if len(left_out) == 1 else "chunks are"
+        damage = "; ".join(
+            [f"{len(left_out)} {chunks} left out: {left_out[0]}", *([damage] if damage else [])]
+        )
     return Repaired(count, tuple(topics), damage)
