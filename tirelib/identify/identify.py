@@ -205,14 +205,14 @@ def estimated(
     fit = fit_waveforms(
         runs.data(),
         values,
-        Prior(np.array([_prior_std(start, coordinate) for coordinate in free])),
+        Prior(np.array([prior_std(start, coordinate) for coordinate in free])),
         free=free,
         discrepancy=discrepancy,
         progress=progress,
     )
     estimates = [_estimate(fit, k, start) for k in range(len(fit.free))]
     if any("not_identifiable" in e.flags for e in estimates):
-        ways = next_run(fit, _structure(start, fit), discrepancy)
+        ways = next_run(fit, structure_std(start, fit.free), discrepancy)
         estimates = [
             replace(e, helps=_help(e, fit, k, ways)) if "not_identifiable" in e.flags else e
             for k, e in enumerate(estimates)
@@ -281,7 +281,7 @@ def start_file(
     return TireFile(geometry.name or header.name, numbers)
 
 
-def _prior_std(start: TireFile, coordinate: Coordinate) -> float:
+def prior_std(start: TireFile, coordinate: Coordinate) -> float:
     """Return the prior's standard deviation of a coordinate, from the number's kind."""
     number = start.numbers[coordinate.name]
     by_kind = {"measured": 0.1, "fitted": 0.15, "literature": 0.5, "assumed": 0.7}[number.kind]
@@ -290,13 +290,13 @@ def _prior_std(start: TireFile, coordinate: Coordinate) -> float:
     return number.std / abs(number.value) if np.isfinite(number.std) else by_kind
 
 
-def _structure(start: TireFile, fit: WaveformFit) -> FloatArray:
+def structure_std(start: TireFile, free: tuple[Coordinate, ...]) -> FloatArray:
     """Return the structural standard deviation of every coordinate."""
-    known = WITHOUT_SHEAR if len(fit.free) == len(WITHOUT_SHEAR) else STRUCTURE_STD
+    known = WITHOUT_SHEAR if len(free) == len(WITHOUT_SHEAR) else STRUCTURE_STD
     return np.array(
         [
             known[c.name] * (abs(start.numbers[c.name].value) / c.unit if c.unit else 1.0)
-            for c in fit.free
+            for c in free
         ]
     )
 
@@ -306,7 +306,7 @@ def _estimate(fit: WaveformFit, k: int, start: TireFile) -> Estimate:
     name = coordinate.name
     value = float(fit.values[name])
     fit_std = coordinate.spread(value, float(np.sqrt(fit.covariance[k, k])))
-    structure = coordinate.spread(value, float(_structure(start, fit)[k]))
+    structure = coordinate.spread(value, float(structure_std(start, fit.free)[k]))
     low, high = (float(coordinate.moved(value, step)) for step in fit.interval[k])
     low, high = min(low, high), max(low, high)
     low = value - float(np.hypot(value - low, 1.96 * structure))
