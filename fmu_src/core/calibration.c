@@ -38,18 +38,19 @@ static void numbers(Reader *r, double *to, size_t n) {
     for (size_t i = 0; i < n; i++) to[i] = x ? x[i] : NAN;
 }
 
-/* Check that every `width`-th number is a value's, from `low` on. */
-static void check_values(Reader *r, const double *x, int n, int width, int low) {
+/* Rows that begin with the number of a value, from `low` on. */
+static const double *rows(Reader *r, int n, int width, int low) {
+    const double *x = taken(r, (size_t)(n * width));
     for (int i = 0; x && i < n; i++)
         if (!(x[i * width] >= low && x[i * width] < VALUES)) r->bad = 1;
+    return x;
 }
 
 static Form form(Reader *r) {
     Form f;
     f.variables = whole(r, 0, VARIABLES);
     f.terms = whole(r, 0, TERMS);
-    f.variable = taken(r, 3 * (size_t)f.variables);
-    check_values(r, f.variable, f.variables, 3, 0);
+    f.variable = rows(r, f.variables, 3, 0);
     size_t n = (size_t)(f.terms * f.variables);
     f.exponent = taken(r, n);
     for (size_t i = 0; f.exponent && i < n; i++)
@@ -142,8 +143,7 @@ static Likeness likeness(Reader *r) {
     l.names = whole(r, 1, NAMES);
     l.angle_slope = whole(r, -1, l.names - 1);
     l.limit = number(r);
-    l.name = taken(r, SHIFTS * (size_t)l.names);
-    check_values(r, l.name, l.names, SHIFTS, 0);
+    l.name = rows(r, l.names, SHIFTS, 0);
     l.coefficient = taken(r, (size_t)(l.form.terms * l.names));
     l.covariance = taken(r, (size_t)(l.names * l.names));
     return l;
@@ -168,8 +168,7 @@ static Chain chain(Reader *r, int gages) {
     numbers(r, c.camber, 2);
     for (int q = 0; q < QUANTITIES; q++) {
         c.guard[q].ranges = whole(r, 0, VALUES + 1);
-        c.guard[q].range = taken(r, RANGE_WIDTH * (size_t)c.guard[q].ranges);
-        check_values(r, c.guard[q].range, c.guard[q].ranges, RANGE_WIDTH, -1);
+        c.guard[q].range = rows(r, c.guard[q].ranges, RANGE_WIDTH, -1);
     }
     c.laws = laws(r);
     c.force_laws = laws(r);

@@ -3,7 +3,7 @@
 static const double PULL_SLIP = 0.0066;
 
 double unseen_by_load(double here, double before) {
-    return 0.5 / sqrt(3.0) * fabs(here * here - before * before);
+    return 0.5 / sqrt(3.0) * fabs(here * here - (isnan(before) ? 0.0 : before * before));
 }
 
 double unseen_by_traction(const Rolled *here, const Rolled *before, double half) {

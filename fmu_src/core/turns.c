@@ -61,7 +61,8 @@ static double sigma_of(const Cutter *c, const AngleLaw *law) {
 
 /* Reference: _pulse */
 static double pulse_of(const Contact *contact, const AngleLaw *law) {
-    return 0.5 * (law_at(law, contact->fall) - law_at(law, contact->rise));
+    double rise = law_at(law, contact->rise), fall = law_at(law, contact->fall);
+    return fall > rise ? 0.5 * (fall - rise) : NAN;
 }
 
 /* How many wheel angles of the grid are looked at with a pulse. */
@@ -304,7 +305,8 @@ static int full_turn(Cutter *c, const Contact *contact, const Contact *before, T
     turn->omega = c->law.step * c->rate;
     turn->angle_std = c->law.std;
     turn->pulse = pulse_of(contact, &c->law);
-    if (!isnan(sigma) && !window_of(c, turn, sigma)) return 0;
+    if (isnan(turn->pulse)) turn->flags |= ACCELERATING; /* so much that its angle is unknown */
+    if (!isnan(sigma) && !isnan(turn->pulse) && !window_of(c, turn, sigma)) return 0;
     take_strain(c, start, stop, turn);
     take_slip(c, before, turn);
     take_conditions(c, contact, start, stop, turn);

@@ -570,13 +570,15 @@ FMI2_EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
     return fmi2OK;
 }
 
+static const char NO_STATE[] =
+    "FormatError: the bytes are not a saved state of this FMU; save the state again";
+
 FMI2_EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
     Slave *s = c;
     State *kept = state;
     int with_wheel = 0;
     if (!s || !kept) return fmi2Error;
-    if (kept->n < own_size(s)) return failed(s, "FormatError: the bytes are not a saved state of this FMU; save the state "
-                         "again");
+    if (kept->n < own_size(s)) return failed(s, NO_STATE);
     exchange(s, kept->bytes, &with_wheel, 1);
     for (int i = 0; i < PARAMETERS; i++) s->text[i][TEXT - 1] = 0;
     s->rolling[sizeof s->rolling - 1] = s->status[LINE - 1] = s->cause[LINE - 1] = 0;
@@ -590,8 +592,7 @@ FMI2_EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
     if (!started(s)) return fmi2Error;
     if (!state_restore(s->wheel, kept->bytes + own_size(s), kept->n - own_size(s))) {
         s->wheel = NULL;
-        return failed(s, "FormatError: the bytes are not a saved state of this FMU; save the state "
-                         "again");
+        return failed(s, NO_STATE);
     }
     s->phase = phase == TERMINATED ? TERMINATED : STEPPING;
     return fmi2OK;

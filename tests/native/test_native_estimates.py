@@ -206,6 +206,20 @@ def test_calibrations_that_lack_a_link_or_know_more(
     assert_same(core, varied(known, name), disturbed(features, 250, 5))
 
 
+def test_a_slippery_road_moves_the_slip_angle_outwards_on_both_sides(
+    core: ctypes.CDLL, observed: tuple[Calibration, Features]
+) -> None:
+    known, features = observed
+    x = rows_of(features, np.arange(len(features)))
+    x["friction"][:] = 0.7
+    icy = Features(lateral=features.lateral, **x)
+    plain = without(known, sliding=None).estimate(icy).value["alpha"]
+    moved = known.estimate(icy).value["alpha"] - plain
+    for side in (-1.0, 1.0):
+        assert (moved[side * plain > 0.02] * side > 1e-3).sum() > 5
+    assert_same(core, known, icy)
+
+
 def test_from_samples_to_estimates(core: ctypes.CDLL) -> None:
     known, native = live.calibration(), NativeCalibration(core, live.calibration())
     strain, trigger = live.strain_of(4e3, 0.1, turns=6.4)

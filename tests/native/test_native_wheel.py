@@ -27,6 +27,10 @@ def spoilt(kind: str) -> np.ndarray:
         strain[1, begin:] = strain[1, begin]
     elif kind == "lifted gage":
         strain[4] = 2.7e-3 + 0.1 * (strain[4] - 2.7e-3)
+    elif kind == "gage cut off":
+        strain[1, begin:] = np.nan
+    elif kind == "clipped gage":
+        strain[3] = np.minimum(strain[3], np.quantile(strain[3], 0.8))
     elif kind == "silent gage":
         strain[4] = 2.7e-3
     elif kind == "jump":
@@ -40,7 +44,7 @@ def spoilt(kind: str) -> np.ndarray:
 
 KINDS = (
     *("well", "gap", "stop", "frozen gage", "lifted gage", "silent gage", "jump", "another tire"),
-    "lost centre",
+    *("lost centre", "gage cut off", "clipped gage"),
 )
 
 

@@ -41,9 +41,10 @@ def unseen_by_load(here: float, before: float) -> float:
     Parameters
     ----------
     here, before : float, [rad]
-        Half the angle of this contact and of the one before.
+        Half the angle of this contact and of the one before; where that is unknown, all of this
+        one's is unseen.
     """
-    return float(RADIUS_SHARE * abs(here**2 - before**2))
+    return float(RADIUS_SHARE * abs(here**2 - np.nan_to_num(before) ** 2))
 
 
 def pull(strain: FloatArray) -> float:

@@ -230,7 +230,8 @@ class TurnCutter:
     def _stop(self, contact: Contact, law: AngleLaw) -> int:
         """Return the number of the sample after the last one that a turn needs."""
         sigma = self._sigma(law) or LowPass().sigma(1.0)
-        end = float(PHI[_pulse(contact, law) + AFTER >= PHI][-1])
+        seen = PHI[_pulse(contact, law) + AFTER >= PHI]
+        end = float(seen[-1] if seen.size else PHI[0])
         return int(law.sample(end + half_width(sigma)) + 2.0) + 1
 
     def _damaged(self, contact: Contact) -> bool:
@@ -290,6 +291,8 @@ class TurnCutter:
         if contact.damaged or before.damaged or missed:
             flags |= TurnFlag.FIRST_TURN | TurnFlag.GAP  # its period is unknown
         pulse = _pulse(contact, law)
+        if np.isnan(pulse):
+            flags |= TurnFlag.ACCELERATING  # so much that its angle is unknown
         strain, rate, gage_flags = self._window(law, sigma, pulse, stop)
         sector = (law.sample(-np.pi + side * OFFSET_HALF_WIDTH) for side in (-1.0, 1.0))
         opposite, gap = self._mean(slice(0, self._gages), *sector, robust=True)
@@ -391,7 +394,7 @@ class TurnCutter:
         """Strain and rate over `PHI`, NaN beyond the end of the window, and the gages' flags."""
         strain = np.full((self._gages, PHI.size), np.nan)
         rate = np.full((self._gages, PHI.size), np.nan)
-        if sigma is None:
+        if sigma is None or np.isnan(pulse):
             return strain, rate, np.zeros(self._gages, dtype=np.int64)
         seen = pulse + AFTER >= PHI
         first = max(int(law.sample(PHI[0] - half_width(sigma)) - 2.0), self._base)
@@ -440,9 +443,12 @@ class TurnCutter:
 
 
 def _pulse(contact: Contact, law: AngleLaw) -> float:
-    """Return half the wheel angle from where the centre gage's pulse rises to where it falls."""
+    """Return half the wheel angle from where the centre gage's pulse rises to where it falls.
+
+    NaN where the law turns the wheel back between them, because it stopped or locked there.
+    """
     rise, fall = law.at(np.array([contact.rise, contact.fall]))
-    return 0.5 * float(fall - rise)
+    return 0.5 * float(fall - rise) if fall > rise else np.nan
 
 
 def cut_turns(

@@ -1,0 +1,285 @@
+/* Feeds the core what nobody should: damaged calibrations and resources, wild samples, conditions,
+ * steps and states, and calls of FMI in any order. Only sanitizers judge.
+ *
+ * With libFuzzer (clang -fsanitize=fuzzer) it is the target. Without, -DALONE, it makes its own
+ * bytes: fuzz SEED INPUTS, the same ones for a seed. The folder FUZZ holds what it starts from:
+ * StrainTire.core of an FMU, and samples.bin, doubles, five gages a sample. */
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "../../fmu_src/core/state.h"
+#include "../../fmu_src/fmi2/fmi2.h"
+#include "../../fmu_src/fmi2/resources.h"
+
+fmi2Component fmi2Instantiate(fmi2String, fmi2Type, fmi2String, fmi2String,
+                              const fmi2CallbackFunctions *, fmi2Boolean, fmi2Boolean);
+void fmi2FreeInstance(fmi2Component);
+fmi2Status fmi2ExitInitializationMode(fmi2Component), fmi2Terminate(fmi2Component);
+fmi2Status fmi2Reset(fmi2Component), fmi2DoStep(fmi2Component, double, double, int);
+fmi2Status fmi2GetReal(fmi2Component, const unsigned[], size_t, double[]);
+fmi2Status fmi2SetReal(fmi2Component, const unsigned[], size_t, const double[]);
+fmi2Status fmi2SetInteger(fmi2Component, const unsigned[], size_t, const int[]);
+fmi2Status fmi2SetBoolean(fmi2Component, const unsigned[], size_t, const int[]);
+fmi2Status fmi2GetString(fmi2Component, const unsigned[], size_t, fmi2String[]);
+fmi2Status fmi2SetString(fmi2Component, const unsigned[], size_t, const fmi2String[]);
+fmi2Status fmi2GetFMUstate(fmi2Component, fmi2FMUstate *), fmi2SetFMUstate(fmi2Component, fmi2FMUstate);
+fmi2Status fmi2FreeFMUstate(fmi2Component, fmi2FMUstate *);
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component, fmi2FMUstate, size_t *);
+fmi2Status fmi2SerializeFMUstate(fmi2Component, fmi2FMUstate, char[], size_t);
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component, const char[], size_t, fmi2FMUstate *);
+
+enum { SAMPLES = 10, MOST_SAMPLES = 400 };
+
+static Resources own;
+static char *file;
+static size_t file_size, samples;
+static double *strain;
+static char folder[4096];
+
+/* What is left of the bytes; zeros behind their end. */
+typedef struct {
+    const uint8_t *at, *end;
+} Source;
+
+static unsigned byte_of(Source *s) { return s->at < s->end ? *s->at++ : 0; }
+
+static unsigned long place_of(Source *s, unsigned long n) {
+    unsigned long x = byte_of(s);
+    x = x << 8 | byte_of(s);
+    x = x << 8 | byte_of(s);
+    return n ? x % n : 0;
+}
+
+static double number_of(Source *s, double usual) {
+    static const double ODD[] = {0.0, -0.0, 1.0, -1.0, 0.5, 1e-300, 1e300, -1e300, 1e18, -1e18, 256.0,
+                                 2147483648.0, -2147483649.0, 4503599627370497.5, 1e-9, 3.0};
+    unsigned kind = byte_of(s);
+    uint64_t bits = 0;
+    double x;
+    if (kind < 64) return ODD[kind % 16];
+    if (kind < 80) return NAN;
+    if (kind < 96) return kind % 2 ? INFINITY : -INFINITY;
+    if (kind < 208) return usual * (1.0 + ((int)byte_of(s) - 128) / 64.0);
+    for (int i = 0; i < 8; i++) bits = bits << 8 | byte_of(s);
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+
+static void *memory(size_t n) {
+    void *found = malloc(n ? n : 1);
+    if (!found) exit(3);
+    return found;
+}
+
+/* Give a wheel samples of the recording, some of them changed. */
+static void play(Wheel *w, int gages, Source *s, int steps) {
+    double frame[MOST_SAMPLES * GAGES], conditions[HELD];
+    Outputs out;
+    size_t at = 0;
+    for (int c = 0; c < HELD; c++) conditions[c] = NAN;
+    conditions[SPEED] = 18.0;
+    for (int step = 0; step < steps; step++) {
+        for (int i = 0; i < SAMPLES; i++, at++)
+            for (int g = 0; g < gages; g++)
+                frame[i * gages + g] = strain[at % samples * 5 + (size_t)g % 5];
+        double length = SAMPLES / 5000.0;
+        int count = -1, valid = 1;
+        if (s->at < s->end && byte_of(s) < 48) {
+            unsigned what = byte_of(s) % 8;
+            if (what < 3) frame[place_of(s, (unsigned long)(SAMPLES * gages))] = number_of(s, 1e-3);
+            if (what == 3) conditions[byte_of(s) % HELD] = number_of(s, 18.0);
+            if (what == 4) length = number_of(s, length);
+            if (what == 5) count = (int)byte_of(s) - 100;
+            if (what == 6) valid = 0;
+            if (what == 7) at += place_of(s, 4000);
+        }
+        wheel_step(w, frame, length, valid, conditions, count);
+        wheel_outputs(w, &out);
+    }
+}
+
+/* A calibration of which numbers are changed, or whose end is missing. */
+static void try_table(Source *s) {
+    size_t n = own.numbers;
+    double *table = memory(n * sizeof *table);
+    Calibration *known = memory(sizeof *known);
+    memcpy(table, own.table, n * sizeof *table);
+    for (int edits = (int)byte_of(s) % 6; edits >= 0; edits--) {
+        size_t at = byte_of(s) < 128 ? place_of(s, 700) : place_of(s, n);
+        int counts = byte_of(s) < 128; /* something that says how many, or which */
+        while (counts && at < n && !(table[at] == floor(table[at]) && fabs(table[at]) < 300.0)) at++;
+        if (at < n) table[at] = counts ? (int)byte_of(s) - 20 : number_of(s, table[at]);
+    }
+    if (byte_of(s) < 16) {
+        n = place_of(s, n);
+        if (n > 2) table[2] = (double)n;
+        table = realloc(table, n * sizeof *table + 1);
+    }
+    if (!calibration_read(known, table, n)) {
+        size_t size = wheel_size(known, 5000.0);
+        void *place = size ? memory(size) : NULL;
+        Wheel *w = place ? wheel_start(place, known, 5000.0, SAMPLES, ISO) : NULL;
+        if (w) play(w, known->gages, s, 120);
+        free(place);
+    }
+    free(known);
+    free(table);
+}
+
+/* Wild samples, steps and rates; states of it, damaged and whole. */
+static void try_wheel(Source *s) {
+    static const double RATES[] = {5000.0, 5000.0, 5000.0, 1e3, 100.0, 1e5, 20000.0, 777.7};
+    Calibration *known = memory(sizeof *known);
+    if (calibration_read(known, own.table, own.numbers)) exit(4);
+    double rate = RATES[byte_of(s) % 8];
+    void *place = memory(wheel_size(known, rate)), *there = memory(wheel_size(known, rate));
+    Wheel *w = wheel_start(place, known, rate, SAMPLES, (int)byte_of(s) % 3);
+    Wheel *other = wheel_start(there, known, rate, SAMPLES, w->axes);
+    for (int rounds = (int)byte_of(s) % 4; rounds >= 0; rounds--) {
+        play(w, known->gages, s, 1 + (int)place_of(s, 150));
+        size_t n = state_size(w);
+        unsigned char *bytes = memory(n);
+        state_save(w, bytes);
+        if (byte_of(s) < 128) {
+            if (!state_restore(other, bytes, n)) abort();
+            play(other, known->gages, s, 20);
+        } else {
+            bytes[place_of(s, n)] ^= (unsigned char)(1 + byte_of(s) % 255);
+            if (state_restore(other, bytes, n)) abort();
+            state_restore(other, bytes, place_of(s, n));
+        }
+        free(bytes);
+    }
+    free(place);
+    free(there);
+    free(known);
+}
+
+static void said(fmi2Environment e, fmi2String name, fmi2Status status, fmi2String category,
+                 fmi2String text, ...) {
+    (void)e, (void)name, (void)status, (void)category;
+    if (strlen(text) > 1u << 20) abort();
+}
+
+static void write_core(Source *s, const char *path) {
+    char *bytes = memory(file_size);
+    size_t n = file_size;
+    FILE *out = fopen(path, "wb");
+    memcpy(bytes, file, n);
+    for (int edits = (int)byte_of(s) % 8; edits > 0; edits--) {
+        size_t at = byte_of(s) < 200 ? place_of(s, 6000) : place_of(s, n);
+        bytes[at < n ? at : 0] = (char)byte_of(s);
+    }
+    if (byte_of(s) < 16) n = place_of(s, n);
+    if (!out || fwrite(bytes, 1, n, out) != n) exit(5);
+    fclose(out);
+    free(bytes);
+}
+
+/* Calls of FMI in any order, on whole or damaged resources. */
+static void try_fmi(Source *s) {
+    static const char *const TEXTS[] = {"", "iso", "sae", "adapted_sae", "live tire", "%s%n", "/nowhere"};
+    char path[4200], uri[64];
+    fmi2CallbackFunctions host = {said, NULL, NULL, NULL, NULL};
+    fmi2FMUstate state = NULL;
+    fmi2String guid = own.guid, text;
+    int damaged = byte_of(s) < 64;
+    snprintf(path, sizeof path, "%s%s", folder, damaged ? "/damaged" : "");
+    if (damaged) {
+        char name[4300];
+        snprintf(name, sizeof name, "%s/StrainTire.core", path);
+        write_core(s, name);
+    }
+    for (size_t i = 0; i < sizeof uri - 1; i++) uri[i] = (char)byte_of(s);
+    uri[sizeof uri - 1] = 0;
+    fmi2FreeInstance(fmi2Instantiate("w", fmi2CoSimulation, guid, uri, &host, 0, 0));
+    fmi2Component c = fmi2Instantiate("w", fmi2CoSimulation, guid, path, &host, 0, 0);
+    if (byte_of(s) < 220) fmi2ExitInitializationMode(c);
+    for (int calls = 0; c && calls < 60 && s->at < s->end; calls++) {
+        unsigned r = byte_of(s) < 240 ? (unsigned)place_of(s, own.variables + 2) : ~0u;
+        double real = number_of(s, 1.0);
+        int whole = (int)byte_of(s) - 20;
+        text = TEXTS[byte_of(s) % 7];
+        switch (byte_of(s) % 12) {
+        case 0: fmi2SetReal(c, &r, 1, &real); break;
+        case 1: fmi2SetInteger(c, &r, 1, &whole); break;
+        case 2: fmi2SetBoolean(c, &r, 1, &whole); break;
+        case 3: fmi2SetString(c, &r, 1, &text); break;
+        case 4: fmi2GetReal(c, &r, 1, &real); break;
+        case 5: fmi2GetString(c, &r, 1, &text); break;
+        case 6: fmi2DoStep(c, 0.0, byte_of(s) < 200 ? SAMPLES / 5000.0 : real, 0); break;
+        case 7: byte_of(s) < 60 ? fmi2Reset(c) : fmi2ExitInitializationMode(c); break;
+        case 8: byte_of(s) < 60 ? fmi2Terminate(c) : fmi2GetFMUstate(c, &state); break;
+        case 9: fmi2SetFMUstate(c, state); break;
+        case 10: fmi2FreeFMUstate(c, &state); break;
+        case 11: {
+            size_t n = 0;
+            if (fmi2SerializedFMUstateSize(c, state, &n) != fmi2OK) break;
+            char *bytes = memory(n);
+            fmi2SerializeFMUstate(c, state, bytes, n);
+            for (int edits = (int)byte_of(s) % 3; edits > 0; edits--)
+                bytes[place_of(s, n)] ^= (char)byte_of(s);
+            fmi2DeSerializeFMUstate(c, bytes, byte_of(s) < 230 ? n : place_of(s, n), &state);
+            free(bytes);
+        }
+        }
+    }
+    fmi2FreeFMUstate(c, &state);
+    fmi2FreeInstance(c);
+}
+
+static char *whole_file(const char *name, size_t *n) {
+    char path[4200];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    FILE *in = fopen(path, "rb");
+    if (!in || fseek(in, 0, SEEK_END)) exit(2);
+    *n = (size_t)ftell(in);
+    char *bytes = memory(*n);
+    rewind(in);
+    if (fread(bytes, 1, *n, in) != *n) exit(2);
+    fclose(in);
+    return bytes;
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    Source s = {data, data + size};
+    if (!file) {
+        size_t n;
+        char path[4200];
+        snprintf(folder, sizeof folder, "%s", getenv("FUZZ") ? getenv("FUZZ") : ".");
+        file = whole_file("StrainTire.core", &file_size);
+        strain = (double *)(void *)whole_file("samples.bin", &n);
+        samples = n / sizeof(double) / 5;
+        snprintf(path, sizeof path, "%s/StrainTire.core", folder);
+        if (resources_read(&own, path) || !samples) exit(2);
+    }
+    switch (byte_of(&s) % 4) {
+    case 0: try_table(&s); break;
+    case 1: case 2: try_wheel(&s); break;
+    default: try_fmi(&s);
+    }
+    return 0;
+}
+
+#ifdef ALONE
+int main(int n, char **argument) {
+    uint64_t x = n > 1 ? strtoull(argument[1], NULL, 10) * 0x9E3779B97F4A7C15u + 1 : 1;
+    long runs = n > 2 ? strtol(argument[2], NULL, 10) : 100;
+    for (long run = 0; run < runs; run++) {
+        uint8_t bytes[700];
+        for (size_t i = 0; i < sizeof bytes; i++) { /* xorshift64*, S. Vigna 2016 */
+            x ^= x >> 12, x ^= x << 25, x ^= x >> 27;
+            bytes[i] = (uint8_t)((x * 0x2545F4914F6CDD1Du) >> 56);
+        }
+        size_t size = 1 + bytes[0] * 2u;
+        bytes[0] = (uint8_t)run;
+        LLVMFuzzerTestOneInput(bytes, size);
+    }
+    printf("%ld inputs\n", runs);
+    return 0;
+}
+#endif
