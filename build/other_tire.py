@@ -6,12 +6,14 @@ Calibrates each tire on `set1` (65 km/h, 2.3 bar) and judges every tire with eve
 another day of `set1`, on `set3` (1.3 to 2.5 bar, 10 to 150 km/h, straight) and on `drift` (1.5 to
 2.7 bar, 20 to 140 km/h, straight and at 3 deg). Prints how many turns in range
 are flagged `other_tire`, with friction and tread given and not; the same with half and double of
-what decides; and the shifts of which `DRIFT` is the mean. `--tire random-41` draws a tire. The rig
+what decides; and the shifts of which `DRIFT` is the mean. `--tire random-41` draws a tire. Further
+campaigns of the tires (`--own FOLDER`, made by `tirelib rig` or another program of this folder) are
+judged by the calibration of their own tire, for the share of false alarms. The rig
 takes some minutes a tire; campaigns and calibrations are kept in the folder.
 """
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import click
@@ -140,6 +142,21 @@ def broad(name: str, folder: Path, jobs: int) -> Calibration:
     return read_calibration(file)
 
 
+def false_alarms(calibrations: Mapping[str, Calibration], folders: Sequence[Path]) -> list[str]:
+    """Return how many turns of further campaigns are taken for another tire's: none should be."""
+    lines, turns, runs = [], np.zeros(2, dtype=np.int64), 0
+    for folder in folders:
+        seen = observe([read_campaign(folder)])
+        name = seen.headers[0].tire.name
+        own = next(x for x in calibrations.values() if x.tire == name)
+        found = np.array(flagged(own, seen))
+        estimates = own.estimate(seen.features)
+        runs += np.unique(seen.run[estimates.turn_valid]).size
+        turns += found
+        lines.append(f"{folder}: {found[0]} of {found[1]} turns in range")
+    return [*lines, f"own tire, further campaigns: {turns[0]} of {turns[1]} turns of {runs} runs"]
+
+
 def main() -> None:
     """Measure, calibrate, judge, print."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -147,6 +164,7 @@ def main() -> None:
     parser.add_argument("--tire", action="append", required=True)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--broad", action="store_true", help="also a broad one of the first tire")
+    parser.add_argument("--own", type=Path, nargs="*", default=[], help="further campaigns")
     given = parser.parse_args()
     calibrations, days, moved = {}, {}, {}
     for name in given.tire:
@@ -171,6 +189,7 @@ def main() -> None:
         for other, campaigns in days.items():
             click.echo(f"| {name} | {other} | {' | '.join(row(calibration, campaigns))} |")
     click.echo("\n".join(["", *halves(calibrations, days)]))
+    click.echo("\n".join(["", *false_alarms(calibrations, given.own)]))
     click.echo("\nshift with a doubled pressure, and with (40 m/s)^2; now, then tire by tire")
     for name, (pressure, speed) in DRIFT.items():
         cells = [f"{moved[tire][name][k]:8.4f}" for k in (0, 1) for tire in moved]

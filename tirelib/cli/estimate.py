@@ -116,8 +116,8 @@ def print_document(name: str, document: dict[str, Any], calibration: Calibration
         console.print(
             f"another tire? {other['turns']} of {other['judged']} turns in range have a strain "
             f"pattern that the calibrated {document['tire']!r} does not show (by chance one turn "
-            "in a thousand would); check whether this tire is on the wheel, and whether it is "
-            "worn or soft; otherwise calibrate again"
+            "in a thousand would, on a worn tread under a high load one in twenty); check whether "
+            "this tire is on the wheel, and whether it is worn or soft; otherwise calibrate again"
         )
     limits = (outside(turns, calibration), weakly_checked(other), *not_checked(calibration))
     for sentence in (not_given(document["not_given"]), *limits):

@@ -415,8 +415,9 @@ class Chain:
         load_here = np.where(known, values["load"], self.mean_load)
         at["load"] = self.laws.equivalent_load(load_here, values)
         radius, std = model.predict(at)
-        at_reference, _ = model.predict({**at, "load": load_here})
-        std = np.hypot(std, RADIUS_SHARE * np.abs(radius - at_reference))
+        if not np.array_equal(at["load"], load_here):
+            at_reference, _ = model.predict({**at, "load": load_here})
+            std = np.hypot(std, RADIUS_SHARE * np.abs(radius - at_reference))
         std = np.hypot(std, RADIUS_DOUBT * radius * self.laws.speed_departure(values))
         worn, unknown = self.road.worn(values)
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -425,9 +426,10 @@ class Chain:
         if any(variable.name == "load" for variable in model.variables):
             per_load = np.abs(model.slope(at, "load"))
             away = 0.5 * self.mean_load * per_load
-            if load is not None:
+            if load is not None and not known.all():
                 told = model.predict({**at, "load": self.laws.equivalent_load(load.value, values)})
                 away = np.fmax(away, np.abs(told[0] - radius))
+            if load is not None:
                 away = np.where(known, per_load * load.std, away)
             std = np.hypot(std, away)
             harder, unknown = tread

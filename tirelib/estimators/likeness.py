@@ -81,8 +81,11 @@ ROAD_DOUBT = 0.5
 PRESSURE_DOUBT, SPEED_DOUBT = 0.5, 1.0
 """Tires differ: standard deviation of another tire's shift, as a share of `DRIFT`; those of the rig
 by 0.35 of the shift with pressure. ``docs/estimators.md`` has half and double."""
-FEWEST_UNLIKE, SHARE_UNLIKE = 5, 0.05
-"""Turns, and share of them, that must look like another tire's: fifty times chance."""
+FEWEST_UNLIKE, SHARE_UNLIKE = 5, 0.08
+"""Turns, and share of them, that must look like another tire's. On drawn roads and treads up to
+0.055 of a tire's own turns do (``python build/other_tire.py --own``), all above 6.5 kN on a worn
+tread; on dry roads none. Half of the share takes one of six such campaigns for another tire's,
+double misses a tire of which 0.1 of the turns are flagged."""
 EDGE = 1.0 + 1e-6
 """End of a standardised regressor's calibrated range."""
 
@@ -212,7 +215,7 @@ def suspected(unlike: int, judged: int) -> bool:
 
     Examples
     --------
-    >>> suspected(4, 4), suspected(5, 90), suspected(5, 110)
+    >>> suspected(4, 4), suspected(5, 60), suspected(5, 70)
     (False, True, False)
     """
     return unlike >= FEWEST_UNLIKE and unlike > SHARE_UNLIKE * judged

@@ -15,7 +15,7 @@ from tirelib.errors import CalibrationError
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
 from tirelib.estimators.doubt import ANGLE_STEP, with_moved
-from tirelib.estimators.likeness import DRIFT, ROAD_DRIFT
+from tirelib.estimators.likeness import DRIFT, ROAD_DRIFT, suspected
 from tirelib.estimators.mixed import strangers
 from tirelib.estimators.regressors import ODD, compute_regressors
 from tirelib.estimators.result import estimate_document
@@ -63,6 +63,12 @@ def test_an_estimate_says_where_another_tire_may_go_undetected(
     assert "may go undetected" in weakly_checked(away)
     assert weakly_checked(away | {"suspected": True}) == ""  # then it is said to be another tire
     assert weakly_checked(None) == ""  # and that nothing is checked stands in `not_checked`
+
+
+def test_what_worn_treads_and_slippery_roads_show_of_the_own_tire_is_no_other_tire() -> None:
+    """Largest share of three tires of the rig on drawn roads, and the least of another tire."""
+    assert not suspected(12, 218)
+    assert suspected(16, 168)
 
 
 def test_another_shape_of_the_contact_is_another_tire(
