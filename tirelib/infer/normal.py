@@ -12,10 +12,15 @@ The log evidence that a block of rows a has the variance t more than D says is
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy import linalg
 
 from tirelib.arrays import FloatArray
+
+LEAST = 1e-11
+"""Variance that stands for none: so little that no sample tells it from zero."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,15 +50,19 @@ class Normal:
         cls,
         rows: Mapping[str, FloatArray],
         rest: FloatArray,
-        whiten: Callable[[FloatArray], FloatArray],
+        whiten: Callable[[FloatArray], FloatArray] | None = None,
     ) -> "Normal":
-        """Return the normal equations of named rows (k, ...) and a residual (...)."""
+        """Return the normal equations of named rows (k, ...) and a residual (...).
+
+        Without `whiten` they are white already, of shapes (k, n) and (n,).
+        """
         blocks, first = {}, 0
         for name, block in rows.items():
             blocks[name] = slice(first, first + len(block))
             first += len(block)
-        every = whiten(np.concatenate(list(rows.values())))
-        rest = whiten(rest)
+        every = np.concatenate(list(rows.values()))
+        if whiten is not None:
+            every, rest = whiten(every), whiten(rest)
         return cls(blocks, every @ every.T, every @ rest, float(rest @ rest), rest.size)
 
     def spread(self, variance: Mapping[str, float | FloatArray]) -> FloatArray:
@@ -67,27 +76,44 @@ class Normal:
 class Weighed:
     """Normal equations in the metric of C.
 
+    With R = D^1/2 and A = I + R G R, everything is made of one inverse: X = R A^-1 R,
+    G - G X G = R^-1 (I - A^-1) R^-1 and g - G X g = R^-1 A^-1 R g.
+
     Parameters
     ----------
     normal : Normal
     spread : shape (m,)
-        Diagonal of D.
+        Diagonal of D. A variance below `LEAST` counts as `LEAST`.
     """
 
     def __init__(self, normal: Normal, spread: FloatArray) -> None:
         self.normal = normal
-        root = np.sqrt(spread)
-        inner = np.eye(root.size) + root[:, None] * normal.gram * root
-        self.lower = np.linalg.cholesky(inner)
-        half = np.linalg.solve(self.lower, np.diag(root))
-        self.covariance = half.T @ half
-        """Of beta, given the residual (X)."""
-        self._turned = normal.gram @ self.covariance
-        self.gram = normal.gram - self._turned @ normal.gram
+        self.root = np.sqrt(np.maximum(spread, LEAST))
+        inner = np.eye(self.root.size) + self.root[:, None] * normal.gram * self.root
+        self.lower: FloatArray = linalg.cholesky(inner, lower=True, check_finite=False)
+
+    @cached_property
+    def _inverse(self) -> FloatArray:
+        below, failed = linalg.lapack.dpotri(self.lower, lower=1)
+        assert not failed  # noqa: S101 - the factor has a positive diagonal
+        out: FloatArray = np.tril(below) + np.tril(below, -1).T
+        return out
+
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """Covariance X of beta, given the residual, shape (m, m)."""
+        out: FloatArray = self.root[:, None] * self._inverse * self.root
+        return out
+
+    @cached_property
+    def gram(self) -> FloatArray:
+        """B C^-1 B', shape (m, m)."""
+        out: FloatArray = (np.eye(self.root.size) - self._inverse) / np.outer(self.root, self.root)
+        return out
 
     def right(self, right: FloatArray) -> FloatArray:
         """Return B C^-1 r of right-hand sides B r of shape (m,) or (m, k)."""
-        out: FloatArray = right - self._turned @ right
+        out: FloatArray = ((self._inverse @ (self.root * right.T).T).T / self.root).T
         return out
 
     def mean(self, right: FloatArray) -> FloatArray:
@@ -104,8 +130,10 @@ class Weighed:
 
     def gain(self, right: FloatArray) -> FloatArray:
         """Return the log density of residuals over that of unit noise alone, for (m, k)."""
-        explained = 0.5 * np.sum(right * self.mean(right), axis=0)
-        return np.asarray(explained - np.sum(np.log(np.diag(self.lower))))
+        turned = linalg.solve_triangular(
+            self.lower, (self.root * right.T).T, lower=True, check_finite=False
+        )
+        return np.asarray(0.5 * np.sum(turned**2, axis=0) - np.sum(np.log(np.diag(self.lower))))
 
     def log_likelihood(self) -> float:
         """Return the log density of the residual, up to a constant of the samples' number."""
@@ -114,13 +142,14 @@ class Weighed:
 
 
 def evidence(
-    weighed: Weighed, right: FloatArray, blocks: Sequence[slice], more: Sequence[FloatArray]
+    gram: FloatArray, right: FloatArray, blocks: Sequence[slice], more: Sequence[FloatArray]
 ) -> FloatArray:
     """Return the log evidence of more variance in each block, for each right-hand side.
 
     Parameters
     ----------
-    weighed : Weighed
+    gram : shape (m, m)
+        B C^-1 B' (`Weighed.gram`).
     right : shape (m, k)
         B C^-1 r of k residuals (`Weighed.right`).
     blocks : sequence of slice
@@ -131,11 +160,30 @@ def evidence(
     -------
     shape (n_blocks, k)
     """
-    out = []
-    for block, variance in zip(blocks, more, strict=True):
-        root = np.sqrt(variance)
-        inner = np.eye(root.size) + root[:, None] * weighed.gram[block, block] * root
+    out = np.zeros((len(blocks), right.shape[1]))
+    sizes = [block.stop - block.start for block in blocks]
+    for size in sorted(set(sizes)):
+        which = [k for k, each in enumerate(sizes) if each == size]
+        rows = np.array([blocks[k].start for k in which])[:, None] + np.arange(size)
+        root = np.sqrt(np.array([more[k] for k in which]))
+        inner = (
+            np.eye(size)
+            + root[:, :, None] * gram[rows[:, :, None], rows[:, None, :]] * (root[:, None, :])
+        )
         lower = np.linalg.cholesky(inner)
-        turned = np.linalg.solve(lower, root[:, None] * right[block])
-        out.append(0.5 * np.sum(turned**2, axis=0) - np.sum(np.log(np.diag(lower))))
-    return np.array(out)
+        turned = np.linalg.solve(lower, root[:, :, None] * right[rows])
+        volume = np.sum(np.log(np.diagonal(lower, axis1=1, axis2=2)), axis=1)
+        out[which] = 0.5 * np.sum(turned**2, axis=1) - volume[:, None]
+    return out
+
+
+def beside(
+    gram: FloatArray, right: FloatArray, block: slice, more: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return B C^-1 B' and B C^-1 r where C has more variance in one block.
+
+    The arguments are those of `evidence` for this block.
+    """
+    inner = gram[block, block] + np.diag(1.0 / more)
+    share = np.linalg.solve(inner, gram[block])
+    return gram - gram[:, block] @ share, right - share.T @ right[block]

@@ -127,11 +127,16 @@ def posterior(
             for name, rows in near.rows.items()
             if name != BASE and name not in has and not name.startswith(ROUGHLY)
         }
-    normal = Normal.of({BASE: slopes, **others}, solved.rest, whiten)
+    white = whiten(np.concatenate(list(others.values())))
+    ends = np.cumsum([len(rows) for rows in others.values()])[:-1]
+    whitened = dict(zip(others, np.split(white, ends), strict=True))
+    rest = whiten(solved.rest)
     damping, moved = 1e-3, np.inf
     for _ in range(MOST_STEPS):
+        white_slopes = whiten(slopes)
+        rows = np.concatenate([white_slopes, white])
+        normal = Normal.of({BASE: white_slopes, **whitened}, rest)
         metric = Weighed(normal, normal.spread(spread))
-        rows = whiten(np.concatenate([slopes, *others.values()]))
         block = normal.blocks[BASE]
         here = _coordinates(point)
         gram = metric.gram[block, block] + np.diag(widths**-2)
@@ -145,23 +150,22 @@ def posterior(
             moved = float(np.abs(dz / deviation).max())
             trial = _tried(problem, point, dz, solved)
             if trial is not None:
-                rest = whiten(trial[1].rest)
+                left = whiten(trial[1].rest)
                 after = _cost(
-                    metric, rows @ rest, float(rest @ rest), _coordinates(trial[0]), widths
+                    metric, rows @ left, float(left @ left), _coordinates(trial[0]), widths
                 )
                 if after < cost + GAINS:
                     break
             damping = max(10.0 * damping, 1e-2)
         if trial is None or after >= cost + GAINS:
             break  # no way down: the bottom, or its edge
-        point, solved = trial
+        (point, solved), rest = trial, left
         damping = max(0.1 * damping, 1e-9)
         if progress is not None:
             progress(f"fit of {', '.join(e.name for e in effects) or 'the base'}, cost {after:.0f}")
         if moved < SETTLED or cost - after < GAINS:
             break
         slopes = problem.slopes(point, solved)
-        normal = Normal.of({BASE: slopes, **others}, solved.rest, whiten)
     else:
         raise ConvergenceError(
             f"fit with {', '.join(e.name for e in effects) or 'no effect'}: the parameters still "
@@ -179,7 +183,7 @@ def posterior(
     normal = Normal.of(every, solved.rest, whiten)
     metric = Weighed(normal, normal.spread(spread))
     block = normal.blocks[BASE]
-    covariance = np.linalg.inv(metric.gram[block, block] + np.diag(widths**-2))
+    covariance = np.asarray(np.linalg.inv(metric.gram[block, block] + np.diag(widths**-2)))
     cost = _cost(metric, normal.right, normal.square, _coordinates(point), widths)
     return Posterior(point, solved, every, widths, covariance, cost, {own: normal})
 

@@ -22,7 +22,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
-from tirelib.infer.normal import Normal, Weighed, evidence
+from tirelib.infer.normal import Normal, Weighed, beside, evidence
 from tirelib.infer.plain import BASE, FOLDS, ROUGHLY, Family, pooled
 from tirelib.infer.posterior import Posterior, posterior
 from tirelib.infer.problem import Problem
@@ -151,48 +151,56 @@ class Null:
         noise = random.standard_normal(planted.shape) * np.sqrt(np.clip(values, 0.0, None))
         self.right = normal.gram @ planted.T + vectors @ noise.T
 
-    def _of(
-        self,
-        without: int | None,
-        right: FloatArray,
-        names: Sequence[str],
-        further: Mapping[str, FloatArray] | None = None,
-    ) -> FloatArray:
-        """Return the log evidence of effects or shapes for right-hand sides, (n_names, k).
+    def _at_sizes(
+        self, without: int | None, right: FloatArray
+    ) -> list[tuple[FloatArray, FloatArray, FloatArray, list[FloatArray]]]:
+        """Return B C^-1 B', B C^-1 r, log densities and what is more by block, for every size."""
+        typical, out = self.family.spread(without), []
+        for size in SIZES:
+            diagonal = self.normal.spread({**_sized(typical, size), **self.allowed})
+            weighed = Weighed(self.normal, diagonal)
+            more = [
+                MORE * diagonal[block]
+                if "," in name
+                else np.full(block.stop - block.start, PRIOR**2)
+                for name, block in zip(self.names, self.blocks, strict=True)
+            ]
+            likelihood = weighed.gain(right) + _size_prior(size)
+            out.append((weighed.gram, weighed.right(right), likelihood, more))
+        return out
+
+    def _of(self, without: int | None, right: FloatArray) -> FloatArray:
+        """Return the log evidence of every effect and shape for right-hand sides, (n_names, k).
 
         Each right-hand side is one tire's. It is judged at its most likely size of what plain tires
         show, by itself without the effect and with it: some tires leave much of everything, some
         little, and a hidden effect must not pass for a tire that leaves much.
         """
-        blocks = [self.normal.blocks[name] for name in names]
-        typical = self.family.spread(without)
         plain, missing = [], []
-        for size in SIZES:
-            allowed = {**_sized(typical, size), **self.allowed, **(further or {})}
-            diagonal = self.normal.spread(allowed)
-            weighed = Weighed(self.normal, diagonal)
-            likelihood = weighed.gain(right) + _size_prior(size)
-            more = [
-                MORE * diagonal[block]
-                if "," in name
-                else np.full(block.stop - block.start, PRIOR**2)
-                for name, block in zip(names, blocks, strict=True)
-            ]
+        for gram, turned, likelihood, more in self._at_sizes(without, right):
             plain.append(likelihood)
-            missing.append(likelihood + evidence(weighed, weighed.right(right), blocks, more))
+            missing.append(likelihood + evidence(gram, turned, self.blocks, more))
         return np.asarray(np.max(missing, axis=0) - np.max(plain, axis=0))
 
     def seen(self) -> FloatArray:
         """Return the log evidence of every effect and shape beside the hypothesis, (n_names,)."""
-        return self._of(None, self.normal.right[:, None], self.names)[:, 0]
+        return self._of(None, self.normal.right[:, None])[:, 0]
 
-    def beside(self, name: str) -> float:
-        """Return the largest evidence against the hypothesis with one more effect, [nats]."""
-        block = self.normal.blocks[name]
-        more = {name: np.full(block.stop - block.start, PRIOR**2)}
-        names = [each for each in self.names if each != name]
-        found = self._of(None, self.normal.right[:, None], names, more)
-        return float(found.max())
+    def beside(self) -> dict[str, float]:
+        """Return the largest evidence against the hypothesis with each further effect, [nats]."""
+        sizes, out = self._at_sizes(None, self.normal.right[:, None]), {}
+        for k, name in enumerate(self.names):
+            if "," in name:
+                continue
+            plain, missing = [], []
+            for gram, turned, likelihood, more in sizes:
+                one = evidence(gram, turned, self.blocks[k : k + 1], more[k : k + 1])[0]
+                with_it = beside(gram, turned, self.blocks[k], more[k])
+                plain.append(likelihood + one)
+                missing.append(plain[-1] + evidence(*with_it, self.blocks, more))
+            found = np.max(missing, axis=0) - np.max(plain, axis=0)
+            out[name] = float(np.delete(found[:, 0], k).max())
+        return out
 
     def largest(self) -> FloatArray:
         """Return the largest log evidence of each plain tire by the others, (n_tires,)."""
@@ -200,7 +208,7 @@ class Null:
         for fold in range(FOLDS):
             part = self.family.fold == fold
             if part.any():
-                out[part] = self._of(fold, self.right[:, part], self.names).max(axis=0)
+                out[part] = self._of(fold, self.right[:, part]).max(axis=0)
         return out
 
 
@@ -231,11 +239,13 @@ def judged(
             free = max(free, _rank(float(null.seen().max()), null.largest()))
     top = int(np.argmax(seen[best]))
     limits = [float(np.quantile(each, 1.0 - alpha)) for each in largest]
-    names = [name for name in nulls[best].names if "," not in name] if each[best] <= alpha else []
-    left = {
-        name: min(null.beside(name) - limit for null, limit in zip(nulls, limits, strict=True))
-        for name in names
-    }
+    left: dict[str, float] = {}
+    if each[best] <= alpha:
+        every = [null.beside() for null in nulls]
+        left = {
+            name: min(one[name] - limit for one, limit in zip(every, limits, strict=True))
+            for name in every[best]
+        }
     return Hypothesis(
         fit,
         float(seen[best][top]),

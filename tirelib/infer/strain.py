@@ -11,7 +11,6 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.effects import Effect
-from tirelib.effects.effect import Strength
 from tirelib.errors import ParameterError
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.delay import STD, UNIT, by_delay, earlier
@@ -25,13 +24,14 @@ from tirelib.identify.discrepancy import (
 from tirelib.identify.random_effects import scales, tangents
 from tirelib.infer.problem import Point
 from tirelib.infer.whiten import INSIDE, Whitener
-from tirelib.model.base import Correction, coordinates, move, predict
+from tirelib.model import solution
+from tirelib.model.base import coordinates, move
 from tirelib.model.chain import Changes
-from tirelib.model.state import State
-from tirelib.model.whole import Whole, WholeSlopes, solve_whole, whole_slopes
+from tirelib.model.rolled import RolledSlopes
+from tirelib.model.solution import Solution, added_by_values, by_effects, by_values
+from tirelib.rolling.assemble import Unknowns
+from tirelib.rolling.solve import Rolling
 from tirelib.waveforms import GRID
-
-Values = Mapping[str, float | FloatArray]
 
 WIDTH = {
     "bending_stiffness": 0.7,
@@ -76,21 +76,29 @@ UNKNOWN_NOISE = 0.005
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StrainSolved:
-    """The model at a point, `tirelib.infer.problem.Solved`."""
+    """The model at a point, `tirelib.infer.problem.Solved`.
+
+    Attributes
+    ----------
+    rest : shape (n_runs, n_phi)
+        Measured less model.
+    point : Point
+    model : Solution
+    delay : float, [s]
+    waveform : shape (n_runs, n_phi)
+        Of the model, with the delay.
+    """
 
     rest: FloatArray
-    values: Values
-    whole: Whole
-    correction: Correction
-    waveform: FloatArray
-    deflection: FloatArray
-    changes: Changes
+    point: Point
+    model: Solution
     delay: float
+    waveform: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Changed:
-    """What effects add to the slopes by the tire's coordinates, and the point it was taken at."""
+class _Added:
+    """How the tire's coordinates move what effects add, and the point it was taken at."""
 
     point: Point
     slopes: FloatArray
@@ -127,7 +135,7 @@ class StrainProblem:
     def __init__(
         self,
         runs: StraightRuns,
-        values: Values,
+        values: Mapping[str, float | FloatArray],
         catalogue: Sequence[Effect],
         effects: Sequence[Effect] = (),
         strengths: Sequence[FloatArray] = (),
@@ -140,16 +148,17 @@ class StrainProblem:
         self.dead: dict[str, str] = {}
         typical = float(np.sqrt(np.mean(runs.strain**2)))
         noise = runs.noise.std if runs.noise.known else UNKNOWN_NOISE * typical
-        solved = self._solve(self.start, None)
+        self._last: tuple[StrainSolved, RolledSlopes] | None = None
+        self._added: _Added | None = None
+        solved = self.solve(self.start)
         self.half_angle = 0.6 * np.sqrt(
-            2.0 * solved.deflection / float(np.max(self.values["free_radius"]))
+            2.0 * solved.model.deflection / float(np.max(self.values["free_radius"]))
         )
         self.reference = solved
-        slopes = self._base_slopes(solved)
+        slopes = by_values(solved.model, self.free)
         self._tangent = tangents(solved.waveform, slopes.waveform[-2], slopes.waveform[-1])
         self._noise = noise
         self._whiteners: dict[float, Whitener] = {}
-        self._changed: _Changed | None = None
         self.living = self._alive(catalogue)
 
     def whitener(self, own: float) -> Whitener:
@@ -169,104 +178,76 @@ class StrainProblem:
 
     def solve(self, point: Point, near: StrainSolved | None = None) -> StrainSolved:
         """Return the model at a point; raises TirelibError where it has none."""
-        solved = self._solve(point, near or self.reference)
-        return replace(solved, rest=self.data.strain - solved.waveform)
-
-    def _solve(self, point: Point, near: StrainSolved | None) -> StrainSolved:
-        data, values = self.data, move(self.values, point.base[:-1], self.free)
-        start = None if near is None or near.whole.contact is None else near.whole.contact.x
-        whole = solve_whole(
-            {**values, "damping": 0.0}, data.points, low_pass=data.low_pass, start=start
-        )
-        linear = predict({**values, "damping": 0.0}, data.points, low_pass=data.low_pass)
-        correction = Correction(
-            whole.waveform - linear.wave,
-            whole.deflection - linear.deflection,
-            start=linear.contact.start if linear.contact else None,
-        )
-        changes = _changes(point)
-        state = self._predict(values, changes, correction)
-        delay = UNIT * float(point.base[-1])
-        wave = earlier(state.wave, data.points.omega, -delay)
-        return StrainSolved(
-            np.zeros(0), values, whole, correction, wave, state.deflection, changes, delay
-        )
-
-    def _predict(self, values: Values, changes: Changes, correction: Correction) -> State:
-        return predict(
+        values = {**move(self.values, point.base[:-1], self.free), "damping": 0.0}
+        model = solution.solved(
             values,
             self.data.points,
-            changes,
+            _changes(point),
             low_pass=self.data.low_pass,
-            correction=correction,
+            start=self._guess(point, near),
         )
+        delay = UNIT * float(point.base[-1])
+        waveform = earlier(model.waveform, self.data.points.omega, -delay)
+        return StrainSolved(self.data.strain - waveform, point, model, delay, waveform)
 
-    def _base_slopes(self, solved: StrainSolved) -> WholeSlopes:
-        still = {**solved.values, "damping": 0.0}
-        return whole_slopes(
-            solved.whole, still, self.data.points, self.free, low_pass=self.data.low_pass
-        )
+    def _guess(self, point: Point, near: StrainSolved | None) -> Rolling | Unknowns | None:
+        """Return a start of the contact: a solution nearby, moved along its slopes if known."""
+        if near is None:
+            return None
+        if self._last is None or self._last[0] is not near:
+            return near.model.rolling
+        return self._last[1].start(near.model.rolling, (point.base - near.point.base)[:-1])
 
     def slopes(self, point: Point, solved: StrainSolved) -> FloatArray:
         """Return slopes by the base, the delay and strengths in ranges."""
-        slopes = self._base_slopes(solved).waveform[: len(self.free)]
+        by = by_values(solved.model, self.free)
+        assert by.rolled is not None  # noqa: S101 - values move the rolling ring
+        self._last = (solved, by.rolled)
+        slopes = by.waveform[: len(self.free)]
         if point.effects:
-            if self._changed is None or not self._changed.serves(point):
-                self._changed = _Changed(point, self._changed_slopes(solved))
-            slopes = slopes + self._changed.slopes
-        rows = [*slopes, by_delay(solved.waveform, self.data.points.omega)]
+            if self._added is None or not self._added.serves(point):
+                more = added_by_values(solved.model, self.free, LEAST_STEP)
+                self._added = _Added(point, more)
+            slopes = slopes + self._added.slopes
+        there, steps = [], []
         for k, effect in enumerate(point.effects):
             for j in range(effect.components):
-                step = LEAST_STEP * effect.toward
+                steps.append(LEAST_STEP * effect.toward)
                 strengths = [s.copy() for s in point.strengths]
-                strengths[k][j] += step
-                moved = replace(point, strengths=tuple(strengths))
-                wave = self._predict(solved.values, _changes(moved), solved.correction).wave
-                late = earlier(wave, self.data.points.omega, -solved.delay)
-                rows.append((late - solved.waveform) * (effect.scale / step))
-        return np.array(rows)
-
-    def _changed_slopes(self, solved: StrainSolved) -> FloatArray:
-        """Return what effects add to the slopes of the waveform by the tire's coordinates."""
-        here = self._added(solved.values, solved)
-        rows = []
-        for coordinate in self.free:
-            value = np.asarray(solved.values[coordinate.name], dtype=float)
-            moved = {**solved.values, coordinate.name: coordinate.moved(value, LEAST_STEP)}
-            rows.append((self._added(moved, solved) - here) / LEAST_STEP)
-        return np.array(rows)
-
-    def _added(self, values: Values, solved: StrainSolved) -> FloatArray:
-        """Return what the effects of a solution add to the waveform of a tire nearby."""
-        with_them = self._predict(values, solved.changes, solved.correction)
-        return with_them.wave - self._predict(values, (), solved.correction).wave
+                strengths[k][j] += steps[-1]
+                moved = _changes(replace(point, strengths=tuple(strengths)))
+                there.append((effect.hook, moved))
+        rows = [*slopes]
+        if there:
+            rows += [*by_effects(solved.model, there, steps).waveform * self._scales(point.effects)]
+        late = earlier(np.array(rows), self.data.points.omega, -solved.delay)
+        delay = by_delay(solved.waveform, self.data.points.omega)[None]
+        return np.concatenate([late[: len(self.free)], delay, late[len(self.free) :]])
 
     def signatures(self, point: Point, solved: StrainSolved) -> dict[str, FloatArray]:
         """Return changes per range of the living effects that the point has not."""
         has = {effect.name for effect in point.effects}
-        return {
-            effect.name: self.signature(solved, effect)
-            for effect in self.living
-            if effect.name not in has
-        }
+        return self._signatures(solved, [e for e in self.living if e.name not in has])
 
-    def signature(
-        self,
-        solved: StrainSolved,
-        effect: Effect,
-        trials: Sequence[Strength] | None = None,
-        size: float | None = None,
-    ) -> FloatArray:
-        """Return changes (components, n_runs, n_phi) for a strength of one range."""
-        omega = self.data.points.omega
-        rows = []
-        for trial in effect.trials if trials is None else trials:
-            state = self._predict(
-                solved.values, [*solved.changes, effect.at(trial)], solved.correction
-            )
-            change = earlier(state.wave, omega, -solved.delay) - solved.waveform
-            rows.append(change * (effect.scale / (effect.step if size is None else size)))
-        return np.array(rows)
+    def _signatures(self, solved: StrainSolved, effects: Sequence[Effect]) -> dict[str, FloatArray]:
+        there = [
+            (effect.hook, [*solved.model.changes, effect.at(trial)])
+            for effect in effects
+            for trial in effect.trials
+        ]
+        steps = [effect.step for effect in effects for _ in effect.trials]
+        rows = by_effects(solved.model, there, steps).waveform * self._scales(effects)
+        late = earlier(rows, self.data.points.omega, -solved.delay)
+        out, first = {}, 0
+        for effect in effects:
+            out[effect.name] = late[first : first + effect.components]
+            first += effect.components
+        return out
+
+    def _scales(self, effects: Sequence[Effect]) -> FloatArray:
+        """Return the ranges of strengths, (n_components, 1, 1)."""
+        each = [effect.scale for effect in effects for _ in range(effect.components)]
+        return np.array(each)[:, None, None]
 
     def remainder(self, point: Point, solved: StrainSolved) -> dict[str, FloatArray]:
         """Return smooth shapes over the wheel angle, by how they go with a run's conditions."""
@@ -321,7 +302,7 @@ class StrainProblem:
             reason = effect.untestable or self._idle(effect)
             if not reason:
                 try:
-                    rows = self.whitener(OWN)(self.signature(solved, effect))
+                    rows = self.whitener(OWN)(self._signatures(solved, [effect])[effect.name])
                     signal = float(np.linalg.norm(rows))
                     if signal < LEAST_SIGNAL:
                         reason = "changes nothing that this plan could show" + (

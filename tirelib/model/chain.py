@@ -52,30 +52,25 @@ def waveform(state: State, changes: Changes = (), *, low_pass: LowPass | None = 
     ParameterError, ConvergenceError
         From ring and contact.
     """
+    solved = strained(pressed(state, changes), changes, low_pass or LowPass())
+    return apply(solved, changes, "gage")
+
+
+def pressed(state: State, changes: Changes) -> State:
+    """Return the state with its contact, whose deflection the changed constants follow."""
     constants = [change for stage, change in changes if stage == "constants"]
-    solved = _pressed(state, constants)
-    solved = _apply(solved, changes, "contact")
-    assert solved.belt is not None  # noqa: S101 - set above
-    solved = solved.but(strain=strain_harmonics(solved.belt, solved.radius, solved.offset))
-    solved = _apply(solved, changes, "strain")
-    solved = solved.but(waveform=_filtered(solved, low_pass or LowPass()))
-    return _apply(solved, changes, "gage")
-
-
-def _pressed(state: State, constants: Sequence[Change]) -> State:
-    """Return the state with its contact, whose deflection the constants follow."""
     depth = np.where(np.isnan(state.deflection), FIRST_DEPTH, state.deflection)
-    changed = _changed(state, constants, depth)
+    changed = at_depth(state, constants, depth)
     before: tuple[FloatArray, FloatArray] | None = None
     for _ in range(SETTLE):
         contact = _press(changed)
         found = contact.deflection
         off = float(np.abs(found - depth).max())
-        if off < SETTLED or _alike(changed, _changed(state, constants, found)):
+        if off < SETTLED or _alike(changed, at_depth(state, constants, found)):
             break
-        assumed, depth = depth, _crossing(depth, found, before)
+        assumed, depth = depth, crossing(depth, found, before)
         before = assumed, found
-        changed = _changed(state, constants, depth).but(start=contact.start)
+        changed = at_depth(state, constants, depth).but(start=contact.start)
     else:
         raise ConvergenceError(
             f"model: after {SETTLE} passes, constants that follow the deflection still change it "
@@ -86,7 +81,16 @@ def _pressed(state: State, constants: Sequence[Change]) -> State:
     return changed.but(contact=contact, belt=contact.displacement, deflection=found)
 
 
-def _crossing(
+def strained(state: State, changes: Changes, low_pass: LowPass) -> State:
+    """Return a pressed state with the filtered waveform that effects at the gage act on."""
+    solved = apply(state, changes, "contact")
+    assert solved.belt is not None  # noqa: S101 - a pressed state has it
+    solved = solved.but(strain=strain_harmonics(solved.belt, solved.radius, solved.offset))
+    solved = apply(solved, changes, "strain")
+    return solved.but(waveform=_filtered(solved, low_pass))
+
+
+def crossing(
     assumed: FloatArray, found: FloatArray, before: tuple[FloatArray, FloatArray] | None
 ) -> FloatArray:
     """Return where each point's found deflection will be the assumed one, by the last two."""
@@ -99,7 +103,8 @@ def _crossing(
     return out
 
 
-def _changed(state: State, constants: Sequence[Change], depth: FloatArray) -> State:
+def at_depth(state: State, constants: Sequence[Change], depth: FloatArray) -> State:
+    """Return the state with changed constants, for a deflection (n_points,) that they follow."""
     state = state.but(deflection=depth)
     for change in constants:
         state = change(state)
@@ -122,7 +127,8 @@ def _press(state: State) -> radial.RadialContact:
     )
 
 
-def _apply(state: State, changes: Changes, stage: str) -> State:
+def apply(state: State, changes: Changes, stage: str) -> State:
+    """Return the state after the changes of one stage."""
     for at, change in changes:
         if at == stage:
             state = change(state)

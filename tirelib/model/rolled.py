@@ -102,7 +102,7 @@ class RolledSlopes:
 
 
 def rolled_slopes(
-    found: Rolling, here: Made, there: Sequence[Made], step: float, n_phi: int
+    found: Rolling, here: Made, there: Sequence[Made], step: float | Sequence[float], n_phi: int
 ) -> RolledSlopes:
     """Return slopes towards what a waveform is made of `step` away, for each of `there`.
 
@@ -110,15 +110,16 @@ def rolled_slopes(
     """
     at = residual(found.x, here.constants, found.mesh)[0]
     off = [residual(found.x, each.constants, found.mesh)[0] for each in there]
-    moved = slopes(found, [each.less(at, step) for each in off])
+    steps = np.broadcast_to(np.asarray(step, dtype=float), (len(there),))
+    moved = slopes(found, [each.less(at, float(h)) for each, h in zip(off, steps, strict=True)])
 
     def shown(z: FloatArray, made: Made) -> FloatArray:
         return strain(z, made.constants, made.gage, found.size, n_phi)
 
     base = shown(found.z, here)
     rows = []
-    for each, by in zip(there, moved, strict=True):
+    for each, by, h in zip(there, moved, steps, strict=True):
         dz = ALONG * fields(by_element(by.node), found.mesh.belt)
         along = (shown(found.z + dz, here) - shown(found.z - dz, here)) / (2.0 * ALONG)
-        rows.append(along + (shown(found.z, each) - base) / step)
+        rows.append(along + (shown(found.z, each) - base) / h)
     return RolledSlopes(np.stack(rows), np.stack([by.depth for by in moved]), moved)

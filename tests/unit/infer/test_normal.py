@@ -27,7 +27,10 @@ def test_evidence_is_a_ratio_of_gaussian_densities(case: tuple) -> None:
     before, more = {"base": 9.0, "one": 0.01}, 0.25
     weighed = Weighed(normal, normal.spread(before))
     found = evidence(
-        weighed, weighed.right(normal.right)[:, None], [normal.blocks["one"]], [np.full(2, more)]
+        weighed.gram,
+        weighed.right(normal.right)[:, None],
+        [normal.blocks["one"]],
+        [np.full(2, more)],
     )[0, 0]
     densities = [
         stats.multivariate_normal(cov=dense(rows, {**before, "one": one})).logpdf(rest)

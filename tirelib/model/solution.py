@@ -1,0 +1,365 @@
+"""The model of a tire with effects, solved at operating points: effects act on the rolling ring.
+
+constants        change what the rolling ring is made of, and may follow its deflection
+contact, strain  add what they change in the linear ring with the same constants
+gage             change the filtered waveform
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.errors import ConvergenceError
+from tirelib.model.base import Coordinate, smoothed
+from tirelib.model.chain import (
+    FIRST_DEPTH,
+    SETTLE,
+    SETTLED,
+    Change,
+    Changes,
+    apply,
+    at_depth,
+    crossing,
+    pressed,
+    strained,
+)
+from tirelib.model.rolled import STEP, Made, RolledSlopes, made_of, rolled_slopes
+from tirelib.model.state import Operating, State
+from tirelib.rolling.assemble import Unknowns
+from tirelib.rolling.constants import STIFFEST, Constants
+from tirelib.rolling.gage import Gage
+from tirelib.rolling.solve import Rolling, solve
+from tirelib.signal import LowPass
+from tirelib.waveforms import GRID
+
+Values = Mapping[str, float | FloatArray]
+SAME = (
+    *("radius", "free_radius", "EI", "mass", "rotary_inertia", "k_u", "k_v"),
+    *("dashpots", "k_t", "hardening", "thickness"),
+)
+"""Constants of the rolling ring that a state holds under the same name."""
+LINEAR_ONLY = ("damping", "inertia_share")
+"""Fields of a state that the rolling ring has not: a change of them acts on the linear ring."""
+SMALL = 1e-4
+"""Change of a waveform, over its largest value, by which a gage is differentiated."""
+DEPTH_STEP = 1e-6
+"""Change of the deflection by which constants that follow it are differentiated, [m]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solution:
+    """The solved model.
+
+    Attributes
+    ----------
+    values : mapping
+        Parameters of the tire.
+    points : Operating
+    changes : sequence of (stage, change)
+        Effects.
+    low_pass : LowPass
+    rolling : Rolling
+    made : Made
+        What it is made of, effects on the constants included.
+    shown : shape (n_points, n_phi), [-]
+        Filtered waveform without the effects at the gage.
+    waveform : shape (n_points, n_phi), [-]
+    """
+
+    values: Values
+    points: Operating
+    changes: Changes
+    low_pass: LowPass
+    rolling: Rolling
+    made: Made
+    shown: FloatArray
+    waveform: FloatArray
+
+    @property
+    def deflection(self) -> FloatArray:
+        """d0, (n_points,), [m]."""
+        return self.rolling.deflection
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SolutionSlopes:
+    """Slopes of a solution by some directions.
+
+    Attributes
+    ----------
+    waveform : shape (n_directions, n_points, n_phi)
+    rolled : RolledSlopes or None
+        Of the rolling ring, by those directions that move it.
+    """
+
+    waveform: FloatArray
+    rolled: RolledSlopes | None
+
+
+def solved(
+    values: Values,
+    points: Operating,
+    changes: Changes = (),
+    *,
+    low_pass: LowPass,
+    start: Rolling | Unknowns | None = None,
+) -> Solution:
+    """Return the solved model.
+
+    Parameters
+    ----------
+    values : mapping
+        Parameters of a tire without modal damping.
+    points : Operating
+    changes : sequence of (stage, change)
+        Effects.
+    low_pass : LowPass
+    start : Rolling or Unknowns, optional
+        A solution nearby; it saves time only.
+
+    Raises
+    ------
+    ParameterError, ConvergenceError
+        From ring, contact and effects.
+    """
+    own, linear = _split(values, points, changes)
+    rolling, made = _followed(values, points, own, start)
+    shown = smoothed(rolling.strain(made.gage, GRID.size), points, low_pass)
+    if linear:
+        shown = shown + added(values, points, own, linear, low_pass)
+    state = State.of(values, points, GRID).but(deflection=rolling.deflection, waveform=shown)
+    waveform = apply(state, changes, "gage").wave
+    return Solution(values, points, changes, low_pass, rolling, made, shown, waveform)
+
+
+def made_with(
+    values: Values, points: Operating, constants: Sequence[Change], depth: FloatArray
+) -> Made:
+    """Return what the rolling ring is made of with effects, for a deflection (n_points,)."""
+    made = made_of(values, points)
+    if not constants:
+        return made
+    before = State.of(values, points, GRID)
+    after = at_depth(before, constants, depth)
+    k = made.constants.but(
+        **{name: getattr(after, name) for name in SAME},
+        EA=np.minimum(after.EA, STIFFEST),
+        # a state's shear stiffness is the tire's less the tension
+        GA=np.minimum(after.GA + before.belt_tension, STIFFEST),
+        inflation=after.tension_pressure * after.width,
+        tension=made.constants.tension + after.tension,
+        half_width=0.5 * after.width,
+    )
+    return Made(k, Gage(after.offset, made.gage.liner))
+
+
+def by_values(found: Solution, free: Sequence[Coordinate]) -> SolutionSlopes:
+    """Return slopes by coordinates, then by relative load and relative pressure.
+
+    What effects add through the linear ring is held as it is (`added_by_values`).
+    """
+    v, p = found.values, found.points
+    there: list[tuple[Values, Operating, Changes]] = []
+    for coordinate in free:
+        moved = coordinate.moved(np.asarray(v[coordinate.name], dtype=float), STEP)
+        there.append(({**v, coordinate.name: moved}, p, found.changes))
+    there.append((v, replace(p, load=p.load * (1.0 + STEP)), found.changes))
+    there.append((v, replace(p, pressure=p.pressure * (1.0 + STEP)), found.changes))
+    shown, by = _towards(found, there, STEP)
+    return SolutionSlopes(_through_gage(found, shown), by)
+
+
+def added_by_values(found: Solution, free: Sequence[Coordinate], step: float) -> FloatArray:
+    """Return how coordinates move what effects add through the linear ring, (n_free, ...)."""
+    own, linear = _split(found.values, found.points, found.changes)
+    if not linear:
+        return np.zeros((len(free), 1, 1))
+    here, rows = _added(found.values, found, own, linear), []
+    for coordinate in free:
+        value = np.asarray(found.values[coordinate.name], dtype=float)
+        moved = {**found.values, coordinate.name: coordinate.moved(value, step)}
+        rows.append((_added(moved, found, own, linear) - here) / step)
+    return _through_gage(found, np.stack(rows))
+
+
+def by_effects(
+    found: Solution, there: Sequence[tuple[str, Changes]], steps: Sequence[float]
+) -> SolutionSlopes:
+    """Return slopes towards changed effects.
+
+    Parameters
+    ----------
+    found : Solution
+    there : sequence of (stage, changes)
+        All effects, one of them, which acts at this stage, with its strength `step` away.
+    steps : sequence of float
+    """
+    own, linear = _split(found.values, found.points, found.changes)
+    shown = np.zeros((len(there), *found.shown.shape))
+    at_gage, plain, here = np.zeros_like(shown), None, None
+    rolled: list[int] = []
+    for k, ((stage, changes), step) in enumerate(zip(there, steps, strict=True)):
+        if stage == "gage":
+            at_gage[k] = (_at_gage(found, found.shown, changes) - found.waveform) / step
+            continue
+        own_there, linear_there = _split(found.values, found.points, changes)
+        if stage == "constants" and len(linear_there) == len(linear):
+            rolled.append(k)
+            continue
+        if plain is None or here is None:
+            plain = _plain(found.values, found.points, own)
+            here = _added(found.values, found, own, linear, plain)
+        shown[k] = (_added(found.values, found, own_there, linear_there, plain) - here) / step
+    by = None
+    if rolled:
+        moved = [(found.values, found.points, there[k][1]) for k in rolled]
+        shown[rolled], by = _towards(found, moved, [steps[k] for k in rolled])
+    rows = _through_gage(found, shown) + at_gage
+    return SolutionSlopes(rows, by)
+
+
+def _plain(values: Values, points: Operating, own: Sequence[Change]) -> State:
+    return pressed(State.of(values, points, GRID), [("constants", change) for change in own])
+
+
+def _added(
+    values: Values,
+    found: Solution,
+    own: Sequence[Change],
+    linear: Changes,
+    plain: State | None = None,
+) -> FloatArray:
+    """Return what changes of the linear ring change there, filtered, (n_points, n_phi)."""
+    return added(values, found.points, own, linear, found.low_pass, plain)
+
+
+def added(
+    values: Values,
+    points: Operating,
+    own: Sequence[Change],
+    linear: Changes,
+    low_pass: LowPass,
+    plain: State | None = None,
+) -> FloatArray:
+    """Return what changes of the linear ring change there, filtered, (n_points, n_phi).
+
+    `own` changes the constants of both rings; `plain` is the linear ring with them alone.
+    """
+    if not linear:
+        return np.zeros((len(points), GRID.size))
+    if plain is None:
+        plain = _plain(values, points, own)
+    with_them = plain
+    if any(stage == "constants" for stage, _ in linear):
+        every = [*(("constants", change) for change in own), *linear]
+        with_them = pressed(State.of(values, points, GRID), every)
+    return strained(with_them, linear, low_pass).wave - strained(plain, (), low_pass).wave
+
+
+def _at_gage(found: Solution, shown: FloatArray, changes: Changes) -> FloatArray:
+    """Return a waveform (n_points, n_phi) after the effects at the gage."""
+    state = State.of(found.values, found.points, GRID)
+    return apply(state.but(deflection=found.deflection, waveform=shown), changes, "gage").wave
+
+
+def _through_gage(found: Solution, rows: FloatArray) -> FloatArray:
+    """Return small changes (k, n_points, n_phi) of the waveform as the gage shows them."""
+    if not any(stage == "gage" for stage, _ in found.changes):
+        return rows
+    size = SMALL * float(np.abs(found.shown).max())
+    out = []
+    for row in rows:
+        step = size / max(float(np.abs(row).max()), 1e-300)
+        moved = _at_gage(found, found.shown + step * row, found.changes)
+        out.append((moved - found.waveform) / step)
+    return np.stack(out)
+
+
+def _towards(
+    found: Solution,
+    there: Sequence[tuple[Values, Operating, Changes]],
+    steps: float | Sequence[float],
+) -> tuple[FloatArray, RolledSlopes]:
+    """Return slopes of the filtered waveform before the gage, and of the rolling ring."""
+    depth = found.deflection
+    moved = [made_with(v, p, _split(v, p, changes)[0], depth) for v, p, changes in there]
+    each = [*np.broadcast_to(np.asarray(steps, dtype=float), (len(there),)).tolist()]
+    own = _split(found.values, found.points, found.changes)[0]
+    deeper = made_with(found.values, found.points, own, depth + DEPTH_STEP)
+    follow = not _same(deeper.constants, found.made.constants)
+    if follow:
+        moved, each = [*moved, deeper], [*each, DEPTH_STEP]
+    by = rolled_slopes(found.rolling, found.made, moved, each, GRID.size)
+    if follow:
+        by = _following(by)
+    return smoothed(by.strain, found.points, found.low_pass), by
+
+
+def _following(by: RolledSlopes) -> RolledSlopes:
+    """Return slopes with constants that follow the deflection; the last direction is theirs."""
+    strain, depth, last = by.strain[-1], by.deflection[-1], by.unknowns[-1]
+    share = by.deflection[:-1] / (1.0 - depth)
+    return RolledSlopes(
+        by.strain[:-1] + share[:, :, None] * strain,
+        by.deflection[:-1] + share * depth,
+        [each.plus(last, much) for each, much in zip(by.unknowns[:-1], share, strict=True)],
+    )
+
+
+def _followed(
+    values: Values,
+    points: Operating,
+    constants: Sequence[Change],
+    start: Rolling | Unknowns | None,
+) -> tuple[Rolling, Made]:
+    """Return the rolling ring whose constants follow its deflection."""
+    depth = np.full(len(points), FIRST_DEPTH)
+    if start is not None:
+        depth = start.depth if isinstance(start, Unknowns) else start.deflection
+    before: tuple[FloatArray, FloatArray] | None = None
+    for _ in range(SETTLE):
+        made = made_with(values, points, constants, depth)
+        start = solve(made.constants, start=start)
+        found = start.deflection
+        off = float(np.abs(found - depth).max())
+        if off < SETTLED:
+            return start, made
+        if _same(made_with(values, points, constants, found).constants, made.constants):
+            return start, made
+        assumed, depth = depth, crossing(depth, found, before)
+        before = assumed, found
+    raise ConvergenceError(
+        f"model: after {SETTLE} passes, constants that follow the deflection still change it by "
+        f"{off:.2g} m; an effect follows it too steeply: use a smaller strength",
+        found,
+        off,
+    )
+
+
+def _split(
+    values: Values, points: Operating, changes: Changes
+) -> tuple[list[Change], list[tuple[str, Change]]]:
+    """Return changes of the rolling ring's constants, and those that act on the linear one."""
+    own: list[Change] = []
+    linear: list[tuple[str, Change]] = []
+    if not changes:
+        return own, linear
+    state = State.of(values, points, GRID).but(deflection=np.full(len(points), FIRST_DEPTH))
+    for stage, change in changes:
+        if stage == "constants":
+            after = change(state)
+            if all(getattr(after, name) is getattr(state, name) for name in LINEAR_ONLY):
+                own.append(change)
+            else:
+                linear.append((stage, change))
+        elif stage != "gage":
+            linear.append((stage, change))
+    return own, linear
+
+
+def _same(a: Constants, b: Constants) -> bool:
+    return all(
+        np.array_equal(getattr(a, field.name), getattr(b, field.name)) for field in fields(a)
+    )
