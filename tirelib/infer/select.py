@@ -44,6 +44,8 @@ LAW = 0.15
 """Relative standard deviation by which a law is off as conditions change."""
 SINGLES, PARTNERS, LEADERS = 6, 3, 3
 """Hypotheses that are fitted exactly: single effects, partners of each leader, and leaders."""
+LEAVES = 0.5
+"""Share of the evidence against a hypothesis that a further effect may leave, to first order."""
 MOST = 3
 """Effects of a hypothesis at most."""
 SLACK = 2.0
@@ -393,7 +395,7 @@ def select(
 
     if base.p > false_alarm:
         return done("none", ())
-    level = [at((name,), base) for name in _leading(base, effects)[:SINGLES]]
+    level = [at((name,), base) for name in _further(base, effects, SINGLES, LEADERS)]
     for size in range(1, MOST + 1):
         # two leaders may lead to one and the same set
         fitted = list(dict.fromkeys(h for h in level if h is not None))
@@ -406,7 +408,7 @@ def select(
         level = []
         for leader in [h for h in fitted if h.plausible][: LEADERS if size == 1 else 1]:
             added = _added(leader, len(had))
-            for partner in _partners(leader, effects)[:PARTNERS]:
+            for partner in _further(leader, effects, PARTNERS, 0):
                 level.append(at((*added, partner), leader))
     free = [h for h in tried.values() if h is not None and h.fit.names[len(had) :]]
     free = [h for h in free if h.plausible and h.free_p > false_alarm]
@@ -423,20 +425,17 @@ def _added(hypothesis: Hypothesis, had: int) -> tuple[str, ...]:
     return hypothesis.names[had:]
 
 
-def _leading(hypothesis: Hypothesis, effects: dict[str, Effect]) -> list[str]:
-    """Return effects by their evidence beside a hypothesis, best first."""
-    found = {name: value for name, value in hypothesis.evidence.items() if name in effects}
-    return sorted(found, key=lambda name: -found[name])
-
-
-def _partners(leader: Hypothesis, effects: dict[str, Effect]) -> list[str]:
+def _further(leader: Hypothesis, effects: dict[str, Effect], most: int, least: int) -> list[str]:
     """Return the effects that take away most of what stands against a hypothesis, best first.
 
-    One that leaves more than half of it, to first order, is no partner.
+    One that leaves more than `LEAVES` of it, to first order, is tried only if fewer than `least`
+    leave less: two effects may be needed together.
     """
     excess = leader.statistic - leader.limit
     found = {name: left for name, left in leader.left.items() if name in effects}
-    return sorted((n for n, left in found.items() if left < 0.5 * excess), key=lambda n: found[n])
+    every = sorted(found, key=lambda name: found[name])
+    good = sum(found[name] < LEAVES * excess for name in every)
+    return every[: min(most, max(good, least))]
 
 
 def _start(
