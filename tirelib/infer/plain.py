@@ -25,11 +25,9 @@ ROUNDS = 60
 SETTLED = 0.01
 """Relative change of all variances below which they are learned."""
 START = 0.02**2
-LEAST = 0.003**2
-"""Least variance of an effect's apparent strength."""
 FLOOR = 0.3
-"""Least size of a group of shapes over that of the largest: what twenty tires of one family hardly
-show, those of another may."""
+"""Least size of an effect, or of a group of shapes, over that of the largest in its family: what
+twenty tires of one family hardly show, those of another may."""
 TINY = 1e-8
 """Least variance while they are learned."""
 BASE, ROUGHLY = "base", "roughly "
@@ -74,8 +72,10 @@ class Family:
         count = known.sum(axis=0)
         mean = np.where(count > 0, total / np.maximum(count, 1), START)
         shapes = np.array(["," in name for name in self.blocks])
-        floor = FLOOR**2 * float(np.max(mean, where=shapes, initial=0.0))
-        least = np.where(shapes, floor, LEAST)
+        floor = [
+            FLOOR**2 * float(np.max(mean, where=kind, initial=0.0)) for kind in (~shapes, shapes)
+        ]
+        least = np.where(shapes, floor[1], floor[0])
         return dict(zip(self.blocks, np.maximum(mean, least).tolist(), strict=True))
 
     def on(self, normal: Normal) -> FloatArray:

@@ -109,9 +109,9 @@ class Whitener:
         volume = -float(np.sum(np.log(lower[:, diagonal, diagonal])))
         return cls(harmonics, np.linalg.inv(lower), volume)
 
-    def __call__(self, waves: FloatArray) -> FloatArray:
+    def __call__(self, rows: FloatArray) -> FloatArray:
         """Return whitened rows (..., n)."""
-        found = np.asarray(waves @ self.harmonics)
+        found = np.asarray(rows @ self.harmonics)
         by_run = np.moveaxis(found.reshape(-1, *found.shape[-2:]), 0, 2)
         white = np.moveaxis(self.inverse @ by_run, 2, 0)
-        return np.ascontiguousarray(white).reshape(*waves.shape[:-2], -1)
+        return np.ascontiguousarray(white).reshape(*rows.shape[:-2], -1)

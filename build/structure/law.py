@@ -1,0 +1,93 @@
+"""Learn by how much the catalogue's laws are off where another simulator has the same effect.
+
+    python build/structure/law.py
+
+Fits every campaign with one known effect with that effect, and prints for each family the log
+likelihood of the relative standard deviation of a law (`tirelib.infer.select.LAW`), summed over its
+campaigns. The other families' plain tires give the rest of the covariance.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import numpy as np
+
+from structure.cases import load_case
+from structure.judge import _identified
+from structure.learn import FAMILIES, OUT, say
+from tirelib.effects import CATALOGUE
+from tirelib.errors import TirelibError
+from tirelib.identify.campaign_data import straight_runs
+from tirelib.infer.normal import Weighed
+from tirelib.infer.plain import BASE, Family, load, pooled
+from tirelib.infer.posterior import posterior
+from tirelib.infer.select import LAW, OWN, SIZES, _law_errors, _size_prior, _sized
+from tirelib.infer.strain import StrainProblem
+from tirelib.threads import one_thread
+
+LOOSER = tuple(2.0 ** np.arange(-3, 4))
+
+
+def main() -> None:
+    """Print the likelihoods."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=OUT)
+    parser.add_argument("--families", default=",".join(FAMILIES))
+    options = parser.parse_args()
+    say(f"{'law error':36}" + " ".join(f"{LAW * looser:8.3f}" for looser in LOOSER))
+    with one_thread():
+        for family in options.families.split(","):
+            others = [f for f in load(options.out / "plain_tires.npz")[0] if f.name != family]
+            total = np.zeros(len(LOOSER))
+            for file in sorted((options.out / family).glob("*.npz")):
+                kind = file.stem.split("-")[1]
+                if kind in CATALOGUE:
+                    found = likelihoods(file, kind, others, options.out)
+                    if found is not None:
+                        total += found
+                        say(row(f"{family} {file.stem}", found))
+            say(row(family, total))
+
+
+def row(name: str, found: np.ndarray) -> str:
+    """Return a line of log likelihoods less the largest."""
+    return f"{name:36}" + " ".join(f"{each:8.1f}" for each in found - found.max())
+
+
+def likelihoods(file: Path, kind: str, others: list[Family], out: Path) -> np.ndarray | None:
+    """Return the log likelihoods of law errors for one campaign with its own effect."""
+    case = load_case(file)
+    runs = straight_runs(case.waves)
+    try:
+        values = _identified(runs, out / "values" / f"{case.family}-{file.stem}.pkl")
+        problem = StrainProblem(runs, values, list(CATALOGUE.values()))
+        own = max(family.own for family in others)
+        start = [np.zeros(CATALOGUE[kind].components)]
+        fit = posterior(problem, [CATALOGUE[kind]], pooled(others), own, strengths=start)
+    except TirelibError as error:
+        say(f"{file.name}: {error}")
+        return None
+    found = []
+    for looser in LOOSER:
+        each = []
+        for family in others:
+            for width in OWN:
+                normal = fit.normal(problem, width)
+                for size in SIZES:
+                    allowed = {
+                        **_sized(family.spread(), size),
+                        BASE: fit.widths**2,
+                        **_law_errors(fit, looser),
+                    }
+                    weighed = Weighed(normal, normal.spread(allowed))
+                    volume = problem.whitener(width).log_volume
+                    each.append(weighed.log_likelihood() + volume + _size_prior(size))
+        found.append(max(each))
+    return np.array(found)
+
+
+if __name__ == "__main__":
+    main()
