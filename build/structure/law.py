@@ -75,7 +75,7 @@ def likelihoods(file: Path, kind: str, others: list[Family], out: Path) -> np.nd
         each = []
         for family in others:
             for width in OWN:
-                normal = fit.normal(problem, width)
+                normal = fit.view(problem, width).normal
                 for size in SIZES:
                     allowed = {
                         **_sized(family.spread(), size),

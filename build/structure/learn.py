@@ -14,6 +14,7 @@ import json
 import pickle
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ from tirelib.effects import CATALOGUE
 from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.identify import estimated
-from tirelib.infer.plain import Family, Whitened, learn, save
+from tirelib.infer.plain import Family, learn, save
 from tirelib.infer.posterior import Posterior, posterior
 from tirelib.infer.select import OWN, judged
 from tirelib.infer.strain import StrainProblem
@@ -111,10 +112,7 @@ def fit_of(file: Path) -> Fit | None:
 
 def family_of(name: str, fits: Sequence[Fit]) -> Family:
     """Return what a family's tires show."""
-    tires = [
-        [Whitened(own, fit.normal(problem, own), problem.whitener(own).log_volume) for own in OWN]
-        for problem, fit in fits
-    ]
+    tires = [[replace(fit.view(problem, own), white=np.zeros(0)) for own in OWN] for problem, fit in fits]
     family = learn(name, tires, fits[0][0].widths)
     say(f"{name}: {len(fits)} tires, median of a run's own misfit {family.own:g}")
     return family

@@ -94,7 +94,7 @@ class Family:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Whitened:
+class View:
     """Normal equations of a tire's plan at one size of the misfit that each run has for itself.
 
     Attributes
@@ -103,20 +103,23 @@ class Whitened:
     normal : Normal
     log_volume : float
         Logarithm of the whitening's determinant: likelihoods at several sizes compare with it.
+    white : shape (m, n)
+        Whitened rows; empty where only the normal equations are kept.
     """
 
     own: float
     normal: Normal
     log_volume: float
+    white: FloatArray
 
 
-def learn(name: str, tires: Sequence[Sequence[Whitened]], widths: FloatArray) -> Family:
+def learn(name: str, tires: Sequence[Sequence[View]], widths: FloatArray) -> Family:
     """Return a family from its plain tires.
 
     Parameters
     ----------
     name : str
-    tires : sequence of sequence of Whitened
+    tires : sequence of sequence of View
         Each about a fitted model without effects, at the same sizes of a run's own misfit. Every
         tire takes its most likely one.
     widths : shape (n_base,)

@@ -7,7 +7,7 @@ plain tires show beside their model, and the priors of the base and of the stren
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from tirelib.arrays import FloatArray
 from tirelib.effects import Effect
 from tirelib.errors import ConvergenceError, TirelibError
 from tirelib.infer.normal import Normal, Weighed
-from tirelib.infer.plain import BASE, ROUGHLY
+from tirelib.infer.plain import BASE, ROUGHLY, View
 from tirelib.infer.problem import Point, Problem
 
 MOST_STEPS = 30
@@ -59,18 +59,22 @@ class Posterior:
     widths: FloatArray
     covariance: FloatArray
     cost: float
-    _normals: dict[float, Normal] = field(default_factory=dict)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Of the model's effects."""
         return tuple(effect.name for effect in self.point.effects)
 
-    def normal(self, problem: Problem, own: float) -> Normal:
-        """Return the normal equations in the whitening of a family."""
-        if own not in self._normals:
-            self._normals[own] = Normal.of(self.rows, self.solved.rest, problem.whitener(own))
-        return self._normals[own]
+    def view(self, problem: Problem, own: float) -> View:
+        """Return the normal equations for one size of the misfit that each run has for itself."""
+        whiten = problem.whitener(own)
+        white, first = {}, 0
+        every = whiten(np.concatenate(list(self.rows.values())))
+        for name, rows in self.rows.items():
+            white[name] = every[first : first + len(rows)]
+            first += len(rows)
+        normal = Normal.of(white, whiten(self.solved.rest))
+        return View(own, normal, whiten.log_volume, every)
 
     def std(self, index: int) -> FloatArray:
         """Return standard deviations of an effect's strength, in its unit."""
@@ -185,7 +189,7 @@ def posterior(
     block = normal.blocks[BASE]
     covariance = np.asarray(np.linalg.inv(metric.gram[block, block] + np.diag(widths**-2)))
     cost = _cost(metric, normal.right, normal.square, _coordinates(point), widths)
-    return Posterior(point, solved, every, widths, covariance, cost, {own: normal})
+    return Posterior(point, solved, every, widths, covariance, cost)
 
 
 def _coordinates(point: Point) -> FloatArray:

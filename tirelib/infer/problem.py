@@ -42,6 +42,9 @@ class Whitening(Protocol):
     def __call__(self, rows: FloatArray) -> FloatArray:
         """Return whitened rows."""
 
+    def coloured(self, white: FloatArray) -> FloatArray:
+        """Return rows (k, ...) whose whitened ones are these, (k, n)."""
+
 
 class Solved(Protocol):
     """The model at a point."""

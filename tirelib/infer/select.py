@@ -22,8 +22,8 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
-from tirelib.infer.normal import Normal, Weighed, beside, evidence
-from tirelib.infer.plain import BASE, FOLDS, ROUGHLY, Family, pooled
+from tirelib.infer.normal import Weighed, beside, evidence
+from tirelib.infer.plain import BASE, FOLDS, ROUGHLY, Family, View, pooled
 from tirelib.infer.posterior import Posterior, posterior
 from tirelib.infer.problem import Problem
 
@@ -49,7 +49,7 @@ LEAVES = 0.5
 MOST = 3
 """Effects of a hypothesis at most."""
 SLACK = 2.0
-"""Standard deviations by which a strength may leave its range."""
+"""Standard deviations by which a strength may leave its range, those of its law included."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,25 +123,40 @@ class Verdict:
 class Null:
     """A fitted hypothesis among the plain tires of one family.
 
+    What a tire leaves over what its family leaves (its size), and the misfit that each run has for
+    itself, are taken at their likeliest, by themselves without a further effect and with it: some
+    tires leave much of everything, some little, and a hidden effect must pass neither for a tire
+    that leaves much nor for runs that differ.
+
     Parameters
     ----------
-    normal : Normal
-        About the fit, whitened at the most likely size of a run's own misfit.
+    problem : Problem
+    views : sequence of View
+        Normal equations about the fit at every size of a run's own misfit.
+    rows : shape (m, ...)
+        What they are made of.
     family : Family
     allowed : mapping of block to variance
         What the hypothesis leaves open beside what plain tires show.
     """
 
     def __init__(
-        self, normal: Normal, family: Family, allowed: Mapping[str, float | FloatArray]
+        self,
+        problem: Problem,
+        views: Sequence[View],
+        rows: FloatArray,
+        family: Family,
+        allowed: Mapping[str, float | FloatArray],
     ) -> None:
-        self.normal, self.family, self.allowed = normal, family, allowed
+        normal = views[0].normal
+        self.views, self.family, self.allowed = views, family, allowed
         self.names = [
             name
             for name in normal.blocks
             if name != BASE and not name.startswith(ROUGHLY) and name not in allowed
         ]
         self.blocks = [normal.blocks[name] for name in self.names]
+        self.seen_at = [(v.normal.right[:, None], np.array([v.normal.square])) for v in views]
         random = np.random.default_rng(len(family))
         planted = family.on(normal)
         for name, variance in allowed.items():
@@ -149,35 +164,51 @@ class Null:
                 block = normal.blocks[name]
                 size = (len(family), block.stop - block.start)
                 planted[:, block] = np.sqrt(variance) * random.standard_normal(size)
-        values, vectors = np.linalg.eigh(normal.gram)
-        noise = random.standard_normal(planted.shape) * np.sqrt(np.clip(values, 0.0, None))
-        self.right = normal.gram @ planted.T + vectors @ noise.T
+        whiten = problem.whitener(self._likeliest())
+        tires = whiten.coloured(random.standard_normal((len(family), normal.count)))
+        tires = tires + np.tensordot(planted, rows, axes=1)
+        self.tires_at = []
+        for view in views:
+            white = problem.whitener(view.own)(tires)
+            self.tires_at.append((view.white @ white.T, np.sum(white**2, axis=1)))
+
+    def _likeliest(self) -> float:
+        """Return the likeliest size of a run's own misfit by the hypothesis alone."""
+        typical, found = self.family.spread(), []
+        for view in self.views:
+            for size in SIZES:
+                diagonal = view.normal.spread({**_sized(typical, size), **self.allowed})
+                likelihood = Weighed(view.normal, diagonal).log_likelihood()
+                found.append((likelihood + view.log_volume + _size_prior(size), view.own))
+        return max(found)[1]
 
     def _at_sizes(
-        self, without: int | None, right: FloatArray
+        self, without: int | None, right: Sequence[tuple[FloatArray, FloatArray]]
     ) -> list[tuple[FloatArray, FloatArray, FloatArray, list[FloatArray]]]:
-        """Return B C^-1 B', B C^-1 r, log densities and what is more by block, for every size."""
+        """Return B C^-1 B', B C^-1 r, log densities and what is more by block, for every size.
+
+        `right` holds B r, (m, k), and r' r, (k,), of k residuals for every view.
+        """
         typical, out = self.family.spread(without), []
-        for size in SIZES:
-            diagonal = self.normal.spread({**_sized(typical, size), **self.allowed})
-            weighed = Weighed(self.normal, diagonal)
-            more = [
-                MORE * diagonal[block]
-                if "," in name
-                else np.full(block.stop - block.start, PRIOR**2)
-                for name, block in zip(self.names, self.blocks, strict=True)
-            ]
-            likelihood = weighed.gain(right) + _size_prior(size)
-            out.append((weighed.gram, weighed.right(right), likelihood, more))
+        for view, (turned, square) in zip(self.views, right, strict=True):
+            for size in SIZES:
+                diagonal = view.normal.spread({**_sized(typical, size), **self.allowed})
+                weighed = Weighed(view.normal, diagonal)
+                more = [
+                    MORE * diagonal[block]
+                    if "," in name
+                    else np.full(block.stop - block.start, PRIOR**2)
+                    for name, block in zip(self.names, self.blocks, strict=True)
+                ]
+                likelihood = weighed.gain(turned) - 0.5 * square
+                likelihood = likelihood + view.log_volume + _size_prior(size)
+                out.append((weighed.gram, weighed.right(turned), likelihood, more))
         return out
 
-    def _of(self, without: int | None, right: FloatArray) -> FloatArray:
-        """Return the log evidence of every effect and shape for right-hand sides, (n_names, k).
-
-        Each right-hand side is one tire's. It is judged at its most likely size of what plain tires
-        show, by itself without the effect and with it: some tires leave much of everything, some
-        little, and a hidden effect must not pass for a tire that leaves much.
-        """
+    def _of(
+        self, without: int | None, right: Sequence[tuple[FloatArray, FloatArray]]
+    ) -> FloatArray:
+        """Return the log evidence of every effect and shape for k residuals, (n_names, k)."""
         plain, missing = [], []
         for gram, turned, likelihood, more in self._at_sizes(without, right):
             plain.append(likelihood)
@@ -186,11 +217,11 @@ class Null:
 
     def seen(self) -> FloatArray:
         """Return the log evidence of every effect and shape beside the hypothesis, (n_names,)."""
-        return self._of(None, self.normal.right[:, None])[:, 0]
+        return self._of(None, self.seen_at)[:, 0]
 
     def beside(self) -> dict[str, float]:
         """Return the largest evidence against the hypothesis with each further effect, [nats]."""
-        sizes, out = self._at_sizes(None, self.normal.right[:, None]), {}
+        sizes, out = self._at_sizes(None, self.seen_at), {}
         for k, name in enumerate(self.names):
             if "," in name:
                 continue
@@ -210,7 +241,8 @@ class Null:
         for fold in range(FOLDS):
             part = self.family.fold == fold
             if part.any():
-                out[part] = self._of(fold, self.right[:, part]).max(axis=0)
+                right = [(turned[:, part], square[part]) for turned, square in self.tires_at]
+                out[part] = self._of(fold, right).max(axis=0)
         return out
 
 
@@ -229,15 +261,20 @@ def judged(
     own_effects : int
         How many of the fit's effects the model had already: they are part of it.
     """
-    nulls = [_null(problem, fit, family, 1.0) for family in families]
+    views = [fit.view(problem, own) for own in OWN]
+    rows = np.concatenate(list(fit.rows.values()))
+    widths: dict[str, float | FloatArray] = {BASE: fit.widths**2}
+    allowed = {**widths, **_law_errors(fit, 1.0)}
+    nulls = [Null(problem, views, rows, family, allowed) for family in families]
     seen = [null.seen() for null in nulls]
     largest = [null.largest() for null in nulls]
     each = [_rank(float(s.max()), t) for s, t in zip(seen, largest, strict=True)]
     best = int(np.argmax(each))
     free = each[best]
     if fit.point.effects and free <= alpha:
+        allowed = {**widths, **_law_errors(fit, 1.0 / LAW)}
         for family in families:
-            null = _null(problem, fit, family, 1.0 / LAW)
+            null = Null(problem, views, rows, family, allowed)
             free = max(free, _rank(float(null.seen().max()), null.largest()))
     top = int(np.argmax(seen[best]))
     limits = [float(np.quantile(each, 1.0 - alpha)) for each in largest]
@@ -260,44 +297,6 @@ def judged(
         limits[best],
         left,
     )
-
-
-def _null(
-    problem: Problem,
-    fit: Posterior,
-    family: Family,
-    looser: float,
-    more: Mapping[str, float] | None = None,
-) -> Null:
-    allowed: dict[str, float | FloatArray] = {
-        BASE: fit.widths**2,
-        **_law_errors(fit, looser),
-        **(more or {}),
-    }
-    return Null(_likeliest(problem, fit, family, allowed), family, allowed)
-
-
-def _likeliest(
-    problem: Problem,
-    fit: Posterior,
-    family: Family,
-    allowed: Mapping[str, float | FloatArray],
-) -> Normal:
-    """Return the normal equations at the most likely size of what each run has for itself.
-
-    It belongs to a laboratory rather than to a tire, so that no family may tell it.
-    """
-    typical, found = family.spread(), []
-    for own in OWN:
-        normal = fit.normal(problem, own)
-        volume = problem.whitener(own).log_volume
-        each = [
-            Weighed(normal, normal.spread({**_sized(typical, size), **allowed})).log_likelihood()
-            + _size_prior(size)
-            for size in SIZES
-        ]
-        found.append((max(each) + volume, own))
-    return fit.normal(problem, max(found)[1])
 
 
 def _sized(typical: Mapping[str, float], size: float) -> dict[str, float]:
@@ -332,7 +331,7 @@ def _law_errors(fit: Posterior, looser: float) -> dict[str, float]:
 def plausible(fit: Posterior, own_effects: int) -> bool:
     """Return whether the strengths of the further effects lie in their ranges."""
     for k, effect in enumerate(fit.point.effects):
-        slack = SLACK * fit.std(k)
+        slack = SLACK * np.hypot(fit.std(k), LAW * np.linalg.norm(fit.point.strengths[k]))
         low, high = effect.low - slack, effect.high + slack
         inside = (fit.point.strengths[k] >= low) & (fit.point.strengths[k] <= high)
         if k >= own_effects and not inside.all():
@@ -450,7 +449,7 @@ def _start(
     if near is None:
         return [*had, *(np.zeros(e.components) for e in more)]
     known = dict(zip(near.names, near.fit.point.strengths, strict=True))
-    normal = near.fit.normal(problem, own)
+    normal = near.fit.view(problem, own).normal
     wide = {e.name: 1.0 for e in more if e.name not in known}
     diagonal = normal.spread({**spread, BASE: near.fit.widths**2, **wide})
     mean = Weighed(normal, diagonal).mean(normal.right)

@@ -42,13 +42,14 @@ class Whitener:
     ----------
     harmonics : shape (n_phi, n_harmonics)
         Orthonormal cosines and sines.
-    inverse : shape (n_runs, n_harmonics, n_harmonics)
-        Inverse Cholesky factors.
+    lower, inverse : shape (n_runs, n_harmonics, n_harmonics)
+        Cholesky factors and their inverses.
     log_volume : float
         Logarithm of the determinant of all of them together.
     """
 
     harmonics: FloatArray
+    lower: FloatArray
     inverse: FloatArray
     log_volume: float
 
@@ -107,7 +108,7 @@ class Whitener:
         covariance[:, diagonal, diagonal] += np.tile(power, 2)
         lower = np.linalg.cholesky(covariance)
         volume = -float(np.sum(np.log(lower[:, diagonal, diagonal])))
-        return cls(harmonics, np.linalg.inv(lower), volume)
+        return cls(harmonics, lower, np.linalg.inv(lower), volume)
 
     def __call__(self, rows: FloatArray) -> FloatArray:
         """Return whitened rows (..., n)."""
@@ -115,3 +116,8 @@ class Whitener:
         by_run = np.moveaxis(found.reshape(-1, *found.shape[-2:]), 0, 2)
         white = np.moveaxis(self.inverse @ by_run, 2, 0)
         return np.ascontiguousarray(white).reshape(*rows.shape[:-2], -1)
+
+    def coloured(self, white: FloatArray) -> FloatArray:
+        """Return waveforms (k, n_runs, n_phi) whose whitened rows are these, (k, n)."""
+        by_run = np.moveaxis(white.reshape(len(white), *self.lower.shape[:2]), 0, 2)
+        return np.asarray(np.moveaxis(self.lower @ by_run, 2, 0) @ self.harmonics.T)

@@ -49,6 +49,9 @@ class Louder:
     def __call__(self, rows: FloatArray) -> FloatArray:
         return np.asarray(rows / self.std)
 
+    def coloured(self, white: FloatArray) -> FloatArray:
+        return np.asarray(white * self.std)
+
 
 class Toy:
     """Measured numbers that are linear in everything."""
