@@ -106,7 +106,7 @@ class Whitener:
         covariance += moved @ moved.swapaxes(1, 2)
         diagonal = np.arange(2 * order.size)
         covariance[:, diagonal, diagonal] += np.tile(power, 2)
-        lower = np.linalg.cholesky(covariance)
+        lower = np.asarray(np.linalg.cholesky(covariance), dtype=float)
         volume = -float(np.sum(np.log(lower[:, diagonal, diagonal])))
         return cls(harmonics, lower, np.linalg.inv(lower), volume)
 
