@@ -65,6 +65,11 @@ class Posterior:
         """Of the model's effects."""
         return tuple(effect.name for effect in self.point.effects)
 
+    @property
+    def coordinates(self) -> FloatArray:
+        """Coordinates of the base, and strengths in ranges, (n_coordinates,)."""
+        return _coordinates(self.point)
+
     def view(self, problem: Problem, own: float) -> View:
         """Return the normal equations for one size of the misfit that each run has for itself."""
         whiten = problem.whitener(own)

@@ -6,7 +6,9 @@ largest log evidence of any of these beside the hypothesis,
 
     T(H) = max over a of log p(r | H and a) - log p(r | H),
 
-and its p-value is the rank of T among plain tires with the hypothesis planted in the user's plan:
+to first order about H for every a, and by its own fit for those effects that first order finds
+likeliest: a base that has bent itself to a strong effect is too far from the truth for first order.
+and Its p-value is the rank of T among plain tires with the hypothesis planted in the user's plan:
 for each family of tires by itself, judged by what its other tires show; the largest p over the
 families counts, so that a tire that is like any one of them is covered. Every hypothesis with
 p > alpha is in the set. Its smallest members are what the data say (Ferrari and Yang 2015): none in
@@ -15,7 +17,7 @@ apart; none at all, something unknown is there.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -74,6 +76,10 @@ class Hypothesis:
         T that plain tires exceed with the false-alarm probability.
     left : mapping of name to float
         Largest T, less this limit, that first order leaves beside each further effect.
+    seen, level : shape (n_families,)
+        T to first order, and log likelihood of the fit, by family, [nats].
+    largest : tuple of shape (n_tires,)
+        T of plain tires with this hypothesis planted, by family.
     """
 
     fit: Posterior
@@ -86,6 +92,9 @@ class Hypothesis:
     evidence: dict[str, float]
     limit: float
     left: dict[str, float]
+    seen: FloatArray
+    level: FloatArray
+    largest: tuple[FloatArray, ...]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -215,6 +224,10 @@ class Null:
             missing.append(likelihood + evidence(gram, turned, self.blocks, more))
         return np.asarray(np.max(missing, axis=0) - np.max(plain, axis=0))
 
+    def level(self) -> float:
+        """Return the largest log likelihood of the hypothesis, [nats]."""
+        return max(float(each[2][0]) for each in self._at_sizes(None, self.seen_at))
+
     def seen(self) -> FloatArray:
         """Return the log evidence of every effect and shape beside the hypothesis, (n_names,)."""
         return self._of(None, self.seen_at)[:, 0]
@@ -263,7 +276,9 @@ def judged(
     """
     views = [fit.view(problem, own) for own in OWN]
     rows = np.concatenate(list(fit.rows.values()))
-    widths: dict[str, float | FloatArray] = {BASE: fit.widths**2}
+    wide = fit.widths**2
+    wide[len(fit.point.base) :] *= PRIOR**2
+    widths: dict[str, float | FloatArray] = {BASE: wide}
     allowed = {**widths, **_law_errors(fit, 1.0)}
     nulls = [Null(problem, views, rows, family, allowed) for family in families]
     seen = [null.seen() for null in nulls]
@@ -296,6 +311,35 @@ def judged(
         dict(zip(nulls[best].names, seen[best].tolist(), strict=True)),
         limits[best],
         left,
+        np.array([float(each.max()) for each in seen]),
+        np.array([null.level() for null in nulls]) - 0.5 * float(np.sum(fit.coordinates**2 / wide)),
+        tuple(largest),
+    )
+
+
+def against_fits(hypothesis: Hypothesis, others: Sequence[Hypothesis]) -> Hypothesis:
+    """Return a hypothesis with its p-value where other fits stand against it too.
+
+    One that lacks some of its effects stands for the fit with both, which is at least as likely.
+    """
+    names = set(hypothesis.names)
+    more = [other for other in others if not set(other.names) <= names and other.plausible]
+    if not more:
+        return hypothesis
+    gains = np.array([other.level - hypothesis.level for other in more])
+    statistic = np.maximum(hypothesis.seen, gains.max(axis=0))
+    each = [_rank(float(t), tires) for t, tires in zip(statistic, hypothesis.largest, strict=True)]
+    best = int(np.argmax(each))
+    against = hypothesis.against
+    if statistic[best] > hypothesis.seen[best]:
+        strongest = more[int(np.argmax(gains[:, best]))]
+        against = ", ".join(name for name in strongest.names if name not in names)
+    return replace(
+        hypothesis,
+        statistic=float(statistic[best]),
+        against=against,
+        p=each[best],
+        p_std=_std(each[best], len(hypothesis.largest[best])),
     )
 
 
@@ -381,10 +425,8 @@ def select(
                 tried[key] = None
         return tried[key]
 
-    base = at((), None)
-    if base is None:
-        fit = posterior(problem, had, spread, own, strengths=problem.start.strengths)
-        base = judged(problem, fit, families, false_alarm, own_effects=len(had))
+    first = posterior(problem, had, spread, own, strengths=problem.start.strengths)
+    base = judged(problem, first, families, false_alarm, own_effects=len(had))
 
     def done(kind: str, members: Sequence[Hypothesis]) -> Verdict:
         best = members[0] if members else base
@@ -392,13 +434,21 @@ def select(
         every = tuple(each for each in tried.values() if each is not None)
         return Verdict(kind, sets, best, base, every, false_alarm)
 
+    likeliest = _leading(base, effects)[:SINGLES]
+    level = [at((name,), base) for name in likeliest]
+    fitted = [h for h in level if h is not None and h.plausible]
+    base = _settled(problem, base, fitted, families, false_alarm, spread, own, len(had))
+    tried[frozenset()] = base
+    base = against_fits(base, fitted)
     if base.p > false_alarm:
         return done("none", ())
-    level = [at((name,), base) for name in _further(base, effects, SINGLES, LEADERS)]
+    names = [name for name in _further(base, effects, SINGLES, LEADERS) if name not in likeliest]
+    level += [at((name,), base) for name in names]
     for size in range(1, MOST + 1):
         # two leaders may lead to one and the same set
-        fitted = list(dict.fromkeys(h for h in level if h is not None))
-        fitted.sort(key=lambda h: h.fit.cost)
+        every = [h for h in tried.values() if h is not None]
+        fitted = [against_fits(h, every) for h in dict.fromkeys(level) if h is not None]
+        fitted.sort(key=lambda h: -float(h.level.max()))
         members = [h for h in fitted if h.plausible and h.p > false_alarm]
         if members:
             return done("named" if len(members) == 1 else "indistinguishable", members)
@@ -420,8 +470,40 @@ def select(
     return done("unknown", ())
 
 
+def _settled(
+    problem: Problem,
+    base: Hypothesis,
+    others: Sequence[Hypothesis],
+    families: Sequence[Family],
+    alpha: float,
+    spread: dict[str, float],
+    own: float,
+    had: int,
+) -> Hypothesis:
+    """Return the base, fitted again from the likeliest of other fits if that is likelier."""
+    if not others:
+        return base
+    best = max(others, key=lambda h: float(h.level.max()))
+    if float((best.level - base.level - base.seen).max()) < 0.5 * base.limit:
+        return base
+    start = problem.start
+    try:
+        fit = posterior(
+            problem, start.effects, spread, own, near=best.fit, strengths=start.strengths
+        )
+    except TirelibError:
+        return base
+    again = judged(problem, fit, families, alpha, own_effects=had)
+    return again if float(again.level.max()) > float(base.level.max()) else base
+
+
 def _added(hypothesis: Hypothesis, had: int) -> tuple[str, ...]:
     return hypothesis.names[had:]
+
+
+def _leading(hypothesis: Hypothesis, effects: dict[str, Effect]) -> list[str]:
+    """Return effects by their evidence beside a hypothesis, best first."""
+    return sorted(effects, key=lambda name: -hypothesis.evidence.get(name, -np.inf))
 
 
 def _further(leader: Hypothesis, effects: dict[str, Effect], most: int, least: int) -> list[str]:
