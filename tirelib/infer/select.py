@@ -330,8 +330,9 @@ def against_fits(hypothesis: Hypothesis, others: Sequence[Hypothesis]) -> Hypoth
     statistic = np.maximum(hypothesis.seen, gains.max(axis=0))
     each = [_rank(float(t), tires) for t, tires in zip(statistic, hypothesis.largest, strict=True)]
     best = int(np.argmax(each))
-    against = hypothesis.against
+    against, free = hypothesis.against, hypothesis.free_p
     if statistic[best] > hypothesis.seen[best]:
+        free = min(free, each[best])
         strongest = more[int(np.argmax(gains[:, best]))]
         against = ", ".join(name for name in strongest.names if name not in names)
     return replace(
@@ -340,6 +341,7 @@ def against_fits(hypothesis: Hypothesis, others: Sequence[Hypothesis]) -> Hypoth
         against=against,
         p=each[best],
         p_std=_std(each[best], len(hypothesis.largest[best])),
+        free_p=free,
     )
 
 
