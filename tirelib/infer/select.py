@@ -18,6 +18,7 @@ apart; none at all, something unknown is there.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -129,6 +130,10 @@ class Verdict:
     alpha: float
 
 
+Sized = tuple[FloatArray, FloatArray, FloatArray, list[FloatArray]]
+"""B C^-1 B', B C^-1 r, log densities and what is more by block, at one size."""
+
+
 class Null:
     """A fitted hypothesis among the plain tires of one family.
 
@@ -165,7 +170,6 @@ class Null:
             if name != BASE and not name.startswith(ROUGHLY) and name not in allowed
         ]
         self.blocks = [normal.blocks[name] for name in self.names]
-        self.seen_at = [(v.normal.right[:, None], np.array([v.normal.square])) for v in views]
         random = np.random.default_rng(len(family))
         planted = family.on(normal)
         for name, variance in allowed.items():
@@ -191,10 +195,16 @@ class Null:
                 found.append((likelihood + view.log_volume + _size_prior(size), view.own))
         return max(found)[1]
 
+    @cached_property
+    def _seen(self) -> list[Sized]:
+        """The measured residual at every size."""
+        here = [(v.normal.right[:, None], np.array([v.normal.square])) for v in self.views]
+        return self._at_sizes(None, here)
+
     def _at_sizes(
         self, without: int | None, right: Sequence[tuple[FloatArray, FloatArray]]
-    ) -> list[tuple[FloatArray, FloatArray, FloatArray, list[FloatArray]]]:
-        """Return B C^-1 B', B C^-1 r, log densities and what is more by block, for every size.
+    ) -> list[Sized]:
+        """Return what is made of residuals at every size.
 
         `right` holds B r, (m, k), and r' r, (k,), of k residuals for every view.
         """
@@ -214,32 +224,30 @@ class Null:
                 out.append((weighed.gram, weighed.right(turned), likelihood, more))
         return out
 
-    def _of(
-        self, without: int | None, right: Sequence[tuple[FloatArray, FloatArray]]
-    ) -> FloatArray:
+    def _of(self, sizes: Sequence[Sized]) -> FloatArray:
         """Return the log evidence of every effect and shape for k residuals, (n_names, k)."""
         plain, missing = [], []
-        for gram, turned, likelihood, more in self._at_sizes(without, right):
+        for gram, turned, likelihood, more in sizes:
             plain.append(likelihood)
             missing.append(likelihood + evidence(gram, turned, self.blocks, more))
         return np.asarray(np.max(missing, axis=0) - np.max(plain, axis=0))
 
     def level(self) -> float:
         """Return the largest log likelihood of the hypothesis, [nats]."""
-        return max(float(each[2][0]) for each in self._at_sizes(None, self.seen_at))
+        return max(float(each[2][0]) for each in self._seen)
 
     def seen(self) -> FloatArray:
         """Return the log evidence of every effect and shape beside the hypothesis, (n_names,)."""
-        return self._of(None, self.seen_at)[:, 0]
+        return self._of(self._seen)[:, 0]
 
     def beside(self) -> dict[str, float]:
         """Return the largest evidence against the hypothesis with each further effect, [nats]."""
-        sizes, out = self._at_sizes(None, self.seen_at), {}
+        out = {}
         for k, name in enumerate(self.names):
             if "," in name:
                 continue
             plain, missing = [], []
-            for gram, turned, likelihood, more in sizes:
+            for gram, turned, likelihood, more in self._seen:
                 one = evidence(gram, turned, self.blocks[k : k + 1], more[k : k + 1])[0]
                 with_it = beside(gram, turned, self.blocks[k], more[k])
                 plain.append(likelihood + one)
@@ -255,7 +263,7 @@ class Null:
             part = self.family.fold == fold
             if part.any():
                 right = [(turned[:, part], square[part]) for turned, square in self.tires_at]
-                out[part] = self._of(fold, right).max(axis=0)
+                out[part] = self._of(self._at_sizes(fold, right)).max(axis=0)
         return out
 
 
