@@ -130,7 +130,7 @@ def _told(h: Hypothesis) -> dict[str, Any]:
         "p": round(h.p, 4),
         "free_p": round(h.free_p, 4),
         "plausible": h.plausible,
-        "strengths": [np.round(s, 5).tolist() for s in h.fit.point.strengths],
+        "strengths": [np.round(s, 5).tolist() for s in h.fit.strengths],
     }
 
 

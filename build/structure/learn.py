@@ -29,6 +29,7 @@ from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.identify import estimated
 from tirelib.infer.plain import Family, learn, save
 from tirelib.infer.posterior import Posterior, posterior
+from tirelib.infer.problem import Point
 from tirelib.infer.select import OWN, judged
 from tirelib.infer.strain import StrainProblem
 from tirelib.threads import one_thread
@@ -106,8 +107,10 @@ def fit_of(file: Path) -> Fit | None:
     except TirelibError as error:
         say(f"{file.name}: {error}")
         return None
-    problem.living = ()  # laws cannot be kept in a file, and are needed no more
-    return problem, fit
+    # laws cannot be kept in a file, and are needed no more
+    problem.living = ()
+    problem.forget()
+    return problem, replace(fit, point=Point(fit.point.base), solved=None)
 
 
 def family_of(name: str, fits: Sequence[Fit]) -> Family:

@@ -3,7 +3,9 @@
 The cost is that of one Gaussian: the residual in the covariance of noise, set points and of what
 plain tires show beside their model, and the priors of the base and of the strengths.
 
-    J = r' C^-1 r + sum (z_k / width_k)^2 + sum (s_j / range_j)^2
+    J = r' C^-1 r + sum (z_k / width_k)^2 + sum (s_j / range_j)^2 + sum (a_j / sigma_j)^2
+
+with strengths s of the model's effects and a of all others, sigma that of plain tires.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,7 +17,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.effects import Effect
 from tirelib.errors import ConvergenceError, TirelibError
-from tirelib.infer.normal import Normal, Weighed
+from tirelib.infer.normal import LEAST, Normal, Weighed
 from tirelib.infer.plain import BASE, ROUGHLY, View
 from tirelib.infer.problem import Point, Problem
 
@@ -40,35 +42,53 @@ class Posterior:
     Attributes
     ----------
     point : Point
+        The effects of the model first, then every other effect at what this tire shows of it.
+    count : int
+        Effects of the model.
     solved : object
         The problem's own solution.
+    rest : shape (...)
+        What the model would leave with the base where it starts and without any effect, by its
+        slopes: all coefficients of the rows are counted from there.
     rows : mapping of name to shape (k, ...)
-        "base" (strengths behind it), effects by name, the groups of the remainder, and "roughly
-        NAME" for each effect of the model.
+        "base" (strengths of the model's effects behind it), further effects by name, the groups of
+        the remainder, and "roughly NAME" for each effect of the model.
     widths : shape (n_coordinates,)
         Prior standard deviations of the block "base".
     covariance : shape (n_coordinates, n_coordinates)
-        Of the coordinates.
+        Of its coordinates.
     cost : float
         J at the point.
     """
 
     point: Point
+    count: int
     solved: Any
+    rest: FloatArray
     rows: Mapping[str, FloatArray]
     widths: FloatArray
     covariance: FloatArray
     cost: float
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Of the model's effects."""
-        return tuple(effect.name for effect in self.point.effects)
+    def effects(self) -> tuple[Effect, ...]:
+        """Effects of the model."""
+        return self.point.effects[: self.count]
 
     @property
-    def coordinates(self) -> FloatArray:
-        """Coordinates of the base, and strengths in ranges, (n_coordinates,)."""
-        return _coordinates(self.point)
+    def strengths(self) -> tuple[FloatArray, ...]:
+        """Their strengths, in their units."""
+        return self.point.strengths[: self.count]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the model's effects."""
+        return tuple(effect.name for effect in self.effects)
+
+    def strength(self, name: str) -> FloatArray | None:
+        """Return the strength of an effect, of the model or beside it; None if it has none."""
+        pairs = zip(self.point.effects, self.point.strengths, strict=True)
+        return next((strength for effect, strength in pairs if effect.name == name), None)
 
     def view(self, problem: Problem, own: float) -> View:
         """Return the normal equations for one size of the misfit that each run has for itself."""
@@ -78,8 +98,7 @@ class Posterior:
         for name, rows in self.rows.items():
             white[name] = every[first : first + len(rows)]
             first += len(rows)
-        normal = Normal.of(white, whiten(self.solved.rest))
-        return View(own, normal, whiten.log_volume, every)
+        return View(own, Normal.of(white, whiten(self.rest)), whiten.log_volume, every)
 
     def std(self, index: int) -> FloatArray:
         """Return standard deviations of an effect's strength, in its unit."""
@@ -101,6 +120,9 @@ def posterior(
 ) -> Posterior:
     """Fit the model with effects.
 
+    Every other effect that the plan may show is fitted as well, to what plain tires show of it: at
+    a noise of some thousandths of the strain their laws are not linear.
+
     Parameters
     ----------
     problem : Problem
@@ -120,25 +142,19 @@ def posterior(
     ConvergenceError
         If the steps do not settle.
     """
-    base = problem.start.base if near is None else near.point.base
-    begin = tuple(np.zeros(e.components) for e in effects) if strengths is None else strengths
-    point = Point(base, tuple(effects), tuple(np.array(s, dtype=float) for s in begin))
+    names = {effect.name for effect in effects}
+    others = [effect for effect in problem.living if effect.name not in names]
+    point = _start(problem, [*effects, *others], near, strengths)
     whiten = problem.whitener(own)
-    widths = np.concatenate([problem.widths, np.ones(sum(e.components for e in effects))])
+    widths = [problem.widths, np.ones(sum(e.components for e in effects))]
+    widths += [np.full(e.components, np.sqrt(max(spread.get(e.name, 0.0), LEAST))) for e in others]
+    width = np.concatenate(widths)
     solved = problem.solve(point, near.solved if near else None)
     slopes = problem.slopes(point, solved)
-    has = {effect.name for effect in effects}
-    if near is None:
-        others = {**problem.signatures(point, solved), **problem.remainder(point, solved)}
-    else:  # a metric nearby serves until the fit has settled
-        others = {
-            name: rows
-            for name, rows in near.rows.items()
-            if name != BASE and name not in has and not name.startswith(ROUGHLY)
-        }
-    white = whiten(np.concatenate(list(others.values())))
-    ends = np.cumsum([len(rows) for rows in others.values()])[:-1]
-    whitened = dict(zip(others, np.split(white, ends), strict=True))
+    shapes = problem.remainder(point, solved)
+    white = whiten(np.concatenate(list(shapes.values())))
+    ends = np.cumsum([len(rows) for rows in shapes.values()])[:-1]
+    whitened = dict(zip(shapes, np.split(white, ends), strict=True))
     rest = whiten(solved.rest)
     damping, moved = 1e-3, np.inf
     for _ in range(MOST_STEPS):
@@ -148,20 +164,20 @@ def posterior(
         metric = Weighed(normal, normal.spread(spread))
         block = normal.blocks[BASE]
         here = _coordinates(point)
-        gram = metric.gram[block, block] + np.diag(widths**-2)
-        gradient = metric.right(normal.right)[block] - here / widths**2
-        cost = _cost(metric, normal.right, normal.square, here, widths)
+        gram = metric.gram[block, block] + np.diag(width**-2)
+        gradient = metric.right(normal.right)[block] - here / width**2
+        cost = _cost(metric, normal.right, normal.square, here, width)
         deviation = np.sqrt(np.diag(np.linalg.inv(gram)))
         after, trial = np.inf, None
         while damping < HARDEST:
             dz = np.linalg.solve(gram + damping * np.diag(np.diag(gram)), gradient)
             dz = dz * min(1.0, LONGEST / float(np.abs(dz).max()))
             moved = float(np.abs(dz / deviation).max())
-            trial = _tried(problem, point, dz, solved)
+            trial = _tried(problem, point, dz, solved, len(effects))
             if trial is not None:
                 left = whiten(trial[1].rest)
                 after = _cost(
-                    metric, rows @ left, float(left @ left), _coordinates(trial[0]), widths
+                    metric, rows @ left, float(left @ left), _coordinates(trial[0]), width
                 )
                 if after < cost + GAINS:
                     break
@@ -184,17 +200,48 @@ def posterior(
             moved,
         )
     slopes = problem.slopes(point, solved)
-    every = {BASE: slopes, **problem.signatures(point, solved), **problem.remainder(point, solved)}
+    count = len(point.base) + sum(e.components for e in effects)
+    every = {BASE: slopes[:count]}
+    first = count
+    for effect in others:
+        every[effect.name] = slopes[first : first + effect.components]
+        first += effect.components
+    every |= problem.remainder(point, solved)
     first = len(point.base)
     for effect in effects:
         every[ROUGHLY + effect.name] = problem.roughly(slopes[first : first + effect.components])
         first += effect.components
+    here = _coordinates(point)
+    rest_from_start = solved.rest + np.tensordot(here, slopes, axes=1)
     normal = Normal.of(every, solved.rest, whiten)
     metric = Weighed(normal, normal.spread(spread))
     block = normal.blocks[BASE]
-    covariance = np.asarray(np.linalg.inv(metric.gram[block, block] + np.diag(widths**-2)))
-    cost = _cost(metric, normal.right, normal.square, _coordinates(point), widths)
-    return Posterior(point, solved, every, widths, covariance, cost)
+    covariance = np.asarray(np.linalg.inv(metric.gram[block, block] + np.diag(width[:count] ** -2)))
+    return Posterior(
+        point,
+        len(effects),
+        solved,
+        rest_from_start,
+        every,
+        width[:count],
+        covariance,
+        after if np.isfinite(after) else cost,
+    )
+
+
+def _start(
+    problem: Problem,
+    effects: Sequence[Effect],
+    near: Posterior | None,
+    strengths: Sequence[FloatArray] | None,
+) -> Point:
+    """Return the point from which a fit starts."""
+    given = list(strengths or ())
+    for effect in effects[len(given) :]:
+        known = None if near is None else near.strength(effect.name)
+        given.append(np.zeros(effect.components) if known is None else known)
+    base = problem.start.base if near is None else near.point.base
+    return Point(base, tuple(effects), tuple(np.array(s, dtype=float) for s in given))
 
 
 def _coordinates(point: Point) -> FloatArray:
@@ -203,13 +250,20 @@ def _coordinates(point: Point) -> FloatArray:
     return np.concatenate([point.base, *ranges])
 
 
-def _tried(problem: Problem, point: Point, dz: FloatArray, solved: Any) -> tuple[Point, Any] | None:
-    """Return the model a step away; None where it has no solution."""
+def _tried(
+    problem: Problem, point: Point, dz: FloatArray, solved: Any, count: int
+) -> tuple[Point, Any] | None:
+    """Return the model a step away; None where it has no solution.
+
+    What a tire shows of effects behind the first `count` stays within their ranges.
+    """
     k = len(point.base)
     cuts = np.cumsum([e.components for e in point.effects])[:-1]
     steps = np.split(dz[k:], cuts) if point.effects else []
+    moved = [s + e.scale * d for s, e, d in zip(point.strengths, point.effects, steps, strict=True)]
     strengths = tuple(
-        s + e.scale * d for s, e, d in zip(point.strengths, point.effects, steps, strict=True)
+        s if k < count else np.clip(s, e.low, e.high)
+        for k, (s, e) in enumerate(zip(moved, point.effects, strict=True))
     )
     there = Point(point.base + dz[:k], point.effects, strengths)
     try:

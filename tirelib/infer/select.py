@@ -294,7 +294,7 @@ def judged(
     each = [_rank(float(s.max()), t) for s, t in zip(seen, largest, strict=True)]
     best = int(np.argmax(each))
     free = each[best]
-    if fit.point.effects and free <= alpha:
+    if fit.effects and free <= alpha:
         allowed = {**widths, **_law_errors(fit, 1.0 / LAW)}
         for family in families:
             null = Null(problem, views, rows, family, allowed)
@@ -320,7 +320,7 @@ def judged(
         limits[best],
         left,
         np.array([float(each.max()) for each in seen]),
-        np.array([null.level() for null in nulls]) - 0.5 * float(np.sum(fit.coordinates**2 / wide)),
+        np.array([null.level() for null in nulls]),
         tuple(largest),
     )
 
@@ -376,7 +376,7 @@ def _std(p: float, count: int) -> float:
 def _law_errors(fit: Posterior, looser: float) -> dict[str, float]:
     """Return variances of the blocks of laws that are but roughly right."""
     out = {}
-    for effect, strength in zip(fit.point.effects, fit.point.strengths, strict=True):
+    for effect, strength in zip(fit.effects, fit.strengths, strict=True):
         size = float(np.linalg.norm(strength)) / effect.scale
         out[ROUGHLY + effect.name] = (looser * LAW * size) ** 2
     return out
@@ -384,10 +384,10 @@ def _law_errors(fit: Posterior, looser: float) -> dict[str, float]:
 
 def plausible(fit: Posterior, own_effects: int) -> bool:
     """Return whether the strengths of the further effects lie in their ranges."""
-    for k, effect in enumerate(fit.point.effects):
-        slack = SLACK * np.hypot(fit.std(k), LAW * np.linalg.norm(fit.point.strengths[k]))
+    for k, effect in enumerate(fit.effects):
+        slack = SLACK * np.hypot(fit.std(k), LAW * np.linalg.norm(fit.strengths[k]))
         low, high = effect.low - slack, effect.high + slack
-        inside = (fit.point.strengths[k] >= low) & (fit.point.strengths[k] <= high)
+        inside = (fit.strengths[k] >= low) & (fit.strengths[k] <= high)
         if k >= own_effects and not inside.all():
             return False
     return True
@@ -540,12 +540,12 @@ def _start(
     had = [*problem.start.strengths]
     if near is None:
         return [*had, *(np.zeros(e.components) for e in more)]
-    known = dict(zip(near.names, near.fit.point.strengths, strict=True))
+    known = dict(zip(near.names, near.fit.strengths, strict=True))
     normal = near.fit.view(problem, own).normal
     wide = {e.name: 1.0 for e in more if e.name not in known}
     diagonal = normal.spread({**spread, BASE: near.fit.widths**2, **wide})
     mean = Weighed(normal, diagonal).mean(normal.right)
-    out = list(near.fit.point.strengths[: len(had)])
+    out = list(near.fit.strengths[: len(had)])
     for effect in more:
         if effect.name in known:
             out.append(known[effect.name])

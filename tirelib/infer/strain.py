@@ -176,6 +176,10 @@ class StrainProblem:
             )
         return self._whiteners[own]
 
+    def forget(self) -> None:
+        """Forget slopes that only save time."""
+        self._last = self._added = None
+
     def solve(self, point: Point, near: StrainSolved | None = None) -> StrainSolved:
         """Return the model at a point; raises TirelibError where it has none."""
         values = {**move(self.values, point.base[:-1], self.free), "damping": 0.0}
@@ -204,7 +208,7 @@ class StrainProblem:
         assert by.rolled is not None  # noqa: S101 - values move the rolling ring
         self._last = (solved, by.rolled)
         slopes = by.waveform[: len(self.free)]
-        if point.effects:
+        if self._bends(point):
             if self._added is None or not self._added.serves(point):
                 more = added_by_values(solved.model, self.free, LEAST_STEP)
                 self._added = _Added(point, more)
@@ -223,6 +227,13 @@ class StrainProblem:
         late = earlier(np.array(rows), self.data.points.omega, -solved.delay)
         delay = by_delay(solved.waveform, self.data.points.omega)[None]
         return np.concatenate([late[: len(self.free)], delay, late[len(self.free) :]])
+
+    def _bends(self, point: Point) -> bool:
+        """Return whether effects are strong enough to matter to the slopes of the base."""
+        return any(
+            effect.hook in ("contact", "strain") and float(np.abs(s).max()) >= NEAR * effect.scale
+            for effect, s in zip(point.effects, point.strengths, strict=True)
+        )
 
     def signatures(self, point: Point, solved: StrainSolved) -> dict[str, FloatArray]:
         """Return changes per range of the living effects that the point has not."""
