@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy import optimize
 
 from tirelib.arrays import FloatArray
 from tirelib.effects import Effect
@@ -149,6 +150,7 @@ def posterior(
     widths = [problem.widths, np.ones(sum(e.components for e in effects))]
     widths += [np.full(e.components, np.sqrt(max(spread.get(e.name, 0.0), LEAST))) for e in others]
     width = np.concatenate(widths)
+    low, high = _ends(others, len(width))
     solved = problem.solve(point, near.solved if near else None)
     slopes = problem.slopes(point, solved)
     shapes = problem.remainder(point, solved)
@@ -170,10 +172,10 @@ def posterior(
         deviation = np.sqrt(np.diag(np.linalg.inv(gram)))
         after, trial = np.inf, None
         while damping < HARDEST:
-            dz = np.linalg.solve(gram + damping * np.diag(np.diag(gram)), gradient)
+            dz = _step(gram + damping * np.diag(np.diag(gram)), gradient, low - here, high - here)
             dz = dz * min(1.0, LONGEST / float(np.abs(dz).max()))
             moved = float(np.abs(dz / deviation).max())
-            trial = _tried(problem, point, dz, solved, len(effects))
+            trial = _tried(problem, point, dz, solved)
             if trial is not None:
                 left = whiten(trial[1].rest)
                 after = _cost(
@@ -250,20 +252,35 @@ def _coordinates(point: Point) -> FloatArray:
     return np.concatenate([point.base, *ranges])
 
 
-def _tried(
-    problem: Problem, point: Point, dz: FloatArray, solved: Any, count: int
-) -> tuple[Point, Any] | None:
-    """Return the model a step away; None where it has no solution.
+def _ends(others: Sequence[Effect], count: int) -> tuple[FloatArray, FloatArray]:
+    """Return the ends of all coordinates: what a tire shows of an effect is within its range."""
+    low, high = np.full(count, -np.inf), np.full(count, np.inf)
+    first = count - sum(effect.components for effect in others)
+    for effect in others:
+        rows = slice(first, first + effect.components)
+        low[rows], high[rows] = effect.low / effect.scale, effect.high / effect.scale
+        first += effect.components
+    return low, high
 
-    What a tire shows of effects behind the first `count` stays within their ranges.
-    """
+
+def _step(gram: FloatArray, gradient: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return the step to the bottom of a quadratic cost between ends."""
+    lower = np.linalg.cholesky(gram)
+    free = np.asarray(np.linalg.solve(gram, gradient))
+    if ((free >= low) & (free <= high)).all():
+        return free
+    target = np.linalg.solve(lower, gradient)
+    ends = (np.minimum(low, 0.0), np.maximum(high, 1e-12))
+    return np.asarray(optimize.lsq_linear(lower.T, target, ends, method="bvls").x)
+
+
+def _tried(problem: Problem, point: Point, dz: FloatArray, solved: Any) -> tuple[Point, Any] | None:
+    """Return the model a step away; None where it has no solution."""
     k = len(point.base)
     cuts = np.cumsum([e.components for e in point.effects])[:-1]
     steps = np.split(dz[k:], cuts) if point.effects else []
-    moved = [s + e.scale * d for s, e, d in zip(point.strengths, point.effects, steps, strict=True)]
     strengths = tuple(
-        s if k < count else np.clip(s, e.low, e.high)
-        for k, (s, e) in enumerate(zip(moved, point.effects, strict=True))
+        s + e.scale * d for s, e, d in zip(point.strengths, point.effects, steps, strict=True)
     )
     there = Point(point.base + dz[:k], point.effects, strengths)
     try:
