@@ -77,8 +77,9 @@ class Hypothesis:
         T that plain tires exceed with the false-alarm probability.
     left : mapping of name to float
         Largest T, less this limit, that first order leaves beside each further effect.
-    seen, level : shape (n_families,)
-        T to first order, and log likelihood of the fit, by family, [nats].
+    seen, level, strict : shape (n_families,)
+        T to first order, and log likelihood of the fit with laws that are roughly right and with
+        laws that are right, by family, [nats].
     largest : tuple of shape (n_tires,)
         T of plain tires with this hypothesis planted, by family.
     """
@@ -95,6 +96,7 @@ class Hypothesis:
     left: dict[str, float]
     seen: FloatArray
     level: FloatArray
+    strict: FloatArray
     largest: tuple[FloatArray, ...]
 
     @property
@@ -177,7 +179,7 @@ class Null:
                 block = normal.blocks[name]
                 size = (len(family), block.stop - block.start)
                 planted[:, block] = np.sqrt(variance) * random.standard_normal(size)
-        whiten = problem.whitener(self._likeliest())
+        whiten = problem.whitener(self.likeliest(allowed)[1])
         tires = whiten.coloured(random.standard_normal((len(family), normal.count)))
         tires = tires + np.tensordot(planted, rows, axes=1)
         self.tires_at = []
@@ -185,15 +187,15 @@ class Null:
             white = problem.whitener(view.own)(tires)
             self.tires_at.append((view.white @ white.T, np.sum(white**2, axis=1)))
 
-    def _likeliest(self) -> float:
-        """Return the likeliest size of a run's own misfit by the hypothesis alone."""
+    def likeliest(self, allowed: Mapping[str, float | FloatArray]) -> tuple[float, float]:
+        """Return the largest log likelihood, [nats], and the size of a run's own misfit there."""
         typical, found = self.family.spread(), []
         for view in self.views:
             for size in SIZES:
-                diagonal = view.normal.spread({**_sized(typical, size), **self.allowed})
+                diagonal = view.normal.spread({**_sized(typical, size), **allowed})
                 likelihood = Weighed(view.normal, diagonal).log_likelihood()
                 found.append((likelihood + view.log_volume + _size_prior(size), view.own))
-        return max(found)[1]
+        return max(found)
 
     @cached_property
     def _seen(self) -> list[Sized]:
@@ -321,6 +323,7 @@ def judged(
         left,
         np.array([float(each.max()) for each in seen]),
         np.array([null.level() for null in nulls]),
+        np.array([null.likeliest(widths)[0] for null in nulls]),
         tuple(largest),
     )
 
@@ -329,12 +332,13 @@ def against_fits(hypothesis: Hypothesis, others: Sequence[Hypothesis]) -> Hypoth
     """Return a hypothesis with its p-value where other fits stand against it too.
 
     One that lacks some of its effects stands for the fit with both, which is at least as likely.
+    The laws of the others count as right: what a rough law may add is not theirs.
     """
     names = set(hypothesis.names)
     more = [other for other in others if not set(other.names) <= names and other.plausible]
     if not more:
         return hypothesis
-    gains = np.array([other.level - hypothesis.level for other in more])
+    gains = np.array([other.strict - hypothesis.level for other in more])
     statistic = np.maximum(hypothesis.seen, gains.max(axis=0))
     each = [_rank(float(t), tires) for t, tires in zip(statistic, hypothesis.largest, strict=True)]
     best = int(np.argmax(each))
@@ -493,8 +497,8 @@ def _settled(
     """Return the base, fitted again from the likeliest of other fits if that is likelier."""
     if not others:
         return base
-    best = max(others, key=lambda h: float(h.level.max()))
-    if float((best.level - base.level - base.seen).max()) < 0.5 * base.limit:
+    best = max(others, key=lambda h: float(h.strict.max()))
+    if float((best.strict - base.level - base.seen).max()) < 0.5 * base.limit:
         return base
     start = problem.start
     try:
