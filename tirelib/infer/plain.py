@@ -25,7 +25,7 @@ ROUNDS = 60
 SETTLED = 0.01
 """Relative change of all variances below which they are learned."""
 START = 0.02**2
-FLOOR = 0.3
+FLOOR = {"effect": 0.1, "shape": 0.3}
 """Least size of an effect, or of a group of shapes, over that of the largest in its family: what
 twenty tires of one family hardly show, those of another may."""
 TINY = 1e-8
@@ -72,10 +72,9 @@ class Family:
         count = known.sum(axis=0)
         mean = np.where(count > 0, total / np.maximum(count, 1), START)
         shapes = np.array(["," in name for name in self.blocks])
-        floor = [
-            FLOOR**2 * float(np.max(mean, where=kind, initial=0.0)) for kind in (~shapes, shapes)
-        ]
-        least = np.where(shapes, floor[1], floor[0])
+        least = np.zeros(len(mean))
+        for kind, which in (("effect", ~shapes), ("shape", shapes)):
+            least[which] = FLOOR[kind] ** 2 * float(np.max(mean, where=which, initial=0.0))
         return dict(zip(self.blocks, np.maximum(mean, least).tolist(), strict=True))
 
     def on(self, normal: Normal) -> FloatArray:
