@@ -55,7 +55,7 @@ class Row:
     Attributes
     ----------
     error : float
-        Of the base, in units of the noise.
+        What the base leaves, in units of the noise.
     wrong, held : mapping
         By name the relative error, and whether the 95 % interval holds the true value.
     """

@@ -32,8 +32,9 @@ from tirelib.effects import CATALOGUE
 from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.identify.identify import estimated
+from tirelib.infer.hypothesis import Hypothesis
 from tirelib.infer.plain import load
-from tirelib.infer.select import Hypothesis, Verdict, select
+from tirelib.infer.select import Verdict, select
 from tirelib.infer.strain import StrainProblem
 from tirelib.threads import one_thread
 

@@ -3,8 +3,8 @@
     python build/structure/law.py
 
 Fits every campaign with one known effect with that effect, and prints for each family the log
-likelihood of the relative standard deviation of a law (`tirelib.infer.select.LAW`), summed over its
-campaigns. The other families' plain tires give the rest of the covariance.
+likelihood of the relative standard deviation of a law (`tirelib.infer.hypothesis.LAW`), summed
+over its campaigns. The other families' plain tires give the rest of the covariance.
 """
 
 import argparse
@@ -21,10 +21,11 @@ from structure.learn import FAMILIES, OUT, say
 from tirelib.effects import CATALOGUE
 from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import straight_runs
+from tirelib.infer.hypothesis import LAW, law_errors
 from tirelib.infer.normal import Weighed
+from tirelib.infer.null import OWN, SIZES, size_prior, sized
 from tirelib.infer.plain import BASE, Family, load, pooled
 from tirelib.infer.posterior import posterior
-from tirelib.infer.select import LAW, OWN, SIZES, _law_errors, _size_prior, _sized
 from tirelib.infer.strain import StrainProblem
 from tirelib.threads import one_thread
 
@@ -78,13 +79,13 @@ def likelihoods(file: Path, kind: str, others: list[Family], out: Path) -> np.nd
                 normal = fit.view(problem, width).normal
                 for size in SIZES:
                     allowed = {
-                        **_sized(family.spread(), size),
+                        **sized(family.spread(), size),
                         BASE: fit.widths**2,
-                        **_law_errors(fit, looser),
+                        **law_errors(fit, looser),
                     }
                     weighed = Weighed(normal, normal.spread(allowed))
                     volume = problem.whitener(width).log_volume
-                    each.append(weighed.log_likelihood() + volume + _size_prior(size))
+                    each.append(weighed.log_likelihood() + volume + size_prior(size))
         found.append(max(each))
     return np.array(found)
 

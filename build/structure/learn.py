@@ -27,10 +27,11 @@ from tirelib.effects import CATALOGUE
 from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.identify import estimated
+from tirelib.infer.hypothesis import judged
+from tirelib.infer.null import OWN
 from tirelib.infer.plain import Family, learn, save
 from tirelib.infer.posterior import Posterior, posterior
 from tirelib.infer.problem import Point
-from tirelib.infer.select import OWN, judged
 from tirelib.infer.strain import StrainProblem
 from tirelib.threads import one_thread
 

@@ -85,9 +85,6 @@ class Problem(Protocol):
     def slopes(self, point: Point, solved: Any) -> FloatArray:
         """Return slopes by the base, then by strengths in ranges, (n_coordinates, ...)."""
 
-    def signatures(self, point: Point, solved: Any) -> Mapping[str, FloatArray]:
-        """Return, for each living effect that the point has not, rows (components, ...) a range."""
-
     def remainder(self, point: Point, solved: Any) -> Mapping[str, FloatArray]:
         """Return groups of smooth shapes that no law describes, rows (k, ...) each."""
 

@@ -235,25 +235,13 @@ class StrainProblem:
             for effect, s in zip(point.effects, point.strengths, strict=True)
         )
 
-    def signatures(self, point: Point, solved: StrainSolved) -> dict[str, FloatArray]:
-        """Return changes per range of the living effects that the point has not."""
-        has = {effect.name for effect in point.effects}
-        return self._signatures(solved, [e for e in self.living if e.name not in has])
-
-    def _signatures(self, solved: StrainSolved, effects: Sequence[Effect]) -> dict[str, FloatArray]:
-        there = [
-            (effect.hook, [*solved.model.changes, effect.at(trial)])
-            for effect in effects
-            for trial in effect.trials
-        ]
-        steps = [effect.step for effect in effects for _ in effect.trials]
-        rows = by_effects(solved.model, there, steps).waveform * self._scales(effects)
-        late = earlier(rows, self.data.points.omega, -solved.delay)
-        out, first = {}, 0
-        for effect in effects:
-            out[effect.name] = late[first : first + effect.components]
-            first += effect.components
-        return out
+    def _signature(self, solved: StrainSolved, effect: Effect) -> FloatArray:
+        """Return changes (components, n_runs, n_phi) for a strength of one range."""
+        changes = solved.model.changes
+        there = [(effect.hook, [*changes, effect.at(trial)]) for trial in effect.trials]
+        steps = [effect.step] * effect.components
+        rows = by_effects(solved.model, there, steps).waveform * effect.scale
+        return earlier(rows, self.data.points.omega, -solved.delay)
 
     def _scales(self, effects: Sequence[Effect]) -> FloatArray:
         """Return the ranges of strengths, (n_components, 1, 1)."""
@@ -313,7 +301,7 @@ class StrainProblem:
             reason = effect.untestable or self._idle(effect)
             if not reason:
                 try:
-                    rows = self.whitener(OWN)(self._signatures(solved, [effect])[effect.name])
+                    rows = self.whitener(OWN)(self._signature(solved, effect))
                     signal = float(np.linalg.norm(rows))
                     if signal < LEAST_SIGNAL:
                         reason = "changes nothing that this plan could show" + (

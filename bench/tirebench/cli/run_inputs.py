@@ -226,7 +226,7 @@ def refuse_line_options(context: click.Context) -> None:
     Raises
     ------
     click.UsageError
-        With the first that was given.
+        If one of them was given; the message names the first.
     """
     for name, option in _LINE_OPTIONS.items():
         if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:

@@ -82,10 +82,6 @@ class Toy:
     def slopes(self, point: Point, solved: Any) -> FloatArray:
         return np.concatenate([self.base, *(self.by[e.name] for e in point.effects)])
 
-    def signatures(self, point: Point, solved: Any) -> dict[str, FloatArray]:
-        has = {e.name for e in point.effects}
-        return {name: rows for name, rows in self.by.items() if name not in has}
-
     def remainder(self, point: Point, solved: Any) -> dict[str, FloatArray]:
         return {"smooth, all": self.shapes, "smooth, there": self.there}
 

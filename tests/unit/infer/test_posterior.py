@@ -5,8 +5,8 @@ import pytest
 from scipy import optimize
 
 from tests.unit.infer.linear_problem import EFFECTS, N, Toy, drawn, family
+from tirelib.infer.hypothesis import against_fits, judged
 from tirelib.infer.posterior import _step, posterior
-from tirelib.infer.select import against_fits, judged
 
 FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
 SPREAD = FAMILIES[0].spread()

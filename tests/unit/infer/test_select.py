@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from tests.unit.infer.linear_problem import N, Toy, drawn, family
+from tirelib.infer.hypothesis import judged
 from tirelib.infer.posterior import posterior
-from tirelib.infer.select import judged, select
+from tirelib.infer.select import select
 
 FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
 
