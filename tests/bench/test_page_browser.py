@@ -1,6 +1,7 @@
 """The page in a real browser: what it shows is what was recorded; keys; two viewers."""
 
 import json
+import math
 import os
 import re
 import signal
@@ -375,6 +376,7 @@ class FourWheels(FakeSource):
         super().__init__(0, 1, 2, 3)
         self.heard = time.time() + 3600.0
         self.wheels.heard[2].rssi = -93
+        self.wheels.heard[1].bus_conditions["speed"] = math.nan
         self.wheels.heard[2].bus_conditions["speed"] = 18.0
         self.events: list[Any] = []
         self.about = About("port", conditions=Conditions.constant(pressure=2.3e5), folder=folder)
@@ -401,6 +403,13 @@ def test_all_wheels_alarms_what_is_in_use_and_the_zero_of_the_gages(
         wait_for(page, "document.querySelectorAll('#all .card').length === 4")
         shown = page.locator("#all [data-key=Fz] .value")
         wait_until(lambda: shown.all_text_contents() == ["1000", "2000", "3000", "4000"])
+        speeds = page.locator("#use-list dd[data-use=speed]")
+        wait_until(
+            lambda: (
+                speeds.all_inner_texts()
+                == ["not known", "not known the bus is silent", "64.8 km/h bus", "not known"]
+            )
+        )
         alarms = page.locator("#alarms .alarm")
         wait_until(lambda: alarms.count() == 4)
         said = " ".join(alarms.all_text_contents())

@@ -35,7 +35,7 @@ from tirebench.estimator.estimation import Estimation, News
 from tirebench.estimator.fmu_archive import read_fmu
 from tirebench.estimator.fmu_model import FmuFile, FmuModel
 from tirebench.estimator.session import Session
-from tirebench.estimator.wheels import Line, Wheels
+from tirebench.estimator.wheels import BusCondition, Line, Wheels
 from tirebench.links import Read
 from tirebench.links.opening import PortPlan
 from tirebench.live.chain import LiveChain, LivePlan
@@ -65,6 +65,7 @@ format = "tirebench-map/1"
 message = "ABS"
 signal = "v"
 unit = "km/h"
+hold_s = 3600.0
 [[pressure]]
 wheel = 3
 message = "ABS"
@@ -434,6 +435,39 @@ def test_several_ports_are_unplugged_when_the_last_one_is_given_up(exchange: Exc
         link._next_look = 0.0
     with pytest.raises(UnpluggedError, match="port 0: it went away; port 1: it went away"):
         link.receive(Deadline.after(0.0))
+
+
+def test_a_speed_about_which_the_bus_is_silent_is_unknown_until_it_comes_again() -> None:
+    """It was held for ever, so that the slip ratio was wrong and valid."""
+    second, frames = 10**9, wire()
+    user = parse_map(VEHICLE.replace("hold_s = 3600.0\n", ""), "", "v.toml")
+    bus = SourcePlan(PortPlan("slcan:p"), ProtocolPlan(SLCAN, 1e3, user))
+    wheels = wheels_of((SourcePlan(PortPlan("w"), wheel=3), bus))
+    seen: list[tuple[str, float]] = []
+
+    def push(source: int, data: bytes, at: float) -> None:
+        blocks = wheels.push(data, round(at * second), source)
+        told = [b.content.measured for b in blocks if isinstance(b.content, BusCondition)]
+        seen.extend((one.name, one.value) for one in told)
+
+    for number, (source, data, at) in enumerate(
+        (
+            (0, frames[0], 0.0),
+            (1, told(65.0), 0.1),
+            (0, frames[1], 1.05),
+            (0, frames[2], 1.15),
+            (0, frames[3], 1.2),
+            (1, told(72.0), 5.0),
+        )
+    ):
+        push(source, data, at)
+        silent = {
+            name: bool(said) for (name, _), said in wheels.silences(round(at * second)).items()
+        }
+        assert silent.get("speed", False) == (number in (3, 4))
+    names, values = zip(*seen, strict=True)
+    assert names == ("speed", "pressure", "speed", "speed", "pressure")  # a pressure stays
+    np.testing.assert_allclose(3.6 * np.array(values)[[0, 2, 3]], [65.0, np.nan, 72.0])
 
 
 def test_an_emulator_plays_one_source_of_several(tmp_path: Path) -> None:

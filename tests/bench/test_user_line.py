@@ -148,8 +148,8 @@ def test_conditions_stand_between_the_frames_of_strain() -> None:
     kinds = ["strain" if isinstance(item, Frames) else item.name for item in items]
     assert kinds == ["strain", "speed", "camber", "strain"]
     speed, camber = items[1], items[2]
-    assert speed == Measured("speed", pytest.approx(50.5 / 3.6))
-    assert camber == Measured("camber", pytest.approx(np.radians(-1.5)), 2)
+    assert speed == Measured("speed", pytest.approx(50.5 / 3.6), hold=1.0)
+    assert camber == Measured("camber", pytest.approx(np.radians(-1.5)), 2, hold=1.0)
     told = [item for item in decoded(BINARY, binary(9))[0] if isinstance(item, Measured)]
     assert [one.value for one in told] == pytest.approx([2.3e5] * 9)
 

@@ -86,7 +86,7 @@ def at_start(path: Path, reader: ReaderPlan, rule: RecordingRule, *, watched: bo
     watched : bool
         Whether there is a page or a terminal view, which know limits and markers.
     """
-    wheels = max(reader.expected, len(reader.sources))
+    wheels = max(reader.expected, sum(source.sends_strain for source in reader.sources))
     said = room(path, wheels, strain=rule.strain)
     if rule.around is not None:
         said += (

@@ -3,6 +3,7 @@
 All of it can be pickled, so that a reader that is started again goes on where the last one was.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
@@ -194,6 +195,7 @@ class Wheels:
         self._bus_conditions: dict[
             tuple[str, int | None], Measured
         ] = {}  # the last that a bus sent
+        self._sent_at: dict[tuple[str, int | None], int] = {}  # and when it came [ns]
 
     @classmethod
     def of_one(
@@ -213,7 +215,8 @@ class Wheels:
     def push(self, data: bytes, arrival: int = 0, source: int = 0) -> list[Block]:
         """Take bytes of a source that came at a moment [ns, monotonic]; return what they bring.
 
-        A condition from a bus holds for the wheels of all lines, from their next sample on.
+        A condition from a bus holds for the wheels of all lines, from their next sample on; when
+        the bus was silent about it for too long it is unknown to them.
 
         Raises
         ------
@@ -224,9 +227,14 @@ class Wheels:
         bus_conditions: dict[
             tuple[str, int | None], Measured
         ] = {}  # since the last frame of strain
+        for place, silence in self.silences(arrival).items():
+            last = self._bus_conditions[place]
+            if silence and not math.isnan(last.value):
+                bus_conditions[place] = replace(last, value=math.nan)
         for item in self.lines[source].push(data, arrival):
             if isinstance(item, Measured):
                 bus_conditions[item.name, item.wheel] = item
+                self._sent_at[item.name, item.wheel] = arrival
                 continue
             self._hand_over(bus_conditions, sorted_items)
             numbers = sorted(set(item.wheel.tolist()))
@@ -249,6 +257,25 @@ class Wheels:
             if items
             for block in self._wheel(wheel).take(items, arrival)
         ]
+
+    def silences(self, now: int) -> dict[tuple[str, int | None], str]:
+        """Return a sentence on each condition about which its bus has been silent for too long.
+
+        Those that came in time have an empty one.
+
+        Parameters
+        ----------
+        now : int, [ns]
+            Monotonic, as arrivals are.
+        """
+        return {
+            (name, wheel): ""
+            if 1e-9 * (now - self._sent_at[name, wheel]) <= last.hold
+            else f"{name}{'' if wheel is None else f' of wheel {wheel}'}: the bus has not sent it "
+            f"for more than {last.hold:g} s, so it is unknown; check the bus, or set hold_s in its "
+            "map if it is sent less often"
+            for (name, wheel), last in self._bus_conditions.items()
+        }
 
     def _hand_over(
         self,

@@ -1,5 +1,6 @@
 """Alarms of a live run as sentences, one when a fault begins and one when it ends."""
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -18,7 +19,7 @@ DECODED_AGAIN = "the estimates continue"
 
 
 class RunAlarms:
-    """A reader that is too late, wheels with a wrong rate, ports that are away, a full disk.
+    """A late reader, wheels with a wrong rate, a silent bus, ports that are away, a full disk.
 
     Parameters
     ----------
@@ -44,6 +45,7 @@ class RunAlarms:
         self._write = write
         self._passing = False
         self._contradicted: set[int] = set()
+        self._silent: set[tuple[str, int | None]] = set()
         self._unrecorded = ""
 
     def look(
@@ -53,7 +55,7 @@ class RunAlarms:
 
         `ports` holds the state of each port that a process of its own reads, None before the first.
         """
-        alarms = self._busy(line) + self._rates(line) + self._away(ports)
+        alarms = self._busy(line) + self._rates(line) + self._bus(line) + self._away(ports)
         if recorded.error != self._unrecorded:  # there is no recording to write this into
             self._unrecorded = recorded.error
             alarms.append(recorded.error or RECORDED_AGAIN)
@@ -74,6 +76,15 @@ class RunAlarms:
                 self._contradicted.add(wheel)
                 alarms.append(f"{said}; its turns are not reported" if self._estimated else said)
                 self._write(alarm_event("sample rate", alarms[-1], on=True))
+        return alarms
+
+    def _bus(self, line: LineState) -> list[str]:
+        alarms = []
+        for place, silence in line.wheels.silences(time.monotonic_ns()).items():
+            if bool(silence) != (place in self._silent):
+                self._silent ^= {place}
+                alarms.append(silence or f"{place[0]}: the bus sends it again")
+                self._write(alarm_event(f"{place[0]} from the bus", alarms[-1], on=bool(silence)))
         return alarms
 
     def _away(self, ports: Sequence[PortState | None]) -> list[str]:

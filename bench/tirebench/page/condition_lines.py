@@ -13,7 +13,9 @@ ALWAYS = ("speed", "pressure", "camber")
 
 
 def in_use(wheel: Wheel, conditions: Conditions, origin: str) -> dict[str, dict[str, Any]]:
-    """Return value, unit and source of each condition; null and "" where it is not known.
+    """Return value, unit and source of each condition; null where it is not known.
+
+    The source is empty unless a bus sent the condition and is silent about it now.
 
     Parameters
     ----------
@@ -31,6 +33,7 @@ def in_use(wheel: Wheel, conditions: Conditions, origin: str) -> dict[str, dict[
         if math.isfinite(used):
             unit, dimension = UNITS[name]
             found[name] = {"value": from_si(used, unit, dimension), "unit": unit, "source": source}
-        elif name in ALWAYS:
-            found[name] = {"value": None, "unit": UNITS[name][0], "source": ""}
+        elif name in wheel.bus_conditions or name in ALWAYS:
+            silent = "the bus is silent" if name in wheel.bus_conditions else ""
+            found[name] = {"value": None, "unit": UNITS[name][0], "source": silent}
     return found

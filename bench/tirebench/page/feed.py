@@ -201,6 +201,8 @@ class Feed:
         changed += [] if busy else self._unheard(now)
         for number, said in self._source.wheels.contradicted.items():
             self._alarms.report(f"sample rate of wheel {number}", said, now)
+        for (name, wheel), said in self._source.wheels.silences(time.monotonic_ns()).items():
+            self._alarms.report(f"{name} of {wheel} from the bus", said, now)
         for source, said in chain.get("given_up", {}).items():
             self._alarms.report(f"port of source {source}", said, now)
         self._alarms.report("busy", busy, now)  # the run writes these into the recording

@@ -1,5 +1,6 @@
 """Content of a map of another make's transmitter: its wheels, and the conditions that it sends."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -56,6 +57,8 @@ class Quantity:
         Unit of the signal's value.
     wheel : int or None
         For which it holds; None: for all.
+    hold : float, [s]
+        How long the bus may be silent about it before it is unknown.
     """
 
     name: str
@@ -63,12 +66,13 @@ class Quantity:
     signal: Signal
     unit: str
     wheel: int | None = None
+    hold: float = math.inf
 
     def measured(self, raw: float) -> Measured:
         """Return what a raw value means."""
         shown = self.signal.offset + self.signal.factor * raw
         name, dimension = TELLABLE[self.name]
-        return Measured(name, float(to_si(shown, self.unit, dimension)), self.wheel)
+        return Measured(name, float(to_si(shown, self.unit, dimension)), self.wheel, self.hold)
 
 
 @dataclass(frozen=True, slots=True)

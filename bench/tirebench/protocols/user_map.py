@@ -19,6 +19,7 @@
     message = "ABS"
     signal  = "v_ref"
     unit    = "km/h"
+    hold_s  = 1.0                 # optional: unknown when the bus is silent about it for so long
 
     [[pressure]]                  # of one wheel; also camber, omega, temperature
     wheel   = 0
@@ -56,7 +57,7 @@ from tirebench.errors import DeviceError, cause
 from tirebench.protocols.map_messages import Message, kind_of, listed, of_dbc
 from tirebench.protocols.map_parts import Quantity, UserMap, WheelMap, clashes
 from tirebench.protocols.signals import Signal
-from tirebench.wire.conditions import TELLABLE
+from tirebench.wire.conditions import HOLD, TELLABLE
 from tirebench.wire.device import Device
 from tirebench.wire.frames import MOST_GAGES
 from tirelib.errors import TirelibError
@@ -71,6 +72,8 @@ _WANTED = (
     "(binary), or name and columns (text)"
 )
 _KEYS = {"format", "dbc", "rate_hz", "strain_unit", "wheel", "message", "name", *TELLABLE}
+_WHEEL_KEYS = {"wheel", "message", "samples", "counter", "time", "time_unit"}
+_CONDITION_KEYS = {"message", "signal", "unit", "wheel", "hold_s"}
 
 
 def read_map(path: Path) -> UserMap:
@@ -117,9 +120,15 @@ class _Reader:
     def __init__(self, document: dict[str, Any], where: str) -> None:
         self.document = document
         self.where = where
-        self.faults = [
-            f"{where}: unknown key {key}; allowed keys are {', '.join(sorted(_KEYS))}; correct it"
-            for key in sorted(set(document) - _KEYS)
+        self.faults: list[str] = []
+        self._known_keys("", document, _KEYS)
+
+    def _known_keys(self, what: str, table: Mapping[str, Any], known: set[str]) -> None:
+        """Note each key that a table cannot have: a misspelt one would be left out silently."""
+        self.faults += [
+            f"{self.where}: {what}unknown key {key}; allowed keys are {', '.join(sorted(known))}; "
+            "correct it"
+            for key in sorted(set(table) - known)
         ]
 
     def fault(self, what: str, given: object, allowed: str, remedy: str = "correct it") -> None:
@@ -202,6 +211,7 @@ class _Reader:
     ) -> WheelMap | None:
         before = len(self.faults)
         what = f"wheel {table.get('wheel')!r}"
+        self._known_keys(f"{what}: ", table, _WHEEL_KEYS)
         message = self._message(f"{what}: message", table.get("message"), messages)
         rows = table.get("samples", [])
         if (
@@ -367,10 +377,14 @@ class _Reader:
     def _quantity(
         self, name: str, table: dict[str, Any], messages: Mapping[str, Message]
     ) -> Quantity | None:
+        self._known_keys(f"{name}: ", table, _CONDITION_KEYS)
         message = self._message(f"{name}: message", table.get("message"), messages)
         if message is None:
             return None
         signal = self._signal(name, table.get("signal"), message)
+        hold = table.get("hold_s", HOLD.get(TELLABLE[name][0], math.inf))
+        if not isinstance(hold, int | float) or isinstance(hold, bool) or not hold > 0.0:
+            self.fault(f"{name}: hold_s", hold, "a time above 0 s is needed")
         unit, wheel = str(table.get("unit")), table.get("wheel")
         dimension = TELLABLE[name][1]
         try:
@@ -383,7 +397,7 @@ class _Reader:
                 wheel,
                 "0 .. 255 is needed; leave it out if the value holds for all wheels",
             )
-        return None if signal is None else Quantity(name, message, signal, unit, wheel)
+        return None if signal is None else Quantity(name, message, signal, unit, wheel, hold)
 
 
 def _is_wheel(number: object) -> bool:

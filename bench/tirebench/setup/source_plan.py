@@ -47,6 +47,12 @@ class SourcePlan:
         return [] if user is None else [wheel.wheel for wheel in user.wheels]
 
     @property
+    def sends_strain(self) -> bool:
+        """Whether it has wheels, and is not a bus that sends conditions only."""
+        user = self.protocol.user_map
+        return user is None or bool(user.wheels)
+
+    @property
     def gages(self) -> set[int]:
         """Numbers of gages that its wheels have."""
         user = self.protocol.user_map

@@ -45,6 +45,12 @@ TRUTH = {
     "kappa": ("1", "ratio"),
     "Fy": ("N", "force"),
 }
+HOLD = {"speed": 1.0, "omega": 1.0, "camber": 1.0}
+"""How long a bus may be silent about a condition before it is unknown, [s], unless its map gives
+`hold_s`; one that is not listed is held for ever. A vehicle's bus sends its speed every 10 to
+100 ms (SAE J1939-71: wheel-based speed every 100 ms), so ten messages are missing. After half of
+it five are, and a bus that sends twice a second would come and go; after double of it a wheel that
+brakes with 8 m/s^2 is 16 m/s slower than the held speed, instead of 8 m/s."""
 ROUNDING = 0.6
 """Device time is a whole number of microseconds; a condition this close has begun, [us]."""
 LONGEST_MEMORY = 256
@@ -164,11 +170,14 @@ class Measured:
     value : float, SI
     wheel : int or None
         For which it holds; None: for all.
+    hold : float, [s]
+        It holds for so long unless the bus sends it again; then it is unknown.
     """
 
     name: str
     value: float
     wheel: int | None = None
+    hold: float = math.inf
 
 
 class Held:

@@ -269,7 +269,7 @@ function drawState() {
   $("system").textContent = parts.join(" · ");
   $("system").title = $("system").textContent;
   drawHealth($("health"), state.wheels, state.alarms);
-  drawUse($("use-list"), state, app.wheel);
+  drawUse($("use-list"), state, app.all ? null : app.wheel);
   drawGages(state);
   $("gages").disabled = !state.live || Boolean(state.ended) || app.wheel === null;
   const alarms = drawAlarms($("alarms"), state);

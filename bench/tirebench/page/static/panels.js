@@ -63,9 +63,26 @@ function size(bytes) {
   return bytes >= 1e9 ? `${shown(bytes / 1e9, 1)} GB` : `${shown(bytes / 1e6, 1)} MB`;
 }
 
-// The recording, the conditions of a wheel with their source, the last notes.
+// Conditions of these wheels with their source: a row each, and one for each wheel where they differ.
+function conditionRows(wheels) {
+  const found = new Map();
+  for (const [number, { in_use: used }] of wheels) {
+    for (const [name, { value, unit, source }] of Object.entries(used)) {
+      const digits = unit === "km/h" ? 1 : 2;
+      const said = unit === "1" ? shown(value, digits) : `${shown(value, digits)} ${unit}`;
+      const one = { name, number, text: value === null ? "not known" : said, source, none: value === null };
+      found.set(name, [...(found.get(name) || []), one]);
+    }
+  }
+  return [...found.values()].flatMap((all) => {
+    const alike = all.every(({ text, source }) => text === all[0].text && source === all[0].source);
+    return alike ? [all[0]] : all.map((one) => ({ ...one, label: `${one.name} ${one.number}` }));
+  });
+}
+
+// The recording, the conditions of a wheel (null: of all) with their source, the last notes.
 export function drawUse(list, state, number) {
-  const wheel = state.wheels[String(number)];
+  const wheels = Object.entries(state.wheels).filter(([n]) => number === null || n === String(number));
   const rows = [];
   const row = (name, text, quiet) => {
     const value = node("dd", text);
@@ -83,12 +100,10 @@ export function drawUse(list, state, number) {
     row("room", `${size(chain.free_bytes)} free`, chain.minutes_left === null ? ""
       : `for ${minutes(chain.minutes_left)}`).dataset.use = "room";
   }
-  for (const [name, { value, unit, source }] of Object.entries(wheel ? wheel.in_use : {})) {
-    const digits = unit === "km/h" ? 1 : 2;
-    const said = unit === "1" ? shown(value, digits) : `${shown(value, digits)} ${unit}`;
-    const cell = value === null ? row(name, "not known") : row(name.replaceAll("_", " "), said, source);
+  for (const { name, label, text, source, none } of conditionRows(wheels)) {
+    const cell = row((label || name).replaceAll("_", " "), text, source);
     cell.dataset.use = name;
-    cell.classList.toggle("none", value === null);
+    cell.classList.toggle("none", none);
   }
   for (const { time, text } of [...(state.notes || [])].reverse().slice(0, 3)) row(clock(1000 * time), text);
   list.replaceChildren(...rows);
