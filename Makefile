@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: all demo test lint docs bench figures fem proof hidden next-test cosim cosim-all bench-demo faults endurance soak \
+.PHONY: all demo studio test lint docs bench figures fem proof hidden next-test cosim cosim-all bench-demo faults endurance soak \
 	package clean
 
 all: $(STAMP)
@@ -12,12 +12,16 @@ $(STAMP): pyproject.toml .ci/constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed")'
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --constraint .ci/constraints.txt --editable ".[fmu,bench,cosim,docs,dev]"
+	$(BIN)/python -m pip install --quiet --constraint .ci/constraints.txt --editable ".[fmu,bench,studio,cosim,docs,dev]"
 	touch $@
 
 # The main job, end to end, on the numerical rig; ends by naming the files to open.
 demo: $(STAMP)
 	$(BIN)/python build/demo.py
+
+# The journey in the browser; "Try the example" there measures a virtual tire with a hidden effect.
+studio: $(STAMP)
+	$(BIN)/tirelib studio
 
 # One process a core, a file to each; the array libraries keep to one thread in each.
 test: lint

@@ -22,10 +22,11 @@ from websockets.sync.client import connect
 from tests.bench.in_process import FakeSource
 from tests.bench.programs import PATIENCE, wait_until
 from tirebench.estimator.estimation import News
-from tirebench.page.connections import MOST_IDLE, Connection, least_needed
 from tirebench.page.feed import About
 from tirebench.page.live import LivePage, PageChoice
 from tirebench.page.server import MOST_VIEWERS, STATIC
+from tirelib.web.assets import CHARTS
+from tirelib.web.connections import MOST_IDLE, Connection, least_needed
 
 Answer = tuple[int, dict[str, str], bytes]
 
@@ -161,7 +162,7 @@ def test_the_printed_address_gives_a_cookie_and_leaves_no_token_in_the_address(
 
 
 def test_every_file_is_served_and_loads_nothing_from_elsewhere(served: Served) -> None:
-    for path, (name, _) in STATIC.items():
+    for path, name in (STATIC | CHARTS).items():
         status, _, body = served.ask(path, **served.good)
         assert status == 200, path
         if not name.startswith("uplot") and name.endswith((".js", ".css", ".html")):

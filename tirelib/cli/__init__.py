@@ -26,6 +26,7 @@ VERBS = {
     "add": "Add EFFECT to a model, fit it to CAMPAIGN and show how the error changes.",
     "selftest": "Plant each effect at the plan and noise of CAMPAIGN and tell the chance of "
     "finding it.",
+    "studio": "Open the journey in the browser: see, suspect, add, take away.",
     "simulate": "Simulate the rolling ring on the road: shape, pressure, shear, strain and strain "
     "rate.",
     "fmu": "Export the estimator or the virtual tire as an FMU, check it, and run it.",
@@ -35,7 +36,13 @@ VERBS = {
 verbs needs no verb's module. A verb is the command of that name in the module of that name
 (`import_` for import, `_` in place of `-`)."""
 
-OPTIONAL = {"pythonfmu": "fmu", "fmpy": "fmu"}
+OPTIONAL = {
+    "pythonfmu": "fmu",
+    "fmpy": "fmu",
+    "starlette": "studio",
+    "uvicorn": "studio",
+    "websockets": "studio",
+}
 """Packages that a plain install lacks, and the extra that brings each."""
 
 _EXAMPLE = """\b

@@ -1,6 +1,8 @@
 """What several verbs share: progress bars, JSON files, tables."""
 
+import json
 import os
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from errno import ENOTDIR
@@ -47,6 +49,8 @@ FILE = click.Path(path_type=Path, dir_okay=False)
 NEW_FILE = NewPath(path_type=Path, dir_okay=False)
 NEW_FOLDER = NewPath(path_type=Path, file_okay=False)
 WIDTH = 120
+PROGRESS = "TIRELIB_PROGRESS"
+"""Environment variable that asks for progress as lines of JSON."""
 
 
 def output() -> Console:
@@ -59,7 +63,14 @@ def output() -> Console:
 
 @contextmanager
 def progress_bar(what: str, total: int | None = None) -> Iterator[Callable[[str], None]]:
-    """Yield a callback that advances a bar on stderr by one step and shows a label."""
+    """Yield a callback that advances a bar on stderr by one step and shows a label.
+
+    With the environment variable `PROGRESS` set to "json", every step is a line of JSON on stderr
+    instead: what is done, the number of steps so far, of all steps (or null), and the label.
+    """
+    if os.environ.get(PROGRESS) == "json":
+        yield _lines(what, total)
+        return
     console = Console(stderr=True)
     with Progress(
         TextColumn("{task.description}"),
@@ -77,3 +88,20 @@ def progress_bar(what: str, total: int | None = None) -> Iterator[Callable[[str]
             bar.update(task, advance=1, label=label)
 
         yield advance
+
+
+def _lines(what: str, total: int | None) -> Callable[[str], None]:
+    count = 0
+
+    def say(label: str) -> None:
+        line = {"progress": what, "done": count, "total": total, "label": label}
+        sys.stderr.write(json.dumps(line) + "\n")
+        sys.stderr.flush()
+
+    def advance(label: str) -> None:
+        nonlocal count
+        count += 1
+        say(label)
+
+    say("")
+    return advance

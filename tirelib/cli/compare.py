@@ -7,12 +7,14 @@ import click
 from tirelib.campaign import read_campaign
 from tirelib.cli.common import (
     CAMPAIGN,
+    NEW_FILE,
     NEW_FOLDER,
     output,
     progress_bar,
     write_json,
 )
 from tirelib.cli.options import effects_option, json_option, model_option, quantity_option
+from tirelib.errors import ParameterError
 
 _EXAMPLE = """\b
 Examples:
@@ -20,10 +22,14 @@ Examples:
   tirelib identify build/out/straight --out build/out/M.toml
   tirelib compare build/out/straight --model build/out/M.toml --out build/out/compared
   tirelib compare build/out/set1 --model build/out/M.toml --quantity Fy --json build/out/Fy.json
+  tirelib compare build/out/straight --model build/out/M.toml --trace sidewall_load=0.2 \
+                  --data build/out/traces.npz
 
 \b
 DIR/index.html holds everything in one file; comparison.md and comparison.json hold the same as
 text and as numbers. Errors are in units of the noise between repeated runs. Exit code 2: bad input.
+A trace is the difference, model less measured, that an effect of this strength would leave if the
+measured tire had it and the model did not.
 """
 
 
@@ -39,6 +45,21 @@ text and as numbers. Errors are in units of the noise between repeated runs. Exi
     type=NEW_FOLDER,
     help="Folder for index.html, comparison.md and comparison.json.",
 )
+@click.option(
+    "--data",
+    "data_file",
+    metavar="FILE.npz",
+    type=NEW_FILE,
+    help="Write what the plots are drawn from: arrays in the units of the plots (numpy).",
+)
+@click.option(
+    "--trace",
+    "traces",
+    metavar="EFFECT=STRENGTH",
+    multiple=True,
+    help="With --data: also the trace of an effect at a strength; several components of a "
+    "strength are separated by commas. May be given several times.",
+)
 @json_option()
 def compare(
     folder: Path,
@@ -46,6 +67,8 @@ def compare(
     quantity: str | None,
     effect_files: tuple[Path, ...],
     out: Path | None,
+    data_file: Path | None,
+    traces: tuple[str, ...],
     json_file: Path | None,
 ) -> None:
     """Compare a model with CAMPAIGN and show where it fails."""
@@ -55,10 +78,17 @@ def compare(
     from tirelib.parameters import read_tire
 
     catalogue = registered_effects(effect_files)
+    planted = [_trace(given) for given in traces]
+    if planted and data_file is None:
+        raise ParameterError("--trace is written by --data FILE.npz only; give both")
     file = read_tire(model_name)
     campaign = read_campaign(folder)
     with progress_bar("comparing") as progress:
         found = compare_model(campaign, file, quantity, effects=catalogue, progress=progress)
+        if data_file is not None:
+            from tirelib.compare.plot_data import plot_data, write_plot_data
+
+            data = plot_data(found, campaign, file, planted, catalogue, progress=progress)
     document = comparison_document(found)
     console = output()
     console.print(_answer(document))
@@ -73,6 +103,21 @@ def compare(
     for path in targets:
         write_json(path, document)
         console.print(f"written: {path}")
+    if data_file is not None:
+        write_plot_data(data_file, data)
+        console.print(f"written: {data_file}")
+
+
+def _trace(given: str) -> tuple[str, tuple[float, ...]]:
+    """Return name and strength of an effect."""
+    name, _, numbers = given.partition("=")
+    try:
+        return name, tuple(float(number) for number in numbers.split(","))
+    except ValueError:
+        raise ParameterError(
+            f"--trace {given}: EFFECT=STRENGTH is needed, for instance sidewall_load=0.2; correct "
+            "the strength"
+        ) from None
 
 
 def _answer(document: dict[str, object]) -> str:

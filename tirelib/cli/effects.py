@@ -1,16 +1,24 @@
 """``tirelib effects``: the catalogue, and the check of effects of your own."""
 
+import inspect
+from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from tirelib.cli.common import output, progress_bar
-from tirelib.cli.options import effects_option
+from tirelib.cli.common import output, progress_bar, write_json
+from tirelib.cli.options import effects_option, json_option
 from tirelib.errors import FormatError
 
+if TYPE_CHECKING:
+    from tirelib.effects import Effect
+    from tirelib.model.registration import Registration
+
+FORMAT = "tirelib-effects/1"
 _EXAMPLE = """\b
 Examples:
   tirelib effects
@@ -25,7 +33,8 @@ again. Exit code: 0 all passed, 2 one did not.
 
 @click.command(epilog=_EXAMPLE)
 @effects_option
-def effects(effect_files: tuple[Path, ...]) -> None:
+@json_option("what each effect is: title, stage, unit, range, source, law")
+def effects(effect_files: tuple[Path, ...], json_file: Path | None) -> None:
     """List the effects of the catalogue, or register effects of your own."""
     from tirelib.effects import CATALOGUE
     from tirelib.effects.load import all_effects
@@ -39,6 +48,7 @@ def effects(effect_files: tuple[Path, ...]) -> None:
             ends = f"{effect.low:g} .. {effect.high:g}"
             table.add_row(effect.stage, effect.name, effect.unit, ends, effect.title)
         output().print(table)
+        _write(json_file, found.values(), ())
         return
     faults: list[str] = []
     with progress_bar("registering") as progress:
@@ -63,3 +73,47 @@ def effects(effect_files: tuple[Path, ...]) -> None:
         console.print(f"  effects with a similar trace: {twins or 'none'}")
     if faults:
         raise FormatError(faults)
+    _write(json_file, found.values(), reports)
+
+
+def _write(
+    json_file: Path | None, every: "Iterable[Effect]", reports: "Iterable[Registration]"
+) -> None:
+    if json_file is None:
+        return
+    tested = {
+        report.effect.name: {
+            "planted": report.planted,
+            "recovered": report.recovered,
+            "imitated_by_base": 1.0 - report.survives,
+            "twins": [{"effect": name, "angle_deg": float(angle)} for name, angle in report.twins],
+        }
+        for report in reports
+        if not report.effect.untestable
+    }
+    listed = [_entry(effect) | {"tested": tested.get(effect.name)} for effect in every]
+    write_json(json_file, {"format": FORMAT, "effects": listed})
+
+
+def _entry(effect: "Effect") -> dict[str, Any]:
+    from tirelib.effects import CATALOGUE
+
+    try:
+        law = inspect.getsource(effect.law)
+    except (OSError, TypeError):
+        law = ""
+    return {
+        "effect": effect.name,
+        "title": effect.title,
+        "stage": effect.stage,
+        "unit": effect.unit,
+        "range": [effect.low, effect.high],
+        "components": effect.components,
+        "varies_with": list(effect.varies_with),
+        "needs": list(effect.needs),
+        "source": effect.source,
+        "untestable": effect.untestable,
+        "own": effect.name not in CATALOGUE,
+        "equation": (inspect.getdoc(effect.law) or "").partition("\n")[2].strip(),
+        "law": law,
+    }

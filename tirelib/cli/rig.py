@@ -9,6 +9,7 @@ from rich.table import Table
 
 from tirelib.cli.common import NEW_FOLDER, output, progress_bar, write_json
 from tirelib.cli.options import json_option
+from tirelib.errors import ParameterError
 
 if TYPE_CHECKING:
     from tirelib.rig.campaign import Truth
@@ -16,8 +17,9 @@ if TYPE_CHECKING:
 RIG_FORMAT = "tirelib-rig/1"
 
 _EXAMPLE = """\b
-Example:
+Examples:
   tirelib rig --plan set1 --out build/out/set1 --seed 1 --repeats 6
+  tirelib rig --plan short --hide sidewall_load=0.3 --out build/out/hidden
 
 \b
 The folder is a campaign (campaign.toml, runs.csv, runs/*.mf4). Its truth.csv holds the noise-free
@@ -64,6 +66,14 @@ in SI and ISO signs.
     help="Depth of the tread grooves; a new tread has 8 mm. [default: 8]",
 )
 @click.option(
+    "--hide",
+    "hidden_effects",
+    metavar="EFFECT=STRENGTH",
+    multiple=True,
+    help="Physical effect that the virtual tire or its gages have and the base model lacks; "
+    "--list shows all. May be given several times.",
+)
+@click.option(
     "--axes",
     default="iso",
     show_default=True,
@@ -82,6 +92,7 @@ def rig(
     tire_name: str,
     friction: float | None,
     tread_depth_mm: float | None,
+    hidden_effects: tuple[str, ...],
     axes: str,
     jobs: int,
     force: bool,
@@ -98,6 +109,7 @@ def rig(
     from tirelib.rig.plans import on_one_road, plan, with_repeats
     from tirelib.rig.tire import tire
 
+    planted = dict(_hidden(given) for given in hidden_effects)
     depth = None if tread_depth_mm is None else 1e-3 * tread_depth_mm
     chosen = on_one_road(plan(plan_name), friction, depth)
     count = len(with_repeats(chosen, chosen.repeats if repeats is None else repeats))
@@ -111,6 +123,7 @@ def rig(
             jobs=jobs,
             axes=axes,
             overwrite=force,
+            planted=planted,
             progress=lambda done, total: advance(f"run {done} of {total}"),
         )
     click.echo(f"{count} runs of {plan_name} in {out} (axes {axes}, seed {seed})")
@@ -118,7 +131,22 @@ def rig(
         write_json(json_file, _document(plan_name, out, seed, tire_name, axes, truths))
 
 
+def _hidden(given: str) -> tuple[str, float]:
+    """Return name and strength of an effect to hide."""
+    from tirelib.rig.hidden import hidden
+
+    name, _, number = given.partition("=")
+    try:
+        return hidden(name).name, float(number)
+    except ValueError:
+        raise ParameterError(
+            f"--hide {given}: EFFECT=STRENGTH is needed, for instance {name}="
+            f"{hidden(name).visible:g}; correct the strength"
+        ) from None
+
+
 def _list(json_file: Path | None) -> None:
+    from tirelib.rig.hidden import HIDDEN
     from tirelib.rig.plans import PLANS, with_repeats
     from tirelib.rig.tire import TIRES
 
@@ -132,6 +160,10 @@ def _list(json_file: Path | None) -> None:
     console = output()
     console.print(table)
     console.print(f"tires: {', '.join(TIRES)}")
+    effects = Table("effect to hide", "visible at", "unit", "law", box=SIMPLE_HEAD)
+    for one in HIDDEN.values():
+        effects.add_row(one.name, f"{one.visible:g}", one.unit, one.law)
+    console.print(effects)
     if json_file is not None:
         write_json(json_file, {"format": RIG_FORMAT, "plans": rows, "tires": list(TIRES)})
 

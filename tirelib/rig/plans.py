@@ -137,6 +137,16 @@ def _straight() -> Plan:
     return Plan("straight", "5 loads x 3 pressures x 4 speeds and 6 repeats", runs, repeats=6)
 
 
+def _short() -> Plan:
+    runs = tuple(
+        _at(load, bar, kmh)
+        for bar in (1.9, 2.5)
+        for kmh in (40, 110)
+        for load in _loads((60.0, 100.0, 140.0))
+    )
+    return Plan("short", "3 loads x 2 pressures x 2 speeds and 3 repeats", runs, repeats=3)
+
+
 def _along(about: str, start: Condition, name: str, *corners: tuple[float, float]) -> Ramp:
     """Return a ramp of one condition, held before and after; corners are times [s], values."""
     first, last = corners[0], corners[-1]
@@ -178,6 +188,7 @@ PLANS: Mapping[str, Callable[[], Plan]] = MappingProxyType(
         "set3_cornering": _set3_cornering,
         "combined": _combined,
         "straight": _straight,
+        "short": _short,
         "ramps": _ramps,
     }
 )

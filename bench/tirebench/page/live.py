@@ -10,17 +10,17 @@ from multiprocessing.connection import Connection
 from types import TracebackType
 from typing import Any
 
-from tirebench.errors import DeviceError
+from tirebench.errors import DeviceError, LinkError
 from tirebench.estimator.estimation import News
 from tirebench.estimator.session import Source
 from tirebench.live.board import Board
 from tirebench.live.supervised import CONTEXT, Supervised
-from tirebench.page.address import listener, new_token
 from tirebench.page.alarms import RULES, Rule
 from tirebench.page.commands import CommandDesk, Switch
 from tirebench.page.feed import About, Feed
 from tirebench.page.gages import GageSetup
-from tirebench.page.guard import bracketed
+from tirelib.web.address import listener, new_token
+from tirelib.web.guard import bracketed
 
 LOOPBACK = "127.0.0.1"
 HANGS = 60.0
@@ -183,7 +183,7 @@ class LivePage:
         from tirebench.page.server import PagePlan, serve
 
         choice, token = self._choice, new_token()
-        opened = self._stack.enter_context(listener(choice.host, choice.port))
+        opened = self._stack.enter_context(_bound(choice))
         port = opened.getsockname()[1]
         shown = socket.gethostname() if _unspecified(choice.host) else bracketed(choice.host)
         self.url = (
@@ -226,6 +226,17 @@ class LivePage:
         kept = Supervised(target, arguments, lambda: self._board.silence > HANGS)
         self._kept.append(kept)
         self._stack.callback(kept.wait, 0.0)
+
+
+def _bound(choice: PageChoice) -> socket.socket:
+    try:
+        return listener(choice.host, choice.port)
+    except OSError as error:
+        raise LinkError(
+            f"--host {choice.host} --page-port {choice.port}: the page cannot be bound "
+            f"({error.strerror}); an address and a free port of this machine are needed; choose "
+            "others (port 0 for any free one), or --no-page"
+        ) from None
 
 
 def _unspecified(host: str) -> bool:

@@ -11,7 +11,6 @@ import socket
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
-from importlib.resources import files
 from multiprocessing import parent_process
 from multiprocessing.connection import Connection
 from typing import Any
@@ -28,28 +27,27 @@ from tirebench.errors import DeviceError
 from tirebench.live.board import Board
 from tirebench.live.priority import below
 from tirebench.page.commands import parse_command
-from tirebench.page.connections import Connection as HttpConnection
-from tirebench.page.guard import LONGEST_BODY, Guard
 from tirebench.page.history import History, Viewer
+from tirelib.web.assets import file_routes
+from tirelib.web.connections import Connection as HttpConnection
+from tirelib.web.guard import LONGEST_BODY, Guard
 
 TICK = 0.05
 """Time between two messages to a viewer at least, [s]."""
 MOST_VIEWERS = 16
 STATIC = {
-    "/": ("index.html", "text/html; charset=utf-8"),
-    "/page.css": ("page.css", "text/css; charset=utf-8"),
-    "/page.js": ("page.js", "text/javascript; charset=utf-8"),
-    "/all.js": ("all.js", "text/javascript; charset=utf-8"),
-    "/format.js": ("format.js", "text/javascript; charset=utf-8"),
-    "/gages.js": ("gages.js", "text/javascript; charset=utf-8"),
-    "/panels.js": ("panels.js", "text/javascript; charset=utf-8"),
-    "/charts.js": ("charts.js", "text/javascript; charset=utf-8"),
-    "/shape.js": ("shape.js", "text/javascript; charset=utf-8"),
-    "/uplot.min.js": ("uplot.min.js", "text/javascript; charset=utf-8"),
-    "/uplot.min.css": ("uplot.min.css", "text/css; charset=utf-8"),
-    "/icon.svg": ("icon.svg", "image/svg+xml"),
+    "/": "index.html",
+    "/page.css": "page.css",
+    "/page.js": "page.js",
+    "/all.js": "all.js",
+    "/format.js": "format.js",
+    "/gages.js": "gages.js",
+    "/panels.js": "panels.js",
+    "/charts.js": "charts.js",
+    "/shape.js": "shape.js",
+    "/icon.svg": "icon.svg",
 }
-"""Every address of a file, its name and type."""
+"""Every address of a file of this page, and its name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,15 +85,13 @@ class Page:
 
     def app(self) -> Starlette:
         """Return the application, guarded."""
-        folder = files("tirebench.page") / "static"
-        routes: list[Route | WebSocketRoute] = [
-            Route(path, _file((folder / name).read_bytes(), kind), methods=["GET"])
-            for path, (name, kind) in STATIC.items()
-        ]
+        routes: list[Route | WebSocketRoute] = [*file_routes("tirebench.page", STATIC)]
         routes.append(Route("/command", self._command, methods=["POST"]))
         routes.append(WebSocketRoute("/stream", self._stream))
         plan = self._plan
-        guard = Middleware(Guard, token=plan.token, host=plan.host, port=plan.port)
+        guard = Middleware(
+            Guard, token=plan.token, host=plan.host, port=plan.port, command="tirebench run"
+        )
         return Starlette(routes=routes, middleware=[guard], lifespan=self._lifespan)
 
     @asynccontextmanager
@@ -218,13 +214,6 @@ def serve(plan: PagePlan, listener: socket.socket, pipe: Connection) -> None:
         timeout_keep_alive=5,
     )
     asyncio.run(_Server(config).serve([listener]))
-
-
-def _file(data: bytes, kind: str) -> Any:
-    async def send(_: Request) -> Response:
-        return Response(data, media_type=kind)
-
-    return send
 
 
 def _choose(viewer: Viewer, text: str) -> None:

@@ -1,12 +1,13 @@
 """Who may see the page: one middleware for HTTP and WebSocket.
 
-A request passes only with the run's token (in a cookie, or once in the address), under a name of
-this machine that was asked for, and from a page of this origin. That stops other sites in the same
-browser (cross-site requests, WebSockets, a rebound name) and other users of the machine.
+A request passes only with the server's token (in a cookie, or once in the address), under a name
+of this machine that was asked for, and from a page of this origin. That stops other sites in the
+same browser (cross-site requests, WebSockets, a rebound name) and other users of the machine.
 """
 
 import ipaddress
 import secrets
+from collections.abc import Mapping
 from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qs
 
@@ -15,17 +16,17 @@ from starlette.responses import PlainTextResponse, RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 LONGEST_BODY = 4096
-"""Bytes of a request's body."""
+"""Bytes of a request's body, where a page does not allow more."""
 _REFUSED = {
-    "host": (400, "the page answers only at the address that `tirebench run` printed"),
+    "host": (400, "the page answers only at the address that `{command}` printed"),
     "origin": (403, "the request comes from another page"),
-    "token": (403, "the token is missing or wrong: open the address that `tirebench run` printed"),
-    "length": (413, f"a request may hold up to {LONGEST_BODY} bytes"),
+    "token": (403, "the token is missing or wrong: open the address that `{command}` printed"),
+    "length": (413, "the request holds more bytes than allowed"),
 }
 
 
 class Guard:
-    """Refuse what does not belong to this run's page.
+    """Refuse what does not belong to this server's page.
 
     Parameters
     ----------
@@ -34,13 +35,27 @@ class Guard:
     host : str
         Address that the server is bound to.
     port : int
+    command : str
+        Command that printed the address, as the user typed it; its first word names the cookie.
+    bodies : mapping of path to int
+        Bytes that a request to a path may hold, where that is not `LONGEST_BODY`.
     """
 
-    def __init__(self, app: ASGIApp, token: str, host: str, port: int) -> None:
+    def __init__(
+        self,
+        app: ASGIApp,
+        token: str,
+        host: str,
+        port: int,
+        command: str,
+        bodies: Mapping[str, int] | None = None,
+    ) -> None:
         self._app = app
         self._token = token.encode()
         self._port = port
-        self._cookie = cookie_name(port)
+        self._command = command
+        self._bodies = dict(bodies or {})
+        self._cookie = cookie_name(command.split()[0], port)
         self._any_address = ipaddress.ip_address(host).is_unspecified
         self._names = {"127.0.0.1", "localhost", "[::1]", bracketed(host)}
 
@@ -53,7 +68,7 @@ class Guard:
         host = headers.get("host", "")
         given = parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]
         first = scope["type"] == "http" and scope["path"] == "/" and self._good(given)
-        fault = self._fault(headers, host, first)
+        fault = self._fault(headers, host, first, scope.get("path", ""))
         if fault:
             await self._refuse(scope, receive, send, fault)
         elif first:
@@ -63,7 +78,7 @@ class Guard:
         else:
             await self._app(scope, receive, send)
 
-    def _fault(self, headers: Headers, host: str, first: bool) -> str:
+    def _fault(self, headers: Headers, host: str, first: bool, path: str) -> str:
         if len(headers.getlist("host")) != 1 or not self._known(host):
             return "host"
         origins = headers.getlist("origin")
@@ -74,7 +89,7 @@ class Guard:
         if not first and not self._good(self._in_cookie(headers)):
             return "token"
         length = headers.get("content-length", "0")
-        if not length.isdecimal() or int(length) > LONGEST_BODY:
+        if not length.isdecimal() or int(length) > self._bodies.get(path, LONGEST_BODY):
             return "length"
         return ""
 
@@ -116,13 +131,13 @@ class Guard:
             await receive()
             await send({"type": "websocket.close", "code": 1008})
             return
-        response = PlainTextResponse(f"{text}\n", status)
+        response = PlainTextResponse(f"{text.format(command=self._command)}\n", status)
         await response(scope, receive, _secured(send, ""))
 
 
-def cookie_name(port: int) -> str:
+def cookie_name(program: str, port: int) -> str:
     """Return the name of the cookie: cookies know no ports, so it is in the name."""
-    return f"tirebench-{port}"
+    return f"{program}-{port}"
 
 
 def bracketed(host: str) -> str:

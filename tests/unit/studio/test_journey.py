@@ -1,0 +1,118 @@
+"""The journey over the server: what follows what, cancel, history, and what a restart keeps."""
+
+import os
+from pathlib import Path
+
+from tests.unit.studio.conftest import RUNNER, Served, until
+from tirelib.studio.desk import Desk
+from tirelib.studio.jobs import Jobs
+from tirelib.studio.session import Session
+
+
+def alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().split()[2] != "Z"
+    except OSError:
+        return False
+
+
+def verbs(served: Served) -> list[str]:
+    return [each["argv"][0] for each in served.said()]
+
+
+def test_opening_a_campaign_leads_to_a_verdict_and_the_page_gets_what_the_commands_wrote(
+    served: Served, opened: str
+) -> None:
+    told = served.campaign(opened)
+    model = told["models"][0]
+    assert (told["current"], told["quantity"]) == ("001", "strain")
+    assert told["quantities"] == ["strain", "Fy"]
+    assert (model["error"], model["verdict"], model["named"]) == (15.25, "named", ["sidewall_load"])
+    assert [said for _, said in model["lines"]] == ["A.", "B.", "C.", "D."]
+    asked = f"campaign={opened}&model=001&quantity=strain"
+    assert served.get(f"/document?{asked}&name=comparison")["error"] == 15.25
+    traced = next(each["argv"] for each in served.said() if "--trace" in each["argv"])
+    assert "sidewall_load=0.3" in traced
+    assert "nonuniformity=1.0,2.0" in traced
+    body = served.ask(f"/arrays?{asked}&name=plots", **served.good)[2]
+    assert b'"angle": {"shape": [3], "at": 0}' in body
+    assert body.endswith(bytes([0, 0, 0, 0, 0, 0, 128, 63, 0, 0, 0, 64]))  # 0, 1, 2 as floats
+    served.do(do="look", campaign=opened, model="001")
+    assert verbs(served).count("diagnose") == 1  # nothing is computed twice
+
+
+def test_two_ticked_effects_are_added_one_after_the_other_and_undo_goes_back(
+    served: Served, opened: str
+) -> None:
+    status, told = served.do(do="add", campaign=opened, model="001", effects=["sidewall_load"])
+    assert (status, told["models"]) == (200, ["002"])
+    until(lambda: served.campaign(opened)["current"] == "002")
+    model = served.campaign(opened)["models"][1]
+    assert (model["parent"], model["fit"]["error_after"]) == ("001", 5.5)
+    served.do(do="look", campaign=opened, model="001")
+    assert served.campaign(opened)["current"] == "001"
+    served.do(do="mark", campaign=opened, model="002", label="mine", pinned=True, hidden=True)
+    model = served.campaign(opened)["models"][1]
+    assert (model["label"], model["pinned"], model["hidden"]) == ("mine", True, True)
+    lines = served.get(f"/taken?campaign={opened}&model=002&what=commands")["commands"]
+    assert lines[1] == f"tirelib identify {served.measured} --out M.toml --json M.json"
+    assert lines[2].startswith("tirelib add sidewall_load --model M.toml --data ")
+    assert lines[2].endswith("--quantity strain --out M2.toml --json M2.json")
+
+
+def test_a_refit_is_cancelled_at_once_and_can_be_run_again(served: Served, opened: str) -> None:
+    served.hold.touch()
+    served.do(do="add", campaign=opened, model="001", effects=["sidewall_load"])
+    pid = until(lambda: [each["pid"] for each in served.said() if each["argv"][0] == "add"])[0]
+    job = next(j for j in served.campaign(opened)["jobs"] if j["kind"] == "add")
+    until(lambda: served.desk.jobs.progress[job["job"]].errors)
+    served.do(do="cancel", job=job["job"])
+    assert not alive(pid)
+    told = served.campaign(opened)
+    assert next(j for j in told["jobs"] if j["kind"] == "add")["state"] == "cancelled"
+    assert (told["current"], told["models"][1]["ready"]) == ("001", False)
+    served.hold.unlink()
+    served.do(do="again", job=job["job"])
+    until(lambda: served.campaign(opened)["current"] == "002")
+
+
+def test_a_command_that_fails_says_why(served: Served, opened: str) -> None:
+    served.desk.jobs.add(
+        "add",
+        {"campaign": "c", "model": "m", "effect": "sidewall_pressure"},
+        {"campaign": opened, "model": "001", "quantity": "strain"},
+    )
+    failed = until(lambda: [j for j in served.campaign(opened)["jobs"] if j["state"] == "failed"])
+    assert failed[0]["message"] == "it does not fit; choose another"
+    status, told = served.do(do="add", campaign=opened, model="001", effects=["nonsense"])
+    assert status == 400
+    assert "nonsense" in told["error"]
+
+
+def test_a_restart_shows_the_same_and_what_ran_is_interrupted(served: Served, opened: str) -> None:
+    served.hold.touch()
+    served.do(do="add", campaign=opened, model="001", effects=["sidewall_load"])
+    pid = until(lambda: [each["pid"] for each in served.said() if each["argv"][0] == "add"])[0]
+    before = served.campaign(opened)["models"][0]
+    folder = served.folder / "session"
+    again = Desk(Session(folder), Jobs(folder / "jobs", RUNNER), [])  # as after kill -9
+    assert [job.state for job in again.jobs.all.values()][-1] == "interrupted"
+    kept = next(iter(again.session)).models[0]
+    assert kept.told["number"] == before["number"]
+    assert kept.ready
+    served.close()
+    until(lambda: not alive(pid))
+
+
+def test_a_job_ends_when_its_server_is_gone(tmp_path: Path) -> None:
+    os.environ["HOLD"], os.environ["SAID"] = str(tmp_path / "hold"), str(tmp_path / "said")
+    (tmp_path / "hold").touch()
+    jobs = Jobs(tmp_path / "jobs", RUNNER)
+    jobs.add("add", {"campaign": "c", "model": "m", "effect": "e"}, {})
+    jobs.look()
+    process = next(iter(jobs._processes.values()))
+    until(lambda: (tmp_path / "said").exists())
+    assert process.stdin is not None
+    process.stdin.close()  # what the system does with the pipe of a server that was killed
+    assert process.wait(60) == 9
+    jobs.close()

@@ -1,0 +1,215 @@
+"""What the plots of a comparison are drawn from, and the traces of effects, as arrays.
+
+A trace is the difference (model less measured) that an effect would leave if the measured tire had
+it and the model did not: what it changes at its strength, less what the base model's numbers, the
+delay of the gages and the set points could take up, with the sign turned. It is of first order in
+these, so it shows the shape; how much an effect really takes away is told by an exact refit.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.campaign import Campaign
+from tirelib.compare.force_model import ForceBench, force_model_of
+from tirelib.compare.force_points import force_points
+from tirelib.compare.forces import ForceComparison, usable_points
+from tirelib.compare.set_points import predict_set_points
+from tirelib.compare.strain import Comparison
+from tirelib.effects import Effect
+from tirelib.errors import FormatError, ParameterError, TirelibError
+from tirelib.identify.delay import by_delay
+from tirelib.identify.force_data import force_data
+from tirelib.identify.random_effects import scales, whitening_of
+from tirelib.identify.span import span
+from tirelib.model.base import coordinates, large_displacements, linearised, operating_points
+from tirelib.model.base import predict as predict_waves
+from tirelib.parameters import TireFile
+from tirelib.waveforms import GRID
+
+FORMAT = "tirelib-plot-data/1"
+STEP = 1e-3
+"""Relative step of a brush's numbers."""
+Planted = Sequence[tuple[str, tuple[float, ...]]]
+
+
+def plot_data(
+    found: Comparison | ForceComparison,
+    campaign: Campaign,
+    file: TireFile,
+    planted: Planted,
+    effects: Mapping[str, Effect],
+    *,
+    progress: Callable[[str], None] | None = None,
+) -> dict[str, Any]:
+    """Return arrays by name, in the units of the plots, axes ISO 8855.
+
+    Parameters
+    ----------
+    found : Comparison or ForceComparison
+    campaign : Campaign
+    file : TireFile
+        The model that was compared.
+    planted : sequence of (name, strength)
+        Effects whose traces are wanted.
+    effects : mapping
+        The catalogue.
+    progress : callable, optional
+        Called with a label after each trace.
+
+    Returns
+    -------
+    Of strain, over runs and `GRID` [deg]: measured, model, difference [ustrain], white (whitened
+    residual, in noise), by_gage and measured_by_gage (runs, gages, angles); of forces, over points.
+    `trace_NAME` has the shape of the difference; `fault_NAME` tells why there is none.
+
+    Raises
+    ------
+    ParameterError
+        If an effect is unknown.
+    """
+    unknown = [name for name, _ in planted if name not in effects]
+    if unknown:
+        raise ParameterError(
+            f"--trace {unknown[0]}: the effect is not known; known are {', '.join(effects)}; "
+            "correct the name, or load the file that defines it with --effects"
+        )
+    if isinstance(found, ForceComparison):
+        data, trace = _forces(found), _force_traces(found, campaign, file, effects)
+    else:
+        data, trace = _strain(found), _strain_traces(found)
+    for name, strength in planted:
+        if progress is not None:
+            progress(f"trace of {name}")
+        try:
+            data[f"trace_{name}"] = trace(effects[name], strength)
+        except TirelibError as error:
+            data[f"fault_{name}"] = np.array(str(error))
+    return data
+
+
+def write_plot_data(path: Path, data: Mapping[str, Any]) -> None:
+    """Write the arrays as one .npz file.
+
+    Raises
+    ------
+    FormatError
+        If the file cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("wb") as stream:
+            np.savez(stream, **data)
+    except OSError as error:
+        raise FormatError(
+            f"{path}: cannot be written ({error.strerror}); choose another file"
+        ) from None
+
+
+def _strain(found: Comparison) -> dict[str, Any]:
+    waves, counted, c = found.chosen.waves, found.chosen.straight, found.chosen.waves.conditions
+    white = np.full(found.difference.shape, np.nan)
+    if found.error.whiten is not None:
+        white[counted] = -found.error.whiten(found.error.rest)
+    lateral = [1e3 * waves.header.gage_lateral[g] for g in found.chosen.gages]
+    return {
+        "format": np.array(FORMAT),
+        "quantity": np.array("strain"),
+        "angle": np.rad2deg(GRID),
+        "run": found.run,
+        "counted": counted,
+        "order": waves.start,
+        "load": c["Fz"],
+        "pressure": c["pressure"] / 1e5,
+        "speed": 3.6 * c["speed"],
+        "slip_angle": np.rad2deg(c["slip_angle"]),
+        "camber": np.rad2deg(c["camber"]),
+        "slip_ratio": c["slip_ratio"],
+        "edges": np.rad2deg(found.prediction.edges),
+        "gages": np.array(lateral),
+        "measured": 1e6 * found.chosen.strain,
+        "model": 1e6 * found.prediction.strain,
+        "difference": 1e6 * found.difference,
+        "white": white,
+        "noise": np.array(1e6 * found.noise.std),
+        "measured_by_gage": 1e6 * waves.strain[:, found.chosen.gages],
+        "by_gage": 1e6 * found.by_gage,
+    }
+
+
+def _strain_traces(found: Comparison) -> Callable[[Effect, tuple[float, ...]], FloatArray]:
+    model, waves = found.model, found.chosen.waves
+    at = operating_points(waves)
+    correction = None
+    if model.large:
+        correction = large_displacements(model.values, at, low_pass=waves.low_pass)
+    options: dict[str, Any] = {"low_pass": waves.low_pass, "correction": correction}
+    linear = linearised(model.values, at, coordinates(model.values), model.changes, **options)
+    scale, spread = scales(found.chosen.tolerance, waves.angle_std), float(np.std(found.difference))
+    tangent = found.points.tangent
+    noise = found.noise.std if found.noise.known else spread
+    whiten = whitening_of(tangent, scale, noise)
+    slopes = np.concatenate([linear.waveform_slopes, by_delay(linear.waveform, at.omega)[None]])
+    rows = whiten(slopes)
+    columns = rows.reshape(len(rows), -1).T
+
+    def trace(effect: Effect, strength: tuple[float, ...]) -> FloatArray:
+        planted = effect.at(strength[0] if effect.components == 1 else strength)
+        wave = predict_waves(model.values, at, [*model.changes, planted], **options).wave
+        raw = wave - linear.waveform
+        share = np.linalg.lstsq(columns, whiten(raw).ravel(), rcond=1e-9)[0]
+        own = raw - np.tensordot(share, slopes, axes=1)
+        return -1e6 * (own - predict_set_points(own, tangent, scale, noise).shift)
+
+    return trace
+
+
+def _forces(found: ForceComparison) -> dict[str, Any]:
+    data = found.data
+    return {
+        "format": np.array(FORMAT),
+        "quantity": np.array(found.quantity),
+        "run": found.run,
+        "order": data.time,
+        "load": data.load,
+        "pressure": data.pressure / 1e5,
+        "speed": 3.6 * data.speed,
+        "temperature": data.temperature - 273.15,
+        "slip_angle": np.rad2deg(data.slip_angle),
+        "camber": np.rad2deg(data.camber),
+        "slip_ratio": data.slip_ratio,
+        "measured": found.measured,
+        "model": found.predicted,
+        "difference": found.difference,
+        "white": found.difference / found.noise,
+        "noise": np.array(found.noise),
+    }
+
+
+def _force_traces(
+    found: ForceComparison, campaign: Campaign, file: TireFile, effects: Mapping[str, Effect]
+) -> Callable[[Effect, tuple[float, ...]], FloatArray]:
+    model = force_model_of(file, effects)
+    points = usable_points(campaign, model, force_points(force_data(campaign)))
+    points = points.take(np.isfinite(getattr(points.data, found.quantity)))
+    bench, values, name = ForceBench.of(model, points), model.values, found.quantity
+
+    def force(numbers: Mapping[str, float], *more: Any) -> FloatArray:
+        forces = bench.forces(numbers, [*model.changes, *more])
+        return np.asarray(getattr(forces, name), dtype=np.float64)
+
+    base = force(values)
+    columns = [np.ones_like(base)]
+    for key, value in values.items():
+        if np.isfinite(value) and value != 0.0:
+            columns.append((force({**values, key: value * (1.0 + STEP)}) - base) / STEP)
+    basis = span(np.stack(columns, axis=1))
+
+    def trace(effect: Effect, strength: tuple[float, ...]) -> FloatArray:
+        raw = force(values, effect.at(strength[0] if effect.components == 1 else strength)) - base
+        return np.asarray(-(raw - basis @ (basis.T @ raw)), dtype=np.float64)
+
+    return trace

@@ -1,0 +1,420 @@
+"""What the user asks for, and what follows from a job that has ended."""
+
+import json
+import shutil
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from tirelib.errors import FormatError, ParameterError
+from tirelib.studio import intake
+from tirelib.studio.disk import read_document, safe_name, write_atomic
+from tirelib.studio.jobs import Job, Jobs
+from tirelib.studio.session import QUANTITIES, Model, Opened, Session
+
+EXAMPLE = {"plan": "short", "seed": 1, "hide": ["sidewall_load=0.4"]}
+"""The example: 15 runs of a virtual tire whose sidewall softens as it is pressed."""
+OF_CAMPAIGN = ("check", "show")
+OF_MODEL = ("identify", "add", "remove")
+OF_QUANTITY = ("compare", "diagnose", "traces", "plant", "next-test")
+TAKEN = ("report", "calibrate", "fmu")
+LONGEST_LABEL = 80
+
+
+class Desk:
+    """Turns wishes into jobs, and results into documents of the session.
+
+    Parameters
+    ----------
+    session : Session
+    jobs : Jobs
+    roots : sequence of Path
+        Folders that the page may look into.
+    """
+
+    def __init__(self, session: Session, jobs: Jobs, roots: Sequence[Path]) -> None:
+        self.session, self.jobs = session, jobs
+        self.roots = [root.expanduser().resolve() for root in roots]
+        self.actions: Mapping[str, Callable[[Mapping[str, Any]], Mapping[str, Any] | None]] = {
+            "open": self._open,
+            "example": self._example,
+            "dropped": self._dropped,
+            "columns": self._columns,
+            "import": self._import,
+            "look": self._look,
+            "add": self._add,
+            "remove": self._remove,
+            "cancel": self._cancel,
+            "again": self._again,
+            "mark": self._mark,
+            "plant": self._plant,
+            "next-test": self._next_test,
+            "take": self._take,
+            "confirm-effect": self._confirm,
+        }
+        if not (session.folder / "effects.json").exists():
+            jobs.add("catalogue", {}, {})
+
+    def do(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Do what the page asks for.
+
+        Raises
+        ------
+        TirelibError
+            If it cannot be done, with the reason.
+        """
+        name = wish.get("do")
+        if not isinstance(name, str) or name not in self.actions:
+            raise ParameterError(f"{name!r} is no action; allowed are {', '.join(self.actions)}")
+        return self.actions[name](wish) or {}
+
+    def start(self, folder: Path, model_file: Path | None) -> str:
+        """Open a campaign that the command line names; return its address on the page."""
+        opened = self.session.open(folder)
+        if model_file is not None:
+            from tirelib.parameters import read_tire
+
+            read_tire(str(model_file))  # a file that is no model is refused here
+            model = opened.new_model(None, "identify", "", "")
+            model.change(label=model_file.name)
+            shutil.copyfile(model_file, model.file)
+            opened.change(current=model.number, quantity=None)
+        return self._begin(opened).name
+
+    def _quantity(self, opened: Opened, model: Model) -> str:
+        """Return what a model is looked at with: the last choice, else what it was fitted to."""
+        shown = read_document(opened.place / "show.json") or {}
+        gages = (shown.get("header") or {"gage_lateral_mm": [0.0]}).get("gage_lateral_mm")
+        told = opened.told.get("quantity") or next(iter(model.quantities), None)
+        return str(told or ("strain" if gages else "Fy"))
+
+    def ended(self, job: Job) -> None:
+        """Put results in their place, and begin what comes next."""
+        if job.state != "done":
+            return
+        out, subject = self.jobs.out(job), job.subject
+        if job.kind in ("rig", "import"):
+            opened = self.session.open(out / "campaign", "example" if job.kind == "rig" else "")
+            self._begin(opened)
+        elif job.kind in ("catalogue", "effects"):
+            _move(out, self.session.folder)
+            for path in job.order.get("effect_files", ())[-1:]:
+                told = read_document(Path(path).with_suffix(".json")) or {}
+                write_document(Path(path).with_suffix(".json"), told | {"confirmed": True})
+        elif job.kind in OF_CAMPAIGN:
+            opened = self.session.campaign(subject["campaign"])
+            _move(out, opened.place)
+            if job.kind == "check":
+                self._checked(opened)
+        elif job.kind in OF_MODEL:
+            opened = self.session.campaign(subject["campaign"])
+            model = opened.model(subject["model"])
+            _move(out, model.place)
+            quantity = subject.get("quantity") or self._quantity(opened, model)
+            opened.change(current=model.number, quantity=quantity)
+            self._computed(opened, model, quantity)
+        elif job.kind in OF_QUANTITY:
+            opened = self.session.campaign(subject["campaign"])
+            model = opened.model(subject["model"])
+            _move(out, model.place / subject["quantity"])
+            self._computed(opened, model, subject["quantity"])
+        elif job.kind in TAKEN:
+            opened = self.session.campaign(subject["campaign"])
+            place = opened.model(subject["model"]).place / "taken"
+            _move(out, place)
+            if job.kind == "calibrate":
+                self.jobs.add("fmu", {"calibration": str(place / "CAL.toml")}, subject)
+
+    def _begin(self, opened: Opened) -> Opened:
+        """Check a campaign that was opened, and read its runs."""
+        subject = {"campaign": opened.name}
+        for kind in OF_CAMPAIGN:
+            self._once(kind, {"campaign": opened.folder}, subject)
+        return opened
+
+    def _checked(self, opened: Opened) -> None:
+        """Fit the base model of a campaign that is sound."""
+        told = read_document(opened.place / "check.json") or {}
+        if told.get("errors"):
+            return
+        if not opened.models:
+            self._identify(opened)
+        for model in opened.models:
+            if model.number == opened.told.get("current"):
+                self._computed(opened, model, self._quantity(opened, model))
+
+    def _identify(self, opened: Opened) -> None:
+        model = opened.new_model(None, "identify", "", "")
+        subject = {"campaign": opened.name, "model": model.number}
+        self.jobs.add("identify", {"campaign": opened.folder}, subject)
+
+    def _computed(self, opened: Opened, model: Model, quantity: str) -> None:
+        """Compute what is not known yet of a model: comparison, diagnosis, traces."""
+        if not model.ready:
+            return
+        about = self._about(opened, model, quantity)
+        subject = {"campaign": opened.name, "model": model.number, "quantity": quantity}
+        if not model.document("plots.npz", quantity).exists():
+            self._once("compare", about, subject)
+            return
+        if not model.document("diagnosis.json", quantity).exists():
+            self._once("diagnose", about, subject)
+            return
+        told = read_document(model.document("diagnosis.json", quantity)) or {}
+        wanted = [_trace(e["effect"], e["strength"]) for e in told.get("candidates", [])]
+        if wanted and not model.document("traces.npz", quantity).exists():
+            self._once("traces", about | {"traces": wanted}, subject)
+
+    def _about(self, opened: Opened, model: Model, quantity: str) -> dict[str, Any]:
+        return {
+            "campaign": opened.folder,
+            "model": str(model.file),
+            "quantity": quantity,
+            "effect_files": [str(path) for path in self.session.effect_files],
+        }
+
+    def _once(self, kind: str, order: Mapping[str, Any], subject: Mapping[str, Any]) -> Job | None:
+        """Add a job unless the same one waits, runs, or was ended by the user or an error."""
+        for job in self.jobs.all.values():
+            if job.kind == kind and job.subject == dict(subject) and job.state != "done":
+                if job.over and job.state != "interrupted":
+                    return None
+                if not job.over:
+                    return job
+        return self.jobs.add(kind, order, subject)
+
+    def _open(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
+        folder = intake.inside(str(wish.get("path", "")), self._known_roots())
+        return {"campaign": self._begin(self.session.open(folder)).name}
+
+    def _known_roots(self) -> list[Path]:
+        return [*self.roots, self.session.folder.resolve()]
+
+    def _example(self, _: Mapping[str, Any]) -> Mapping[str, Any]:
+        for opened in self.session:
+            if opened.told.get("note") == "example":
+                self.session.open(Path(opened.folder), "example")
+                return {"campaign": opened.name}
+        job = self._once("rig", EXAMPLE, {})
+        return {"job": job.number if job else None}
+
+    def files(self, number: str) -> Path:
+        """Return a folder of dropped files.
+
+        Raises
+        ------
+        FormatError
+            If there is none of this number.
+        """
+        place = self.session.folder / "files" / str(number)
+        if not str(number).isdecimal() or not place.is_dir():
+            raise FormatError(f"files {number!r}: nothing was dropped under this number")
+        return place
+
+    def unpack(self, number: str) -> None:
+        """Unpack the archives among dropped files; it takes a while, and touches no job."""
+        for archive in self.files(number).rglob("*.zip"):
+            if not archive.with_suffix("").exists():
+                intake.unpack(archive, archive.with_suffix(""))
+
+    def _dropped(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Tell what was dropped: a campaign, a user's effect, or files of another format."""
+        place = self.files(wish.get("files", ""))
+        campaign = intake.campaign_in(place)
+        if campaign is not None:
+            return {"campaign": self._begin(self.session.open(campaign)).name}
+        effects = sorted(place.rglob("*.py"))
+        if effects:
+            return {"effect": self._received(effects[0])}
+        return self._foreign(place.name, intake.foreign_in(place))
+
+    def _columns(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Begin the import of a file on disk."""
+        file = intake.inside(str(wish.get("path", "")), self._known_roots())
+        place = self.session.new_files()
+        return self._foreign(place.name, [file])
+
+    def _foreign(self, number: str, files: Sequence[Path]) -> Mapping[str, Any]:
+        if not files:
+            raise FormatError(
+                "nothing that can be opened was dropped; a campaign folder (or its zip archive), "
+                f"measured files ({', '.join(intake.FOREIGN)}) or an effect file (.py) is needed"
+            )
+        order = {"files": [str(path) for path in files], "place": number}
+        for kind in ("columns", "suggest"):
+            self.jobs.add(kind, order, {"files": number})
+        return {"files": number}
+
+    def import_form(self, number: str) -> dict[str, Any]:
+        """Return what is known of dropped files: columns, a draft of the map, faults."""
+        self.files(number)
+        mine = [job for job in self.jobs.all.values() if job.subject.get("files") == number]
+        found: dict[str, Any] = {"files": number, "map": None, "columns": None, "message": ""}
+        for job in mine:
+            if job.state == "failed":
+                found["message"] = job.message
+            if job.state != "done":
+                continue
+            if job.kind == "columns":
+                found["columns"] = read_document(self.jobs.out(job) / "columns.json")
+                found["names"] = [Path(path).name for path in job.order["files"]]
+            elif job.kind == "suggest":
+                text = (self.jobs.place(job) / "stdout.txt").read_text(encoding="utf-8")
+                found["map"] = tomllib.loads(text)
+        return found
+
+    def _import(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
+        number = str(wish.get("files", ""))
+        place, drawn = self.files(number), wish.get("map")
+        mine = [j for j in self.jobs.all.values() if j.subject.get("files") == number]
+        files = next((j.order["files"] for j in mine if j.kind == "columns"), None)
+        if not isinstance(drawn, dict) or files is None:
+            raise ParameterError("import: a map and files are needed; drop the files again")
+        try:
+            text = tomli_w.dumps(drawn)
+        except (TypeError, ValueError) as error:
+            raise ParameterError(f"import: the map cannot be written ({error})") from None
+        write_atomic(place / "map.toml", text)
+        order = {"files": files, "map": str(place / "map.toml")}
+        return {"job": self.jobs.add("import", order, {"files": number}).number}
+
+    def _model(self, wish: Mapping[str, Any]) -> tuple[Opened, Model, str]:
+        opened = self.session.campaign(str(wish.get("campaign", "")))
+        model = opened.model(str(wish.get("model", "")))
+        quantity = str(wish.get("quantity") or opened.told.get("quantity") or "strain")
+        if quantity not in QUANTITIES:
+            raise ParameterError(f"{quantity!r}: allowed are {', '.join(QUANTITIES)}")
+        return opened, model, quantity
+
+    def _look(self, wish: Mapping[str, Any]) -> None:
+        opened, model, quantity = self._model(wish)
+        opened.change(current=model.number, quantity=quantity)
+        self._computed(opened, model, quantity)
+
+    def _add(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Add effects one after the other, each to the model that the one before has made."""
+        opened, model, quantity = self._model(wish)
+        known = {entry["effect"] for entry in self.catalogue()}
+        names = [str(name) for name in wish.get("effects", ())]
+        unknown = [name for name in names if name not in known]
+        if not names or unknown:
+            raise ParameterError(f"add: {unknown or 'nothing'} is not in the catalogue; tick one")
+        numbers = []
+        for name in names:
+            new = opened.new_model(model.number, "add", name, quantity)
+            self._fit("add", opened, model, new, name, quantity)
+            numbers.append(new.number)
+            model = new
+        return {"models": numbers}
+
+    def _remove(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
+        opened, model, quantity = self._model(wish)
+        name = str(wish.get("effect", ""))
+        new = opened.new_model(model.number, "remove", name, quantity)
+        self._fit("remove", opened, model, new, name, quantity)
+        return {"models": [new.number]}
+
+    def _fit(
+        self, kind: str, opened: Opened, model: Model, new: Model, effect: str, quantity: str
+    ) -> None:
+        order = self._about(opened, model, quantity) | {"effect": effect}
+        subject = {"campaign": opened.name, "model": new.number, "quantity": quantity}
+        self.jobs.add(kind, order, subject)
+
+    def _job(self, wish: Mapping[str, Any]) -> Job:
+        job = self.jobs.all.get(wish.get("job", 0))
+        if job is None:
+            raise ParameterError(f"job {wish.get('job')!r}: there is none of this number")
+        return job
+
+    def _cancel(self, wish: Mapping[str, Any]) -> None:
+        self.jobs.cancel(self._job(wish))
+
+    def _again(self, wish: Mapping[str, Any]) -> None:
+        job = self._job(wish)
+        if job.over and job.state != "done":
+            self.jobs.add(job.kind, job.order, job.subject)
+
+    def _mark(self, wish: Mapping[str, Any]) -> None:
+        """Label, pin or hide a model; nothing is deleted."""
+        _, model, _ = self._model(wish)
+        values: dict[str, Any] = {}
+        if "label" in wish:
+            values["label"] = str(wish["label"])[:LONGEST_LABEL]
+        for name in ("pinned", "hidden"):
+            if name in wish:
+                values[name] = bool(wish[name])
+        model.change(**values)
+
+    def _plant(self, wish: Mapping[str, Any]) -> None:
+        opened, model, quantity = self._model(wish)
+        numbers = [float(x) for x in wish.get("strength", ())]
+        about = self._about(opened, model, quantity)
+        traces = [_trace(str(wish.get("effect", "")), numbers)]
+        subject = {"campaign": opened.name, "model": model.number, "quantity": quantity}
+        self.jobs.add("plant", about | {"traces": traces}, subject)
+
+    def _next_test(self, wish: Mapping[str, Any]) -> None:
+        opened, model, quantity = self._model(wish)
+        subject = {"campaign": opened.name, "model": model.number, "quantity": quantity}
+        known = {"diagnosis": str(model.document("diagnosis.json", quantity))}
+        self.jobs.add("next-test", self._about(opened, model, quantity) | known, subject)
+
+    def _take(self, wish: Mapping[str, Any]) -> None:
+        opened, model, quantity = self._model(wish)
+        subject = {"campaign": opened.name, "model": model.number, "quantity": quantity}
+        if wish.get("what") == "report":
+            self.jobs.add("report", self._about(opened, model, quantity), subject)
+        elif wish.get("what") == "fmu":
+            self.jobs.add("calibrate", {"campaign": opened.folder}, subject)
+        else:
+            raise ParameterError(f"take {wish.get('what')!r}: allowed are report, fmu")
+
+    def catalogue(self) -> list[dict[str, Any]]:
+        """Return the effects as the last `tirelib effects` has listed them."""
+        told = read_document(self.session.folder / "effects.json") or {}
+        return list(told.get("effects", []))
+
+    def _received(self, file: Path) -> dict[str, Any]:
+        """Keep a user's effect file; it is not run, and the page shows what is in it."""
+        target = self.session.folder / "effects" / f"{safe_name(file.stem)}.py"
+        data = file.read_bytes()
+        write_atomic(target, data)
+        write_document(target.with_suffix(".json"), {"confirmed": False})
+        text = data.decode("utf-8", "replace")
+        return {"name": target.name, "code": text, "sha256": sha256(data).hexdigest()}
+
+    def _confirm(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Check an effect file that the user has read and allowed to be run."""
+        target = self.session.folder / "effects" / safe_name(str(wish.get("name", "")))
+        if target.suffix != ".py" or not target.is_file():
+            raise FormatError(f"{target.name}: there is no such effect file; drop it again")
+        if sha256(target.read_bytes()).hexdigest() != wish.get("sha256"):
+            raise FormatError(f"{target.name}: it is not the file that was shown; drop it again")
+        files = [str(p) for p in self.session.effect_files if p != target]
+        job = self.jobs.add("effects", {"effect_files": [*files, str(target)]}, {"effect": 1})
+        return {"job": job.number}
+
+
+def write_document(path: Path, document: Mapping[str, Any]) -> None:
+    """Write a small JSON document as a whole."""
+    write_atomic(path, json.dumps(document, indent=1))
+
+
+def _move(out: Path, target: Path) -> None:
+    """Move results into their place, each as a whole."""
+    target.mkdir(parents=True, exist_ok=True)
+    for result in out.iterdir():
+        place = target / result.name
+        if place.is_dir():
+            shutil.rmtree(place)
+        result.replace(place)
+
+
+def _trace(effect: str, strength: float | Sequence[float]) -> str:
+    numbers = [strength] if isinstance(strength, int | float) else strength
+    return f"{effect}=" + ",".join(repr(float(x)) for x in numbers)

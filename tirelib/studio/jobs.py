@@ -1,0 +1,254 @@
+"""Jobs: commands that run as processes, with progress, an end on request, and a record on disk."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from tirelib.studio.commands import KINDS
+from tirelib.studio.disk import write_atomic
+
+AT_ONCE = max(1, min(2, (os.cpu_count() or 1)))
+"""Jobs that run side by side."""
+TAIL = 4000
+"""Characters of a failed command's last words that are kept."""
+MOST_ERRORS = 400
+"""Points of the error's fall that a job keeps."""
+RUNNER = (sys.executable, "-m", "tirelib.studio.runner")
+"""Command of the process that waits for a job."""
+_ERROR = re.compile(r"\berror (\d+(?:\.\d+)?(?:e[+-]?\d+)?)")
+
+
+@dataclass(slots=True)
+class Job:
+    """One command and what became of it; all but the process is in `job.json`.
+
+    Attributes
+    ----------
+    number : int
+    kind : str
+        Key of `KINDS`.
+    order : dict
+        What it is about, with the places that it reads from.
+    subject : dict
+        Whose it is: campaign, model, quantity.
+    state : str
+        waiting, running, done, failed, cancelled or interrupted (the server ended before it).
+    argv : list of str
+        Words after `tirelib`.
+    begun, ended : float or None
+        Seconds since 1970.
+    message : str
+        Why it failed.
+    """
+
+    number: int
+    kind: str
+    order: dict[str, Any]
+    subject: dict[str, Any]
+    state: str = "waiting"
+    argv: list[str] = field(default_factory=list)
+    begun: float | None = None
+    ended: float | None = None
+    message: str = ""
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing more happens to it."""
+        return self.state not in ("waiting", "running")
+
+
+@dataclass(slots=True)
+class Progress:
+    """How far a running job is: what it does, steps so far and in all, label, errors seen."""
+
+    what: str = ""
+    done: int = 0
+    total: int | None = None
+    label: str = ""
+    errors: list[float] = field(default_factory=list)
+    rest: bytes = b""
+    at: int = 0
+
+    def read(self, file: Path) -> bool:
+        """Take what a command has said since the last look; return whether there is news."""
+        try:
+            with file.open("rb") as stream:
+                stream.seek(self.at)
+                new = stream.read(1 << 20)
+        except OSError:
+            return False
+        self.at += len(new)
+        *lines, self.rest = (self.rest + new).split(b"\n")
+        return sum(map(self._take, lines)) > 0
+
+    def _take(self, line: bytes) -> bool:
+        try:
+            told = json.loads(line)
+            self.what, self.done, self.total = told["progress"], told["done"], told["total"]
+            self.label = str(told["label"])
+        except (ValueError, TypeError, KeyError):
+            return False
+        if found := _ERROR.search(self.label):
+            self.errors = [*self.errors[-MOST_ERRORS:], float(found[1])]
+        return True
+
+
+class Jobs:
+    """Every job of a session, and the processes of those that run.
+
+    Parameters
+    ----------
+    folder : Path
+        One folder for each job: job.json, stdout.txt, stderr.txt, out.
+    runner : sequence of str
+        Command of the process that waits for a job.
+    """
+
+    def __init__(self, folder: Path, runner: Sequence[str] = RUNNER) -> None:
+        self.folder, self._runner = folder, list(runner)
+        folder.mkdir(parents=True, exist_ok=True)
+        self.all: dict[int, Job] = {}
+        self.progress: dict[int, Progress] = {}
+        self._processes: dict[int, subprocess.Popen[bytes]] = {}
+        self._spare: subprocess.Popen[bytes] | None = None
+        for file in sorted(folder.glob("*/job.json")):
+            with suppress(OSError, ValueError, TypeError):
+                job = Job(**json.loads(file.read_text()))
+                if not job.over:
+                    job.state = "interrupted"
+                    self._save(job)
+                self.all[job.number] = job
+
+    def place(self, job: Job) -> Path:
+        """Return the folder of a job."""
+        return self.folder / f"{job.number:04d}"
+
+    def out(self, job: Job) -> Path:
+        """Return the folder of a job's results."""
+        return self.place(job) / "out"
+
+    def add(self, kind: str, order: Mapping[str, Any], subject: Mapping[str, Any]) -> Job:
+        """Put a job at the end of those that wait."""
+        job = Job(max(self.all, default=0) + 1, kind, dict(order), dict(subject))
+        self.out(job).mkdir(parents=True)
+        job.argv = KINDS[kind].argv(job.order, str(self.out(job)))
+        self.all[job.number] = job
+        self._save(job)
+        return job
+
+    def look(self) -> tuple[list[Job], bool]:
+        """Start what may start; return the jobs that have just ended, and whether there is news."""
+        ended, news = [], False
+        for number, process in list(self._processes.items()):
+            job, progress = self.all[number], self.progress[number]
+            code = process.poll()
+            news |= progress.read(self.place(job) / "stderr.txt")
+            if code is not None:
+                self._finish(job, code)
+                ended.append(job)
+        waiting = [job for job in self.all.values() if job.state == "waiting"]
+        for job in waiting[: max(0, AT_ONCE - len(self._processes))]:
+            self._start(job)
+            news = True
+        return ended, news or bool(ended)
+
+    def cancel(self, job: Job) -> None:
+        """End a job at once."""
+        if job.over:
+            return
+        job.state, job.ended = "cancelled", time.time()
+        if process := self._processes.pop(job.number, None):
+            _kill(process)
+        self._save(job)
+
+    def close(self) -> None:
+        """End every process."""
+        for job in list(self.all.values()):
+            if job.state == "running":
+                self.cancel(job)
+                job.state = "interrupted"
+                self._save(job)
+        if self._spare is not None:
+            _kill(self._spare)
+
+    def warm(self) -> None:
+        """Have a process ready, so that the next job starts at once."""
+        if self._spare is None or self._spare.poll() is not None:
+            self._spare = _spawn(self._runner)
+
+    def _start(self, job: Job) -> None:
+        self.warm()
+        process, self._spare = self._spare, None
+        assert process is not None  # noqa: S101 - warm has set it
+        place = self.place(job)
+        words = {"argv": job.argv} | {n: str(place / f"{n}.txt") for n in ("stdout", "stderr")}
+        pipe = process.stdin
+        assert pipe is not None  # noqa: S101 - it is a pipe
+        _send(pipe, words)
+        self._processes[job.number] = process
+        self.progress[job.number] = Progress()
+        job.state, job.begun = "running", time.time()
+        self._save(job)
+        self.warm()
+
+    def _finish(self, job: Job, code: int) -> None:
+        process = self._processes.pop(job.number)
+        if process.stdin is not None:
+            process.stdin.close()
+        job.ended = time.time()
+        job.state = "done" if code in KINDS[job.kind].allowed else "failed"
+        if job.state == "failed":
+            job.message = self._last_words(job, code)
+        self._save(job)
+
+    def _last_words(self, job: Job, code: int) -> str:
+        said = ""
+        for name in ("stderr.txt", "stdout.txt"):
+            with suppress(OSError):
+                lines = (self.place(job) / name).read_text(errors="replace").splitlines()
+                lines = [line for line in lines if not line.startswith('{"progress"')]
+                said = said or "\n".join(lines).strip()[-TAIL:]
+        return said.removeprefix("Error: ") or f"the command ended with exit code {code}"
+
+    def _save(self, job: Job) -> None:
+        write_atomic(self.place(job) / "job.json", json.dumps(asdict(job), indent=1))
+
+
+def _spawn(runner: Sequence[str]) -> subprocess.Popen[bytes]:
+    environment = os.environ | {"TIRELIB_PROGRESS": "json", "PYTHONUNBUFFERED": "1"}
+    return subprocess.Popen(
+        list(runner),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env=environment,
+        start_new_session=True,
+    )
+
+
+def _send(pipe: BinaryIO | Any, words: Mapping[str, Any]) -> None:
+    with suppress(OSError):  # a process that has died is seen at the next look
+        pipe.write(json.dumps(words).encode() + b"\n")
+        pipe.flush()
+
+
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    """End a process and its children, and wait until it is gone."""
+    with suppress(OSError):
+        if os.name == "posix":
+            os.killpg(process.pid, signal.SIGKILL)
+        else:
+            process.kill()
+    if process.stdin is not None:
+        with suppress(OSError):
+            process.stdin.close()
+    process.wait()

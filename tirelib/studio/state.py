@@ -1,0 +1,159 @@
+"""What the page is told of a session: lists for all views, without the documents themselves."""
+
+from pathlib import Path
+from typing import Any
+
+from tirelib.studio.commands import KINDS, told
+from tirelib.studio.desk import Desk
+from tirelib.studio.disk import read_document
+from tirelib.studio.jobs import Job
+from tirelib.studio.parts import part_of
+from tirelib.studio.session import DOCUMENTS, QUANTITIES, Model, Opened
+
+SHOWN_JOBS = 40
+
+
+def home(desk: Desk) -> dict[str, Any]:
+    """Return the campaigns of the session, the user's effects, and the jobs of no campaign."""
+    return {
+        "campaigns": [
+            {
+                "campaign": opened.name,
+                "title": opened.told.get("title"),
+                "folder": opened.folder,
+                "there": Path(opened.folder).is_dir(),
+                "opened": opened.told.get("opened"),
+                "models": sum(model.ready for model in opened.models),
+            }
+            for opened in desk.session
+        ],
+        "effects": [
+            {**entry, "part": part_of(entry["effect"], entry["stage"])}
+            for entry in desk.catalogue()
+        ],
+        "own_effects": [path.name for path in desk.session.effect_files],
+        "jobs": [_job(desk, job) for job in _last(desk) if "campaign" not in job.subject],
+    }
+
+
+def campaign(desk: Desk, opened: Opened) -> dict[str, Any]:
+    """Return a campaign: findings, models, jobs."""
+    told_of = opened.told
+    models = opened.models
+    quantities = next((m.quantities for m in models if m.told["parent"] is None and m.ready), [])
+    quantity = told_of.get("quantity") or next(iter(quantities), "strain")
+    return {
+        "campaign": opened.name,
+        "title": told_of.get("title"),
+        "folder": opened.folder,
+        "current": told_of.get("current"),
+        "quantity": quantity,
+        "quantities": quantities,
+        "check": read_document(opened.place / "check.json"),
+        "shown": _stamp(opened.place / "show.json"),
+        "models": [_model(model, quantity) for model in models],
+        "jobs": [
+            _job(desk, job) for job in _last(desk) if job.subject.get("campaign") == opened.name
+        ],
+    }
+
+
+def commands(desk: Desk, opened: Opened, number: str) -> list[str]:
+    """Return the command lines that repeat the way to a model, with plain file names."""
+    lines = [told(["campaign", "check", opened.folder])]
+    names: dict[str, str] = {}
+    for model in opened.path_to(number):
+        name = "M.toml" if not names else f"M{len(names) + 1}.toml"
+        names[model.number] = name
+        action = str(model.told["action"])
+        order: dict[str, Any] = {"campaign": opened.folder, "effect": model.told["effect"]}
+        order["effect_files"] = [str(path) for path in desk.session.effect_files]
+        order["quantity"] = model.told["quantity"]
+        if model.told["parent"] is not None:
+            order["model"] = names[model.told["parent"]]
+        words = KINDS[action].argv(order, ".")
+        words[words.index("--out") + 1] = name
+        words[words.index("--json") + 1] = f"{Path(name).stem}.json"
+        lines.append(told(words))
+    quantity = str(opened.told.get("quantity") or "strain")
+    last = {"campaign": opened.folder, "model": names[number], "quantity": quantity}
+    for kind, out in (("compare", "C.json"), ("diagnose", "D.json")):
+        words = KINDS[kind].argv(last, ".")
+        words = words[: words.index("--json")]
+        lines.append(told([*words, "--json", out]))
+    return lines
+
+
+def _last(desk: Desk) -> list[Job]:
+    return list(desk.jobs.all.values())[-SHOWN_JOBS:]
+
+
+def _job(desk: Desk, job: Job) -> dict[str, Any]:
+    return {
+        "job": job.number,
+        "kind": job.kind,
+        "title": KINDS[job.kind].title,
+        "effect": job.order.get("effect"),
+        "subject": job.subject,
+        "state": job.state,
+        "begun": job.begun,
+        "ended": job.ended,
+        "message": job.message,
+        "command": told(job.argv),
+    }
+
+
+def progress(desk: Desk) -> list[dict[str, Any]]:
+    """Return how far each running job is."""
+    return [
+        {
+            "job": job.number,
+            "what": p.what,
+            "done": p.done,
+            "total": p.total,
+            "label": p.label,
+            "errors": p.errors,
+        }
+        for job in desk.jobs.all.values()
+        if job.state == "running" and (p := desk.jobs.progress.get(job.number)) is not None
+    ]
+
+
+def _model(model: Model, quantity: str) -> dict[str, Any]:
+    fit = read_document(model.place / "fit.json") or {}
+    compared = read_document(model.document("comparison.json", quantity)) or {}
+    diagnosis = read_document(model.document("diagnosis.json", quantity)) or {}
+    return {
+        **model.told,
+        "ready": model.ready,
+        "fit": {key: fit[key] for key in _FIT if key in fit},
+        "error": compared.get("error"),
+        "error_unit": compared.get("error_unit"),
+        "effects": compared.get("effects", []),
+        "verdict": diagnosis.get("verdict"),
+        "named": diagnosis.get("named", []),
+        "floor": diagnosis.get("floor"),
+        "lines": list(diagnosis.get("explanation", {}).items()),
+        "documents": {
+            f"{q}/{name}": stamp
+            for q in QUANTITIES
+            for name in (*DOCUMENTS, "planted.npz")
+            if (stamp := _stamp(model.document(name, q))) is not None
+        },
+        "taken": [p.name for p in sorted((model.place / "taken").glob("*"))],
+    }
+
+
+_FIT = (
+    *("effect", "action", "title", "strength", "std", "unit", "range", "in_range", "flags"),
+    *("error_before", "error_after", "error_unit", "error_refitted", "floor"),
+    *("heldout_error_before", "heldout_error_after", "held_out", "messages", "quantity"),
+    *("error", "reasons", "residual_rms_before", "residual_rms_after", "residual_rms_unit"),
+)
+
+
+def _stamp(path: Path) -> float | None:
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        return None

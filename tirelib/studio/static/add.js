@@ -1,0 +1,111 @@
+// Step 4: the refit while it runs, the fall of the error, and every model that was made.
+import { app, current, documentOf, nameOf, progressOf, wish } from "./data.js";
+import { choose, csvButton, dialog, fill, h, number, strength, unitName } from "./dom.js";
+import { Plot, waterfall } from "./plots.js";
+
+export class Add {
+  constructor(go) {
+    this.go = go;
+    this.running = h("div", {});
+    this.fall = h("div", { class: "card" });
+    this.strip = h("div", { class: "card" });
+    this.plot = new Plot("fit", { height: 170 });
+    this.element = h("div", {}, this.running, this.fall, this.strip);
+    this.hidden = false;
+  }
+
+  leave() { this.plot.remove(); }
+
+  fitting() {
+    return (app.campaign?.jobs || []).filter((job) => ["add", "remove", "identify"].includes(job.kind) && ["waiting", "running"].includes(job.state));
+  }
+
+  progress() {
+    const job = this.fitting().find((one) => one.state === "running"), at = job && progressOf(job.job);
+    if (!at || !this.text) return;
+    this.text.textContent = at.label ? `${at.label} (step ${at.done})` : "begins";
+    if (at.errors.length > 1) this.plot.show({ title: "weighted residual of the fits, step by step: of all runs, then with parts held out", unit: "weighted residual [1]", x: { title: "step", values: at.errors.map((_, i) => i + 1) }, series: [{ name: "error", values: at.errors, color: "model" }] });
+  }
+
+  update() {
+    const c = app.campaign;
+    if (!c) { fill(this.strip, h("p", {}, "Open a campaign first.")); return; }
+    const fitting = this.fitting(), key = fitting.map((job) => job.job + job.state).join();
+    if (key !== this.jobsKey) {
+      this.jobsKey = key;
+      fill(this.running, fitting.map((job) => h("div", { class: "card" }, h("div", { class: "row" },
+        h("h2", {}, job.kind === "identify" ? "The base model is fitted" : `${job.kind === "add" ? "Adding" : "Removing"} ${job.effect}`), job.state === "running" ? (this.text = h("span", { class: "quiet", role: "status" }, "begins")) : h("span", { class: "quiet" }, "waits"), h("span", { class: "room" }),
+        h("button", { type: "button", "data-cancel": job.job, onclick: () => wish({ do: "cancel", job: job.job }) }, "Cancel")), job.state === "running" ? this.plot.element : null, h("pre", { class: "small" }, job.command))));
+      this.progress();
+    }
+    this.history(c);
+  }
+
+  path(c, model) {
+    const out = [];
+    for (let at = model; at && out.length < 500; at = c.models.find((m) => m.number === at.parent)) out.unshift(at);
+    return out;
+  }
+
+  steps(c, model) {
+    return this.path(c, model).map((one, i, all) => ({
+      name: i ? `${one.action === "remove" ? "− " : "+ "}${one.effect}` : "base model", note: one.fit?.strength !== undefined && one.fit.strength !== null ? strength(one.fit.strength, 3) : "",
+      error: i ? one.fit?.error_after ?? one.error : one.error ?? all[1]?.fit?.error_before ?? null,
+      heldout: i ? one.fit?.heldout_error_after ?? null : all[1]?.fit?.heldout_error_before ?? null,
+      floor: one.fit?.floor ?? null,
+    }));
+  }
+
+  history(c) {
+    const now = current(), unit = unitName(now?.error_unit || now?.fit?.error_unit);
+    const failed = c.jobs.filter((job) => ["add", "remove"].includes(job.kind) && ["failed", "cancelled", "interrupted"].includes(job.state)).slice(-3);
+    const key = JSON.stringify([c.models, c.current, failed.map((j) => j.job), this.hidden, c.quantity]);
+    if (key === this.key) return;
+    this.key = key;
+    const steps = now ? this.steps(c, now) : [];
+    const last = now?.fit && now.parent ? now.fit : null;
+    fill(this.fall, h("div", { class: "row" }, h("h2", {}, "The fall of the error"), h("span", { class: "quiet" }, c.quantity), h("span", { class: "room" }),
+      csvButton("waterfall", () => [["step", steps.map((s) => s.name)], [`error [${unit}]`, steps.map((s) => s.error)], ["held-out error", steps.map((s) => s.heldout)], ["floor", steps.map((s) => s.floor)]])),
+    steps.length ? waterfall(steps, unit) : h("p", { class: "quiet" }, "There is no model yet."),
+    last ? h("p", { id: "result" }, `${last.effect}: strength ${strength(last.strength, 4)} ± ${strength(Array.isArray(last.std) ? last.std.map((s) => 1.96 * s) : 1.96 * last.std, 2)} ${last.unit === "1" ? "" : last.unit}. Error ${number(last.error_before, 4)} before, `, h("b", { id: "error-after" }, number(last.error_after, 4)), ` after [${unitName(last.error_unit)}]. Held out: ${number(last.heldout_error_before, 4)} before, ${number(last.heldout_error_after, 4)} after.`) : null,
+    last?.flags?.length ? h("p", { class: "warn" }, last.flags.map((flag) => flag.replaceAll("_", " ")).join("; ")) : null,
+    now?.verdict ? h("p", {}, "With this model the verdict is ", h("b", {}, now.verdict.replaceAll("_", " ")), now.named.length ? `: ${now.named.join(", ")}` : "", ". ", h("a", { href: `#/suspect/${app.wanted}` }, "See the suspects again")) : now ? h("p", { class: "quiet" }, "The verdict of this model is being computed.") : null,
+    failed.map((job) => h("p", { class: job.state === "failed" ? "bad" : "warn" }, `${job.kind} ${job.effect}: ${job.state}. ${job.message} `, h("button", { class: "small", type: "button", onclick: () => wish({ do: "again", job: job.job }) }, "Run again"))));
+    const shown = c.models.filter((m) => m.ready && (this.hidden || !m.hidden));
+    fill(this.strip, h("div", { class: "row" }, h("h2", {}, "Models"), h("span", { class: "quiet small" }, "Nothing is deleted. Continue from any of them."), h("span", { class: "room" }),
+      now?.parent ? h("button", { type: "button", id: "undo", onclick: () => this.look(c.models.find((m) => m.number === now.parent)) }, "Undo: back to the model before") : null,
+      h("button", { type: "button", onclick: () => this.compare(c, shown) }, "Compare two"),
+      h("label", {}, h("input", { type: "checkbox", checked: this.hidden, onchange: (e) => { this.hidden = e.target.checked; this.history(c); } }), " show hidden ones")),
+    h("div", { class: "strip" }, [...shown].sort((a, b) => b.pinned - a.pinned || (a.number < b.number ? -1 : 1)).map((m) => this.card(c, m))));
+  }
+
+  card(c, m) {
+    const mark = (values) => wish({ do: "mark", campaign: c.campaign, model: m.number, ...values });
+    const name = h("input", { value: m.label, placeholder: nameOf(m), "aria-label": `label of model ${m.number}`, size: 16, onchange: () => mark({ label: name.value }) });
+    const before = c.models.find((one) => one.number === m.parent);
+    return h("div", { class: `model${m.number === c.current ? " current" : ""}${m.hidden ? " hidden-model" : ""}`, "data-model": m.number },
+      h("div", { class: "name" }, `${m.pinned ? "📌 " : ""}${nameOf(m)}`), h("div", { class: "small quiet" }, before ? `from ${nameOf(before)}` : "the start"),
+      h("div", {}, `error ${number(m.error ?? m.fit?.error_after)} `, h("span", { class: "quiet" }, unitName(m.error_unit || m.fit?.error_unit))), name,
+      h("div", { class: "row" }, m.number === c.current ? h("span", { class: "tag" }, "shown") : h("button", { class: "small", type: "button", onclick: () => this.look(m) }, "Continue from here"),
+        h("button", { class: "small", type: "button", onclick: () => mark({ pinned: !m.pinned }) }, m.pinned ? "Unpin" : "Pin"), h("button", { class: "small", type: "button", onclick: () => mark({ hidden: !m.hidden }) }, m.hidden ? "Show" : "Hide")));
+  }
+
+  look(model) { wish({ do: "look", campaign: app.campaign.campaign, model: model.number, quantity: app.campaign.quantity }); }
+
+  compare(c, models) {
+    const pick = { a: models[0]?.number, b: c.current || models.at(-1)?.number }, body = h("div", {});
+    const options = models.map((m) => [m.number, `${m.number} ${nameOf(m)}`]);
+    const draw = async () => {
+      const both = [pick.a, pick.b].map((n) => c.models.find((m) => m.number === n));
+      const told = await Promise.all(both.map((m) => documentOf(m, "comparison").catch(() => null)));
+      const line = (text, value) => h("tr", {}, h("td", {}, text), told.map((t, i) => h("td", {}, value(t, both[i]) ?? "–")));
+      const runs = new Map();
+      told.forEach((t, i) => (t?.runs || t?.curves || []).forEach((r) => { const key = r.run ?? r.words; if (!runs.has(key)) runs.set(key, [null, null]); runs.get(key)[i] = r.rms_noise ?? r.rms; }));
+      fill(body, h("table", {}, h("tbody", {}, h("tr", {}, h("th", {}, ""), both.map((m) => h("th", {}, nameOf(m)))),
+        line("error", (t) => t && `${number(t.error, 4)} ${unitName(t.error_unit)}`), line("not explained, rms", (t) => t && `${number(t.residual_rms)} ${unitName(t.unit)}`), line("effects", (t) => t && (t.effects.map((e) => `${e.effect} ${strength(e.strength)}`).join("; ") || "none")), line("verdict", (_, m) => m.verdict?.replaceAll("_", " ")), line("held-out error", (_, m) => m.fit?.heldout_error_after && number(m.fit.heldout_error_after, 4)))),
+      h("h3", {}, "Each part of the measurement, rms over the noise"), h("div", { class: "scroll" }, h("table", {}, h("tbody", {}, [...runs.entries()].map(([run, [x, y]]) => h("tr", {}, h("td", {}, run), h("td", { class: "n" }, number(x)), h("td", { class: "n" }, number(y)), h("td", { class: y < x ? "good" : "warn" }, x && y ? (y < x ? "▼ lower" : "▲ higher") : "")))))));
+    };
+    dialog("Two models side by side", h("div", { class: "row" }, choose(options, pick.a, (v) => { pick.a = v; draw(); }, "left"), choose(options, pick.b, (v) => { pick.b = v; draw(); }, "right")), body);
+    draw();
+  }
+}

@@ -1,0 +1,131 @@
+// What the server knows: one state that all views read, documents and arrays by their time stamp.
+import { toast } from "./dom.js";
+
+export const app = { home: null, campaign: null, running: [], connected: false };
+const listeners = new Set();
+export const listen = (what) => { listeners.add(what); return () => listeners.delete(what); };
+const tell = (what) => listeners.forEach((one) => one(what));
+
+async function answer(response) {
+  if (response.ok) return response;
+  let said = `${response.status}`;
+  try { said = (await response.json()).error || said; } catch { said = await response.text().catch(() => said); }
+  throw new Error(said);
+}
+
+export async function get(path, asked = {}) {
+  const query = new URLSearchParams(asked).toString();
+  return (await answer(await fetch(query ? `${path}?${query}` : path))).json();
+}
+
+export async function wish(what) {
+  try {
+    const response = await fetch("/do", { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(what) });
+    return await (await answer(response)).json();
+  } catch (error) {
+    toast(error.message, true);
+    return null;
+  }
+}
+
+export async function upload(files) {
+  let number = "";
+  for (const [name, file] of files) {
+    const query = new URLSearchParams({ name, files: number });
+    number = (await (await answer(await fetch(`/upload?${query}`, { method: "POST", body: file }))).json()).files;
+  }
+  return number;
+}
+
+let busy = false;
+let again = false;
+export async function refresh() {
+  if (busy) { again = true; return; }
+  busy = true;
+  try {
+    const name = app.wanted;
+    const [home, campaign] = await Promise.all([get("/home"), name ? get("/campaign", { campaign: name }).catch(() => null) : null]);
+    app.home = home;
+    if (name === app.wanted) app.campaign = campaign;
+    tell("state");
+  } catch { /* the connection tells it */ }
+  busy = false;
+  if (again) { again = false; refresh(); }
+}
+
+export const current = () => {
+  const c = app.campaign;
+  return c ? c.models.find((m) => m.number === c.current && m.ready) || null : null;
+};
+
+export function nameOf(model) {
+  if (model.label) return model.label;
+  if (model.action === "identify") return "base model";
+  return `${model.action === "remove" ? "without" : "with"} ${model.effect}`;
+}
+
+// Jobs of the campaign or of none that wait or run.
+export const active = () => [...(app.campaign?.jobs || []), ...(app.home?.jobs || [])]
+  .filter((job) => ["waiting", "running"].includes(job.state));
+export const progressOf = (number) => app.running.find((one) => one.job === number);
+
+const kept = new Map();
+async function once(key, load) {
+  if (!kept.has(key)) {
+    kept.set(key, load().catch((error) => { kept.delete(key); throw error; }));
+    if (kept.size > 60) kept.delete(kept.keys().next().value);
+  }
+  return kept.get(key);
+}
+
+const about = (model, quantity, name) => ({ campaign: app.campaign.campaign, model: model.number, quantity, name });
+
+export function documentOf(model, name, quantity = app.campaign.quantity) {
+  const stamp = model.documents[`${quantity}/${name}.json`];
+  if (!stamp) return Promise.resolve(null);
+  return once(`${app.campaign.campaign}/${model.number}/${quantity}/${name}/${stamp}`, () => get("/document", about(model, quantity, name)));
+}
+
+export function shown() {
+  const c = app.campaign;
+  if (!c?.shown) return Promise.resolve(null);
+  return once(`${c.campaign}/show/${c.shown}`, () => get("/document", { campaign: c.campaign, name: "show" }));
+}
+
+export function arraysOf(model, name, quantity = app.campaign.quantity) {
+  const stamp = model.documents[`${quantity}/${name}.npz`];
+  if (!stamp) return Promise.resolve(null);
+  return once(`${app.campaign.campaign}/${model.number}/${quantity}/${name}/${stamp}`, async () => {
+    const query = new URLSearchParams(about(model, quantity, name));
+    return unpack(await (await answer(await fetch(`/arrays?${query}`))).arrayBuffer());
+  });
+}
+
+function unpack(buffer) {
+  const length = new DataView(buffer).getUint32(0, true);
+  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  const out = { texts: head.texts, shapes: {} };
+  for (const [name, { shape, at }] of Object.entries(head.arrays)) {
+    out[name] = new Float32Array(buffer, 4 + length + 4 * at, shape.reduce((a, b) => a * b, 1));
+    out.shapes[name] = shape;
+  }
+  return out;
+}
+
+let seen = -1;
+export function connect() {
+  const socket = new WebSocket(`ws://${location.host}/news`);
+  socket.onmessage = (message) => {
+    const news = JSON.parse(message.data);
+    app.running = news.running;
+    if (!app.connected) { app.connected = true; tell("link"); }
+    if (news.changed !== seen) { seen = news.changed; refresh(); }
+    tell("progress");
+  };
+  socket.onclose = () => {
+    app.connected = false;
+    seen = -1;
+    tell("link");
+    setTimeout(connect, 500);
+  };
+}

@@ -1,0 +1,79 @@
+// Elements, numbers as text, messages, and tables as CSV files.
+export function h(kind, attributes = {}, ...children) {
+  const made = document.createElement(kind);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (value === null || value === undefined || value === false) continue;
+    if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
+    else if (name === "class") made.className = value;
+    else if (name === "value") made.value = value;
+    else if (name === "checked") made.checked = value;
+    else made.setAttribute(name, value === true ? "" : value);
+  }
+  made.append(...children.flat(3).filter((one) => one !== null && one !== undefined && one !== false));
+  return made;
+}
+
+export function fill(place, ...children) {
+  place.replaceChildren(...children.flat(3).filter((one) => one !== null && one !== undefined && one !== false));
+  return place;
+}
+
+export function number(value, digits = 3) {
+  if (value === null || value === undefined || !Number.isFinite(Number(value))) return "–";
+  const x = Number(value);
+  if (x === 0) return "0";
+  const size = Math.abs(x);
+  const text = size >= 1e5 || size < 1e-3 ? x.toExponential(digits - 1) : String(Number(x.toPrecision(digits)));
+  return text.replace("e-", "e\u2212").replace("e+", "e").replace(/^-/, "\u2212");
+}
+
+export function strength(value, digits = 3) {
+  return Array.isArray(value) ? value.map((x) => number(x, digits)).join(", ") : number(value, digits);
+}
+
+const UNITS = { noise: "× noise", ustrain: "microstrain" };
+export const unitName = (unit) => UNITS[unit] || unit || "";
+
+let timer = 0;
+export function toast(text, bad = false) {
+  const place = document.getElementById("toast");
+  place.textContent = text;
+  place.className = bad ? "bad" : "";
+  place.hidden = false;
+  clearTimeout(timer);
+  timer = setTimeout(() => { place.hidden = true; }, bad ? 12000 : 4000);
+}
+
+export function choose(options, value, change, label) {
+  const made = h("select", { onchange: () => change(made.value), "aria-label": label || "" },
+    options.map(([key, text]) => h("option", { value: key, selected: key === value }, text)));
+  made.value = value;
+  return label ? h("label", {}, `${label} `, made) : made;
+}
+
+export function save(name, data, type = "text/csv") {
+  const address = URL.createObjectURL(new Blob([data], { type }));
+  h("a", { href: address, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(address), 10000);
+}
+
+// Columns of equal length: [[name, values], ...].
+export function csv(columns) {
+  const quoted = (x) => (/[",\n]/.test(x) ? `"${x.replaceAll('"', '""')}"` : x);
+  const cell = (x) => (x === null || x === undefined || (typeof x === "number" && !Number.isFinite(x)) ? "" : quoted(String(x)));
+  const rows = [columns.map(([name]) => quoted(name)).join(",")];
+  const length = Math.max(0, ...columns.map(([, values]) => values.length));
+  for (let i = 0; i < length; i += 1) rows.push(columns.map(([, values]) => cell(values[i])).join(","));
+  return rows.join("\r\n") + "\r\n";
+}
+
+export const csvButton = (name, columns) =>
+  h("button", { class: "small", type: "button", title: "The data of this plot", onclick: () => save(`${name}.csv`, csv(columns())) }, "CSV");
+
+export function dialog(title, ...content) {
+  const box = document.getElementById("dialog");
+  fill(box, h("div", { class: "row" }, h("h2", {}, title), h("span", { class: "room" }),
+    h("button", { type: "button", onclick: () => box.close() }, "Close")), ...content);
+  if (!box.open) box.showModal();
+  return box;
+}

@@ -1,0 +1,84 @@
+// From arrays to what is drawn: rows of a map, waveforms and curves, numbers by run; of strain and of forces.
+import { number } from "./dom.js";
+
+export const CONDITIONS = [["load", "load", "N"], ["pressure", "inflation pressure", "bar"], ["speed", "speed", "km/h"], ["slip_angle", "slip angle", "deg"], ["slip_ratio", "slip ratio", "1"], ["camber", "camber", "deg"], ["temperature", "tread temperature", "degC"], ["order", "time order", "s"]];
+export const isStrain = (data) => data.texts.quantity === "strain";
+export const unitOf = (data) => (isStrain(data) ? "microstrain" : data.texts.quantity === "Mz" ? "Nm" : "N");
+const varies = (values) => { let a = Infinity, b = -Infinity; for (const x of values || []) if (Number.isFinite(x)) { a = Math.min(a, x); b = Math.max(b, x); } return b > a && b - a > 1e-6 * Math.max(Math.abs(a), Math.abs(b)); };
+export const varying = (data) => CONDITIONS.filter(([key]) => data[key] && varies(data[key]));
+export const slipOf = (data) => (data.texts.quantity === "Fx" || (varies(data.slip_ratio) && !varies(data.slip_angle)) ? CONDITIONS[4] : CONDITIONS[3]);
+
+// Levels of a condition: values that lie nearer than `gap` of the largest are one.
+export function levels(values, gap = 0.06) {
+  const order = [...values.keys()].filter((i) => Number.isFinite(values[i])).sort((a, b) => values[a] - values[b]);
+  const high = Math.max(...order.map((i) => Math.abs(values[i])), 1e-12), out = new Int16Array(values.length).fill(-1), centres = [];
+  let level = -1, last = -Infinity, sum = 0, count = 0;
+  for (const i of order) {
+    if (values[i] - last > gap * high) { level += 1; sum = 0; count = 0; }
+    last = values[i]; out[i] = level; sum += last; count += 1; centres[level] = sum / count;
+  }
+  return { level: out, centres };
+}
+
+export function sliced(data, name, row) {
+  const n = data.shapes[name].at(-1);
+  return data[name].subarray(row * n, (row + 1) * n);
+}
+
+export function runWords(data, i) {
+  const slip = [["slip_angle", "deg"], ["camber", "deg"], ["slip_ratio", "slip"]].filter(([k]) => Math.abs(data[k][i]) > (k === "slip_ratio" ? 0.005 : 0.25)).map(([k, u]) => `${k.replace("_", " ")} ${number(data[k][i], 2)} ${u}`);
+  return [`run ${data.run[i]}`, `${number(data.load[i], 4)} N`, `${number(data.pressure[i], 3)} bar`, `${number(data.speed[i], 3)} km/h`, ...slip].join(", ");
+}
+
+// Rows of the map of strain: runs in an order; of forces: levels of the conditions, over bins of slip.
+export function strainRows(data, by, name) {
+  const keys = { load: ["load", "pressure", "speed"], pressure: ["pressure", "load", "speed"], speed: ["speed", "load", "pressure"], order: ["order"] }[by];
+  const level = keys.map((key) => (key === "order" ? { level: data.order, centres: null } : levels(data[key])));
+  const index = [...data.run.keys()].sort((a, b) => level.map((l) => l.level[a] - l.level[b]).find((d) => d) || a - b);
+  const lead = level[0];
+  let last = null;
+  return index.map((i) => {
+    const mark = by === "order" ? `run ${data.run[i]}` : lead.level[i];
+    const tick = mark === last ? "" : by === "order" ? mark : `${number(lead.centres[lead.level[i]], 3)} ${CONDITIONS.find(([k]) => k === by)[2]}`;
+    last = mark;
+    return { index: i, label: runWords(data, i), tick, values: sliced(data, name, i), edges: [data.edges[2 * i], data.edges[2 * i + 1]] };
+  });
+}
+
+export const BINS = 36;
+export function forceRows(data, by, name) {
+  const [slipKey, slipName, slipUnit] = slipOf(data);
+  const keys = ["load", "pressure", "camber", "speed"].filter((k) => varies(data[k])).sort((a, b) => (b === by) - (a === by));
+  const found = keys.map((key) => levels(data[key], key === "camber" ? 0.25 : 0.12));
+  const low = Math.min(...data[slipKey]), high = Math.max(...data[slipKey]);
+  const groups = new Map();
+  for (const i of data.run.keys()) {
+    const key = found.map((f) => String(f.level[i] + 100)).join();
+    if (!groups.has(key)) groups.set(key, []);
+    groups.get(key).push(i);
+  }
+  const rows = [...groups.entries()].sort(([a], [b]) => (a < b ? -1 : 1)).map(([, members]) => {
+    const sum = new Float32Array(BINS), count = new Uint16Array(BINS);
+    for (const i of members) { const k = Math.min(BINS - 1, Math.floor((BINS * (data[slipKey][i] - low)) / (high - low || 1))); sum[k] += data[name][i]; count[k] += 1; }
+    const said = keys.map((key, j) => { const [, , unit] = CONDITIONS.find(([k]) => k === key); return `${number(found[j].centres[found[j].level[members[0]]], 3)} ${unit}`; });
+    return { members, label: said.join(", ") || "all points", tick: said.join(", "), values: sum.map((s, k) => (count[k] ? s / count[k] : NaN)), said };
+  });
+  return { rows, slip: { key: slipKey, title: `${slipName} [${slipUnit}]`, low, high } };
+}
+
+// What a brushed range holds: its rms, its share of the squares.
+export function share(data, name, rows, inside, counted) {
+  let part = 0, whole = 0, count = 0;
+  for (const row of rows) {
+    if (counted && row.index !== undefined && !counted[row.index]) continue;
+    row.values.forEach((value, k) => { if (!Number.isFinite(value)) return; whole += value * value; if (inside(k)) { part += value * value; count += 1; } });
+  }
+  return { rms: Math.sqrt(part / Math.max(count, 1)), share: part / (whole || 1), count };
+}
+
+export function rms(values) {
+  let sum = 0, n = 0;
+  for (const x of values) if (Number.isFinite(x)) { sum += x * x; n += 1; }
+  return n ? Math.sqrt(sum / n) : NaN;
+}
+export const mean = (values) => { let sum = 0, n = 0; for (const x of values) if (Number.isFinite(x)) { sum += x; n += 1; } return n ? sum / n : NaN; };

@@ -1,0 +1,147 @@
+// Step 1: a campaign of the list, a folder, files that are dropped, or the example.
+import { app, get, progressOf, shown, upload, wish } from "./data.js";
+import { dialog, fill, h, number, toast } from "./dom.js";
+import { importForm } from "./import.js";
+
+async function entries(transfer) {
+  const out = [];
+  async function walk(entry, path) {
+    if (entry.isFile) {
+      out.push([path + entry.name, await new Promise((done, fail) => entry.file(done, fail))]);
+      return;
+    }
+    const reader = entry.createReader();
+    for (;;) {
+      const part = await new Promise((done, fail) => reader.readEntries(done, fail));
+      if (!part.length) return;
+      for (const one of part) await walk(one, `${path}${entry.name}/`);
+    }
+  }
+  for (const one of [...transfer.items].map((item) => item.webkitGetAsEntry()).filter(Boolean)) await walk(one, "");
+  return out;
+}
+
+export class Open {
+  constructor(go) {
+    this.go = go;
+    this.start = h("div", { class: "card" });
+    this.recent = h("div", { class: "card" });
+    this.facts = h("div", {});
+    this.picker = h("input", { type: "file", multiple: true, hidden: true, onchange: (event) => this.take([...event.target.files].map((f) => [f.name, f])) });
+    this.zone = h("div", { class: "drop", tabindex: "0", role: "button", onclick: () => this.picker.click(), onkeydown: (event) => { if (event.key === "Enter" || event.key === " ") this.picker.click(); } },
+      "Drop a campaign folder, its zip archive, measured files (MAT, CSV, Parquet, TYDEX, MDF) or an effect file (.py) here, or click to choose files");
+    this.element = h("div", { class: "two" }, h("div", {}, this.start, this.recent), this.facts);
+    fill(this.start, h("h2", {}, "Measurements"), h("p", {}, "A campaign is a folder with campaign.toml, runs.csv and the recorded runs. Other files are imported."),
+      h("div", { class: "row" },
+        h("button", { class: "main", type: "button", id: "example", onclick: () => this.example() }, "Try the example"),
+        h("button", { type: "button", id: "browse", onclick: () => this.browse("") }, "Choose a folder or file …")),
+      h("p", { class: "quiet small" }, "The example measures a virtual tire, on this machine and now, that has a physical effect which the base model lacks. It takes less than a minute on an idle machine."),
+      this.zone, this.picker, this.progressLine = h("p", { role: "status" }));
+    for (const kind of ["dragenter", "dragover"]) this.zone.addEventListener(kind, (event) => { event.preventDefault(); this.zone.classList.add("over"); });
+    this.zone.addEventListener("dragleave", () => this.zone.classList.remove("over"));
+    this.zone.addEventListener("drop", async (event) => {
+      event.preventDefault();
+      this.zone.classList.remove("over");
+      this.take(await entries(event.dataTransfer));
+    });
+    this.shownFor = "";
+  }
+
+  async example() {
+    const done = await wish({ do: "example" });
+    if (done?.campaign) this.go("see", done.campaign);
+    else if (done?.job) app.follow = done.job;
+  }
+
+  async take(files) {
+    if (!files.length) return;
+    this.progressLine.textContent = `Reading ${files.length} files`;
+    try {
+      const number = await upload(files);
+      this.taken(await wish({ do: "dropped", files: number }));
+    } catch (error) { toast(error.message, true); }
+    this.progressLine.textContent = "";
+  }
+
+  taken(done) {
+    if (!done) return;
+    if (done.campaign) this.go("open", done.campaign);
+    else if (done.effect) confirmEffect(done.effect);
+    else if (done.files) importForm(done.files);
+  }
+
+  async browse(path) {
+    let found;
+    try { found = await get("/browse", { path }); } catch (error) { toast(error.message, true); return; }
+    const open = async (folder) => {
+      const done = await wish({ do: "open", path: folder });
+      if (done) { document.getElementById("dialog").close(); this.taken(done); }
+    };
+    dialog("Choose a campaign", h("p", { class: "quiet" }, found.path || "Folders that the server may read (tirelib studio --root adds others)"),
+      found.campaign ? h("button", { class: "main", type: "button", onclick: () => open(found.path) }, "Open this campaign") : null,
+      h("ul", { class: "list scroll" },
+        found.path ? h("li", {}, h("button", { class: "link", type: "button", onclick: () => this.browse(found.parent) }, "↑ up")) : null,
+        found.folders.map((one) => h("li", {}, h("button", { class: "link", type: "button", onclick: () => (one.campaign ? open(one.path) : this.browse(one.path)) }, one.name), one.campaign ? h("span", { class: "tag" }, "campaign") : null)),
+        found.files.map((one) => h("li", {}, h("button", { class: "link", type: "button", onclick: async () => { const done = await wish({ do: "columns", path: one.path }); document.getElementById("dialog").close(); this.taken(done); } }, one.name), h("span", { class: "quiet" }, "import"))),
+        !found.folders.length && !found.files.length ? h("li", { class: "quiet" }, "This folder holds no folders and no measured files.") : null));
+  }
+
+  progress() {
+    if (!app.follow) return;
+    const at = progressOf(app.follow);
+    if (at) this.progressLine.textContent = `The virtual tire is measured: ${at.label || "it begins"}`;
+  }
+
+  update() {
+    const home = app.home;
+    if (!home) return;
+    const broken = home.jobs.filter((job) => ["interrupted", "failed", "cancelled"].includes(job.state) && ["rig", "import"].includes(job.kind)).slice(-3);
+    fill(this.recent, h("h2", {}, "Recent campaigns"),
+      home.campaigns.length ? h("ul", { class: "list" }, home.campaigns.map((one) => h("li", {},
+        h("button", { class: "link", type: "button", onclick: () => this.go("open", one.campaign) }, one.title), h("span", { class: "quiet small" }, one.there ? one.folder : `${one.folder} is not there`),
+        h("span", { class: "room" }), h("span", { class: "quiet small" }, `${one.models} ${one.models === 1 ? "model" : "models"}`)))) : h("p", { class: "quiet" }, "None yet."),
+      broken.map((job) => h("p", { class: "warn" }, `${job.title}: ${job.state}. ${job.message} `, h("button", { class: "small", type: "button", onclick: async () => { if (await wish({ do: "again", job: job.job })) app.follow = null; } }, "Run again"))));
+    const c = app.campaign;
+    if (!c) { fill(this.facts); this.shownFor = ""; return; }
+    const key = JSON.stringify([c.campaign, c.check, c.shown, c.models.length, c.jobs.map((j) => j.state)]);
+    if (key === this.shownFor) return;
+    this.shownFor = key;
+    this.campaign(c);
+  }
+
+  async campaign(c) {
+    const findings = h("div", { class: "card" }, h("h2", {}, "Findings"));
+    const { check } = c;
+    if (!check) findings.append(h("p", { class: "quiet" }, "The campaign is being checked."));
+    else if (!check.problems.length) findings.append(h("p", { class: "good" }, "The check found nothing wrong."));
+    else {
+      findings.append(h("p", {}, `${check.errors} errors, ${check.warnings} warnings. ${check.errors ? "No model is fitted before the errors are corrected." : ""}`),
+        h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ["", "where", "what was found", "what to do"].map((t) => h("th", {}, t)))),
+          h("tbody", {}, check.problems.map((p) => h("tr", {}, h("td", { class: p.severity === "error" ? "bad" : "warn" }, p.severity), h("td", {}, p.where), h("td", {}, `${p.given}. Allowed: ${p.allowed}`), h("td", {}, p.remedy)))))));
+    }
+    const failed = c.jobs.filter((job) => ["failed", "interrupted", "cancelled"].includes(job.state)).slice(-4);
+    const ready = c.models.some((m) => m.ready);
+    const next = h("div", { class: "row" }, h("button", { class: "main", type: "button", disabled: !ready, onclick: () => this.go("see") }, "See where the model fails"),
+      ready ? null : h("span", { class: "quiet" }, check?.errors ? "There is no model: correct the errors first." : "The base model is being fitted."));
+    const troubles = failed.map((job) => h("p", { class: job.state === "failed" ? "bad" : "warn" }, `${job.title}: ${job.state}. ${job.message} `, h("button", { class: "small", type: "button", onclick: () => wish({ do: "again", job: job.job }) }, "Run again")));
+    fill(this.facts, h("div", { class: "card" }, h("h2", {}, c.title), h("p", { class: "quiet small" }, c.folder), next, troubles), findings);
+    const told = await shown().catch(() => null);
+    if (!told || app.campaign !== c) return;
+    const { header, runs } = told, mean = (r, k) => { const x = r.mean?.[k] ?? r.set_point?.[k]; return number(k === "slip_ratio" ? (Math.abs(x) < 5e-4 ? 0 : x) : Math.abs(x) < 5e-3 ? 0 : x, 4); };
+    const columns = [["Fz_N", "load [N]"], ["pressure_bar", "pressure [bar]"], ["speed_kmh", "speed [km/h]"], ["slip_angle_deg", "slip angle [deg]"], ["camber_deg", "camber [deg]"], ["slip_ratio", "slip ratio [1]"]];
+    this.facts.append(h("div", { class: "card" }, h("h2", {}, `${runs.length} runs`),
+      h("p", { class: "quiet small" }, `${header.tire?.name ?? ""}; free radius ${number(header.tire?.free_radius_mm, 4)} mm; ${header.gage_lateral_mm?.length ? `gages at ${header.gage_lateral_mm.join(", ")} mm` : "no gages"}; files in axes ${header.file_axes}, shown in ISO 8855. Means of the measurement, else set points.`),
+      h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, h("th", { class: "n" }, "run"), h("th", {}, "kind"), columns.map(([, t]) => h("th", { class: "n" }, t)))),
+        h("tbody", {}, runs.map((r) => h("tr", {}, h("td", { class: "n" }, r.run), h("td", {}, r.kind), columns.map(([k]) => h("td", { class: "n" }, mean(r, k))))))))));
+  }
+}
+
+export function confirmEffect(effect) {
+  dialog(`Effect file ${effect.name}`,
+    h("p", { class: "warn" }, "This file is a program. If you go on, it is run on this machine with your rights. It has not been run yet. Read it, and go on only if you trust where it comes from."),
+    h("pre", { class: "scroll" }, effect.code),
+    h("button", { class: "main", type: "button", onclick: async () => {
+      const done = await wish({ do: "confirm-effect", name: effect.name, sha256: effect.sha256 });
+      if (done) { document.getElementById("dialog").close(); toast("The effect is being checked; it joins the list when it passes."); }
+    } }, "I have read it: run and check it"));
+}

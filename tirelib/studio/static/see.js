@@ -1,0 +1,198 @@
+// Step 2: where the model fails: a map of what is left, the chosen run, and any number over any condition.
+import { app, arraysOf, current, documentOf, active, progressOf } from "./data.js";
+import { choose, csvButton, fill, h, number, unitName } from "./dom.js";
+import { Heat, limitOf } from "./heat.js";
+import { Plot } from "./plots.js";
+import { CONDITIONS, forceRows, isStrain, mean, rms, runWords, share, sliced, slipOf, strainRows, unitOf, varying, BINS } from "./maps.js";
+
+const TICKS = [-180, -120, -60, 0, 60, 120, 180];
+const VALUES = { difference: "model less measured", white: "whitened residual" };
+
+// The map with its controls and the plots of the chosen row; the next step shows the same with a trace.
+export class Field {
+  constructor({ height = 400, onRow = null } = {}) {
+    this.by = "load"; this.value = "difference"; this.row = 0; this.range = null; this.trace = null; this.onRow = onRow;
+    this.heat = new Heat("Map of the residual; arrow keys choose a run", { height, choose: (at) => { this.row = at.row; this.detail(); }, brush: (range) => { this.range = range; this.detail(); this.stats(); } });
+    this.controls = h("div", { class: "row" });
+    this.said = h("p", { class: "small", role: "status" });
+    this.element = h("div", { class: "card" }, this.controls, this.heat.element, this.said);
+    this.curve = new Plot("curve", { height: 210 });
+    this.rest = new Plot("residual", { height: 190, select: (range) => { this.range = range; this.heat.range = range; this.heat.draw(); this.stats(); this.detail(); } });
+  }
+
+  async load(model) {
+    this.model = model;
+    const key = `${app.campaign.campaign}/${model.number}/${app.campaign.quantity}/${model.documents[`${app.campaign.quantity}/plots.npz`]}`;
+    if (key === this.key) return Boolean(this.data);
+    const data = await arraysOf(model, "plots");
+    if (!data) return false;
+    this.key = key; this.data = data; this.trace = null;
+    if (!isStrain(data) || !["load", "pressure", "speed", "order"].includes(this.by)) this.by = "load";
+    this.build();
+    return true;
+  }
+
+  build() {
+    const { data } = this, strain = isStrain(data);
+    this.unit = this.value === "white" ? "noise" : unitOf(data);
+    const shownData = this.trace ? { ...data, trace: this.trace.values, shapes: { ...data.shapes, trace: data.shapes.difference } } : data;
+    const name = this.trace ? "trace" : this.value;
+    if (strain) {
+      this.rows = strainRows(shownData, this.by, name);
+      this.columns = data.angle.length;
+      this.x = { title: "wheel angle [deg] (0: under the axle, entry < 0)", low: -180, high: 180, ticks: TICKS };
+    } else {
+      const found = forceRows(shownData, this.by, name);
+      this.rows = found.rows; this.slip = found.slip; this.columns = BINS;
+      const step = (found.slip.high - found.slip.low) / 6;
+      this.x = { ...found.slip, ticks: [0, 1, 2, 3, 4, 5, 6].map((k) => found.slip.low + k * step) };
+    }
+    this.row = Math.min(this.row, this.rows.length - 1);
+    this.limit = limitOf(data[this.value]);
+    this.heat.at.row = this.row;
+    this.heat.show({ columns: this.columns, rows: this.rows, x: this.x, unit: this.unit, limit: this.limit, say: (r, c) => this.cell(r, c) });
+    const has = varying(data).map(([key, text]) => [key, text]);
+    const orders = strain ? [["load", "load"], ["pressure", "pressure"], ["speed", "speed"], ["order", "time order"]] : has.filter(([k]) => ["load", "pressure", "camber", "speed"].includes(k));
+    const known = data.white.some(Number.isFinite);
+    fill(this.controls, h("h2", {}, this.trace ? `What ${this.trace.name} would leave` : "What is left"), h("span", { class: "room" }),
+      choose(orders.length ? orders : [["load", "load"]], this.by, (by) => { this.by = by; this.build(); this.detail(); }, "rows by"),
+      choose(Object.entries(VALUES).filter(([k]) => k !== "white" || known), this.value, (v) => { this.value = v; this.build(); this.detail(); }, "values"),
+      choose([["diverging", "blue and red"], ["cividis", "dark to light"]], this.heat.colors, (c) => { this.heat.colors = c; this.heat.image = null; this.heat.draw(); }, "colours"),
+      csvButton("map", () => [["row", this.rows.map((r) => r.label)], ...Array.from({ length: this.columns }, (_, k) => [number(this.x.low + ((k + (strain ? 0 : 0.5)) * (this.x.high - this.x.low)) / this.columns, 5), this.rows.map((r) => r.values[k])])]));
+    this.stats();
+  }
+
+  cell(r, c) {
+    const row = this.rows[r], at = this.x.low + ((c + 0.5) * (this.x.high - this.x.low)) / this.columns;
+    return `${row.label}; at ${number(at, 3)} ${isStrain(this.data) ? "deg" : "slip"}: ${number(row.values[c])} ${this.unit}`;
+  }
+
+  stats() {
+    const { data, range } = this;
+    if (!range) { this.said.textContent = "Drag over the map or the plot to see what share of the squared residual a range holds."; return; }
+    const at = (k) => this.x.low + ((k + 0.5) * (this.x.high - this.x.low)) / this.columns;
+    const found = share(data, this.value, this.rows, (k) => at(k) >= range[0] && at(k) <= range[1], data.counted);
+    this.said.textContent = `From ${number(range[0])} to ${number(range[1])}: rms ${number(found.rms)} ${this.unit}, ${number(100 * found.share, 3)} % of the squares, ${found.count} values.`;
+  }
+
+  overlay(trace) { this.trace = trace; this.build(); this.detail(); }
+
+  detail() {
+    const { data } = this;
+    if (!data || !this.rows.length) return;
+    if (this.onRow) this.onRow(this.rows[this.row]);
+  }
+}
+
+export class See {
+  constructor(go) {
+    this.go = go; this.x = "angle"; this.y = "difference"; this.gages = false;
+    this.field = new Field({ onRow: () => this.plots() });
+    this.head = h("div", { class: "card" });
+    this.tools = h("div", { class: "row" });
+    this.tools2 = h("div", { class: "row" });
+    this.side = h("div", {}, h("div", { class: "card" }, this.tools, this.field.curve.element), h("div", { class: "card" }, this.tools2, this.field.rest.element));
+    this.body = h("div", { class: "two wide-left" }, this.field.element, this.side);
+    this.element = h("div", {}, this.head, this.body);
+  }
+
+  leave() { this.field.curve.remove(); this.field.rest.remove(); }
+
+  async update() {
+    const model = current();
+    const compared = model && (await documentOf(model, "comparison").catch(() => null));
+    if (!compared || !(await this.field.load(model).catch(() => false))) { this.body.hidden = true; wait(this.head); return; }
+    this.body.hidden = false;
+    const c = compared, said = [...c.statements, ...c.messages];
+    fill(this.head, h("div", { class: "row" },
+      h("div", { class: "figures" }, h("div", {}, h("span", { class: "quiet" }, "error of the model"), h("b", { id: "error" }, number(c.error, 4)), h("span", { class: "quiet" }, unitName(c.error_unit))),
+        h("div", {}, h("span", { class: "quiet" }, "not explained, rms"), h("b", {}, number(c.residual_rms, 3)), h("span", { class: "quiet" }, `of ${number(c.measured_rms, 3)} ${unitName(c.unit)}`)),
+        c.noise ? h("div", {}, h("span", { class: "quiet" }, "noise of the repeats"), h("b", {}, number(c.noise, 3)), h("span", { class: "quiet" }, unitName(c.unit))) : null,
+        h("div", {}, h("span", { class: "quiet" }, "verdict"), h("b", {}, c.verdict.replaceAll("_", " ")), h("span", { class: "quiet" }, c.verdict === "fits" ? "the rest is noise" : ""))),
+      h("span", { class: "room" }), h("button", { class: "main", type: "button", onclick: () => this.go("suspect") }, "Find what is missing")),
+    said.length ? h("details", {}, h("summary", {}, `Where it fails, in words (${said.length})`), h("ul", {}, said.map((s) => h("li", {}, s)))) : null);
+    this.plots();
+  }
+
+  progress() { if (this.body.hidden) wait(this.head); }
+
+  plots() {
+    const { field } = this, { data } = field;
+    const strain = isStrain(data), has = varying(data), [slipKey] = slipOf(data);
+    if (!strain && ["angle", "place", "phase"].includes(this.x)) this.x = slipKey;
+    if (strain && !["angle", "place", "phase"].includes(this.x) && !data[this.x]) this.x = "angle";
+    fill(this.tools, h("h2", {}, strain ? runWords(data, field.rows[field.row].index) : field.rows[field.row].label), h("span", { class: "room" }),
+      strain ? h("label", {}, h("input", { type: "checkbox", checked: this.gages, onchange: (e) => { this.gages = e.target.checked; this.plots(); } }), " each gage") : null);
+    const xs = [...(strain ? [["angle", "wheel angle"], ["place", "place in the contact"]] : []), ...has.map(([k, t]) => [k, t]), ...(strain ? [["phase", "once-per-turn phase"]] : [])];
+    const ys = [["difference", "model less measured"], ...(data.white.some(Number.isFinite) ? [["white", "whitened residual"]] : []), ["measured", "measured"]];
+    fill(this.tools2, choose(ys, this.y, (v) => { this.y = v; this.plots(); }, "y"), choose(xs, this.x, (v) => { this.x = v; this.plots(); }, "over"));
+    if (strain) this.strainPlots(); else this.forcePlots();
+  }
+
+  strainPlots() {
+    const { field } = this, { data } = field, i = field.rows[field.row].index, along = this.x === "place" ? "place" : "angle";
+    const [a, b] = [data.edges[2 * i], data.edges[2 * i + 1]];
+    const xs = along === "place" ? data.angle.map((x) => (2 * x - a - b) / (b - a)) : data.angle;
+    const x = { title: along === "place" ? "place in the model's contact [1] (entry −1, exit +1)" : "wheel angle [deg]", values: Array.from(xs), range: along === "place" ? [-3, 3] : undefined };
+    const one = (name) => sliced(data, name, i), noise = data.noise[0];
+    const measured = one("measured"), gages = this.gages ? gageLines(data, i, "measured_by_gage") : [];
+    const band = Number.isFinite(noise) ? [{ name: "noise, upper", values: measured.map((v) => v + 2 * noise), color: "measured", width: 0.5, quiet: true }, { name: "noise, lower", values: measured.map((v) => v - 2 * noise), color: "measured", width: 0.5, quiet: true }] : [];
+    field.curve.show({ title: `strain, mean of the gages; band: ± 2 noise`, unit: "microstrain", x, bands: band.length ? [[1, 2, "measured"]] : [], series: [...band, { name: "measured", values: measured, color: "measured" }, { name: "model", values: one("model"), color: "model", dash: [8, 4] }, ...gages] });
+    if (["angle", "place"].includes(this.x)) {
+      const lines = this.gages && this.y !== "white" ? gageLines(data, i, this.y === "measured" ? "measured_by_gage" : "by_gage") : [];
+      const unit = this.y === "white" ? "noise" : "microstrain";
+      field.rest.points = false;
+      field.rest.show({ title: `${VALUES[this.y] || this.y}, this run`, unit, x, series: [{ name: VALUES[this.y] || "measured", values: one(this.y), color: this.y === "measured" ? "measured" : "rest" }, ...lines] });
+      return;
+    }
+    const inside = (k) => !field.range || (data.angle[k] >= field.range[0] && data.angle[k] <= field.range[1]);
+    const part = (run) => sliced(data, this.y, run).filter((_, k) => inside(k));
+    const runs = [...data.run.keys()], where = field.range ? "of the chosen range" : "of the whole turn";
+    const means = field.range ? runs.map((r) => mean(part(r))) : null, sizes = runs.map((r) => rms(part(r)));
+    const phases = this.x === "phase" ? runs.map((r) => phase(sliced(data, this.y, r), data.angle)) : null;
+    const values = phases ? phases.map((p) => p.phase) : Array.from(data[this.x]);
+    const order = runs.slice().sort((p, q) => values[p] - values[q]);
+    const [, title, unit] = CONDITIONS.find(([k]) => k === this.x) || [null, "phase of the once-per-turn part", "deg"];
+    const series = phases ? [{ name: "amplitude once per turn", values: order.map((r) => phases[r].size), color: "rest", points: true }]
+      : [{ name: "rms", values: order.map((r) => sizes[r]), color: "rest", points: true }, ...(means ? [{ name: "mean", values: order.map((r) => means[r]), color: "model", points: true, hollow: true }] : [])];
+    field.rest.points = true;
+    field.rest.chosen = (at) => { const run = order[at]; field.row = field.rows.findIndex((r) => r.index === run); field.heat.at.row = field.row; field.heat.draw(); this.plots(); };
+    field.rest.show({ title: `${VALUES[this.y] || this.y} of each run, ${where}; click a point to choose the run`, unit: this.y === "white" ? "noise" : "microstrain", x: { title: `${title} [${unit}]`, values: order.map((r) => values[r]) }, extra: [["run", order.map((r) => data.run[r])]], series });
+  }
+
+  forcePlots() {
+    const { field } = this, { data } = field, unit = unitOf(data), name = data.texts.quantity;
+    const draw = (plot, members, key, series, title, label) => {
+      const order = members.slice().sort((a, b) => data[key][a] - data[key][b]);
+      const [, text, u] = CONDITIONS.find(([k]) => k === key);
+      plot.points = true;
+      plot.show({ title, unit: label, y: `${name} [${label}]`, x: { title: `${text} [${u}]`, values: order.map((i) => data[key][i]) }, extra: [["run", order.map((i) => data.run[i])]], series: series.map((s) => ({ ...s, points: true, values: order.map((i) => data[s.from][i]) })) });
+    };
+    draw(field.curve, field.rows[field.row].members, field.slip.key, [{ name: "measured", from: "measured", color: "measured" }, { name: "model", from: "model", color: "model", hollow: true }], "measured (filled) and model (hollow) at these conditions", unit);
+    draw(field.rest, [...data.run.keys()], this.x, [{ name: VALUES[this.y] || this.y, from: this.y, color: "rest" }], "all points", this.y === "white" ? "noise" : unit);
+  }
+}
+
+const GAGE_DASH = [[2, 3], [6, 3], [10, 3], [6, 3, 2, 3], [1, 2]];
+function gageLines(data, i, name) {
+  const [, gages, n] = data.shapes[name];
+  return Array.from({ length: gages }, (_, g) => ({ name: `gage y = ${number(data.gages[g], 3)} mm`, values: data[name].subarray((i * gages + g) * n, (i * gages + g + 1) * n), color: "quiet", width: 1.2, dash: GAGE_DASH[g % 5] }));
+}
+
+function phase(values, angle) {
+  let [re, im] = [0, 0];
+  values.forEach((v, k) => { re += v * Math.cos((angle[k] * Math.PI) / 180); im += v * Math.sin((angle[k] * Math.PI) / 180); });
+  return { phase: (180 / Math.PI) * Math.atan2(im, re), size: (2 / values.length) * Math.hypot(re, im) };
+}
+
+// What is computed while there is nothing to be seen, and what has failed.
+export function wait(place, kinds = ["check", "identify", "compare"]) {
+  const c = app.campaign;
+  if (!c) { fill(place, h("p", {}, "Open a campaign first.")); return; }
+  const running = active().filter((job) => job.subject.campaign === c.campaign);
+  const broken = c.jobs.filter((job) => ["failed", "interrupted", "cancelled"].includes(job.state) && kinds.includes(job.kind)).at(-1);
+  fill(place, h("h2", {}, running.length ? "Being computed" : broken ? "It could not be computed" : "Nothing to be seen yet"),
+    c.check?.errors ? h("p", { class: "bad" }, `The campaign has ${c.check.errors} errors; they stand in step 1 with what to do.`) : null,
+    running.map((job) => { const at = progressOf(job.job); return h("p", {}, `${job.title}: ${job.state === "running" ? at?.label || "begins" : "waits"}`); }),
+    !running.length && broken ? h("p", { class: "bad" }, `${broken.title}: ${broken.state}. ${broken.message}`) : null);
+}

@@ -1,0 +1,193 @@
+// Step 3: which effect is missing: the verdict in four lines, the effects by part, the trace of each.
+import { app, arraysOf, current, documentOf, wish } from "./data.js";
+import { dialog, fill, h, number, strength, toast, unitName } from "./dom.js";
+import { Plot } from "./plots.js";
+import { Field, wait } from "./see.js";
+import { CONDITIONS, isStrain, sliced, unitOf } from "./maps.js";
+
+const TITLES = { missing: "What is missing", sure: "How sure", error: "The error", next: "What to do next" };
+const ORDER = ["belt", "sidewall", "tread", "contact", "gages", "rig"];
+
+export class Suspect {
+  constructor(go) {
+    this.go = go; this.ticked = new Set(); this.hovered = ""; this.key = "";
+    this.head = h("div", { class: "card" });
+    this.list = h("div", { class: "card" });
+    this.field = new Field({ height: 260, onRow: () => this.draw() });
+    this.plot = new Plot("trace", { height: 230 });
+    this.about = h("div", { class: "card" }, this.plot.element);
+    this.body = h("div", { class: "two wide-left" }, this.list, h("div", {}, this.about, this.field.element));
+    this.element = h("div", {}, this.head, this.body);
+  }
+
+  leave() { this.plot.remove(); this.field.curve.remove(); this.field.rest.remove(); }
+  progress() { if (this.body.hidden) wait(this.head, ["check", "identify", "compare", "diagnose"]); }
+
+  async update() {
+    const model = current();
+    const told = model && (await documentOf(model, "diagnosis").catch(() => null));
+    if (!told || !(await this.field.load(model).catch(() => false))) { this.body.hidden = true; this.key = ""; wait(this.head, ["check", "identify", "compare", "diagnose"]); return; }
+    const key = JSON.stringify([app.campaign.campaign, model.number, app.campaign.quantity, model.documents, app.home.effects.length]);
+    if (key === this.key) return;
+    this.key = key; this.body.hidden = false; this.told = told; this.model = model; this.hovered = "";
+    this.traces = await arraysOf(model, "traces").catch(() => null);
+    this.next = await documentOf(model, "next-test").catch(() => null);
+    this.ticked = new Set([...this.ticked].filter((name) => told.candidates.some((e) => e.effect === name)));
+    this.say();
+    this.table();
+    this.draw();
+  }
+
+  say() {
+    const { told, model } = this;
+    const apart = told.verdict === "indistinguishable" || told.candidates.some((e) => e.twins.length && told.named.includes(e.effect)) || (told.sets || []).length > 1;
+    fill(this.head, h("div", { class: "row" }, h("h2", {}, "The verdict"), h("span", { class: "tag alarm", id: "verdict" }, told.verdict.replaceAll("_", " ")),
+      told.false_alarm !== undefined && told.false_alarm !== null ? h("span", { class: "quiet small" }, `chance of a false alarm: ${number(100 * told.false_alarm, 2)} %`) : null, h("span", { class: "room" }),
+      h("button", { type: "button", onclick: () => wish({ do: "next-test", ...this.where() }).then(() => toast("The next run is being looked for.")) }, apart ? "What would tell them apart?" : "Which run to measure next?")),
+    h("dl", { class: "verdict" }, (model.lines || []).map(([what, said]) => [h("dt", {}, TITLES[what] || what), h("dd", {}, said)])),
+    this.next ? this.nextTest(this.next) : null);
+  }
+
+  where() { return { campaign: app.campaign.campaign, model: this.model.number, quantity: app.campaign.quantity }; }
+
+  nextTest(found) {
+    const plan = h("div", {});
+    const list = (found.candidates || []).slice(0, 3), said = found.what || "";
+    const draw = new Plot("plan", { height: 180 });
+    const { data } = this.field, x = "load", y = varyingSecond(data, x);
+    const at = (run, key) => run[{ load: "load_N", pressure: "pressure_bar", speed: "speed_kmh", slip_angle: "slip_angle_deg", camber: "camber_deg", slip_ratio: "slip_ratio" }[key]] ?? null;
+    const order = [...data.run.keys()].sort((a, b) => data[x][a] - data[x][b]);
+    const all = [...order.map((i) => [data[x][i], data[y][i], null]), ...list.map((run) => [at(run, x), null, at(run, y)])].filter(([v]) => v !== null).sort((a, b) => a[0] - b[0]);
+    queueMicrotask(() => draw.show({ title: "the plan, and the runs that would tell most", unit: unitOfCondition(y), y: label(y), x: { title: label(x), values: all.map((a) => a[0]) }, series: [{ name: "measured runs", values: all.map((a) => a[1]), color: "measured", points: true }, { name: "best next runs", values: all.map((a) => a[2]), color: "rest", points: true, hollow: true }] }));
+    fill(plan, h("h3", {}, "The next run"), h("p", {}, said), list.map((run) => h("p", {}, ["load_N", "pressure_bar", "speed_kmh", "slip_angle_deg", "camber_deg", "slip_ratio"].filter((k) => run[k] !== undefined && run[k] !== null).map((k) => `${k.replace("_N", " [N]").replace("_bar", " [bar]").replace("_kmh", " [km/h]").replace("_deg", " [deg]").replaceAll("_", " ")} ${number(run[k])}`).join(", "))), list.length ? draw.element : null);
+    return plan;
+  }
+
+  title(name) { return app.home.effects.find((e) => e.effect === name); }
+
+  table() {
+    const { told, model } = this, known = new Map(app.home.effects.map((e) => [e.effect, e]));
+    const groups = new Map(ORDER.map((part) => [part, []]));
+    const put = (row, name) => (groups.get(known.get(name)?.part || "rig") || groups.get("rig")).push(row);
+    for (const e of told.candidates) put(this.candidate(e), e.effect);
+    for (const e of model.effects || []) put(this.owned(e), e.effect);
+    for (const name of told.dead) put(this.dead(name, (told.dead_reasons || {})[name]), name);
+    const withP = told.candidates.some((e) => e.p !== undefined && e.p !== null);
+    const rank = (part) => Math.min(...groups.get(part).map((r) => Number(r.dataset.rank || 999)), 999);
+    fill(this.list, h("div", { class: "row" }, h("h2", {}, "Effects"), h("span", { class: "quiet small" }, "Hover or focus a line to see what the effect would leave; tick what to add."), h("span", { class: "room" }),
+      this.button = h("button", { class: "main", type: "button", id: "add", onclick: () => this.add() }, "Add")),
+    h("div", { class: "scroll tall" }, h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), h("th", {}, "effect"), h("th", { class: "n" }, withP ? "p" : "score / threshold"), h("th", {}, "strength"), h("th", { class: "n", title: `error with this effect, ${unitName(told.error_unit)}` }, "error with it"), h("th", {}, ""))),
+      h("tbody", {}, [...groups.keys()].filter((part) => groups.get(part).length).sort((a, b) => rank(a) - rank(b)).map((part) => [h("tr", { class: "part" }, h("td", { colspan: 6 }, part)), ...groups.get(part).sort((a, b) => Number(a.dataset.rank || 999) - Number(b.dataset.rank || 999))])))));
+    this.count();
+  }
+
+  candidate(e) {
+    const { told } = this, sets = (told.sets || []).flatMap((set, i) => (set.includes(e.effect) ? [i + 1] : []));
+    const half = Array.isArray(e.std) ? e.std.map((s) => 1.96 * s) : 1.96 * e.std;
+    const box = h("input", { type: "checkbox", "aria-label": `tick ${e.effect}`, "data-effect": e.effect, checked: this.ticked.has(e.effect), onchange: () => { if (box.checked) this.ticked.add(e.effect); else this.ticked.delete(e.effect); this.count(); } });
+    const on = () => this.hover(e.effect);
+    return h("tr", { "data-rank": e.rank, "data-name": e.effect, onmouseenter: on, onfocusin: on },
+      h("td", {}, box),
+      h("td", {}, h("button", { class: "small", type: "button", title: "What it is, its source, what it would look like here", onclick: () => this.page(e.effect, e) }, e.effect), " ", told.named.includes(e.effect) ? h("span", { class: "tag alarm" }, "named") : e.level !== "quiet" ? h("span", { class: "tag" }, e.level) : null,
+        h("div", { class: "small quiet" }, this.title(e.effect)?.title || e.title || "", e.twins.length ? ` Looks like ${e.twins.map((t) => `${t.effect} (${number(t.angle_deg, 2)} deg apart)`).join(", ")}.` : "", sets.length ? ` In set ${sets.join(", ")}.` : "")),
+      h("td", { class: "n" }, e.p !== undefined && e.p !== null ? [number(e.p, 2), e.p_std ? h("div", { class: "small quiet" }, `± ${number(e.p_std, 1)}`) : null] : number(e.score / e.threshold, 3)),
+      h("td", {}, `${strength(e.strength)} ± ${strength(half, 2)} ${e.unit === "1" ? "" : e.unit}`, e.in_range ? null : h("div", { class: "small warn" }, `outside the plausible ${(e.range || []).map((x) => number(x)).join(" to ")}`)),
+      h("td", { class: "n" }, number(e.error_after)),
+      h("td", { class: "n small quiet" }, e.power !== undefined && e.power !== null ? `found in ${number(100 * e.power, 2)} %` : ""));
+  }
+
+  owned(e) {
+    return h("tr", { "data-rank": 0 }, h("td", {}, "✓"), h("td", {}, `${e.effect} `, h("span", { class: "tag" }, "in the model"), h("div", { class: "small quiet" }, this.title(e.effect)?.title || "")), h("td", {}), h("td", {}, strength(e.strength)), h("td", {}),
+      h("td", {}, h("button", { class: "small", type: "button", onclick: () => this.remove(e.effect) }, "Remove")));
+  }
+
+  dead(name, why) {
+    return h("tr", { class: "dead", "data-rank": 900 }, h("td", {}, "–"), h("td", {}, h("button", { class: "small", type: "button", onclick: () => this.page(name, null) }, name), h("div", { class: "small" }, this.title(name)?.title || "")), h("td", { colspan: 4, class: "small" }, `This plan cannot show it: ${why || "it changes nothing here"}`));
+  }
+
+  count() { this.button.textContent = this.ticked.size ? `Add ${[...this.ticked].join(", ")}` : "Add what is ticked"; this.button.disabled = !this.ticked.size; }
+
+  async add() {
+    const done = await wish({ do: "add", ...this.where(), effects: [...this.ticked] });
+    if (done) { this.ticked.clear(); this.go("add"); }
+  }
+
+  async remove(effect) { if (await wish({ do: "remove", ...this.where(), effect })) this.go("add"); }
+
+  hover(name) {
+    if (name === this.hovered) return;
+    this.hovered = name;
+    for (const row of this.list.querySelectorAll("tr[data-name]")) row.setAttribute("aria-selected", row.dataset.name === name);
+    this.draw();
+  }
+
+  draw() {
+    const { data } = this.field;
+    if (!data) return;
+    const begun = performance.now(), row = this.field.rows[this.field.row], name = this.hovered;
+    const trace = name && this.traces?.[`trace_${name}`], fault = name && this.traces?.texts[`fault_${name}`];
+    const title = !name ? "hover an effect to see what it would leave" : fault ? `${name}: ${fault}` : trace ? `the residual, and what ${name} would leave at its fitted strength` : this.traces ? `${name}: no trace` : "the traces of the effects are being computed";
+    const points = !isStrain(data);
+    let x, rest, own;
+    if (points) {
+      const order = row.members.slice().sort((a, b) => data[this.field.slip.key][a] - data[this.field.slip.key][b]);
+      x = { title: this.field.slip.title, values: order.map((i) => data[this.field.slip.key][i]) };
+      rest = order.map((i) => data.difference[i]); own = trace && order.map((i) => trace[i]);
+    } else {
+      x = { title: "wheel angle [deg]", values: Array.from(data.angle) };
+      rest = sliced(data, "difference", row.index);
+      own = trace && trace.subarray(row.index * data.angle.length, (row.index + 1) * data.angle.length);
+    }
+    this.plot.show({ title: `${title}; ${row.label}`, unit: unitOf(data), y: `model less measured [${unitOf(data)}]`, x, series: [{ name: "residual", values: rest, color: "rest", points }, { name: "what the effect would leave", values: own || new Array(x.values.length).fill(null), color: "trace", dash: [6, 4], points, hollow: points }] });
+    this.drawn = performance.now() - begun;
+    if (this.field.trace?.name !== (trace ? name : undefined)) {
+      clearTimeout(this.later);
+      this.later = setTimeout(() => this.field.overlay(trace ? { name, values: trace } : null), 60);
+    }
+  }
+
+  page(name, e) {
+    const about = this.title(name);
+    if (!about) return;
+    const plot = new Plot(`planted-${name}`, { height: 230 }), said = h("p", { class: "small quiet", role: "status" });
+    const middle = e ? e.strength : about.components > 1 ? new Array(about.components).fill(0).map((_, k) => (k ? 0 : about.range[1] / 2)) : (Math.abs(about.range[1]) >= Math.abs(about.range[0]) ? about.range[1] : about.range[0]) / 2;
+    const input = h("input", { value: [].concat(middle).map((x) => Number(x.toPrecision(4))).join(", "), size: 16, "aria-label": "strength" });
+    const show = async () => {
+      const numbers = input.value.split(",").map(Number);
+      if (numbers.some((x) => !Number.isFinite(x)) || numbers.length !== about.components) { said.textContent = `${about.components} number(s) are needed.`; return; }
+      const before = this.model.documents[`${app.campaign.quantity}/planted.npz`];
+      said.textContent = "The effect is being planted.";
+      await wish({ do: "plant", ...this.where(), effect: name, strength: numbers });
+      const look = setInterval(async () => {
+        const model = current(), stamp = model?.documents[`${app.campaign.quantity}/planted.npz`];
+        const failed = app.campaign.jobs.filter((job) => job.kind === "plant").at(-1);
+        if (failed?.state === "failed") { clearInterval(look); said.textContent = failed.message; return; }
+        if (!stamp || stamp === before) return;
+        clearInterval(look);
+        const planted = await arraysOf(model, "planted"), { data } = this.field;
+        const trace = planted[`trace_${name}`];
+        if (!trace) { said.textContent = planted.texts[`fault_${name}`] || "There is no trace."; return; }
+        said.textContent = `What ${name} of strength ${input.value} ${about.unit} would leave in each run, and the residual of the chosen run.`;
+        if (isStrain(data)) {
+          const n = data.angle.length, row = this.field.rows[this.field.row];
+          plot.show({ title: row.label, unit: "microstrain", x: { title: "wheel angle [deg]", values: Array.from(data.angle) }, series: [{ name: "residual", values: sliced(data, "difference", row.index), color: "rest" }, { name: name, values: trace.subarray(row.index * n, (row.index + 1) * n), color: "trace", dash: [6, 4] }] });
+        } else {
+          const order = [...data.run.keys()].sort((a, b) => data[this.field.slip.key][a] - data[this.field.slip.key][b]);
+          plot.show({ title: "all points", unit: unitOf(data), x: { title: this.field.slip.title, values: order.map((i) => data[this.field.slip.key][i]) }, series: [{ name: "residual", values: order.map((i) => data.difference[i]), color: "rest", points: true }, { name, values: order.map((i) => trace[i]), color: "trace", points: true, hollow: true }] });
+        }
+      }, 150);
+    };
+    dialog(name, h("p", {}, about.title), h("p", { class: "small" }, `Acts on: ${about.stage}. Varies with: ${about.varies_with.join(", ") || "nothing"}. Plausible strength: ${about.range.map((x) => number(x)).join(" to ")} ${about.unit}.`),
+      h("h3", {}, "Equation"), h("p", {}, about.equation || "The law itself says it:"), h("details", {}, h("summary", {}, "The law as it is computed"), h("pre", {}, about.law)),
+      h("h3", {}, "Source"), h("p", {}, about.source), h("h3", {}, "What it would look like here"),
+      h("div", { class: "row" }, h("label", {}, "strength ", input, ` ${about.unit}`), h("button", { type: "button", onclick: show }, "Plant it")), said, plot.element);
+    document.getElementById("dialog").addEventListener("close", () => plot.remove(), { once: true });
+  }
+}
+
+const label = (key) => { const [, text, unit] = CONDITIONS.find(([k]) => k === key); return `${text} [${unit}]`; };
+const unitOfCondition = (key) => CONDITIONS.find(([k]) => k === key)[2];
+function varyingSecond(data, first) {
+  const spread = (k) => { const v = Array.from(data[k] || []).filter(Number.isFinite); return v.length ? (Math.max(...v) - Math.min(...v)) / (Math.max(...v.map(Math.abs)) || 1) : 0; };
+  return ["speed", "pressure", "slip_angle", "camber"].filter((k) => k !== first).sort((a, b) => spread(b) - spread(a))[0];
+}
