@@ -1,7 +1,7 @@
 """``tirelib campaign``: checks a folder of measurements, and shows its content."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -9,12 +9,11 @@ from typing import Any
 import click
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 
 from tirelib.campaign.problem import Problem
 from tirelib.campaign.read import Campaign, read_campaign
-from tirelib.cli.common import NEW_FOLDER
+from tirelib.cli.common import NEW_FOLDER, progress_bar
 from tirelib.cli.options import json_option
 from tirelib.errors import FormatError
 
@@ -30,19 +29,10 @@ def campaign() -> None:
 
 
 @contextmanager
-def _progress(what: str) -> Iterator[Any]:
-    """Yield a callback (done, total) that draws a bar on stderr when that is a terminal."""
-    console = Console(stderr=True)
-    with Progress(
-        TextColumn(what),
-        BarColumn(),
-        MofNCompleteColumn(),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    ) as progress:
-        task = progress.add_task(what, total=None)
-        yield lambda done, total: progress.update(task, completed=done, total=total)
+def _progress(what: str) -> Iterator[Callable[[int, int], None]]:
+    """Yield a callback (done, total) that shows progress as every verb does."""
+    with progress_bar(what) as advance:
+        yield lambda done, total: advance(f"run {done} of {total}")
 
 
 _CHECK_EXAMPLE = """\b

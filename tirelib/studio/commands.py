@@ -118,6 +118,7 @@ KINDS: Mapping[str, Kind] = {
             *("identify", o["campaign"], "--out", f"{out}/M.toml", "--json", f"{out}/fit.json")
         ],
         ("M.toml", "fit.json"),
+        (0, 1),  # 1: the runs gave no ring, or no brush; what they gave counts
     ),
     "compare": Kind(
         "compare the model with the measurements",

@@ -205,7 +205,9 @@ class Jobs:
         if process.stdin is not None:
             process.stdin.close()
         job.ended = time.time()
-        job.state = "done" if code in KINDS[job.kind].allowed else "failed"
+        kind = KINDS[job.kind]
+        made = all((self.out(job) / name).exists() for name in kind.results)
+        job.state = "done" if code in kind.allowed and made else "failed"
         if job.state == "failed":
             job.message = self._last_words(job, code)
         self._save(job)

@@ -1,5 +1,6 @@
 """What the page is told of a session: lists for all views, without the documents themselves."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -120,13 +121,13 @@ def progress(desk: Desk) -> list[dict[str, Any]]:
 
 
 def _model(model: Model, quantity: str) -> dict[str, Any]:
-    fit = read_document(model.place / "fit.json") or {}
-    compared = read_document(model.document("comparison.json", quantity)) or {}
-    diagnosis = read_document(model.document("diagnosis.json", quantity)) or {}
+    fit = _part(model.place / "fit.json", _FIT)
+    compared = _part(model.document("comparison.json", quantity), _COMPARED)
+    diagnosis = _part(model.document("diagnosis.json", quantity), _DIAGNOSED)
     return {
         **model.told,
         "ready": model.ready,
-        "fit": {key: fit[key] for key in _FIT if key in fit},
+        "fit": fit,
         "error": compared.get("error"),
         "error_unit": compared.get("error_unit"),
         "effects": compared.get("effects", []),
@@ -150,6 +151,20 @@ _FIT = (
     *("heldout_error_before", "heldout_error_after", "held_out", "messages", "quantity"),
     *("error", "reasons", "residual_rms_before", "residual_rms_after", "residual_rms_unit"),
 )
+_COMPARED = ("error", "error_unit", "effects")
+_DIAGNOSED = ("verdict", "named", "floor", "explanation")
+_known: dict[Path, tuple[float, dict[str, Any]]] = {}
+
+
+def _part(path: Path, keys: Sequence[str]) -> dict[str, Any]:
+    """Return some keys of a document, which is read again only when it has changed."""
+    stamp = _stamp(path)
+    if stamp is None:
+        return {}
+    if path not in _known or _known[path][0] != stamp:
+        told = read_document(path) or {}
+        _known[path] = stamp, {key: told[key] for key in keys if key in told}
+    return _known[path][1]
 
 
 def _stamp(path: Path) -> float | None:

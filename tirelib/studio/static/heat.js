@@ -3,7 +3,7 @@ import { h, number, fill } from "./dom.js";
 
 const BLUE_RED = [[33, 102, 172], [146, 197, 222], null, [244, 165, 130], [178, 24, 43]];
 const CIVIDIS = [[0, 32, 77], [67, 78, 108], [124, 123, 120], [187, 175, 113], [255, 234, 70]];
-const LEFT = 118, BOTTOM = 36, TOP = 6, RIGHT = 62;
+const BOTTOM = 36, TOP = 6, RIGHT = 62;
 
 function ramp(colors, zero) {
   const stops = colors.map((color) => color || zero);
@@ -33,7 +33,7 @@ export class Heat {
     this.canvas = h("canvas", { tabindex: "0", role: "application", "aria-label": label });
     this.tip = h("div", { class: "tip", "aria-live": "polite" });
     this.element = h("div", { class: "heat" }, this.canvas, this.tip);
-    this.height = height; this.choose = choose; this.hover = hover; this.brush = brush;
+    this.height = (window.innerWidth >= 2200 ? 1.8 : 1) * height; this.left = 90; this.choose = choose; this.hover = hover; this.brush = brush;
     this.at = { row: 0, column: 0 }; this.range = null; this.colors = "diverging";
     this.canvas.addEventListener("pointermove", (event) => this.moved(event));
     this.canvas.addEventListener("pointerdown", (event) => this.pressed(event));
@@ -78,11 +78,12 @@ export class Heat {
     this.canvas.style.height = `${height}px`;
     const g = this.canvas.getContext("2d");
     g.scale(ratio, ratio);
+    g.font = `${width > 1400 ? 16 : 12}px system-ui, sans-serif`;
+    const LEFT = this.left = 14 + Math.min(0.4 * width, Math.max(40, ...map.rows.map((row) => (row.tick ? g.measureText(row.tick).width : 0))));
     const w = width - LEFT - RIGHT, t = height - TOP - BOTTOM, n = map.rows.length;
     this.box = { w, t };
     g.imageSmoothingEnabled = false;
     g.drawImage(this.image, LEFT, TOP, w, t);
-    g.font = `${width > 1400 ? 16 : 12}px system-ui, sans-serif`;
     g.fillStyle = g.strokeStyle = style("--quiet");
     const up = (row) => TOP + t - ((row + 0.5) * t) / n;
     g.textAlign = "right"; g.textBaseline = "middle";
@@ -118,7 +119,7 @@ export class Heat {
 
   place(event) {
     const box = this.canvas.getBoundingClientRect(), { w, t } = this.box, map = this.map;
-    const share = Math.max(0, Math.min(1, (event.clientX - box.left - LEFT) / w));
+    const share = Math.max(0, Math.min(1, (event.clientX - box.left - this.left) / w));
     const row = Math.floor(map.rows.length * (1 - (event.clientY - box.top - TOP) / t));
     return { row: Math.max(0, Math.min(map.rows.length - 1, row)), column: Math.min(map.columns - 1, Math.floor(share * map.columns)), x: map.x.low + share * (map.x.high - map.x.low) };
   }

@@ -4,18 +4,18 @@ import { number } from "./dom.js";
 export const CONDITIONS = [["load", "load", "N"], ["pressure", "inflation pressure", "bar"], ["speed", "speed", "km/h"], ["slip_angle", "slip angle", "deg"], ["slip_ratio", "slip ratio", "1"], ["camber", "camber", "deg"], ["temperature", "tread temperature", "degC"], ["order", "time order", "s"]];
 export const isStrain = (data) => data.texts.quantity === "strain";
 export const unitOf = (data) => (isStrain(data) ? "microstrain" : data.texts.quantity === "Mz" ? "Nm" : "N");
-const varies = (values) => { let a = Infinity, b = -Infinity; for (const x of values || []) if (Number.isFinite(x)) { a = Math.min(a, x); b = Math.max(b, x); } return b > a && b - a > 1e-6 * Math.max(Math.abs(a), Math.abs(b)); };
+const varies = (values) => { let a = Infinity, b = -Infinity; for (const x of values || []) if (Number.isFinite(x)) { a = Math.min(a, x); b = Math.max(b, x); } return b - a > 0.03 * Math.max(Math.abs(a), Math.abs(b)); };
 export const varying = (data) => CONDITIONS.filter(([key]) => data[key] && varies(data[key]));
 export const slipOf = (data) => (data.texts.quantity === "Fx" || (varies(data.slip_ratio) && !varies(data.slip_angle)) ? CONDITIONS[4] : CONDITIONS[3]);
 
-// Levels of a condition: values that lie nearer than `gap` of the largest are one.
+// Levels of a condition: a value that lies nearer to the mean of a level than `gap` of the largest belongs to it.
 export function levels(values, gap = 0.06) {
   const order = [...values.keys()].filter((i) => Number.isFinite(values[i])).sort((a, b) => values[a] - values[b]);
   const high = Math.max(...order.map((i) => Math.abs(values[i])), 1e-12), out = new Int16Array(values.length).fill(-1), centres = [];
   let level = -1, last = -Infinity, sum = 0, count = 0;
   for (const i of order) {
     if (values[i] - last > gap * high) { level += 1; sum = 0; count = 0; }
-    last = values[i]; out[i] = level; sum += last; count += 1; centres[level] = sum / count;
+    out[i] = level; sum += values[i]; count += 1; last = centres[level] = sum / count;
   }
   return { level: out, centres };
 }
@@ -45,11 +45,24 @@ export function strainRows(data, by, name) {
   });
 }
 
+// A level in words: digits that its neighbours need, and no 1e-4 for zero.
+function rounded(value, centres) {
+  const high = Math.max(...centres.map(Math.abs)), step = 10 ** (Math.floor(Math.log10(high || 1)) - 1);
+  return number(Math.round(value / step) * step, 4);
+}
+
+// Round numbers that divide a range.
+export function niceTicks(low, high) {
+  const rough = (high - low) / 5, power = 10 ** Math.floor(Math.log10(rough || 1)), step = [1, 2, 5, 10].map((k) => k * power).find((k) => k >= rough) || power, out = [];
+  for (let k = Math.ceil(low / step); k * step <= high * (1 + 1e-9); k += 1) out.push(Number((k * step).toPrecision(6)));
+  return out;
+}
+
 export const BINS = 36;
 export function forceRows(data, by, name) {
   const [slipKey, slipName, slipUnit] = slipOf(data);
   const keys = ["load", "pressure", "camber", "speed"].filter((k) => varies(data[k])).sort((a, b) => (b === by) - (a === by));
-  const found = keys.map((key) => levels(data[key], key === "camber" ? 0.25 : 0.12));
+  const found = keys.map((key) => levels(data[key], key === "camber" ? 0.2 : 0.07));
   const low = Math.min(...data[slipKey]), high = Math.max(...data[slipKey]);
   const groups = new Map();
   for (const i of data.run.keys()) {
@@ -60,7 +73,7 @@ export function forceRows(data, by, name) {
   const rows = [...groups.entries()].sort(([a], [b]) => (a < b ? -1 : 1)).map(([, members]) => {
     const sum = new Float32Array(BINS), count = new Uint16Array(BINS);
     for (const i of members) { const k = Math.min(BINS - 1, Math.floor((BINS * (data[slipKey][i] - low)) / (high - low || 1))); sum[k] += data[name][i]; count[k] += 1; }
-    const said = keys.map((key, j) => { const [, , unit] = CONDITIONS.find(([k]) => k === key); return `${number(found[j].centres[found[j].level[members[0]]], 3)} ${unit}`; });
+    const said = keys.map((key, j) => { const [, , unit] = CONDITIONS.find(([k]) => k === key); return `${rounded(found[j].centres[found[j].level[members[0]]], found[j].centres)} ${unit}`; });
     return { members, label: said.join(", ") || "all points", tick: said.join(", "), values: sum.map((s, k) => (count[k] ? s / count[k] : NaN)), said };
   });
   return { rows, slip: { key: slipKey, title: `${slipName} [${slipUnit}]`, low, high } };

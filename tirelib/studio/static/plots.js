@@ -16,7 +16,7 @@ const axis = (label, extra = {}) => ({
 // series: [{name, values, color, dash, points, width, fill}], bands: [[upper, lower, color]]
 export class Plot {
   constructor(name, { height = 210, select = null, points = false, chosen = null } = {}) {
-    this.name = name; this.height = height; this.select = select; this.points = points; this.chosen = chosen;
+    this.name = name; this.height = (big() ? 1.8 : 1) * height; this.select = select; this.points = points; this.chosen = chosen;
     this.head = h("span");
     this.place = h("div");
     this.legend = h("div", { class: "legend" });

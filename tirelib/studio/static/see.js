@@ -1,9 +1,9 @@
 // Step 2: where the model fails: a map of what is left, the chosen run, and any number over any condition.
-import { app, arraysOf, current, documentOf, active, progressOf } from "./data.js";
+import { active, app, arraysOf, current, documentOf, progressOf, wish } from "./data.js";
 import { choose, csvButton, fill, h, number, unitName } from "./dom.js";
 import { Heat, limitOf } from "./heat.js";
 import { Plot } from "./plots.js";
-import { CONDITIONS, forceRows, isStrain, mean, rms, runWords, share, sliced, slipOf, strainRows, unitOf, varying, BINS } from "./maps.js";
+import { CONDITIONS, forceRows, isStrain, mean, niceTicks, rms, runWords, share, sliced, slipOf, strainRows, unitOf, varying, BINS } from "./maps.js";
 
 const TICKS = [-180, -120, -60, 0, 60, 120, 180];
 const VALUES = { difference: "model less measured", white: "whitened residual" };
@@ -44,8 +44,7 @@ export class Field {
     } else {
       const found = forceRows(shownData, this.by, name);
       this.rows = found.rows; this.slip = found.slip; this.columns = BINS;
-      const step = (found.slip.high - found.slip.low) / 6;
-      this.x = { ...found.slip, ticks: [0, 1, 2, 3, 4, 5, 6].map((k) => found.slip.low + k * step) };
+      this.x = { ...found.slip, ticks: niceTicks(found.slip.low, found.slip.high) };
     }
     this.row = Math.min(this.row, this.rows.length - 1);
     this.limit = limitOf(data[this.value]);
@@ -185,14 +184,21 @@ function phase(values, angle) {
   return { phase: (180 / Math.PI) * Math.atan2(im, re), size: (2 / values.length) * Math.hypot(re, im) };
 }
 
+let asked = ""; // what was asked for last, so that it is asked for once
+
 // What is computed while there is nothing to be seen, and what has failed.
 export function wait(place, kinds = ["check", "identify", "compare"]) {
   const c = app.campaign;
   if (!c) { fill(place, h("p", {}, "Open a campaign first.")); return; }
   const running = active().filter((job) => job.subject.campaign === c.campaign);
   const broken = c.jobs.filter((job) => ["failed", "interrupted", "cancelled"].includes(job.state) && kinds.includes(job.kind)).at(-1);
+  const model = current(), idle = model && !running.length && !broken;
+  if (idle && asked !== `${c.campaign}/${model.number}/${c.quantity}`) {
+    asked = `${c.campaign}/${model.number}/${c.quantity}`;
+    wish({ do: "look", campaign: c.campaign, model: model.number, quantity: c.quantity });
+  }
   fill(place, h("h2", {}, running.length ? "Being computed" : broken ? "It could not be computed" : "Nothing to be seen yet"),
     c.check?.errors ? h("p", { class: "bad" }, `The campaign has ${c.check.errors} errors; they stand in step 1 with what to do.`) : null,
     running.map((job) => { const at = progressOf(job.job); return h("p", {}, `${job.title}: ${job.state === "running" ? at?.label || "begins" : "waits"}`); }),
-    !running.length && broken ? h("p", { class: "bad" }, `${broken.title}: ${broken.state}. ${broken.message}`) : null);
+    !running.length && broken ? h("p", { class: "bad" }, `${broken.title}: ${broken.state}. ${broken.message} `, h("button", { class: "small", type: "button", onclick: () => wish({ do: "again", job: broken.job }) }, "Run again")) : null);
 }

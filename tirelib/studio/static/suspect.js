@@ -76,7 +76,7 @@ export class Suspect {
     const rank = (part) => Math.min(...groups.get(part).map((r) => Number(r.dataset.rank || 999)), 999);
     fill(this.list, h("div", { class: "row" }, h("h2", {}, "Effects"), h("span", { class: "quiet small" }, "Hover or focus a line to see what the effect would leave; tick what to add."), h("span", { class: "room" }),
       this.button = h("button", { class: "main", type: "button", id: "add", onclick: () => this.add() }, "Add")),
-    h("div", { class: "scroll tall" }, h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), h("th", {}, "effect"), h("th", { class: "n" }, withP ? "p" : "score / threshold"), h("th", {}, "strength"), h("th", { class: "n", title: `error with this effect, ${unitName(told.error_unit)}` }, "error with it"), h("th", {}, ""))),
+    h("div", { class: "scroll tall" }, h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), h("th", {}, "effect"), h("th", { class: "n" }, withP ? "p" : "score / threshold"), h("th", {}, "strength"), h("th", { class: "n", title: `error with this effect, ${unitName(told.error_unit)}` }, "error with it"), h("th", { class: "n", title: "chance that a diagnosis of this plan finds the effect at this strength" }, "chance to find it"))),
       h("tbody", {}, [...groups.keys()].filter((part) => groups.get(part).length).sort((a, b) => rank(a) - rank(b)).map((part) => [h("tr", { class: "part" }, h("td", { colspan: 6 }, part)), ...groups.get(part).sort((a, b) => Number(a.dataset.rank || 999) - Number(b.dataset.rank || 999))])))));
     this.count();
   }
@@ -93,7 +93,7 @@ export class Suspect {
       h("td", { class: "n" }, e.p !== undefined && e.p !== null ? [number(e.p, 2), e.p_std ? h("div", { class: "small quiet" }, `± ${number(e.p_std, 1)}`) : null] : number(e.score / e.threshold, 3)),
       h("td", {}, `${strength(e.strength)} ± ${strength(half, 2)} ${e.unit === "1" ? "" : e.unit}`, e.in_range ? null : h("div", { class: "small warn" }, `outside the plausible ${(e.range || []).map((x) => number(x)).join(" to ")}`)),
       h("td", { class: "n" }, number(e.error_after)),
-      h("td", { class: "n small quiet" }, e.power !== undefined && e.power !== null ? `found in ${number(100 * e.power, 2)} %` : ""));
+      h("td", { class: "n small quiet" }, e.power !== undefined && e.power !== null ? `${number(100 * e.power, 2)} %` : ""));
   }
 
   owned(e) {
@@ -139,7 +139,7 @@ export class Suspect {
       own = trace && trace.subarray(row.index * data.angle.length, (row.index + 1) * data.angle.length);
     }
     this.plot.show({ title: `${title}; ${row.label}`, unit: unitOf(data), y: `model less measured [${unitOf(data)}]`, x, series: [{ name: "residual", values: rest, color: "rest", points }, { name: "what the effect would leave", values: own || new Array(x.values.length).fill(null), color: "trace", dash: [6, 4], points, hollow: points }] });
-    this.drawn = performance.now() - begun;
+    app.drawn = performance.now() - begun; // how long a hover takes, [ms]
     if (this.field.trace?.name !== (trace ? name : undefined)) {
       clearTimeout(this.later);
       this.later = setTimeout(() => this.field.overlay(trace ? { name, values: trace } : null), 60);
