@@ -1,4 +1,4 @@
-"""How the noise of forces depends on the constants of `tirelib.compare.force_noise`.
+"""How the noise of forces depends on the constants of `tirelib.identify.force_noise`.
 
     python build/force_noise.py [CAMPAIGN...]
 
@@ -15,9 +15,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from tests.magic_sweep import Sweep, magic_sweep
 from tirelib.campaign import read_campaign
-from tirelib.compare import force_noise
-from tirelib.compare.force_points import ForcePoints, force_points
+from tirelib.identify import force_noise
 from tirelib.identify.force_data import FORCES, force_data
+from tirelib.identify.force_points import ForcePoints, force_points
 from tirelib.threads import one_thread
 
 CONSTANTS = ("LEAST", "MOST", "REACH", "STEEPEST")

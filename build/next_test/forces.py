@@ -17,8 +17,7 @@ import numpy as np
 from next_test.pair import REFERENCE, Pair, PairCase, foretold, look_alikes, open_still
 from tests.magic_sweep import _force
 from tirelib.arrays import FloatArray
-from tirelib.compare.force_model import ForceBench, ForceModel
-from tirelib.compare.force_points import force_points
+from tirelib.compare.force_model import ForceModel
 from tirelib.diagnose.forces.assess import ForceCase
 from tirelib.diagnose.forces.candidates import force_candidates
 from tirelib.diagnose.forces.fit import ForceFit, Problem, fit_force
@@ -26,6 +25,7 @@ from tirelib.effects import CATALOGUE
 from tirelib.identify.brush_fit import fit_brush
 from tirelib.identify.brush_model import BrushModel
 from tirelib.identify.force_data import ForceData
+from tirelib.identify.force_points import force_points
 from tirelib.planning.envelope import Envelope
 from tirelib.planning.force_rivals import (
     MEMBERS,
@@ -191,7 +191,7 @@ def case_of(data: ForceData) -> ForceCase:
     model = ForceModel(
         "fitted", BrushModel("fitted", values, fit.reference, None), (), reference, ()
     )
-    problem = Problem.of(ForceBench.of(model, force_points(data)), "Fy", NOISE)
+    problem = Problem.of(model.bench(force_points(data)), "Fy", NOISE)
     return ForceCase("steady", model, problem, problem, NOISE, len(problem) // 2, ())
 
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.arrays import IntArray
-from tirelib.compare.force_points import CELL_ANGLE
 from tirelib.compare.forces import ForceComparison
 from tirelib.compare.sentences import told
 from tirelib.identify.error_bands import levels
+from tirelib.identify.force_points import CELL_ANGLE
 
 LEAST_POINTS = 3
 """Points that a curve has at least."""

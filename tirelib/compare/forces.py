@@ -1,8 +1,8 @@
 """A model's brush held against the forces of a campaign.
 
 Points are runs, or passes of a sweep through a cell of conditions. Points in the same cell are the
-repeats, which give the noise (`tirelib.compare.force_noise`). The model is computed at the measured
-conditions, so a set point that is off moves both.
+repeats, which give the noise (`tirelib.identify.force_noise`). The model is computed at the
+measured conditions, so a set point that is off moves both.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,9 +17,7 @@ from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.brush.predict import PointParameters
 from tirelib.campaign import Campaign
 from tirelib.compare.floor import last_floor
-from tirelib.compare.force_model import ForceBench, ForceModel, force_model_of
-from tirelib.compare.force_noise import force_noise
-from tirelib.compare.force_points import CELL_ANGLE, ForcePoints, force_points
+from tirelib.compare.force_model import ForceModel, force_model_of
 from tirelib.compare.model import UsedEffect
 from tirelib.compare.sentences import told
 from tirelib.compare.strain import verdict_of
@@ -29,6 +27,8 @@ from tirelib.identify import brush_model
 from tirelib.identify.brush_fit import ANGLE_SPAN, RATIO_SPAN
 from tirelib.identify.error_bands import levels
 from tirelib.identify.force_data import FORCES, ForceData, force_data
+from tirelib.identify.force_noise import force_noise
+from tirelib.identify.force_points import CELL_ANGLE, ForcePoints, force_points
 from tirelib.parameters import TireFile
 
 SLIP_LIMITS = {
@@ -184,7 +184,7 @@ def compare_forces(
     points = force_points(force_data(campaign))
     wanted = quantities_of(campaign, points, quantity)
     points = usable_points(campaign, model, points)
-    bench = ForceBench.of(model, points)
+    bench = model.bench(points)
     found, data_hash = bench.forces(model.values, model.changes), campaign.content_hash()
     left_out = tuple(
         f"the model's effect {name} acts on strain and has no part in the forces"

@@ -14,8 +14,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.campaign import Campaign
-from tirelib.compare.force_model import ForceBench, force_model_of
-from tirelib.compare.force_points import force_points
+from tirelib.compare.force_model import force_model_of
 from tirelib.compare.forces import ForceComparison, usable_points
 from tirelib.compare.set_points import predict_set_points
 from tirelib.compare.strain import Comparison
@@ -23,6 +22,7 @@ from tirelib.effects import Effect
 from tirelib.errors import FormatError, ParameterError, TirelibError
 from tirelib.identify.delay import by_delay
 from tirelib.identify.force_data import force_data
+from tirelib.identify.force_points import force_points
 from tirelib.identify.random_effects import scales, whitening_of
 from tirelib.identify.span import span
 from tirelib.model.base import coordinates, large_displacements, linearised, operating_points
@@ -195,7 +195,7 @@ def _force_traces(
     model = force_model_of(file, effects)
     points = usable_points(campaign, model, force_points(force_data(campaign)))
     points = points.take(np.isfinite(getattr(points.data, found.quantity)))
-    bench, values, name = ForceBench.of(model, points), model.values, found.quantity
+    bench, values, name = model.bench(points), model.values, found.quantity
 
     def force(numbers: Mapping[str, float], *more: Any) -> FloatArray:
         forces = bench.forces(numbers, [*model.changes, *more])

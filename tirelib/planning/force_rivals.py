@@ -14,16 +14,15 @@ from typing import Any
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.compare.force_model import ForceBench
-from tirelib.compare.force_points import ForcePoints
 from tirelib.diagnose.forces.assess import ForceCase
-from tirelib.diagnose.forces.candidates import varies
 from tirelib.diagnose.forces.ensemble import variant
-from tirelib.diagnose.forces.fit import WIDTH, ForceFit, Problem, slopes_at, with_effect
+from tirelib.diagnose.forces.fit import ForceFit, Problem, slopes_at, with_effect
 from tirelib.diagnose.stage import RANGE_SLACK
 from tirelib.effects import Effect
 from tirelib.errors import CalibrationError, TirelibError
 from tirelib.identify.force_data import ForceData
+from tirelib.identify.force_points import ForcePoints
+from tirelib.infer.forces import WIDTH, varies
 from tirelib.planning.criterion import NOTHING, Forecast, Noise
 from tirelib.planning.envelope import Envelope
 from tirelib.planning.force_noise import Counted, counted_noise, set_points
@@ -157,7 +156,7 @@ def points_ahead(case: ForceCase, envelope: Envelope, wanted: FloatArray) -> Pro
         np.concatenate([points.cell, points.cell.max() + 1 + np.arange(n)]),
         np.concatenate([points.sweep, np.full(n, bool(rate.any()))]),
     )
-    bench = ForceBench.of(case.model, joint)
+    bench = case.model.bench(joint)
     order = np.concatenate([case.problem.bench.conditions.order, np.ones(n)])
     bench = replace(bench, conditions=replace(bench.conditions, order=order))
     return Problem(

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.arrays import FloatArray, IntArray
-from tirelib.compare.force_points import CELL_ANGLE, CELL_RATIO, ForcePoints, set_points
 from tirelib.errors import ParameterError
+from tirelib.identify.force_points import CELL_ANGLE, CELL_RATIO, ForcePoints, set_points
 
 LEAST = 4
 """Different slips that make a run one of several points."""

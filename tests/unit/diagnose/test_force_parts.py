@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.unit.force_points import ANGLES, LOADS, MODEL, PRESSURES, VALUES
 from tirelib.brush.predict import PointConditions, PointParameters, predict_forces
-from tirelib.compare.force_model import ForceBench, ForceModel
-from tirelib.compare.force_points import force_points
 from tirelib.diagnose.forces.candidates import force_candidates
 from tirelib.diagnose.forces.ensemble import force_ensemble
 from tirelib.diagnose.forces.fit import ForceFit, Problem, fit_force
@@ -16,22 +15,8 @@ from tirelib.diagnose.forces.held_out import ForceFold, force_folds, pooled
 from tirelib.diagnose.forces.left import left_of
 from tirelib.diagnose.forces.ranking import ForceRanking
 from tirelib.effects import CATALOGUE, effect
-from tirelib.identify.brush_law import Reference
-from tirelib.identify.brush_model import BrushModel
 from tirelib.identify.force_data import ForceData
-
-VALUES = {
-    "lateral_stiffness": 8e6,
-    "friction": 0.95,
-    "half_length": 0.06,
-    "load_power": 0.5,
-    "slip_angle_offset": 0.0,
-    "Fy_offset": 0.0,
-}
-MODEL = ForceModel(
-    "made up", BrushModel("made up", VALUES, Reference(4e3, 2e5), None), (), (4e3, 2e5), ()
-)
-LOADS, PRESSURES, ANGLES = (2e3, 4e3, 6e3), (1.7e5, 2.3e5), np.deg2rad(np.linspace(-8, 8, 9))
+from tirelib.identify.force_points import force_points
 
 
 def problem(
@@ -60,7 +45,7 @@ def problem(
         np.arange(n),
         np.full(n, 20.0),
     )
-    return Problem.of(ForceBench.of(MODEL, force_points(data)), "Fy", noise)
+    return Problem.of(MODEL.bench(force_points(data)), "Fy", noise)
 
 
 @pytest.fixture(scope="module")

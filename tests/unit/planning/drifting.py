@@ -4,14 +4,13 @@ from functools import cache
 
 import numpy as np
 
-from tests.unit.diagnose.test_force_parts import MODEL
+from tests.unit.force_points import MODEL
 from tirelib.arrays import FloatArray
 from tirelib.brush.predict import PointConditions, PointParameters, predict_forces
-from tirelib.compare.force_model import ForceBench
-from tirelib.compare.force_points import force_points
 from tirelib.diagnose.forces.assess import ForceCase
 from tirelib.diagnose.forces.fit import Problem
 from tirelib.identify.force_data import ForceData
+from tirelib.identify.force_points import force_points
 
 PRESSURES = (1.7e5, 2.0e5, 2.3e5)
 LOADS = (2e3, 4e3, 6e3)
@@ -59,5 +58,5 @@ def case(kind: str, size: float, seed: int = 3) -> ForceCase:
         np.full(n, 20.0),
         time=10.0 * np.arange(n),
     )
-    problem = Problem.of(ForceBench.of(MODEL, force_points(data)), "Fy", NOISE)
+    problem = Problem.of(MODEL.bench(force_points(data)), "Fy", NOISE)
     return ForceCase("in order", MODEL, problem, problem, NOISE, n // 2, ())

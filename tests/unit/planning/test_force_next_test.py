@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.unit.diagnose.test_force_parts import VALUES
+from tests.unit.force_points import VALUES
 from tests.unit.planning.drifting import NOISE, PRESSURES, case, side_force
 from tirelib.diagnose.forces.assess import ForceAssessment, ForceCase, assess_forces
 from tirelib.diagnose.forces.candidates import force_candidates

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.unit.diagnose.test_force_parts import VALUES
+from tests.unit.force_points import VALUES
 from tests.unit.planning.drifting import NOISE, case
 from tirelib.diagnose.forces.fit import fit_force
 from tirelib.effects import CATALOGUE

@@ -6,13 +6,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.unit.diagnose.test_force_parts import VALUES
+from tests.unit.force_points import VALUES
 from tests.unit.planning.drifting import PRESSURES, case
-from tirelib.compare.force_points import force_points
 from tirelib.diagnose.forces.assess import ForceCase
 from tirelib.diagnose.forces.fit import fit_force
 from tirelib.effects import CATALOGUE
 from tirelib.errors import ParameterError
+from tirelib.identify.force_points import force_points
 from tirelib.planning.criterion import Noise
 from tirelib.planning.document import Plan, plan_document, plan_force_test
 from tirelib.planning.envelope import Envelope

@@ -6,18 +6,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tirelib.campaign import Campaign
-from tirelib.compare.force_model import Changes, ForceBench, ForceModel, force_model_of
-from tirelib.compare.force_noise import force_noise
-from tirelib.compare.force_points import ForcePoints, force_points
+from tirelib.compare.force_model import ForceModel, force_model_of
 from tirelib.compare.forces import UNITS, quantities_of, slips, usable_points
-from tirelib.diagnose.forces.candidates import varies
 from tirelib.diagnose.forces.diagnose import ForceDiagnosis, ForceFinding, diagnose_force
 from tirelib.diagnose.forces.ensemble import MEMBERS
 from tirelib.diagnose.forces.fit import ForceFit, Problem
 from tirelib.diagnose.forces.left import ForceLeft, left_of
 from tirelib.effects import Effect
 from tirelib.errors import CalibrationError
+from tirelib.identify.force_bench import Changes
 from tirelib.identify.force_data import force_data
+from tirelib.identify.force_noise import force_noise
+from tirelib.identify.force_points import ForcePoints, force_points
+from tirelib.infer.forces import varies
 from tirelib.parameters import TireFile
 
 MOST_POINTS = 4000
@@ -148,8 +149,8 @@ def _case(name: str, model: ForceModel, points: ForcePoints, quantity: str) -> F
             f"{len(whole)} points, passes of the sweep; one in {step} is fitted ({len(points)})"
         )
     noise, _, repeats = force_noise(whole, getattr(whole.data, quantity))
-    problem = Problem.of(ForceBench.of(model, points), quantity, noise)
-    every = Problem.of(ForceBench.of(model, whole), quantity, noise)
+    problem = Problem.of(model.bench(points), quantity, noise)
+    every = Problem.of(model.bench(whole), quantity, noise)
     return ForceCase(name, model, problem, every, noise, repeats, tuple(messages))
 
 

@@ -16,29 +16,7 @@ from tirelib.diagnose.candidates import TWIN_ANGLE
 from tirelib.diagnose.forces.fit import ForceFit, Problem
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
-from tirelib.model.brush import BrushConditions
-
-LEAST_SIGNAL = 3.0
-"""An effect at the end of its range that changes scaled forces by less is dead."""
-LEAST_OWN = 0.02
-"""Share of a signature that the base must not be able to mimic."""
-SPANS = {
-    "load": 0.1,
-    "pressure": 0.03,
-    "speed": 0.1,
-    "slip_angle": np.deg2rad(1.0),
-    "slip_ratio": 0.01,
-    "camber": np.deg2rad(0.5),
-    "temperature": 5.0,
-}
-"""Least range of a condition: relative for load, pressure and speed, else [rad], [-], [K]."""
-_RELATIVE = ("load", "pressure", "speed")
-_WORDS = {
-    "slip_angle": "slip angle",
-    "slip_ratio": "slip ratio",
-    "temperature": "tread temperature",
-    "slip_rate": "rate of the slip angle",
-}
+from tirelib.infer.forces import LEAST_OWN, LEAST_SIGNAL, blind
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,31 +108,6 @@ def force_candidates(
         else:
             living.append(candidate)
     return ForceCandidates(tuple(living), dead, _angles(living))
-
-
-def blind(at: BrushConditions, effect: Effect) -> str:
-    """Return why a plan cannot show an effect, or an empty text."""
-    if effect.untestable:
-        return effect.untestable
-    unknown = [_WORDS.get(name, name) for name in effect.unknown(at)]
-    if unknown:
-        return f"{' and '.join(unknown)} is not measured at every point"
-    if effect.varies_with and not any(varies(at, name) for name in effect.varies_with):
-        names = [_WORDS.get(name, name) for name in effect.varies_with]
-        return f"no run varies {' or '.join(names)}"
-    return ""
-
-
-def varies(at: BrushConditions, name: str) -> bool:
-    """Return whether a condition has a range in which an effect could show."""
-    if name not in SPANS:
-        return True
-    values = getattr(at, name)
-    if not np.isfinite(values).all():
-        return False
-    span = float(np.ptp(values))
-    size = float(np.abs(values).max()) if name in _RELATIVE else 1.0
-    return bool(span > SPANS[name] * size)
 
 
 def _with_range(effect: Effect) -> str:

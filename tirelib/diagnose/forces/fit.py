@@ -7,30 +7,12 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
-from tirelib.compare.force_model import Changes, ForceBench
 from tirelib.effects import Effect
 from tirelib.errors import ConvergenceError, TirelibError
 from tirelib.identify.brush_law import SPECS
+from tirelib.identify.force_bench import Changes, ForceBench
+from tirelib.infer.forces import COORDINATES, LOAD_RATIO, OF_CONTACT, WIDTH, changes_at
 
-COORDINATES: Mapping[str, tuple[str, ...]] = {
-    "Fy": ("lateral_stiffness", "friction", "load_power", "slip_angle_offset", "Fy_offset"),
-    "Fx": ("longitudinal_stiffness", "friction", "load_power", "slip_ratio_offset", "Fx_offset"),
-    "Mz": (
-        "lateral_stiffness",
-        "friction",
-        "half_length",
-        "load_power",
-        "slip_angle_offset",
-        "Mz_offset",
-    ),
-}
-"""Parameters that are fitted anew with each force; the others stay as the model has them."""
-OF_CONTACT = ("half_length", "load_power")
-"""Parameters that have no part where a ring gives the contact's length."""
-LOAD_RATIO = 1.1
-"""Range of the load from which its power is fitted."""
-WIDTH = 1.0
-"""Prior standard deviation of a logarithm, of an offset over its size, of a strength over range."""
 BEYOND = 0.5
 """Share of its range by which a strength may leave it in a fit."""
 MISFIT = 0.02
@@ -137,7 +119,7 @@ class ForceFit:
     @property
     def changes(self) -> Changes:
         """The effects at their strengths."""
-        return changes_of(self.effects, self.strengths)
+        return changes_at(self.effects, self.strengths)
 
     def strength_std(self, index: int) -> FloatArray:
         """Return standard deviations of an effect's strength, in its unit."""
@@ -152,14 +134,6 @@ class ForceFit:
         at = self.names.index(name)
         unit = self.values[name] if SPECS[name].log else SPECS[name].size
         return float(abs(unit) * np.sqrt(self.covariance[at, at]))
-
-
-def changes_of(effects: Sequence[Effect], strengths: Sequence[FloatArray]) -> Changes:
-    """Return effects at strengths as changes of the brush."""
-    return [
-        effect.at(float(s[0]) if effect.components == 1 else tuple(float(x) for x in s))
-        for effect, s in zip(effects, strengths, strict=True)
-    ]
 
 
 def moved(values: Mapping[str, float], names: Sequence[str], z: FloatArray) -> dict[str, float]:
@@ -209,7 +183,7 @@ def fit_force(
 
     def predicted(z: FloatArray) -> FloatArray:
         at = moved(values, names, z[: len(names)])
-        return problem.predict(at, changes_of(chosen, split(z)))
+        return problem.predict(at, changes_at(chosen, split(z)))
 
     def residual(z: FloatArray) -> FloatArray:
         rest = (predicted(z) - problem.measured) / problem.scale
@@ -298,7 +272,7 @@ def slopes_at(problem: Problem, model: ForceFit) -> FloatArray:
         flat = np.concatenate([*model.strengths, []]) + step[len(model.names) :] * scale
         cuts = np.cumsum([effect.components for effect in model.effects])[:-1]
         strengths = np.split(flat, cuts) if model.effects else []
-        rows.append((problem.predict(values, changes_of(model.effects, strengths)) - here) / STEP)
+        rows.append((problem.predict(values, changes_at(model.effects, strengths)) - here) / STEP)
     return np.stack(rows)
 
 

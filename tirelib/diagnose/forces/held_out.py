@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
-from tirelib.compare.force_points import set_points
-from tirelib.diagnose.forces.candidates import varies
-from tirelib.diagnose.forces.fit import ForceFit, Problem, changes_of, fit_force
+from tirelib.diagnose.forces.fit import ForceFit, Problem, fit_force
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
+from tirelib.identify.force_points import set_points
+from tirelib.infer.forces import changes_at, varies
 
 BLOCK = 11.0
 """Length of a held-out block of time, [s]."""
@@ -120,7 +120,7 @@ def held_out_errors(
         try:
             trained = fit_force(problem.take(~fold.out), values, effects, strengths)
             seen = problem.take(fold.out)
-            found = seen.predict(trained.values, changes_of(trained.effects, trained.strengths))
+            found = seen.predict(trained.values, changes_at(trained.effects, trained.strengths))
             errors.append(float(np.sqrt(np.mean((seen.measured - found) ** 2))))
         except TirelibError:
             errors.append(float("nan"))

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
-from tirelib.diagnose.forces.candidates import varies
 from tirelib.diagnose.forces.fit import ForceFit, Problem
+from tirelib.infer.forces import varies
 from tirelib.model.brush import BrushConditions
 
 FLAT = 0.2

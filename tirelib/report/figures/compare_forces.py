@@ -7,10 +7,10 @@ from scipy import special
 
 from tirelib.arrays import FloatArray, IntArray
 from tirelib.compare.force_curves import Curve, ranked, slip_of
-from tirelib.compare.force_points import CELL_ANGLE
 from tirelib.compare.forces import UNITS, ForceComparison
 from tirelib.compare.sentences import told
 from tirelib.identify.error_bands import levels
+from tirelib.identify.force_points import CELL_ANGLE
 from tirelib.report.figures.compare_plot import DIVERGING, Plot, limit_of, styled_figure
 from tirelib.report.figures.compare_trends import SYMBOLS
 from tirelib.report.style import BLUE, CATEGORIES, FAINT, RED

@@ -5,9 +5,9 @@ import plotly.graph_objects as go
 
 from tirelib.arrays import FloatArray, IntArray
 from tirelib.diagnose.forces.assess import ForceAssessment
-from tirelib.diagnose.forces.candidates import varies
 from tirelib.diagnose.forces.fit import ForceFit
 from tirelib.identify.error_bands import levels
+from tirelib.infer.forces import varies
 from tirelib.report.figures.compare_plot import DIVERGING, Plot, limit_of, styled_figure
 from tirelib.units import from_si
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tirelib.arrays import FloatArray
-from tirelib.compare.force_points import (
+from tirelib.identify.force_points import (
     CELL_ANGLE,
     CELL_RATIO,
     CELL_SHARE,
