@@ -1,0 +1,1 @@
+"""Tires on a flat belt, of three families that share no code: plain, and with something hidden."""

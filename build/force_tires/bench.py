@@ -1,0 +1,23 @@
+"""A campaign of forces as the library sees it: the identified brush, and the problem."""
+
+from tirelib.compare.force_model import ForceModel
+from tirelib.effects import CATALOGUE
+from tirelib.identify.brush_fit import fit_brush
+from tirelib.identify.brush_model import BrushModel
+from tirelib.identify.force_data import ForceData
+from tirelib.identify.force_noise import force_noise
+from tirelib.identify.force_points import force_points
+from tirelib.infer.forces import ForceProblem
+
+
+def problem_of(data: ForceData, quantity: str) -> ForceProblem:
+    """Return the problem of a campaign about the brush that `tirelib identify` fits to it."""
+    fit = fit_brush(data)
+    reference = (fit.reference.load, fit.reference.pressure)
+    brush = BrushModel("fitted", fit.values, fit.reference, None)
+    points = force_points(data)
+    model = ForceModel("fitted", brush, (), reference, ())
+    noise = force_noise(points, getattr(points.data, quantity))[0]
+    return ForceProblem(
+        model.bench(points), quantity, model.values, list(CATALOGUE.values()), noise=noise
+    )

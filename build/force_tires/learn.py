@@ -1,0 +1,109 @@
+"""Learn what plain tires leave of a fitted brush, and count false alarms on a family left out.
+
+    python build/force_tires/learn.py
+    python build/force_tires/learn.py --quantities Fy,Mz,Fx --seeds 1-40 --out build/out
+
+Writes tirelib/infer/plain_Fy.npz (plain_Fx.npz, plain_Mz.npz) with its seeds and the families'
+hash, and prints which plain tires are said to lack something, each judged by the other families,
+to first order.
+"""
+
+import argparse
+import hashlib
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from force_tires.bench import problem_of
+from force_tires.families import FAMILIES
+from force_tires.plans import case
+from tirelib.errors import TirelibError
+from tirelib.infer.forces import ForceProblem
+from tirelib.infer.hypothesis import judged
+from tirelib.infer.null import OWN
+from tirelib.infer.plain import Family, learn, save
+from tirelib.infer.posterior import Posterior, posterior
+from tirelib.threads import one_thread
+
+HERE = Path(__file__).parent
+OUT = Path(__file__).parents[2] / "tirelib" / "infer"
+FIRST = {"effect": 0.1**2, "shape": 0.01**2}
+"""Variances of the fits from which the learning starts."""
+Fit = tuple[ForceProblem, Posterior]
+
+
+def seeds(text: str) -> range:
+    """Return the seeds of `1-40`."""
+    first, last = text.split("-")
+    return range(int(first), int(last) + 1)
+
+
+def say(text: str) -> None:
+    """Print a line at once."""
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
+
+
+def fit_of(family: str, seed: int, quantity: str) -> Fit | None:
+    """Return the fitted brush of a plain tire, or None if there is none."""
+    try:
+        problem = problem_of(case(family, seed, quantity=quantity), quantity)
+        spread = {effect.name: FIRST["effect"] for effect in problem.living}
+        groups = problem.remainder(problem.start, problem.solve(problem.start))
+        spread |= dict.fromkeys(groups, FIRST["shape"])
+        return problem, posterior(problem, (), spread, OWN[2])
+    except TirelibError as error:
+        say(f"{family} {seed} {quantity}: {error}")
+        return None
+
+
+def family_of(name: str, fits: Sequence[Fit]) -> Family:
+    """Return what a family's tires show."""
+    tires = [
+        [replace(fit.view(problem, own), white=np.zeros(0)) for own in OWN] for problem, fit in fits
+    ]
+    return learn(name, tires, fits[0][1].widths)
+
+
+def main() -> None:
+    """Fit, learn, judge, write."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quantities", default="Fy")
+    parser.add_argument("--seeds", type=seeds, default=seeds("1-24"))
+    parser.add_argument("--out", type=Path, default=OUT)
+    given = parser.parse_args()
+    code = b"".join((HERE / name).read_bytes() for name in ("families.py", "plans.py"))
+    for quantity in given.quantities.split(","):
+        found = {
+            name: {seed: fit_of(name, seed, quantity) for seed in given.seeds} for name in FAMILIES
+        }
+        fits = {
+            name: {seed: fit for seed, fit in of.items() if fit is not None}
+            for name, of in found.items()
+        }
+        families = [family_of(name, list(of.values())) for name, of in fits.items()]
+        for family in families:
+            shown = {k: round(float(np.sqrt(v)), 3) for k, v in family.spread().items()}
+            say(f"{quantity} {family.name} {len(family)}, own {family.own:g}: {json.dumps(shown)}")
+        provenance = {
+            "made by": "build/force_tires/learn.py",
+            "seeds": {name: sorted(of) for name, of in fits.items()},
+            "families_sha256": hashlib.sha256(code).hexdigest(),
+        }
+        save(given.out / f"plain_{quantity}.npz", families, provenance)
+        for name, of in fits.items():
+            others = [family for family in families if family.name != name]
+            p = {s: judged(*fit, others, 0.05, own_effects=0).p for s, fit in of.items()}
+            alarms = [seed for seed, each in p.items() if each <= 0.05]
+            say(f"{quantity} {name}: {len(alarms)} of {len(p)} alarms, seeds {alarms}")
+
+
+if __name__ == "__main__":
+    with one_thread():
+        main()
