@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
 .PHONY: all demo studio test lint docs bench figures fem proof hidden next-test cosim cosim-all bench-demo faults endurance soak \
-	package clean
+	measured package clean
 
 all: $(STAMP)
 
@@ -86,6 +86,10 @@ soak: $(STAMP)
 # A million damaged frames on a serial line: none may pass, few good ones may be lost.
 faults: $(STAMP)
 	$(BIN)/python build/bench_faults.py
+
+# Every figure of the estimators, the co-simulations and the bench, one after the other; hours, on a quiet machine.
+measured: $(STAMP)
+	$(BIN)/python build/measure_again.py
 
 # The wheel in an empty environment and an empty folder: every verb of the core, then the bench's extra.
 package: $(STAMP)

@@ -4,17 +4,18 @@
 
 Calibrates each tire on `set1` (65 km/h, 2.3 bar) and judges every tire with every calibration, on
 another day of `set1`, on `set3` (1.3 to 2.5 bar, 10 to 150 km/h, straight) and on `drift` (1.5 to
-2.7 bar, 20 to 140 km/h, straight and at 3 deg). Prints how many turns in range
-are flagged `other_tire`, with friction and tread given and not; the same with half and double of
-what decides; and the shifts of which `DRIFT` is the mean. `--tire random-41` draws a tire. Further
-campaigns of the tires (`--own FOLDER`, made by `tirelib rig` or another program of this folder) are
-judged by the calibration of their own tire, for the share of false alarms. The rig
+2.7 bar, 20 to 140 km/h, straight and at 3 deg). Prints how many turns in range are flagged
+`other_tire`, with friction and tread given and not; the same with half and double of what decides
+on a turn, and on a campaign; and the shifts of which `DRIFT` is the mean. `--tire random-41` draws
+a tire. Further campaigns of the tires (`--own FOLDER`, made by `tirelib rig` or another program of
+this folder) are judged by the calibration of their own tire, for the share of false alarms. The rig
 takes some minutes a tire; campaigns and calibrations are kept in the folder.
 """
 
 import argparse
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
@@ -22,11 +23,13 @@ from road_constants import times
 from road_coverage import measured, silent, tire_of
 
 from tirelib.campaign import read_campaign
+from tirelib.cli import limits
 from tirelib.estimators import likeness
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
 from tirelib.estimators.likeness import DRIFT, suspected
 from tirelib.estimators.regressors import ODD, compute_regressors
+from tirelib.estimators.result import other_tire
 from tirelib.estimators.train import train
 from tirelib.flags import TurnFlag
 from tirelib.observations import Observations, observe
@@ -129,6 +132,44 @@ def halves(
     return lines
 
 
+def verdicts(
+    calibrations: Mapping[str, Calibration], days: Mapping[str, Mapping[str, Observations]]
+) -> list[str]:
+    """Return what half and double of the numbers that decide on a whole campaign change.
+
+    A campaign is called another tire's, or the check of its tire is called weak; with friction and
+    tread given, and, counted as campaigns of their own, not given.
+    """
+    found: list[tuple[bool, Mapping[str, Any]]] = []
+    for name, calibration in calibrations.items():
+        for other, campaigns in days.items():
+            own = name.split(",")[0] == other
+            for seen in campaigns.values():
+                for given in (seen, silent(seen)):
+                    found.append((own, other_tire(calibration.estimate(given.features))))
+    lines = [
+        "| number | value | own tire suspected | others suspected | called weakly checked |",
+        "|---|---|---|---|---|",
+    ]
+    numbers = ((likeness, "FEWEST_UNLIKE"), (likeness, "SHARE_UNLIKE"), (limits, "WEAKLY_CHECKED"))
+    for module, name in numbers:
+        for factor in (0.5, 1.0, 2.0):
+            with times(module, name, factor):
+                told = [
+                    (own, {**one, "suspected": suspected(one["turns"], one["judged"])})
+                    for own, one in found
+                ]
+                cells = [
+                    f"{sum(one['suspected'] for own, one in told if own is mine)} of "
+                    f"{sum(own is mine for own, _ in told)}"
+                    for mine in (True, False)
+                ]
+                weak = sum(bool(limits.weakly_checked(one)) for _, one in told)
+                value = getattr(module, name)
+                lines.append(f"| `{name}` | {value:g} | {' | '.join(cells)} | {weak} |")
+    return lines
+
+
 def broad(name: str, folder: Path, jobs: int) -> Calibration:
     """Return a calibration of one tire on all loads, cambers, speeds and pressures."""
     kind, _, seed = name.partition("-")
@@ -189,6 +230,7 @@ def main() -> None:
         for other, campaigns in days.items():
             click.echo(f"| {name} | {other} | {' | '.join(row(calibration, campaigns))} |")
     click.echo("\n".join(["", *halves(calibrations, days)]))
+    click.echo("\n".join(["", *verdicts(calibrations, days)]))
     click.echo("\n".join(["", *false_alarms(calibrations, given.own)]))
     click.echo("\nshift with a doubled pressure, and with (40 m/s)^2; now, then tire by tire")
     for name, (pressure, speed) in DRIFT.items():

@@ -2,8 +2,8 @@
 
 The virtual tire rolls straight at a held load and brakes or accelerates evenly; its strain goes
 through the calibration of the co-simulations. "Even turn" is wheel angle as time times the mean
-rate of the preceding turn. Writes ``docs/ramp_error.png`` and prints the tables of steps and of
-slip ratios in ``docs/estimators.md``.
+rate of the preceding turn. Writes ``docs/ramp_error.png`` and prints the tables of the largest
+errors, of steps and of slip ratios in ``docs/estimators.md``.
 """
 
 import sys
@@ -39,6 +39,8 @@ RESTING = {
     "pressure": 2.3e5,
 }
 ROAD = {"friction": 1.0, "tread_depth": 8e-3, "tread_temperature": 300.0}
+AS_CALIBRATED = {"friction": 0.95, "tread_depth": 8e-3, "tread_temperature": 313.15}
+"""Road and tread on which the virtual tire and the calibration were made."""
 STEADY = 0.5
 """Time before the speed begins to change, [s]."""
 
@@ -80,18 +82,20 @@ def ramp(acceleration: float, load: float, t: float) -> dict[str, float]:
 
 
 def draw() -> None:
-    """Draw the error of every turn of all ramps."""
+    """Draw the error of every turn of all ramps; print the largest of each load, and in std."""
+    found: dict[tuple[float, str], list[tuple[float, float]]] = {}
     figure = Figure(figsize=(9.0, 4.0), layout="constrained")
     left, right = figure.subplots(1, 2, sharex=True)
     for load, mark in ((2000.0, "o"), (4000.0, "s")):
         for acceleration in (-8.0, -6.0, -4.0, -2.0, 2.0, 4.0, 6.0, 8.0):
             made = play(STEADY + abs(14.0 / acceleration), partial(ramp, acceleration, load))
+            made |= {name: np.full(made["Fz"].size, x) for name, x in AS_CALIBRATED.items()}
             with mock.patch.object(turns, "angle_law", even):
-                before = estimate(made, "speed")
+                before = estimate(made, "speed", *AS_CALIBRATED)
             for axes, color, (features, told) in (
                 (left, "tab:red", before),
-                (right, "tab:green", estimate(made, "speed")),
-                (right, "tab:blue", estimate(made, "speed", "omega")),
+                (right, "tab:green", estimate(made, "speed", *AS_CALIBRATED)),
+                (right, "tab:blue", estimate(made, "speed", "omega", *AS_CALIBRATED)),
             ):
                 shape = "+" if color == "tab:blue" else mark
                 late = (features.time > STEADY + 0.1) & told.turn_valid
@@ -100,6 +104,11 @@ def draw() -> None:
                 )
                 x = 50.0 * acceleration * features.period / speed
                 error = 100.0 * (told.value["Fz"] / load - 1.0)
+                if axes is right:
+                    over = np.abs(told.value["Fz"] - load) / told.std["Fz"]
+                    pairs = zip(np.abs(error[late]), over[late], strict=True)
+                    by = "speed, omega" if color == "tab:blue" else "speed"
+                    found.setdefault((load, by), []).extend(pairs)
                 axes.plot(x[late], error[late], shape, color=color, markersize=3, alpha=0.6)
     left.set(title="even turn", ylabel="error of Fz [%]", xlabel="a T / (2 v) [%]")
     right.set(
@@ -118,6 +127,9 @@ def draw() -> None:
         fontsize=8,
     )
     figure.savefig(ROOT / "docs/ramp_error.png", dpi=110)
+    for (load, by), rows in found.items():
+        error, over = np.array(rows).max(axis=0)
+        sys.stdout.write(f"| {load:g} N | {by} | {len(rows)} | {error:.1f} % | {over:.1f} |\n")
 
 
 def steps() -> None:

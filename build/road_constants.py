@@ -2,10 +2,12 @@
 
     python build/road_constants.py build/out/road/reference-21 [more folders] --out build/out/road
     python build/road_constants.py --measure reference
+    python build/road_constants.py --measure random --seed 30
 
 Folders are those of `build/road_coverage.py`. With `--measure`, straight and 1 deg runs of one tire
-on a tread of 8, 6 and 4 mm give `EDGE`, `BENT` and `CORNERING`; nothing is estimated there. The
-columns below are what L and a sliding share of one shift (`ROAD_DRIFT`).
+on a tread of 8, 6 and 4 mm give `EDGE`, `BENT` and `CORNERING`; nothing is estimated there. Where
+`build/road_coverage.py` has calibrated the tire, the columns below are what L and a sliding share
+of one shift (`ROAD_DRIFT`), and what slippery roads do to its estimates.
 """
 
 import argparse
@@ -239,6 +241,10 @@ def main() -> None:
     if given.measure:
         asked = (given.measure, given.seed, given.out, given.jobs)
         lines += measure(*asked)
+    if (
+        given.measure
+        and (given.out / f"{given.measure}-{given.seed}" / "calibration.toml").exists()
+    ):
         for name, (hard, slid) in zip(DRIFT, shifts(*asked).T, strict=True):
             lines.append(f"{name:18} {hard:9.4f} {slid:9.4f}")
         lines += doubts(given.measure, given.seed, given.out)

@@ -1,11 +1,13 @@
 """How often the 95 % intervals hold on slippery roads and worn treads that were not calibrated.
 
-    python build/road_coverage.py --out build/out/road
+    python build/road_coverage.py --tire reference --seed 21
+    python build/road_coverage.py --tire random --seed 30 31 32 33 34 35 36 37
 
 Calibrates on the rig's plan `set1` (dry, new), without a word of friction or tread, and judges on
 runs whose friction and tread depth are drawn from the declared ranges. Campaigns
-and calibration are kept in the folder; with none there, the rig takes some minutes. `--tire` and
-`--seed` choose others. `coverage.md` and `coverage.png` are written.
+and calibration are kept in the folder; with none there, the rig takes some minutes. With `random`
+each seed is a tire of its own. `coverage.md` and `coverage.png` are written for each, and what all
+of them together show is printed last.
 """
 
 import argparse
@@ -32,6 +34,8 @@ from tirelib.rig.plans import Plan, plan
 from tirelib.rig.tire import NEW_DEPTH, TIRES, Condition, RigTire, tire
 from tirelib.threads import one_thread
 
+Turns = tuple[Estimates, Observations]
+"""What is estimated of a tire's turns, and the turns."""
 BANDS: Mapping[str, tuple[tuple[float, float], ...]] = {
     "friction": ((0.3, 0.5), (0.5, 0.7), (0.7, 0.9), (0.9, 1.1)),
     "wear [mm]": ((0.0, 1.0), (1.0, 2.0), (2.0, 3.0), (3.0, 4.0)),
@@ -56,8 +60,20 @@ def drawn(runs: int, seed: int) -> Plan:
 
 
 def tire_of(name: str, seed: int) -> RigTire:
-    """Return a tire of the rig, or with `random` one whose constants are drawn."""
-    return random_tire(seed) if name == "random" else tire(name)
+    """Return a tire of the rig, or with `random` one whose constants are drawn.
+
+    Its road is as dry as that of the others, the rubber between belt and road as thick as on any
+    of them.
+    """
+    if name != "random":
+        return tire(name)
+    thick = [own.tread_thickness for own in TIRES.values()]
+    rng = np.random.default_rng([seed, 78])
+    return replace(
+        random_tire(seed),
+        friction=RigTire().friction,
+        tread_thickness=float(rng.uniform(min(thick), max(thick))),
+    )
 
 
 def measured(folder: Path, chosen: Plan, own: RigTire, seed: int, jobs: int) -> Observations:
@@ -169,17 +185,10 @@ def draw(calibration: Calibration, seen: Observations, folder: Path) -> None:
     save(figure, folder, "coverage")
 
 
-def main() -> None:
-    """Measure, calibrate, judge, write."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("build/out/road"))
-    parser.add_argument("--tire", default="reference", choices=(*TIRES, "random"))
-    parser.add_argument("--runs", type=int, default=64)
-    parser.add_argument("--seed", type=int, default=21, help="of the noise and of what is drawn")
-    parser.add_argument("--jobs", type=int, default=2)
-    given = parser.parse_args()
-    folder: Path = given.out / f"{given.tire}-{given.seed}"
-    own, seed = tire_of(given.tire, given.seed), given.seed
+def judged(name: str, seed: int, given: argparse.Namespace) -> list[Turns]:
+    """Measure and calibrate a tire, write and print its table; return the turns behind it."""
+    folder: Path = given.out / f"{name}-{seed}"
+    own = tire_of(name, seed)
     dry = measured(folder / "set1", plan("set1"), own, seed, given.jobs)
     seen = measured(folder / "drawn", drawn(given.runs, seed + 2), own, seed + 1, given.jobs)
     file = folder / "calibration.toml"
@@ -189,7 +198,45 @@ def main() -> None:
     lines = table(calibration, dry, seen)
     (folder / "coverage.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
     draw(calibration, seen, folder)
-    click.echo("\n".join(lines))
+    click.echo("\n".join((f"{own.name}, seed {seed}", "", *lines, "")))
+    return [(calibration.estimate(x.features), seen) for x in (silent(seen), seen)]
+
+
+def together(turns: list[list[Turns]]) -> list[str]:
+    """Return the lines of what all tires show: by turn, and the share of each tire."""
+    lines = [
+        "| what is said | quantity | turns | in the 95 % interval | of each tire |",
+        "|---|---|---|---|---|",
+    ]
+    for part, label in enumerate(("nothing", "friction and tread")):
+        for quantity in EDGE_UNIT:
+            count, held = [], []
+            for own in turns:
+                estimates, seen = own[part]
+                every, share, inside, *_ = rows_of(estimates, seen, quantity, seen.usable)
+                count.append(every * share)
+                held.append(inside)
+            each = ", ".join(f"{100 * x:.0f}" for x in held)
+            total = float(np.average(held, weights=count))
+            lines.append(
+                f"| {label} | {quantity} | {sum(count):.0f} | {100 * total:.1f} % | {each} |"
+            )
+    return lines
+
+
+def main() -> None:
+    """Measure, calibrate, judge, write."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("build/out/road"))
+    parser.add_argument("--tire", nargs="+", default=["reference"], choices=(*TIRES, "random"))
+    parser.add_argument("--runs", type=int, default=64)
+    parser.add_argument(
+        "--seed", type=int, nargs="+", default=[21], help="of the noise and of what is drawn"
+    )
+    parser.add_argument("--jobs", type=int, default=2)
+    given = parser.parse_args()
+    turns = [judged(name, seed, given) for name in given.tire for seed in given.seed]
+    click.echo("\n".join(together(turns)))
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ def estimate_document(
         "format": FORMAT,
         "axes": "iso",
         "tire": calibration.tire,
-        "other_tire": _other_tire(estimates) if calibration.knows_tire else None,
+        "other_tire": other_tire(estimates) if calibration.knows_tire else None,
         "not_given": cost_rows(costs),
         "summary": {
             quantity: _summary(quantity, observations, estimates, _floor(chain, quantity))
@@ -49,7 +49,7 @@ def estimate_document(
     }
 
 
-def _other_tire(estimates: Estimates) -> dict[str, Any]:
+def other_tire(estimates: Estimates) -> dict[str, Any]:
     """Return how many turns in range show another tire's strain, and whether that is no chance.
 
     `extrapolated` counts the turns in range at a pressure or speed that was not calibrated: there
