@@ -29,6 +29,7 @@ CORE: Sequence[tuple[str, int, str]] = (
     ("tirelib identify straight --out M.toml", 0, "M.toml"),
     ("tirelib simulate --model M.toml --load 4000", 0, ""),
     ("tirelib fmu build --calibration cal.toml --out X.fmu", 2, "pip install 'tirelib[fmu]'"),
+    ("tirelib studio --no-browser", 2, "pip install 'tirelib[studio]'"),
     ("tirebench --help", 0, "Commands:"),
     ("tirebench run --port /dev/null --fmu X.fmu", 2, "pip install 'tirelib[bench]'"),
 )

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -32,24 +33,28 @@ def wait_for(page: Any, script: str) -> None:
         time.sleep(0.05)
 
 
-def serve(folder: Path, *words: str) -> tuple[subprocess.Popen[str], str]:
+@contextmanager
+def serve(folder: Path, *words: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """Run the server until the end, which is not a gentle one; give its process and address."""
     command = [sys.executable, "-m", "tirelib", "studio", *words, "--session", str(folder / "s")]
-    server = subprocess.Popen([*command, "--no-browser"], stdout=subprocess.PIPE, text=True)
-    assert server.stdout is not None
-    return server, str(re.search(r"http\S+", server.stdout.readline())[0])  # type: ignore[index]
+    with subprocess.Popen([*command, "--no-browser"], stdout=subprocess.PIPE, text=True) as server:
+        line = server.stdout.readline() if server.stdout is not None else ""
+        try:
+            yield server, line.partition(" ")[2].strip()
+        finally:
+            server.kill()
 
 
 def test_five_clicks_add_the_effect_that_forces_lack(browser: Any, tmp_path: Path) -> None:
     write_sweep(tmp_path / "sweep", 81, {"friction_load": 0.12})
-    server, url = serve(tmp_path, str(tmp_path / "sweep"))
     complaints: list[str] = []
     addresses: list[str] = []
-    try:
-        page = browser.new_context(viewport={"width": 1280, "height": 800}).new_page()
-        page.set_default_timeout(1000.0 * PATIENCE)
-        page.on("console", lambda said: complaints.append(said.text))
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on("request", lambda request: addresses.append(request.url))
+    page = browser.new_context(viewport={"width": 1280, "height": 800}).new_page()
+    page.set_default_timeout(1000.0 * PATIENCE)
+    page.on("console", lambda said: complaints.append(said.text))
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("request", lambda request: addresses.append(request.url))
+    with serve(tmp_path, str(tmp_path / "sweep")) as (server, url):
         page.goto(url)
         page.get_by_role("button", name="Find what is missing").click()  # click 1
         page.locator("input[data-effect=friction_load]").click()  # click 2
@@ -58,17 +63,14 @@ def test_five_clicks_add_the_effect_that_forces_lack(browser: Any, tmp_path: Pat
         page.locator("#add").click()  # click 3
         shown = page.locator("#error-after").inner_text()
         server.kill()  # no goodbye
-        server.wait()
         wait_for(page, "studio.connected === false")
-        server, again = serve(tmp_path)
+    with serve(tmp_path) as (_, again):
         assert again == url
         wait_for(page, "studio.connected === true")
         wait_for(second, "studio.campaign !== null && studio.campaign.current === '002'")
         page.reload()
         assert page.locator("#error-after").inner_text() == shown
-    finally:
-        server.kill()
-        server.wait()
+    page.context.close()
     place = next((tmp_path / "s").glob("campaigns/*/models/002"))
     fit = json.loads((place / "fit.json").read_text())
     assert shown == str(float(f"{fit['error_after']:.4g}"))

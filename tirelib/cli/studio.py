@@ -83,11 +83,11 @@ def studio(
     with hold(place):
         session = Session(place)
         desk = Desk(session, Jobs(place / "jobs"), roots or (Path.cwd(), Path.home()))
+        first = desk.start(folder, model_file) if folder is not None else ""
         known = session.address
         opened = _bound(port, int(known.get("port", 0)))
         token, at = str(known.get("token") or new_token()), opened.getsockname()[1]
         session.keep_address(at, token)
-        first = desk.start(folder, model_file) if folder is not None else ""
         url = f"http://{LOOPBACK}:{at}/?token={token}"
         click.echo(f"studio: {url}")
         click.echo(f"session: {place}")

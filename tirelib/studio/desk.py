@@ -45,6 +45,7 @@ class Desk:
             "dropped": self._dropped,
             "columns": self._columns,
             "import": self._import,
+            "fit": self._fit_again,
             "look": self._look,
             "add": self._add,
             "remove": self._remove,
@@ -110,6 +111,10 @@ class Desk:
             _move(out, opened.place)
             if job.kind == "check":
                 self._checked(opened)
+            else:
+                shown = read_document(opened.place / "show.json") or {}
+                fitted = opened.told.get("fitted_to") or shown.get("content_hash")
+                opened.change(fitted_to=fitted, stale=fitted != shown.get("content_hash"))
         elif job.kind in OF_MODEL:
             opened = self.session.campaign(subject["campaign"])
             model = opened.model(subject["model"])
@@ -151,6 +156,13 @@ class Desk:
         model = opened.new_model(None, "identify", "", "")
         subject = {"campaign": opened.name, "model": model.number}
         self.jobs.add("identify", {"campaign": opened.folder}, subject)
+
+    def _fit_again(self, wish: Mapping[str, Any]) -> None:
+        """Fit another base model: to measurements that have changed since."""
+        opened = self.session.campaign(str(wish.get("campaign", "")))
+        shown = read_document(opened.place / "show.json") or {}
+        opened.change(fitted_to=shown.get("content_hash"), stale=False)
+        self._identify(opened)
 
     def _computed(self, opened: Opened, model: Model, quantity: str) -> None:
         """Compute what is not known yet of a model: comparison, diagnosis, traces."""
@@ -306,7 +318,7 @@ class Desk:
         numbers = []
         for name in names:
             new = opened.new_model(model.number, "add", name, quantity)
-            self._fit("add", opened, model, new, name, quantity)
+            self._changed("add", opened, model, new, name, quantity)
             numbers.append(new.number)
             model = new
         return {"models": numbers}
@@ -315,10 +327,10 @@ class Desk:
         opened, model, quantity = self._model(wish)
         name = str(wish.get("effect", ""))
         new = opened.new_model(model.number, "remove", name, quantity)
-        self._fit("remove", opened, model, new, name, quantity)
+        self._changed("remove", opened, model, new, name, quantity)
         return {"models": [new.number]}
 
-    def _fit(
+    def _changed(
         self, kind: str, opened: Opened, model: Model, new: Model, effect: str, quantity: str
     ) -> None:
         order = self._about(opened, model, quantity) | {"effect": effect}

@@ -51,6 +51,7 @@ def campaign(desk: Desk, opened: Opened) -> dict[str, Any]:
         "quantity": quantity,
         "quantities": quantities,
         "check": read_document(opened.place / "check.json"),
+        "stale": bool(told_of.get("stale")),
         "shown": _stamp(opened.place / "show.json"),
         "models": [_model(model, quantity) for model in models],
         "jobs": [

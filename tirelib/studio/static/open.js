@@ -103,7 +103,7 @@ export class Open {
       broken.map((job) => h("p", { class: "warn" }, `${job.title}: ${job.state}. ${job.message} `, h("button", { class: "small", type: "button", onclick: async () => { if (await wish({ do: "again", job: job.job })) app.follow = null; } }, "Run again"))));
     const c = app.campaign;
     if (!c) { fill(this.facts); this.shownFor = ""; return; }
-    const key = JSON.stringify([c.campaign, c.check, c.shown, c.models.length, c.jobs.map((j) => j.state)]);
+    const key = JSON.stringify([c.campaign, c.stale, c.check, c.shown, c.models.length, c.jobs.map((j) => j.state)]);
     if (key === this.shownFor) return;
     this.shownFor = key;
     this.campaign(c);
@@ -124,7 +124,8 @@ export class Open {
     const next = h("div", { class: "row" }, h("button", { class: "main", type: "button", disabled: !ready, onclick: () => this.go("see") }, "See where the model fails"),
       ready ? null : h("span", { class: "quiet" }, check?.errors ? "There is no model: correct the errors first." : "The base model is being fitted."));
     const troubles = failed.map((job) => h("p", { class: job.state === "failed" ? "bad" : "warn" }, `${job.title}: ${job.state}. ${job.message} `, h("button", { class: "small", type: "button", onclick: () => wish({ do: "again", job: job.job }) }, "Run again")));
-    fill(this.facts, h("div", { class: "card" }, h("h2", {}, c.title), h("p", { class: "quiet small" }, c.folder), next, troubles), findings);
+    fill(this.facts, h("div", { class: "card" }, h("h2", {}, c.title), h("p", { class: "quiet small" }, c.folder),
+      c.stale ? h("p", { class: "warn" }, "The measurements have changed since the models were fitted; the models and their errors belong to the old ones. ", h("button", { class: "small", type: "button", onclick: () => wish({ do: "fit", campaign: c.campaign }) }, "Fit a new base model")) : null, next, troubles), findings);
     const told = await shown().catch(() => null);
     if (!told || app.campaign !== c) return;
     const { header, runs } = told, mean = (r, k) => { const x = r.mean?.[k] ?? r.set_point?.[k]; return number(k === "slip_ratio" ? (Math.abs(x) < 5e-4 ? 0 : x) : Math.abs(x) < 5e-3 ? 0 : x, 4); };
