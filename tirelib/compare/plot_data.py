@@ -16,7 +16,6 @@ from tirelib.arrays import FloatArray
 from tirelib.campaign import Campaign
 from tirelib.compare.force_model import force_model_of
 from tirelib.compare.forces import ForceComparison, usable_points
-from tirelib.compare.set_points import predict_set_points
 from tirelib.compare.strain import Comparison
 from tirelib.effects import Effect
 from tirelib.errors import FormatError, ParameterError, TirelibError
@@ -151,6 +150,8 @@ def _strain_traces(found: Comparison) -> Callable[[Effect, tuple[float, ...]], F
     scale, spread = scales(found.chosen.tolerance, waves.angle_std), float(np.std(found.difference))
     tangent = found.points.tangent
     noise = found.noise.std if found.noise.known else spread
+    shifts = tangent[..., :4] * scale[:, None, :]
+    inside = shifts.swapaxes(1, 2) @ shifts + noise**2 * np.eye(4)
     whiten = whitening_of(tangent, scale, noise)
     slopes = np.concatenate([linear.waveform_slopes, by_delay(linear.waveform, at.omega)[None]])
     rows = whiten(slopes)
@@ -162,7 +163,8 @@ def _strain_traces(found: Comparison) -> Callable[[Effect, tuple[float, ...]], F
         raw = wave - linear.waveform
         share = np.linalg.lstsq(columns, whiten(raw).ravel(), rcond=1e-9)[0]
         own = raw - np.tensordot(share, slopes, axes=1)
-        return -1e6 * (own - predict_set_points(own, tangent, scale, noise).shift)
+        moved = np.linalg.solve(inside, shifts.swapaxes(1, 2) @ own[:, :, None])
+        return np.asarray(1e6 * ((shifts @ moved)[:, :, 0] - own))
 
     return trace
 

@@ -2,18 +2,15 @@
 
 import json
 import shutil
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-import tomli_w
-
-from tirelib.errors import FormatError, ParameterError
+from tirelib.errors import ParameterError
 from tirelib.studio import intake
-from tirelib.studio.disk import read_document, safe_name, write_atomic
+from tirelib.studio.disk import read_document, write_atomic
 from tirelib.studio.jobs import Job, Jobs
+from tirelib.studio.receiving import Receiving
 from tirelib.studio.session import QUANTITIES, Model, Opened, Session
 
 EXAMPLE = {"plan": "short", "seed": 1, "hide": ["sidewall_load=0.4"]}
@@ -39,12 +36,16 @@ class Desk:
     def __init__(self, session: Session, jobs: Jobs, roots: Sequence[Path]) -> None:
         self.session, self.jobs = session, jobs
         self.roots = [root.expanduser().resolve() for root in roots]
+        known = [*self.roots, session.folder.resolve()]
+        self.receiving = Receiving(
+            session, jobs, known, lambda folder: self._begin(session.open(folder)).name
+        )
         self.actions: Mapping[str, Callable[[Mapping[str, Any]], Mapping[str, Any] | None]] = {
             "open": self._open,
             "example": self._example,
-            "dropped": self._dropped,
-            "columns": self._columns,
-            "import": self._import,
+            "dropped": self.receiving.dropped,
+            "columns": self.receiving.columns,
+            "import": self.receiving.make_campaign,
             "fit": self._fit_again,
             "look": self._look,
             "add": self._add,
@@ -55,7 +56,7 @@ class Desk:
             "plant": self._plant,
             "next-test": self._next_test,
             "take": self._take,
-            "confirm-effect": self._confirm,
+            "confirm-effect": self.receiving.confirm,
         }
         if not (session.folder / "effects.json").exists():
             jobs.add("catalogue", {}, {})
@@ -106,6 +107,7 @@ class Desk:
             for path in job.order.get("effect_files", ())[-1:]:
                 told = read_document(Path(path).with_suffix(".json")) or {}
                 write_document(Path(path).with_suffix(".json"), told | {"confirmed": True})
+                self._diagnose_anew()
         elif job.kind in OF_CAMPAIGN:
             opened = self.session.campaign(subject["campaign"])
             _move(out, opened.place)
@@ -125,6 +127,8 @@ class Desk:
         elif job.kind in OF_QUANTITY:
             opened = self.session.campaign(subject["campaign"])
             model = opened.model(subject["model"])
+            if job.kind == "diagnose":
+                model.document("traces.npz", subject["quantity"]).unlink(missing_ok=True)
             _move(out, model.place / subject["quantity"])
             self._computed(opened, model, subject["quantity"])
         elif job.kind in TAKEN:
@@ -135,11 +139,16 @@ class Desk:
                 self.jobs.add("fmu", {"calibration": str(place / "CAL.toml")}, subject)
 
     def _begin(self, opened: Opened) -> Opened:
-        """Check a campaign that was opened, and read its runs."""
+        """Check a campaign that was opened, and read its runs: they may have changed."""
         subject = {"campaign": opened.name}
         for kind in OF_CAMPAIGN:
-            self._once(kind, {"campaign": opened.folder}, subject)
+            if not self._under_way(kind, subject):
+                self.jobs.add(kind, {"campaign": opened.folder}, subject)
         return opened
+
+    def _under_way(self, kind: str, subject: Mapping[str, Any]) -> list[Job]:
+        every = self.jobs.all.values()
+        return [j for j in every if j.kind == kind and j.subject == dict(subject) and not j.over]
 
     def _checked(self, opened: Opened) -> None:
         """Fit the base model of a campaign that is sound."""
@@ -163,6 +172,17 @@ class Desk:
         shown = read_document(opened.place / "show.json") or {}
         opened.change(fitted_to=shown.get("content_hash"), stale=False)
         self._identify(opened)
+
+    def _diagnose_anew(self) -> None:
+        """Diagnose the model that is looked at again: there is another suspect."""
+        for opened in list(self.session)[:1]:
+            number = opened.told.get("current")
+            model = opened.model(number) if number else None
+            if model is not None and model.ready:
+                quantity = self._quantity(opened, model)
+                about = self._about(opened, model, quantity)
+                subject = {"campaign": opened.name, "model": number, "quantity": quantity}
+                self.jobs.add("diagnose", about, subject)
 
     def _computed(self, opened: Opened, model: Model, quantity: str) -> None:
         """Compute what is not known yet of a model: comparison, diagnosis, traces."""
@@ -191,108 +211,26 @@ class Desk:
 
     def _once(self, kind: str, order: Mapping[str, Any], subject: Mapping[str, Any]) -> Job | None:
         """Add a job unless the same one waits, runs, or was ended by the user or an error."""
-        for job in self.jobs.all.values():
-            if job.kind == kind and job.subject == dict(subject) and job.state != "done":
-                if job.over and job.state != "interrupted":
-                    return None
-                if not job.over:
-                    return job
+        if under_way := self._under_way(kind, subject):
+            return under_way[0]
+        same = [j for j in self.jobs.all.values() if (j.kind, j.subject) == (kind, dict(subject))]
+        if any(job.state in ("failed", "cancelled") for job in same):
+            return None
         return self.jobs.add(kind, order, subject)
 
     def _open(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
-        folder = intake.inside(str(wish.get("path", "")), self._known_roots())
+        folder = intake.inside(
+            str(wish.get("path", "")), [*self.roots, self.session.folder.resolve()]
+        )
         return {"campaign": self._begin(self.session.open(folder)).name}
-
-    def _known_roots(self) -> list[Path]:
-        return [*self.roots, self.session.folder.resolve()]
 
     def _example(self, _: Mapping[str, Any]) -> Mapping[str, Any]:
         for opened in self.session:
             if opened.told.get("note") == "example":
                 self.session.open(Path(opened.folder), "example")
                 return {"campaign": opened.name}
-        job = self._once("rig", EXAMPLE, {})
-        return {"job": job.number if job else None}
-
-    def files(self, number: str) -> Path:
-        """Return a folder of dropped files.
-
-        Raises
-        ------
-        FormatError
-            If there is none of this number.
-        """
-        place = self.session.folder / "files" / str(number)
-        if not str(number).isdecimal() or not place.is_dir():
-            raise FormatError(f"files {number!r}: nothing was dropped under this number")
-        return place
-
-    def unpack(self, number: str) -> None:
-        """Unpack the archives among dropped files; it takes a while, and touches no job."""
-        for archive in self.files(number).rglob("*.zip"):
-            if not archive.with_suffix("").exists():
-                intake.unpack(archive, archive.with_suffix(""))
-
-    def _dropped(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Tell what was dropped: a campaign, a user's effect, or files of another format."""
-        place = self.files(wish.get("files", ""))
-        campaign = intake.campaign_in(place)
-        if campaign is not None:
-            return {"campaign": self._begin(self.session.open(campaign)).name}
-        effects = sorted(place.rglob("*.py"))
-        if effects:
-            return {"effect": self._received(effects[0])}
-        return self._foreign(place.name, intake.foreign_in(place))
-
-    def _columns(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Begin the import of a file on disk."""
-        file = intake.inside(str(wish.get("path", "")), self._known_roots())
-        place = self.session.new_files()
-        return self._foreign(place.name, [file])
-
-    def _foreign(self, number: str, files: Sequence[Path]) -> Mapping[str, Any]:
-        if not files:
-            raise FormatError(
-                "nothing that can be opened was dropped; a campaign folder (or its zip archive), "
-                f"measured files ({', '.join(intake.FOREIGN)}) or an effect file (.py) is needed"
-            )
-        order = {"files": [str(path) for path in files], "place": number}
-        for kind in ("columns", "suggest"):
-            self.jobs.add(kind, order, {"files": number})
-        return {"files": number}
-
-    def import_form(self, number: str) -> dict[str, Any]:
-        """Return what is known of dropped files: columns, a draft of the map, faults."""
-        self.files(number)
-        mine = [job for job in self.jobs.all.values() if job.subject.get("files") == number]
-        found: dict[str, Any] = {"files": number, "map": None, "columns": None, "message": ""}
-        for job in mine:
-            if job.state == "failed":
-                found["message"] = job.message
-            if job.state != "done":
-                continue
-            if job.kind == "columns":
-                found["columns"] = read_document(self.jobs.out(job) / "columns.json")
-                found["names"] = [Path(path).name for path in job.order["files"]]
-            elif job.kind == "suggest":
-                text = (self.jobs.place(job) / "stdout.txt").read_text(encoding="utf-8")
-                found["map"] = tomllib.loads(text)
-        return found
-
-    def _import(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
-        number = str(wish.get("files", ""))
-        place, drawn = self.files(number), wish.get("map")
-        mine = [j for j in self.jobs.all.values() if j.subject.get("files") == number]
-        files = next((j.order["files"] for j in mine if j.kind == "columns"), None)
-        if not isinstance(drawn, dict) or files is None:
-            raise ParameterError("import: a map and files are needed; drop the files again")
-        try:
-            text = tomli_w.dumps(drawn)
-        except (TypeError, ValueError) as error:
-            raise ParameterError(f"import: the map cannot be written ({error})") from None
-        write_atomic(place / "map.toml", text)
-        order = {"files": files, "map": str(place / "map.toml")}
-        return {"job": self.jobs.add("import", order, {"files": number}).number}
+        under_way = self._under_way("rig", {})
+        return {"job": (under_way or [self.jobs.add("rig", EXAMPLE, {})])[0].number}
 
     def _model(self, wish: Mapping[str, Any]) -> tuple[Opened, Model, str]:
         opened = self.session.campaign(str(wish.get("campaign", "")))
@@ -390,26 +328,6 @@ class Desk:
         """Return the effects as the last `tirelib effects` has listed them."""
         told = read_document(self.session.folder / "effects.json") or {}
         return list(told.get("effects", []))
-
-    def _received(self, file: Path) -> dict[str, Any]:
-        """Keep a user's effect file; it is not run, and the page shows what is in it."""
-        target = self.session.folder / "effects" / f"{safe_name(file.stem)}.py"
-        data = file.read_bytes()
-        write_atomic(target, data)
-        write_document(target.with_suffix(".json"), {"confirmed": False})
-        text = data.decode("utf-8", "replace")
-        return {"name": target.name, "code": text, "sha256": sha256(data).hexdigest()}
-
-    def _confirm(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Check an effect file that the user has read and allowed to be run."""
-        target = self.session.folder / "effects" / safe_name(str(wish.get("name", "")))
-        if target.suffix != ".py" or not target.is_file():
-            raise FormatError(f"{target.name}: there is no such effect file; drop it again")
-        if sha256(target.read_bytes()).hexdigest() != wish.get("sha256"):
-            raise FormatError(f"{target.name}: it is not the file that was shown; drop it again")
-        files = [str(p) for p in self.session.effect_files if p != target]
-        job = self.jobs.add("effects", {"effect_files": [*files, str(target)]}, {"effect": 1})
-        return {"job": job.number}
 
 
 def write_document(path: Path, document: Mapping[str, Any]) -> None:

@@ -1,6 +1,7 @@
 """What comes in from the page: folders that are looked at, files and archives that are dropped."""
 
 import zipfile
+import zlib
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -127,7 +128,7 @@ def unpack(archive: Path, target: Path) -> None:
                         if left < 0:
                             raise FormatError(f"{archive.name}: it holds more than it says")
                         sink.write(block)
-    except (zipfile.BadZipFile, RuntimeError, NotImplementedError, EOFError) as error:
+    except (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError) as error:
         raise FormatError(
             f"{archive.name}: it cannot be unpacked ({error}); pack it again without a password"
         ) from None

@@ -189,7 +189,7 @@ class Studio:
         return JSONResponse(await asyncio.to_thread(intake.browse, path, self.desk.roots))
 
     async def _import_form(self, request: Request) -> Response:
-        return JSONResponse(self.desk.import_form(request.query_params.get("files", "")))
+        return JSONResponse(self.desk.receiving.import_form(request.query_params.get("files", "")))
 
     async def _do(self, request: Request) -> Response:
         kind = request.headers.get("content-type", "").partition(";")[0]
@@ -208,7 +208,7 @@ class Studio:
             return JSONResponse({"error": "an object is needed"}, 400)
         try:
             if wish.get("do") == "dropped":
-                await asyncio.to_thread(self.desk.unpack, str(wish.get("files", "")))
+                await asyncio.to_thread(self.desk.receiving.unpack, str(wish.get("files", "")))
             done = self.desk.do(wish)
         except (TypeError, ValueError, AttributeError) as error:
             return JSONResponse({"error": f"the request is not understood ({error})"}, 400)
@@ -222,7 +222,7 @@ class Studio:
         asked = request.query_params
         name = intake.relative(asked.get("name", ""))
         number = asked.get("files", "")
-        place = self.desk.files(number) if number else self.desk.session.new_files()
+        place = self.desk.receiving.files(number) if number else self.desk.session.new_files()
         if sum(1 for _ in place.rglob("*")) > intake.MOST_FILES:
             raise FormatError(f"more than {intake.MOST_FILES} files were dropped; drop fewer")
         target = place / name

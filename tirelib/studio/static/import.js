@@ -57,7 +57,7 @@ export async function importForm(files) {
     });
   };
   dialog(`Import ${(form.names || []).join(", ")}`,
-    h("p", {}, "The names were recognised where they are usual ones. Check the axis system, the units, and give the free radius of the tire; leave out what does not belong to the measurement."),
+    h("p", {}, "The names were recognised where they are usual ones. Check the axis system, the units, and give the free radius of the tire; leave out what does not belong to the measurement, and columns whose range is impossible (a turn rate or a rolling radius of a broken encoder)."),
     h("div", { class: "row" }, h("label", {}, "Axes of the files ", axes), h("label", {}, "Kind ", kind)),
     h("div", { class: "row" }, h("label", {}, "Name ", name), h("label", {}, "Free radius ", radius, " mm")),
     h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ["column", "range", "missing", "quantity", "unit in the file"].map((t, i) => h("th", { class: i === 1 || i === 2 ? "n" : "" }, t)))), h("tbody", {}, rows.map((r) => r.element)))),

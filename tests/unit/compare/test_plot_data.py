@@ -1,0 +1,72 @@
+"""What plots are drawn from: arrays of a comparison, and traces that look like the residual."""
+
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from tests.unit.diagnose.planted import EFFECT, STRENGTH, model_file, waves
+from tests.unit.force_campaigns import brush_file, steady_runs, write_forces
+from tests.unit.identify.model_waves import TIRE
+from tirelib.campaign import Campaign
+from tirelib.compare.forces import compare_forces
+from tirelib.compare.model import model_of
+from tirelib.compare.plot_data import plot_data, write_plot_data
+from tirelib.compare.strain import compare_strain
+from tirelib.effects import CATALOGUE
+from tirelib.errors import ParameterError
+from tirelib.identify.delay import by_delay
+from tirelib.model.base import coordinates, linearised, operating_points
+from tirelib.parameters import Number
+
+
+def like(trace: Any, rest: Any) -> float:
+    """Return the cosine between a trace and what is left."""
+    return float(np.sum(trace * rest) / np.sqrt(np.sum(trace**2) * np.sum(rest**2)))
+
+
+def test_the_trace_of_the_planted_effect_looks_like_what_is_left(tmp_path: Path) -> None:
+    """In units of the noise, and beyond what the tire's own numbers and the delay could take up."""
+    file = model_file()
+    file.numbers["bending_stiffness"] = Number(TIRE.bending_stiffness, 0.2, "fitted", "test")
+    model = model_of(file)
+    found = compare_strain(waves(EFFECT, STRENGTH), model)
+    planted = [(EFFECT, (STRENGTH,)), ("gage_length", (900.0,))]
+    data = plot_data(found, cast(Campaign, None), file, planted, CATALOGUE)
+    np.testing.assert_allclose(data["difference"], 1e6 * found.difference)
+    white, whiten = data["white"], found.error.whiten
+    assert np.sqrt(np.mean(white**2)) == pytest.approx(found.error.value)
+    at, low_pass = operating_points(found.chosen.waves), found.chosen.waves.low_pass
+    linear = linearised(model.values, at, coordinates(model.values), low_pass=low_pass)
+    assert whiten is not None
+    slopes = [*linear.waveform_slopes, by_delay(linear.waveform, at.omega)]
+    basis = np.linalg.qr(whiten(np.stack(slopes)).reshape(len(slopes), -1).T)[0]
+    rest = white.ravel() - basis @ (basis.T @ white.ravel())
+    own = data[f"trace_{EFFECT}"]
+    assert like(whiten(1e-6 * own).ravel(), rest) > 0.95
+    other = whiten(1e-6 * data["trace_gage_length"]).ravel()
+    assert abs(like(other, rest)) < 0.8
+    write_plot_data(tmp_path / "d.npz", data)
+    with np.load(tmp_path / "d.npz") as again:
+        assert str(again["quantity"]) == "strain"
+        np.testing.assert_array_equal(again[f"trace_{EFFECT}"], own)
+
+
+def test_the_trace_of_a_brush_effect_looks_like_what_is_left(tmp_path: Path) -> None:
+    campaign = write_forces(tmp_path / "steady", steady_runs(slope=0.25), "steady")
+    file = brush_file(campaign)
+    found = compare_forces(campaign, file, "Fy")
+    planted = [("friction_load", (0.25,)), ("conicity", (20.0,))]
+    data = plot_data(found, campaign, file, planted, CATALOGUE)
+    np.testing.assert_allclose(data["model"] - data["measured"], data["difference"])
+    found_like = like(data["trace_friction_load"], data["difference"])
+    assert found_like > 0.5  # of first order: the fit has moved stiffness and friction far
+    assert abs(like(data["trace_conicity"], data["difference"])) < 0.5 * found_like
+
+
+def test_an_unknown_effect_is_refused() -> None:
+    file = model_file()
+    found = compare_strain(waves(EFFECT, STRENGTH), model_of(file))
+    with pytest.raises(ParameterError, match="--trace nonsense"):
+        plot_data(found, cast(Campaign, None), file, [("nonsense", (1.0,))], CATALOGUE)

@@ -1,0 +1,144 @@
+"""What is dropped on the page: a campaign, files of another format, an effect of the user's own."""
+
+import json
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from tirelib.errors import FormatError, ParameterError
+from tirelib.studio import intake
+from tirelib.studio.disk import read_document, safe_name, write_atomic
+from tirelib.studio.jobs import Jobs
+from tirelib.studio.session import Session
+
+
+class Receiving:
+    """Takes in what is dropped or chosen; nothing of it is run before the user has allowed it.
+
+    Parameters
+    ----------
+    session : Session
+    jobs : Jobs
+    roots : sequence of Path
+        Folders from which files may be chosen.
+    open_campaign : callable
+        (folder) -> address of the campaign on the page.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        jobs: Jobs,
+        roots: Sequence[Path],
+        open_campaign: Callable[[Path], str],
+    ) -> None:
+        self.session, self.jobs = session, jobs
+        self._roots, self._open = roots, open_campaign
+
+    def files(self, number: str) -> Path:
+        """Return a folder of dropped files.
+
+        Raises
+        ------
+        FormatError
+            If there is none of this number.
+        """
+        place = self.session.folder / "files" / str(number)
+        if not str(number).isdecimal() or not place.is_dir():
+            raise FormatError(f"files {number!r}: nothing was dropped under this number")
+        return place
+
+    def unpack(self, number: str) -> None:
+        """Unpack the archives among dropped files; it takes a while, and touches no job."""
+        for archive in self.files(number).rglob("*.zip"):
+            if not archive.with_suffix("").exists():
+                intake.unpack(archive, archive.with_suffix(""))
+
+    def dropped(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Tell what was dropped: a campaign, a user's effect, or files of another format."""
+        place = self.files(wish.get("files", ""))
+        campaign = intake.campaign_in(place)
+        if campaign is not None:
+            return {"campaign": self._open(campaign)}
+        effects = sorted(place.rglob("*.py"))
+        if effects:
+            return {"effect": self._received(effects[0])}
+        return self._foreign(place.name, intake.foreign_in(place))
+
+    def columns(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Begin the import of a file on disk."""
+        file = intake.inside(str(wish.get("path", "")), self._roots)
+        place = self.session.new_files()
+        return self._foreign(place.name, [file])
+
+    def _foreign(self, number: str, files: Sequence[Path]) -> Mapping[str, Any]:
+        if not files:
+            raise FormatError(
+                "nothing that can be opened was dropped; a campaign folder (or its zip archive), "
+                f"measured files ({', '.join(intake.FOREIGN)}) or an effect file (.py) is needed"
+            )
+        order = {"files": [str(path) for path in files], "place": number}
+        for kind in ("columns", "suggest"):
+            self.jobs.add(kind, order, {"files": number})
+        return {"files": number}
+
+    def import_form(self, number: str) -> dict[str, Any]:
+        """Return what is known of dropped files: columns, a draft of the map, faults."""
+        self.files(number)
+        mine = [job for job in self.jobs.all.values() if job.subject.get("files") == number]
+        found: dict[str, Any] = {"files": number, "map": None, "columns": None, "message": ""}
+        for job in mine:
+            if job.state == "failed":
+                found["message"] = job.message
+            if job.state != "done":
+                continue
+            if job.kind == "columns":
+                found["columns"] = read_document(self.jobs.out(job) / "columns.json")
+                found["names"] = [Path(path).name for path in job.order["files"]]
+            elif job.kind == "suggest":
+                text = (self.jobs.place(job) / "stdout.txt").read_text(encoding="utf-8")
+                try:
+                    found["map"] = tomllib.loads(text)
+                except ValueError:  # a draft that leaves too much open: the form is empty
+                    found["map"] = {}
+        return found
+
+    def make_campaign(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Begin to make a campaign of dropped files with the map of the form."""
+        number = str(wish.get("files", ""))
+        place, drawn = self.files(number), wish.get("map")
+        mine = [j for j in self.jobs.all.values() if j.subject.get("files") == number]
+        files = next((j.order["files"] for j in mine if j.kind == "columns"), None)
+        if not isinstance(drawn, dict) or files is None:
+            raise ParameterError("import: a map and files are needed; drop the files again")
+        try:
+            text = tomli_w.dumps(drawn)
+        except (TypeError, ValueError) as error:
+            raise ParameterError(f"import: the map cannot be written ({error})") from None
+        write_atomic(place / "map.toml", text)
+        order = {"files": files, "map": str(place / "map.toml")}
+        return {"job": self.jobs.add("import", order, {"files": number}).number}
+
+    def _received(self, file: Path) -> dict[str, Any]:
+        """Keep a user's effect file; it is not run, and the page shows what is in it."""
+        target = self.session.folder / "effects" / f"{safe_name(file.stem)}.py"
+        data = file.read_bytes()
+        write_atomic(target, data)
+        write_atomic(target.with_suffix(".json"), json.dumps({"confirmed": False}))
+        text = data.decode("utf-8", "replace")
+        return {"name": target.name, "code": text, "sha256": sha256(data).hexdigest()}
+
+    def confirm(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Check an effect file that the user has read and allowed to be run."""
+        target = self.session.folder / "effects" / safe_name(str(wish.get("name", "")))
+        if target.suffix != ".py" or not target.is_file():
+            raise FormatError(f"{target.name}: there is no such effect file; drop it again")
+        if sha256(target.read_bytes()).hexdigest() != wish.get("sha256"):
+            raise FormatError(f"{target.name}: it is not the file that was shown; drop it again")
+        files = [str(p) for p in self.session.effect_files if p != target]
+        job = self.jobs.add("effects", {"effect_files": [*files, str(target)]}, {"effect": 1})
+        return {"job": job.number}
