@@ -162,6 +162,7 @@ def main() -> None:
             page.wait_for_timeout(500)
             picture("take")
             faults += repeat(page, session) if given.repeat else []
+            page.context.close()
         browser.close()
     say = Console(highlight=False).print
     for name, value in took.items():

@@ -116,7 +116,11 @@ class Desk:
             else:
                 shown = read_document(opened.place / "show.json") or {}
                 fitted = opened.told.get("fitted_to") or shown.get("content_hash")
-                opened.change(fitted_to=fitted, stale=fitted != shown.get("content_hash"))
+                opened.change(
+                    title=(shown.get("header") or {}).get("name") or opened.told.get("title"),
+                    fitted_to=fitted,
+                    stale=fitted != shown.get("content_hash"),
+                )
         elif job.kind in OF_MODEL:
             opened = self.session.campaign(subject["campaign"])
             model = opened.model(subject["model"])

@@ -3,6 +3,11 @@ import { app, current, documentOf, nameOf, progressOf, wish } from "./data.js";
 import { choose, csvButton, dialog, fill, h, number, strength, unitName } from "./dom.js";
 import { Plot, waterfall } from "./plots.js";
 
+const FLAGS = {
+  out_of_range: "The fitted strength lies outside the plausible range: another effect may be missing.", not_significant: "The fitted strength does not differ significantly from zero.",
+  no_gain: "The effect does not lower the error.", heldout_worse: "The effect raises the error on the held-out runs: it may stand for another one.",
+};
+
 export class Add {
   constructor(go) {
     this.go = go;
@@ -67,8 +72,8 @@ export class Add {
     fill(this.fall, h("div", { class: "row" }, h("h2", {}, "The fall of the error"), h("span", { class: "quiet" }, c.quantity), h("span", { class: "room" }),
       csvButton("waterfall", () => [["step", steps.map((s) => s.name)], [`error [${unit}]`, steps.map((s) => s.error)], ["held-out error", steps.map((s) => s.heldout)], ["floor", steps.map((s) => s.floor)]])),
     steps.length ? waterfall(steps, unit) : h("p", { class: "quiet" }, "There is no model yet."),
-    last ? h("p", { id: "result" }, `${last.effect}: strength ${strength(last.strength, 4)} ± ${strength(Array.isArray(last.std) ? last.std.map((s) => 1.96 * s) : 1.96 * last.std, 2)} ${last.unit === "1" ? "" : last.unit}. Error ${number(last.error_before, 4)} before, `, h("b", { id: "error-after" }, number(last.error_after, 4)), ` after [${unitName(last.error_unit)}]. Held out: ${number(last.heldout_error_before, 4)} before, ${number(last.heldout_error_after, 4)} after.`) : null,
-    last?.flags?.length ? h("p", { class: "warn" }, last.flags.map((flag) => flag.replaceAll("_", " ")).join("; ")) : null,
+    last ? h("p", { id: "result" }, `${last.effect}: strength ${strength(last.strength, 4)} ± ${strength(Array.isArray(last.std) ? last.std.map((s) => 1.96 * s) : 1.96 * last.std, 2)}${last.unit === "1" ? "" : ` ${last.unit}`}. Error ${number(last.error_before, 4)} before, `, h("b", { id: "error-after" }, number(last.error_after, 4)), ` after [${unitName(last.error_unit)}]. Held out: ${number(last.heldout_error_before, 4)} before, ${number(last.heldout_error_after, 4)} after.`) : null,
+    last?.flags?.length ? h("p", { class: "warn" }, last.flags.map((flag) => FLAGS[flag] || flag.replaceAll("_", " ")).join(" ")) : null,
     now?.verdict ? h("p", {}, "With this model the verdict is ", h("b", {}, now.verdict.replaceAll("_", " ")), now.named.length ? `: ${now.named.join(", ")}` : "", ". ", h("a", { href: `#/suspect/${app.wanted}` }, "See the suspects again")) : now ? h("p", { class: "quiet" }, "The verdict of this model is being computed.") : null,
     failed.map((job) => h("p", { class: job.state === "failed" ? "bad" : "warn" }, `${job.kind} ${job.effect}: ${job.state}. ${job.message} `, h("button", { class: "small", type: "button", onclick: () => wish({ do: "again", job: job.job }) }, "Run again"))));
     const shown = c.models.filter((m) => m.ready && (this.hidden || !m.hidden));
