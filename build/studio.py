@@ -79,7 +79,6 @@ def walk(page: Any, campaign: str | None, picture: Any) -> dict[str, float]:
         page,
         "studio.running.some(job => job.errors.length > 6) || studio.campaign.current !== '001'",
     )
-    picture("add-running")
     took["added"] = wait(page, "studio.campaign.current === '002'")
     page.wait_for_selector("#error-after")
     wait(page, "!!studio.campaign.models[1].verdict")
