@@ -87,7 +87,9 @@ def commands(desk: Desk, opened: Opened, number: str) -> list[str]:
 
 
 def _last(desk: Desk) -> list[Job]:
-    return list(desk.jobs.all.values())[-SHOWN_JOBS:]
+    """Return the last jobs; of those that do the same, the one that came last."""
+    found = {(job.kind, str(job.subject)): job for job in desk.jobs.all.values()}
+    return sorted(found.values(), key=lambda job: job.number)[-SHOWN_JOBS:]
 
 
 def _job(desk: Desk, job: Job) -> dict[str, Any]:

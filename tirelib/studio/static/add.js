@@ -98,7 +98,7 @@ export class Add {
   look(model) { wish({ do: "look", campaign: app.campaign.campaign, model: model.number, quantity: app.campaign.quantity }); }
 
   compare(c, models) {
-    const pick = { a: models[0]?.number, b: c.current || models.at(-1)?.number }, body = h("div", {});
+    const pick = { a: models[0]?.number, b: c.current !== models[0]?.number ? c.current : models.at(-1)?.number }, body = h("div", {});
     const options = models.map((m) => [m.number, `${m.number} ${nameOf(m)}`]);
     const draw = async () => {
       const both = [pick.a, pick.b].map((n) => c.models.find((m) => m.number === n));
@@ -108,7 +108,7 @@ export class Add {
       told.forEach((t, i) => (t?.runs || t?.curves || []).forEach((r) => { const key = r.run ?? r.words; if (!runs.has(key)) runs.set(key, [null, null]); runs.get(key)[i] = r.rms_noise ?? r.rms; }));
       fill(body, h("table", {}, h("tbody", {}, h("tr", {}, h("th", {}, ""), both.map((m) => h("th", {}, nameOf(m)))),
         line("error", (t) => t && `${number(t.error, 4)} ${unitName(t.error_unit)}`), line("not explained, rms", (t) => t && `${number(t.residual_rms)} ${unitName(t.unit)}`), line("effects", (t) => t && (t.effects.map((e) => `${e.effect} ${strength(e.strength)}`).join("; ") || "none")), line("verdict", (_, m) => m.verdict?.replaceAll("_", " ")), line("held-out error", (_, m) => m.fit?.heldout_error_after && number(m.fit.heldout_error_after, 4)))),
-      h("h3", {}, "Each part of the measurement, rms over the noise"), h("div", { class: "scroll" }, h("table", {}, h("tbody", {}, [...runs.entries()].map(([run, [x, y]]) => h("tr", {}, h("td", {}, run), h("td", { class: "n" }, number(x)), h("td", { class: "n" }, number(y)), h("td", { class: y < x ? "good" : "warn" }, x && y ? (y < x ? "▼ lower" : "▲ higher") : "")))))));
+      h("h3", {}, "Each part of the measurement, rms over the noise"), h("div", { class: "scroll" }, h("table", {}, h("tbody", {}, [...runs.entries()].map(([run, [x, y]]) => h("tr", {}, h("td", {}, run), h("td", { class: "n" }, number(x)), h("td", { class: "n" }, number(y)), h("td", { class: y < x ? "good" : "warn" }, x && y ? (y < x ? "▼ lower" : y > x ? "▲ higher" : "the same") : "")))))));
     };
     dialog("Two models side by side", h("div", { class: "row" }, choose(options, pick.a, (v) => { pick.a = v; draw(); }, "left"), choose(options, pick.b, (v) => { pick.b = v; draw(); }, "right")), body);
     draw();

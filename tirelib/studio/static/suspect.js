@@ -150,6 +150,7 @@ export class Suspect {
   page(name, e) {
     const about = this.title(name);
     if (!about) return;
+    const unit = about.unit === "1" ? "" : ` ${about.unit}`;
     const plot = new Plot(`planted-${name}`, { height: 230 }), said = h("p", { class: "small quiet", role: "status" });
     const middle = e ? e.strength : about.components > 1 ? new Array(about.components).fill(0).map((_, k) => (k ? 0 : about.range[1] / 2)) : (Math.abs(about.range[1]) >= Math.abs(about.range[0]) ? about.range[1] : about.range[0]) / 2;
     const input = h("input", { value: [].concat(middle).map((x) => Number(x.toPrecision(4))).join(", "), size: 16, "aria-label": "strength" });
@@ -168,7 +169,7 @@ export class Suspect {
         const planted = await arraysOf(model, "planted"), { data } = this.field;
         const trace = planted[`trace_${name}`];
         if (!trace) { said.textContent = planted.texts[`fault_${name}`] || "There is no trace."; return; }
-        said.textContent = `What ${name} of strength ${input.value} ${about.unit} would leave in each run, and the residual of the chosen run.`;
+        said.textContent = `What ${name} of strength ${input.value}${unit} would leave in each run, and the residual of the chosen run.`;
         if (isStrain(data)) {
           const n = data.angle.length, row = this.field.rows[this.field.row];
           plot.show({ title: row.label, unit: "microstrain", x: { title: "wheel angle [deg]", values: Array.from(data.angle) }, series: [{ name: "residual", values: sliced(data, "difference", row.index), color: "rest" }, { name: name, values: trace.subarray(row.index * n, (row.index + 1) * n), color: "trace", dash: [6, 4] }] });
@@ -178,10 +179,10 @@ export class Suspect {
         }
       }, 150);
     };
-    dialog(name, h("p", {}, about.title), h("p", { class: "small" }, `Acts on: ${about.stage}. Varies with: ${about.varies_with.join(", ") || "nothing"}. Plausible strength: ${about.range.map((x) => number(x)).join(" to ")} ${about.unit}.`),
+    dialog(name, h("p", {}, about.title), h("p", { class: "small" }, `Acts on: ${about.stage}. Varies with: ${about.varies_with.join(", ") || "nothing"}. Plausible strength: ${about.range.map((x) => number(x)).join(" to ")}${unit}.`),
       h("h3", {}, "Equation"), h("p", {}, about.equation || "The law itself says it:"), h("details", {}, h("summary", {}, "The law as it is computed"), h("pre", {}, about.law)),
       h("h3", {}, "Source"), h("p", {}, about.source), h("h3", {}, "What it would look like here"),
-      h("div", { class: "row" }, h("label", {}, "strength ", input, ` ${about.unit}`), h("button", { type: "button", onclick: show }, "Plant it")), said, plot.element);
+      h("div", { class: "row" }, h("label", {}, "strength ", input, unit), h("button", { type: "button", onclick: show }, "Plant it")), said, plot.element);
     document.getElementById("dialog").addEventListener("close", () => plot.remove(), { once: true });
   }
 }
