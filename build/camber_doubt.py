@@ -19,6 +19,7 @@ from road_constants import times
 from road_coverage import measured, rows_of, tire_of
 
 from tirelib.arrays import FloatArray
+from tirelib.core import choose_numpy
 from tirelib.estimators import tilt
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
@@ -135,5 +136,6 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    choose_numpy()  # constants of the compiled core cannot be changed
     with one_thread():
         main()

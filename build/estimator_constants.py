@@ -20,6 +20,7 @@ import pandas as pd
 from ramp_coverage import RAMPS, STEADY, TRUE, campaigns
 
 from tirelib.arrays import FloatArray
+from tirelib.core import choose_numpy
 from tirelib.estimators import ends, fit_links, fit_sliding, pulled
 from tirelib.estimators.calibrate import calibrate_chain
 from tirelib.estimators.edge import EDGE_UNIT
@@ -100,5 +101,6 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    choose_numpy()  # constants of the compiled core cannot be changed
     with one_thread():
         main()

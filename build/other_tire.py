@@ -24,6 +24,7 @@ from road_coverage import measured, silent, tire_of
 
 from tirelib.campaign import read_campaign
 from tirelib.cli import limits
+from tirelib.core import choose_numpy
 from tirelib.estimators import likeness
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
@@ -239,5 +240,6 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    choose_numpy()  # constants of the compiled core cannot be changed
     with one_thread():
         main()

@@ -16,6 +16,7 @@ from unittest import mock
 import numpy as np
 from matplotlib.figure import Figure
 
+from tirelib.core import choose_numpy
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.features.extract import extract_features
 from tirelib.fmu.virtual.options import Options
@@ -257,6 +258,7 @@ def _step(change: dict[str, tuple[float, float]], at: float, t: float) -> dict[s
 
 
 if __name__ == "__main__":
+    choose_numpy()  # constants of the compiled core cannot be changed
     with one_thread():
         turning()
         slips()

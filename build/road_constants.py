@@ -21,6 +21,7 @@ import numpy as np
 from road_coverage import measured, rows_of, silent, tire_of
 
 from tirelib.campaign import read_campaign
+from tirelib.core import choose_numpy
 from tirelib.estimators import any_road, chain, sliding, unknowns
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration
@@ -252,5 +253,6 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    choose_numpy()  # constants of the compiled core cannot be changed
     with one_thread():
         main()

@@ -19,6 +19,7 @@ from scipy.optimize import least_squares
 
 from tirelib.arrays import FloatArray
 from tirelib.campaign import conditions_of, read_campaign
+from tirelib.core import choose_numpy
 from tirelib.estimators import contact_length
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.estimators.contact_length import contact_lengths
@@ -138,5 +139,6 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    choose_numpy()  # constants of the compiled core cannot be changed
     with one_thread():
         main()

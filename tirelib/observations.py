@@ -9,9 +9,9 @@ import numpy as np
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.campaign import Campaign, CampaignHeader, Run, conditions_of
 from tirelib.errors import CalibrationError
-from tirelib.features.extract import Features, extract_features
+from tirelib.features.extract import Features, features_of_record
 from tirelib.flags import INVALIDATING
-from tirelib.signal import LowPass, cut_turns
+from tirelib.signal import LowPass
 from tirelib.sizes import differing
 
 TRUTH = ("Fx", "Fy", "Fz", "Mz", "slip_angle", "slip_ratio")
@@ -82,7 +82,7 @@ def measure_run(
             "strain_1 .. strain_N are needed"
         )
     held: Any = conditions_of(run, run.time())
-    turns = cut_turns(
+    features = features_of_record(
         run.strain,
         run.rate,
         header.gage_lateral,
@@ -90,7 +90,6 @@ def measure_run(
         low_pass=low_pass,
         **held,
     )
-    features = extract_features(turns)
     features = replace(
         features, time=features.time + run.start_time, ready=features.ready + run.start_time
     )

@@ -1,4 +1,4 @@
-/* A calibration as a flat table of doubles, which tirelib.fmu.calibration_table writes.
+/* A calibration as a flat table of doubles, which tirelib.estimators.core_table writes.
  *
  * Constants of the estimators stand in the table as well, so that the Python modules are the only
  * place where they are. The structures point into the table; the caller keeps it.
@@ -8,12 +8,12 @@
 
 #include "values.h"
 
-/* Sizes of tirelib.fmu.calibration_table. */
+/* Sizes of tirelib.estimators.core_table. */
 enum { VARIABLES = 32, TERMS = 256, NAMES = 24, NODES = 64, WHOLE = 6 };
 enum { FZ, ALPHA, KAPPA, FY, QUANTITIES };
 enum { ALL_GAGES = GAGES }; /* place of the chain without a missing gage */
 
-/* Constants of tirelib.estimators, in the order of calibration_table.CONSTANTS. */
+/* Constants of tirelib.estimators, in the order of core_table.CONSTANTS. */
 typedef struct {
     double pressure_low, pressure_high, pressure_doubt, force_exponent, force_doubt;
     double unknown_pressure, fastest, slowest, speed_doubt, speed_unit, radius_share;

@@ -22,62 +22,99 @@ int lowpass_suits(const LowPass *p, double turn_rate, double rate) {
 
 double lowpass_half_width(double sigma) { return SUPPORT * sigma; }
 
-/* Return the sample nearest to a wheel angle. */
-static size_t nearest(const Filter *filter, double phi) {
-    size_t low = 0, high = filter->n;
-    while (low < high) { /* numpy.searchsorted */
-        size_t middle = low + (high - low) / 2;
-        if (filter->angle[middle] < phi)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    if (low < 1) low = 1;
-    if (low > filter->n - 1) low = filter->n - 1;
-    return low - (phi - filter->angle[low - 1] <= filter->angle[low] - phi);
+/* Go on from a place to the sample nearest to a wheel angle, which grows from call to call. */
+static size_t nearest(const Filter *filter, double phi, size_t *place) {
+    const double *angle = filter->angle;
+    while (*place < filter->n - 1 && angle[*place] < phi) ++*place; /* numpy.searchsorted */
+    return *place - (phi - angle[*place - 1] <= angle[*place] - phi);
 }
 
-int filter_start(Filter *filter, const double *angle, size_t n, double sigma, double first,
-                 double last, double *scratch) {
+int filter_start(Filter *filter, const double *angle, size_t n, double sigma, int angles,
+                 double *scratch) {
     if (n < 2) return 0;
     filter->angle = angle;
     filter->n = n;
     filter->sigma = sigma;
+    filter->angles = angles;
     for (size_t i = 0; i + 1 < n; i++) scratch[i] = angle[i + 1] - angle[i];
     double width = lowpass_half_width(sigma), reach = width / median(scratch, n - 1);
     if (!(reach < (double)n)) return 0;
     filter->reach = reach < 1.0 ? 1 : (size_t)reach;
-    size_t before = nearest(filter, first), behind = n - 1 - nearest(filter, last);
+    double first = phi_at(0), last = phi_at(angles - 1);
+    size_t place = 1, before = nearest(filter, first, &place);
+    size_t behind = n - 1 - nearest(filter, last, &place);
     size_t room = before < behind ? before : behind;
     if (room >= filter->reach) return 1;
     filter->reach = room; /* as wide where the wheel is fastest */
     return angle[0] <= first - width && angle[n - 1] >= last + width;
 }
 
-void filter_at(const Filter *filter, double phi, const double *samples, size_t stride, int gages,
-               double *strain, double *rate, double *weights) {
-    size_t start = nearest(filter, phi) - filter->reach, size = 2 * filter->reach + 1;
-    const double *angle = filter->angle + start;
-    double *moments = weights + size, narrow = -0.5 / (filter->sigma * filter->sigma);
-    double total = 0.0, first = 0.0, second = 0.0;
-    for (size_t i = 0; i < size; i++) {
-        double distance = angle[i] - phi;
-        weights[i] = exp(distance * distance * narrow);
-        moments[i] = weights[i] * distance;
-        total += weights[i];
-        first += moments[i];
-        second += moments[i] * distance;
+/* Weights of the samples from `start` to before `stop` about a wheel angle, exp(-d^2 / 2 sigma^2).
+ * Those before `known` were weighed about the angle before, a spacing h less: there the weight grows
+ * by exp(h d / sigma^2 - h^2 / 2 sigma^2), and that by exp(-h^2 / sigma^2), so that a sample costs
+ * two exponentials as it comes in and none later. */
+static void weigh_samples(const Filter *filter, double phi, size_t start, size_t known, size_t stop,
+                          double *weight, double *growth) {
+    double h = phi_at(1) - phi_at(0), narrow = 1.0 / (filter->sigma * filter->sigma);
+    double slower = exp(-h * h * narrow);
+    for (size_t i = start; i < known; i++) {
+        weight[i] *= growth[i];
+        growth[i] *= slower;
     }
-    double mean = first / total; /* of the distance: the weights are not quite symmetric */
-    for (int g = 0; g < gages; g++) {
-        const double *sample = samples + (size_t)g * stride + start;
-        double plain = 0.0, moment = 0.0;
-        for (size_t i = 0; i < size; i++) {
-            plain += sample[i] * weights[i];
-            moment += sample[i] * moments[i];
+    for (size_t i = known > start ? known : start; i < stop; i++) {
+        double distance = filter->angle[i] - phi;
+        weight[i] = exp(-0.5 * distance * distance * narrow);
+        growth[i] = exp((distance - 0.5 * h) * h * narrow);
+    }
+}
+
+/* Sums of weighted samples, and of them times their distance from a wheel angle. */
+static void add_samples(const double *rows, size_t lanes, const double *weight, const double *angle,
+                        double phi, size_t n, double *plain, double *moment) {
+    double sum[LANES] = {0.0}, moved[LANES] = {0.0};
+    for (size_t i = 0; i < n; i++) {
+        const double *sample = rows + i * lanes;
+        double share = weight[i], arm = share * (angle[i] - phi);
+        for (int g = 0; g < LANES; g++) {
+            sum[g] += sample[g] * share;
+            moved[g] += sample[g] * arm;
         }
-        double slope = (moment - mean * plain) / (second - mean * first);
-        rate[g * ANGLES] = slope;
-        strain[g * ANGLES] = plain / total - mean * slope;
+    }
+    for (int g = 0; g < LANES; g++) {
+        plain[g] = sum[g];
+        moment[g] = moved[g];
+    }
+}
+
+void filter_rows(const Filter *filter, const double *samples, size_t stride, int gages,
+                 double *rows) {
+    size_t lanes = filter_lanes(gages), one = (size_t)gages;
+    for (size_t i = 0; i < filter->n; i++, rows += lanes) {
+        for (size_t g = 0; g < lanes; g++) rows[g] = g < one ? samples[g * stride + i] : 0.0;
+        rows[one] = 1.0;
+        rows[one + 1] = filter->angle[i];
+    }
+}
+
+void filter_turn(const Filter *filter, const double *rows, int gages, double *strain, double *rate,
+                 double *scratch) {
+    double *weight = scratch, *growth = weight + filter->n, plain[MOST_LANES], moment[MOST_LANES];
+    size_t size = 2 * filter->reach + 1, lanes = filter_lanes(gages), place = 1, known = 0;
+    for (int k = 0; k < filter->angles; k++) {
+        double phi = phi_at(k);
+        size_t start = nearest(filter, phi, &place) - filter->reach;
+        weigh_samples(filter, phi, start, known, start + size, weight, growth);
+        known = start + size;
+        for (size_t g = 0; g < lanes; g += LANES)
+            add_samples(rows + start * lanes + g, lanes, weight + start, filter->angle + start, phi,
+                        size, plain + g, moment + g);
+        double total = plain[gages], first = moment[gages];
+        double second = moment[gages + 1] - phi * first;
+        double mean = first / total; /* of the distance: the weights are not quite symmetric */
+        for (int g = 0; g < gages; g++) {
+            double slope = (moment[g] - mean * plain[g]) / (second - mean * first);
+            rate[g * ANGLES + k] = slope;
+            strain[g * ANGLES + k] = plain[g] / total - mean * slope;
+        }
     }
 }

@@ -19,22 +19,34 @@ int lowpass_suits(const LowPass *low_pass, double turn_rate, double rate);
 /* Reference: half_width */
 double lowpass_half_width(double sigma);
 
-/* The samples that the filter looks at for one wheel angle, and their weights' sums. */
+/* Numbers that are summed at once; a row of samples has a multiple of them: the gages, a one, and the
+ * sample's wheel angle, so that the sums of the weights and of their moments come along. */
+enum { LANES = 8, MOST_LANES = (GAGES + 2 + LANES - 1) / LANES * LANES };
+
+/* The samples of a turn, and how many of them the filter looks at for one wheel angle. */
 typedef struct {
     const double *angle; /* of each sample */
     size_t n, reach;
     double sigma;
+    int angles; /* of the grid, from its first one on */
 } Filter;
 
-/* Prepare the filter for samples at given, growing angles; `scratch` holds n doubles.
- * Returns 0 if it would reach beyond the samples for an angle from `first` to `last`. */
-int filter_start(Filter *filter, const double *angle, size_t n, double sigma, double first,
-                 double last, double *scratch);
+/* Return how many doubles a row of samples has. */
+static inline size_t filter_lanes(int gages) { return (size_t)((gages + 2 + LANES - 1) / LANES * LANES); }
 
-/* Filter all gages at one wheel angle: strain[g * ANGLES] and rate[g * ANGLES] of each gage g, whose
- * samples begin at samples + g * stride; `weights` holds 2 (2 reach + 1) doubles.
- * Reference: smooth_to_angle; test: test_native_turns. */
-void filter_at(const Filter *filter, double phi, const double *samples, size_t stride, int gages,
-               double *strain, double *rate, double *weights);
+/* Prepare the filter for samples at given, growing angles; `scratch` holds n doubles.
+ * Returns 0 if it would reach beyond the samples for one of the first `angles` of the grid. */
+int filter_start(Filter *filter, const double *angle, size_t n, double sigma, int angles,
+                 double *scratch);
+
+/* Write samples as rows: gage g's begin at samples + g * stride; `rows` holds filter_lanes(gages)
+ * doubles for each sample. */
+void filter_rows(const Filter *filter, const double *samples, size_t stride, int gages,
+                 double *rows);
+
+/* Filter all gages at the wheel angles: strain[g * ANGLES + k] and rate[g * ANGLES + k] of gage g at
+ * angle k; `scratch` holds 2 n doubles. Reference: smooth_to_angle; test: test_native_turns. */
+void filter_turn(const Filter *filter, const double *rows, int gages, double *strain, double *rate,
+                 double *scratch);
 
 #endif

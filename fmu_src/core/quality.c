@@ -66,12 +66,12 @@ static void bridge(double *x, const unsigned char *missing, size_t n) {
 
 /* Swing of the samples that are there, and whether they stand still at its ends. */
 static double swing_of(const double *x, size_t n, double step, int *flags) {
-    double low = NAN, high = NAN;
+    double low = INFINITY, high = -INFINITY;
     for (size_t i = 0; i < n; i++) {
-        low = fmin(low, x[i]);
-        high = fmax(high, x[i]);
+        if (x[i] < low) low = x[i];
+        if (x[i] > high) high = x[i];
     }
-    double swing = isnan(low) ? 0.0 : high - low, angle = floor(FLAT_ANGLE / step);
+    double swing = low > high ? 0.0 : high - low, angle = floor(FLAT_ANGLE / step);
     double needed = angle > FLAT_SAMPLES ? angle : FLAT_SAMPLES;
     for (int end = 0; end < 2 && swing > 0.0; end++) {
         double extreme = end ? low : high;
@@ -126,8 +126,8 @@ void mark_without_contact(const double *rate, size_t n, int gages, int *flags) {
     for (int g = 0; g < gages; g++) {
         double low = INFINITY, high = -INFINITY;
         for (size_t i = 0; i < n; i++) {
-            low = fmin(low, rate[g * ANGLES + i]);
-            high = fmax(high, rate[g * ANGLES + i]);
+            if (rate[g * ANGLES + i] < low) low = rate[g * ANGLES + i];
+            if (rate[g * ANGLES + i] > high) high = rate[g * ANGLES + i];
         }
         steep[g] = sorted[g] = high - low;
     }

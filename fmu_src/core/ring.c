@@ -1,7 +1,5 @@
 #include "ring.h"
 
-#include <string.h>
-
 size_t ring_size(int gages, int64_t capacity) {
     return (size_t)(gages + HELD + 2) * (size_t)capacity;
 }
@@ -9,19 +7,17 @@ size_t ring_size(int gages, int64_t capacity) {
 void ring_start(Ring *ring, double *memory, int gages, int64_t capacity) {
     ring->rows = memory;
     ring->capacity = capacity;
-    ring->total = 0;
+    ring->total = ring->place = 0;
     ring->gages = gages;
     ring->width = gages + HELD + 2;
 }
 
-double *ring_row(const Ring *ring, int64_t sample) {
-    return ring->rows + (size_t)(sample % ring->capacity) * (size_t)ring->width;
-}
-
-void ring_take(Ring *ring, const double *sample) {
-    double *row = ring_row(ring, ring->total++);
-    memcpy(row, sample, (size_t)(ring->width - 1) * sizeof *row);
+void ring_take(Ring *ring, const Column *columns, int64_t at) {
+    double *row = ring->rows + ring->place * ring->width;
+    for (int i = 0; i < ring->width - 1; i++) row[i] = columns[i].first[at * columns[i].step];
     row[ring->width - 1] = NAN;
+    ring->total++;
+    if (++ring->place == ring->capacity) ring->place = 0;
 }
 
 int64_t ring_base(const Ring *ring) {
@@ -34,15 +30,12 @@ int ring_search(const Ring *ring) { return ring->gages + HELD + 1; }
 
 size_t ring_column(const Ring *ring, int column, int64_t start, int64_t stop, double *out) {
     size_t n = 0;
-    int64_t place = start % ring->capacity;
-    const double *value = ring->rows + (size_t)place * (size_t)ring->width + column;
+    const double *end = ring->rows + ring->capacity * ring->width;
+    const double *row = start < stop ? ring_row(ring, start) : end;
     for (int64_t i = start; i < stop; i++) {
-        out[n++] = *value;
-        value += ring->width;
-        if (++place == ring->capacity) {
-            place = 0;
-            value = ring->rows + column;
-        }
+        out[n++] = row[column];
+        row += ring->width;
+        if (row == end) row = ring->rows;
     }
     return n;
 }

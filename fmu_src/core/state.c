@@ -73,6 +73,7 @@ static void keep_places(Cutter *to, const Cutter *own) {
     to->ring.rows = own->ring.rows;
     to->waiting = own->waiting;
     to->window = own->window;
+    to->rows = own->rows;
     to->angle = own->angle;
     to->scratch = own->scratch;
     to->missing = own->missing;

@@ -23,7 +23,8 @@ static int64_t places_of(double rate) { return capacity_of(rate) / 3 + 1; }
 size_t cutter_size(int gages, double rate) {
     if (gages < 1 || gages > GAGES || !(rate >= 1.0 && rate <= 1e6)) return 0;
     size_t n = (size_t)capacity_of(rate);
-    size_t doubles = ring_size(gages, capacity_of(rate)) + ((size_t)gages + 3) * n;
+    size_t doubles = ring_size(gages, capacity_of(rate)) +
+                     ((size_t)gages + filter_lanes(gages) + 3) * n;
     return sizeof(Cutter) + doubles * sizeof(double) + (size_t)places_of(rate) * sizeof(Contact) + n;
 }
 
@@ -39,9 +40,11 @@ Cutter *cutter_start(void *memory, int gages, const double *lateral, double rate
     c->room = capacity_of(rate);
     c->places = places_of(rate);
     double *next = (double *)(void *)(c + 1);
+    size_t n = (size_t)c->room;
     ring_start(&c->ring, next, gages, c->room);
     next += ring_size(gages, c->room);
     c->window = next, next += gages * c->room;
+    c->rows = next, next += filter_lanes(gages) * n;
     c->angle = next, next += c->room;
     c->scratch = next, next += 2 * c->room;
     c->waiting = (Contact *)(void *)next;
@@ -153,11 +156,9 @@ static int window_of(Cutter *c, Turn *turn, double sigma) {
         ring_column(&c->ring, g, first, c->stop, c->window + (size_t)g * stride);
     inspect(c->window, stride, n, c->gages, c->law.step, turn->gage_flags, c->missing);
     for (size_t i = 0; i < n; i++) c->angle[i] = law_at(&c->law, (double)(first + (int64_t)i));
-    if (!filter_start(&filter, c->angle, n, sigma, phi_at(0), phi_at(seen - 1), c->scratch))
-        return 0;
-    for (int k = 0; k < seen; k++)
-        filter_at(&filter, phi_at(k), c->window, stride, c->gages, turn->strain + k,
-                  turn->rate + k, c->scratch);
+    if (!filter_start(&filter, c->angle, n, sigma, seen, c->scratch)) return 0;
+    filter_rows(&filter, c->window, stride, c->gages, c->rows);
+    filter_turn(&filter, c->rows, c->gages, turn->strain, turn->rate, c->scratch);
     mark_without_contact(turn->rate, (size_t)seen, c->gages, turn->gage_flags);
     return 1;
 }
@@ -263,8 +264,8 @@ static void take_strain(Cutter *c, double start, double stop, Turn *turn) {
         for (int k = g * ANGLES; k < (g + 1) * ANGLES; k++) {
             turn->strain[k] = unusable ? NAN : turn->strain[k] - turn->offset[g];
             if (unusable) turn->rate[k] = NAN;
-            low = fmin(low, turn->strain[k]);
-            high = fmax(high, turn->strain[k]);
+            if (turn->strain[k] < low) low = turn->strain[k];
+            if (turn->strain[k] > high) high = turn->strain[k];
         }
         turn->mean[g] = unusable ? NAN : mean[g] - turn->offset[g];
         if (fabs(moved[g]) > DRIFT_SHARE * (high - low)) turn->gage_flags[g] |= DRIFT;
@@ -314,9 +315,9 @@ static int full_turn(Cutter *c, const Contact *contact, const Contact *before, T
     return 1;
 }
 
-int cutter_take(Cutter *c, const double *sample) {
+int cutter_take(Cutter *c, const Column *columns, int64_t at) {
     Contact found;
-    ring_take(&c->ring, sample);
+    ring_take(&c->ring, columns, at);
     if (!finder_take(&c->finder, &c->ring, &found)) return 1;
     if (c->queued == c->places) return 0;
     c->waiting[(c->next + c->queued++) % c->places] = found;
@@ -368,11 +369,10 @@ int cutter_next(Cutter *c, Turn *turn) {
     return done ? 1 : -1;
 }
 
-int cutter_run(Cutter *c, const double *samples, int64_t n, int64_t *taken, Turn *turn) {
+int cutter_run(Cutter *c, const Column *columns, int64_t n, int64_t *taken, Turn *turn) {
     int found = cutter_next(c, turn);
     while (!found && *taken < n) {
-        if (!cutter_take(c, samples + *taken * (c->ring.width - 1))) return -1;
-        ++*taken;
+        if (!cutter_take(c, columns, (*taken)++)) return -1;
         found = cutter_next(c, turn);
     }
     return found;

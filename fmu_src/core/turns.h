@@ -8,7 +8,8 @@
 #include "lowpass.h"
 #include "slip.h"
 
-/* Turn of the reference, same names and units; arrays over gages, and over wheel angles. */
+/* Turn of the reference, same names and units; arrays over gages, and over wheel angles. What comes
+ * before the curves stands in TurnHead in the same order. */
 typedef struct {
     double time, ready, period, omega, angle_std, slip_std, pulse, axis_shift;
     double speed, pressure, camber, friction, tread_depth, tread_temperature;
@@ -17,6 +18,11 @@ typedef struct {
     int gage_flags[GAGES];
     int flags;
 } Turn;
+
+/* A turn without its curves and flags, which its features have. */
+typedef struct {
+    double number[14], offset[GAGES], offset_std[GAGES], mean[GAGES];
+} TurnHead;
 
 /* What each gage read opposite the contact, and when [samples]. */
 typedef struct {
@@ -44,7 +50,7 @@ typedef struct {
     int stage;
     int64_t stop; /* the sample before which the law, or the turn, has all it needs */
     AngleLaw law;
-    double *window, *angle, *scratch; /* of one turn's samples */
+    double *window, *rows, *angle, *scratch; /* of one turn's samples */
     unsigned char *missing;
     int64_t room; /* samples that the window holds for each gage */
 } Cutter;
@@ -58,10 +64,10 @@ size_t cutter_size(int gages, double rate);
 Cutter *cutter_start(void *memory, int gages, const double *lateral, double rate,
                      const LowPass *low_pass);
 
-/* Take one sample: gages, held conditions, trigger (NaN: there is none). Then ask cutter_next until
- * it returns 0. Returns 0 if more contacts wait than a queue can hold, which no wheel brings about.
+/* Take sample `at` of columns: gages, held conditions, trigger (NaN: there is none). Then ask
+ * cutter_next until it returns 0. Returns 0 if more contacts wait than a queue can hold, which no wheel brings about.
  * Reference: TurnCutter.push; test: test_native_turns. */
-int cutter_take(Cutter *cutter, const double *sample);
+int cutter_take(Cutter *cutter, const Column *columns, int64_t at);
 
 /* Give the next turn that is complete: 1, none: 0, or -1 where the reference raises an error: the
  * filter would reach beyond the samples. Reference: TurnCutter._next_turn. */
@@ -69,6 +75,6 @@ int cutter_next(Cutter *cutter, Turn *turn);
 
 /* Take of n samples those after `*taken`, up to the next turn. Returns 1 with a turn, 0 when all
  * samples are taken, -1 after an error as above. */
-int cutter_run(Cutter *cutter, const double *samples, int64_t n, int64_t *taken, Turn *turn);
+int cutter_run(Cutter *cutter, const Column *columns, int64_t n, int64_t *taken, Turn *turn);
 
 #endif

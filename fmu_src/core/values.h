@@ -1,6 +1,6 @@
 /* Regressors of a turn and what the chain adds to them, by number; NaN where unknown.
  *
- * Same order as tirelib.fmu.calibration_table.VALUES, from which the numbers in a table come.
+ * Same order as tirelib.estimators.core_table.VALUES, from which the numbers in a table come.
  */
 #ifndef TIRE_VALUES_H
 #define TIRE_VALUES_H

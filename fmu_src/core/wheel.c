@@ -15,7 +15,7 @@ static size_t rounded(size_t bytes) { return (bytes + 15) / 16 * 16; }
 
 size_t wheel_size(const Calibration *cal, double rate) {
     if (!(rate >= LOWEST_RATE && rate <= HIGHEST_RATE)) return 0;
-    size_t doubles = estimate_scratch(cal) + GAGES + HELD + 1;
+    size_t doubles = estimate_scratch(cal);
     return rounded(sizeof(Wheel)) + rounded(sizeof(Turn)) + rounded(doubles * sizeof(double)) +
            cutter_size(cal->gages, rate);
 }
@@ -29,6 +29,7 @@ static void reset(Wheel *w) {
     w->live.deadline = LONGEST_TURN * w->rate;
     w->live.standing = -1;
     w->live.idle = 0.0;
+    w->turned = 0;
 }
 
 /* Which gage of the calibration each one of the frame is. Reference: _gage_order */
@@ -55,8 +56,7 @@ Wheel *wheel_start(void *memory, const Calibration *cal, double rate, int sample
     w->turn = (Turn *)(void *)next;
     next += rounded(sizeof(Turn));
     w->scratch = (double *)(void *)next;
-    w->sample = w->scratch + estimate_scratch(cal);
-    next += rounded((estimate_scratch(cal) + GAGES + HELD + 1) * sizeof(double));
+    next += rounded(estimate_scratch(cal) * sizeof(double));
     w->cutter = (Cutter *)(void *)next;
     reset(w);
     return find_order(w) ? w : NULL;
@@ -112,7 +112,7 @@ static void take_turn(Wheel *w) {
     extract_features(turn, w->gages, &w->features);
     estimate(w->calibration, turn, &w->features, w->scratch, &l->latest);
     l->turns++;
-    l->told = 1;
+    w->turned = l->told = 1;
     l->time = turn->time;
     l->ready = turn->ready;
     l->omega = turn->omega;
@@ -140,21 +140,56 @@ static void fault(Wheel *w) {
     reset(w);
 }
 
-/* Take n samples of a frame; those that did not come are missing. */
-static int take_samples(Wheel *w, const double *frame, int n, int valid) {
-    int found = 0, taken = 0;
-    for (int i = 0; i < n; i++) {
-        for (int g = 0; g < w->gages; g++)
-            w->sample[g] = valid && i < w->samples ? frame[i * w->gages + w->order[g]] : NAN;
-        if (!cutter_take(w->cutter, w->sample)) return 0;
-        while ((found = cutter_next(w->cutter, w->turn)) > 0) {
-            take_turn(w);
-            taken = 1;
-        }
-        if (found < 0) return 0;
+/* Take samples up to the next turn: 1; 0 when there are no more; -1 after an error. */
+static int go_on(Wheel *w, const Column *columns, int64_t n, int64_t *taken) {
+    const Column *omega = &columns[w->gages + OMEGA];
+    Live *l = &w->live;
+    int found = cutter_next(w->cutter, w->turn);
+    while (!found && *taken < n) {
+        int64_t at = (*taken)++;
+        if (!cutter_take(w->cutter, columns, at)) return -1;
+        if (fabs(omega->first[at * omega->step]) < STANDSTILL) l->standing = l->count;
+        l->idle = 0.0;
+        l->count++;
+        found = cutter_next(w->cutter, w->turn);
     }
-    if (taken) w->live.complete = !(w->turn->flags & NO_SPEED) && !gage_out(w);
-    return 1;
+    if (found > 0) take_turn(w);
+    return found;
+}
+
+/* Tell, after the samples of a frame, whether all gages and the speed were there in the last turn. */
+static void settle(Wheel *w) {
+    if (w->turned) w->live.complete = !(w->turn->flags & NO_SPEED) && !gage_out(w);
+    w->turned = 0;
+}
+
+int wheel_take(Wheel *w, const Column *columns, int64_t n, int64_t *taken) {
+    int found = go_on(w, columns, n, taken);
+    if (!found) settle(w);
+    return found;
+}
+
+/* Take n samples of a frame; those that did not come are missing. */
+static int take_samples(Wheel *w, const double *frame, int64_t n, int valid,
+                        const double *conditions) {
+    static const double MISSING = NAN;
+    int64_t taken = 0, given = !valid ? 0 : n < w->samples ? n : w->samples;
+    Column columns[GAGES + HELD + 1];
+    int found;
+    for (int i = 0; i < w->gages + HELD + 1; i++) {
+        int held = i - w->gages; /* there is no trigger */
+        int known = held >= 0 && held < HELD && isfinite(conditions[held]);
+        columns[i].first = held < 0 ? frame + w->order[i] : known ? conditions + held : &MISSING;
+        columns[i].step = held < 0 ? w->gages : 0;
+    }
+    while ((found = go_on(w, columns, given, &taken)) > 0) continue;
+    for (int g = 0; g < w->gages; g++) {
+        columns[g].first = &MISSING;
+        columns[g].step = 0;
+    }
+    while (found >= 0 && (found = go_on(w, columns, n, &taken)) > 0) continue;
+    settle(w);
+    return found >= 0;
 }
 
 int wheel_step(Wheel *w, const double *frame, double step, int valid, const double *conditions,
@@ -166,17 +201,12 @@ int wheel_step(Wheel *w, const double *frame, double step, int valid, const doub
         l->idle += step;
         return STEP_DONE;
     }
-    for (int i = 0; i < HELD; i++)
-        w->sample[w->gages + i] = isfinite(conditions[i]) ? conditions[i] : NAN;
-    w->sample[w->gages + HELD] = NAN; /* there is no trigger */
-    if (!take_samples(w, frame, n, valid)) {
-        fault(w);
-        return WHEEL_FAULT;
-    }
-    if (fabs(w->sample[w->gages + OMEGA]) < STANDSTILL) l->standing = l->count + n - 1;
-    l->idle = 0.0;
-    l->count += n;
-    return STEP_DONE;
+    int64_t before = l->count, standing = l->standing;
+    double idle = l->idle;
+    if (take_samples(w, frame, n, valid, conditions)) return STEP_DONE;
+    l->count = before, l->standing = standing, l->idle = idle; /* the step was not done */
+    fault(w);
+    return WHEEL_FAULT;
 }
 
 /* Old values, no validity. Reference: Wheel._held_outputs */

@@ -36,11 +36,12 @@ typedef struct {
 typedef struct {
     const Calibration *calibration;
     Cutter *cutter;
-    double *scratch, *sample;
+    double *scratch;
     Turn *turn;
     Features features;
     double rate;
     int gages, samples, axes, order[GAGES];
+    int turned; /* whether a turn was completed by the samples that are being taken */
     Live live;
 } Wheel;
 
@@ -50,6 +51,11 @@ size_t wheel_size(const Calibration *calibration, double rate);
 /* Start a wheel in `memory`, aligned as malloc's is; frames have `samples` samples. NULL where the
  * gages have no mirror image in the axes. */
 Wheel *wheel_start(void *memory, const Calibration *calibration, double rate, int samples, int axes);
+
+/* Take of n samples, in columns as of cutter_take, those after `*taken`, up to the next turn. Returns
+ * 1 with a turn (`turn`, `features`, `live.latest`), 0 when all samples are taken, -1 where the
+ * reference raises an error. Reference: NumpyEstimator.push; test: test_compiled. */
+int wheel_take(Wheel *wheel, const Column *columns, int64_t n, int64_t *taken);
 
 /* Take a frame, sample by sample, gages in the axes' order, and go on by a step [s]. `valid` 0: the
  * frame was lost. `count`: how many of its samples are new, whatever the step; -1: as many as the

@@ -330,7 +330,7 @@ def test_a_fault_at_every_step_is_logged_a_few_times_and_the_values_are_held(
     fmu.start(live.RATE)
     before = play(fmu, strain[:, :ONSET])[-1]
     package = next((Path(fmu.slave.unzipDirectory) / "resources").glob("tirelib_*")).name
-    estimator = sys.modules[f"{package}.stream.estimator"].StreamEstimator
+    estimator = sys.modules[f"{package}.stream.reference"].NumpyEstimator
     count = [0]
 
     def always(*_: Any, **__: Any) -> Any:

@@ -297,7 +297,7 @@ def test_an_unexpected_error_holds_the_values_invalid_and_the_fmu_recovers(
     before = play(ten, samples)[-1]
     resources = Path(ten.slave.unzipDirectory) / "resources"
     package = next(resources.glob("tirelib_*")).name
-    estimator = sys.modules[f"{package}.stream.estimator"].StreamEstimator
+    estimator = sys.modules[f"{package}.stream.reference"].NumpyEstimator
     good, calls = estimator.take, [0]
 
     def fails_once(*arguments: Any, **options: Any) -> Any:

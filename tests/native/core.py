@@ -11,55 +11,18 @@ import native_fmu
 import numpy as np
 import pytest
 
+from tirelib.core import FEATURE_ROWS, TURN_SCALARS, FeatureStruct, TurnStruct, columns_of
 from tirelib.features.extract import Features
 from tirelib.held import HELD
 from tirelib.signal import LowPass, Turn
+from tirelib.signal.compiled import low_pass_struct
 from tirelib.signal.turns import PHI
 
 SOURCE = Path(__file__).parents[2] / "fmu_src" / "core"
 FLAGS = (*native_fmu.C99, *native_fmu.STRICT, "-Wconversion", "-Wno-sign-conversion")
-GAGES = 16
 REAL = c.c_double
-ROW = REAL * GAGES
-TRACE = REAL * (GAGES * PHI.size)
-CONDITIONS = ("speed", "pressure", "camber", "friction", "tread_depth", "tread_temperature")
-SCALARS = (
-    *("time", "ready", "period", "omega", "angle_std", "slip_std", "pulse", "axis_shift"),
-    *CONDITIONS,
-)
-BY_GAGE = (
-    *("lead", "trail", "rate_lead", "rate_trail", "cp1", "cp2", "tp"),
-    *("cp1_angle", "cp2_angle", "tp_angle", "e_vertical", "e_friction", "skew"),
-)
-
-
-class NativeTurn(c.Structure):
-    """Turn of turns.h."""
-
-    _fields_ = [
-        *((name, REAL) for name in SCALARS),
-        *((name, ROW) for name in ("offset", "offset_std", "mean")),
-        ("strain", TRACE),
-        ("rate", TRACE),
-        ("gage_flags", c.c_int * GAGES),
-        ("flags", c.c_int),
-    ]
-
-
-class NativeFeatures(c.Structure):
-    """Features of features.h."""
-
-    _fields_ = [
-        *((name, ROW) for name in BY_GAGE),
-        ("gage_flags", c.c_int * GAGES),
-        ("flags", c.c_int),
-    ]
-
-
-class NativeLowPass(c.Structure):
-    """LowPass of lowpass.h."""
-
-    _fields_ = [("order", REAL), ("cut_off", REAL)]
+SCALARS, BY_GAGE = TURN_SCALARS, FEATURE_ROWS
+NativeTurn, NativeFeatures = TurnStruct, FeatureStruct
 
 
 def compiled(folder: Path, *flags: str) -> c.CDLL:
@@ -121,15 +84,13 @@ class NativeCutter:
         self, core: c.CDLL, lateral: Sequence[float], rate: float, low_pass: LowPass | None = None
     ) -> None:
         self.core, self.gages = core, len(lateral)
-        chosen = low_pass or LowPass()
-        cut_off = np.nan if chosen.cut_off is None else chosen.cut_off
         self._memory = c.create_string_buffer(core.cutter_size(self.gages, rate))
         self._cutter = core.cutter_start(
             self._memory,
             self.gages,
             (REAL * self.gages)(*lateral),
             rate,
-            c.byref(NativeLowPass(chosen.order, cut_off)),
+            c.byref(low_pass_struct(low_pass or LowPass())),
         )
 
     def push(
@@ -137,20 +98,15 @@ class NativeCutter:
     ) -> Iterator[tuple[NativeTurn, NativeFeatures]]:
         """Yield the turns that a frame completes, each with its features."""
         n = strain.shape[1]
-        samples = np.full((n, self.gages + len(HELD) + 1), np.nan)
-        samples[:, : self.gages] = strain.T
-        for column, name in enumerate(HELD, start=self.gages):
-            samples[:, column] = held.get(name, np.nan)
-        samples[:, -1] = np.nan if trigger is None else trigger
+        columns, kept = columns_of(strain, held, HELD, trigger)
         taken = c.c_int64(0)
         while True:
             turn, features = NativeTurn(), NativeFeatures()
-            found = self.core.cutter_run(
-                self._cutter, samples.ctypes.data, n, c.byref(taken), c.byref(turn)
-            )
+            found = self.core.cutter_run(self._cutter, columns, n, c.byref(taken), c.byref(turn))
             if found < 0:
                 raise CoreError
             if not found:
+                del kept  # until here the core read them
                 return
             self.core.extract_features(c.byref(turn), self.gages, c.byref(features))
             yield turn, features

@@ -4,34 +4,19 @@ import ctypes as c
 
 import numpy as np
 
-from tests.native.core import BY_GAGE, REAL, ROW, SCALARS, NativeFeatures, NativeTurn
+from tests.native.core import BY_GAGE, SCALARS, NativeFeatures, NativeTurn
+from tirelib.core import EstimateStruct
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.chain import QUANTITIES
+from tirelib.estimators.compiled import NOTES, ROLLING
+from tirelib.estimators.core_table import flat_table
 from tirelib.features.extract import Features
-from tirelib.fmu.calibration_table import flat_table
 
-NOTES = (
-    *(f"{quantity}_out_of_range" for quantity in QUANTITIES),
-    *("alpha_saturated", "condition_extrapolated", "camber_unknown"),
-    *("friction_implausible", "tread_depth_implausible", "tread_temperature_implausible"),
-)
-ROLLING = ("unknown", "free", "braking", "driving")
 SIZE = {"Fz": 1e2, "alpha": 1e-2, "kappa": 1e-2, "Fy": 1e2}
 """Usual size of a quantity, SI, of which 1e-9 is as good as none."""
 
 
-class NativeEstimates(c.Structure):
-    """Estimates of estimates.h."""
-
-    _fields_ = [
-        ("value", REAL * 4),
-        ("std", REAL * 4),
-        ("radius", REAL),
-        ("contact_length", ROW),
-        ("contact_length_std", ROW),
-        ("valid", c.c_int * 4),
-        *((name, c.c_int) for name in ("turn_valid", "flags", "notes", "rolling")),
-    ]
+NativeEstimates = EstimateStruct
 
 
 class NativeCalibration:

@@ -12,17 +12,18 @@ from tests.native.estimates import NativeCalibration, assert_same_estimates
 from tests.synthetic import LATERAL, synthetic_run, write
 from tirelib.campaign import read_campaign
 from tirelib.errors import FormatError
+from tirelib.estimators import core_table
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.chain import Chain
+from tirelib.estimators.core_table import flat_table
 from tirelib.estimators.polynomial import Polynomial, Variable
 from tirelib.estimators.train import train
 from tirelib.estimators.unknowns import Road
-from tirelib.features import Features, extract_features
+from tirelib.features import Features
+from tirelib.features.extract import reference_features
 from tirelib.flags import TurnFlag
-from tirelib.fmu import calibration_table
-from tirelib.fmu.calibration_table import flat_table
 from tirelib.observations import observe
-from tirelib.signal import cut_turns
+from tirelib.signal import TurnCutter, stack_turns
 
 SLIPS = (-0.3, -0.1, -0.05, -0.02, 0.0, 0.02, 0.05, 0.1, 0.3)
 MOMENT = Polynomial(
@@ -114,7 +115,7 @@ def disturbed(features: Features, n: int, seed: int) -> Features:
 
 def assert_same(core: ctypes.CDLL, known: Calibration, features: Features) -> set[str]:
     """Estimate all turns with both; return what was flagged and noted."""
-    native, wanted = NativeCalibration(core, known), known.estimate(features)
+    native, wanted = NativeCalibration(core, known), known.reference_estimate(features)
     for row in range(len(features)):
         assert_same_estimates(native.row(features, row), wanted, row)
     notes = {note for turn in wanted.notes for note in turn}
@@ -213,8 +214,8 @@ def test_a_slippery_road_moves_the_slip_angle_outwards_on_both_sides(
     x = rows_of(features, np.arange(len(features)))
     x["friction"][:] = 0.7
     icy = Features(lateral=features.lateral, **x)
-    plain = without(known, sliding=None).estimate(icy).value["alpha"]
-    moved = known.estimate(icy).value["alpha"] - plain
+    plain = without(known, sliding=None).reference_estimate(icy).value["alpha"]
+    moved = known.reference_estimate(icy).value["alpha"] - plain
     for side in (-1.0, 1.0):
         assert (moved[side * plain > 0.02] * side > 1e-3).sum() > 5
     assert_same(core, known, icy)
@@ -225,8 +226,9 @@ def test_from_samples_to_estimates(core: ctypes.CDLL) -> None:
     strain, trigger = live.strain_of(4e3, 0.1, turns=6.4)
     strain[0, 2000:] = strain[0, 2000]
     held = {"speed": live.SPEED, "pressure": live.PRESSURE, "camber": 0.0}
-    turns = cut_turns(strain, live.RATE, LATERAL, trigger=trigger, **held)
-    wanted = known.estimate(extract_features(turns))
+    cut = TurnCutter(LATERAL, live.RATE).push(strain, trigger=trigger, **held)
+    turns = stack_turns(cut, np.array(LATERAL), live.RATE)
+    wanted = known.reference_estimate(reference_features(turns))
     cutter = NativeCutter(core, LATERAL, live.RATE)
     got = list(cutter.push(strain, trigger=trigger, **held))
     assert len(got) == len(turns) == 6
@@ -266,16 +268,16 @@ def test_a_regressor_that_the_core_does_not_know_is_refused() -> None:
 def test_the_table_knows_the_sizes_that_the_core_was_compiled_with() -> None:
     header = (SOURCE / "calibration.h").read_text()
     for name in ("VARIABLES", "TERMS", "NAMES", "NODES", "WHOLE"):
-        assert f" {name} = {getattr(calibration_table, name)}" in header, name
+        assert f" {name} = {getattr(core_table, name)}" in header, name
 
 
-@pytest.mark.parametrize("terms", [calibration_table.TERMS, calibration_table.TERMS + 1])
+@pytest.mark.parametrize("terms", [core_table.TERMS, core_table.TERMS + 1])
 def test_a_polynomial_fills_its_room_and_a_larger_one_is_refused(
     core: ctypes.CDLL, terms: int
 ) -> None:
     """Each term is an exponent in one of as many regressors as there is room for."""
-    room = calibration_table.VARIABLES
-    names = [calibration_table.VALUES[n % len(calibration_table.VALUES)] for n in range(room)]
+    room = core_table.VARIABLES
+    names = [core_table.VALUES[n % len(core_table.VALUES)] for n in range(room)]
     large = replace(
         MOMENT,
         variables=tuple(Variable(name, 0.0, 1.0) for name in names),
@@ -284,7 +286,7 @@ def test_a_polynomial_fills_its_room_and_a_larger_one_is_refused(
         covariance=np.zeros((terms, terms)),
     )
     known = without(live.calibration(), moment=large)
-    if terms > calibration_table.TERMS:
+    if terms > core_table.TERMS:
         with pytest.raises(FormatError, match="32 and 256 are allowed; calibrate with fewer"):
             flat_table(known)
     else:

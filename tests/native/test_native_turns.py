@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tests.native.core import CoreError, NativeCutter, assert_same_features, assert_same_turn
 from tests.synthetic import LATERAL, RATE, record, waveform
 from tirelib.errors import ParameterError
-from tirelib.features.extract import extract_features
+from tirelib.features.extract import reference_features
 from tirelib.flags import TurnFlag
 from tirelib.signal import LowPass, TurnCutter, stack_turns
 
@@ -40,7 +40,7 @@ def assert_same(
         return []
     got = list(NativeCutter(core, lateral, rate, low_pass).push(strain, **given))
     assert len(got) == len(wanted)
-    features = extract_features(stack_turns(wanted, cutter.lateral, rate))
+    features = reference_features(stack_turns(wanted, cutter.lateral, rate))
     for row, ((turn, said), reference) in enumerate(zip(got, wanted, strict=True)):
         assert_same_turn(turn, reference)
         assert_same_features(said, features, row, reference.strain)

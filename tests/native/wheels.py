@@ -5,27 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from tests.native.core import REAL, ROW
-from tests.native.estimates import NOTES, ROLLING
+from tirelib.core import OutputStruct
 from tirelib.estimators.calibration import Calibration
+from tirelib.estimators.compiled import NOTES, ROLLING
+from tirelib.estimators.core_table import flat_table
 from tirelib.flags import flag_names
-from tirelib.fmu.calibration_table import flat_table
 
 AXES = ("iso", "sae", "adapted_sae")
 REASONS = {-1: "whole number", -2: "longest turn", -3: "samples = ", -4: "fault"}
-
-
-class NativeOutputs(c.Structure):
-    """Outputs of wheel.h."""
-
-    _fields_ = [
-        *(("value", REAL * 4), ("std", REAL * 4)),
-        *(("contact_length", ROW), ("contact_length_std", ROW)),
-        *((name, REAL) for name in ("rolling_radius", "turn_rate", "contact_time", "age")),
-        ("turn", c.c_int64),
-        *((name, c.c_int) for name in ("flags", "notes", "valid")),
-        *(("valid_of", c.c_int * 4), ("rolling", c.c_int)),
-    ]
 
 
 class NativeWheel:
@@ -70,7 +57,7 @@ class NativeWheel:
 
     def outputs(self) -> tuple[tuple[float, ...], tuple[Any, ...]]:
         """Return the values of the Real outputs and of the others, in the table's order."""
-        out = NativeOutputs()
+        out = OutputStruct()
         self.core.wheel_outputs(self._wheel, c.byref(out))
         notes = [name for bit, name in enumerate(NOTES) if out.notes & 1 << bit]
         reals = (

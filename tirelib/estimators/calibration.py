@@ -147,9 +147,19 @@ class Calibration:
                 f"them at {_millimetres(self.lateral)} mm; calibrate with this layout"
             )
 
-    @one_thread()
     def estimate(self, features: Features) -> Estimates:
-        """Estimate every turn; a turn with one gage out uses the chain without it."""
+        """Estimate every turn; a turn with one gage out uses the chain without it.
+
+        The compiled core estimates, where there is one for this machine (`tirelib.core`).
+        """
+        from tirelib.estimators.compiled import core_calibration  # which imports this module
+
+        known = core_calibration(self)
+        return self.reference_estimate(features) if known is None else known.estimate(features)
+
+    @one_thread()
+    def reference_estimate(self, features: Features) -> Estimates:
+        """Estimate every turn with numpy: the reference of the compiled core."""
         n = len(features)
         value = {q: np.full(n, np.nan) for q in QUANTITIES}
         std = {q: np.full(n, np.nan) for q in QUANTITIES}

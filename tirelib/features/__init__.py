@@ -1,5 +1,5 @@
 """Features of each turn and gage: edges, peaks, integrals, symmetry."""
 
-from tirelib.features.extract import Features, extract_features
+from tirelib.features.extract import Features, extract_features, features_of_record
 
-__all__ = ["Features", "extract_features"]
+__all__ = ["Features", "extract_features", "features_of_record"]

@@ -15,14 +15,21 @@ its middle:
           E_{friction} = l \int_0^{l/2} |\varepsilon_{fri}|\,d\xi
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Unpack
 
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core import GAGES, loaded_core
+from tirelib.features.compiled import read_by_core, record_by_core
 from tirelib.features.peaks import peak
 from tirelib.flags import TurnFlag
-from tirelib.signal.turns import AFTER, Turns
+from tirelib.held import Held
+from tirelib.signal.compiled import Record
+from tirelib.signal.lowpass import LowPass
+from tirelib.signal.turns import AFTER, Turns, check_gages, cut_turns
 
 EDGE_REACH = 0.35
 """How far outside the centre gage's pulse a leading edge is looked for, [rad]."""
@@ -122,10 +129,41 @@ class Features:
 
 
 def extract_features(turns: Turns) -> Features:
-    """Read the features of all turns and gages at once.
+    """Read the features of all turns and gages, by the compiled core where there is one.
 
     Source: dissertation, sections 3.4 and 4.1; Eq. (11), (12).
     """
+    core = loaded_core()
+    if core is None or turns.trace.lateral.size > GAGES:
+        return reference_features(turns)
+    read, gage_flags, flags = read_by_core(core, turns)
+    return features_of(turns, read, gage_flags, flags)
+
+
+def features_of_record(
+    strain: FloatArray,
+    rate: float,
+    lateral: Sequence[float],
+    *,
+    trigger: BoolArray | None = None,
+    low_pass: LowPass | None = None,
+    **held: Unpack[Held],
+) -> Features:
+    """Return the features of a whole record: `extract_features` of `cut_turns`, in one go.
+
+    Parameters and errors are those of `tirelib.signal.cut_turns`.
+    """
+    core, places = loaded_core(), np.asarray(lateral, dtype=np.float64)
+    if core is None or not core.cutter_size(places.size, rate):
+        turns = cut_turns(strain, rate, lateral, trigger=trigger, low_pass=low_pass, **held)
+        return extract_features(turns)
+    check_gages(strain, places.size)
+    record = Record(core, strain, places, rate, low_pass or LowPass(), held, trigger)
+    return Features(lateral=places, **record_by_core(core, record, places.size))
+
+
+def reference_features(turns: Turns) -> Features:
+    """Read the features of all turns and gages at once: the reference of the compiled core."""
     trace = turns.trace
     phi, spacing = trace.phi, trace.spacing
     pulse = trace.pulse[:, None, None]
@@ -148,20 +186,32 @@ def extract_features(turns: Turns) -> Features:
     angles, sizes, _ = largest((low, low, trace.strain), (before, after, inside))
     e_vertical, e_friction, skew = _integrals(trace.strain, phi, lead, trail)
     weak = np.where(weak_edges.any(axis=0), int(TurnFlag.WEAK_EDGE), 0)
+    read = {
+        "lead": lead,
+        "trail": trail,
+        "rate_lead": rates[0],
+        "rate_trail": -rates[1],
+        "cp1": -sizes[0],
+        "cp2": -sizes[1],
+        "tp": sizes[2],
+        "cp1_angle": angles[0],
+        "cp2_angle": angles[1],
+        "tp_angle": angles[2],
+        "e_vertical": e_vertical,
+        "e_friction": e_friction,
+        "skew": skew,
+    }
+    flags = turns.flags | weak.max(axis=1, initial=0)
+    return features_of(turns, read, turns.gage_flags | weak, flags)
+
+
+def features_of(
+    turns: Turns, read: Mapping[str, FloatArray], gage_flags: IntArray, flags: IntArray
+) -> Features:
+    """Return features: those that were read from the curves, and what the turns bring."""
+    trace = turns.trace
     return Features(
-        lead=lead,
-        trail=trail,
-        rate_lead=rates[0],
-        rate_trail=-rates[1],
-        cp1=-sizes[0],
-        cp2=-sizes[1],
-        tp=sizes[2],
-        cp1_angle=angles[0],
-        cp2_angle=angles[1],
-        tp_angle=angles[2],
-        e_vertical=e_vertical,
-        e_friction=e_friction,
-        skew=skew,
+        **read,
         mean=turns.mean,
         offset=turns.offset,
         time=turns.time,
@@ -178,8 +228,8 @@ def extract_features(turns: Turns) -> Features:
         offset_std=turns.offset_std,
         angle_std=turns.angle_std,
         slip_std=turns.slip_std,
-        flags=turns.flags | weak.max(axis=1, initial=0),
-        gage_flags=turns.gage_flags | weak,
+        flags=flags,
+        gage_flags=gage_flags,
         lateral=trace.lateral,
     )
 

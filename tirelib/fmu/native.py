@@ -15,7 +15,7 @@ import numpy as np
 from tirelib import __version__
 from tirelib.errors import FormatError
 from tirelib.estimators.calibration import Calibration
-from tirelib.fmu.calibration_table import flat_table
+from tirelib.estimators.core_table import flat_table
 from tirelib.fmu.parts import Identity, check_writable, identity_of, source_file, write_fmu
 from tirelib.fmu.spec import SlaveSpec
 from tirelib.fmu.variables import Variable

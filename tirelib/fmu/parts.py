@@ -12,6 +12,7 @@ from pathlib import Path
 from uuid import UUID, uuid5
 
 from tirelib import __version__
+from tirelib.core import shipped
 from tirelib.errors import FormatError
 from tirelib.fmu.bundle import content_hash
 from tirelib.fmu.describe import described, repack
@@ -128,13 +129,12 @@ def source_file(name: str) -> Path:
     FormatError
         If it is in neither.
     """
-    package = Path(__file__).parents[1]
-    for folder in (package.parent / "fmu_src", package / "fmu_src"):
-        if (folder / name).is_file():
-            return folder / name
+    found = shipped(name)
+    if found is not None:
+        return found
     raise FormatError(
-        f"{package.parent}: holds no fmu_src/{name}, a source of the FMU; install tirelib from its "
-        "repository or its wheel"
+        f"{Path(__file__).parents[2]}: holds no fmu_src/{name}, a source of the FMU; install "
+        "tirelib from its repository or its wheel"
     )
 
 

@@ -21,7 +21,7 @@ from tirelib.fmu.reference import Reference, contact_strain
 from tirelib.fmu.variables import inputs, outputs
 from tirelib.fmu.wheel import Wheel
 from tirelib.held import HELD
-from tirelib.stream.estimator import StreamEstimator
+from tirelib.stream.reference import NumpyEstimator
 
 TURNS, STILL = 6.4, 2.3
 """Number of rolling turns, and the duration of standstill in turns."""
@@ -179,7 +179,7 @@ def _made_up(calibration: Calibration, rate: float) -> _Scene:
         )
 
     for _ in range(_PASSES):
-        estimator = StreamEstimator(calibration, rate)
+        estimator = NumpyEstimator(calibration, rate)
         strain = _strain(scene(), rate, 3.4)
         estimator.push(strain, speed=speed, pressure=pressure, camber=0.0)
         latest = estimator.latest

@@ -16,7 +16,8 @@ from tirelib.estimators.chain import QUANTITIES
 from tirelib.flags import TurnFlag, flag_names
 from tirelib.fmu.refusals import FAULT, StepError, status_entry
 from tirelib.signal.turns import LONGEST_TURN
-from tirelib.stream.estimator import StreamEstimator, TurnEstimate
+from tirelib.stream.estimate import TurnEstimate
+from tirelib.stream.reference import NumpyEstimator
 
 _AXIS_NAME = {"Fz": "Fz", "alpha": "slip_angle", "kappa": "slip_ratio", "Fy": "Fy"}
 STEP_TOLERANCE = 0.01
@@ -49,7 +50,7 @@ class Wheel:
         self._sign = [sign(_AXIS_NAME[quantity], axes) for quantity in QUANTITIES]
         self._order = _gage_order(calibration.lateral, sign("lateral", axes), axes)
         self._mirrored = self._order != sorted(self._order)
-        self._estimator = StreamEstimator(calibration, rate)
+        self._estimator = NumpyEstimator(calibration, rate)
         self.rate = float(rate)
         self.samples = samples
         self._known_step = math.nan, 0  # a communication step [s] and its samples

@@ -1,7 +1,8 @@
 """One turn of strain over wheel angle, and several of them stacked."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -90,42 +91,37 @@ class Turns:
 
 def stack_turns(turns: Sequence[Turn], lateral: FloatArray, rate: float) -> Turns:
     """Stack single turns along a new first axis."""
-    gages = lateral.size
+    shapes = dict.fromkeys(("offset", "offset_std", "mean", "gage_flags"), (lateral.size,))
+    curves = dict.fromkeys(("strain", "rate"), (lateral.size, PHI.size))
+    columns = {
+        field.name: np.array([getattr(turn, field.name) for turn in turns], dtype=np.float64)
+        for field in fields(Turn)
+    }
+    for name, shape in {**shapes, **curves}.items():
+        columns[name] = columns[name].reshape(len(turns), *shape)
+    return turns_of(columns, lateral, rate)
 
-    def column(name: str) -> FloatArray:
-        return np.array([getattr(turn, name) for turn in turns], dtype=np.float64)
 
-    def rows(name: str, *shape: int) -> FloatArray:
-        return column(name).reshape(len(turns), *shape)
-
+def turns_of(columns: Mapping[str, Any], lateral: FloatArray, rate: float) -> Turns:
+    """Return the turns of whose attributes, by the names of `Turn`, these are the columns."""
+    conditions = ("omega", "speed", "pressure", "camber")
     trace = StrainTrace(
         phi=PHI,
-        strain=rows("strain", gages, PHI.size),
-        rate=rows("rate", gages, PHI.size),
-        pulse=column("pulse"),
         lateral=lateral,
-        axis_shift=column("axis_shift"),
-        conditions=Conditions(
-            omega=column("omega"),
-            speed=column("speed"),
-            pressure=column("pressure"),
-            camber=column("camber"),
-        ),
+        conditions=Conditions(**{name: columns[name] for name in conditions}),
+        **{name: columns[name] for name in ("strain", "rate", "pulse", "axis_shift")},
     )
     return Turns(
         trace=trace,
-        time=column("time"),
-        ready=column("ready"),
-        period=column("period"),
-        angle_std=column("angle_std"),
-        slip_std=column("slip_std"),
-        offset=rows("offset", gages),
-        offset_std=rows("offset_std", gages),
-        mean=rows("mean", gages),
-        friction=column("friction"),
-        tread_depth=column("tread_depth"),
-        tread_temperature=column("tread_temperature"),
-        gage_flags=rows("gage_flags", gages).astype(np.int64),
-        flags=column("flags").astype(np.int64),
         rate_hz=rate,
+        gage_flags=columns["gage_flags"].astype(np.int64),
+        flags=columns["flags"].astype(np.int64),
+        **{name: columns[name] for name in _PLAIN},
     )
+
+
+_PLAIN = (
+    *("time", "ready", "period", "angle_std", "slip_std", "offset", "offset_std", "mean"),
+    *("friction", "tread_depth", "tread_temperature"),
+)
+"""Attributes of a turn that turns have under the same name."""

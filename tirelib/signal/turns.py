@@ -9,8 +9,8 @@ For the contact k, with the middles of the centre gage's pulses m at k-1 and k:
   are those of the contact,
 - strain and rate over wheel angle: `tirelib.signal.lowpass`, up to 20 degrees after the pulse.
 
-`TurnCutter` takes samples in frames of any length; `cut_turns` gives it a whole record. Both run
-the same code, so they agree.
+`TurnCutter` takes samples in frames of any length; it is the readable reference. `cut_turns` cuts a
+whole record, by the compiled core where there is one; both agree to 1e-9, flags included.
 """
 
 from collections import deque
@@ -22,10 +22,12 @@ from typing import Unpack
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core import loaded_core
 from tirelib.errors import ParameterError, ShapeError
 from tirelib.flags import TurnFlag
 from tirelib.held import HELD, Held
 from tirelib.signal.angle import SOURCES, AngleLaw, Past, angle_law, minmod
+from tirelib.signal.compiled import Record, cut_by_core
 from tirelib.signal.contacts import Contact, ContactFinder
 from tirelib.signal.course import course
 from tirelib.signal.lowpass import LowPass, half_width, smooth_to_angle
@@ -115,8 +117,7 @@ class TurnCutter:
         **held : array of shape (n,) or a number
             Conditions, see `Held`; those that are not given are unknown.
         """
-        if strain.ndim != 2 or strain.shape[0] != self._gages:
-            raise ShapeError(f"strain has shape {strain.shape}; ({self._gages}, n) is needed")
+        check_gages(strain, self._gages)
         turns: list[Turn] = []
         for start in range(0, strain.shape[1], self._keep):
             part = slice(start, min(start + self._keep, strain.shape[1]))
@@ -451,6 +452,18 @@ def _pulse(contact: Contact, law: AngleLaw) -> float:
     return 0.5 * float(fall - rise) if fall > rise else np.nan
 
 
+def check_gages(strain: FloatArray, gages: int) -> None:
+    """Refuse a frame of another number of gages.
+
+    Raises
+    ------
+    ShapeError
+        Which shape it has, and which is needed.
+    """
+    if strain.ndim != 2 or strain.shape[0] != gages:
+        raise ShapeError(f"strain has shape {strain.shape}; ({gages}, n) is needed")
+
+
 def cut_turns(
     strain: FloatArray,
     rate: float,
@@ -460,7 +473,21 @@ def cut_turns(
     low_pass: LowPass | None = None,
     **held: Unpack[Held],
 ) -> Turns:
-    """Cut a whole record into turns; parameters as in `TurnCutter` and its `push`."""
-    cutter = TurnCutter(lateral, rate, low_pass)
-    turns = cutter.push(strain, trigger=trigger, **held)
-    return stack_turns(turns, cutter.lateral, rate)
+    """Cut a whole record into turns; parameters as in `TurnCutter` and its `push`.
+
+    The compiled core cuts, where there is one for this machine (`tirelib.core`).
+
+    Raises
+    ------
+    ShapeError
+        If the strain is not of these gages, or a condition not of its samples.
+    ParameterError
+        If the rate is not above zero, or the filter would reach beyond the samples.
+    """
+    core, places = loaded_core(), np.asarray(lateral, dtype=np.float64)
+    if core is None or not core.cutter_size(places.size, rate):
+        turns = TurnCutter(lateral, rate, low_pass).push(strain, trigger=trigger, **held)
+        return stack_turns(turns, places, rate)
+    check_gages(strain, places.size)
+    record = Record(core, strain, places, rate, low_pass or LowPass(), held, trigger)
+    return cut_by_core(core, record, places, rate)

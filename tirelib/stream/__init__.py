@@ -1,11 +1,12 @@
 """Live estimates from frames of strain: the same code and the same numbers as a whole record.
 
-`StreamEstimator` pushes frames of any length through `TurnCutter`, `extract_features` and
-`Calibration.estimate`. It adds what only a live signal needs: the age of the last estimate, a
-watchdog for contacts that stay away, and its whole state as JSON. Numpy and scipy only, so the same
-modules run inside an FMU.
+`StreamEstimator` cuts frames of any length into turns and estimates each. It adds what only a live
+signal needs: the age of the last estimate, a watchdog for contacts that stay away, and its whole
+state as JSON. The compiled core does it (`compiled`); `reference` does the same in numpy and scipy
+only, and runs inside a Python FMU.
 """
 
-from tirelib.stream.estimator import StreamEstimator, TurnEstimate
+from tirelib.stream.estimate import TurnEstimate
+from tirelib.stream.estimator import StreamEstimator
 
 __all__ = ["StreamEstimator", "TurnEstimate"]

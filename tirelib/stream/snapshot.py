@@ -105,7 +105,7 @@ _CONTAINERS: dict[str, Callable[[list[Any]], Any]] = {"list": list, "tuple": tup
 
 
 def _classes() -> dict[str, Callable[..., Any]]:
-    from tirelib.stream.estimator import TurnEstimate
+    from tirelib.stream.estimate import TurnEstimate
 
     known = (Contact, ContactFinder, Estimates, Features, LowPass, TurnEstimate)
     return {kind.__name__: kind for kind in known}

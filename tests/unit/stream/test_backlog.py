@@ -14,8 +14,8 @@ from tests.synthetic import frames as cut
 from tirelib.flags import TurnFlag
 from tirelib.held import HELD
 from tirelib.signal.turns import TurnCutter
-from tirelib.stream import StreamEstimator
 from tirelib.stream.backlog import MOST_SAMPLES, quiet_range
+from tirelib.stream.reference import NumpyEstimator
 
 TURN = int(2.0 * np.pi * live.RADIUS / live.SPEED * live.RATE)
 
@@ -50,7 +50,7 @@ def held(at: int) -> dict[str, Any]:
     return {name: known.get(name, math.nan) for name in HELD}
 
 
-def told(estimator: StreamEstimator) -> Any:
+def told(estimator: NumpyEstimator) -> Any:
     return (estimator.turns, estimator.valid, estimator.flags, repr(estimator.age), estimator.time)
 
 
@@ -64,7 +64,7 @@ def test_taken_samples_say_at_every_step_what_pushed_ones_do(
     kind: str, longest: int, seed: int
 ) -> None:
     strain = spoilt(kind)
-    one, two = (StreamEstimator(live.calibration(), live.RATE) for _ in range(2))
+    one, two = (NumpyEstimator(live.calibration(), live.RATE) for _ in range(2))
     for part in cut(strain.shape[1], longest, seed=seed):
         conditions = held(part.start)
         pushed = one.push(strain[:, part], **conditions)
@@ -75,7 +75,7 @@ def test_taken_samples_say_at_every_step_what_pushed_ones_do(
 
 
 def test_most_of_a_turn_waits_and_never_more_than_a_bound(monkeypatch: pytest.MonkeyPatch) -> None:
-    estimator = StreamEstimator(live.calibration(), live.RATE)
+    estimator = NumpyEstimator(live.calibration(), live.RATE)
     strain = live.strain_of(4e3, 0.05, turns=6.4)[0]
     estimator.push(strain[:, : 2 * TURN], **held(0))
     calls, honest = [], TurnCutter.push
@@ -93,7 +93,7 @@ def test_most_of_a_turn_waits_and_never_more_than_a_bound(monkeypatch: pytest.Mo
 
 
 def test_a_standing_wheel_is_seen_at_once() -> None:
-    estimator = StreamEstimator(live.calibration(), live.RATE)
+    estimator = NumpyEstimator(live.calibration(), live.RATE)
     estimator.push(live.strain_of(4e3, 0.05, turns=3.0)[0], **held(1))
     assert quiet_range(vars(estimator)["_cutter"]) is not None
     assert estimator.valid

@@ -1,0 +1,102 @@
+"""Turns cut by the compiled core, see `tirelib.core`."""
+
+import ctypes as c
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from tirelib.arrays import BoolArray, FloatArray
+from tirelib.core import (
+    TURN_ROWS,
+    TURN_SCALARS,
+    Core,
+    LowPassStruct,
+    TurnStruct,
+    block_of,
+    columns_of,
+    memory,
+)
+from tirelib.errors import ParameterError
+from tirelib.held import HELD, Held
+from tirelib.signal.lowpass import LowPass
+from tirelib.signal.turn import PHI, Turns, turns_of
+
+BLOCK = 32
+"""Turns that the core gives at a time."""
+
+
+class Record:
+    """A whole record in the core; parameters as in `tirelib.signal.cut_turns`."""
+
+    def __init__(
+        self,
+        core: Core,
+        strain: FloatArray,
+        lateral: FloatArray,
+        rate: float,
+        low_pass: LowPass,
+        held: Held,
+        trigger: BoolArray | None,
+    ) -> None:
+        self._columns, self._kept = columns_of(strain, dict(held), HELD, trigger)
+        self._positions = np.ascontiguousarray(lateral, dtype=np.float64)
+        self._memory = memory(core.cutter_size(lateral.size, rate))
+        self._cutter = core.cutter_start(
+            self._memory.ctypes.data,
+            lateral.size,
+            self._positions.ctypes.data,
+            rate,
+            c.byref(low_pass_struct(low_pass)),
+        )
+        self._size, self._taken = strain.shape[1], c.c_int64(0)
+
+    def blocks(self, function: Any, *arguments: int) -> Iterator[int]:
+        """Yield how many turns a cutting function of the core gives at a time.
+
+        Raises
+        ------
+        ParameterError
+            If the filter would reach beyond the samples.
+        """
+        found = BLOCK
+        while found == BLOCK:
+            taken = c.byref(self._taken)
+            found = function(self._cutter, self._columns, self._size, taken, *arguments, BLOCK)
+            if found < 0:
+                raise beyond_samples(self._taken.value)
+            yield found
+
+
+def cut_by_core(core: Core, record: Record, lateral: FloatArray, rate: float) -> Turns:
+    """Return the turns of a record."""
+    block = block_of(TurnStruct, BLOCK)
+    parts = [
+        turn_columns(block[:n], lateral.size) for n in record.blocks(core.cut, block.ctypes.data)
+    ]
+    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return turns_of(columns, lateral, rate)
+
+
+def low_pass_struct(low_pass: LowPass) -> LowPassStruct:
+    """Return a filter as the core has it."""
+    return LowPassStruct(low_pass.order, np.nan if low_pass.cut_off is None else low_pass.cut_off)
+
+
+def beyond_samples(sample: int) -> ParameterError:
+    """Return the error of a filter that reaches beyond the samples of a turn."""
+    return ParameterError(
+        f"turn that ends before sample {sample}: its filter needs samples that are not kept; the "
+        "turn lasts too long or changes its rate too much; leave this part of the record out"
+    )
+
+
+def turn_columns(block: Any, gages: int) -> dict[str, Any]:
+    """Return copies of the columns of a block of turns, by the names of `Turn`."""
+    found = {name: block[name].copy() for name in TURN_SCALARS}
+    found |= {name: block[name][:, :gages].copy() for name in (*TURN_ROWS, "gage_flags")}
+    for name in ("strain", "rate"):
+        curves = block[name][:, : gages * PHI.size].copy()
+        found[name] = curves.reshape(len(block), gages, PHI.size)
+    found["flags"] = block["flags"].copy()
+    return found
