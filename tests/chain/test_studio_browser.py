@@ -1,12 +1,14 @@
-"""The studio in a real browser: five clicks from a sweep of forces to the named effect added."""
+"""The studio in a real browser: clicks from a sweep of forces to the added effect; attacks."""
 
 import json
 import re
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +17,7 @@ import pytest
 from tests.bench.browser import chromium
 from tests.bench.programs import PATIENCE
 from tests.unit.force_campaigns import write_sweep
-
-pytest.importorskip("starlette", reason="the extra `studio` is not installed")
+from tests.unit.studio.conftest import TOKEN, Served, until
 
 
 @pytest.fixture(scope="module")
@@ -81,3 +82,49 @@ def test_five_clicks_add_the_effect_that_forces_lack(browser: Any, tmp_path: Pat
     assert complaints == [] or all("WebSocket" in said for said in complaints), complaints
     host = re.split("[/?]", url)[2]
     assert {re.split("[/?]", one)[2] for one in addresses if "://" in one} == {host}
+
+
+HOSTILE = """async target => {
+  const found = {};
+  const body = '{"do": "example"}';
+  const form = { method: "POST", mode: "no-cors", credentials: "include", body };
+  found.blind = await fetch(`http://${target}/do`, form).then((r) => r.type, () => "refused");
+  found.read = await fetch(`http://${target}/home`, { credentials: "include" })
+    .then((r) => r.text(), () => "refused");
+  found.stream = await new Promise((done) => {
+    const socket = new WebSocket(`ws://${target}/news`);
+    socket.onopen = () => done("open");
+    socket.onerror = () => done("refused");
+  });
+  found.script = await new Promise((done) => {
+    const script = document.createElement("script");
+    script.src = `http://${target}/studio.js`;
+    script.onload = () => done("loaded");
+    script.onerror = () => done("refused");
+    document.head.append(script);
+  });
+  return found;
+}"""
+"""What a page of another origin tries, in a browser that has the studio's cookie."""
+
+
+def test_a_hostile_page_in_the_same_browser_reads_and_starts_nothing(
+    browser: Any, tmp_path: Path
+) -> None:
+    served = Served(tmp_path)
+    until(lambda: served.server.started)
+    with ThreadingHTTPServer(("127.0.0.1", 0), SimpleHTTPRequestHandler) as evil:
+        threading.Thread(target=evil.serve_forever, daemon=True).start()
+        page = browser.new_context().new_page()
+        page.set_default_timeout(1000.0 * PATIENCE)
+        page.goto(f"http://{served.host}/?token={TOKEN}")
+        page.locator("#steps a").first.wait_for()
+        page.goto(f"http://127.0.0.1:{evil.server_port}/nothing-here")  # same site, other origin
+        found = page.evaluate(HOSTILE, served.host)
+        page.context.close()
+        evil.shutdown()
+    kinds = [job.kind for job in served.desk.jobs.all.values()]
+    served.close()
+    assert found["read"] == found["stream"] == found["script"] == "refused"
+    assert found["blind"] in ("opaque", "refused")  # the browser does not say which
+    assert kinds == ["catalogue"]
