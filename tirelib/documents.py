@@ -1,5 +1,6 @@
-"""Results as JSON documents."""
+"""Results as JSON documents, and the hashes of the files that they come from."""
 
+import hashlib
 import json
 from pathlib import Path
 from typing import Any
@@ -41,3 +42,9 @@ def plain(value: Any) -> Any:
     if isinstance(value, float | np.floating):
         return float(value) if np.isfinite(value) else None
     return value
+
+
+def file_hash(path: Path) -> str:
+    """Return the SHA-256 of a file, in hex; the file may be larger than the memory."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

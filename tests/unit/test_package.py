@@ -32,7 +32,10 @@ def imported(folder: Path) -> set[str]:
 
 @pytest.mark.parametrize(
     ("folder", "extras", "own"),
-    [("tirelib", ("fmu",), {"tirelib"}), ("bench/tirebench", ("bench",), {"tirelib", "tirebench"})],
+    [
+        ("tirelib", ("fmu", "fleet", "delta"), {"tirelib"}),
+        ("bench/tirebench", ("bench",), {"tirelib", "tirebench"}),
+    ],
 )
 def test_everything_that_is_imported_is_declared(
     folder: str, extras: tuple[str, ...], own: set[str]

@@ -1,9 +1,10 @@
 """ASAM MDF 4 files as plain groups of channels. The only place that knows asammdf."""
 
+import mmap
 import struct
 import zlib
-from collections.abc import Sequence
-from contextlib import redirect_stdout
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from io import BytesIO, StringIO
 from pathlib import Path
@@ -21,6 +22,8 @@ _WHOLE = (
     "copy it again from the logger or take the run out of runs.csv",
 )
 _HEADER_END = 168  # identification block 64 bytes, header block 104 bytes
+_START_TIME = 64 + 24 + 6 * 8  # in the header block, after its links: ns since 1970
+_SHOWN = 12
 _BLOCK_HEAD = 24  # of any block: 4 bytes name, 4 spare, 8 length, 8 number of links
 
 
@@ -61,17 +64,29 @@ def read_mdf(path: Path) -> list[Group]:
         If the file is missing, is not MDF 4, was never finished, or ends too early.
     """
     content = _checked_content(path)
+    # From memory: a truncated file then ends in an exception, never in a bus error.
+    with _reading(len(content)) as MDF, _mdf(MDF, BytesIO(content)) as mdf:
+        return [_group(mdf, index) for index in range(len(mdf.groups))]
+
+
+def _mdf(MDF: Any, stream: Any) -> Any:
+    return MDF(stream, raise_on_multiple_occurrences=False)
+
+
+@contextmanager
+def _reading(size: int) -> Iterator[Any]:
+    """Yield the reader's class; what it raises over a file of a size in bytes is a FormatError.
+
+    The reader prints what it stumbles over; only the command line prints here.
+    """
     from asammdf import MDF  # 0.4 s to import; only those who read pay
     from asammdf.blocks.utils import MdfException
 
     try:
-        # From memory: a truncated file then ends in an exception, never in a bus error.
-        # The reader prints what it stumbles over; only the command line prints here.
-        with (
-            redirect_stdout(StringIO()),
-            MDF(BytesIO(content), raise_on_multiple_occurrences=False) as mdf,
-        ):
-            return [_group(mdf, index) for index in range(len(mdf.groups))]
+        with redirect_stdout(StringIO()):
+            yield MDF
+    except FormatError:
+        raise
     except (
         MdfException,
         ArithmeticError,
@@ -87,7 +102,7 @@ def read_mdf(path: Path) -> list[Group]:
         raise FormatError(
             Fault(
                 "",
-                f"truncated or damaged MDF 4 file of {len(content)} bytes (reader: "
+                f"truncated or damaged MDF 4 file of {size} bytes (reader: "
                 f"{str(error)[:80] or type(error).__name__})",
                 *_WHOLE,
             )
@@ -107,7 +122,20 @@ def _checked_content(path: Path) -> bytes:
                 "restore it or take its row out of runs.csv",
             )
         ) from None
-    if content.startswith(_UNFINISHED):
+    _check_beginning(content)
+    return content
+
+
+def _check_beginning(content: "bytes | mmap.mmap") -> None:
+    """Refuse what does not begin like a finished MDF 4 file.
+
+    Raises
+    ------
+    FormatError
+        Saying what it is instead.
+    """
+    beginning = content[:8]
+    if beginning == _UNFINISHED:
         raise FormatError(
             Fault(
                 "",
@@ -116,11 +144,11 @@ def _checked_content(path: Path) -> bytes:
                 "finish it with the logger's own tool",
             )
         )
-    if not content.startswith(_MAGIC):
+    if beginning != _MAGIC:
         raise FormatError(
             Fault(
                 "",
-                f"not an MDF file (begins with {content[:8]!r})",
+                f"not an MDF file (begins with {beginning!r})",
                 "ASAM MDF 4 is needed",
                 "convert it with `tirelib import`",
             )
@@ -143,10 +171,9 @@ def _checked_content(path: Path) -> bytes:
                 *_WHOLE,
             )
         )
-    return content
 
 
-def _has_header(content: bytes) -> bool:
+def _has_header(content: "bytes | mmap.mmap") -> bool:
     """Return whether the header and the chains of data and channel groups lie within the file.
 
     The reader would find that out too, but leaves a half-made object behind.
@@ -171,7 +198,7 @@ def _has_header(content: bytes) -> bool:
     return True
 
 
-def _links(content: bytes, address: int) -> list[int] | None:
+def _links(content: "bytes | mmap.mmap", address: int) -> list[int] | None:
     """Return the links of the block at an address, None when it does not lie within the file."""
     if address + _BLOCK_HEAD > len(content):
         return None
@@ -207,6 +234,151 @@ def _channel(signal: Any) -> Channel:
     if invalid is not None and samples.dtype.kind in "biuf":
         samples = np.where(np.asarray(invalid, dtype=bool), np.nan, samples)
     return Channel(str(signal.name), str(signal.unit or ""), samples)
+
+
+def started_at(path: Path) -> float | None:
+    """Return when a recording began, [s since 1970-01-01 UTC]; None if the file does not say."""
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(_HEADER_END)
+    except OSError:
+        return None
+    if len(head) < _HEADER_END or not head.startswith(_MAGIC):
+        return None
+    return 1e-9 * float(struct.unpack_from("<Q", head, _START_TIME)[0]) or None
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a channel lies in a file: its group, its number there, and its unit."""
+
+    name: str
+    group: int
+    index: int
+    unit: str
+
+
+class MdfFile:
+    """An MDF 4 file that is read in blocks, so that memory does not grow with its length.
+
+    Parameters
+    ----------
+    path : Path
+
+    Attributes
+    ----------
+    start : float, [s]
+        When the recording began, since 1970-01-01 UTC.
+
+    Raises
+    ------
+    FormatError
+        As from `read_mdf`.
+    """
+
+    def __init__(self, path: Path) -> None:
+        try:
+            self._stream = path.open("rb")
+            self._size = path.stat().st_size
+        except OSError as error:
+            raise FormatError(
+                Fault(
+                    str(path),
+                    f"the recording cannot be read ({error.strerror})",
+                    "every file of a recording must be there",
+                    "restore it",
+                )
+            ) from None
+        try:
+            if self._size < _HEADER_END:
+                _check_beginning(self._stream.read())
+            with mmap.mmap(self._stream.fileno(), 0, access=mmap.ACCESS_READ) as content:
+                _check_beginning(content)
+                self.start = 1e-9 * struct.unpack_from("<Q", content, _START_TIME)[0]
+            # a file object, not a path: a file that ends early raises and never a bus error
+            with _reading(self._size) as MDF:
+                self._mdf = _mdf(MDF, self._stream)
+        except BaseException:
+            self._stream.close()
+            raise
+        self._places: dict[str, list[Place]] = {}
+        for number, group in enumerate(self._mdf.groups):
+            for index, channel in enumerate(group.channels):
+                place = Place(channel.name, number, index, "")
+                self._places.setdefault(channel.name, []).append(place)
+
+    def __enter__(self) -> "MdfFile":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._mdf.close()
+        self._stream.close()
+
+    def place(self, name: str) -> Place:
+        """Return where the only channel of a name lies.
+
+        Raises
+        ------
+        FormatError
+            If there is none, or more than one.
+        """
+        found = self._places.get(name, [])
+        if len(found) != 1:
+            known = ", ".join(sorted(self._places)[:_SHOWN])
+            raise FormatError(
+                Fault(
+                    "",
+                    f"channel {name!r} is there {len(found)} times",
+                    f"a channel that is named must be there once; the file has {known}"
+                    + (" and others" if len(self._places) > _SHOWN else ""),
+                    "correct the name in the description or rename the channel in the logger",
+                )
+            )
+        return found[0]
+
+    def clock(self, group: int) -> Place:
+        """Return the time channel of a group.
+
+        Raises
+        ------
+        FormatError
+            If the group has none.
+        """
+        master = self._mdf.masters_db.get(group)
+        if master is None:
+            raise FormatError(
+                Fault(
+                    f"group {group}",
+                    "it has no time channel",
+                    "each group needs its own",
+                    "export it with its master channel",
+                )
+            )
+        return Place(self._mdf.groups[group].channels[master].name, group, master, "")
+
+    def samples(self, group: int) -> int:
+        """Return the number of samples of a group."""
+        return int(self._mdf.groups[group].channel_group.cycles_nr)
+
+    def read(self, places: Sequence[Place], start: int, count: int) -> list[Channel]:
+        """Return samples `start` to `start + count` of channels of one group.
+
+        Raises
+        ------
+        FormatError
+            If the file ends before them.
+        """
+        with _reading(self._size):
+            signals = self._mdf.select(
+                [(None, place.group, place.index) for place in places],
+                record_offset=start,
+                record_count=count,
+                copy_master=False,
+            )
+            for signal in signals:
+                if len(signal.samples) != count:
+                    raise ValueError(f"{signal.name} has {len(signal.samples)} of {count} samples")
+            return [_channel(signal) for signal in signals]
 
 
 def write_mdf(path: Path, groups: Sequence[Group]) -> None:

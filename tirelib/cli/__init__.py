@@ -30,6 +30,7 @@ VERBS = {
     "simulate": "Simulate the rolling ring on the road: shape, pressure, shear, strain and strain "
     "rate.",
     "fmu": "Export the estimator or the virtual tire as an FMU, check it, and run it.",
+    "fleet": "Run TASK over every campaign and recording below PATHS, on Dask.",
     "rig": "Measure a virtual tire on the numerical rig and write a campaign.",
 }
 """Verbs in the order of the journey, each with the first sentence of its help, so that the list of
@@ -42,6 +43,11 @@ OPTIONAL = {
     "starlette": "studio",
     "uvicorn": "studio",
     "websockets": "studio",
+    "dask": "fleet",
+    "distributed": "fleet",
+    "fsspec": "fleet",
+    "s3fs": "fleet",
+    "deltalake": "delta",
 }
 """Packages that a plain install lacks, and the extra that brings each."""
 

@@ -1,5 +1,6 @@
 """``tirelib estimate``: Fz, alpha, kappa and Fy of every turn, with standard deviations."""
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -8,9 +9,12 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from tirelib.campaign import read_campaign
+from tirelib.campaign.recording import FILE as RECORDING
+from tirelib.campaign.recording import read_recording
 from tirelib.cli.common import (
     CAMPAIGN,
     FILE,
+    NEW_FILE,
     NEW_FOLDER,
     output,
     progress_bar,
@@ -18,17 +22,26 @@ from tirelib.cli.common import (
 )
 from tirelib.cli.limits import not_checked, not_given, outside, weakly_checked
 from tirelib.cli.options import json_option
+from tirelib.documents import file_hash
 from tirelib.errors import CalibrationError
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration
+from tirelib.estimators.continuous import estimate_recording
+from tirelib.estimators.continuous_document import Totals, TurnsInJson
 from tirelib.estimators.costs import costs_of
 from tirelib.estimators.result import estimate_document
+from tirelib.estimators.turn_table import TurnTable
 from tirelib.observations import geometry_of, observe
 from tirelib.signal import LowPass
 
 _EXAMPLE = """\b
-Example:
+Examples:
   tirelib estimate data/another-day --calibration build/out/cal.toml --json build/out/e.json
+  tirelib estimate data/commute --calibration build/out/cal.toml --out build/out/turns.parquet
+
+\b
+DIR is a campaign, or a continuous recording (a folder with a recording.toml): hours of driving, one
+or several wheels, in bounded memory; then --report is not available.
 
 \b
 JSON: N, deg, kappa without unit, ISO 8855 axes. A value is null where a quantity has no calibration
@@ -51,6 +64,13 @@ probably another one.
 @click.option(
     "--report", metavar="FOLDER", type=NEW_FOLDER, help="Write the accuracy with figures as HTML."
 )
+@click.option(
+    "--out",
+    "table",
+    metavar="FILE.parquet",
+    type=NEW_FILE,
+    help="Write every turn as a table, one row each; of a recording they are then not in --json.",
+)
 @json_option("every turn")
 @click.pass_context
 def estimate(
@@ -58,10 +78,19 @@ def estimate(
     folder: Path,
     calibration_file: Path,
     report: Path | None,
+    table: Path | None,
     json_file: Path | None,
 ) -> None:
     """Estimate every turn of DIR, and compare with the forces that the rig measured."""
     calibration = read_calibration(calibration_file)
+    if (folder / RECORDING).is_file():
+        if report is not None:
+            raise CalibrationError(
+                f"{folder}: a recording has no forces of a rig to compare with, so there is no "
+                "--report; use --out or --json"
+            )
+        document = _estimate_recording(folder, calibration, calibration_file, table, json_file)
+        context.exit(0 if document["valid_turns"] else 1)
     campaign = read_campaign(folder)
     header = campaign.header
     calibration.check_layout(
@@ -80,6 +109,10 @@ def estimate(
     document = estimate_document(observations, estimates, calibration, costs)
     console = output()
     print_document(campaign.header.name, document, calibration)
+    if table is not None:
+        with TurnTable(table, file_hash(calibration_file)) as turns:
+            turns.write("", observations.run, observations.features, estimates)
+        console.print(f"written: {table}")
     if json_file is not None:
         write_json(json_file, document)
         console.print(f"written: {json_file}")
@@ -89,6 +122,55 @@ def estimate(
         page = write_estimate_report(observations, estimates, calibration, report)
         console.print(f"written: {page}")
     context.exit(exit_code(document))
+
+
+def _estimate_recording(
+    folder: Path,
+    calibration: Calibration,
+    calibration_file: Path,
+    table: Path | None,
+    json_file: Path | None,
+) -> dict[str, Any]:
+    """Write the turns of a continuous recording as they come, and return the document's head."""
+    recording = read_recording(folder)
+    console = output()
+    with ExitStack() as stack:
+        rows = stack.enter_context(TurnTable(table, file_hash(calibration_file))) if table else None
+        turns = stack.enter_context(TurnsInJson(json_file)) if json_file else None
+        total = Totals(recording, calibration)
+        progress = stack.enter_context(progress_bar("estimating"))
+        for part in estimate_recording(recording, calibration):
+            total.add(part)
+            if rows is not None:
+                rows.write(part.wheel.name, 0, part.features, part.estimates)
+            if turns is not None and rows is None:
+                turns.write(part)
+            progress(f"{part.wheel.name} {part.until:.0f} s")
+        document = total.document()
+        if turns is not None:
+            turns.end(document)
+    console.print(
+        f"{recording.name}: {document['duration_s'] / 3600:.2f} h, "
+        f"{len(document['wheels'])} wheels, {document['turn_count']} turns, "
+        f"{document['valid_turns']} valid (ISO 8855 axes)"
+    )
+    for name, wheel in document["wheels"].items():
+        console.print(
+            f"  {name}: {wheel['turns']} turns, {wheel['valid']} valid, {wheel['gaps']} long gaps, "
+            f"{wheel['missing_samples']} samples missing"
+        )
+        for flag, count in sorted(wheel["flags"].items(), key=lambda item: -item[1]):
+            console.print(f"    {count:6d} turns flagged {flag}")
+        other = wheel["other_tire"]
+        if other and other["suspected"]:
+            console.print(
+                f"    another tire? {other['turns']} of {other['judged']} turns in range have a "
+                f"strain pattern that the calibrated {calibration.tire!r} does not show"
+            )
+    for path in (table, json_file):
+        if path is not None:
+            console.print(f"written: {path}")
+    return document
 
 
 def exit_code(document: dict[str, Any]) -> int:

@@ -14,6 +14,7 @@ from tirelib.estimators.chain import QUANTITIES, Chain
 from tirelib.estimators.costs import COLUMN, Cost
 from tirelib.estimators.edge import EDGE_UNIT, FORMAT, VARIED
 from tirelib.estimators.likeness import suspected
+from tirelib.features.extract import Features
 from tirelib.flags import TurnFlag, flag_names
 from tirelib.observations import Observations, mean_by
 
@@ -44,7 +45,8 @@ def estimate_document(
             for quantity in QUANTITIES
         },
         "turns": [
-            _turn(row, observations, estimates, calibration) for row in range(len(observations))
+            turn_row(row, int(run), observations.features, estimates)
+            for row, run in enumerate(observations.run)
         ],
     }
 
@@ -152,12 +154,10 @@ def _summary(
     }
 
 
-def _turn(
-    row: int, observations: Observations, estimates: Estimates, calibration: Calibration
-) -> dict[str, Any]:
-    features = observations.features
+def turn_row(row: int, run: int, features: Features, estimates: Estimates) -> dict[str, Any]:
+    """Return one turn of the document."""
     turn: dict[str, Any] = {
-        "run": int(observations.run[row]),
+        "run": run,
         "t": _number(features.time[row]),
         "ready": _number(features.ready[row]),
     }
@@ -166,7 +166,7 @@ def _turn(
         turn[quantity] = _number(estimates.value[quantity][row] * factor)
         turn[f"{quantity}_std"] = _number(estimates.std[quantity][row] * factor)
         turn[f"{quantity}_valid"] = bool(estimates.valid[quantity][row])
-    for gage in range(len(calibration.lateral)):
+    for gage in range(estimates.contact_length.shape[1]):
         turn[f"contact_length_{gage + 1}_mm"] = _number(1e3 * estimates.contact_length[row, gage])
         turn[f"contact_length_{gage + 1}_std_mm"] = _number(
             1e3 * estimates.contact_length_std[row, gage]

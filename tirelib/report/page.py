@@ -123,12 +123,11 @@ def draw_all(folder: Path, drawings: Sequence[Drawing]) -> list[Picture]:
     return pictures
 
 
-def write_page(folder: Path, template: str | Path, **content: Any) -> Path:
-    """Fill a template and write it as ``index.html`` of the folder.
+def filled(template: str | Path, **content: Any) -> str:
+    """Return the text of a template with its values filled in.
 
     Parameters
     ----------
-    folder : Path
     template : str or Path
         The name of a template of this package, or the path of a template that extends one of them.
     **content
@@ -144,9 +143,14 @@ def write_page(folder: Path, template: str | Path, **content: Any) -> Path:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    text = environment.get_template(template.name).render(
+    return environment.get_template(template.name).render(
         axes=AXES_NAME, version=__version__, **content
     )
+
+
+def write_page(folder: Path, template: str | Path, **content: Any) -> Path:
+    """Fill a template and write it as ``index.html`` of the folder; values as of `filled`."""
+    text = filled(template, **content)
     folder.mkdir(parents=True, exist_ok=True)
     page = folder / "index.html"
     page.write_text(text, encoding="utf-8")

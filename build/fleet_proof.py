@@ -1,0 +1,246 @@
+"""Measure a fleet: throughput by workers, memory by number and by length, the scheduler's limit.
+
+    python build/fleet_proof.py recording --hours 0.1 2
+    python build/fleet_proof.py memory --counts 10 100 1000
+    python build/fleet_proof.py scheduler --counts 10000
+    python build/fleet_proof.py workers --counts 60
+    python build/fleet_proof.py endurance --minutes 10
+
+Each prints one line of numbers a case; docs/fleet.md holds them. Campaigns and recordings are of
+the tests' made-up tire. On a machine that others use, wall times say little: the processor time of
+workers is beside them.
+"""
+
+import argparse
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Thread
+
+import psutil
+from distributed import Client, LocalCluster
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT))
+
+from tests.fleet.recordings import describe, write_drive  # noqa: E402
+from tests.synthetic import cornering_runs, synthetic_run, write  # noqa: E402
+from tirelib.campaign import read_campaign  # noqa: E402
+from tirelib.cli.fleet import run_verb  # noqa: E402
+from tirelib.estimators.calibration_file import write_calibration  # noqa: E402
+from tirelib.estimators.train import train  # noqa: E402
+from tirelib.fleet import engine  # noqa: E402
+from tirelib.fleet.dataset import DataSet  # noqa: E402
+from tirelib.observations import observe  # noqa: E402
+
+PEAK = """
+import resource, sys
+from tirelib.cli.fleet import run_verb
+code, said = run_verb(sys.argv[1:])
+own = resource.getrusage(resource.RUSAGE_SELF)
+print(said.splitlines()[0])
+print(f"peak {own.ru_maxrss / 1024:.0f} MiB, {own.ru_utime + own.ru_stime:.1f} s of processor")
+"""
+
+
+def main() -> None:
+    """Run the measurement that is asked for."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "what", choices=("recording", "memory", "scheduler", "workers", "endurance")
+    )
+    parser.add_argument("--hours", type=float, nargs="+", default=(0.1, 2.0))
+    parser.add_argument("--counts", type=int, nargs="+", default=(10, 100, 1000))
+    parser.add_argument("--minutes", type=float, default=10.0)
+    chosen = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="fleet-proof-") as name:
+        folder = Path(name)
+        if chosen.what == "recording":
+            recording(folder, chosen.hours)
+        elif chosen.what == "memory":
+            memory(folder, chosen.counts)
+        elif chosen.what == "scheduler":
+            scheduler(folder, chosen.counts)
+        elif chosen.what == "workers":
+            workers(folder, chosen.counts[0])
+        else:
+            endurance(folder, chosen.minutes)
+
+
+def calibration(folder: Path) -> Path:
+    """Return a calibration of the made-up tire."""
+    write(folder / "calibration", cornering_runs())
+    path = folder / "cal.toml"
+    trained = train(observe([read_campaign(folder / "calibration")]))
+    write_calibration(trained.calibration, path, {})
+    return path
+
+
+def recording(folder: Path, hours: Sequence[float]) -> None:
+    """Peak memory of `tirelib estimate` over the length of a recording of two wheels."""
+    known = calibration(folder)
+    for length in hours:
+        drive = describe(folder / f"drive-{length}", ("FL", "FR"))
+        write_drive(
+            drive / "a.mf4",
+            seconds=3600.0 * length,
+            wheels=("FL", "FR"),
+            loads=(4000.0, 5000.0),
+            gaps=[(40.0, 40.01), (100.0, 110.0)],
+        )
+        (drive / "a.mf4").stat().st_size / 2**20
+        table = drive / "turns.parquet"
+        command = ["estimate", str(drive), "--calibration", str(known), "--out", str(table)]
+        done = subprocess.run(
+            [sys.executable, "-c", PEAK, *command], capture_output=True, text=True, cwd=ROOT
+        )
+        if done.returncode:
+            raise SystemExit(done.stderr)
+        shutil.rmtree(drive)
+
+
+def campaigns(folder: Path, count: int) -> Path:
+    """Write campaigns of one short run: the same samples, each with a name of its own."""
+    target = folder / "campaigns"
+    first = write(folder / "first", [synthetic_run(1, turns=3.2)])
+    header = (first / "campaign.toml").read_text()
+    for number in range(count):
+        place = target / f"{number:06d}"
+        if place.exists():
+            continue
+        (place / "runs").mkdir(parents=True)
+        (place / "campaign.toml").write_text(header.replace("synthetic", f"day {number}"))
+        os.link(first / "runs.csv", place / "runs.csv")
+        for run in (first / "runs").iterdir():
+            os.link(run, place / "runs" / run.name)
+    return target
+
+
+@contextmanager
+def cluster(workers: int) -> Iterator[Client]:
+    """Yield a client of a local cluster."""
+    with (
+        LocalCluster(
+            n_workers=workers, threads_per_worker=1, dashboard_address=":0", silence_logs=50
+        ) as local,
+        Client(local) as client,
+    ):
+        yield client
+
+
+class Peak(Thread):
+    """Watch the memory of this process and of the workers."""
+
+    def __init__(self, client: Client) -> None:
+        super().__init__(daemon=True)
+        self._pids = [os.getpid(), *client.run(os.getpid).values()]
+        self.peak = [0] * len(self._pids)
+        self.going = True
+
+    def run(self) -> None:
+        """Look twice a second."""
+        while self.going:
+            for k, pid in enumerate(self._pids):
+                self.peak[k] = max(self.peak[k], psutil.Process(pid).memory_info().rss)
+            time.sleep(0.5)
+
+
+def _check(paths: Path, out: Path, client: Client, verb=run_verb) -> engine.Counts:
+    data = DataSet(str(out))
+    data.open()
+    recipe = engine.recipe_of("check", data, files={})
+    return engine.run([str(paths)], data, recipe, client, verb)
+
+
+def memory(folder: Path, counts: Sequence[int]) -> None:
+    """Peak memory of client with scheduler, and of a worker, over the number of campaigns."""
+    for count in counts:
+        paths = campaigns(folder, count)
+        with cluster(2) as client:
+            watch = Peak(client)
+            watch.start()
+            began = time.monotonic()
+            _check(paths, folder / f"out-{count}", client)
+            time.monotonic() - began
+            watch.going = False
+        ", ".join(f"{peak / 2**20:.0f}" for peak in watch.peak)
+
+
+def nothing(command: Sequence[str]) -> tuple[int, str]:
+    """Write the document of a check that found nothing, at once."""
+    place = command[command.index("--json") + 1]
+    Path(place).write_text('{"errors": 0, "warnings": 0, "problems": []}')
+    return 0, ""
+
+
+def scheduler(folder: Path, counts: Sequence[int]) -> None:
+    """Tasks a second when the verb itself takes no time."""
+    for count in counts:
+        paths = campaigns(folder, count)
+        with cluster(2) as client:
+            _processor(client)
+            began = time.monotonic()
+            _check(paths, folder / f"out-{count}", client, nothing)
+            time.monotonic() - began
+            _processor(client)
+        resource.getrusage(resource.RUSAGE_SELF)
+
+
+def _spent() -> float:
+    own = resource.getrusage(resource.RUSAGE_SELF)
+    return own.ru_utime + own.ru_stime
+
+
+def _processor(client: Client) -> float:
+    return float(sum(client.run(_spent).values()))
+
+
+def workers(folder: Path, count: int) -> None:
+    """Throughput with one worker and with two, as wall time and as processor time."""
+    known = calibration(folder)
+    paths = campaigns(folder, count)
+    for number in (1, 2, 1, 2):
+        out = folder / f"out-{number}-{time.monotonic_ns()}"
+        with cluster(number) as client:
+            data = DataSet(str(out))
+            data.open()
+            recipe = engine.recipe_of("estimate", data, files={"calibration": str(known)})
+            engine.run([str(paths / "000000")], data, recipe, client, run_verb)
+            before, began = _processor(client), time.monotonic()
+            engine.run([str(paths)], data, recipe, client, run_verb)
+            _wall, _spent = time.monotonic() - began, _processor(client) - before
+
+
+def endurance(folder: Path, minutes: float) -> None:
+    """Kill a worker every ten seconds; in the end everything is there once."""
+    paths = campaigns(folder, 400)
+    until, kills, rounds = time.monotonic() + 60.0 * minutes, 0, 0
+    while time.monotonic() < until:
+        out = folder / f"out-{rounds}"
+        with cluster(2) as client:
+            last = time.monotonic()
+
+            def kill(counts: engine.Counts, client: Client = client) -> None:
+                nonlocal last, kills
+                if time.monotonic() - last > 10.0:
+                    last, kills = time.monotonic(), kills + 1
+                    os.kill(next(iter(client.run(os.getpid).values())), signal.SIGKILL)
+
+            data = DataSet(str(out))
+            data.open()
+            recipe = engine.recipe_of("check", data, files={})
+            engine.run([str(paths)], data, recipe, client, run_verb, report=kill)
+        data.table("container_metrics")["container_id"].to_pylist()
+        rounds += 1
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,213 @@
+"""A fleet on a cluster: what is kept, skipped, reported, resumed, and who can read it."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+
+pytest.importorskip("distributed", reason="the extra tirelib[fleet] is not installed")
+
+from distributed import Client
+
+from tests.fleet.recordings import describe, write_drive
+from tirelib.cli import program
+from tirelib.cli.fleet import run_verb
+from tirelib.errors import FormatError, ParameterError
+from tirelib.fleet import engine, work
+from tirelib.fleet.dataset import DataSet
+from tirelib.fleet.engine import Counts
+from tirelib.fleet.page import fleet_document, write_fleet_page
+from tirelib.fleet.sources import content_hash, find_sources
+
+
+def run(
+    task: str, paths: Sequence[Path | str], out: Path | str, client: Client, **options: object
+) -> Counts:
+    data = DataSet(str(out))
+    data.open()
+    files = {k: str(options.pop(k)) for k in ("calibration", "model") if k in options}
+    recipe = engine.recipe_of(task, data, files=files, options=options.pop("also", ()))  # type: ignore[arg-type]
+    return engine.run([str(p) for p in paths], data, recipe, client, run_verb, **options)  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def estimated(
+    campaigns: Path, calibration: Path, client: Client, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, Counts]:
+    out = tmp_path_factory.mktemp("fleet") / "data"
+    drive = describe(out.parent / "drives" / "commute")
+    write_drive(drive / "a.mf4", seconds=12.0)
+    paths = [campaigns, out.parent / "drives"]
+    counts = run("estimate", paths, out, client, calibration=calibration, delta=True)
+    return out, counts
+
+
+def test_a_broken_campaign_stops_no_other(estimated: tuple[Path, Counts]) -> None:
+    out, counts = estimated
+    assert (counts.total, counts.done, counts.failed, counts.left) == (5, 4, 1, 0)
+    (message,) = counts.messages.values()
+    assert "'tirelib-campaign/99' is an unknown version" in message
+    failures = DataSet(str(out)).table("failures").to_pylist()
+    assert failures[0]["cause"]
+    assert failures[0]["file_path"].endswith("broken")
+
+
+def test_numbers_are_those_of_the_command(
+    estimated: tuple[Path, Counts], campaigns: Path, calibration: Path, tmp_path: Path
+) -> None:
+    out, _ = estimated
+    folder = campaigns / "north" / "day-1"
+    document = tmp_path / "e.json"
+    command = ["estimate", str(folder), "--calibration", str(calibration), "--json", str(document)]
+    CliRunner().invoke(program, command, catch_exceptions=False)
+    turns = json.loads(document.read_text())["turns"]
+    metrics = pd.read_parquet(out / "container_metrics")
+    row = metrics[metrics.file_path == str(folder)].iloc[0]
+    assert row.content_hash == content_hash(folder)
+    channels = pd.read_parquet(out / "channels", filters=[("container_id", "==", row.container_id)])
+    names = pd.read_parquet(out / "channel_metrics")
+    names = names[names.container_id == row.container_id].set_index("channel_name")
+    for name in ("Fz", "alpha", "Fy_std"):
+        mine = channels[channels.channel_id == names.loc[name, "channel_id"]].sort_values("tstart")
+        expected = [np.nan if turn[name] is None else turn[name] for turn in turns]
+        np.testing.assert_allclose(mine.value, expected, rtol=1e-12)
+        assert mine.run.tolist() == [turn["run"] for turn in turns]
+        assert names.loc[name, "mean"] == pytest.approx(np.nanmean(expected))
+    assert (channels.tend >= channels.tstart).all()
+    assert channels.tirelib.nunique() == 1
+    assert channels.recipe.nunique() == 1
+
+
+def test_a_recording_of_a_wheel_is_a_container(estimated: tuple[Path, Counts]) -> None:
+    out, _ = estimated
+    metrics = pd.read_parquet(out / "container_metrics")
+    row = metrics[metrics.kind == "recording"].iloc[0]
+    assert row.duration_ms == pytest.approx(12000, abs=300)
+    assert str(row.start_dt).startswith("2026-05-28")
+    tags = pd.read_parquet(out / "channel_tags")
+    tags = tags[(tags.container_id == row.container_id) & (tags.key == "wheel")]
+    assert set(tags.value) == {"FL"}
+
+
+def test_readers_agree(estimated: tuple[Path, Counts]) -> None:
+    polars, duckdb = pytest.importorskip("polars"), pytest.importorskip("duckdb")
+    deltalake = pytest.importorskip("deltalake")
+    out, _ = estimated
+    for table in ("channels", "channel_metrics", "container_tags", "container_metrics", "results"):
+        frame = pd.read_parquet(out / table)
+        pattern = str(out / table / "task=*" / "*.parquet")
+        count = len(frame)
+        assert count
+        assert set(frame.task) == {"estimate"}
+        assert polars.read_parquet(pattern, hive_partitioning=True).height == count
+        query = f"select count(*), min(task) from read_parquet('{pattern}', hive_partitioning=true)"
+        assert duckdb.sql(query).fetchall()[0] == (count, "estimate")
+        assert deltalake.DeltaTable(str(out / table)).to_pyarrow_table().num_rows == count
+
+
+def test_finished_ones_are_skipped_wherever_they_lie(
+    estimated: tuple[Path, Counts], campaigns: Path, calibration: Path, client: Client
+) -> None:
+    out, _ = estimated
+    again = run("estimate", [campaigns], out, client, calibration=calibration)
+    assert (again.skipped, again.done, again.failed) == (3, 0, 1)
+    moved = out.parent / "moved"
+    (campaigns / "north" / "day-2").rename(moved)
+    try:
+        counts = run("estimate", [moved], out, client, calibration=calibration)
+    finally:
+        moved.rename(campaigns / "north" / "day-2")
+    assert (counts.total, counts.known, counts.done) == (1, 1, 0)
+    assert len(pd.read_parquet(out / "container_metrics")) == 4
+
+
+def test_a_client_that_dies_loses_nothing(
+    campaigns: Path, client: Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Killed after two small tables: the half batch goes, and notes are taken unread."""
+    data = DataSet(str(tmp_path / "out"))
+
+    def dies(self: DataSet, task: str, rows: dict[str, list[dict[str, object]]]) -> None:
+        real(self, task, {"results": rows["results"]})
+        for path in data.files("container_metrics"):
+            data.fs.rm(data.path("container_metrics", path))
+        raise SystemError("killed")
+
+    real = DataSet.add
+    monkeypatch.setattr(DataSet, "add", dies)
+    with pytest.raises(SystemError, match="killed"):
+        run("check", [campaigns / "north"], tmp_path / "out", client)
+    monkeypatch.setattr(DataSet, "add", real)
+    assert data.files("results")
+    assert not data.files("container_metrics")
+    assert len(data.fs.ls(data.path("pending", "check"))) == 3
+
+    computed: list[object] = []
+    monkeypatch.setattr(work, "_compute", lambda *given: computed.append(given))
+    counts = run("check", [campaigns / "north"], tmp_path / "out", client)
+    assert (counts.done, computed) == (3, [])
+    assert len(data.table("container_metrics")) == 3
+    assert set(data.table("results")["container_id"].to_pylist()) == set(
+        data.table("container_metrics")["container_id"].to_pylist()
+    )
+    assert not data.fs.ls(data.path("pending", "check"))
+
+
+def test_calibrations_of_a_data_set_serve_every_campaign_of_their_tire(
+    campaigns: Path, calibration: Path, client: Client, tmp_path: Path
+) -> None:
+    calibrations, out = tmp_path / "calibrations", tmp_path / "estimates"
+    whole = calibration.parent / "campaign"
+    assert run("calibrate", [whole], calibrations, client, also=("--quick",)).done == 1
+    counts = run("estimate", [campaigns / "north"], out, client, calibration=calibrations)
+    assert (counts.done, counts.failed) == (3, 0)
+
+
+@pytest.mark.parametrize(
+    ("task", "files", "said"),
+    [
+        ("estimate", {}, "--calibration is missing"),
+        ("check", {"model": "table-6-1"}, "takes no --model"),
+        ("estimate", {"calibration": "nowhere"}, "neither a file nor a data set"),
+    ],
+)
+def test_a_wrong_recipe_is_refused(
+    task: str, files: dict[str, str], said: str, tmp_path: Path
+) -> None:
+    data = DataSet(str(tmp_path / "out"))
+    data.open()
+    with pytest.raises((ParameterError, FormatError), match=said):
+        engine.recipe_of(task, data, files=files)
+
+
+def test_paths_without_campaigns_and_foreign_folders_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(FormatError) as caught:
+        find_sources([str(tmp_path / "empty"), "nowhere/at-all", "s4://what"])
+    assert len(caught.value.problems) == 3
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(FormatError, match="not empty and not a data set"):
+        DataSet(str(tmp_path)).open()
+
+
+def test_patterns_find_each_once(campaigns: Path) -> None:
+    found = find_sources([f"{campaigns}/no*/day-*", str(campaigns / "north")])
+    assert [Path(source.url).name for source in found] == ["day-0", "day-1", "day-2"]
+
+
+def test_the_page_shows_failures_and_links(estimated: tuple[Path, Counts]) -> None:
+    out, _ = estimated
+    data = DataSet(str(out))
+    page = Path(write_fleet_page(data)).read_text()
+    assert "Failures by cause" in page
+    assert "is an unknown version" in page
+    document = fleet_document(data)
+    assert {each["channel"] for each in document["changes"]} >= {"pressure", "rolling_radius"}
+    for each in document["containers"]:
+        own = (out / each["page"]).read_text()
+        assert each["page"] in page
+        assert "../../index.html" in own

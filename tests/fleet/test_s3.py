@@ -1,0 +1,57 @@
+"""Campaigns in a bucket, results in a bucket: a server of S3 in this process."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+pytest.importorskip("s3fs", reason="the extra tirelib[fleet] is not installed")
+pytest.importorskip("moto.server", reason="moto is not installed, so there is no bucket")
+
+import fsspec
+from distributed import Client
+from moto import server
+
+from tirelib.cli.fleet import run_verb
+from tirelib.fleet import engine
+from tirelib.fleet.dataset import DataSet
+from tirelib.fleet.page import write_fleet_page
+
+
+@pytest.fixture
+def bucket() -> Iterator[str]:
+    with pytest.MonkeyPatch.context() as patch:
+        running = server.ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
+        running.start()
+        host, port = running.get_host_and_port()
+        patch.setenv("AWS_ENDPOINT_URL", f"http://{host}:{port}")
+        patch.setenv("AWS_ACCESS_KEY_ID", "key")
+        patch.setenv("AWS_SECRET_ACCESS_KEY", "secret")
+        patch.setenv("AWS_DEFAULT_REGION", "us-east-1")
+        fsspec.filesystem("s3", skip_instance_cache=True).mkdir("fleet")
+        yield "s3://fleet"
+        running.stop()
+
+
+def test_from_bucket_to_bucket(
+    bucket: str, campaigns: Path, calibration: Path, client: Client, tmp_path: Path
+) -> None:
+    fs = fsspec.filesystem("s3", skip_instance_cache=True)
+    fs.put(str(campaigns / "north" / "day-0"), "fleet/in/day-0", recursive=True)
+    fs.put(str(campaigns / "broken"), "fleet/in/broken", recursive=True)
+    data = DataSet(f"{bucket}/out")
+    data.open()
+    for skipped in (0, 1):
+        recipe = engine.recipe_of("estimate", data, files={"calibration": str(calibration)})
+        counts = engine.run([f"{bucket}/in"], data, recipe, client, run_verb, delta=True)
+        assert (counts.total, counts.skipped, counts.failed) == (2, skipped, 1), counts.messages
+    assert write_fleet_page(data).endswith("fleet/out/index.html")
+    fs.get("fleet/out", str(tmp_path / "out"), recursive=True)
+    (row,) = pd.read_parquet(tmp_path / "out" / "container_metrics").to_dict("records")
+    assert row["file_path"] == "s3://fleet/in/day-0"
+    assert (tmp_path / "out" / row["page"]).is_file()
+    assert len(pd.read_parquet(tmp_path / "out" / "channels")) > 100
+    deltalake = pytest.importorskip("deltalake")
+    table = deltalake.DeltaTable(str(tmp_path / "out" / "container_metrics"))
+    assert table.to_pyarrow_table().num_rows == 1

@@ -1,0 +1,392 @@
+"""Tasks to Dask: a local cluster or one by address, with a bounded number of tasks at a time."""
+
+import json
+import logging
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pyarrow.dataset as pads
+from distributed import Client, Future, LocalCluster, as_completed
+
+from tirelib import __version__
+from tirelib.errors import FormatError, ParameterError
+from tirelib.fleet.dataset import DataSet, Rows
+from tirelib.fleet.sources import Source, find_sources, fingerprint
+from tirelib.fleet.tables import PARTITION
+from tirelib.fleet.work import NEEDS, TASKS, WRITES, Outcome, Recipe, Verb, failed, process
+
+if TYPE_CHECKING:
+    from tirelib.fleet.delta import DeltaLog
+
+AHEAD = 8
+"""Tasks a worker that are handed to the scheduler at once. With half of it a worker may wait for
+the client between tasks of a millisecond; double costs the scheduler's memory only."""
+FEWEST_AHEAD = 64
+BATCH = 500
+"""Containers whose rows are added as one file."""
+LATEST = 5.0
+"""Time after which finished rows are added, however few they are, [s]."""
+CONNECT = 20.0
+"""Time in which a scheduler must answer, [s]."""
+
+
+@dataclass(slots=True)
+class Counts:
+    """How far a fleet has come."""
+
+    total: int = 0
+    skipped: int = 0
+    known: int = 0
+    done: int = 0
+    failed: int = 0
+    began: float = field(default_factory=time.monotonic)
+    messages: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def left(self) -> int:
+        """Sources that are still to be done."""
+        return self.total - self.skipped - self.known - self.done - self.failed
+
+    @property
+    def rate(self) -> float:
+        """Sources done a second."""
+        return (self.done + self.failed + self.known) / max(time.monotonic() - self.began, 1e-9)
+
+
+class SchedulerLostError(FormatError):
+    """The scheduler went away; what was finished is kept."""
+
+
+@contextmanager
+def cluster(address: str | None, workers: int | None) -> Iterator[Client]:
+    """Yield a client of a scheduler by address, or of a cluster of this machine's processes.
+
+    Raises
+    ------
+    FormatError
+        If there is no scheduler at the address, or its workers have another version of tirelib.
+    """
+    if address is None:
+        with (
+            LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                dashboard_address=":0",
+                silence_logs=logging.ERROR,
+            ) as local,
+            Client(local) as client,
+        ):
+            yield client
+        return
+    try:
+        client = Client(address, timeout=CONNECT)
+    except (OSError, ValueError) as error:
+        raise FormatError(
+            f"--scheduler {address}: no scheduler answers ({error}); start one with `dask "
+            "scheduler`, or leave the option out for a cluster on this machine"
+        ) from None
+    with client:
+        versions = client.run(_version)
+        odd = {worker: found for worker, found in versions.items() if found != __version__}
+        if odd:
+            raise FormatError(
+                f"--scheduler {address}: worker {next(iter(odd))} has tirelib "
+                f"{next(iter(odd.values()))}, this is {__version__}; all need the same version"
+            )
+        yield client
+
+
+def _version() -> str:
+    return __version__
+
+
+def recipe_of(
+    task: str,
+    data: DataSet,
+    *,
+    files: Mapping[str, str],
+    options: Sequence[str] = (),
+    reports: bool = False,
+) -> Recipe:
+    """Return a recipe, and put its files into the data set, where every worker can read them.
+
+    Parameters
+    ----------
+    task : str
+        One of `TASKS`.
+    data : DataSet
+    files : mapping of str to str
+        ``calibration`` and ``model``: a file, the name of a tire that ships with tirelib, or
+        another data set of `tirelib fleet calibrate` or `identify`.
+    options : sequence of str
+    reports : bool
+
+    Raises
+    ------
+    ParameterError
+        If the task is unknown, or lacks the file that it needs, or does not take one.
+    FormatError
+        If a file cannot be read.
+    """
+    if task not in TASKS:
+        raise ParameterError(f"task {task!r}; allowed are {', '.join(TASKS)}; correct the name")
+    needed = NEEDS.get(task)
+    if needed is not None and needed not in files:
+        raise ParameterError(f"fleet {task}: --{needed} is missing; give a file or a data set")
+    for name in files:
+        if name != needed:
+            raise ParameterError(f"fleet {task}: takes no --{name}; leave it out")
+    content = {name: _taken(data, name, given) for name, given in files.items()}
+    whole = json.dumps([task, list(options), {name: h for name, (_, h) in content.items()}])
+    return Recipe(
+        task,
+        tuple(options),
+        {name: path for name, (path, _) in content.items()},
+        reports,
+        sha256(whole.encode()).hexdigest(),
+    )
+
+
+def _taken(data: DataSet, name: str, given: str) -> tuple[str, str]:
+    """Put a file, or the index of a data set of such files, into the data set."""
+    path = Path(given)
+    if path.is_file():
+        content, ending = path.read_bytes(), path.name
+    else:
+        other = DataSet(given)
+        if not other.has("fleet.json"):
+            if name == "model" and "/" not in given:
+                return _shipped(data, given)
+            raise FormatError(
+                f"--{name} {given}: neither a file nor a data set of `tirelib fleet`; correct it"
+            )
+        content, ending = _index(other, name), "index.json"
+    digest = sha256(content).hexdigest()
+    place = f"recipes/{digest[:16]}/{ending}"
+    data.write(content, *place.split("/"))
+    return place, digest
+
+
+def _shipped(data: DataSet, name: str) -> tuple[str, str]:
+    """Write a tire that ships with tirelib as a file."""
+    from tirelib.parameters import read_tire, write_tire
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "model.toml")
+        write_tire(read_tire(name), path, "tirelib-model/1")
+        return _taken(data, "model", str(path))
+
+
+def _index(other: DataSet, name: str) -> bytes:
+    """Return where a data set has the file of each container and of each tire, the newest last."""
+    task = next(task for task, written in WRITES.items() if written == name)
+    columns = ["content_hash", "tire", "file", "finished_dt"]
+    rows = other.table("container_metrics", columns, pads.field(PARTITION) == task)
+    found = sorted(rows.to_pylist(), key=lambda row: row["finished_dt"])
+    return json.dumps(
+        {
+            "data_set": other.url,
+            "by_content": {row["content_hash"]: row["file"] for row in found},
+            "by_tire": {row["tire"]: row["file"] for row in found},
+        },
+        sort_keys=True,
+    ).encode()
+
+
+def run(
+    paths: Sequence[str],
+    data: DataSet,
+    recipe: Recipe,
+    client: Client,
+    verb: Verb,
+    *,
+    counts: Counts | None = None,
+    delta: bool = False,
+    report: Callable[[Counts], None] = lambda counts: None,
+) -> Counts:
+    """Run a task over every source below the paths that is not finished.
+
+    Parameters
+    ----------
+    paths : sequence of str
+    data : DataSet
+        Opened.
+    recipe : Recipe
+    client : Client
+    verb : callable
+        Runs a command of the command line in a worker.
+    counts : Counts, optional
+        Brought up to date as results come.
+    delta : bool
+        Keep a Delta log beside the Parquet files; a data set that has one keeps it in any case.
+    report : callable
+        Called with the counts after each result.
+
+    Raises
+    ------
+    SchedulerLostError
+        If the scheduler goes away.
+    """
+    counts = Counts() if counts is None else counts
+    sources = find_sources(paths)
+    counts.total = len(sources)
+    delta = delta or data.has("container_metrics", "_delta_log")
+    data.repair(recipe.task)
+    finished, marks = data.finished(recipe.task, recipe.hash)
+    book = _Book(data, recipe.task, finished, _delta(data) if delta else None)
+    waiting = _unfinished(sources, marks, counts)
+    given: dict[Future[Any], tuple[Source, str]] = {}
+    done = as_completed()
+    room = max(FEWEST_AHEAD, AHEAD * max(sum(client.nthreads().values()), 1))
+    try:
+        _submit(client, waiting, given, done, room, recipe, data.url, verb)
+        while given:
+            for future in done.next_batch():
+                source, mark = given.pop(future)
+                _take(_outcome(future, source, mark, recipe, client), source, counts, book)
+                future.release()
+            report(counts)
+            book.close(only_if_due=True)
+            _submit(client, waiting, given, done, room, recipe, data.url, verb)
+    finally:
+        client.cancel(list(given), asynchronous=False, force=True) if _alive(client) else None
+        book.close()
+    report(counts)
+    return counts
+
+
+def _delta(data: DataSet) -> "DeltaLog":
+    from tirelib.fleet.delta import DeltaLog  # with a package that only --delta needs
+
+    return DeltaLog(data)
+
+
+def _unfinished(
+    sources: Sequence[Source], marks: set[str], counts: Counts
+) -> Iterator[tuple[Source, str]]:
+    for source in sources:
+        mark = fingerprint(source)
+        if mark in marks:
+            counts.skipped += 1
+        else:
+            yield source, mark
+
+
+def _submit(
+    client: Client,
+    waiting: Iterator[tuple[Source, str]],
+    given: dict[Future[Any], tuple[Source, str]],
+    done: Any,
+    room: int,
+    recipe: Recipe,
+    address: str,
+    verb: Verb,
+) -> None:
+    while len(given) < room:
+        each = next(waiting, None)
+        if each is None:
+            return
+        future = client.submit(
+            process,
+            *each,
+            recipe,
+            address,
+            verb,
+            key=f"{recipe.task}-{recipe.hash[:8]}-{each[1]}",
+            pure=False,
+        )
+        given[future] = each
+        done.add(future)
+
+
+def _outcome(
+    future: Future[Any], source: Source, mark: str, recipe: Recipe, client: Client
+) -> Outcome:
+    if future.status == "finished":
+        return future.result()  # type: ignore[no-any-return]
+    if future.status in ("lost", "cancelled"):
+        raise SchedulerLostError(
+            "the scheduler went away; what is finished is kept; start it again, and give the same "
+            "command once more"
+        )
+    error = future.exception()
+    return failed(source, mark, recipe, f"{source.url}: {error}", type(error).__name__)
+
+
+def _alive(client: Client) -> bool:
+    return bool(client.status == "running")
+
+
+def _take(outcome: Outcome, source: Source, counts: Counts, book: "_Book") -> None:
+    if outcome.failed:
+        counts.failed += 1
+        counts.messages[source.url] = outcome.failed
+    elif outcome.known:
+        counts.known += 1
+    else:
+        counts.done += 1
+    book.add(outcome)
+
+
+class _Book:
+    """Rows that are still to be added to the data set."""
+
+    def __init__(
+        self, data: DataSet, task: str, finished: set[int], log: "DeltaLog | None"
+    ) -> None:
+        self._data, self._task, self._finished, self._log = data, task, finished, log
+        self._open()
+
+    def _open(self) -> None:
+        self._rows: dict[str, list[Mapping[str, Any]]] = {}
+        self._notes: list[str] = []
+        self._channels: list[str] = []
+        self._count = 0
+        self._since = time.monotonic()
+
+    def add(self, outcome: Outcome) -> None:
+        """Keep the rows of an outcome, once for each container."""
+        if outcome.note:
+            self._notes.append(outcome.note)
+        if outcome.known or (outcome.container in self._finished and not outcome.failed):
+            return
+        if not outcome.failed:
+            self._finished.add(outcome.container)
+            self._channels.append(f"{PARTITION}={self._task}/{outcome.container}.parquet")
+        if not self._count:
+            self._since = time.monotonic()
+        self._count += 1
+        for name, rows in outcome.rows.items():
+            self._rows.setdefault(name, []).extend(rows)
+
+    def close(self, *, only_if_due: bool = False) -> None:
+        """Add the rows to the data set, and remove the notes of what was added."""
+        late = time.monotonic() - self._since > LATEST
+        if only_if_due and not (self._count >= BATCH or (self._count and late)):
+            return
+        if self._count:
+            rows: Rows = self._rows
+            written = self._data.add(self._task, rows)
+            if self._log is not None:
+                kept = set(self._data.files("channels")) if self._channels else set()
+                channels = [("channels", path) for path in self._channels if path in kept]
+                self._log.add([*written, *channels])
+        for note in self._notes:
+            path = self._data.path(note)
+            if self._data.fs.exists(path):
+                self._data.fs.rm(path)
+        self._open()
+
+
+def causes(counts: Counts) -> list[tuple[str, int]]:
+    """Return the messages of what failed, the most frequent first."""
+    said = Counter(message.splitlines()[0] for message in counts.messages.values())
+    return said.most_common()

@@ -1,0 +1,386 @@
+"""The page of a fleet: tires side by side, changes with time, effects, failures, joined tires.
+
+Every point and every row opens the page of its campaign or recording.
+"""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import plotly.graph_objects as go
+from markupsafe import Markup
+
+from tirelib.report.comparison import Part
+from tirelib.report.figures.compare_plot import Plot, styled_figure
+from tirelib.report.page import DASH, Table, number
+from tirelib.report.parts_page import write_parts_page
+from tirelib.report.style import BLUE, FAINT, ORANGE, RED
+
+MOST_ROWS = 200
+"""Rows of a table on the page; the tables of the data set have all."""
+
+
+def write_fleet(
+    folder: Path, document: Mapping[str, Any], parts: Sequence[Part], url: str
+) -> tuple[Path, Path]:
+    """Write ``index.html`` and ``index.md``; return their paths."""
+    return write_parts_page(
+        folder,
+        "index",
+        parts,
+        title="Fleet",
+        summary=f"{_count(document)}. Data set: {url}",
+        answer="",
+        messages=(),
+        lines=_lines(document),
+    )
+
+
+def _count(document: Mapping[str, Any]) -> str:
+    by_task = Counter(row["task"] for row in document["containers"])
+    tires = {row["tire"] for row in document["containers"]}
+    tasks = ", ".join(f"{task} {count}" for task, count in sorted(by_task.items())) or "none"
+    return f"Finished campaigns and recordings: {tasks}; {len(tires)} tires"
+
+
+def _lines(document: Mapping[str, Any]) -> list[tuple[str, str]]:
+    odd = [
+        f"{point['tire']} ({each['name']})"
+        for each in document["parameters"]
+        for point in each["points"]
+        if point["outlier"]
+    ]
+    changing = [
+        f"{each['tire']}{f' {wheel}' if (wheel := each['wheel']) else ''}: {each['cause']}"
+        for each in document["changes"]
+        if each["changes"]
+    ]
+    named = Counter(name for each in document["effects"] for name in each["named"])
+    failed = sum(each["number"] for each in document["failures"])
+    gains = [row["gain"] for each in document["parameters"] for row in each["joined"]]
+    lines = [
+        ("Stand out", _some(odd) or "no tire, beyond its interval and the scatter of the others"),
+        ("Change with time", _some(changing) or "none, beyond the scatter of the recordings"),
+        (
+            "Effects",
+            ", ".join(f"{name} in {count}" for name, count in named.most_common()) or "none named",
+        ),
+        ("Failed", f"{failed}, see the causes below" if failed else "none"),
+    ]
+    if gains:
+        lines.append(
+            (
+                "Joined tires",
+                f"the standard deviations fall by a factor of up to {max(gains):.2f} (see below)",
+            )
+        )
+    return lines
+
+
+def _some(items: Sequence[str]) -> str:
+    more = f", and {len(items) - 6} more" if len(items) > 6 else ""
+    return ", ".join(items[:6]) + more
+
+
+def fleet_parts(document: Mapping[str, Any]) -> list[Part]:
+    """Return the parts of the page; one that has nothing to show is left out."""
+    parts = [
+        _parameters(document["parameters"]),
+        _changes(document["changes"]),
+        _effects(document["effects"]),
+        _joined(document["parameters"]),
+        _failures(document["failures"]),
+        _containers(document["containers"]),
+    ]
+    return [part for part in parts if part.plots or part.tables]
+
+
+def _link(page: str, text: str) -> Markup:
+    return Markup('<a href="{}">{}</a>').format(page, text) if page else Markup.escape(text)
+
+
+def _parameters(parameters: Sequence[Mapping[str, Any]]) -> Part:
+    plots = [_parameter_plot(index, each) for index, each in enumerate(parameters)]
+    odd = [
+        [
+            _link(point["page"], point["tire"]),
+            point["campaign"],
+            each["name"],
+            each["unit"],
+            number(point["value"]),
+            number(point["low"]),
+            number(point["high"]),
+            number(each["centre"]),
+            f"{point['score']:+.1f}",
+        ]
+        for each in parameters
+        for point in each["points"]
+        if point["outlier"]
+    ]
+    columns = (
+        "tire",
+        "campaign",
+        "parameter",
+        "unit",
+        "value",
+        "95 % from",
+        "to",
+        "mean of the others",
+        "distance in std",
+    )
+    tables = [Table("Tires that stand out", columns, odd, texts=4)] if odd else []
+    text = (
+        "Points are campaigns with 95 % intervals; the band is the mean of the tires with "
+        "twice the scatter between them. Orange: farther from the others than interval and "
+        "scatter explain (one false alarm in twenty pages). Click on a point to open its campaign."
+    )
+    return Part("Parameters over the tires", "parameters", text, tables, plots)
+
+
+def _parameter_plot(index: int, each: Mapping[str, Any]) -> Plot:
+    points = each["points"]
+    figure = go.Figure()
+    labels = [f"{point['tire']}, {point['campaign']}" for point in points]
+    for outlier, colour, name in ((False, BLUE, "usual"), (True, ORANGE, "stands out")):
+        chosen = [k for k, point in enumerate(points) if point["outlier"] is outlier]
+        if not chosen:
+            continue
+        values = [points[k]["value"] for k in chosen]
+        figure.add_scatter(
+            x=[labels[k] for k in chosen],
+            y=values,
+            mode="markers",
+            name=name,
+            marker={"color": colour, "size": 9, "symbol": "diamond" if outlier else "circle"},
+            error_y={
+                "array": [points[k]["high"] - points[k]["value"] for k in chosen],
+                "arrayminus": [points[k]["value"] - points[k]["low"] for k in chosen],
+                "thickness": 1.2,
+            },
+            customdata=[points[k]["page"] for k in chosen],
+            hovertemplate="%{x}<br>%{y:.4g}<extra></extra>",
+        )
+    low, high = each["centre"] - 2 * each["scatter"], each["centre"] + 2 * each["scatter"]
+    figure.add_hrect(y0=low, y1=high, fillcolor=FAINT, opacity=0.12, line_width=0)
+    figure.add_hline(y=each["centre"], line={"color": FAINT, "width": 1})
+    figure.update_xaxes(
+        categoryorder="array", categoryarray=labels, showticklabels=len(points) <= 40
+    )
+    styled_figure(figure, 360, showlegend=True, legend={"orientation": "h", "y": 1.12})
+    figure.update_yaxes(title=f"{each['name'].replace('_', ' ')} [{each['unit']}]")
+    return Plot(
+        f"parameter-{index}",
+        f"{each['name'].replace('_', ' ')}"
+        + (f", free radius {each['size']}" * bool(each["size"])),
+        f"Mean {number(each['centre'])}, scatter between tires {number(each['scatter'])} "
+        f"{each['unit']}. ",
+        figure,
+        ("tire", "campaign", "value", "low", "high", "stands out"),
+        [[p["tire"], p["campaign"], p["value"], p["low"], p["high"], p["outlier"]] for p in points],
+    )
+
+
+def _changes(changes: Sequence[Mapping[str, Any]]) -> Part:
+    rows = [
+        [
+            _link(each["pages"][-1], each["tire"]),
+            each["wheel"] or DASH,
+            each["channel"],
+            each["unit"],
+            each["cause"],
+            str(len(each["values"])),
+            number(each["change"], 3),
+            number(each["per_day"], 3),
+            f"{each['p']:.1g}",
+        ]
+        for each in changes
+        if each["changes"]
+    ]
+    columns = (
+        "tire",
+        "wheel",
+        "channel",
+        "unit",
+        "what it may be",
+        "recordings",
+        "change",
+        "a day",
+        "chance",
+    )
+    tables = [Table("Changes", columns, rows, texts=5)] if rows else []
+    by_channel: dict[str, list[Mapping[str, Any]]] = {}
+    for each in changes:
+        if len(each["values"]) > 1:
+            by_channel.setdefault(each["channel"], []).append(each)
+    plots = [_change_plot(channel, series) for channel, series in by_channel.items()]
+    text = (
+        "Means of recordings over time, a line for each tire and wheel. Orange: steeper than "
+        "the scatter about it explains; for the rolling radius pressure and load are taken out."
+    )
+    return Part("Changes with time", "changes", text, tables, plots)
+
+
+def _change_plot(channel: str, series: Sequence[Mapping[str, Any]]) -> Plot:
+    figure = go.Figure()
+    for each in series:
+        figure.add_scatter(
+            x=[datetime.fromtimestamp(t, UTC) for t in each["time"]],
+            y=each["values"],
+            mode="lines+markers",
+            name=f"{each['tire']} {each['wheel']}".strip(),
+            line={
+                "color": ORANGE if each["changes"] else BLUE,
+                "width": 2.2 if each["changes"] else 0.8,
+            },
+            opacity=1.0 if each["changes"] else 0.55,
+            customdata=each["pages"],
+            hovertemplate="%{x|%Y-%m-%d}<br>%{y:.4g}<extra>%{fullData.name}</extra>",
+        )
+    styled_figure(figure, 340, showlegend=len(series) <= 12)
+    figure.update_yaxes(title=f"{channel.replace('_', ' ')} [{series[0]['unit']}]")
+    return Plot(
+        f"change-{channel}",
+        channel.replace("_", " "),
+        f"{sum(each['changes'] for each in series)} of {len(series)} lines change. ",
+        figure,
+        ("tire", "wheel", "time_s", "value"),
+        [
+            [each["tire"], each["wheel"], time, value]
+            for each in series
+            for time, value in zip(each["time"], each["values"], strict=True)
+        ],
+    )
+
+
+def _effects(effects: Sequence[Mapping[str, Any]]) -> Part:
+    plots = []
+    names = sorted({name for each in effects for name in (*each["named"], *each["hints"])})
+    if names:
+        tires = [f"{each['tire']}, {each['campaign']}" for each in effects]
+        level = [
+            [2 if name in each["named"] else int(name in each["hints"]) for each in effects]
+            for name in names
+        ]
+        figure = go.Figure(
+            go.Heatmap(
+                x=tires,
+                y=names,
+                z=level,
+                zmin=0,
+                zmax=2,
+                colorscale=[[0.0, "#f2f4f6"], [0.5, "#9ecae1"], [1.0, RED]],
+                xgap=2,
+                ygap=2,
+                showscale=False,
+                customdata=[[each["page"] for each in effects] for _ in names],
+                hovertemplate="%{x}<br>%{y}<extra></extra>",
+            )
+        )
+        styled_figure(figure, 180 + 26 * len(names))
+        figure.update_xaxes(showticklabels=len(tires) <= 40)
+        rows = [[t, n, level[j][i]] for i, t in enumerate(tires) for j, n in enumerate(names)]
+        plots.append(
+            Plot(
+                "effects",
+                "Effects by tire",
+                "Red: named. Blue: a hint. Grey: neither. ",
+                figure,
+                ("tire", "effect", "level"),
+                rows,
+            )
+        )
+    rows = [
+        [
+            _link(each["page"], each["tire"]),
+            each["campaign"],
+            each["quantity"],
+            each["verdict"],
+            ", ".join(each["named"]) or DASH,
+            ", ".join(each["hints"]) or DASH,
+        ]
+        for each in effects[:MOST_ROWS]
+    ]
+    columns = ("tire", "campaign", "quantity", "verdict", "named", "hints")
+    tables = [Table("Verdicts", columns, rows, texts=6)] if rows else []
+    return Part("Effects by tire", "effects", "", tables, plots)
+
+
+def _joined(parameters: Sequence[Mapping[str, Any]]) -> Part:
+    rows = [
+        [
+            _link(row["page"], row["tire"]),
+            each["name"],
+            each["unit"],
+            str(row["campaigns"]),
+            number(row["own"]),
+            number(row["own_std"], 3),
+            number(row["value"]),
+            number(row["low"]),
+            number(row["high"]),
+            f"{row['gain']:.2f}",
+        ]
+        for each in parameters
+        for row in each["joined"]
+    ]
+    rows.sort(key=lambda row: -float(row[-1]))
+    columns = (
+        "tire",
+        "parameter",
+        "unit",
+        "campaigns",
+        "alone",
+        "std alone",
+        "joined",
+        "95 % from",
+        "to",
+        "gain",
+    )
+    note = (
+        "gain: standard deviation alone over that after the join; its square is how many times the "
+        "runs it is worth. Tires that stand out are not joined."
+    )
+    tables = [
+        Table(
+            "Joined numbers", columns, rows[:MOST_ROWS], texts=3, note=note, folded=len(rows) > 40
+        )
+    ]
+    text = (
+        "Tires of one size are one population: a tire with few runs borrows from its siblings, as "
+        "far as these scatter less than its own interval is wide."
+    )
+    return Part("Joined tires", "joined", text, tables if rows else [])
+
+
+def _failures(failures: Sequence[Mapping[str, Any]]) -> Part:
+    rows = [
+        [
+            each["task"],
+            each["cause"],
+            each["message"].splitlines()[0][:160],
+            ", ".join(path.rpartition("/")[2] for path in each["paths"][:3])
+            + (", ..." if len(each["paths"]) > 3 else ""),
+            str(each["number"]),
+        ]
+        for each in failures[:MOST_ROWS]
+    ]
+    columns = ("task", "cause", "first message", "where", "number")
+    tables = [Table("Failures by cause", columns, rows, texts=4)] if rows else []
+    return Part("Failures", "failures", "The same command tries them again.", tables)
+
+
+def _containers(containers: Sequence[Mapping[str, Any]]) -> Part:
+    rows = [
+        [_link(row["page"], row["name"]), row["tire"], row["task"], row["file_path"]]
+        for row in containers[:MOST_ROWS]
+    ]
+    note = (
+        f"The first {MOST_ROWS} of {len(containers)}; the table container_metrics has all."
+        if len(containers) > MOST_ROWS
+        else ""
+    )
+    table = Table(
+        "Pages of all", ("campaign", "tire", "task", "path"), rows, texts=4, note=note, folded=True
+    )
+    return Part("Campaigns and recordings", "containers", "", [table] if rows else [])
