@@ -1,7 +1,11 @@
-"""Campaigns in a bucket, results in a bucket: a server of S3 in this process."""
+"""Campaigns in a bucket, results in a bucket, through a server of S3 on this machine."""
 
+import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
+from socket import create_connection, socket
+from subprocess import Popen
 
 import pandas as pd
 import pytest
@@ -11,8 +15,8 @@ pytest.importorskip("moto.server", reason="moto is not installed, so there is no
 
 import fsspec
 from distributed import Client
-from moto import server
 
+from tests.bench.programs import PATIENCE
 from tirelib.cli.fleet import run_verb
 from tirelib.fleet import engine
 from tirelib.fleet.dataset import DataSet
@@ -21,17 +25,35 @@ from tirelib.fleet.page import write_fleet_page
 
 @pytest.fixture
 def bucket() -> Iterator[str]:
-    with pytest.MonkeyPatch.context() as patch:
-        running = server.ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
-        running.start()
-        host, port = running.get_host_and_port()
-        patch.setenv("AWS_ENDPOINT_URL", f"http://{host}:{port}")
-        patch.setenv("AWS_ACCESS_KEY_ID", "key")
-        patch.setenv("AWS_SECRET_ACCESS_KEY", "secret")
-        patch.setenv("AWS_DEFAULT_REGION", "us-east-1")
-        fsspec.filesystem("s3", skip_instance_cache=True).mkdir("fleet")
-        yield "s3://fleet"
-        running.stop()
+    """A server in its own process: the Delta library waits for it and lets no thread run."""
+    with socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    server = Popen([sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)])
+    try:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("AWS_ENDPOINT_URL", f"http://127.0.0.1:{port}")
+            patch.setenv("AWS_ACCESS_KEY_ID", "key")
+            patch.setenv("AWS_SECRET_ACCESS_KEY", "secret")
+            patch.setenv("AWS_DEFAULT_REGION", "us-east-1")
+            _wait_for(port)
+            fsspec.filesystem("s3", skip_instance_cache=True).mkdir("fleet")
+            yield "s3://fleet"
+    finally:
+        server.kill()
+        server.wait()
+
+
+def _wait_for(port: int) -> None:
+    until = time.monotonic() + PATIENCE
+    while True:
+        try:
+            create_connection(("127.0.0.1", port), timeout=1.0).close()
+        except OSError:
+            assert time.monotonic() < until
+            time.sleep(0.1)
+        else:
+            return
 
 
 def test_from_bucket_to_bucket(

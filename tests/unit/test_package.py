@@ -33,7 +33,7 @@ def imported(folder: Path) -> set[str]:
 @pytest.mark.parametrize(
     ("folder", "extras", "own"),
     [
-        ("tirelib", ("fmu", "fleet", "delta"), {"tirelib"}),
+        ("tirelib", ("fmu", "fleet", "delta", "studio"), {"tirelib"}),
         ("bench/tirebench", ("bench",), {"tirelib", "tirebench"}),
     ],
 )
