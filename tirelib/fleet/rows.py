@@ -163,8 +163,8 @@ class Channels:
             pq.ParquetWriter(target, SCHEMAS["channels"], compression="zstd") as writer,
         ):
             for part in range(file.num_row_groups):
-                for rows in self._rows(file.read_row_group(part)):
-                    writer.write_table(rows)
+                rows = list(self._rows(file.read_row_group(part)))
+                writer.write_table(pa.concat_tables(rows).combine_chunks())
 
     def _rows(self, table: pa.Table) -> Iterator[pa.Table]:
         columns = {name: table[name].to_numpy(zero_copy_only=False) for name in table.column_names}

@@ -17,8 +17,8 @@ FEWEST = 4
 """Tires that can be siblings: with a flat prior three leave the scatter without an upper bound."""
 POINTS = 200
 WIDEST = 10.0
-"""Largest scatter on the grid, in standard deviations of the values. With half or double of it the
-joined numbers of five tires change by less than a hundredth of their standard deviation
+"""Largest scatter on the grid, in standard deviations of the values. With half of it the joined
+numbers of five tires move by 0.08 of their standard deviation at most, with double by 0.04
 (``python build/fleet_constants.py``)."""
 
 
