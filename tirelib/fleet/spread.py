@@ -21,8 +21,8 @@ double 9.5 %, and a tire 5 scatters away is found in 65, 52 and 78 %
 FEWEST = 5
 """Values among which one can stand out: of four, one may differ from three by anything."""
 LARGEST_SHARE = 0.3
-"""Share of the values that may stand out. Each step tests at a part of the level: with half of it 82
-instead of 65 % of tires 5 scatters away are found among 12, with double 49 %."""
+"""Share of the values that may stand out. Each step tests at a part of the level: with half of it
+82 instead of 65 % of tires 5 scatters away are found among 12, with double 49 %."""
 MANY = 100
 """Values from which one of them no longer changes mean and scatter of the others."""
 FEWEST_IN_TIME = 5
