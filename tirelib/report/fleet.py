@@ -134,7 +134,7 @@ def _parameters(parameters: Sequence[Mapping[str, Any]]) -> Part:
     text = (
         "Points are campaigns with 95 % intervals; the band is the mean of the tires with "
         "twice the scatter between them. Orange: farther from the others than interval and "
-        "scatter explain (on about one page in fifteen by chance). Click on a point to open its page."
+        "scatter explain (on one page in fifteen by chance). A click on a point opens its page."
     )
     return Part("Parameters over the tires", "parameters", text, tables, plots)
 
