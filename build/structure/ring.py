@@ -207,6 +207,7 @@ def _constants(
         k_s=tire.k_s,
         poisson=0.0,
         friction=tire.friction,
+        creep=0.0,
         omega=omega,
         load=load,
         torque=0.0,

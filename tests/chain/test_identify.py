@@ -94,6 +94,7 @@ def true() -> dict[str, float]:
         "liner_share": 0.0,
         "tread_poisson": 0.0,
         "contact_crown": 0.0,
+        "creep": 0.0,
     }
 
 
@@ -139,7 +140,7 @@ def test_the_document_says_what_was_done(document: dict[str, Any], campaign: Pat
     assert document["gages"] == [1, 2, 3, 4, 5]
     assert document["noise_ustrain"] is None, "nothing was repeated"
     matrix = np.array(document["correlation"])
-    assert matrix.shape == (16, 16)
+    assert matrix.shape == (17, 17)
     assert np.diag(matrix) == pytest.approx(1.0)
     assert document["provenance"]["data_sha256"] == read_campaign(campaign).content_hash()
     keys = {"name", "meaning", "value", "std", "low", "high", "fit_std", "unit", "flags", "helps"}

@@ -12,7 +12,7 @@ from tirelib.contact.exact import load_exact
 from tirelib.contact.tread import Tread
 from tirelib.errors import ConvergenceError, ParameterError
 from tirelib.ring.ring import Ring
-from tirelib.rolling import belt
+from tirelib.rolling import belt, road
 from tirelib.rolling.assemble import Unknowns, matrix, residual
 from tirelib.rolling.constants import Constants
 from tirelib.rolling.gage import Gage
@@ -44,6 +44,7 @@ BARE: dict[str, Any] = {
     "k_s": 0.0,
     "poisson": 0.0,
     "friction": 0.0,
+    "creep": 0.0,
     "omega": 1.0,
     "load": LOADS,
     "torque": 0.0,
@@ -54,6 +55,7 @@ WHOLE = {
     "rotary_inertia": 6e-5,
     "k_s": 1.8e7,
     "friction": 0.9,
+    "creep": 0.008,
     "hardening": 1.0,
     "dashpots": 0.05,
     "omega": 70.0,
@@ -82,8 +84,9 @@ def rms(values: FloatArray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def test_the_matrix_is_the_derivative_of_the_residual() -> None:
-    k, grid = ring(WHOLE), mesh()
+@pytest.mark.parametrize("creep", [0.0, 0.008])
+def test_the_matrix_is_the_derivative_of_the_residual(creep: float) -> None:
+    k, grid = ring(WHOLE, creep=creep), mesh()
     found, random = solve(k), np.random.default_rng(1)
     x = found.x
     step = Unknowns(
@@ -200,10 +203,68 @@ def test_the_road_carries_the_load_and_no_torque() -> None:
 
 
 def test_what_the_road_puts_in_is_what_dashpots_and_sliding_take() -> None:
-    for grip in ({}, {"friction": 0.3}, {"dashpots": 0.0}):
+    for grip in (
+        {},
+        {"friction": 0.3},
+        {"dashpots": 0.0},
+        {"dashpots": 0.0, "creep": 0.05},
+        {"creep": 0.0},
+    ):
         found = solve(ring({**WHOLE, **grip}))
         speed = found.rolling_radius * found.constants.omega
         np.testing.assert_allclose(found.drag * speed, found.dissipated, rtol=0.02, atol=1e-6)
+
+
+def test_a_tread_that_creeps_less_and_less_sticks_and_one_that_creeps_much_slides_freely() -> None:
+    still = {"dashpots": 0.0}
+    sticks = strain(solve(ring(WHOLE, **still, creep=0.0)))
+    off = [rms(strain(solve(ring(WHOLE, **still, creep=c))) - sticks) for c in (0.004, 4e-4, 4e-5)]
+    assert off[0] > 8.0 * off[1] > 60.0 * off[2]
+    smooth = strain(solve(ring(WHOLE, **still, k_s=0.0)))
+    loose = strain(solve(ring(WHOLE, **still, creep=1e3)))
+    # a sliding bristle takes a hundredth of a further shear
+    assert rms(loose - smooth) < road.SLIDING_STIFFNESS * rms(sticks - smooth)
+
+
+def test_creep_takes_power_and_sticking_none() -> None:
+    """With these constants a tread that sticks does not reach its friction anywhere."""
+    lost = []
+    for creep in (0.0, 1e-3, 2e-3):
+        found = solve(ring(WHOLE, dashpots=0.0, friction=5.0, creep=creep))
+        lost.append(found.drag * found.rolling_radius)
+    assert (np.abs(lost[0]) < 0.02 * lost[1]).all()
+    np.testing.assert_allclose(lost[2] / lost[1], 2.0, rtol=0.05)  # g = c rho k_s q / (mu P)
+
+
+LENGTHS = st.floats(1e-6, 1e-2)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.floats(-1e-2, 1e-2), LENGTHS, st.one_of(st.just(0.0), LENGTHS))
+def test_bristles_follow_the_law_of_friction_and_never_give_power(
+    wanted: float, limit: float, creep: float
+) -> None:
+    def shear(*at: float) -> tuple[FloatArray, ...]:
+        return road.bristles(*[np.array([value]) for value in at])
+
+    found, *slopes = (float(each[0]) for each in shear(wanted, limit, creep))
+    # what a sliding bristle takes of a further shear is numerics, not friction
+    held = (found - road.SLIDING_STIFFNESS * wanted) / (1.0 - road.SLIDING_STIFFNESS)
+    slip = wanted - held
+    assert held * slip >= -1e-15 * held**2
+    assert abs(held) <= limit * (1.0 + 1e-9)
+    if creep > 0.0:
+        law = limit * slip / np.hypot(slip, creep)
+        assert held == pytest.approx(law, abs=1e-9 * limit)
+    else:
+        assert held == pytest.approx(np.clip(wanted, -limit, limit))
+    assert 0.0 <= slopes[0] <= 1.0
+    if creep > 0.0:
+        step = 1e-5 * min(limit, creep)
+        for slope, way in zip(slopes, step * np.eye(3), strict=True):
+            at = np.array([wanted, limit, creep])
+            difference = float(shear(*(at + way))[0][0] - shear(*(at - way))[0][0])
+            assert slope == pytest.approx(difference / (2.0 * step), abs=1e-5)
 
 
 def test_without_losses_the_shape_is_symmetric_and_with_them_it_follows_the_motion() -> None:

@@ -50,6 +50,7 @@ WIDTH = {
     "liner_share": 1.0,
     "tread_poisson": 1.0,
     "contact_crown": 1.3,
+    "creep": 1.3,
 }
 """Prior standard deviations of the base's coordinates: wide, the campaign informs them."""
 IN_BASE = {

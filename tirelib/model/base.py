@@ -68,10 +68,12 @@ PLAIN: tuple[Coordinate, ...] = (
     Coordinate("liner_share", 0.4),
     Coordinate("tread_poisson", 0.3),
     Coordinate("contact_crown"),
+    Coordinate("creep"),
 )
 """Those of the plain tire: every belt shears and has section inertia, every gage sits on layers
-that the shear force leaves alone, every tread sticks to the road, hardens and grows wider when it
-is pressed, and its strips meet the road one after the other."""
+that the shear force leaves alone, every tread holds on to the road with a friction that grows with
+slip, hardens and grows wider when it is pressed, and its strips meet the road one after the
+other."""
 
 
 def coordinates(values: Mapping[str, float | FloatArray]) -> tuple[Coordinate, ...]:

@@ -66,6 +66,7 @@ def made_of(values: Values, points: Operating) -> Made:
         k_s=v["tread_shear_stiffness"],
         poisson=v["tread_poisson"],
         friction=FRICTION,
+        creep=v["creep"],
         omega=points.omega,
         load=points.load,
         torque=0.0,

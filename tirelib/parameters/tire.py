@@ -78,6 +78,9 @@ FIELDS: Mapping[str, Field] = MappingProxyType(
             "tread", "1/m", "curvature", 0.0, 20.0, "curvature across that the belt keeps on a road"
         ),
         "friction": Field("tread", "1", "ratio", 0.0, 5.0, "mu, tread on road"),
+        "creep": Field(
+            "tread", "1", "ratio", 0.0, 1.0, "slip at 71 % of full friction; 0 sticks fully"
+        ),
         "crown_curvature": Field(
             "lateral", "1/m", "curvature", -20.0, 20.0, "curvature of the tread's crown"
         ),
@@ -163,6 +166,7 @@ class Tire:
     tread_poisson: float = 0.0
     contact_crown: float = 0.0
     friction: float = 1.0
+    creep: float = 0.0
     crown_curvature: float = 0.7
     lateral_bending: float = 8000.0
     lateral_shear: float = 1.2e4

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.arrays import BoolArray, FloatArray
 from tirelib.rolling import belt, road
 from tirelib.rolling.constants import Constants
 from tirelib.rolling.mesh import Mesh, Points
@@ -68,14 +68,13 @@ class Contact:
         k_s q on the tread along X.
     node : Tip
         At the fine elements' four nodes, (n_points, n_fine, 4).
-    q, sticks, side : shape (n_points, n_fine, 3)
-        Law of the bristles at each element's second to fourth node.
-    limit_slope : shape (n_points, n_fine, 3)
-        Derivative of the most shear mu P / k_s by the overlap.
-    entered : shape (n_points, n_fine, 3)
-        Share of the way from the node before on which the bristle touches the road.
-    entered_slope : shape (2, n_points, n_fine, 3), [-]
-        Derivative of the shear through it, by the overlaps at the node before and at the node.
+    touches : shape (n_points, n_fine, 3)
+        Whether each element's second to fourth node is below the road.
+    q : shape (n_points, n_fine, 3), [m]
+        Shear by the bristles' law there.
+    by_q, by_step, by_before, by_after, by_rolling : shape (n_points, n_fine, 3)
+        Its slopes by the shear at the node before, by the way that road and tip have moved apart
+        since, by the overlaps there and here, and by the rolling radius.
     """
 
     tip: road.Tip
@@ -84,12 +83,13 @@ class Contact:
     slope: FloatArray
     shear: FloatArray
     node: road.Tip
+    touches: BoolArray
     q: FloatArray
-    sticks: FloatArray
-    side: FloatArray
-    limit_slope: FloatArray
-    entered: FloatArray
-    entered_slope: FloatArray
+    by_q: FloatArray
+    by_step: FloatArray
+    by_before: FloatArray
+    by_after: FloatArray
+    by_rolling: FloatArray
 
 
 def by_element(node: FloatArray) -> FloatArray:
@@ -133,11 +133,27 @@ def contact(x: Unknowns, local: FloatArray, k: Constants, mesh: Mesh) -> Contact
     most, by_overlap = road.pressure(over[..., 1:], k)
     entered, by_before, by_after = road.entered(over[..., :-1], over[..., 1:])
     share = np.divide(k.friction, k.k_s, out=np.zeros(len(k)), where=k.grips)[:, None, None]
-    step = x.rolling[:, None, None] * np.diff(angle) - np.diff(tips.along, axis=-1)
-    q, sticks, side = road.bristles(entered * step, fine[..., :-1, Q], share * most)
-    by = np.stack([by_before * step, by_after * step])
+    way = np.diff(angle)
+    step = x.rolling[:, None, None] * way - np.diff(tips.along, axis=-1)
+    slack = (k.creep * x.rolling)[:, None, None] * way
+    q, by_q, by_limit, by_creep = road.bristles(
+        fine[..., :-1, Q] + entered * step, share * most, entered * slack
+    )
+    by_entered = by_q * step + by_creep * slack
     return Contact(
-        at, delta, push, slope, shear, tips, q, sticks, side, share * by_overlap, entered, by
+        tip=at,
+        delta=delta,
+        pressure=push,
+        slope=slope,
+        shear=shear,
+        node=tips,
+        touches=over[..., 1:] > 0.0,
+        q=q,
+        by_q=by_q,
+        by_step=by_q * entered,
+        by_before=by_entered * by_before,
+        by_after=by_entered * by_after + by_limit * share * by_overlap,
+        by_rolling=entered * way * (by_q + by_creep * k.creep[:, None, None]),
     )
 
 
@@ -266,14 +282,11 @@ def _second(c: Contact, i: int, j: int) -> FloatArray | float:
 def _bristle_rows(element: FloatArray, sides: FloatArray, c: Contact, mesh: Mesh) -> None:
     """Add the derivatives of the bristles' law at each element's second to fourth node."""
     element[:, :, [1, 2, 3], Q, [1, 2, 3], Q] = 1.0
-    angle = np.diff(mesh.node_angles)
     for m in range(3):
-        after, sticks, side = m + 1, c.sticks[..., m], c.side[..., m]
+        after, on = m + 1, c.by_step[..., m]
+        by_before, by_after = c.by_before[..., m], c.by_after[..., m]
         rows = element[:, mesh.fine]
-        rows[:, :, after, Q, m, Q] -= sticks
-        on = sticks * c.entered[..., m]
-        by_before = sticks * c.entered_slope[0, ..., m]
-        by_after = sticks * c.entered_slope[1, ..., m] + side * c.limit_slope[..., m]
+        rows[:, :, after, Q, m, Q] -= c.by_q[..., m]
         for f in range(3):
             down, along = c.node.by_down[f], c.node.by_along[f]
             rows[:, :, after, Q, m, f] -= on * along[..., m] + by_before * down[..., m]
@@ -283,7 +296,7 @@ def _bristle_rows(element: FloatArray, sides: FloatArray, c: Contact, mesh: Mesh
         moved = moved + by_after[..., None] * thicker[..., after, None] * mesh.at_nodes[:, after]
         rows[:, :, after, Q, :, 2] -= moved
         sides[:, mesh.fine, after, Q, 0] -= by_before + by_after
-        sides[:, mesh.fine, after, Q, 1] -= on * angle[:, m]
+        sides[:, mesh.fine, after, Q, 1] -= c.by_rolling[..., m]
 
 
 def _belt_blocks(z: FloatArray, k: Constants, mesh: Mesh) -> FloatArray:

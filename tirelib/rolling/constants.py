@@ -47,6 +47,8 @@ class Constants:
         nu / (1 - nu) of the tread: what it grows thicker as the belt compresses it along the
         circumference, and what it pushes along the belt as the road compresses it.
     friction : [-]
+    creep : [-]
+        Slip, over the road's speed, at which friction has 71 % of its full value; zero sticks.
     omega, load, torque : [rad/s], [N], [N m]
         Values of the wheel; a torque that drives is positive.
     """
@@ -71,6 +73,7 @@ class Constants:
     k_s: FloatArray
     poisson: FloatArray
     friction: FloatArray
+    creep: FloatArray
     omega: FloatArray
     load: FloatArray
     torque: FloatArray

@@ -1,4 +1,4 @@
-r"""Tread and road: pressure that can only push, shear that sticks or slides.
+r"""Tread and road: pressure that can only push, friction that grows with slip.
 
 The tread's tip lies h = R0 - R below the belt along its section's normal. Where it would reach
 below the road by delta > 0, the tread is compressed and pushes back. Its crown is curved across the
@@ -18,9 +18,16 @@ with which rubber that is compressed by the road, and pushes along the belt outs
 line, bends the belt (a layer bonded to the belt, in plane strain; blocks with grooves around have
 less).
 
-Under the contact the road runs with V = rho Omega. A bristle that sticks is sheared by
-dq / dphi = rho - X', X the place of its tip along the road, and slides where k_s |q| > mu P.
-rho, the rolling radius, follows from the wheel's torque.
+Under the contact the road runs with V = rho Omega. A bristle is sheared by the way that road and
+belt move apart, less the slip g of its foot, all per radian, and its shear is the friction of that
+slip:
+
+.. math:: q' = \rho - X' - g, \qquad k_s\,q = \mu P\,\frac{g}{\sqrt{g^2 + (c\rho)^2}},
+
+X the place of the tread's tip along the road. The friction of rubber grows with its sliding speed
+(Grosch, Proc. R. Soc. A 274 (1963)); c, the creep, is the slip at which it has 71 % of its full
+value. With c = 0 a bristle sticks until k_s |q| = mu P and slides from there. rho, the rolling
+radius, follows from the wheel's torque.
 """
 
 from dataclasses import dataclass
@@ -33,6 +40,9 @@ from tirelib.rolling.constants import Constants
 SLIDING_STIFFNESS = 0.01
 """Share of a further shear that a sliding bristle takes: the road's speed stays determined where
 everything slides."""
+SLIP_STEPS = 60
+SLIP_TOLERANCE = 1e-14
+"""Relative to the shear of a bristle that sticks."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,24 +110,54 @@ def pressure(delta: FloatArray, k: Constants) -> tuple[FloatArray, FloatArray]:
 
 
 def bristles(
-    step: FloatArray, before: FloatArray, limit: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return shear of bristles that come from `before` through `step`, held up to `limit`.
+    wanted: FloatArray, limit: FloatArray, creep: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return the shear of bristles after a step, by the implicit Euler method.
+
+    Parameters
+    ----------
+    wanted : shape (...), [m]
+        Shear of a bristle that sticks all the way.
+    limit : shape (...), [m]
+        Shear of one that slides, mu P / k_s; zero where there is no contact.
+    creep : shape (...), [m]
+        Slip over the step at which friction has 71 % of its full value.
 
     Returns
     -------
-    shear, its slope by before + step (1 where it sticks), its slope by the limit
+    shear, and its slopes by the three
     """
-    wanted = before + step
-    sticks = np.abs(wanted) <= limit
-    side = np.sign(wanted) * ~sticks
-    held = side * limit * (1.0 - SLIDING_STIFFNESS) + SLIDING_STIFFNESS * wanted
-    slope = np.where(sticks, 1.0, SLIDING_STIFFNESS * (limit > 0.0))
+    touches = limit > 0.0
+    slip = _slip(np.abs(wanted), np.where(touches, limit, 1.0), creep)
+    root = np.hypot(slip, creep)
+    stiff = limit * creep**2 + root**3
+    sticks = np.divide(limit * creep**2, stiff, out=np.ones_like(stiff), where=stiff > 0.0)
+    full = np.divide(slip, root, out=np.zeros_like(root), where=root > 0.0)
+    slower = np.divide(limit * slip * creep, stiff, out=np.zeros_like(stiff), where=stiff > 0.0)
+    side = np.sign(wanted) * touches * (1.0 - SLIDING_STIFFNESS)
     return (
-        np.where(sticks, wanted, np.where(limit > 0.0, held, 0.0)),
-        slope,
-        side * (1.0 - SLIDING_STIFFNESS) * (limit > 0.0),
+        touches * wanted - side * slip,
+        touches * (sticks + SLIDING_STIFFNESS * (1.0 - sticks)),
+        side * full * (1.0 - sticks),
+        -side * slower,
     )
+
+
+def _slip(wanted: FloatArray, limit: FloatArray, creep: FloatArray) -> FloatArray:
+    """Return the slip s >= 0 with s + limit s / sqrt(s^2 + creep^2) = wanted; limit > 0.
+
+    Newton's method on a concave function, from below: every step is too short.
+    """
+    slip = np.maximum(wanted - limit, wanted * creep / (limit + creep))
+    for _ in range(SLIP_STEPS):
+        root = np.hypot(slip, creep)
+        safe = np.where(root > 0.0, root, 1.0)
+        off = wanted - slip - np.where(root > 0.0, limit * slip / safe, wanted - slip)
+        step = off / (1.0 + limit * creep**2 / safe**3)
+        slip = slip + step
+        if (np.abs(step) <= SLIP_TOLERANCE * wanted).all():
+            break
+    return slip
 
 
 def entered(before: FloatArray, after: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -269,9 +269,8 @@ def _cold(k: Constants, grid: Mesh) -> tuple[Unknowns, int]:
 def _gripped(k: Constants, x: Unknowns, grid: Mesh) -> Unknowns:
     """Return a frictionless solution on a road that runs as fast as the tread's tip on average."""
     c = contact(x, by_element(x.node), k, grid)
-    inner = c.limit_slope > 0.0
-    run = (np.diff(c.node.along) * inner).sum(axis=(1, 2))
-    angle = (np.diff(grid.node_angles) * inner).sum(axis=(1, 2))
+    run = (np.diff(c.node.along) * c.touches).sum(axis=(1, 2))
+    angle = (np.diff(grid.node_angles) * c.touches).sum(axis=(1, 2))
     speed = np.divide(run, angle, out=x.rolling.copy(), where=angle > 0.0)
     return Unknowns(x.node, x.depth, np.where(k.grips, speed, x.rolling))
 

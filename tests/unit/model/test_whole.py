@@ -32,6 +32,7 @@ GRIPPING = {
     "liner_share": 0.4,
     "tread_poisson": 0.5,
     "contact_crown": 0.3,
+    "creep": 0.005,
 }
 CASES: dict[str, tuple[Mapping[str, float | FloatArray], Changes]] = {
     "plain": (VALUES, ()),
