@@ -124,7 +124,7 @@ def _identified(runs: StraightRuns, kept: Path) -> Mapping[str, float | FloatArr
 def _told(h: Hypothesis) -> dict[str, Any]:
     return {
         "names": list(h.names),
-        "cost": round(h.fit.cost, 2),
+        "likelihood": round(h.likelihood, 1),
         "statistic": round(h.statistic, 2),
         "limit": round(h.limit, 2),
         "against": h.against,

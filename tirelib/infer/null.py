@@ -1,4 +1,20 @@
-"""A fitted hypothesis among the plain tires of a family, and what stands against both."""
+"""A fitted hypothesis among the plain tires of one family.
+
+What stands beside the hypothesis - a further effect, more of a group of smooth shapes, or a law of
+the hypothesis that is further off than laws are - gains the likelihood ratio
+
+    L_j = 2 [max over k of log p(r | H, a_j, k) - max over k of log p(r | H, k)],
+
+a_j at its likeliest, k the size of what this tire shows of everything and that of the misfit which
+each run has for itself. Were the model of plain tires exact, L_j would be a chi-square of as many
+degrees of freedom n_j as a_j has components. It is not exact, and by more for one effect than for
+another. So each L_j / n_j counts in units of its mean over the family's plain tires, planted in the
+user's plan, or of 1 (an exact model) where that is larger; the cube root makes chi-squares of
+different n_j comparable (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17 (1931) 684). The largest of
+these standard scores is the statistic of the hypothesis; its rank among the same tires is the
+p-value. Each tire is judged by what the tires of the other parts of the family show, its own mean
+left out.
+"""
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -6,7 +22,7 @@ from functools import cached_property
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.infer.normal import Weighed, beside, evidence
+from tirelib.infer.normal import Weighed, beside
 from tirelib.infer.plain import BASE, FOLDS, ROUGHLY, Family, View
 from tirelib.infer.problem import Problem
 
@@ -25,17 +41,8 @@ OWN = tuple(0.0005 * 2.0 ** np.arange(6))
 chooses."""
 
 
-Sized = tuple[FloatArray, FloatArray, FloatArray, list[FloatArray]]
-"""B C^-1 B', B C^-1 r, log densities and what is more by block, at one size."""
-
-
 class Null:
     """A fitted hypothesis among the plain tires of one family.
-
-    What a tire leaves over what its family leaves (its size), and the misfit that each run has for
-    itself, are taken at their likeliest, by themselves without a further effect and with it: some
-    tires leave much of everything, some little, and a hidden effect must pass neither for a tire
-    that leaves much nor for runs that differ.
 
     Parameters
     ----------
@@ -47,6 +54,13 @@ class Null:
     family : Family
     allowed : mapping of block to variance
         What the hypothesis leaves open beside what plain tires show.
+
+    Attributes
+    ----------
+    names : list of str
+        Of everything that may stand beside the hypothesis.
+    likelihood : float
+        Largest log likelihood over the sizes, [nats].
     """
 
     def __init__(
@@ -58,13 +72,14 @@ class Null:
         allowed: Mapping[str, float | FloatArray],
     ) -> None:
         normal = views[0].normal
-        self.views, self.family, self.allowed = views, family, allowed
-        self.names = [
-            name
-            for name in normal.blocks
-            if name != BASE and not name.startswith(ROUGHLY) and name not in allowed
-        ]
+        self.family, self.allowed = family, allowed
+        self.names = [name for name in normal.blocks if name != BASE]
         self.blocks = [normal.blocks[name] for name in self.names]
+        self.counts = np.array([block.stop - block.start for block in self.blocks], dtype=float)
+        levels = [max(level for level, _ in self._levels(view)) for view in views]
+        likeliest = int(np.argmax(levels))
+        self.likelihood = levels[likeliest]
+        self.views = views[max(likeliest - 1, 0) : likeliest + 2]
         random = np.random.default_rng(len(family))
         planted = family.on(normal)
         for name, variance in allowed.items():
@@ -72,99 +87,133 @@ class Null:
                 block = normal.blocks[name]
                 size = (len(family), block.stop - block.start)
                 planted[:, block] = np.sqrt(variance) * random.standard_normal(size)
-        whiten = problem.whitener(self.likeliest(allowed)[1])
+        whiten = problem.whitener(views[likeliest].own)
         tires = whiten.coloured(random.standard_normal((len(family), normal.count)))
         tires = tires + np.tensordot(planted, rows, axes=1)
         self.tires_at = []
-        for view in views:
+        for view in self.views:
             white = problem.whitener(view.own)(tires)
             self.tires_at.append((view.white @ white.T, np.sum(white**2, axis=1)))
+        self._measured = [
+            (v.normal.right[:, None], np.array([v.normal.square])) for v in self.views
+        ]
 
-    def likeliest(self, allowed: Mapping[str, float | FloatArray]) -> tuple[float, float]:
-        """Return the largest log likelihood, [nats], and the size of a run's own misfit there."""
-        typical, found = self.family.spread(), []
-        for view in self.views:
-            for size in SIZES:
-                diagonal = view.normal.spread({**sized(typical, size), **allowed})
-                likelihood = Weighed(view.normal, diagonal).log_likelihood()
-                found.append((likelihood + view.log_volume + size_prior(size), view.own))
-        return max(found)
+    def _levels(self, view: View, without: int | None = None) -> list[tuple[float, Weighed]]:
+        """Return the log likelihood and the normal equations at every size of the tire, [nats].
 
-    @cached_property
-    def _seen(self) -> list[Sized]:
-        """The measured residual at every size."""
-        here = [(v.normal.right[:, None], np.array([v.normal.square])) for v in self.views]
-        return self._at_sizes(None, here)
-
-    def _at_sizes(
-        self, without: int | None, right: Sequence[tuple[FloatArray, FloatArray]]
-    ) -> list[Sized]:
-        """Return what is made of residuals at every size.
-
-        `right` holds B r, (m, k), and r' r, (k,), of k residuals for every view.
+        What is typical of a tire is of all tires of the family, or of those beside one part.
         """
         typical, out = self.family.spread(without), []
-        for view, (turned, square) in zip(self.views, right, strict=True):
-            for size in SIZES:
-                diagonal = view.normal.spread({**sized(typical, size), **self.allowed})
-                weighed = Weighed(view.normal, diagonal)
-                more = [
-                    MORE * diagonal[block]
-                    if "," in name
-                    else np.full(block.stop - block.start, PRIOR**2)
-                    for name, block in zip(self.names, self.blocks, strict=True)
+        for size in SIZES:
+            variance = {name: size**2 * each for name, each in typical.items()} | dict(self.allowed)
+            weighed = Weighed(view.normal, view.normal.spread(variance))
+            constant = view.log_volume + size_prior(size)
+            out.append((weighed.log_likelihood() + constant, weighed))
+        return out
+
+    @cached_property
+    def _here(self) -> list[tuple[View, float, Weighed]]:
+        """The normal equations at every size, from all tires."""
+        return self._every(None)
+
+    def _every(self, without: int | None) -> list[tuple[View, float, Weighed]]:
+        return [
+            (view, size, weighed)
+            for view in self.views
+            for size, (_, weighed) in zip(SIZES, self._levels(view, without), strict=True)
+        ]
+
+    def _ratios(
+        self,
+        right: Sequence[tuple[FloatArray, FloatArray]],
+        without: int | None = None,
+        given: int | None = None,
+    ) -> FloatArray:
+        """Return L_j / n_j of k residuals, (n_names, k).
+
+        `right` holds B r, (m, k), and r' r, (k,), for every view; `given` is a further effect that
+        the hypothesis counts with.
+        """
+        plain, free = [], []
+        products = {view.own: each for view, each in zip(self.views, right, strict=True)}
+        for view, size, weighed in self._here if without is None else self._every(without):
+            turned, square = products[view.own]
+            gram, turned_here = weighed.gram, weighed.right(turned)
+            level = weighed.gain(turned) - 0.5 * square + view.log_volume + size_prior(size)
+            variance = weighed.root**2
+            if given is not None:
+                block, more = self.blocks[given], self._more(given, variance)
+                level = level + _taken(gram, turned_here, block, more)
+                gram, turned_here = beside(gram, turned_here, block, more)
+            plain.append(level)
+            free.append(
+                [
+                    level + _taken(gram, turned_here, block, self._more(j, variance))
+                    for j, block in enumerate(self.blocks)
                 ]
-                likelihood = weighed.gain(turned) - 0.5 * square
-                likelihood = likelihood + view.log_volume + size_prior(size)
-                out.append((weighed.gram, weighed.right(turned), likelihood, more))
-        return out
+            )
+        gain = np.max(free, axis=0) - np.max(plain, axis=0)
+        return np.asarray(2.0 * gain / self.counts[:, None])
 
-    def _of(self, sizes: Sequence[Sized]) -> FloatArray:
-        """Return the log evidence of every effect and shape for k residuals, (n_names, k)."""
-        plain, missing = [], []
-        for gram, turned, likelihood, more in sizes:
-            plain.append(likelihood)
-            missing.append(likelihood + evidence(gram, turned, self.blocks, more))
-        return np.asarray(np.max(missing, axis=0) - np.max(plain, axis=0))
+    def _more(self, j: int, variance: FloatArray) -> FloatArray:
+        """Return the variance of a block beyond that of plain tires."""
+        block = self.blocks[j]
+        if "," in self.names[j] or self.names[j].startswith(ROUGHLY):
+            return np.asarray(MORE * variance[block])
+        return np.full(block.stop - block.start, PRIOR**2)
 
-    def level(self) -> float:
-        """Return the largest log likelihood of the hypothesis, [nats]."""
-        return max(float(each[2][0]) for each in self._seen)
-
-    def seen(self) -> FloatArray:
-        """Return the log evidence of every effect and shape beside the hypothesis, (n_names,)."""
-        return self._of(self._seen)[:, 0]
-
-    def beside(self) -> dict[str, float]:
-        """Return the largest evidence against the hypothesis with each further effect, [nats]."""
-        out = {}
-        for k, name in enumerate(self.names):
-            if "," in name:
-                continue
-            plain, missing = [], []
-            for gram, turned, likelihood, more in self._seen:
-                one = evidence(gram, turned, self.blocks[k : k + 1], more[k : k + 1])[0]
-                with_it = beside(gram, turned, self.blocks[k], more[k])
-                plain.append(likelihood + one)
-                missing.append(plain[-1] + evidence(*with_it, self.blocks, more))
-            found = np.max(missing, axis=0) - np.max(plain, axis=0)
-            out[name] = float(np.delete(found[:, 0], k).max())
-        return out
-
-    def largest(self) -> FloatArray:
-        """Return the largest log evidence of each plain tire by the others, (n_tires,)."""
-        out = np.zeros(len(self.family))
+    @cached_property
+    def _tires(self) -> FloatArray:
+        """L_j / n_j of each plain tire by the others, (n_names, n_tires)."""
+        out = np.zeros((len(self.names), len(self.family)))
         for fold in range(FOLDS):
             part = self.family.fold == fold
             if part.any():
                 right = [(turned[:, part], square[part]) for turned, square in self.tires_at]
-                out[part] = self._of(self._at_sizes(fold, right)).max(axis=0)
+                out[:, part] = self._ratios(right, fold)
+        return out
+
+    @cached_property
+    def scale(self) -> FloatArray:
+        """Mean of L_j / n_j over the plain tires, at least 1, (n_names,)."""
+        return np.asarray(np.maximum(self._tires.mean(axis=1), 1.0))
+
+    @cached_property
+    def largest(self) -> FloatArray:
+        """The largest standard score of each plain tire by the others, (n_tires,)."""
+        count = len(self.family)
+        others = (self._tires.sum(axis=1, keepdims=True) - self._tires) / (count - 1)
+        scores = standard(self._tires / np.maximum(others, 1.0), self.counts[:, None])
+        return np.asarray(scores.max(axis=0))
+
+    @cached_property
+    def scores(self) -> FloatArray:
+        """The standard score of everything beside the hypothesis, (n_names,)."""
+        return standard(self._ratios(self._measured)[:, 0] / self.scale, self.counts)
+
+    def left(self, names: Sequence[str]) -> dict[str, float]:
+        """Return the largest standard score beside the hypothesis with each further effect."""
+        out = {}
+        for name in names:
+            j = self.names.index(name)
+            scores = standard(self._ratios(self._measured, given=j)[:, 0] / self.scale, self.counts)
+            out[name] = float(np.delete(scores, j).max())
         return out
 
 
-def sized(typical: Mapping[str, float], size: float) -> dict[str, float]:
-    """Return variances of a tire that leaves so much more than its family does."""
-    return {name: size**2 * variance for name, variance in typical.items()}
+def _taken(gram: FloatArray, right: FloatArray, block: slice, more: FloatArray) -> FloatArray:
+    """Return by how much a block at its likeliest raises the log density of k residuals, (k,).
+
+    The arguments are those of `tirelib.infer.normal.evidence`.
+    """
+    inner = gram[block, block] + np.diag(1.0 / more)
+    return np.asarray(0.5 * np.sum(right[block] * np.linalg.solve(inner, right[block]), axis=0))
+
+
+def standard(ratio: FloatArray, count: FloatArray) -> FloatArray:
+    """Return the normal score of a mean square of `count` numbers over its expectation."""
+    spread = 2.0 / (9.0 * count)
+    return np.asarray((np.cbrt(np.maximum(ratio, 0.0)) - (1.0 - spread)) / np.sqrt(spread))
 
 
 def size_prior(size: float) -> float:

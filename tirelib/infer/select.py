@@ -1,19 +1,13 @@
 """A confidence set of hypotheses: which effects, if any, may be missing.
 
 A hypothesis is a set of effects. It is held against everything else that might be there: each
-further effect, and more of each group of smooth shapes than plain tires have. The statistic is the
-largest log evidence of any of these beside the hypothesis,
-
-    T(H) = max over a of log p(r | H and a) - log p(r | H),
-
-to first order about H for every a, and by its own fit for those effects that first order finds
-likeliest: a base that has bent itself to a strong effect is too far from the truth for first order.
-and Its p-value is the rank of T among plain tires with the hypothesis planted in the user's plan:
-for each family of tires by itself, judged by what its other tires show; the largest p over the
-families counts, so that a tire that is like any one of them is covered. Every hypothesis with
-p > alpha is in the set. Its smallest members are what the data say (Ferrari and Yang 2015): none in
-it, nothing is missing; one smallest member, that is what is missing; several, they cannot be told
-apart; none at all, something unknown is there.
+further effect, more of each group of smooth shapes than plain tires have, and laws that are further
+off than laws are. Its p-value is the rank of the largest standard score (`tirelib.infer.null`)
+among plain tires with the hypothesis planted in the user's plan: for each family of tires by
+itself; the largest p over the families counts, so that a tire that is like any one of them is
+covered. Every hypothesis with p > alpha is in the set. Its smallest members are what the data say
+(Ferrari and Yang 2015): none in it, nothing is missing; one smallest member, that is what is
+missing; several, they cannot be told apart; none at all, something unknown is there.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,16 +18,14 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
-from tirelib.infer.hypothesis import Hypothesis, against_fits, judged
+from tirelib.infer.hypothesis import Hypothesis, judged
 from tirelib.infer.normal import Weighed
 from tirelib.infer.plain import BASE, Family, pooled
 from tirelib.infer.posterior import posterior
 from tirelib.infer.problem import Problem
 
-SINGLES, PARTNERS, LEADERS = 6, 3, 3
+SINGLES, PARTNERS, LEADERS = 6, 3, 2
 """Hypotheses that are fitted exactly: single effects, partners of each leader, and leaders."""
-LEAVES = 0.5
-"""Share of the evidence against a hypothesis that a further effect may leave, to first order."""
 MOST = 3
 """Effects of a hypothesis at most."""
 
@@ -116,89 +108,46 @@ def select(
         every = tuple(each for each in tried.values() if each is not None)
         return Verdict(kind, sets, best, base, every, false_alarm)
 
-    likeliest = _leading(base, effects)[:SINGLES]
-    level = [at((name,), base) for name in likeliest]
-    fitted = [h for h in level if h is not None and h.plausible]
-    base = _settled(problem, base, fitted, families, false_alarm, spread, own, len(had))
-    tried[frozenset()] = base
-    base = against_fits(base, fitted)
     if base.p > false_alarm:
         return done("none", ())
-    names = [name for name in _further(base, effects, SINGLES, LEADERS) if name not in likeliest]
-    level += [at((name,), base) for name in names]
+    leaders: list[Hypothesis] = [base]
+    added: list[tuple[str, ...]] = [()]
     for size in range(1, MOST + 1):
+        level = [
+            at((*names, further), leader)
+            for leader, names in zip(leaders, added, strict=True)
+            for further in _further(leader, effects, SINGLES if size == 1 else PARTNERS)
+        ]
         # two leaders may lead to one and the same set
-        every = [h for h in tried.values() if h is not None]
-        fitted = [against_fits(h, every) for h in dict.fromkeys(level) if h is not None]
-        fitted.sort(key=lambda h: -float(h.level.max()))
-        members = [h for h in fitted if h.plausible and h.p > false_alarm]
+        fitted = [h for h in dict.fromkeys(level) if h is not None and h.plausible]
+        fitted.sort(key=lambda h: -h.likelihood)
+        members = [h for h in fitted if h.p > false_alarm]
         if members:
             return done("named" if len(members) == 1 else "indistinguishable", members)
-        if size == MOST:
-            break
-        level = []
-        for leader in [h for h in fitted if h.plausible][: LEADERS if size == 1 else 1]:
-            added = _added(leader, len(had))
-            for partner in _further(leader, effects, PARTNERS, 0):
-                level.append(at((*added, partner), leader))
-    free = [h for h in tried.values() if h is not None and h.fit.names[len(had) :]]
-    free = [h for h in free if h.plausible and h.free_p > false_alarm]
+        leaders = fitted[: LEADERS if size == 1 else 1]
+        added = [_added(leader, len(had)) for leader in leaders]
+    free = [h for h in tried.values() if h is not None and h.plausible and h.free_p > false_alarm]
     if free:
         fewest = min(len(h.names) for h in free)
-        return done(
-            "form_inadequate",
-            sorted((h for h in free if len(h.names) == fewest), key=lambda h: h.fit.cost)[:1],
-        )
+        likeliest = max((h for h in free if len(h.names) == fewest), key=lambda h: h.likelihood)
+        return done("form_inadequate", [likeliest])
     return done("unknown", ())
-
-
-def _settled(
-    problem: Problem,
-    base: Hypothesis,
-    others: Sequence[Hypothesis],
-    families: Sequence[Family],
-    alpha: float,
-    spread: dict[str, float],
-    own: float,
-    had: int,
-) -> Hypothesis:
-    """Return the base, fitted again from the likeliest of other fits if that is likelier."""
-    if not others:
-        return base
-    best = max(others, key=lambda h: float(h.strict.max()))
-    if float((best.strict - base.level - base.seen).max()) < 0.5 * base.limit:
-        return base
-    start = problem.start
-    try:
-        fit = posterior(
-            problem, start.effects, spread, own, near=best.fit, strengths=start.strengths
-        )
-    except TirelibError:
-        return base
-    again = judged(problem, fit, families, alpha, own_effects=had)
-    return again if float(again.level.max()) > float(base.level.max()) else base
 
 
 def _added(hypothesis: Hypothesis, had: int) -> tuple[str, ...]:
     return hypothesis.names[had:]
 
 
-def _leading(hypothesis: Hypothesis, effects: dict[str, Effect]) -> list[str]:
-    """Return effects by their evidence beside a hypothesis, best first."""
-    return sorted(effects, key=lambda name: -hypothesis.evidence.get(name, -np.inf))
+def _further(leader: Hypothesis, effects: dict[str, Effect], most: int) -> list[str]:
+    """Return the further effects that leave least beside a hypothesis, to first order, best first.
 
-
-def _further(leader: Hypothesis, effects: dict[str, Effect], most: int, least: int) -> list[str]:
-    """Return the effects that take away most of what stands against a hypothesis, best first.
-
-    One that leaves more than `LEAVES` of it, to first order, is tried only if fewer than `least`
-    leave less: two effects may be needed together.
+    The one that stands out most is always among them.
     """
-    excess = leader.statistic - leader.limit
-    found = {name: left for name, left in leader.left.items() if name in effects}
-    every = sorted(found, key=lambda name: found[name])
-    good = sum(found[name] < LEAVES * excess for name in every)
-    return every[: min(most, max(good, least))]
+    names = [name for name in leader.null.names if name in effects]
+    left, scores = leader.null.left(names), leader.scores
+    least = sorted(names, key=lambda name: left[name])[:most]
+    first = max(names, key=lambda name: scores[name], default="")
+    return least if first in least or not first else [first, *least[: most - 1]]
 
 
 def _start(

@@ -5,7 +5,6 @@ import pytest
 from scipy import optimize
 
 from tests.unit.infer.linear_problem import EFFECTS, N, Toy, drawn, family
-from tirelib.infer.hypothesis import against_fits, judged
 from tirelib.infer.posterior import _step, posterior
 
 FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
@@ -56,17 +55,3 @@ def test_the_rest_is_counted_from_where_the_base_starts() -> None:
     fit = posterior(toy, [EFFECTS["bend"]], SPREAD, 0.001)
     # the toy is linear: nothing but the measured numbers is left without base and effects
     assert fit.rest == pytest.approx(measured, abs=1e-9)
-
-
-def test_a_rival_stands_against_every_hypothesis_that_lacks_its_effect() -> None:
-    toy = Toy(drawn(np.random.default_rng(6), swell=0.6))
-    fits = {
-        name: judged(
-            toy, posterior(toy, [EFFECTS[name]], SPREAD, 0.001), FAMILIES, 0.05, own_effects=0
-        )
-        for name in ("swell", "bend")
-    }
-    right, wrong = (against_fits(fits[name], list(fits.values())) for name in ("swell", "bend"))
-    assert right.p > 0.05
-    assert wrong.p <= 0.05
-    assert wrong.statistic >= float((fits["swell"].strict - fits["bend"].level).min())
