@@ -103,6 +103,7 @@ def diagnose(
     quantity: str | None = None,
     *,
     effects: "Mapping[str, Effect] | None" = None,
+    false_alarm: float = 0.05,
     members: int = 100,
     seed: int = 0,
     progress: Progress | None = None,
@@ -113,10 +114,10 @@ def diagnose(
     ----------
     campaign, model, quantity, effects, progress
         As of `compare`.
-    members : int
-        Number of variants of the model that the threshold is taken from.
-    seed : int
-        Seed of these variants.
+    false_alarm : float
+        Probability with which a tire that lacks nothing is said to lack something (strain).
+    members, seed : int
+        Number and seed of the variants of the model that thresholds are taken from (forces).
 
     Raises
     ------
@@ -146,8 +147,7 @@ def diagnose(
         effects_of,
         effects=[each.effect for each in used],
         strengths=[np.atleast_1d(np.asarray(each.strength, dtype=float)) for each in used],
-        members=members,
-        seed=seed,
+        false_alarm=false_alarm,
         progress=progress,
     )
     return assess(found, given, progress=progress)

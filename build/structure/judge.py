@@ -126,7 +126,7 @@ def _told(h: Hypothesis) -> dict[str, Any]:
         "names": list(h.names),
         "likelihood": round(h.likelihood, 1),
         "statistic": round(h.statistic, 2),
-        "limit": round(h.limit, 2),
+        "limit": round(h.limit(0.05), 2),
         "against": h.against,
         "p": round(h.p, 4),
         "free_p": round(h.free_p, 4),

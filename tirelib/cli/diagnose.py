@@ -19,6 +19,7 @@ from tirelib.cli.common import (
 )
 from tirelib.cli.options import (
     effects_option,
+    false_alarm_option,
     json_option,
     members_option,
     model_option,
@@ -56,6 +57,7 @@ SHOWN = 8
 @model_option
 @quantity_option
 @effects_option
+@false_alarm_option
 @members_option
 @seed_option
 @report_option("diagnosis")
@@ -65,6 +67,7 @@ def diagnose(
     model_name: str,
     quantity: str | None,
     effect_files: tuple[Path, ...],
+    false_alarm: float,
     members: int,
     seed: int,
     out: Path | None,
@@ -79,9 +82,11 @@ def diagnose(
     file = read_tire(model_name)
     campaign = read_campaign(folder)
     forces = explains_forces(quantity, campaign, file)
-    explain = of_forces if forces else _of_strain
     with progress_bar("diagnosing") as progress:
-        told, document = explain(campaign, file, catalogue, quantity, members, seed, progress)
+        if forces:
+            told, document = of_forces(campaign, file, catalogue, quantity, members, seed, progress)
+        else:
+            told, document = _of_strain(campaign, file, catalogue, false_alarm, progress)
     explanation = explained(document, model_name, str(folder))
     document["explanation"] = asdict(explanation)
     _say(document, explanation.lines)
@@ -99,9 +104,7 @@ def _of_strain(
     campaign: Campaign,
     file: "TireFile",
     catalogue: Mapping[str, "Effect"],
-    quantity: str | None,
-    members: int,
-    seed: int,
+    false_alarm: float,
     progress: Callable[[str], None],
 ) -> tuple[Any, dict[str, Any]]:
     from tirelib.compare.model import model_of
@@ -121,8 +124,7 @@ def _of_strain(
         list(catalogue.values()),
         effects=[each.effect for each in used],
         strengths=[np.atleast_1d(np.asarray(each.strength, dtype=float)) for each in used],
-        members=members,
-        seed=seed,
+        false_alarm=false_alarm,
         progress=progress,
     )
     told = assess(found, model, progress=progress)

@@ -203,8 +203,6 @@ def next_test(
                 list(catalogue.values()),
                 effects=effects,
                 strengths=strengths,
-                members=members,
-                seed=seed,
                 progress=progress,
             )
             told = diagnosis_document(assess(found, model, progress=progress))

@@ -55,6 +55,16 @@ effects_option = click.option(
 )
 """Effects that are in no catalogue."""
 
+false_alarm_option = click.option(
+    "--false-alarm",
+    "false_alarm",
+    metavar="P",
+    type=click.FloatRange(min=0, max=0.5, min_open=True),
+    default=0.05,
+    show_default=True,
+    help="Probability with which a tire that lacks nothing is said to lack something.",
+)
+
 members_option = click.option(
     "--members",
     metavar="N",

@@ -1,73 +1,68 @@
-"""The verdict: rounds of ranking, refit and threshold, at most three."""
+"""Which effects a model of strain lacks, by the inference of the library (`tirelib.infer`)."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.diagnose.ensemble import MEMBERS
-from tirelib.diagnose.floor import usual_size
 from tirelib.diagnose.guess import Guess, guess_law
 from tirelib.diagnose.left import left_of
-from tirelib.diagnose.noise import noise_in, white_noise
-from tirelib.diagnose.plain import BELT, usual
-from tirelib.diagnose.refit import FELL, Refit, Refits, fall, refit
-from tirelib.diagnose.rivals import inseparable
-from tirelib.diagnose.rounds import HALVED, Rounds, rounds
-from tirelib.diagnose.stage import ALARM, Stage, within
-from tirelib.diagnose.stored import ensemble_of
-from tirelib.diagnose.unlisted import UNLISTED
+from tirelib.diagnose.refit import Refit, Refits, inside, refit
 from tirelib.effects import Effect
 from tirelib.identify.campaign_data import StraightRuns
+from tirelib.identify.span import span
 from tirelib.identify.waveform_fit import Data
+from tirelib.infer.hypothesis import Hypothesis, p_value
+from tirelib.infer.plain import BASE, Family, load
+from tirelib.infer.select import Verdict, select
+from tirelib.infer.strain import StrainProblem
 from tirelib.threads import one_thread
 
-OUTSIDE = 3.0
-"""Ratio of an effect outside its range from which something unknown is there."""
-BARELY = 15.0
-"""The same for one that is outside by no more than structure imitates."""
-EXPLAINED = 0.8
-"""Share of the misfit beyond structure's that named effects have to explain, or `HALVED` of the
-squared error: another law of the same effect may leave what no structure does, but takes the error.
-"""
-BEYOND = 4.0
-"""What the joint fit leaves, over what noise and structure outside the ensemble usually leave, from
-which on something unknown is there."""
+TABLE = Path(__file__).parents[1] / "infer" / "plain_tires.npz"
+"""What plain tires show (`build/structure/learn.py`)."""
+TWIN_ANGLE = np.deg2rad(30.0)
+"""Signatures closer than this are called twins; it decides nothing."""
+FALSE_ALARM = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One candidate as it stands in the end.
+    """One candidate.
 
     Attributes
     ----------
     effect : Effect
     score, threshold : float
-        Misfit that returns without it, and the largest such that variants are expected to have.
+        Standard score beside the model as it is, zero where it is not positive, and the score that
+        plain tires exceed with the false-alarm probability.
     level : str
-        alarm, hint or quiet; what is named is an alarm by its exact fit, whatever first order says,
-        and what plain tires show no more than a hint.
+        alarm for members of a named set, hint for members of other smallest sets, else quiet.
+    p, p_std : float
+        p-value of the hypothesis that this effect is missing and no other.
     strength, std : shape (components,)
     in_range : bool
     share : float
-        Of the misfit, what this effect alone takes away.
+        Of the squared error, what this effect alone takes away, to first order.
     twins : tuple of (name, angle [rad])
     power : float
-        Chance that a third of the range is an alarm, by planting it in every variant.
-    error_after : float
-        Rms whitened residual with this effect alone, to first order.
+        Chance that a third of the range has a score beyond the threshold.
     """
 
     effect: Effect
     score: float
     threshold: float
     level: str
+    p: float
+    p_std: float
     strength: FloatArray
     std: FloatArray
     in_range: bool
     share: float
     twins: tuple[tuple[str, float], ...]
     power: float
-    error_after: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,53 +71,46 @@ class Diagnosis:
 
     Attributes
     ----------
-    verdict : str
-        none, named, form_inadequate, indistinguishable or unknown.
+    verdict : Verdict
     named : tuple of str
-        Best first.
+        Effects of the smallest members of the confidence set, best first.
     findings : tuple of Finding
         By rank.
     dead : mapping of name to reason
     base, final : Refit
-        Without and with the named effects.
-    left, floor : float
-        What the joint fit with the named effects leaves (without any, if nothing is named), over
-        what noise and structure outside the ensemble usually do, and from where on it is more than
-        structure.
-    rounds : int
+        Without further effects and with those of the best member.
     runs : StraightRuns
     data : Data
     beyond : shape (n_runs, n_phi)
-        Whitened part of model less measured that neither the model nor structure explains.
-    usual : float
-        Rms whitened residual that 19 of 20 variants stay below after such a fit.
+        Whitened part of model less measured that neither the best member nor plain tires explain.
     guess : Guess or None
-        A law for it, if it is more than variants leave and a sparse one holds.
-    like : Finding or None
-        What else is needed, if that is in no catalogue (`tirelib.diagnose.unlisted`).
-    by_share : tuple of str
-        What is named for its share of the error beside the belt's shear, whatever its score.
+        A law for it, where no member of the set is right and a sparse law holds.
     refitted : Refits
         Fits of these data, made so far and to come.
     """
 
-    verdict: str
+    verdict: Verdict
     named: tuple[str, ...]
     findings: tuple[Finding, ...]
     dead: Mapping[str, str]
     base: Refit
     final: Refit
-    left: float
-    floor: float
-    rounds: int
     runs: StraightRuns
     data: Data
     beyond: FloatArray
-    usual: float
     guess: Guess | None
-    like: Finding | None
-    by_share: tuple[str, ...]
     refitted: Refits
+
+    @property
+    def exceeds(self) -> bool:
+        """Whether more is left than plain tires leave."""
+        return self.verdict.kind in ("unknown", "form_inadequate")
+
+
+@cache
+def plain_tires() -> tuple[Family, ...]:
+    """Return the families of plain tires that come with the library."""
+    return load(TABLE)[0]
 
 
 @one_thread()
@@ -133,11 +121,10 @@ def diagnose(
     *,
     effects: Sequence[Effect] = (),
     strengths: Sequence[FloatArray] = (),
-    members: int = MEMBERS,
-    seed: int = 0,
+    false_alarm: float = FALSE_ALARM,
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
-    """Tell which effects of a catalogue a model lacks.
+    """Find which effects of a catalogue a model lacks.
 
     Parameters
     ----------
@@ -147,138 +134,136 @@ def diagnose(
     catalogue : sequence of Effect
     effects, strengths
         That the model has already.
-    members, seed : int
-        Of the structural ensemble.
+    false_alarm : float
+        Probability with which a plain tire is said to lack something.
     progress : callable, optional
+
+    Raises
+    ------
+    ConvergenceError
+        If the model cannot be fitted to the runs.
     """
     data = runs.data(with_deflection=False)
     base = refit(data, values, effects, strengths, progress=progress)
-    noise = noise_in(runs)
-    rests = ensemble_of(data, base, noise=noise, members=members, seed=seed, progress=progress)
-    level = white_noise(runs, base, data.strain)
-    first = Stage.of(data, base, catalogue, rests, level, {})
     refitted = Refits(data, progress)
-    found = rounds(data, first, catalogue, rests, level, refitted)
-    stage = found.stage
-    like = None if found.unlisted is None else _like(first, stage, found.unlisted, data)
-    named = stage.model.needed(found.named)
-    findings = _findings(first, named, stage.model, data)
-    twins = inseparable(data, first, findings, named, refitted)
-    verdict, named = _verdict(named, twins, first, found, like)
-    if not named:
-        findings = _findings(first, (), first.model, data)
-    last = stage if named else first
-    left, floor = last.beyond, BEYOND
-    beyond = last.unexplained(last.model.waveform[None] - data.strain)[0]
-    guess = None
-    if left > floor or verdict == "unknown":
+    problem = StrainProblem(runs, base.values, catalogue, effects, base.strengths)
+    verdict = select(problem, plain_tires(), false_alarm=false_alarm, progress=progress)
+    best = verdict.best
+    names = best.names[len(effects) :]
+    final = base
+    if names:
+        strength = [
+            inside(effect, s)
+            for effect, s in zip(
+                best.fit.effects[len(effects) :], best.fit.strengths[len(effects) :], strict=True
+            )
+        ]
+        added = list(best.fit.effects[len(effects) :])
+        found = refitted(base, [*effects, *added], [*base.strengths, *strength])
+        final = base if found is None else found
+    beyond, guess = np.zeros_like(data.strain), None
+    if verdict.kind in ("unknown", "form_inadequate"):
+        beyond = -final.whiten(_unexplained(best))
         guess = guess_law(
-            data.strain - last.model.waveform,
-            last.model.waveform,
+            data.strain - final.waveform,
+            final.waveform,
             data.points,
-            left_of(data, last.model).edges,
-            last.unexplained,
+            left_of(data, final).edges,
+            lambda waveforms: final.whiten(waveforms),
         )
-    extra = {effect.name for effect in UNLISTED} - {effect.name for effect in catalogue}
-    dead = {name: why for name, why in first.found.dead.items() if name not in extra}
     return Diagnosis(
         verdict,
-        tuple(named),
-        findings,
-        dead,
+        tuple(dict.fromkeys(name for names in verdict.sets for name in names)),
+        _findings(problem, verdict, base, data),
+        problem.dead,
         base,
-        last.model,
-        left,
-        floor,
-        found.count,
+        final,
         runs,
         data,
         beyond,
-        usual_size(last.model, last.ranking.structure.members),
         guess,
-        like,
-        tuple(name for name in found.by_share if name in named),
         refitted,
     )
 
 
-def _findings(first: Stage, named: Sequence[str], model: Refit, data: Data) -> tuple[Finding, ...]:
-    fitted = {effect.name: k for k, effect in enumerate(model.effects)}
+def _unexplained(best: Hypothesis) -> FloatArray:
+    """Return what neither a hypothesis nor plain tires explain, measured less model."""
+    rows = np.concatenate(list(best.fit.rows.values()))
+    return best.fit.rest - np.tensordot(best.null.explained(), rows, axes=1)
+
+
+def _findings(
+    problem: StrainProblem, verdict: Verdict, base: Refit, data: Data
+) -> tuple[Finding, ...]:
+    """Return every effect that the plan may show, by rank."""
+    first, null = verdict.base, verdict.base.null
+    limit = first.limit(verdict.alpha)
+    living = {effect.name: effect for effect in problem.living if effect.name in null.names}
+    left = null.left(list(living))
+    tried = {h.names[-1]: h for h in verdict.tried if len(h.names) == len(first.names) + 1}
+    named = verdict.sets[0] if verdict.kind in ("named", "form_inadequate") else ()
+    members = {name for names in verdict.sets for name in names}
+    best = (
+        {}
+        if not verdict.sets
+        else dict(zip(verdict.best.names, range(len(verdict.best.names)), strict=True))
+    )
+    own = span(base.whiten(base.own_slopes).reshape(len(base.own_slopes), -1).T)
+    rest = base.beside_delay(base.whiten(data.strain - base.waveform)).ravel()
     rows = []
-    for index, candidate in enumerate(first.found.living):
-        if candidate.effect in UNLISTED:
-            continue
-        row, name = _finding(first, index, data), candidate.effect.name
-        if name in named:
-            k = fitted[name]
-            strength, std = model.strengths[k], model.strength_std(k)
-            row = replace(
-                row,
-                strength=strength,
-                std=std,
-                in_range=within(candidate.effect, strength, std),
-                level="alarm",
+    for name, effect in living.items():
+        alone = tried.get(name)
+        fit = verdict.best.fit if name in best else None if alone is None else alone.fit
+        if fit is not None:
+            k = fit.names.index(name)
+            strength, std = fit.strengths[k], fit.std(k)
+        else:
+            mean, covariance = null.beside(name)
+            strength = effect.scale * mean
+            std = effect.scale * np.sqrt(np.diag(covariance))
+        p, p_std = p_value(left[name], first.plain) if alone is None else (alone.p, alone.p_std)
+        level = "alarm" if name in named else "hint" if name in members else "quiet"
+        rows.append(
+            Finding(
+                effect,
+                max(first.scores[name], 0.0),
+                limit,
+                level,
+                p,
+                p_std,
+                strength,
+                std,
+                bool(
+                    (
+                        (strength >= effect.low - 2.0 * std) & (strength <= effect.high + 2.0 * std)
+                    ).all()
+                ),
+                _share(base.whiten(first.fit.rows[name]), own, rest),
+                _twins(name, first),
+                null.power(name, 1.0 / 3.0, limit),
             )
-        rows.append(row)
-    order = {name: k for k, name in enumerate(named)}
-    rows.sort(key=lambda f: (order.get(f.effect.name, len(order)), -f.score / f.threshold))
+        )
+    order = {
+        name: k for k, name in enumerate(dict.fromkeys(n for names in verdict.sets for n in names))
+    }
+    rows.sort(key=lambda f: (order.get(f.effect.name, len(order)), -f.score))
     return tuple(rows)
 
 
-def _finding(stage: Stage, index: int, data: Data) -> Finding:
-    """Return one candidate as a stage sees it."""
-    candidate, scores, limit = stage.found.living[index], stage.scores, stage.threshold[index]
-    ratio, strength = stage.ratio[index], scores.strength[index]
-    alarm = stage.alarms[index] and not usual(stage.model.effects, candidate.effect, strength)
-    return Finding(
-        candidate.effect,
-        float(scores.score[index]),
-        float(limit),
-        "alarm" if alarm else "hint" if ratio >= 1.0 else "quiet",
-        strength,
-        scores.std[index],
-        bool(stage.in_range[index]),
-        float(scores.alone[index] / scores.misfit),
-        _listed(stage.found.twins(index)),
-        stage.ranking.power(index, ALARM * limit),
-        candidate.alone(data, stage.model)[1],
-    )
+def _share(white: FloatArray, own: FloatArray, rest: FloatArray) -> float:
+    """Return the share of the squares that rows take beside the fitted numbers."""
+    rows = white.reshape(len(white), -1)
+    rows = rows - (rows @ own) @ own.T
+    weights = np.linalg.lstsq(rows.T, rest, rcond=None)[0]
+    return float(1.0 - np.sum((rest - weights @ rows) ** 2) / np.sum(rest**2))
 
 
-def _like(first: Stage, stage: Stage, index: int, data: Data) -> Finding:
-    """Return what a stage needs in no catalogue, with the error that it leaves the first alone."""
-    found = _finding(stage, index, data)
-    alone = [each for each in first.found.living if each.effect == found.effect]
-    if not alone:
-        return found
-    return replace(found, error_after=alone[0].alone(data, first.model)[1])
-
-
-def _listed(twins: Sequence[tuple[str, float]]) -> tuple[tuple[str, float], ...]:
-    names = {effect.name for effect in UNLISTED}
-    return tuple(twin for twin in twins if twin[0] not in names)
-
-
-def _verdict(
-    named: list[str], twins: Sequence[str], first: Stage, found: Rounds, like: Finding | None
-) -> tuple[str, list[str]]:
-    """Return the verdict and what it names."""
-    last = found.stage
-    excess = first.scores.misfit - first.unit
-    left = last.scores.misfit - last.unit
-    beyond = last.beyond > BEYOND
-    if not named:
-        outside = last.outside >= OUTSIDE or last.imitated >= BARELY
-        return ("unknown" if like or beyond or outside else "none"), []
-    explained = (
-        left <= max((1.0 - EXPLAINED) * excess, 0.0)
-        or fall(first.model, last.model) >= HALVED
-        or any(name in named for name in found.by_share)
-    )
-    hidden = [name for name in named if name not in BELT]
-    # the shear that every belt has does not explain what is in no catalogue
-    if fall(first.model, last.model) < FELL or not explained or (like and not hidden):
-        return "unknown", []
-    if twins:
-        return "indistinguishable", [*(hidden or named)[:1], *twins]
-    return ("form_inadequate" if beyond else "named"), named
+def _twins(name: str, first: Hypothesis) -> tuple[tuple[str, float], ...]:
+    """Return the effects whose signature is near, nearest first."""
+    effects = [other for other in first.null.names if other in first.fit.rows and "," not in other]
+    near = [
+        (other, first.null.angle(name, other))
+        for other in effects
+        if other != name and not other.startswith(BASE) and not other.startswith("roughly ")
+    ]
+    return tuple(sorted((pair for pair in near if pair[1] < TWIN_ANGLE), key=lambda pair: pair[1]))

@@ -9,11 +9,10 @@ import numpy as np
 from tirelib.compare.error import ModelError, Yardstick, named_errors
 from tirelib.compare.model import Model
 from tirelib.diagnose.diagnose import Diagnosis, Finding
-from tirelib.diagnose.floor import MapUnit, floor_of
+from tirelib.diagnose.floor import MapUnit
 from tirelib.diagnose.guess import Guess
 from tirelib.diagnose.held_out import Fold, fold_entry, folds, held_out_errors, pooled
 from tirelib.diagnose.left import Left, left_of, told_powers
-from tirelib.diagnose.plain import BELT
 from tirelib.diagnose.refit import Refit, inside
 from tirelib.identify.waveform_fit import Data
 
@@ -41,7 +40,7 @@ class Assessment:
     before, refitted, after : ModelError
         Of the model as it is given, fitted anew, and with the named effects.
     floor : float
-        Part of `after` that noise and structure explain.
+        Part of `after` that noise and what plain tires show explain.
     folds : tuple of Fold
     held_before : tuple of float
         One error per fold, of the model without the named effects; empty if nothing is named.
@@ -76,13 +75,10 @@ class Assessment:
         return self.diagnosis.final if self.named else self.diagnosis.base
 
     def error_with(self, finding: Finding) -> float:
-        """Return the error with one effect alone: of a sole named one exact, else of first order.
-
-        To first order the effect takes the share of the refitted error that it takes of the fit's.
-        """
+        """Return the error with one effect alone, to first order unless it is the one named."""
         if self.named == (finding.effect.name,):
             return self.after.value
-        return self.refitted.value * finding.error_after / self.diagnosis.base.error
+        return self.refitted.value * float(np.sqrt(max(1.0 - finding.share, 0.0)))
 
 
 def assess(
@@ -99,7 +95,7 @@ def assess(
     """
     data, yardstick = found.data, Yardstick.of(found.runs)
     unit = MapUnit.of(found.runs, data)
-    verdict, named, findings, messages = found.verdict, found.named, found.findings, []
+    verdict, named, findings, messages = found.verdict.kind, found.named, found.findings, []
     if not unit.known:
         verdict, named = "none", ()
         findings = tuple(_hint(finding) for finding in findings)
@@ -108,12 +104,12 @@ def assess(
     near = found.base.correction.contact
     refitted = yardstick.error(found.base.model, start=near)
     after = yardstick.error(final.model, start=final.correction.contact) if named else refitted
-    floor = floor_of(after, found.runs, data, final, found.beyond, found.usual)
+    floor = _floor(found, after)
     chosen = folds(data) if named else ()
     held_before = held_out_errors(data, found.base, chosen, yardstick, progress=progress)
     held_after = {
         name: held_out_errors(data, single, chosen, yardstick, progress=progress)
-        for name in [name for name in named if name not in BELT] or named
+        for name in named
         if (single := _with_one(found, name)) is not None
     }
     alone = next((held_after[name] for name in named if (name,) == named), None)
@@ -127,10 +123,6 @@ def assess(
         for finding in findings
         if finding.effect.name in named and not finding.in_range
     ]
-    messages += [_by_share(name) for name in found.by_share if name in named]
-    others = [f.effect.name for f in findings if f.level == "alarm" and f.effect.name not in named]
-    if others and verdict in ("none", "named"):
-        messages.append(_not_needed(others))
     return Assessment(
         found,
         unit,
@@ -160,19 +152,17 @@ def _too_large(finding: Finding) -> str:
     )
 
 
-def _not_needed(names: Sequence[str]) -> str:
-    return (
-        "also conspicuous, but not needed in an exact fit, or not told apart from what cannot be: "
-        f"{', '.join(names)}"
-    )
+def _floor(found: Diagnosis, after: ModelError) -> float:
+    """Return the part of an error that noise and what plain tires show explain.
 
-
-def _by_share(name: str) -> str:
-    return (
-        f"{name} is named for its share of the error: beside the shear that every belt has, it "
-        "takes more of what is left than anything else does, and more than tires without it show. "
-        "Its score may be low, for structure of the ring looks alike in part"
-    )
+    It is all of it, unless something stands out of what they show.
+    """
+    if not found.exceeds or after.whiten is None:
+        return after.value
+    best = found.verdict.best
+    more, _ = best.null.beside(best.against)
+    taken = after.whiten(np.tensordot(more, best.fit.rows[best.against], axes=1))
+    return float(np.sqrt(max(after.value**2 - float(np.mean(taken**2)), 0.0)))
 
 
 def _hint(finding: Finding) -> Finding:
@@ -212,10 +202,16 @@ def diagnosis_document(told: Assessment) -> dict[str, Any]:
             )
         ],
         "delay_us": 1e6 * found.final.delay,
-        "misfit": found.left,
-        "misfit_floor": found.floor,
+        "false_alarm": found.verdict.alpha,
+        "misfit": found.verdict.best.statistic,
+        "misfit_floor": found.verdict.best.limit(found.verdict.alpha),
+        "misfit_of": found.verdict.best.against,
         "verdict": told.verdict,
         "named": list(told.named),
+        "sets": [list(names) for names in found.verdict.sets] if told.named else [],
+        "p": found.verdict.best.p,
+        "p_std": found.verdict.best.p_std,
+        "p_without": found.verdict.base.p,
         "has": [effect.name for effect in found.base.effects],
         "candidates": [_candidate(finding, k + 1, told) for k, finding in enumerate(told.findings)],
         "dead": list(found.dead),
@@ -235,6 +231,8 @@ def _candidate(finding: Finding, rank: int, told: Assessment) -> dict[str, Any]:
         "score": finding.score,
         "threshold": finding.threshold,
         "level": finding.level,
+        "p": finding.p,
+        "p_std": finding.p_std,
         "strength": _plain(finding.strength),
         "std": _plain(finding.std),
         "unit": finding.effect.unit,
@@ -257,7 +255,7 @@ def _plain(strength: Sequence[float] | np.ndarray) -> float | list[float]:
 
 def _left(found: Diagnosis, data: Data, final: Refit) -> Left:
     """Return what is left; how it grows by the guessed law, where there is one."""
-    if not exceeding(found):
+    if not found.exceeds:
         return left_of(data, final)
     left = left_of(data, final, found.beyond)
     if found.guess is None:
@@ -266,21 +264,15 @@ def _left(found: Diagnosis, data: Data, final: Refit) -> Left:
     return replace(left, powers=powers, scaling=told_powers(powers))
 
 
-def exceeding(found: Diagnosis) -> bool:
-    """Return whether more is left than variants of the model leave."""
-    return found.left > found.floor or found.verdict == "unknown"
-
-
 def exceeds(told: Assessment) -> bool:
-    """Return whether more is left than variants of the model leave."""
-    return exceeding(told.diagnosis)
+    """Return whether more is left than plain tires leave."""
+    return told.diagnosis.exceeds
 
 
 def _unexplained(told: Assessment) -> dict[str, Any]:
     left, guess = told.left, told.diagnosis.guess
-    like = None if told.diagnosis.like is None else _like(told.diagnosis.like, told)
     if not exceeds(told):
-        return {"where": None, "scaling": None, "guess": None, "like": like}
+        return {"where": None, "scaling": None, "guess": None}
     start, stop = np.rad2deg(left.span)
     return {
         "where": {
@@ -300,30 +292,7 @@ def _unexplained(told: Assessment) -> dict[str, Any]:
             },
         },
         "guess": None if guess is None else _guess(guess),
-        "like": like,
     }
-
-
-def _like(like: Finding, told: Assessment) -> dict[str, Any]:
-    return {
-        "title": like.effect.title,
-        "score": like.score,
-        "threshold": like.threshold,
-        "strength": _plain(like.strength),
-        "std": _plain(like.std),
-        "unit": like.effect.unit,
-        "error_after": told.error_with(like),
-    }
-
-
-def told_like(like: Finding) -> str:
-    """Say what the residual looks like."""
-    title, unit = like.effect.title.rstrip("."), like.effect.unit.removeprefix("1")
-    size = f"{float(like.strength[0]):.3g} +- {float(like.std[0]):.1g} {unit}".strip()
-    return (
-        f"it looks like a {title[0].lower()}{title[1:]} ({size}, {like.score / like.threshold:.0f} "
-        "times what variants do), which no catalogue holds"
-    )
 
 
 def _gages(told: Assessment) -> list[dict[str, float]]:
@@ -375,11 +344,6 @@ def next_test(told: Assessment) -> dict[str, Any]:
         differ = sorted(every - common) or sorted(every)
         what = f"more levels of {_and(differ)}, to the ends that the rig allows: there " + (
             f"{_and(between)} part" if len(between) > 1 else "it shows"
-        )
-    elif told.diagnosis.like is not None and told.unit.known:
-        what = (
-            f"{told_like(told.diagnosis.like)}: check the gages' bond and amplifier, or write it "
-            "as an effect of your own (--effects) and add it"
         )
     elif told.verdict == "form_inadequate":
         what = (

@@ -1,7 +1,7 @@
-"""A fitted hypothesis among the plain tires of one family.
+"""What stands beside a fitted hypothesis, weighed by what plain tires of one family show.
 
-What stands beside the hypothesis - a further effect, more of a group of smooth shapes, or a law of
-the hypothesis that is further off than laws are - gains the likelihood ratio
+What may stand there - a further effect, more of a group of smooth shapes, or a law of the
+hypothesis that is further off than laws are - gains the likelihood ratio
 
     L_j = 2 [max over k of log p(r | H, a_j, k) - max over k of log p(r | H, k)],
 
@@ -11,20 +11,18 @@ degrees of freedom n_j as a_j has components. It is not exact, and by more for o
 another. So each L_j / n_j counts in units of its mean over the family's plain tires, planted in the
 user's plan, or of 1 (an exact model) where that is larger; the cube root makes chi-squares of
 different n_j comparable (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17 (1931) 684). The largest of
-these standard scores is the statistic of the hypothesis; its rank among the same tires is the
-p-value. Each tire is judged by what the tires of the other parts of the family show, its own mean
-left out.
+these standard scores is what stands out.
 """
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
+from scipy import stats
 
 from tirelib.arrays import FloatArray
 from tirelib.infer.normal import Weighed, beside
-from tirelib.infer.plain import BASE, FOLDS, ROUGHLY, Family, View
-from tirelib.infer.problem import Problem
+from tirelib.infer.plain import BASE, ROUGHLY, Family, View
 
 PRIOR = 0.5
 """Standard deviation of a further effect's strength, in ranges."""
@@ -40,17 +38,17 @@ OWN = tuple(0.0005 * 2.0 ** np.arange(6))
 """Sizes of the misfit that each run has for itself, over its rms strain, among which its likelihood
 chooses."""
 
+Products = Sequence[tuple[FloatArray, FloatArray]]
+"""B r, (m, k), and r' r, (k,), of k residuals r for every view."""
+
 
 class Null:
     """A fitted hypothesis among the plain tires of one family.
 
     Parameters
     ----------
-    problem : Problem
     views : sequence of View
-        Normal equations about the fit at every size of a run's own misfit.
-    rows : shape (m, ...)
-        What they are made of.
+        Normal equations about the fit at several sizes of a run's own misfit.
     family : Family
     allowed : mapping of block to variance
         What the hypothesis leaves open beside what plain tires show.
@@ -59,146 +57,138 @@ class Null:
     ----------
     names : list of str
         Of everything that may stand beside the hypothesis.
-    likelihood : float
-        Largest log likelihood over the sizes, [nats].
     """
 
     def __init__(
         self,
-        problem: Problem,
         views: Sequence[View],
-        rows: FloatArray,
         family: Family,
         allowed: Mapping[str, float | FloatArray],
     ) -> None:
-        normal = views[0].normal
-        self.family, self.allowed = family, allowed
-        self.names = [name for name in normal.blocks if name != BASE]
-        self.blocks = [normal.blocks[name] for name in self.names]
+        blocks = views[0].normal.blocks
+        self.views, self.family = views, family
+        self.names = [name for name in blocks if name != BASE]
+        self.blocks = [blocks[name] for name in self.names]
         self.counts = np.array([block.stop - block.start for block in self.blocks], dtype=float)
-        levels = [max(level for level, _ in self._levels(view)) for view in views]
-        likeliest = int(np.argmax(levels))
-        self.likelihood = levels[likeliest]
-        self.views = views[max(likeliest - 1, 0) : likeliest + 2]
-        random = np.random.default_rng(len(family))
-        planted = family.on(normal)
-        for name, variance in allowed.items():
-            if name.startswith(ROUGHLY):
-                block = normal.blocks[name]
-                size = (len(family), block.stop - block.start)
-                planted[:, block] = np.sqrt(variance) * random.standard_normal(size)
-        whiten = problem.whitener(views[likeliest].own)
-        tires = whiten.coloured(random.standard_normal((len(family), normal.count)))
-        tires = tires + np.tensordot(planted, rows, axes=1)
-        self.tires_at = []
-        for view in self.views:
-            white = problem.whitener(view.own)(tires)
-            self.tires_at.append((view.white @ white.T, np.sum(white**2, axis=1)))
-        self._measured = [
-            (v.normal.right[:, None], np.array([v.normal.square])) for v in self.views
-        ]
-
-    def _levels(self, view: View, without: int | None = None) -> list[tuple[float, Weighed]]:
-        """Return the log likelihood and the normal equations at every size of the tire, [nats].
-
-        What is typical of a tire is of all tires of the family, or of those beside one part.
-        """
-        typical, out = self.family.spread(without), []
-        for size in SIZES:
-            variance = {name: size**2 * each for name, each in typical.items()} | dict(self.allowed)
-            weighed = Weighed(view.normal, view.normal.spread(variance))
-            constant = view.log_volume + size_prior(size)
-            out.append((weighed.log_likelihood() + constant, weighed))
-        return out
+        typical = family.spread()
+        self._weighed = []
+        for view in views:
+            for size in SIZES:
+                variance = {name: size**2 * each for name, each in typical.items()}
+                spread = view.normal.spread({**variance, **allowed})
+                self._weighed.append((view, size, Weighed(view.normal, spread)))
 
     @cached_property
-    def _here(self) -> list[tuple[View, float, Weighed]]:
-        """The normal equations at every size, from all tires."""
-        return self._every(None)
+    def _levels(self) -> FloatArray:
+        """The log likelihood at every size, [nats]."""
+        return np.array(
+            [w.log_likelihood() + v.log_volume + size_prior(k) for v, k, w in self._weighed]
+        )
 
-    def _every(self, without: int | None) -> list[tuple[View, float, Weighed]]:
-        return [
-            (view, size, weighed)
-            for view in self.views
-            for size, (_, weighed) in zip(SIZES, self._levels(view, without), strict=True)
-        ]
+    @property
+    def likelihood(self) -> float:
+        """The largest log likelihood over the sizes, [nats]."""
+        return float(self._levels.max())
 
-    def _ratios(
-        self,
-        right: Sequence[tuple[FloatArray, FloatArray]],
-        without: int | None = None,
-        given: int | None = None,
-    ) -> FloatArray:
+    @property
+    def likeliest(self) -> tuple[View, Weighed]:
+        """The normal equations at the likeliest sizes."""
+        view, _, weighed = self._weighed[int(np.argmax(self._levels))]
+        return view, weighed
+
+    def _ratios(self, products: Products, given: int | None = None) -> FloatArray:
         """Return L_j / n_j of k residuals, (n_names, k).
 
-        `right` holds B r, (m, k), and r' r, (k,), for every view; `given` is a further effect that
-        the hypothesis counts with.
+        `given` is a further effect that the hypothesis counts with.
         """
         plain, free = [], []
-        products = {view.own: each for view, each in zip(self.views, right, strict=True)}
-        for view, size, weighed in self._here if without is None else self._every(without):
-            turned, square = products[view.own]
-            gram, turned_here = weighed.gram, weighed.right(turned)
+        of_view = {id(view): each for view, each in zip(self.views, products, strict=True)}
+        for view, size, weighed in self._weighed:
+            turned, square = of_view[id(view)]
+            gram, here = weighed.gram, weighed.right(turned)
             level = weighed.gain(turned) - 0.5 * square + view.log_volume + size_prior(size)
-            variance = weighed.root**2
             if given is not None:
-                block, more = self.blocks[given], self._more(given, variance)
-                level = level + _taken(gram, turned_here, block, more)
-                gram, turned_here = beside(gram, turned_here, block, more)
+                block, more = self.blocks[given], self._more(given, weighed)
+                level = level + _taken(gram, here, block, more)
+                gram, here = beside(gram, here, block, more)
             plain.append(level)
             free.append(
                 [
-                    level + _taken(gram, turned_here, block, self._more(j, variance))
+                    level + _taken(gram, here, block, self._more(j, weighed))
                     for j, block in enumerate(self.blocks)
                 ]
             )
         gain = np.max(free, axis=0) - np.max(plain, axis=0)
         return np.asarray(2.0 * gain / self.counts[:, None])
 
-    def _more(self, j: int, variance: FloatArray) -> FloatArray:
+    def _more(self, j: int, weighed: Weighed) -> FloatArray:
         """Return the variance of a block beyond that of plain tires."""
         block = self.blocks[j]
         if "," in self.names[j] or self.names[j].startswith(ROUGHLY):
-            return np.asarray(MORE * variance[block])
+            return np.asarray(MORE * weighed.root[block] ** 2)
         return np.full(block.stop - block.start, PRIOR**2)
 
-    @cached_property
-    def _tires(self) -> FloatArray:
-        """L_j / n_j of each plain tire by the others, (n_names, n_tires)."""
-        out = np.zeros((len(self.names), len(self.family)))
-        for fold in range(FOLDS):
-            part = self.family.fold == fold
-            if part.any():
-                right = [(turned[:, part], square[part]) for turned, square in self.tires_at]
-                out[:, part] = self._ratios(right, fold)
-        return out
+    def measure(self, own: Products) -> None:
+        """Take the family's own plain tires as the unit of every L_j / n_j."""
+        self.scale = np.maximum(self._ratios(own).mean(axis=1), 1.0)
 
-    @cached_property
-    def scale(self) -> FloatArray:
-        """Mean of L_j / n_j over the plain tires, at least 1, (n_names,)."""
-        return np.asarray(np.maximum(self._tires.mean(axis=1), 1.0))
-
-    @cached_property
-    def largest(self) -> FloatArray:
-        """The largest standard score of each plain tire by the others, (n_tires,)."""
-        count = len(self.family)
-        others = (self._tires.sum(axis=1, keepdims=True) - self._tires) / (count - 1)
-        scores = standard(self._tires / np.maximum(others, 1.0), self.counts[:, None])
-        return np.asarray(scores.max(axis=0))
+    def scores_of(self, products: Products) -> FloatArray:
+        """Return the standard scores of k residuals, (n_names, k)."""
+        return standard(self._ratios(products) / self.scale[:, None], self.counts[:, None])
 
     @cached_property
     def scores(self) -> FloatArray:
         """The standard score of everything beside the hypothesis, (n_names,)."""
-        return standard(self._ratios(self._measured)[:, 0] / self.scale, self.counts)
+        return self.scores_of(self._measured)[:, 0]
+
+    @property
+    def _measured(self) -> Products:
+        return [(v.normal.right[:, None], np.array([v.normal.square])) for v in self.views]
 
     def left(self, names: Sequence[str]) -> dict[str, float]:
         """Return the largest standard score beside the hypothesis with each further effect."""
         out = {}
         for name in names:
             j = self.names.index(name)
-            scores = standard(self._ratios(self._measured, given=j)[:, 0] / self.scale, self.counts)
-            out[name] = float(np.delete(scores, j).max())
+            ratio = self._ratios(self._measured, given=j)[:, 0]
+            out[name] = float(np.delete(standard(ratio / self.scale, self.counts), j).max())
         return out
+
+    def explained(self) -> FloatArray:
+        """Return coefficients of all rows by the hypothesis and what plain tires show, (m,)."""
+        view, weighed = self.likeliest
+        return weighed.mean(view.normal.right)
+
+    def beside(self, name: str) -> tuple[FloatArray, FloatArray]:
+        """Return what a further effect or more of a group takes, and its covariance.
+
+        Shapes (n,) and (n, n): coefficients of the rows of that name, beyond what plain tires show.
+        """
+        view, weighed = self.likeliest
+        j = self.names.index(name)
+        block = self.blocks[j]
+        inner = weighed.gram[block, block] + np.diag(1.0 / self._more(j, weighed))
+        covariance = np.asarray(np.linalg.inv(inner), dtype=float)
+        return covariance @ weighed.right(view.normal.right)[block], covariance
+
+    def angle(self, one: str, other: str) -> float:
+        """Return the smallest angle between two effects' signatures as this test weighs them."""
+        _, weighed = self.likeliest
+        a, b = (self.blocks[self.names.index(name)] for name in (one, other))
+        gram = weighed.gram
+        left, right = (np.linalg.cholesky(gram[k, k]) for k in (a, b))
+        inner = np.linalg.solve(left, np.linalg.solve(right, gram[b, a]).T)
+        return float(np.arccos(min(float(np.linalg.norm(inner, 2)), 1.0)))
+
+    def power(self, name: str, strength: float, limit: float) -> float:
+        """Return the chance that an effect of so many ranges has a score beyond a limit."""
+        j = self.names.index(name)
+        _, covariance = self.beside(name)
+        count = self.counts[j]
+        spread = 2.0 / (9.0 * count)
+        least = max(limit * np.sqrt(spread) + 1.0 - spread, 0.0) ** 3 * count * self.scale[j]
+        size = strength**2 / float(np.mean(np.diag(covariance)))
+        return float(stats.ncx2.sf(least, count, size))
 
 
 def _taken(gram: FloatArray, right: FloatArray, block: slice, more: FloatArray) -> FloatArray:

@@ -16,11 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tirelib.arrays import FloatArray, IntArray
+from tirelib.arrays import FloatArray
 from tirelib.infer.normal import Normal, Weighed
 
-FOLDS = 5
-"""Parts of a family's tires; each part is judged by what the others show."""
 ROUNDS = 60
 SETTLED = 0.01
 """Relative change of all variances below which they are learned."""
@@ -59,16 +57,10 @@ class Family:
     def __len__(self) -> int:
         return len(self.draws)
 
-    @property
-    def fold(self) -> IntArray:
-        """Part that each tire belongs to, shape (n_tires,)."""
-        return np.arange(len(self)) % FOLDS
-
-    def spread(self, without: int | None = None) -> dict[str, float]:
-        """Return the variances by block, of all tires or without those of one part."""
-        kept = np.ones(len(self), dtype=bool) if without is None else self.fold != without
-        known = np.isfinite(self.squares[kept])
-        total = np.where(known, self.squares[kept], 0.0).sum(axis=0)
+    def spread(self) -> dict[str, float]:
+        """Return the variances by block."""
+        known = np.isfinite(self.squares)
+        total = np.where(known, self.squares, 0.0).sum(axis=0)
         count = known.sum(axis=0)
         mean = np.where(count > 0, total / np.maximum(count, 1), START)
         shapes = np.array(["," in name for name in self.blocks])

@@ -71,7 +71,11 @@ def suspects_of(told: Mapping[str, Any], catalogue: Mapping[str, Effect]) -> Sus
         name for name, e in entries.items() if e["level"] in ("alarm", "hint") and e["in_range"]
     ]
     if told["verdict"] == "indistinguishable":
-        return _of(named[:MOST], [], entries, catalogue, False, "the campaign cannot tell which")
+        sets = told.get("sets") or [[name] for name in named]
+        common = [name for name in sets[0] if all(name in names for names in sets)]
+        differ = [name for name in named if name not in common]
+        why = "the campaign cannot distinguish them"
+        return _of(differ[:MOST], common, entries, catalogue, False, why)
     for name in named:
         twins = [twin["effect"] for twin in entries.get(name, {}).get("twins", [])]
         doubtful = [twin for twin in twins if twin in alive and twin not in named]

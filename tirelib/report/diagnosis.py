@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from tirelib.diagnose.document import Assessment, exceeds, next_test, told_like
+from tirelib.diagnose.document import Assessment, exceeds, next_test
 from tirelib.diagnose.held_out import pooled
 from tirelib.diagnose.left import Left, left_of
-from tirelib.diagnose.stage import ALARM
 from tirelib.report.comparison import METHOD, RING, Part
 from tirelib.report.figures.compare_plot import (
     ANGLE_TITLE,
@@ -27,12 +26,13 @@ from tirelib.waveforms import GRID
 
 TITLE = "Which effect is missing"
 METHOD_TEXT = (
-    "All effects of the catalogue are fitted together. Residuals are weighted by what variants of "
-    "the model leave that differ in structure but lack no effect, so residuals that structure "
-    "often causes count little. An effect's score is the misfit that returns when it alone is "
-    "removed. The threshold is the largest score expected among that many variants, each judged "
-    f"by the others. An effect with a plausible strength is an alarm from {ALARM:g} times the "
-    "threshold on, and a hint from the threshold on."
+    "Every hypothesis - no effect, one, two or three - is fitted together with the tire's numbers. "
+    "What stands out beside it is compared with what plain tires show, tires of three simulators "
+    "in which nothing is hidden: the standard score of an effect is its likelihood ratio in units "
+    "of theirs. The p-value of a hypothesis is the share of plain tires with as large a score. "
+    "Every hypothesis with a p-value above the false-alarm probability stays in the set, and its "
+    "smallest members are the verdict. Scores in this table are those beside the model as it is; "
+    "the p-value is that of the hypothesis that this effect is missing and no other."
 )
 
 
@@ -43,18 +43,16 @@ def answer_of(told: Assessment) -> str:
         f"the error falls from {number(told.before.value, 3)} to {number(told.after.value, 3)} "
         f"(floor {number(told.floor, 3)})"
     )
-    like = told.diagnosis.like
-    looks = "" if like is None else f" Here {told_like(like)}."
     return {
         "none": f"No effect stands out: the error {number(told.before.value, 3)} (floor "
         f"{number(told.floor, 3)}) gives no reason to name one.",
         "named": f"Missing: {names}. With it {fall}.",
         "form_inadequate": f"{names} acts here, but its law has the wrong form: {fall}, and more "
-        "is left than the structure of the ring explains.",
+        "is left than plain tires show.",
         "indistinguishable": f"One of {names} is missing; this campaign cannot distinguish them. "
         f"With {told.named[0] if told.named else 'it'} {fall}.",
         "unknown": "Something is missing that no effect of the catalogue explains; error "
-        f"{number(told.before.value, 3)} (floor {number(told.floor, 3)}).{looks}",
+        f"{number(told.before.value, 3)} (floor {number(told.floor, 3)}).",
     }[told.verdict]
 
 
@@ -106,7 +104,7 @@ def parts_of(told: Assessment, history: Sequence[Mapping[str, Any]] = ()) -> lis
             "candidates",
             METHOD_TEXT,
             tables=[_candidates(told)],
-            plots=[score_bars(told.findings, ALARM)],
+            plots=[score_bars(told.findings)],
         ),
         Part("Error", "error", tables=[_errors(told)], plots=[fall] if fall else []),
         Part("What is left", "left", _left_text(told), plots=plots),
@@ -144,6 +142,7 @@ def _candidates(told: Assessment) -> Table:
             "yes" if f.in_range else "no",
             ", ".join(f"{twin} {np.rad2deg(angle):.0f}\u00b0" for twin, angle in f.twins),
             number(f.score / f.threshold, 3),
+            number(f.p, 2),
             _strength(f.strength),
             _strength(f.std),
             f.effect.unit,
@@ -161,6 +160,7 @@ def _candidates(told: Assessment) -> Table:
             "in range",
             "twins (angle)",
             "score / threshold",
+            "p",
             "strength",
             "std",
             "unit",
@@ -171,13 +171,15 @@ def _candidates(told: Assessment) -> Table:
         rows,
         texts=4,
         note="Twins: effects whose signatures are less than 30 degrees apart. Power: chance that "
-        "a third of the range would be an alarm. Errors with effects that are not named are "
-        "linear approximations.",
+        "a third of the range has a score beyond the threshold. Errors with "
+        "effects that are not named are linear approximations.",
     )
 
 
 def _errors(told: Assessment) -> Table:
-    found, unit = told.diagnosis, _unit(told)
+    verdict, unit = told.diagnosis.verdict, _unit(told)
+    best = verdict.best
+    limit = best.limit(verdict.alpha)
     rows = [
         [
             "noise of a run's waveform, from repeats [microstrain]",
@@ -187,7 +189,7 @@ def _errors(told: Assessment) -> Table:
         [f"error with its parameters fitted again [{unit}]", number(told.refitted.value, 4)],
         [f"error with the named effects [{unit}]", number(told.after.value, 4)],
         [
-            f"floor: the error that noise and the ring's structure explain [{unit}]",
+            f"floor: the error that noise and what plain tires show explain [{unit}]",
             number(told.floor, 4),
         ],
         [
@@ -196,8 +198,9 @@ def _errors(told: Assessment) -> Table:
             f"{number(1e6 * told.before.rms, 4)}; {number(1e6 * told.after.rms, 4)}",
         ],
         [
-            "misfit beyond structure, relative to the largest of the variants",
-            number(found.left / found.floor, 3),
+            "largest standard score beside the verdict's model, and the score that plain tires "
+            "exceed with the false-alarm probability",
+            f"{number(best.statistic, 3)} ({best.against}); {number(limit, 3)}",
         ],
     ]
     for k, fold in enumerate(told.folds):
@@ -215,18 +218,12 @@ def _errors(told: Assessment) -> Table:
 
 
 def _left_text(told: Assessment) -> str:
-    like, guess = told.diagnosis.like, told.diagnosis.guess
-    looks = f" The missing part: {told_like(like)}." if like is not None else ""
+    guess = told.diagnosis.guess
     if not exceeds(told):
-        return (
-            "The remaining residual is no larger than that of model variants which lack no "
-            "effect." + looks
-        )
+        return "The remaining residual is no larger than what plain tires show."
     text = (
-        f"The residual that structure does not explain lies {told.left.where}; it "
-        f"{told.left.scaling}."
+        f"The residual that plain tires do not show lies {told.left.where}; it {told.left.scaling}."
     )
-    text += looks
     if guess is not None:
         text += (
             f" A guess by sparse regression, measured less model: {guess.law} "

@@ -97,39 +97,66 @@ def _sure(told: Mapping[str, Any]) -> str:
 
 
 def _evidence(told: Mapping[str, Any]) -> list[str]:
-    """Return how significant the named effects are, by the p-value where the document has one."""
-    out, ratios = [], []
-    for name in told["named"] if told["verdict"] != "unknown" else ():
-        entry = _candidate(told, name)
-        if entry is None:
-            continue
-        if entry.get("p") is not None:
-            out.append(f"{name}: p = {number(entry['p'], 2)} if it were not there.")
-        else:
-            ratio = entry["score"] / entry["threshold"]
-            ratios.append(f"{name} {float(f'{ratio:.2g}'):g} times")
+    """Return how significant a verdict is, by p-values where the document has them."""
+    found = [_candidate(told, name) for name in told["named"]]
+    entries = [entry for entry in found if entry is not None]
+    out = []
+    for entry in entries:
+        low, high = (number(end, 3) for end in entry["range"])
         if not entry["in_range"]:
-            low, high = entry["range"]
             out.append(
-                f"The strength of {name} is outside the plausible {number(low, 3)} to "
-                f"{number(high, 3)}: measure it in another way before you believe it."
+                f"The strength of {entry['effect']} is outside the plausible {low} to {high}: "
+                "measure it in another way before you believe it."
             )
+    if told.get("p") is not None:
+        return [_by_p(told), *out]
+    ratios = []
+    if told["verdict"] != "unknown":
+        for entry in entries:
+            ratio = entry["score"] / entry["threshold"]
+            ratios.append(f"{entry['effect']} {float(f'{ratio:.2g}'):g} times")
     if ratios:
-        out.insert(
-            0,
+        return [
             f"{_and(ratios)} as clear as the clearest effect that variants of the model show by "
             "chance and structure alone.",
+            *out,
+        ]
+    largest = max((e["score"] / e["threshold"] for e in told["candidates"]), default=0.0)
+    if told["verdict"] == "none":
+        out.append(
+            f"The most conspicuous effect reaches {number(largest, 2)} times what variants of "
+            "the model without it show, or no fit needs it."
         )
-    if not told["named"]:
-        largest = max((e["score"] / e["threshold"] for e in told["candidates"]), default=0.0)
-        if told["verdict"] == "none":
-            out.append(
-                f"The most conspicuous effect reaches {number(largest, 2)} times what variants of "
-                "the model without it show, or no fit needs it."
-            )
-        else:
-            out.append("More is left than the structure of a tire explains.")
+    elif not told["named"]:
+        out.append("More is left than the structure of a tire explains.")
     return out
+
+
+def _by_p(told: Mapping[str, Any]) -> str:
+    """Return the p-values of the verdict in words."""
+    p, without, level = (number(told[key], 2) for key in ("p", "p_without", "false_alarm"))
+    if told["verdict"] == "none":
+        first = max(told["candidates"], key=lambda e: e["score"] / e["threshold"], default=None)
+        most = ""
+        if first is not None:
+            most = (
+                f" The most conspicuous effect, {first['effect']}, reaches "
+                f"{number(first['score'] / first['threshold'], 2)} of the score that would count."
+            )
+        return (
+            f"A share of {p} of plain tires, in which nothing is hidden, show as much as this one "
+            f"(p = {p}; below {level} something would be missing).{most}"
+        )
+    if told["verdict"] in ("unknown", "form_inadequate"):
+        return (
+            f"Every hypothesis of up to three effects is rejected (p = {p} of the likeliest, "
+            f"{level} is needed): {told['misfit_of']} stands out of what plain tires show."
+        )
+    it = "it" if len(told["sets"][0]) == 1 else "them"
+    return (
+        f"Without {it} the model is rejected (p = {without}); with {it} nothing stands out of what "
+        f"plain tires show (p = {p})."
+    )
 
 
 def _alternatives(told: Mapping[str, Any]) -> list[str]:

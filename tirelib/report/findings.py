@@ -36,8 +36,11 @@ class Finding(Protocol):
         """Return alarm, hint or quiet."""
 
 
-def score_bars(findings: Sequence[Finding], alarm: float) -> Plot:
-    """Return the scores over their thresholds, with the marks of a hint and of an alarm."""
+def score_bars(findings: Sequence[Finding], alarm: float | None = None) -> Plot:
+    """Return the scores over their thresholds.
+
+    Marks are the threshold and, where there is one, the ratio from which on an effect is an alarm.
+    """
     names = [f.effect.name for f in findings]
     ratio = [f.score / f.threshold for f in findings]
     figure = go.Figure(
@@ -49,7 +52,16 @@ def score_bars(findings: Sequence[Finding], alarm: float) -> Plot:
             hovertemplate="%{y}: %{x:.3g}<extra></extra>",
         )
     )
-    for at, text in ((1.0, "hint"), (alarm, "alarm")):
+    marks = [(1.0, "threshold")] if alarm is None else [(1.0, "hint"), (alarm, "alarm")]
+    note = "Red: alarm; blue: hint; gray: quiet."
+    if alarm is not None:
+        note += (
+            f" An effect beyond {alarm:g} that is not an alarm lies outside its plausible range, "
+            "or an exact refit is as good without it."
+        )
+    else:
+        note += " A gray effect beyond the threshold is not needed where what is named is fitted."
+    for at, text in marks:
         figure.add_vline(x=at, line={"dash": "dot", "color": FAINT})
         # places of annotations on an axis of powers are powers
         figure.add_annotation(
@@ -67,8 +79,7 @@ def score_bars(findings: Sequence[Finding], alarm: float) -> Plot:
     return Plot(
         "scores",
         "Score over threshold",
-        f"Red: alarm; blue: hint; gray: quiet. An effect beyond {alarm:g} that is not an alarm "
-        "lies outside its plausible range, or an exact refit is as good without it.",
+        note,
         figure,
         ["effect", "score / threshold", "level"],
         [[f.effect.name, r, f.level] for f, r in zip(findings, ratio, strict=True)],
