@@ -53,9 +53,15 @@ fem: $(STAMP)
 proof: $(STAMP)
 	$(BIN)/python build/proof/run.py
 
-# Hides effects in the rig, lets the library find them, and counts; hours, but resumable and cached.
+# Hides effects in tires of three simulators, lets the library find them, and counts; hours, resumable.
 hidden: $(STAMP)
-	$(BIN)/python build/hidden/run.py --golden
+	for family in rig continuum ring; do \
+		$(BIN)/python build/structure/make.py --family $$family --seeds 2,5,8,11,14,17,20,23,26,29,32,35,38,41,44,47,50,53,56,59; \
+		$(BIN)/python build/structure/make.py --family $$family --seeds 101-170 --kinds known; \
+		$(BIN)/python build/structure/make.py --family $$family --seeds 201-230 --kinds unknown; \
+	done
+	$(BIN)/python build/structure/learn.py
+	$(BIN)/python build/structure/judge.py --jobs 2
 
 # How often the run that next-test advises tells two look-alikes apart; an hour, resumable.
 next-test: $(STAMP)

@@ -11,7 +11,6 @@ from click.testing import CliRunner, Result
 from tests.unit.diagnose.planted import EFFECT, STRENGTH, added, model_file, waves
 from tirelib.cli import program
 from tirelib.cli.diagnose import SHOWN
-from tirelib.diagnose.stage import ALARM
 from tirelib.errors import TirelibError
 from tirelib.parameters import read_tire, write_tire
 from tirelib.waveforms import Waveforms
@@ -66,9 +65,7 @@ def planted(model: Path) -> Any:
     with pytest.MonkeyPatch.context() as patch:
         use(patch, waves(EFFECT, STRENGTH))
         out, target = model.parent / "report", model.parent / "D.json"
-        found = call(
-            "diagnose", "anywhere", "--model", model, "--members", 8, "--out", out, "--json", target
-        )
+        found = call("diagnose", "anywhere", "--model", model, "--out", out, "--json", target)
     assert found.exit_code == 0, found.output
     return SimpleNamespace(told=json.loads(target.read_text()), out=out, said=found.output)
 
@@ -83,6 +80,8 @@ def test_the_contracts_keys_are_there(planted: Any) -> None:
         "error_before",
         "verdict",
         "named",
+        "sets",
+        "false_alarm",
         "candidates",
         "dead",
         "unexplained",
@@ -103,6 +102,8 @@ def test_the_contracts_keys_are_there(planted: Any) -> None:
             "heldout_error_after",
             "twins",
             "power",
+            "p",
+            "p_std",
         }
     assert [entry["rank"] for entry in told["candidates"]] == list(
         range(1, len(told["candidates"]) + 1)
@@ -116,7 +117,9 @@ def test_the_planted_effect_is_named_with_errors_that_fall(planted: Any) -> None
     first = told["candidates"][0]
     assert first["effect"] == EFFECT
     assert first["level"] == "alarm"
-    assert first["score"] >= ALARM * first["threshold"]
+    assert first["score"] > first["threshold"]
+    assert told["p_without"] <= told["false_alarm"] == 0.05
+    assert told["sets"] == [[EFFECT]]
     assert first["error_after"] == told["error_after"] < 0.5 * told["error_before"]
     assert first["heldout_error_after"] < told["heldout_error_before"]
     assert all(entry["heldout_error_after"] is None for entry in told["candidates"][1:])
@@ -157,7 +160,7 @@ def test_the_named_effect_is_added_and_no_longer_a_candidate(
     assert told["error_after"] < 0.5 * told["error_before"]
     assert told["heldout_error_after"] < told["heldout_error_before"]
     assert read_tire(second).extra["effects"][0]["strength"] == told["strength"]
-    again = call("diagnose", "x", "--model", second, "--members", 8, "--json", tmp_path / "D.json")
+    again = call("diagnose", "x", "--model", second, "--json", tmp_path / "D.json")
     assert again.exit_code == 0, again.output
     after = json.loads((tmp_path / "D.json").read_text())
     assert after["has"] == [EFFECT]
@@ -173,7 +176,7 @@ def test_without_repeats_nothing_is_named_and_the_noise_is_null(
 ) -> None:
     use(monkeypatch, waves(EFFECT, STRENGTH, 0))
     target = tmp_path / "D.json"
-    found = call("diagnose", "anywhere", "--model", model, "--members", 4, "--json", target)
+    found = call("diagnose", "anywhere", "--model", model, "--json", target)
     assert found.exit_code == 0, found.output
     told = json.loads(target.read_text())
     assert told["noise"] is None
@@ -229,14 +232,3 @@ def test_names_of_effects_are_told_in_full(planted: Any) -> None:
     names = [entry["effect"] for entry in planted.told["candidates"][:SHOWN]]
     assert max(map(len, names)) > 12
     assert all(name in planted.said for name in names)
-
-
-def test_alarms_that_an_exact_fit_does_not_need_are_told(planted: Any) -> None:
-    found = planted.told
-    others = [
-        entry["effect"]
-        for entry in found["candidates"]
-        if entry["level"] == "alarm" and entry["effect"] not in found["named"]
-    ]
-    told = [text for text in found["messages"] if "is not named" in text]
-    assert [text.split(" stands out")[0] for text in told] == [", ".join(others)] * bool(others)
