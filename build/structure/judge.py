@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import numpy as np
 
 from structure.cases import NONE, load_case
-from structure.learn import FAMILIES, OUT, say
+from structure.learn import FAMILIES, OUT, TABLE, say
 from tirelib.arrays import FloatArray
 from tirelib.effects import CATALOGUE
 from tirelib.errors import TirelibError
@@ -78,7 +78,7 @@ def main() -> None:
 def judged(file: Path, *, out: Path, false_alarm: float) -> dict[str, Any]:
     """Return the verdict on a campaign by the families other than its own."""
     case = load_case(file)
-    families = [f for f in load(out / "plain_tires.npz")[0] if f.name != case.family]
+    families = [f for f in load(TABLE)[0] if f.name != case.family]
     entry: dict[str, Any] = {
         "case": f"{case.family}/{file.stem}",
         "family": case.family,

@@ -17,7 +17,7 @@ import numpy as np
 
 from structure.cases import load_case
 from structure.judge import _identified
-from structure.learn import FAMILIES, OUT, say
+from structure.learn import FAMILIES, OUT, TABLE, say
 from tirelib.effects import CATALOGUE
 from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import straight_runs
@@ -41,7 +41,7 @@ def main() -> None:
     say(f"{'law error':36}" + " ".join(f"{LAW * looser:8.3f}" for looser in LOOSER))
     with one_thread():
         for family in options.families.split(","):
-            others = [f for f in load(options.out / "plain_tires.npz")[0] if f.name != family]
+            others = [f for f in load(TABLE)[0] if f.name != family]
             total = np.zeros(len(LOOSER))
             for file in sorted((options.out / family).glob("*.npz")):
                 kind = file.stem.split("-")[1]

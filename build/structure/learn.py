@@ -1,11 +1,12 @@
 """Learn what plain tires leave of a fitted model; count false alarms on a family left out.
 
-    python build/structure/learn.py                      fits, table and P-P figures
-    python build/structure/learn.py --families rig,ring  of two families only
+    python build/structure/learn.py                 fits, table and p-values
+    python build/structure/learn.py --seeds 2,5,8   of these tires only
 
 Reads the campaigns that `build/structure/make.py` made, identifies and fits each plain one (kept in
-build/out/structure/fits), and writes plain_tires.npz and plain_tires.json there: what the families
-show, and the p-value of every plain tire, judged by the families other than its own.
+build/out/structure/fits), and writes the library's table tirelib/infer/plain_tires.npz, what the
+families show, and tests/golden/plain_tires.json: the p-value of every plain tire, judged by the
+families other than its own.
 """
 
 import argparse
@@ -22,7 +23,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from structure.cases import load_case
+from structure.cases import NONE, case_file, load_case
+from structure.make import seeds
 from tirelib.effects import CATALOGUE
 from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import straight_runs
@@ -37,6 +39,8 @@ from tirelib.threads import one_thread
 
 ROOT = Path(__file__).parents[2]
 OUT = ROOT / "build" / "out" / "structure"
+TABLE = ROOT / "tirelib" / "infer" / "plain_tires.npz"
+GOLDEN = ROOT / "tests" / "golden" / "plain_tires.json"
 FAMILIES = ("rig", "continuum", "ring")
 FIRST = {"effect": 0.02**2, "shape": 0.005**2}
 """Variances of the fit from which the learning starts."""
@@ -46,19 +50,17 @@ Fit = tuple[StrainProblem, Posterior]
 def main() -> None:
     """Fit, learn, judge, write."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--families", default=",".join(FAMILIES))
+    parser.add_argument("--seeds", type=seeds, default=list(range(2, 60, 3)), help="1-60 or 1,5,7")
     parser.add_argument("--out", type=Path, default=OUT)
-    parser.add_argument("--most", type=int, default=60, help="tires of each family")
     options = parser.parse_args()
-    names = options.families.split(",")
+    names = FAMILIES
     with one_thread():
-        fits = {name: fits_of(options.out, name, options.most) for name in names}
+        fits = {name: fits_of(options.out, name, options.seeds) for name in names}
         families = [family_of(name, list(fits[name].values())) for name in names]
-        table = options.out / "plain_tires.npz"
-        save(table, families, provenance(fits))
+        save(TABLE, families, provenance(fits))
         document: dict[str, Any] = {
             "families": {},
-            "sha256": hashlib.sha256(table.read_bytes()).hexdigest(),
+            "sha256": hashlib.sha256(TABLE.read_bytes()).hexdigest(),
         }
         for name in names:
             others = [family for family in families if family.name != name]
@@ -69,7 +71,7 @@ def main() -> None:
             document["families"][name] = {str(seed): round(p, 4) for seed, p in found.items()}
             share = np.mean([p <= 0.05 for p in found.values()])
             say(f"{name}: {len(found)} plain tires by the other families, {share:.1%} alarms")
-        (options.out / "plain_tires.json").write_text(json.dumps(document, indent=1) + "\n")
+        GOLDEN.write_text(json.dumps(document, indent=1) + "\n")
 
 
 def say(text: str) -> None:
@@ -78,13 +80,13 @@ def say(text: str) -> None:
     sys.stdout.flush()
 
 
-def fits_of(out: Path, name: str, most: int) -> dict[int, Fit]:
+def fits_of(out: Path, name: str, chosen: Sequence[int]) -> dict[int, Fit]:
     """Return the fits of a family's plain tires by seed; those that fail are left out."""
     folder = out / "fits"
     folder.mkdir(parents=True, exist_ok=True)
     found = {}
-    files = sorted((out / name).glob("*-none.npz"), key=lambda f: int(f.stem.split("-")[0]))
-    for file in files[:most]:
+    every = (case_file(out, name, seed, NONE, 1.0) for seed in chosen)
+    for file in (each for each in every if each.exists()):
         kept = folder / f"{name}-{file.stem}.pkl"
         if not kept.exists():
             kept.write_bytes(pickle.dumps(fit_of(file)))

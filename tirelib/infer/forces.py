@@ -175,11 +175,12 @@ class ForceProblem:
             state = change(state)
         return state
 
-    def slopes(self, point: Point, solved: ForceSolved) -> FloatArray:
+    def slopes(self, point: Point, solved: ForceSolved, *, near: bool = False) -> FloatArray:
         """Return slopes by the base and by strengths in ranges, (n_coordinates, n).
 
         Every point's force is a function of the state there, so that slopes by the state's fields
-        are taken once, and each coordinate adds how it moves the fields.
+        are taken once, and each coordinate adds how it moves the fields. They are of this point,
+        whether `near` would do or not.
         """
         by, rows = StateSlopes(solved.state, solved.turn, self.quantity), []
         for k in range(point.base.size):

@@ -192,7 +192,7 @@ def posterior(
             progress(f"fit of {', '.join(e.name for e in effects) or 'the base'}, cost {after:.0f}")
         if moved < SETTLED or cost - after < GAINS:
             break
-        slopes = problem.slopes(point, solved)
+        slopes = problem.slopes(point, solved, near=True)
     else:
         raise ConvergenceError(
             f"fit with {', '.join(e.name for e in effects) or 'no effect'}: the parameters still "

@@ -82,8 +82,11 @@ class Problem(Protocol):
     def solve(self, point: Point, near: Any = None) -> Solved:
         """Return the model at a point; raises TirelibError where it has none."""
 
-    def slopes(self, point: Point, solved: Any) -> FloatArray:
-        """Return slopes by the base, then by strengths in ranges, (n_coordinates, ...)."""
+    def slopes(self, point: Point, solved: Any, *, near: bool = False) -> FloatArray:
+        """Return slopes by the base, then by strengths in ranges, (n_coordinates, ...).
+
+        With `near`, those by strengths may be of a point nearby, to save time.
+        """
 
     def remainder(self, point: Point, solved: Any) -> Mapping[str, FloatArray]:
         """Return groups of smooth shapes that no law describes, rows (k, ...) each."""

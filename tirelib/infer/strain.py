@@ -99,7 +99,7 @@ class StrainSolved:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Added:
-    """How the tire's coordinates move what effects add, and the point it was taken at."""
+    """Slopes that cost much, and the point they were taken at."""
 
     point: Point
     slopes: FloatArray
@@ -151,6 +151,7 @@ class StrainProblem:
         noise = runs.noise.std if runs.noise.known else UNKNOWN_NOISE * typical
         self._last: tuple[StrainSolved, RolledSlopes] | None = None
         self._added: _Added | None = None
+        self._strengths: _Added | None = None
         solved = self.solve(self.start)
         self.half_angle = 0.6 * np.sqrt(
             2.0 * solved.model.deflection / float(np.max(self.values["free_radius"]))
@@ -179,7 +180,7 @@ class StrainProblem:
 
     def forget(self) -> None:
         """Forget slopes that only save time."""
-        self._last = self._added = None
+        self._last = self._added = self._strengths = None
 
     def solve(self, point: Point, near: StrainSolved | None = None) -> StrainSolved:
         """Return the model at a point; raises TirelibError where it has none."""
@@ -203,8 +204,11 @@ class StrainProblem:
             return near.model.rolling
         return self._last[1].start(near.model.rolling, (point.base - near.point.base)[:-1])
 
-    def slopes(self, point: Point, solved: StrainSolved) -> FloatArray:
-        """Return slopes by the base, the delay and strengths in ranges."""
+    def slopes(self, point: Point, solved: StrainSolved, *, near: bool = False) -> FloatArray:
+        """Return slopes by the base, the delay and strengths in ranges.
+
+        With `near`, slopes by strengths may be those of a point nearby: they cost most.
+        """
         by = by_values(solved.model, self.free)
         assert by.rolled is not None  # noqa: S101 - values move the rolling ring
         self._last = (solved, by.rolled)
@@ -214,6 +218,15 @@ class StrainProblem:
                 more = added_by_values(solved.model, self.free, LEAST_STEP)
                 self._added = _Added(point, more)
             slopes = slopes + self._added.slopes
+        rows = np.concatenate([slopes, self._by_strengths(point, solved, near=near)])
+        late = earlier(rows, self.data.points.omega, -solved.delay)
+        delay = by_delay(solved.waveform, self.data.points.omega)[None]
+        return np.concatenate([late[: len(self.free)], delay, late[len(self.free) :]])
+
+    def _by_strengths(self, point: Point, solved: StrainSolved, *, near: bool) -> FloatArray:
+        """Return slopes by strengths in ranges, without the delay."""
+        if near and self._strengths is not None and self._strengths.serves(point):
+            return self._strengths.slopes
         there, steps = [], []
         for k, effect in enumerate(point.effects):
             for j in range(effect.components):
@@ -222,12 +235,11 @@ class StrainProblem:
                 strengths[k][j] += steps[-1]
                 moved = _changes(replace(point, strengths=tuple(strengths)))
                 there.append((effect.hook, moved))
-        rows = [*slopes]
+        rows = np.zeros((0, *solved.waveform.shape))
         if there:
-            rows += [*by_effects(solved.model, there, steps).waveform * self._scales(point.effects)]
-        late = earlier(np.array(rows), self.data.points.omega, -solved.delay)
-        delay = by_delay(solved.waveform, self.data.points.omega)[None]
-        return np.concatenate([late[: len(self.free)], delay, late[len(self.free) :]])
+            rows = by_effects(solved.model, there, steps).waveform * self._scales(point.effects)
+        self._strengths = _Added(point, rows)
+        return rows
 
     def _bends(self, point: Point) -> bool:
         """Return whether effects are strong enough to matter to the slopes of the base."""

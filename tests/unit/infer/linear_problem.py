@@ -79,7 +79,7 @@ class Toy:
             model = model + (strength / each.scale) @ self.by[each.name]
         return Solved(self.measured - model)
 
-    def slopes(self, point: Point, solved: Any) -> FloatArray:
+    def slopes(self, point: Point, solved: Any, *, near: bool = False) -> FloatArray:
         return np.concatenate([self.base, *(self.by[e.name] for e in point.effects)])
 
     def remainder(self, point: Point, solved: Any) -> dict[str, FloatArray]:
