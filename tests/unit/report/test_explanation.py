@@ -137,10 +137,15 @@ def test_alternatives_and_doubts_are_named() -> None:
 def test_a_p_value_stands_in_the_place_of_a_score_where_there_is_one() -> None:
     told = explained(
         diagnosis(
-            candidates=[candidate("damping", p=0.0021)], sets=[["damping"], ["shear", "drift"]]
+            candidates=[candidate("damping", p=0.41)],
+            sets=[["damping"], ["shear", "drift"]],
+            p=0.41,
+            p_without=0.048,
+            false_alarm=0.05,
         )
     )
-    assert "damping: p = 0.0021 if it were not there" in told.sure
+    assert "Without it the model is rejected (p = 0.048); with it nothing stands out" in told.sure
+    assert "(p = 0.41)" in told.sure
     assert "Not ruled out: shear with drift." in told.sure
     assert "times as clear" not in told.sure
 
