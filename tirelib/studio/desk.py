@@ -13,8 +13,8 @@ from tirelib.studio.jobs import Job, Jobs
 from tirelib.studio.receiving import Receiving
 from tirelib.studio.session import QUANTITIES, Model, Opened, Session
 
-EXAMPLE = {"plan": "short", "seed": 1, "hide": ["sidewall_load=0.4"]}
-"""The example: 15 runs of a virtual tire whose sidewall softens as it is pressed."""
+EXAMPLE = {"plan": "short", "seed": 1, "hide": ["sidewall_damping=0.05"]}
+"""The example: 15 runs of a virtual tire whose sidewall damps more."""
 OF_CAMPAIGN = ("check", "show")
 OF_MODEL = ("identify", "add", "remove")
 OF_QUANTITY = ("compare", "diagnose", "traces", "plant", "next-test")
