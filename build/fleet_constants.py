@@ -10,6 +10,7 @@ import click
 import numpy as np
 
 from tirelib.fleet import siblings, spread
+from tirelib.threads import one_thread
 
 DRAWS = 200
 TIRES = 12
@@ -88,4 +89,5 @@ def _moved(changed: float, usual: float) -> float:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

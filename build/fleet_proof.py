@@ -41,6 +41,7 @@ from tirelib.fleet import engine, work  # noqa: E402
 from tirelib.fleet.dataset import DataSet  # noqa: E402
 from tirelib.fleet.sources import Source  # noqa: E402
 from tirelib.observations import observe  # noqa: E402
+from tirelib.threads import one_thread  # noqa: E402
 
 PEAK = """
 import resource, sys
@@ -253,4 +254,5 @@ def endurance(folder: Path, minutes: float) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

@@ -40,11 +40,6 @@ def test_nothing_more_is_named_on_the_rig() -> None:
     assert second.base.error == pytest.approx(first.final.error, abs=0.01)
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="the ensemble of variants does not hold what a tire of finite elements shows beside its "
-    "sidewall's damping: hydroplaning is named as well",
-)
 def test_nothing_more_is_named_on_a_tire_of_finite_elements(
     shared: Callable[[str], Path],
 ) -> None:

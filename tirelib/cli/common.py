@@ -44,10 +44,19 @@ class NewPath(click.Path):
         return path
 
 
+class NewPlace(NewPath):
+    """A folder as `NewPath`, or a URL, which is tried by what writes there."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the path, or the URL as text."""
+        return value if "://" in str(value) else super().convert(value, param, ctx)
+
+
 CAMPAIGN = click.Path(path_type=Path)
 FILE = click.Path(path_type=Path, dir_okay=False)
 NEW_FILE = NewPath(path_type=Path, dir_okay=False)
 NEW_FOLDER = NewPath(path_type=Path, file_okay=False)
+NEW_PLACE = NewPlace(path_type=Path, file_okay=False)
 WIDTH = 120
 PROGRESS = "TIRELIB_PROGRESS"
 """Environment variable that asks for progress as lines of JSON."""

@@ -12,7 +12,7 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from tirelib.cli.common import output, write_json
+from tirelib.cli.common import NEW_PLACE, output, write_json
 from tirelib.cli.options import json_option
 from tirelib.errors import TirelibError
 
@@ -73,7 +73,12 @@ def run_verb(command: Sequence[str]) -> tuple[int, str]:
 @click.argument("task", metavar="TASK", type=click.Choice(TASKS))
 @click.argument("paths", metavar="PATHS...", nargs=-1, required=True)
 @click.option(
-    "--out", "out", metavar="DATASET", required=True, help="Folder or URL of the results."
+    "--out",
+    "out",
+    metavar="DATASET",
+    type=NEW_PLACE,
+    required=True,
+    help="Folder or URL of the results.",
 )
 @click.option(
     "--scheduler",
@@ -105,7 +110,7 @@ def fleet(
     context: click.Context,
     task: str,
     paths: tuple[str, ...],
-    out: str,
+    out: Path | str,
     scheduler: str | None,
     workers: int | None,
     calibration: str | None,
@@ -120,7 +125,7 @@ def fleet(
     from tirelib.fleet.dataset import DataSet
     from tirelib.fleet.page import write_fleet_page
 
-    data = DataSet(out)
+    data = DataSet(str(out))
     data.open()
     files = {"calibration": calibration, "model": model}
     recipe = engine.recipe_of(
@@ -152,7 +157,7 @@ def fleet(
     except TirelibError as error:
         click.echo(f"Warning: no page: {error}", err=True)
     if json_file is not None:
-        write_json(json_file, _document(task, out, counts))
+        write_json(json_file, _document(task, str(out), counts))
         console.print(f"written: {json_file}")
     if stopped:
         click.echo(f"Error: {stopped}", err=True)

@@ -29,6 +29,7 @@ from tirelib.flags import TurnFlag
 from tirelib.held import Held
 from tirelib.signal.compiled import Record
 from tirelib.signal.lowpass import LowPass
+from tirelib.signal.turn import PHI
 from tirelib.signal.turns import AFTER, Turns, check_gages, cut_turns
 
 EDGE_REACH = 0.35
@@ -131,10 +132,13 @@ class Features:
 def extract_features(turns: Turns) -> Features:
     """Read the features of all turns and gages, by the compiled core where there is one.
 
+    The core knows the wheel angles `PHI` only; turns over others are read by the reference.
+
     Source: dissertation, sections 3.4 and 4.1; Eq. (11), (12).
     """
     core = loaded_core()
-    if core is None or turns.trace.lateral.size > GAGES:
+    trace = turns.trace
+    if core is None or trace.lateral.size > GAGES or not np.array_equal(trace.phi, PHI):
         return reference_features(turns)
     read, gage_flags, flags = read_by_core(core, turns)
     return features_of(turns, read, gage_flags, flags)
