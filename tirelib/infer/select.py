@@ -17,7 +17,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.effects import Effect
-from tirelib.errors import TirelibError
+from tirelib.errors import ParameterError, TirelibError
 from tirelib.infer.hypothesis import Hypothesis, judged
 from tirelib.infer.normal import Weighed
 from tirelib.infer.plain import BASE, Family, pooled
@@ -74,7 +74,18 @@ def select(
     false_alarm : float
         Probability with which a plain tire of any of the families is said to lack something.
     progress : callable, optional
+
+    Raises
+    ------
+    ParameterError
+        If the families have too few tires for this probability.
     """
+    least = max(1.0 / (len(family) + 1) for family in families)
+    if false_alarm < least:
+        raise ParameterError(
+            f"false-alarm probability {false_alarm:g}: {min(map(len, families))} plain tires of a "
+            f"family tell probabilities from {least:.3g} on; give a larger one"
+        )
     spread, own = pooled(families), max(family.own for family in families)
     had = problem.start.effects
     effects = {effect.name: effect for effect in problem.living}

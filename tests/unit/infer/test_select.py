@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.unit.infer.linear_problem import N, Toy, drawn, family
+from tirelib.errors import ParameterError
 from tirelib.infer.hypothesis import judged
 from tirelib.infer.posterior import posterior
 from tirelib.infer.select import select
@@ -29,6 +30,11 @@ def test_p_values_of_plain_tires_lie_under_the_diagonal() -> None:
     for level in (0.05, 0.1, 0.2, 0.5):
         share = np.mean(np.array(p) <= level)
         assert share <= level + 2.5 * np.sqrt(level * (1.0 - level) / len(p))
+
+
+def test_a_probability_that_so_few_tires_cannot_tell_is_refused() -> None:
+    with pytest.raises(ParameterError, match=r"0\.01: 40 plain tires .* from 0\.0244 on"):
+        select(Toy(np.zeros(N)), FAMILIES, false_alarm=0.01)
 
 
 @pytest.mark.parametrize("name", ["swell", "bend", "twist"])
