@@ -6,8 +6,8 @@
 
 Needs campaigns that `build/structure/make.py` has made. A line for each tire, then one for the
 family: median error in units of the noise, rms errors of the numbers in percent, and the share of
-95 % intervals that hold. `--without` fits a number at zero, `--prior` multiplies the standard
-deviation of a number's prior: half and double of it.
+95 % intervals that hold, of all and of the numbers that are not flagged. `--without` fits a number
+at zero, `--prior` multiplies the standard deviation of a number's prior: half and double of it.
 """
 
 import argparse
@@ -26,7 +26,7 @@ from tirelib.compare.error import error_of
 from tirelib.compare.model import Model
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.identify.discrepancy import Discrepancy
-from tirelib.identify.identify import prior_std, start_file, structure_std
+from tirelib.identify.identify import estimate, prior_std, start_file
 from tirelib.identify.waveform_fit import Prior, WaveformFit, fit_waveforms
 from tirelib.model.base import PLAIN, values_of
 from tirelib.model.whole import solve_whole
@@ -49,6 +49,25 @@ NUDGE = 1e-3
 
 
 @dataclass(frozen=True)
+class Found:
+    """What a fit says of a number.
+
+    Attributes
+    ----------
+    wrong : float
+        Relative error.
+    held : bool
+        Whether the 95 % interval holds the true value.
+    flagged : bool
+        Whether the number is said to be not identifiable.
+    """
+
+    wrong: float
+    held: bool
+    flagged: bool = False
+
+
+@dataclass(frozen=True)
 class Row:
     """What a fit to a tire found.
 
@@ -56,14 +75,13 @@ class Row:
     ----------
     error : float
         What the base leaves, in units of the noise.
-    wrong, held : mapping
-        By name the relative error, and whether the 95 % interval holds the true value.
+    numbers : mapping
+        By name.
     """
 
     seed: int
     error: float
-    wrong: Mapping[str, float]
-    held: Mapping[str, bool]
+    numbers: Mapping[str, Found]
 
 
 def row(case: Case, without: Sequence[str], prior: Mapping[str, float]) -> Row:
@@ -79,20 +97,18 @@ def row(case: Case, without: Sequence[str], prior: Mapping[str, float]) -> Row:
     true = dict(case.truth["numbers"])
     for name in ("k_u", "k_v"):  # of 2 bar
         true[name] += true[f"{name}_slope"] * (float(values["pressure"]) - 2e5)
-    structure = dict(zip((c.name for c in free), structure_std(start, free), strict=True))
-    wrong, held = {}, {}
+    numbers = {}
     for short, name in NUMBERS.items():
-        k = [c.name for c in free].index(name)
-        value, coordinate = float(fit.values[name]), free[k]
-        wrong[short] = value / true[short] - 1.0
-        ends = np.sort([float(coordinate.moved(value, z)) for z in fit.interval[k]])
-        more = 1.96 * coordinate.spread(value, float(structure[name]))
-        low, high = value - np.hypot(value - ends[0], more), value + np.hypot(ends[1] - value, more)
-        held[short] = bool(low <= true[short] <= high)
-    wrong[STIFFNESS] = _stiffness(fit, runs, case)
-    held[STIFFNESS] = abs(wrong[STIFFNESS]) <= NEAR
+        e = estimate(fit, [c.name for c in free].index(name), start)
+        numbers[short] = Found(
+            e.value / true[short] - 1.0,
+            bool(e.low <= true[short] <= e.high),
+            "not_identifiable" in e.flags,
+        )
+    wrong = _stiffness(fit, runs, case)
+    numbers[STIFFNESS] = Found(wrong, abs(wrong) <= NEAR)
     error = error_of(runs, Model.fitted(fit.values, (), ())).value
-    return Row(case.seed, error, wrong, held)
+    return Row(case.seed, error, numbers)
 
 
 def _stiffness(fit: WaveformFit, runs: StraightRuns, case: Case) -> float:
@@ -106,14 +122,18 @@ def _stiffness(fit: WaveformFit, runs: StraightRuns, case: Case) -> float:
     return float(np.median(found / np.array(case.truth["vertical_stiffness"]) - 1.0))
 
 
-def told(label: str, errors: Sequence[float], rows: Sequence[Row]) -> str:
+def told(label: str, rows: Sequence[Row]) -> str:
     """Return a line: error, rms of the relative errors in percent, intervals that hold."""
-    parts = [f"{label:14s} error {np.median(errors):5.2f}"]
-    for name in rows[0].wrong:
-        rms = 100.0 * np.sqrt(np.mean([r.wrong[name] ** 2 for r in rows]))
-        parts.append(f"{name} {rms:.1f} %")
-    held = [h for r in rows for h in r.held.values()]
-    return "  ".join([*parts, f"held {sum(held)} of {len(held)}"]) + "\n"
+    parts = [f"{label:14s} error {np.median([r.error for r in rows]):5.2f}"]
+    for name in rows[0].numbers:
+        rms = 100.0 * np.sqrt(np.mean([r.numbers[name].wrong ** 2 for r in rows]))
+        flagged = sum(r.numbers[name].flagged for r in rows)
+        parts.append(f"{name} {rms:.1f} %{f' ({flagged} flagged)' if flagged else ''}")
+    every = [found for r in rows for found in r.numbers.values()]
+    sure = [found for found in every if not found.flagged]
+    parts.append(f"held {sum(f.held for f in every)} of {len(every)}")
+    parts.append(f"not flagged {sum(f.held for f in sure)} of {len(sure)}")
+    return "  ".join(parts) + "\n"
 
 
 def main() -> None:
@@ -132,9 +152,9 @@ def main() -> None:
     for seed in given.seeds:
         case = load_case(case_file(given.out, given.family, seed, NONE, 1.0))
         rows.append(row(case, given.without, prior))
-        sys.stdout.write(told(f"{given.family} {seed}", [rows[-1].error], rows[-1:]))
+        sys.stdout.write(told(f"{given.family} {seed}", rows[-1:]))
         sys.stdout.flush()
-    sys.stdout.write(told(given.family, [r.error for r in rows], rows))
+    sys.stdout.write(told(given.family, rows))
 
 
 if __name__ == "__main__":

@@ -211,7 +211,7 @@ def estimated(
         discrepancy=discrepancy,
         progress=progress,
     )
-    estimates = [_estimate(fit, k, start) for k in range(len(fit.free))]
+    estimates = [estimate(fit, k, start) for k in range(len(fit.free))]
     if any("not_identifiable" in e.flags for e in estimates):
         ways = next_run(fit, structure_std(start, fit.free), discrepancy)
         estimates = [
@@ -302,7 +302,8 @@ def structure_std(start: TireFile, free: tuple[Coordinate, ...]) -> FloatArray:
     )
 
 
-def _estimate(fit: WaveformFit, k: int, start: TireFile) -> Estimate:
+def estimate(fit: WaveformFit, k: int, start: TireFile) -> Estimate:
+    """Return what a fit tells of its k-th coordinate, with the structural part and flags."""
     coordinate = fit.free[k]
     name = coordinate.name
     value = float(fit.values[name])
