@@ -1,6 +1,6 @@
 """Draw the strain of the rolling continuum and of the numerical rig over the wheel angle.
 
-python build/continuum_plot.py    writes docs/continuum.png
+python build/continuum_plot.py    writes docs/theory/continuum.png
 """
 
 import sys
@@ -68,7 +68,7 @@ def main() -> None:
     for panel in panels[1]:
         panel.set_xlabel("wheel angle [deg], 0 under the axle")
     figure.tight_layout()
-    figure.savefig(ROOT / "docs" / "continuum.png", dpi=90)
+    figure.savefig(ROOT / "docs" / "theory" / "continuum.png", dpi=90)
 
 
 if __name__ == "__main__":

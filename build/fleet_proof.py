@@ -6,9 +6,9 @@
     python build/fleet_proof.py workers --counts 60
     python build/fleet_proof.py endurance --minutes 10
 
-Each prints one line of numbers a case; docs/fleet.md holds them. Campaigns and recordings are of
-the tests' made-up tire. On a machine that others use, wall times say little: the processor time of
-workers is beside them.
+Each prints one line of numbers a case; docs/howto/fleet.md holds them. Campaigns and recordings
+are of the tests' made-up tire. On a machine that others use, wall times say little: the processor
+time of workers is beside them.
 """
 
 import argparse

@@ -2,8 +2,8 @@
 
 The virtual tire rolls straight at a held load and brakes or accelerates evenly; its strain goes
 through the calibration of the co-simulations. "Even turn" is wheel angle as time times the mean
-rate of the preceding turn. Writes ``docs/ramp_error.png`` and prints the tables of the largest
-errors, of steps and of slip ratios in ``docs/estimators.md``.
+rate of the preceding turn. Writes ``docs/theory/ramp_error.png`` and prints the tables of the
+largest errors, of steps and of slip ratios in ``docs/theory/estimators.md``.
 """
 
 import sys
@@ -127,7 +127,7 @@ def draw() -> None:
         va="top",
         fontsize=8,
     )
-    figure.savefig(ROOT / "docs/ramp_error.png", dpi=110)
+    figure.savefig(ROOT / "docs/theory/ramp_error.png", dpi=110)
     for (load, by), rows in found.items():
         error, over = np.array(rows).max(axis=0)
         sys.stdout.write(f"| {load:g} N | {by} | {len(rows)} | {error:.1f} % | {over:.1f} |\n")

@@ -1,6 +1,6 @@
 """The studio's five clicks in a real Chromium, on an example or a campaign; and the docs' pictures.
 
-    python build/studio.py                         the example, five pictures into docs/studio
+    python build/studio.py                         the example, five pictures into docs/howto/studio
     python build/studio.py --campaign DIR          another campaign, no pictures
     python build/studio.py --repeat                and the page's own commands, run again by hand
 
@@ -126,11 +126,11 @@ def main() -> None:
     parser.add_argument("--campaign", metavar="DIR")
     parser.add_argument("--repeat", action="store_true")
     parser.add_argument(
-        "--out", type=Path, help="folder for pictures [docs/studio for the example]"
+        "--out", type=Path, help="folder for pictures [docs/howto/studio for the example]"
     )
     parser.add_argument("--session", type=Path, help="keep the session there")
     given = parser.parse_args()
-    out = given.out or (None if given.campaign else ROOT / "docs" / "studio")
+    out = given.out or (None if given.campaign else ROOT / "docs" / "howto" / "studio")
     path = next((found for name in NAMES if (found := shutil.which(name))), None)
     with TemporaryDirectory() as temporary, sync_playwright() as playwright:
         session = given.session or Path(temporary)

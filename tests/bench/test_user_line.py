@@ -87,7 +87,7 @@ columns = ["v", "", "tilt"]
 GAGES = np.random.default_rng(3).integers(-4000, 4000, (400, 5))
 
 
-DOCS = Path(__file__).parents[2] / "docs" / "protocols.md"
+DOCS = Path(__file__).parents[2] / "docs" / "reference" / "protocols.md"
 
 
 def binary(count: int = len(GAGES), sync: bytes = b"\xaa\x55") -> list[bytes]:

@@ -14,7 +14,8 @@ from distributed.cli.dask_worker import main as dask_worker
 
 from tirelib.cli.fleet import fleet
 
-FOLDER = Path(__file__).parents[2] / "docs" / "fleet"
+ROOT = Path(__file__).parents[2]
+FOLDER = ROOT / "docs" / "howto" / "fleet"
 COMMANDS = {
     ("dask", "scheduler"): dask_scheduler,
     ("dask", "worker"): dask_worker,
@@ -73,4 +74,4 @@ def test_kubernetes_selects_its_pods_and_its_commands_exist() -> None:
 def test_the_image_installs_the_extra_that_exists() -> None:
     extra = re.search(r"/src\[(\w+)\]", (FOLDER / "Dockerfile").read_text())
     assert extra is not None
-    assert f"\n{extra[1]} = [" in (FOLDER.parents[1] / "pyproject.toml").read_text()
+    assert f"\n{extra[1]} = [" in (ROOT / "pyproject.toml").read_text()

@@ -139,7 +139,7 @@ def test_a_file_that_is_no_fmu_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_example_of_the_documentation_runs(capsys: pytest.CaptureFixture[str]) -> None:
-    page = Path(__file__).parents[2] / "docs" / "fmu.md"
+    page = Path(__file__).parents[2] / "docs" / "howto" / "fmu.md"
     code = page.read_text().split("```python\n")[2].split("```")[0]
     code = code.replace('"StrainTire.fmu", 1e4', f'"{live.fmu_file(10)}", {live.RATE}')
     assert len(code.splitlines()) <= 22
@@ -154,7 +154,7 @@ def test_the_example_of_the_documentation_runs(capsys: pytest.CaptureFixture[str
 def test_the_checking_script_of_the_documentation_runs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    page = Path(__file__).parents[2] / "docs" / "fmu.md"
+    page = Path(__file__).parents[2] / "docs" / "howto" / "fmu.md"
     code = page.read_text().split("```python\n")[1].split("```")[0]
     assert len([line for line in code.splitlines() if line.strip()]) <= 22
     monkeypatch.chdir(tmp_path)

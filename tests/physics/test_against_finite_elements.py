@@ -2,9 +2,9 @@
 
 The reference (`tests/golden/fem_tire*`, remade by ``make fem``) is a belt and a tread of continuum
 elements with finite rotation, inflated by a follower pressure and pressed on a flat road with
-Coulomb friction; `docs/finite_elements.md` describes it. Nothing in it comes from the library. The
-bounds are what was measured, plus a fifth: they say how far the ring is from the continuum, and
-fail when it drifts away.
+Coulomb friction; `docs/theory/finite_elements.md` describes it. Nothing in it comes from the
+library. The bounds are what was measured, plus a fifth: they say how far the ring is from the
+continuum, and fail when it drifts away.
 """
 
 import numpy as np
@@ -121,7 +121,8 @@ def test_twice_the_friction_changes_next_to_nothing() -> None:
     np.testing.assert_allclose(full, half, rtol=0.015)
 
 
-# Deviations of the ring from the continuum, per load, as measured; see docs/finite_elements.md.
+# Deviations of the ring from the continuum, per load, as measured;
+# see docs/theory/finite_elements.md.
 MEASURED = {
     "solid_mu000": {
         "centre tension": (-0.0117, -0.0368, -0.0527, -0.0663, -0.0794),

@@ -25,7 +25,7 @@ VALUES = values_of(TIRE)
 PLAN = reference_plan(TIRE)
 FREE_ROLLING = slice(0, 60)
 SIDES = slice(60, 72)
-DOCS = Path(__file__).parents[2] / "docs/effects.md"
+DOCS = Path(__file__).parents[2] / "docs/howto/effects.md"
 
 IN_ORDER = [
     "sidewall_load",

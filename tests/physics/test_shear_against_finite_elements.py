@@ -1,7 +1,7 @@
 """The contact with shear and the exact ring against finite elements of the same tire.
 
 The reference stands and is pressed down; the contact with shear is that of a rolling tire. Both are
-sheared outward. How much differs: see `docs/finite_elements.md`.
+sheared outward. How much differs: see `docs/theory/finite_elements.md`.
 """
 
 from collections.abc import Iterator
@@ -31,7 +31,7 @@ from tirelib.ring.compliance import compliance
 FRICTION = 0.5
 RUBBING = tuple(f"{tire}_mu050" for tire in PAIRS)
 
-# As measured, per load of 1500 to 7500 N; see docs/finite_elements.md.
+# As measured, per load of 1500 to 7500 N; see docs/theory/finite_elements.md.
 SHEARED = {
     ("solid", 0.0): {
         "centre tension": (-0.0140, -0.0255, -0.0177, -0.0065, 0.0027),

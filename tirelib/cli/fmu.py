@@ -124,7 +124,7 @@ fmu.add_command(virtual)
     type=float,
     default=math.nan,
     show_default="NaN",
-    help="What an output shows where it has no value; see docs/fmu.md.",
+    help="What an output shows where it has no value; see docs/howto/fmu.md.",
 )
 @click.option(
     "--python",

@@ -35,7 +35,7 @@ class ShearContact:
     shear_traction : shape (n_points, n_nodes), [N/m]
         f_t of the road on the tread along the deformed belt, positive along +phi (rearward). It is
         directed outward, away from the patch's middle, where it has the sign of phi; on a standing
-        tire that was pressed down it is larger, `docs/shear_contact.md`.
+        tire that was pressed down it is larger, `docs/theory/shear_contact.md`.
     sliding : shape (n_points, n_nodes), bool
     declination : shape (n_points, n_nodes), [rad]
         eta, of the belt's normal from the plumb line, positive toward +phi.

@@ -13,7 +13,7 @@ from tirelib.errors import FormatError
 GROUP = "tirelib.effects"
 """Entry-point group: each entry names an `Effect`, or a list or mapping of them."""
 
-_EXAMPLE = "see docs/effects.md for one of 15 lines"
+_EXAMPLE = "see docs/howto/effects.md for one of 15 lines"
 
 
 def all_effects(

@@ -16,7 +16,7 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 HOURLY, HOURLY_RAW = 0.75e9, 0.26e9
 """What a wheel at 10 kHz takes in an hour, [bytes]: with its strain and without; measured in
-docs/bench_proof.md."""
+docs/reference/bench_proof.md."""
 KEPT_BYTES_PER_SECOND = 1e6
 """Memory that a second of a wheel at 10 kHz takes before a trigger, [bytes]; measured by
 build/bench_trigger.py, rounded up. With `--no-strain` it is less."""

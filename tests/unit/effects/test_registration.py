@@ -15,7 +15,7 @@ from tirelib.errors import FormatError
 from tirelib.model.registration import Registration, register, registered_effects
 from tirelib.model.state import State
 
-DOCS = Path(__file__).parents[3] / "docs/effects.md"
+DOCS = Path(__file__).parents[3] / "docs/howto/effects.md"
 
 
 def made(law: Any, **changes: Any) -> Effect:

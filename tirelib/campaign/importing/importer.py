@@ -75,7 +75,7 @@ def import_campaign(
     files : sequence of str or Path
         In order of measurement; one run each, unless the map names a run column.
     map_file : str or Path
-        See docs/importing.md.
+        See docs/howto/importing.md.
     out : str or Path
         The campaign folder.
     overwrite : bool
