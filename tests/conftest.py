@@ -4,7 +4,6 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -24,10 +23,9 @@ ROOT = Path(__file__).parents[1]
 os.environ["PYTHONPATH"] = os.pathsep.join(  # what tests start imports this checkout as well
     [str(ROOT), str(ROOT / "bench"), *filter(None, [os.environ.get("PYTHONPATH")])]
 )
-if sys.dont_write_bytecode:  # programs that tests start would compile all of it, each time
-    _BYTECODE = TemporaryDirectory(prefix="bytecode-")
-    os.environ["PYTHONPYCACHEPREFIX"] = _BYTECODE.name
-    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+# Programs that tests start, Dask's workers among them, would compile every module each time.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 
 NOT_HERE = (
