@@ -23,9 +23,11 @@ demo: $(STAMP)
 studio: $(STAMP)
 	$(BIN)/tirelib studio
 
-# One process a core, a file to each; the array libraries keep to one thread in each.
+# A file to each process; one process more than cores, as tests of the bench and the browser wait.
+# In the order of the folders: what is short, tests/unit, comes last. One thread in each process.
 test: lint
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses=auto --dist=loadfile
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --dist=loadfile \
+		--no-loadscope-reorder --numprocesses=$$($(BIN)/python -c "import os; print(os.cpu_count() + 1)")
 
 lint: $(STAMP)
 	$(BIN)/ruff check

@@ -4,10 +4,12 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pythonfmu import FmuBuilder
 
+from tests.bench.browser import chromium
 from tests.bench.campaigns import write_tiny_campaign
 from tests.bench.programs import Program
 from tests.synthetic import cornering_runs, write
@@ -76,6 +78,12 @@ def toy_fmus(tmp_path_factory: pytest.TempPathFactory, own_trust_list: None) -> 
     for toy in toys.values():
         remember(read_fmu(toy))
     return toys
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as found:
+        yield found
 
 
 @pytest.fixture

@@ -1,8 +1,6 @@
 """Several sources in one run: told apart, contradictions refused, replayed to the bit."""
 
 import os
-import pickle
-import re
 import signal
 import socket
 from collections.abc import Callable, Iterator
@@ -18,18 +16,16 @@ import pytest
 from click.testing import CliRunner
 from rich.console import Console
 
-from tests.bench.campaigns import tiny_runs
 from tests.bench.in_process import FakeSource
 from tests.bench.programs import PATIENCE
 from tests.bench.servers import Server
+from tests.bench.sources import VEHICLE, serial, told, vehicle, wire
 from tests.bench.test_processes import Turns
 from tirebench.cli import program
 from tirebench.cli.run_inputs import given_replayed
 from tirebench.deadline import Deadline
-from tirebench.emulator.emulator import write_script
-from tirebench.emulator.faults import Faults
 from tirebench.emulator.sources import recording_pieces
-from tirebench.errors import DeviceError, UnpluggedError
+from tirebench.errors import DeviceError
 from tirebench.estimator.chain import Turn
 from tirebench.estimator.estimation import Estimation, News
 from tirebench.estimator.fmu_archive import read_fmu
@@ -39,11 +35,8 @@ from tirebench.estimator.wheels import BusCondition, Line, Wheels
 from tirebench.links import Read
 from tirebench.links.opening import PortPlan
 from tirebench.live.chain import LiveChain, LivePlan
-from tirebench.live.exchange import Exchange
-from tirebench.live.ports import GatheredLink, PortState
 from tirebench.live.reader import ReaderPlan
-from tirebench.live.supervised import CONTEXT
-from tirebench.protocols import SLCAN, slcan
+from tirebench.protocols import SLCAN
 from tirebench.protocols.decoder import SerialDecoder
 from tirebench.protocols.plan import ProtocolPlan
 from tirebench.protocols.user_map import parse_map
@@ -51,51 +44,10 @@ from tirebench.recording.document import turn_document
 from tirebench.recording.link import ReplayLink
 from tirebench.recording.recording import Recorder, Recording, RecordingHeader
 from tirebench.recording.replay import ReplayChain
-from tirebench.setup.setup_file import check_sources, read_setup
 from tirebench.setup.source_plan import SourcePlan, wheels_of
-from tirebench.wire.can_batch import same_kind
 from tirebench.wire.conditions import Conditions
-from tirebench.wire.device import Device
 from tirebench.wire.frames import encode, strain_frames
 from tirebench.wire.rate_check import JUDGED
-
-VEHICLE = """
-format = "tirebench-map/1"
-[speed]
-message = "ABS"
-signal = "v"
-unit = "km/h"
-hold_s = 3600.0
-[[pressure]]
-wheel = 3
-message = "ABS"
-signal = "p3"
-unit = "bar"
-[[message]]
-name = "ABS"
-id = 0x100
-length = 4
-signals = [{ name = "v", start = 0, length = 16, factor = 0.01 },
-           { name = "p3", start = 16, length = 8, factor = 0.1 }]
-"""
-
-
-def told(speed: float, pressure: float = 2.5) -> bytes:
-    """One message of the vehicle on a line of slcan."""
-    values = round(100 * speed).to_bytes(2, "little") + bytes([round(10 * pressure), 0])
-    data = np.frombuffer(values, np.uint8)[None, :]
-    return b"".join(slcan.encode(same_kind(0x100, data, fd=False)))
-
-
-def wire() -> list[bytes]:
-    """Three runs of a wheel that calls itself 0."""
-    return list(write_script(tiny_runs(), Device(), Faults({})).frames)
-
-
-def vehicle(url: str = "p") -> SourcePlan:
-    return SourcePlan(
-        PortPlan(f"slcan:{url}"), ProtocolPlan(SLCAN, 1e3, parse_map(VEHICLE, "", "v.toml"))
-    )
 
 
 @pytest.fixture
@@ -317,64 +269,6 @@ def test_a_port_of_several_that_is_killed_is_read_again(tmp_path: Path) -> None:
     assert {read.source for read in reads if read.data} == {0, 1}
 
 
-@pytest.fixture
-def exchange() -> Iterator[Exchange]:
-    made = Exchange.create(CONTEXT, 1, 0, 2)
-    for number in range(2):
-        made.ports[number].put(pickle.dumps(PortState(f"port {number}"), 5))
-    yield made
-    made.close()
-
-
-def put(exchange: Exchange, source: int, *arrivals: int) -> None:
-    for arrival in arrivals:
-        exchange.reads[source].put(pickle.dumps(Read(arrival, b"x", "", source), 5))
-
-
-def test_reads_of_several_ports_come_in_the_order_of_the_clock(exchange: Exchange) -> None:
-    put(exchange, 0, 1, 4, 5)
-    put(exchange, 1, 2, 3, 5)
-    link = GatheredLink(exchange, {})
-    assert link.name == "port 0 + port 1"
-    reads = [link.receive(Deadline.after(1.0)) for _ in range(6)]
-    assert [(r.arrival, r.source) for r in reads if r] == [
-        (1, 0),
-        (2, 1),
-        (3, 1),
-        (4, 0),
-        (5, 0),
-        (5, 1),
-    ]
-    nothing = link.receive(Deadline.after(0.0))
-    assert nothing is not None
-    assert nothing.data == b""
-
-
-def test_a_reader_after_another_takes_nothing_twice_and_loses_nothing(exchange: Exchange) -> None:
-    put(exchange, 0, 1, 3)
-    put(exchange, 1, 2)
-    first = GatheredLink(exchange, {})
-    assert [getattr(first.receive(Deadline.after(1.0)), "arrival", 0) for _ in range(2)] == [1, 2]
-    other = Exchange(exchange.address)  # the first one ended while it was busy with the second read
-    rest = GatheredLink(other, {0: 1, 1: 2}).receive(Deadline.after(1.0))
-    assert rest is not None
-    assert (rest.arrival, rest.source) == (3, 0)
-    other.close()
-
-
-def test_a_port_that_stays_away_is_told_after_what_it_brought(exchange: Exchange) -> None:
-    put(exchange, 1, 1)
-    gone = PortState("port 1", error=("UnpluggedError", "port 1: it went away"))
-    exchange.ports[1].put(pickle.dumps(gone, 5))
-    link = GatheredLink(exchange, {})
-    read = link.receive(Deadline.after(1.0))
-    assert read is not None
-    assert read.data == b"x"
-    link._next_look = 0.0
-    with pytest.raises(UnpluggedError, match="port 1: it went away"):
-        link.receive(Deadline.after(1.0))
-
-
 def test_a_source_that_is_given_up_is_an_alarm_and_the_other_goes_on(tmp_path: Path) -> None:
     more = Event()
     held = Server(wire()[:20], lambda number: more.wait() if number > 9 else None)
@@ -424,17 +318,6 @@ def test_an_error_after_the_first_turn_is_raised_when_all_is_written() -> None:
     )
     with pytest.raises(DeviceError):
         Session(source).run()
-
-
-def test_several_ports_are_unplugged_when_the_last_one_is_given_up(exchange: Exchange) -> None:
-    link = GatheredLink(exchange, {})
-    for number in range(2):
-        assert link.receive(Deadline.after(0.0)) is not None
-        gone = PortState(f"port {number}", gone=f"port {number}: it went away")
-        exchange.ports[number].put(pickle.dumps(gone, 5))
-        link._next_look = 0.0
-    with pytest.raises(UnpluggedError, match="port 0: it went away; port 1: it went away"):
-        link.receive(Deadline.after(0.0))
 
 
 def test_a_speed_about_which_the_bus_is_silent_is_unknown_until_it_comes_again() -> None:
@@ -505,105 +388,3 @@ def test_a_source_of_one_wheel_refuses_a_second() -> None:
     assert list(wheels.heard) == [5]
     with pytest.raises(DeviceError, match="left: frames came from wheels 1, 2; a source with"):
         wheels.push(frames[0] + frames[1], 2)
-
-
-def serial(port: str, wheel: int | None = None) -> SourcePlan:
-    return SourcePlan(PortPlan(port), wheel=wheel)
-
-
-@pytest.mark.parametrize(
-    ("sources", "conditions", "message"),
-    [
-        ((serial("a"), serial("a")), None, "--port a: given twice"),
-        ((serial("a", 1), serial("b", 1)), None, "wheel 1 comes from a and b"),
-        (
-            (vehicle("a"), vehicle("b")),
-            None,
-            "the same condition: speed from slcan:a, pressure of wheel 3 fr",
-        ),
-        (
-            (serial("a"), vehicle("b")),
-            Conditions.constant(18.0),
-            "speed comes from slcan:b, and from",
-        ),
-    ],
-)
-def test_sources_that_contradict_each_other_are_refused(
-    sources: tuple[SourcePlan, ...], conditions: Conditions | None, message: str
-) -> None:
-    with pytest.raises(DeviceError, match=message):
-        check_sources(sources, conditions)
-    check_sources((serial("a", 1), serial("b", 2), vehicle("c")), Conditions.constant(camber=0.1))
-
-
-SETUP = """
-format = "tirebench-setup/1"
-[[source]]
-port = "/dev/ttyUSB0"
-wheel = 0
-device = "left.toml"
-[[source]]
-port = "slcan:/dev/ttyACM0"
-bitrate = 1000000
-map = "vehicle.toml"
-"""
-DEVICE = 'format = "tirebench-device/1"\nname = "left"\n[scale]\nstrain_per_count = 1e-6\n'
-
-
-def test_a_setup_lists_sources_and_the_options_fill_in(tmp_path: Path) -> None:
-    (tmp_path / "left.toml").write_text(DEVICE)
-    (tmp_path / "vehicle.toml").write_text(VEHICLE)
-    (tmp_path / "s.toml").write_text(SETUP)
-    usual = SourcePlan(PortPlan("", baud=1_000_000), ProtocolPlan(rate=5e3))
-    left, bus = read_setup(tmp_path / "s.toml", usual)
-    assert (left.port.port, left.port.baud, left.wheel) == ("/dev/ttyUSB0", 1_000_000, 0)
-    assert left.devices[None].scale == 1e-6
-    assert (bus.port.encoding, bus.port.bitrate, bus.wheel) == (SLCAN, 1_000_000, None)
-    assert bus.protocol.user_map is not None
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (("tirebench-setup/1", "x/1"), "'x/1'; this program reads 'tirebench-setup/1'"),
-        (("wheel = 0", "wheel = 300"), "source 1: wheel = 300; 0 .. 255"),
-        (("bitrate = 1000000", 'bitrate = "fast"'), "source 2: bitrate = 'fast'; .* type int"),
-        (("wheel = 0", "weel = 0"), "source 1: unknown key weel; allowed keys are port"),
-        (('port = "/dev/ttyUSB0"', ""), "source 1: port is missing"),
-        (("[[source]]", "[[sources]]"), "unknown key sources"),
-        (('map = "vehicle.toml"', 'map = "none.toml"'), "source 2: .*none.toml: cannot be read"),
-        (('"vehicle.toml"', '"left.toml"'), "s.toml: source 2: .*left.toml: .*'tirebench-map/1'"),
-        (
-            ('"left.toml"', '"vehicle.toml"'),
-            "s.toml: source 1: .*vehicle.toml: .*tirebench-device/1",
-        ),
-        (("[[source]]", "[source]"), "cannot be read|tables"),
-    ],
-)
-def test_a_wrong_setup_says_what_is_wrong(
-    change: tuple[str, str], message: str, tmp_path: Path
-) -> None:
-    (tmp_path / "left.toml").write_text(DEVICE)
-    (tmp_path / "vehicle.toml").write_text(VEHICLE)
-    (tmp_path / "s.toml").write_text(SETUP.replace(*change))
-    with pytest.raises(DeviceError, match=message):
-        read_setup(tmp_path / "s.toml", serial(""))
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("--port", "1=/dev/a", "--port", "1=/dev/b"), "wheel 1 comes from /dev/a and /dev/b"),
-        (("--port", "300=/dev/a"), r"--port 300=/dev/a: wheel 300; 0 \.\. 255 is allowed"),
-        (
-            ("--port", "/dev/a", "--device", "256=a.toml"),
-            r"--device 256=a.toml: wheel 256; 0 \.\. 255",
-        ),
-    ],
-)
-def test_options_that_cannot_be_end_the_command(
-    toy_fmus: dict[int, Path], words: tuple[str, ...], message: str
-) -> None:
-    outcome = CliRunner().invoke(program, ["run", *words, "--fmu", str(toy_fmus[16]), "--no-page"])
-    assert isinstance(outcome.exception, DeviceError)
-    assert re.search(message, str(outcome.exception))

@@ -12,7 +12,7 @@ from rich.console import Console
 from tests.bench.clocks import Clock
 from tests.bench.conftest import Spawn
 from tests.bench.programs import A_TURN, PATIENCE
-from tests.bench.test_sources import serial, vehicle
+from tests.bench.sources import serial, vehicle
 from tests.bench.test_user_line import THREE, plan_of
 from tirebench.cli import program
 from tirebench.cli.run_inputs import RunInputs, conditions_of, port_of_file, say_missing

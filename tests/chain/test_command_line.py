@@ -1,9 +1,12 @@
 """The main job through the command line: answers, files, exit codes, messages."""
 
+import io
 import json
+import os
 import shutil
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import pandas as pd
@@ -11,16 +14,32 @@ import pytest
 
 from tests.synthetic import cornering_runs, synthetic_run, write
 from tirelib.campaign import read_campaign
+from tirelib.cli import main
+from tirelib.threads import VARIABLES
 
 
-def run(*words: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+def alone(*words: object) -> subprocess.CompletedProcess[str]:
+    """Run the program as a process of its own."""
     program = "import sys; from tirelib.cli import main; sys.argv[0] = 'tirelib'; main()"
     return subprocess.run(
         [sys.executable, "-c", program, *map(str, words)],
         capture_output=True,
         text=True,
         check=False,
-        cwd=cwd,
+    )
+
+
+def run(*words: object) -> subprocess.CompletedProcess[str]:
+    """Run the program in this process, from its first line to its exit code."""
+    out, err = io.StringIO(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
+        patch.setattr(sys, "argv", ["tirelib", *map(str, words)])
+        for name in VARIABLES:  # the program sets them
+            patch.setenv(name, os.environ.get(name, ""))
+        with pytest.raises(SystemExit) as end:
+            main()
+    return subprocess.CompletedProcess(
+        words, int(end.value.code or 0), out.getvalue(), err.getvalue()
     )
 
 
@@ -193,7 +212,7 @@ def broken(place: Path, tmp_path: Path) -> dict[str, tuple[list[object], str]]:
         "unknown table": (["features", data, "--out", tmp_path / "f.xlsx"], ".parquet and .csv"),
         "bad order": (["calibrate", data, *out, "--order", "3"], "8 .. 120"),
         "no option": (["calibrate", data], "Missing option '--out'"),
-        "no verb": (["calibratte", data], "No such command"),
+        "no verb": (["calibratte", data], "no such command 'calibratte'"),
     }
 
 
@@ -203,6 +222,14 @@ def test_bad_input_ends_with_exit_code_two_and_a_message(place: Path, tmp_path: 
         assert done.returncode == 2, (name, done.stdout, done.stderr)
         assert message in done.stderr, (name, done.stderr)
         assert "Traceback" not in done.stderr, name
+
+
+def test_a_process_ends_as_the_program_does(place: Path, tmp_path: Path) -> None:
+    words, message = broken(place, tmp_path)["another tire"]
+    done = alone(*words)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def test_names_with_markup_stay_names(place: Path, tmp_path: Path) -> None:

@@ -96,21 +96,21 @@ def scheduler(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
         log.close()
 
 
-def test_a_killed_scheduler_and_then_the_same_again(many: Path, tmp_path: Path) -> None:
+def test_a_killed_scheduler_and_then_the_same_again(
+    many: Path, tmp_path: Path, client: Client
+) -> None:
     out = tmp_path / "out"
     with scheduler(tmp_path) as (address, process):
 
         def kill(counts: Counts) -> None:
             process.kill()
 
-        with engine.cluster(address, None) as client:
-            client.wait_for_workers(1, timeout=PATIENCE)
+        with engine.cluster(address, None) as first:
+            first.wait_for_workers(1, timeout=PATIENCE)
             with pytest.raises(SchedulerLostError, match="the scheduler went away"):
-                run(many, out, client, kill)
+                run(many, out, first, kill)
     assert 0 < len(finished(out)) < COUNT
-    with scheduler(tmp_path) as (address, _), engine.cluster(address, None) as client:
-        client.wait_for_workers(1, timeout=PATIENCE)
-        counts = run(many, out, client)
+    counts = run(many, out, client)
     assert counts.failed == 0
     assert len(set(finished(out))) == len(finished(out)) == COUNT
 
