@@ -40,12 +40,11 @@ def test_an_export_without_its_package_says_what_to_install(tmp_path: Path) -> N
     ]
 
 
-def test_the_help_lists_every_verb_and_what_it_lacks() -> None:
+def test_the_help_lists_every_verb() -> None:
     done = tirebench("--help")
     assert done.returncode == 0, done.stderr
     for verb in ("ports", "emulate", "run", "record", "replay", "export", "load"):
         assert f"  {verb}" in done.stdout
-    assert "It needs the package" in done.stdout
 
 
 @pytest.mark.parametrize("words", [("run", "--port", "/dev/null"), ("export", "a.mcap")])

@@ -4,14 +4,14 @@ import ast
 import json
 import subprocess
 import sys
-from importlib import import_module
-from keyword import iskeyword
 from pathlib import Path
 
+import click
 import pytest
 
-import tirelib
-from tirelib.cli import VERBS
+import tirebench.cli
+import tirelib.cli
+from tirelib.cli import VERBS, Verbs
 
 HEAVY = {
     "asammdf",
@@ -43,20 +43,23 @@ def imported(code: str) -> set[str]:
         "import tirelib",
         "from tirelib.cli import program\nprogram(['--help'], standalone_mode=False)",
         "from tirelib.cli import program\nprogram(['--version'], standalone_mode=False)",
+        "from tirebench.cli import program\nprogram(['--help'], standalone_mode=False)",
     ],
-    ids=["import tirelib", "tirelib --help", "tirelib --version"],
+    ids=["import tirelib", "tirelib --help", "tirelib --version", "tirebench --help"],
 )
 def test_nothing_heavy_is_imported(code: str) -> None:
     modules = imported(code)
     assert not modules & HEAVY
-    assert not [name for name in modules if name.startswith("tirelib.cli.")]
+    assert not [name for name in modules if name.startswith(("tirelib.cli.", "tirebench.cli."))]
 
 
-def test_the_list_of_verbs_says_what_each_verb_says_of_itself() -> None:
-    for verb, sentence in VERBS.items():
-        name = f"{verb}_" if iskeyword(verb) else verb.replace("-", "_")
-        command = getattr(import_module(f"tirelib.cli.{name}"), name)
-        assert " ".join(command.help.split()).startswith(sentence), verb
+@pytest.mark.parametrize("program", [tirelib.cli.program, tirebench.cli.program])
+def test_the_list_of_verbs_says_what_each_verb_says_of_itself(program: Verbs) -> None:
+    context = click.Context(program)
+    for verb, sentence in program.sentences.items():
+        command = program.get_command(context, verb)
+        assert command is not None
+        assert " ".join((command.help or "").split()).startswith(sentence), verb
 
 
 def test_every_name_is_typed_listed_documented_and_there() -> None:
