@@ -2,12 +2,32 @@
 
 import hashlib
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tirelib.errors import FormatError
+
+
+@contextmanager
+def new_file(path: Path) -> Iterator[Path]:
+    """Make the folder of a file that is about to be written, and yield the file.
+
+    Raises
+    ------
+    FormatError
+        If the folder cannot be made, or what the block writes cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield path
+    except OSError as error:
+        raise FormatError(
+            f"{path}: cannot be written ({error.strerror}); choose another file"
+        ) from None
 
 
 def write_json(path: Path, document: dict[str, Any]) -> None:
@@ -18,13 +38,8 @@ def write_json(path: Path, document: dict[str, Any]) -> None:
     FormatError
         If the file cannot be written.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with new_file(path):
         path.write_text(json.dumps(plain(document), indent=1, allow_nan=False) + "\n")
-    except OSError as error:
-        raise FormatError(
-            f"{path}: cannot be written ({error.strerror}); choose another file"
-        ) from None
 
 
 def plain(value: Any) -> Any:

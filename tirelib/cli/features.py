@@ -14,6 +14,7 @@ from tirelib.cli.common import (
     write_json,
 )
 from tirelib.cli.options import json_option, low_pass_options
+from tirelib.documents import new_file
 from tirelib.errors import FormatError
 from tirelib.flags import TurnFlag
 from tirelib.observations import Observations, observe
@@ -57,16 +58,11 @@ def features(
             [campaign], low_pass=make_low_pass(order, cut_off), progress=progress
         )
     table = feature_frame(observations.features, run=observations.run)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
+    with new_file(target):
         if target.suffix == ".csv":
             table.to_csv(target, index=False)
         else:
             table.to_parquet(target, index=False)
-    except OSError as error:
-        raise FormatError(
-            f"{target}: cannot be written ({error.strerror}); choose another file"
-        ) from None
     summary = _summary(observations)
     console = output()
     console.print(

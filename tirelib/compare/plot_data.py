@@ -17,8 +17,9 @@ from tirelib.campaign import Campaign
 from tirelib.compare.force_model import force_model_of
 from tirelib.compare.forces import ForceComparison, usable_points
 from tirelib.compare.strain import Comparison
+from tirelib.documents import new_file
 from tirelib.effects import Effect
-from tirelib.errors import FormatError, ParameterError, TirelibError
+from tirelib.errors import ParameterError, TirelibError
 from tirelib.identify.delay import by_delay
 from tirelib.identify.force_data import force_data
 from tirelib.identify.force_points import force_points
@@ -98,14 +99,8 @@ def write_plot_data(path: Path, data: Mapping[str, Any]) -> None:
     FormatError
         If the file cannot be written.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("wb") as stream:
-            np.savez(stream, **data)
-    except OSError as error:
-        raise FormatError(
-            f"{path}: cannot be written ({error.strerror}); choose another file"
-        ) from None
+    with new_file(path), path.open("wb") as stream:
+        np.savez(stream, **data)
 
 
 def _strain(found: Comparison) -> dict[str, Any]:

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from tirelib.campaign.recording import Recording
-from tirelib.documents import plain
-from tirelib.errors import FormatError
+from tirelib.documents import new_file, plain
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.chain import QUANTITIES
 from tirelib.estimators.continuous import WheelTurns
@@ -119,13 +118,8 @@ class TurnsInJson:
     """
 
     def __init__(self, path: Path) -> None:
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
+        with new_file(path):
             self._file = path.open("w", encoding="utf-8")
-        except OSError as error:
-            raise FormatError(
-                f"{path}: cannot be written ({error.strerror}); choose another file"
-            ) from None
         self._file.write('{"turns": [')
         self._between = "\n"
 

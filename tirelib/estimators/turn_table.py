@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 
 from tirelib import __version__
 from tirelib.arrays import FloatArray, IntArray
-from tirelib.errors import FormatError
+from tirelib.documents import new_file
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.chain import QUANTITIES
 from tirelib.estimators.edge import EDGE_UNIT
@@ -123,10 +123,5 @@ class TurnTable:
         self._writer.write_table(table)
 
     def _open(self, schema: Any) -> None:
-        try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
+        with new_file(self.path):
             self._writer = pq.ParquetWriter(self.path, schema, compression="zstd")
-        except OSError as error:
-            raise FormatError(
-                f"{self.path}: cannot be written ({error.strerror}); choose another file"
-            ) from None

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from tirelib.arrays import FloatArray
-from tirelib.errors import FormatError
+from tirelib.documents import new_file
 from tirelib.report.simulation import MICRO, Simulation
 
 FORMAT = "tirelib-simulation/1"
@@ -77,16 +77,10 @@ def write_curves(done: Simulation, path: Path) -> None:
         If the file cannot be written.
     """
     table = columns(done)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(["point", "Fz_N", "phi_rad", *table])
-            for point in range(len(done)):
-                curves = zip(done.phi, *(curve[point] for curve in table.values()), strict=True)
-                force = f"{done.load[point]:.6g}"
-                writer.writerows([point, force, *(f"{x:.9g}" for x in row)] for row in curves)
-    except OSError as error:
-        raise FormatError(
-            f"{path}: cannot be written ({error.strerror}); choose another file"
-        ) from None
+    with new_file(path), path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["point", "Fz_N", "phi_rad", *table])
+        for point in range(len(done)):
+            curves = zip(done.phi, *(curve[point] for curve in table.values()), strict=True)
+            force = f"{done.load[point]:.6g}"
+            writer.writerows([point, force, *(f"{x:.9g}" for x in row)] for row in curves)

@@ -21,7 +21,7 @@ from tirelib.studio.desk import Desk
 from tirelib.studio.pack import packed
 from tirelib.studio.session import QUANTITIES
 from tirelib.web.assets import file_routes
-from tirelib.web.connections import Connection
+from tirelib.web.connections import server_config
 from tirelib.web.guard import Guard
 
 TICK = 0.05
@@ -269,22 +269,9 @@ class Studio:
 
 def server_of(studio: Studio) -> uvicorn.Server:
     """Return the server of an application; it is to be given a bound socket."""
-    config = uvicorn.Config(
-        studio.app(),
-        log_config=None,
-        access_log=False,
-        server_header=False,
-        http=Connection,
-        ws="websockets-sansio",
-        ws_max_size=1024,
-        ws_per_message_deflate=False,
-        proxy_headers=False,
-        lifespan="on",
-        limit_concurrency=128,
-        timeout_keep_alive=5,
-        timeout_graceful_shutdown=2,
+    return uvicorn.Server(
+        server_config(studio.app(), longest_message=1024, timeout_graceful_shutdown=2)
     )
-    return uvicorn.Server(config)
 
 
 def serve(studio: Studio, listener: socket.socket) -> None:

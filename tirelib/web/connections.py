@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from operator import attrgetter
 from typing import Any
 
+import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 MOST_IDLE = 32
@@ -41,6 +42,34 @@ class Connection(H11Protocol):
         """Close the connection if nothing was asked yet; a stream is another protocol's by now."""
         if self.cycle is None and self in self.connections:
             self.transport.abort()
+
+
+def server_config(app: Any, *, longest_message: int, **more: Any) -> uvicorn.Config:
+    """Return how a page of this machine is served: quietly, with bounds on what clients may cost.
+
+    Parameters
+    ----------
+    app : ASGI application
+    longest_message : int
+        Bytes of a message from a viewer's stream; a longer one ends the stream.
+    more
+        Further settings of `uvicorn.Config`.
+    """
+    return uvicorn.Config(
+        app,
+        log_config=None,
+        access_log=False,
+        server_header=False,
+        http=Connection,
+        ws="websockets-sansio",
+        ws_max_size=longest_message,
+        ws_per_message_deflate=False,
+        proxy_headers=False,
+        lifespan="on",
+        limit_concurrency=128,
+        timeout_keep_alive=5,
+        **more,
+    )
 
 
 def least_needed(idle: Iterable[Any]) -> Any:

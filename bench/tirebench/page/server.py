@@ -29,7 +29,7 @@ from tirebench.live.priority import below
 from tirebench.page.commands import parse_command
 from tirebench.page.history import History, Viewer
 from tirelib.web.assets import file_routes
-from tirelib.web.connections import Connection as HttpConnection
+from tirelib.web.connections import server_config
 from tirelib.web.guard import LONGEST_BODY, Guard
 
 TICK = 0.05
@@ -198,21 +198,7 @@ def serve(plan: PagePlan, listener: socket.socket, pipe: Connection) -> None:
     board = Board(plan.board)
     if os.name == "posix":
         os.set_blocking(pipe.fileno(), False)  # a run that does not ask may not stop the page
-    app = Page(plan, board, pipe).app()
-    config = uvicorn.Config(
-        app,
-        log_config=None,
-        access_log=False,
-        server_header=False,
-        http=HttpConnection,
-        ws="websockets-sansio",
-        ws_max_size=256,
-        ws_per_message_deflate=False,
-        proxy_headers=False,
-        lifespan="on",
-        limit_concurrency=128,
-        timeout_keep_alive=5,
-    )
+    config = server_config(Page(plan, board, pipe).app(), longest_message=256)
     asyncio.run(_Server(config).serve([listener]))
 
 
