@@ -71,7 +71,7 @@ def plan(name: str) -> "Plan":
 def measure(name: str, target: Path) -> None:
     """Let the rig measure one day."""
     from tirelib.rig.campaign import run_plan
-    from tirelib.rig.measure import Chain
+    from tirelib.rig.measure import MeasuringChain
     from tirelib.rig.tire import tire
 
     (seed, turns), day, console = DAYS[name], plan(name), Console()
@@ -82,7 +82,7 @@ def measure(name: str, target: Path) -> None:
             target,
             seed=seed,
             jobs=2,
-            chain=Chain(turns=turns),
+            chain=MeasuringChain(turns=turns),
             overwrite=True,
             progress=lambda done, all_: status.update(f"run {done} of {all_}"),
         )

@@ -135,14 +135,14 @@ def end_when_played(
 
 def write_device(file: Path, lateral: Sequence[float]) -> None:
     """Write a device file whose count is the rig's own step of strain, so that nothing is lost."""
-    from tirelib.rig.measure import Chain
+    from tirelib.rig.measure import MeasuringChain
 
-    step = 2.0 * Chain().gage_range / 2 ** Chain().gage_bits
+    step = 2.0 * MeasuringChain().gage_range / 2 ** MeasuringChain().gage_bits
     file.write_text(
         'format = "tirebench-device/1"\nname = "numerical rig"\n\n'
         f"[gages]\nlateral_m = {[float(y) for y in lateral]}\n\n"
-        f"[scale]\nstrain_per_count = {step!r}  # {Chain().gage_bits} bit over "
-        f"+-{1e6 * Chain().gage_range:.0f} microstrain\n",
+        f"[scale]\nstrain_per_count = {step!r}  # {MeasuringChain().gage_bits} bit over "
+        f"+-{1e6 * MeasuringChain().gage_range:.0f} microstrain\n",
         encoding="utf-8",
     )
 

@@ -35,9 +35,9 @@ CONSTANTS: tuple[tuple[ModuleType, str], ...] = (
     (fit_links, "LEAST_FORCE"),
     (fit_links, "LEAST_LOAD"),
     (pulled, "PULL"),
-    (pulled, "FEWEST"),
-    (ends, "FEWEST"),
-    (fit_sliding, "FEWEST"),
+    (pulled, "FEWEST_PULLED"),
+    (ends, "FEWEST_BEYOND"),
+    (fit_sliding, "FEWEST_SLIDING"),
 )
 JUDGED = ("Fz", "Fy", "kappa")
 

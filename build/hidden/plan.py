@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
-from tirelib.rig.measure import Chain, settle
+from tirelib.rig.measure import MeasuringChain, settle
 from tirelib.rig.plans import KMH
 from tirelib.rig.tire import Condition, RigTire
 
@@ -42,7 +42,7 @@ class Day:
 
     seed: int
     tire: RigTire
-    chain: Chain
+    chain: MeasuringChain
     nominal: tuple[Condition, ...]
     really: tuple[Condition, ...]
     group: IntArray
@@ -93,7 +93,7 @@ def tire(seed: int) -> RigTire:
 def day(seed: int) -> Day:
     """Return the campaign of a seed: 12 conditions, three of them twice, three held out."""
     rng = np.random.default_rng([seed, 12])
-    plain = Chain()
+    plain = MeasuringChain()
     noise, setting = rng.uniform(0.7, 1.5), rng.uniform(0.6, 1.2)
     chain = replace(
         plain,

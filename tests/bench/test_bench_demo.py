@@ -29,7 +29,7 @@ from tirebench.links import Read
 from tirebench.protocols.plan import ProtocolPlan
 from tirebench.wire.device import Device
 from tirelib.campaign import Run, check_campaign, read_campaign
-from tirelib.rig.measure import Chain
+from tirelib.rig.measure import MeasuringChain
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ def demo_module(build_programs: None) -> Any:
 
 def as_the_rig_measures(run: Run) -> Run:
     """Round strain to the rig's step, which the line carries whole."""
-    step = 2.0 * Chain().gage_range / 2 ** Chain().gage_bits
+    step = 2.0 * MeasuringChain().gage_range / 2 ** MeasuringChain().gage_bits
     return replace(run, strain=np.rint(np.asarray(run.strain) / step) * step)
 
 

@@ -21,8 +21,7 @@ from tirebench.wire.can_batch import pack
 from tirebench.wire.conditions import conditions_document, parse_conditions
 from tirebench.wire.device import Device
 from tirebench.wire.timeline import Samples, Timeline
-from tirelib.rig.measure import Chain as MeasuringChain
-from tirelib.rig.measure import gages
+from tirelib.rig.measure import MeasuringChain, gages
 from tirelib.rig.ramp import Point
 from tirelib.rig.tire import Condition, tire
 

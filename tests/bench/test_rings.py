@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from tirebench.errors import LinkError
 from tirebench.live.board import SIZE
-from tirebench.live.exchange import LEAST, SAMPLES, Exchange
+from tirebench.live.exchange import LEAST_SAMPLE_BYTES, SAMPLE_BYTES, Exchange
 from tirebench.live.rings import _CONTROL, ByteQueue, Cell, _stride, memory
 from tirebench.live.supervised import CONTEXT
 
@@ -124,8 +124,8 @@ def test_where_shared_memory_is_short_the_queues_of_samples_are(
         monkeypatch.setattr("tirebench.live.exchange.free", lambda n=megabytes: float(n * 2**20))
         exchange = Exchange.create(CONTEXT, 4, beside)
         size = exchange.address.samples
-        assert (size == SAMPLES) == full
-        assert LEAST <= size <= SAMPLES
+        assert (size == SAMPLE_BYTES) == full
+        assert LEAST_SAMPLE_BYTES <= size <= SAMPLE_BYTES
         assert exchange.samples[3].put(bytes(size // 2))
         assert exchange._shared.size + beside <= megabytes * 2**20
         other = Exchange(exchange.address)

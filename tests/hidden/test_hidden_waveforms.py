@@ -9,13 +9,13 @@ from hidden.plan import LOADS, PRESSURES, SPEEDS, Day, day, tire
 
 from tirelib.campaign import read_campaign
 from tirelib.rig.campaign import run_plan
-from tirelib.rig.measure import Chain
+from tirelib.rig.measure import MeasuringChain
 from tirelib.rig.plans import Plan
 from tirelib.rig.solve import solve
 from tirelib.rig.tire import Condition, RigTire
 from tirelib.waveforms import measure_waveforms
 
-EXACT = Chain(
+EXACT = MeasuringChain(
     load_setting=0.0,
     pressure_setting=0.0,
     speed_setting=0.0,

@@ -21,7 +21,7 @@ Floats = npt.NDArray[np.float64]
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 PAIRS = ("solid", "blocks", "stretchy")
-NEAR = 0.6
+NEAR_CONTACT = 0.6
 """The strain is compared at wheel angles up to here, [rad]; beyond, it is smooth and small."""
 HEADROOM = 1.2
 FLOOR = 0.003
@@ -139,7 +139,7 @@ def apart(ring: Answer, fem: Reference) -> dict[str, Floats]:
     """Deviation of the ring, relative to the continuum's value (rms: to its centre tension)."""
     found = fem["beam_strain"]
     centre = found[:, 0]
-    near = np.abs(fem.phi) <= NEAR
+    near = np.abs(fem.phi) <= NEAR_CONTACT
     inside = fem.phi <= fem.summary["edge_rad"][:, None]
     difference = ring.strain - found
 

@@ -20,7 +20,7 @@ from tirelib.campaign.check_order import (
 )
 from tirelib.campaign.check_rig import rig_findings
 from tirelib.campaign.check_turns import turn_findings
-from tirelib.campaign.finding import Finding, gathered
+from tirelib.campaign.finding import RunFinding, gathered
 from tirelib.campaign.mdf import read_mdf
 from tirelib.campaign.model import CampaignHeader, Run, RunPlan
 from tirelib.campaign.problem import Problem, errors_of
@@ -98,7 +98,7 @@ def _legible(folder: Path, plans: tuple[RunPlan, ...], progress: Progress | None
 def _run_problems(
     folder: Path, header: CampaignHeader, plans: tuple[RunPlan, ...], progress: Progress | None
 ) -> list[Problem]:
-    findings: list[Finding] = []
+    findings: list[RunFinding] = []
     summaries: list[RunSummary] = []
     signs: list[ForceSign] = []
     digests: list[tuple[str, str]] = []
@@ -123,17 +123,17 @@ def _run_problems(
     return [*problems, *copy_problems(digests), *_strain_missing(header, strained)]
 
 
-def _content(run: Run, header: CampaignHeader, *, whole: bool) -> list[Finding]:
+def _content(run: Run, header: CampaignHeader, *, whole: bool) -> list[RunFinding]:
     found = gage_findings(run, header, whole=whole)
     if whole:
         found += turn_findings(run, header)
     return found + rig_findings(run, header)
 
 
-def _as_finding(file: str, problem: Problem) -> Finding:
+def _as_finding(file: str, problem: Problem) -> RunFinding:
     """Return a fault of reading as a finding; what differs between runs is the place only."""
     channel = problem.where.partition(", channel ")[2]
-    return Finding(f"{problem.severity} {channel} {problem.given}", file, channel, problem)
+    return RunFinding(f"{problem.severity} {channel} {problem.given}", file, channel, problem)
 
 
 def _digest(run: Run) -> str:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.campaign.finding import Finding, finding
+from tirelib.campaign.finding import RunFinding, finding
 from tirelib.campaign.model import BoolArray, CampaignHeader, FloatArray, Run
 from tirelib.campaign.turns import turn_samples, turn_stack
 from tirelib.units import from_si
@@ -22,7 +22,7 @@ SPIKE = 0.02
 _CONTACT = 45.0 / 360.0  # the dips before and behind the contact lie within this part of a turn
 
 
-def gage_findings(run: Run, header: CampaignHeader, *, whole: bool) -> list[Finding]:
+def gage_findings(run: Run, header: CampaignHeader, *, whole: bool) -> list[RunFinding]:
     """Return the faults of the gages of one run.
 
     Parameters
@@ -35,7 +35,7 @@ def gage_findings(run: Run, header: CampaignHeader, *, whole: bool) -> list[Find
     """
     if run.strain is None:
         return []
-    found: list[Finding] = []
+    found: list[RunFinding] = []
     spread = _spread(run.strain)
     sound = np.zeros(len(run.strain), dtype=bool)
     for gage, samples in enumerate(run.strain):
@@ -62,11 +62,11 @@ def _spread(strain: FloatArray) -> FloatArray:
     return np.where(finite.any(axis=1), high - low, np.nan)
 
 
-def _numbers(run: Run, gage: int, samples: FloatArray, header: CampaignHeader) -> list[Finding]:
+def _numbers(run: Run, gage: int, samples: FloatArray, header: CampaignHeader) -> list[RunFinding]:
     return not_finite(run.plan.file, f"strain_{gage + 1}", samples, run.time())
 
 
-def not_finite(file: str, channel: str, samples: FloatArray, times: FloatArray) -> list[Finding]:
+def not_finite(file: str, channel: str, samples: FloatArray, times: FloatArray) -> list[RunFinding]:
     """Return the finding for samples that are NaN or infinite; one for a whole channel."""
     bad = ~np.isfinite(samples)
     if not bad.any():
@@ -91,7 +91,7 @@ def not_finite(file: str, channel: str, samples: FloatArray, times: FloatArray) 
 
 def _life(
     run: Run, gage: int, samples: FloatArray, spread: FloatArray, header: CampaignHeader
-) -> list[Finding]:
+) -> list[RunFinding]:
     """Find a dead gage: constant, noise only, or far weaker than the others."""
     others = np.delete(spread, gage)
     usual = float(np.nanmedian(others)) if np.isfinite(others).any() else math.nan
@@ -137,7 +137,7 @@ def longest_by_chance(samples: FloatArray, rails: BoolArray) -> float:
     return math.inf if equal > 0.9 else math.log(samples.size) / math.log(1.0 / max(equal, 0.01))
 
 
-def _rails(run: Run, gage: int, samples: FloatArray, header: CampaignHeader) -> list[Finding]:
+def _rails(run: Run, gage: int, samples: FloatArray, header: CampaignHeader) -> list[RunFinding]:
     """Find flat tops, flat bottoms and values that stay.
 
     A real extreme is curved and carries noise, so it holds one quantised value for a few samples
@@ -155,7 +155,7 @@ def _rails(run: Run, gage: int, samples: FloatArray, header: CampaignHeader) -> 
         flat = np.flatnonzero(at_rail & (lengths > once))
     stays = max(20.0, 5.0 * chance)
     stuck = np.flatnonzero(~at_rail & (lengths > stays))
-    found: list[Finding] = []
+    found: list[RunFinding] = []
     if flat.size:
         longest = int(flat[np.argmax(lengths[flat])])
         top = "maximum" if samples[begins[longest]] == samples.max() else "minimum"
@@ -216,7 +216,7 @@ def _held(
     how_long: str,
     normal: float,
     remedy: str,
-) -> Finding:
+) -> RunFinding:
     """Return the finding for a value that is held too long."""
     value = 0.0 if run.strain is None else float(run.strain[gage, begin])
     return finding(
@@ -230,7 +230,7 @@ def _held(
     )
 
 
-def _implausible(run: Run, spread: float, header: CampaignHeader) -> Finding:
+def _implausible(run: Run, spread: float, header: CampaignHeader) -> RunFinding:
     low, high = PLAUSIBLE_STRAIN
     factor = next((f for f in (1e3, 1e6, 1e-3, 1e-6) if low <= spread * f <= high), None)
     guess = (
@@ -277,7 +277,7 @@ def _flanks(level: FloatArray) -> FloatArray:
     return lesser
 
 
-def _inverted(run: Run, sound: BoolArray, header: CampaignHeader) -> list[Finding]:
+def _inverted(run: Run, sound: BoolArray, header: CampaignHeader) -> list[RunFinding]:
     samples = turn_samples(run, header)
     stack = None if run.strain is None or samples is None else turn_stack(run.strain, samples)
     if stack is None:
@@ -303,11 +303,11 @@ def _inverted(run: Run, sound: BoolArray, header: CampaignHeader) -> list[Findin
 
 def _spikes(
     run: Run, sound: BoolArray, spread: FloatArray, header: CampaignHeader
-) -> list[Finding]:
+) -> list[RunFinding]:
     samples = turn_samples(run, header)
     if run.strain is None or samples is None or samples < 150:
         return []  # the contact itself is only a few samples long, like a spike
-    found: list[Finding] = []
+    found: list[RunFinding] = []
     scale = float(np.median(spread[sound])) if sound.any() else math.nan
     window = 3 if samples < 600 else 7
     for gage in np.flatnonzero(sound):

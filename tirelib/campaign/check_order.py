@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.campaign.finding import Finding, finding
+from tirelib.campaign.finding import RunFinding, finding
 from tirelib.campaign.model import BoolArray, CampaignHeader, FloatArray, Run
 from tirelib.campaign.problem import Problem
 from tirelib.campaign.turns import turn_samples, turn_stack
@@ -83,7 +83,7 @@ def _conditions(run: Run) -> FloatArray:
 
 def order_findings(
     summaries: Sequence[RunSummary], header: CampaignHeader
-) -> tuple[list[Finding], list[Problem]]:
+) -> tuple[list[RunFinding], list[Problem]]:
     """Return runs with swapped gages, and a lateral order that the whole campaign contradicts."""
     usable = [s for s in summaries if s.features is not None and np.isfinite(s.conditions).all()]
     if not usable or len(header.gage_lateral) < 2:
@@ -180,7 +180,7 @@ def _badness(residual: FloatArray, sigma: FloatArray) -> FloatArray:
 
 def _swapped(
     file: str, measured: FloatArray, model: FloatArray, sigma: FloatArray
-) -> Finding | None:
+) -> RunFinding | None:
     """Find the order of the gages in which a run fits best, if that is not the order it has."""
     cost = np.sum(((measured[:, None, :] - model[:, :, None]) / sigma[:, :, None]) ** 2, axis=0)
     here = float(np.trace(cost))
@@ -291,7 +291,7 @@ def _out_of_order(slopes: FloatArray, error: float) -> list[int]:
 
 def force_sign_findings(
     summaries: Sequence["ForceSign"], header: CampaignHeader
-) -> tuple[list[Finding], list[Problem]]:
+) -> tuple[list[RunFinding], list[Problem]]:
     """Compare the signs of Fy and slip angle with the axis system: in ISO they are opposite."""
     clear = [item for item in summaries if item.share is not None]
     wrong = [item for item in clear if item.share is not None and item.share > 0.5]

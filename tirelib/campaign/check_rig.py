@@ -7,7 +7,7 @@ import numpy as np
 
 from tirelib.axes import sign
 from tirelib.campaign.check_gages import not_finite
-from tirelib.campaign.finding import Finding, finding
+from tirelib.campaign.finding import RunFinding, finding
 from tirelib.campaign.model import CampaignHeader, Run
 from tirelib.campaign.write import FIELD_UNITS
 from tirelib.units import dimension_of, from_si
@@ -65,9 +65,9 @@ SPIKE = 20.0
 """A rig sample this many robust sigmas off its neighbours is a spike."""
 
 
-def rig_findings(run: Run, header: CampaignHeader) -> list[Finding]:
+def rig_findings(run: Run, header: CampaignHeader) -> list[RunFinding]:
     """Return the faults of the rig quantities of one run."""
-    found: list[Finding] = []
+    found: list[RunFinding] = []
     if run.rig_time is None:
         return found
     file = run.plan.file
@@ -94,7 +94,7 @@ def shown(quantity: str, value: float, axes: str) -> str:
     return f"{given:.4g}" if unit == "1" else f"{given:.4g} {unit}"
 
 
-def _far_from_set_point(run: Run, quantity: str, header: CampaignHeader) -> list[Finding]:
+def _far_from_set_point(run: Run, quantity: str, header: CampaignHeader) -> list[RunFinding]:
     rule = SET_POINTS.get(quantity)
     mean = run.mean(quantity)
     if rule is None or mean is None:
@@ -139,7 +139,7 @@ def _suspect(ratio: float, rule: _SetPoint) -> tuple[float | None, str]:
     return None, "correct the set point in runs.csv, or find out what the rig did"
 
 
-def _implausible(run: Run, quantity: str, header: CampaignHeader) -> list[Finding]:
+def _implausible(run: Run, quantity: str, header: CampaignHeader) -> list[RunFinding]:
     if quantity not in PLAUSIBLE:
         return []
     low, high = PLAUSIBLE[quantity]
@@ -158,7 +158,7 @@ def _implausible(run: Run, quantity: str, header: CampaignHeader) -> list[Findin
     ]
 
 
-def _wrong_fz_sign(run: Run, header: CampaignHeader) -> list[Finding]:
+def _wrong_fz_sign(run: Run, header: CampaignHeader) -> list[RunFinding]:
     middle = float(np.median(run.rig["Fz"]))
     if middle >= 0.0:
         return []
@@ -175,9 +175,9 @@ def _wrong_fz_sign(run: Run, header: CampaignHeader) -> list[Finding]:
     ]
 
 
-def _rolling(run: Run, sound: list[str], header: CampaignHeader) -> list[Finding]:
+def _rolling(run: Run, sound: list[str], header: CampaignHeader) -> list[RunFinding]:
     """Compare speed, wheel speed and loaded radius with the size of the tire."""
-    found: list[Finding] = []
+    found: list[RunFinding] = []
     radius = header.tire.free_radius
     if {"omega", "speed"} <= set(sound):
         slip = run.rig["slip_ratio"] if "slip_ratio" in sound else np.zeros_like(run.rig["speed"])
@@ -211,7 +211,7 @@ def _rolling(run: Run, sound: list[str], header: CampaignHeader) -> list[Finding
     return found
 
 
-def _spikes(run: Run, quantity: str) -> list[Finding]:
+def _spikes(run: Run, quantity: str) -> list[RunFinding]:
     """Find single samples far from both neighbours; a mean hardly cares, hence a warning."""
     samples = run.rig[quantity]
     if samples.size < 10 or run.rig_time is None:

@@ -6,16 +6,16 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.campaign.finding import Finding, finding
+from tirelib.campaign.finding import RunFinding, finding
 from tirelib.campaign.model import CampaignHeader, FloatArray, Run
 from tirelib.campaign.turns import expected_period, trigger_samples, turn_samples
 
 
-def turn_findings(run: Run, header: CampaignHeader) -> list[Finding]:
+def turn_findings(run: Run, header: CampaignHeader) -> list[RunFinding]:
     """Return the faults of the number of turns and of the trigger of one run."""
     if run.strain is None or not math.isfinite(run.rate):
         return []
-    found: list[Finding] = []
+    found: list[RunFinding] = []
     samples = turn_samples(run, header)
     file = run.plan.file
     count = run.strain.shape[1]
@@ -69,7 +69,7 @@ def _periods(
     samples: float,
     begins: FloatArray,
     expected: tuple[float, str, float] | None,
-) -> list[Finding]:
+) -> list[RunFinding]:
     """Compare the trigger's period, in samples, with the rig, and its gaps with each other."""
     file = run.plan.file
     period = samples / run.rate

@@ -12,7 +12,7 @@ _NAMED = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class RunFinding:
     """A problem of one run with its subject, so that equal problems of several runs can be joined.
 
     Attributes
@@ -42,17 +42,17 @@ def finding(
     *,
     at: str = "",
     warning: bool = False,
-) -> Finding:
+) -> RunFinding:
     """Return a finding whose place is `file`, `channel` and, where that helps, `at`."""
     where = ", ".join(part for part in (file, channel and f"channel {channel}", at) if part)
     severity: Severity = "warning" if warning else "error"
     problem = Problem(where, given, allowed, remedy, severity)
-    return Finding(f"{key} {channel} {severity}", file, channel, problem)
+    return RunFinding(f"{key} {channel} {severity}", file, channel, problem)
 
 
-def gathered(findings: Iterable[Finding], n_runs: int) -> list[Problem]:
+def gathered(findings: Iterable[RunFinding], n_runs: int) -> list[Problem]:
     """Return the problems in their order; one that most runs share becomes one line."""
-    by_key: dict[str, list[Finding]] = {}
+    by_key: dict[str, list[RunFinding]] = {}
     listed = list(findings)
     for item in listed:
         by_key.setdefault(item.key, []).append(item)

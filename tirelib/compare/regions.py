@@ -20,7 +20,7 @@ from tirelib.waveforms import GRID
 
 LEVEL = 0.01
 """Chance of one false statement or more when only noise and set points differ."""
-MOST = 6
+MOST_REGIONS = 6
 LEAST_SHARE = 0.02
 """Share of the differences' squares below which a region is not worth a sentence."""
 LEAST_RUNS = 2
@@ -150,7 +150,7 @@ def find_regions(
     order = np.argsort(np.where(good, -share, np.inf), axis=None, kind="stable")
     for flat in order[: int(good.sum())]:
         g, k = np.unravel_index(flat, good.shape)
-        if len(out) == MOST:
+        if len(out) == MOST_REGIONS:
             break
         group = groups[int(g)]
         start, stop = float(starts[k]), float(stops[k])

@@ -50,7 +50,7 @@ class Constant:
 
 
 @dataclass(frozen=True)
-class Problem:
+class ContactProblem:
     """The contact problem: ring by deflection, tread, load if given, other belt loads."""
 
     at: ComplianceAt
@@ -78,7 +78,7 @@ class _State:
     pressure in second order only, so below the tolerance the two need not be made equal.
     """
 
-    def __init__(self, problem: Problem, d0: FloatArray, edges: FloatArray) -> None:
+    def __init__(self, problem: ContactProblem, d0: FloatArray, edges: FloatArray) -> None:
         self.problem = problem
         self.constant = isinstance(problem.at, Constant)
         self.linear = problem.tread.linear
@@ -150,7 +150,7 @@ class Start:
 
 
 def solve(
-    problem: Problem, deflection: FloatArray | None, n_nodes: int, start: Start | None = None
+    problem: ContactProblem, deflection: FloatArray | None, n_nodes: int, start: Start | None = None
 ) -> Solution:
     """Return edges, deflection and compression on convergence, or at the iteration limit.
 
@@ -175,7 +175,7 @@ def solve(
     return Solution(state.edges, state.patch, state.d0, state.delta, iterations, state.change)
 
 
-def _from(problem: Problem, start: Start, nodes: Nodes) -> Solution | None:
+def _from(problem: ContactProblem, start: Start, nodes: Nodes) -> Solution | None:
     """Return the solution near a start, or None if there is none."""
     state = _State(problem, start.deflection.copy(), start.edges)
     state.delta = start.delta.copy()
@@ -188,7 +188,7 @@ def _from(problem: Problem, start: Start, nodes: Nodes) -> Solution | None:
     return Solution(state.edges, state.patch, state.d0, state.delta, iterations, state.change)
 
 
-def _start(problem: Problem, deflection: FloatArray | None) -> tuple[FloatArray, FloatArray]:
+def _start(problem: ContactProblem, deflection: FloatArray | None) -> tuple[FloatArray, FloatArray]:
     """Return a deflection and a patch near the solution."""
     tread, vertical_load = problem.tread, problem.vertical_load
     d0 = np.full(len(tread), 0.02) if deflection is None else deflection.copy()
@@ -264,7 +264,7 @@ class _Secant:
         return out
 
 
-def _refuse_large(edges: FloatArray, d0: FloatArray, problem: Problem) -> None:
+def _refuse_large(edges: FloatArray, d0: FloatArray, problem: ContactProblem) -> None:
     """Refuse what the linear ring cannot describe."""
     if not np.abs(edges).max() > 1.5 * LARGEST_ANGLE:
         return
@@ -273,7 +273,7 @@ def _refuse_large(edges: FloatArray, d0: FloatArray, problem: Problem) -> None:
         refuse_point(int(np.flatnonzero(beyond)[0]), d0, problem)
 
 
-def refuse_point(point: int, d0: FloatArray, problem: Problem) -> None:
+def refuse_point(point: int, d0: FloatArray, problem: ContactProblem) -> None:
     """Raise ParameterError with what this tire carries."""
     load = problem.vertical_load
     given = (

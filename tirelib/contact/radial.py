@@ -35,7 +35,7 @@ from tirelib.contact.free_boundary import (
     N_NODES,
     TOLERANCE,
     Constant,
-    Problem,
+    ContactProblem,
     Solution,
     Start,
     refuse_point,
@@ -256,7 +256,7 @@ def fit_edges(
     one_or_each("contact", len(tread), len(edges), "tread")
     compliance, tread = compliance.spread(len(edges)), tread.spread(len(edges))
     check_radii("contact", tread, compliance.radius)
-    problem = Problem(Constant(compliance), tread, None, None)
+    problem = ContactProblem(Constant(compliance), tread, None, None)
     delta = np.zeros((len(edges), n_nodes))
     d0 = np.zeros(len(edges))
     iteration, moving = 0, True
@@ -289,7 +289,7 @@ def _solve(
     else:
         compliance = each_point(compliance, given.size)
     one_or_each("contact", len(tread), given.size, "tread")
-    problem = Problem(compliance, tread.spread(given.size), vertical_load, extra)
+    problem = ContactProblem(compliance, tread.spread(given.size), vertical_load, extra)
     first = problem.at(np.full(given.size, 0.02) if deflection is None else deflection)
     check_radii("contact", problem.tread, first.radius)
     if extra is not None:
@@ -315,7 +315,7 @@ def _solve(
     return contact
 
 
-def _contact(problem: Problem, found: Solution) -> RadialContact:
+def _contact(problem: ContactProblem, found: Solution) -> RadialContact:
     phi, weights = place(Nodes.of(found.delta.shape[1]), found.patch)
     d0 = found.deflection
     return RadialContact(
@@ -347,7 +347,7 @@ def each_point(at: ComplianceAt, n_points: int) -> ComplianceAt:
     return rows
 
 
-def _check(contact: RadialContact, problem: Problem) -> None:
+def _check(contact: RadialContact, problem: ContactProblem) -> None:
     """Refuse what lies outside the model: range, one patch, tread."""
     check_angle("contact", contact, problem.at, problem.tread)
     away = np.arccos(1.0 - contact.deflection / contact.tread.free_radius)[:, None] * _OUTSIDE

@@ -14,7 +14,7 @@ from tirelib.arrays import BoolArray, FloatArray
 from tirelib.estimators.polynomial import leverage
 from tirelib.estimators.ridge import Ridge, ridge_fits
 
-NEAR = 0.9
+INSIDE_SHARE = 0.9
 """Share of the calibrated rows whose leverage counts as inside the data."""
 FAR = 0.95
 """Share of what was held out up to whose leverage a turn counts as checked."""
@@ -22,9 +22,9 @@ SHARE = 0.12
 """Share of the rows that is left out on one side of a condition; a level is left out whole."""
 LEVEL = 0.03
 """Rows that lie within this share of a condition's range belong to one level."""
-FEWEST = 5
+FEWEST_BEYOND = 5
 """Rows beyond the data without which an end says nothing."""
-MOST = 0.4
+MOST_BEYOND = 0.4
 """Share of the rows above which the rest cannot stand for the calibration."""
 LEAST_REST = 0.2
 """Share of the range that must remain: of two levels, none can be left out."""
@@ -72,7 +72,7 @@ def outermost(conditions: Mapping[str, FloatArray]) -> Iterator[BoolArray]:
             continue
         for side in (x, -x):
             rows = side >= np.quantile(side, 1.0 - SHARE) - LEVEL * span
-            if rows.mean() <= MOST and np.ptp(side[~rows]) >= LEAST_REST * span:
+            if rows.mean() <= MOST_BEYOND and np.ptp(side[~rows]) >= LEAST_REST * span:
                 yield rows
 
 
@@ -92,7 +92,7 @@ def left_out(
 
 def near(fit: Ridge, x: FloatArray) -> float:
     """Return the leverage up to which a row lies among those of the fit, unit of y squared."""
-    return float(np.quantile(leverage(x, fit.covariance), NEAR))
+    return float(np.quantile(leverage(x, fit.covariance), INSIDE_SHARE))
 
 
 def growth(
@@ -110,7 +110,7 @@ def growth(
     most = 0.0
     for error, held, lost in zip(errors, inside, beyond, strict=True):
         far = lost > 0.0
-        if far.sum() >= FEWEST:
+        if far.sum() >= FEWEST_BEYOND:
             most = max(most, _growth(error[far] ** 2, held[far], lost[far]))
     return most
 

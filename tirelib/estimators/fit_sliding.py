@@ -18,7 +18,7 @@ BRUSH_DOUBT = (1.0, 1.0)
 SCALE_USED, SCALE_PULL, SCALE_MOMENT = 0.005, 0.02, 2e-4
 """Errors of u_y, u_x [1] and of Mz / Fz [m] (at 4 kN, in proportion to the load elsewhere) that
 count as one standard deviation of the fit."""
-FEWEST = 12
+FEWEST_SLIDING = 12
 LEAST_LOADS = 0.2
 """Spread of ln(load) above which c, q0 and r vary with the load; twice it: quadratically."""
 LEAST_CAMBER = 0.02
@@ -48,7 +48,7 @@ def fit_sliding(runs: Runs) -> SlidingCurve | None:
     free = ~(np.abs(runs.slip_ratio) > FREE)
     told = np.isfinite(runs.slip_ratio) & np.isfinite(runs.pull)  # how it brakes and drives
     good = (load > 0.0) & np.isfinite(runs.side) & (free | told)
-    if (good & free).sum() < FEWEST:
+    if (good & free).sum() < FEWEST_SLIDING:
         return None
     load = np.where(good, load, LOAD)
     camber = np.nan_to_num(runs.camber)

@@ -16,7 +16,7 @@ from tirelib.arrays import FloatArray
 PULL = 0.03
 """Traction at which half of it counts, T0. The rig's tires show up to 0.01 when they roll freely
 and 0.07 to 0.18 at a slip ratio of 0.015; `docs/theory/estimators.md` has half and double."""
-FEWEST = 6
+FEWEST_PULLED = 6
 """Runs with traction, and without, below which both count alike."""
 
 
@@ -39,7 +39,7 @@ def parted(
     from scipy.optimize import minimize  # calibrating only
 
     share = pull_share(traction)
-    if min((share > 0.5).sum(), (share <= 0.5).sum()) < FEWEST:
+    if min((share > 0.5).sum(), (share <= 0.5).sum()) < FEWEST_PULLED:
         return None
     unit = float(np.mean(error**2))
 

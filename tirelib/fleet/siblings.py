@@ -13,7 +13,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 
-FEWEST = 4
+FEWEST_SIBLINGS = 4
 """Tires that can be siblings: with a flat prior three leave the scatter without an upper bound."""
 POINTS = 200
 WIDEST = 10.0
@@ -53,7 +53,7 @@ def join(values: FloatArray, stds: FloatArray) -> Joined | None:
     values, stds : array, shape (n,)
         One number of each tire, finite, with its own standard deviation above zero.
     """
-    if values.size < FEWEST:
+    if values.size < FEWEST_SIBLINGS:
         return None
     positive = bool((values > 0.0).all())
     y = np.log(values) if positive else values

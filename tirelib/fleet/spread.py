@@ -18,7 +18,7 @@ FALSE_ALARM = 0.05
 same for changes. Of pages of 12 equal tires 7 % mark one (200 pages); with half of it 3.5, with
 double 9.5 %, and a tire 5 scatters away is found in 65, 52 and 78 %
 (``python build/fleet_constants.py``)."""
-FEWEST = 5
+FEWEST_SPREAD = 5
 """Values among which one can stand out: of four, one may differ from three by anything."""
 LARGEST_SHARE = 0.3
 """Share of the values that may stand out. Each step tests at a part of the level: with half of it
@@ -67,7 +67,7 @@ def spread_of(values: FloatArray, stds: FloatArray, tests: int = 1) -> Spread:
     kept = np.ones(n, dtype=np.bool_)
     order: list[int] = []
     last = 0
-    steps = int(LARGEST_SHARE * n) if n >= FEWEST else 0
+    steps = int(LARGEST_SHARE * n) if n >= FEWEST_SPREAD else 0
     level = 0.5 * FALSE_ALARM / (max(steps, 1) * max(tests, 1))
     for step in range(steps):
         left = int(kept.sum())

@@ -16,7 +16,7 @@ from tirelib.arrays import FloatArray
 from tirelib.identify.brush_cells import Conditions, sliding_slips
 from tirelib.identify.brush_law import point_parameters
 from tirelib.identify.brush_misfit import ForceMisfit, Shape, kernel
-from tirelib.identify.brush_problem import ASSUMED_HALF_LENGTH, Problem
+from tirelib.identify.brush_problem import ASSUMED_HALF_LENGTH, BrushProblem
 from tirelib.identify.brush_study import Study
 from tirelib.identify.force_data import ForceData
 from tirelib.identify.ring_patch import half_lengths
@@ -139,7 +139,7 @@ def candidates(study: Study) -> tuple[Candidate, ...]:
     return tuple(out)
 
 
-def _opened(study: Study) -> Problem:
+def _opened(study: Study) -> BrushProblem:
     """Return the problem with the parameters that this campaign could not fit, free."""
     problem = study.problem
     closed = {
@@ -168,7 +168,7 @@ def _value(study: Study, name: str) -> float:
 
 def _information(
     study: Study,
-    problem: Problem,
+    problem: BrushProblem,
     z: FloatArray,
     force: str,
     parts: Sequence[ForceData],

@@ -7,13 +7,13 @@ import numpy as np
 from tirelib.arrays import FloatArray, IntArray
 from tirelib.brush.predict import PointParameters
 from tirelib.identify.brush_law import point_parameters
-from tirelib.identify.brush_problem import Problem
+from tirelib.identify.brush_problem import BrushProblem
 from tirelib.identify.error_bands import levels
 from tirelib.identify.force_data import ForceData
 
 FEW = 150
 """Up to so many points each is its own cell."""
-MOST = 800
+MOST_CELLS = 800
 _CAMBER = float(np.deg2rad(0.5))
 _SLIPS = 36
 """Cells over the range of a slip."""
@@ -67,7 +67,7 @@ class Cells:
     weight: FloatArray
 
 
-def cells_of(problem: Problem, z: FloatArray, robust: float | None) -> tuple[Cells, ...]:
+def cells_of(problem: BrushProblem, z: FloatArray, robust: float | None) -> tuple[Cells, ...]:
     """Return the cells of each force of a solved problem."""
     data = problem.data
     residual = problem.residual(z)
@@ -166,7 +166,7 @@ def cell_numbers(data: ForceData) -> IntArray:
             _bins(data.slip_ratio, share),
         ]
         _, number = np.unique(np.stack(rows), axis=1, return_inverse=True)
-        if number.max() < MOST:
+        if number.max() < MOST_CELLS:
             return np.asarray(number, dtype=np.int64).ravel()
         share *= 1.5
 

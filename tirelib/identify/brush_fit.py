@@ -19,7 +19,7 @@ from tirelib.arrays import FloatArray
 from tirelib.brush.predict import PointForces, PointParameters
 from tirelib.errors import CalibrationError, ParameterError
 from tirelib.identify.brush_law import NEUTRAL, SPECS, Reference, point_parameters, predict
-from tirelib.identify.brush_problem import ASSUMED_HALF_LENGTH, Problem
+from tirelib.identify.brush_problem import ASSUMED_HALF_LENGTH, BrushProblem
 from tirelib.identify.error_bands import BandError, band_errors
 from tirelib.identify.force_checks import (
     ANGLE_SPAN as ANGLE_SPAN,
@@ -161,7 +161,7 @@ def fit_brush(
     if not names:
         raise ParameterError("brush fit: every parameter is held; leave one free")
     reference = Reference(float(np.median(data.load)), float(np.median(data.pressure)))
-    problem = Problem(data, wanted, names, fixed, reference, _ring(tire, data))
+    problem = BrushProblem(data, wanted, names, fixed, reference, _ring(tire, data))
     z = problem.start()
     few = len(data) > _START_POINTS
     if few:

@@ -31,7 +31,7 @@ SHARES = (0.0, 0.5, 0.9, 0.99, 0.999)
 """Of the misfit's variance that is smooth."""
 EVEN = 0.1
 CAMBER_LENGTH = 0.1
-LEAST = 3
+FEWEST_FREEDOMS = 3
 """Degrees of freedom that a force needs to tell its misfit."""
 _MOST_FOR_LENGTHS = 300
 _FLOOR = 1e-10
@@ -238,7 +238,7 @@ def _told(cells: Cells, load: float) -> ForceMisfit:
     misfit = rest @ cells.misfit[take]
     freedom = misfit.size
     shapes = tuple(_grid())
-    if freedom < LEAST:
+    if freedom < FEWEST_FREEDOMS:
         return ForceMisfit(cells, shapes[0], float("inf"), freedom, 0.0)
     score, variance = np.empty(len(shapes)), np.empty(len(shapes))
     scatter = rest @ ((at.load / load)[:, None] ** 2 * rest.T)

@@ -22,7 +22,7 @@ _MOST, _MOST_OF_NORMAL = 0.9, 1.6449
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Problem:
+class BrushProblem:
     """The least squares problem in z: logarithms, or numbers over their size."""
 
     data: ForceData
@@ -33,16 +33,16 @@ class Problem:
     half: FloatArray | None
     scale: FloatArray | None = None  # of each force
 
-    def take(self, index: IntArray) -> "Problem":
+    def take(self, index: IntArray) -> "BrushProblem":
         """Return the problem of some points, with its first scale."""
         half = None if self.half is None else self.half[index]
-        return Problem(
+        return BrushProblem(
             self.data.take(index), self.forces, self.names, self.fixed, self.reference, half
         )
 
-    def weighed(self, scale: FloatArray) -> "Problem":
+    def weighed(self, scale: FloatArray) -> "BrushProblem":
         """Return the problem with another scale of each force."""
-        return Problem(
+        return BrushProblem(
             self.data, self.forces, self.names, self.fixed, self.reference, self.half, scale
         )
 

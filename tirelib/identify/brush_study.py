@@ -11,7 +11,7 @@ from tirelib.identify.brush_cells import cells_of
 from tirelib.identify.brush_fit import BrushFit
 from tirelib.identify.brush_law import point_parameters
 from tirelib.identify.brush_misfit import Misfit, misfit_of
-from tirelib.identify.brush_problem import Problem
+from tirelib.identify.brush_problem import BrushProblem
 from tirelib.identify.force_data import ForceData
 from tirelib.identify.ring_patch import half_lengths
 
@@ -23,7 +23,7 @@ class Study:
     """A solved problem with its misfit: what intervals and advice are computed from."""
 
     fit: BrushFit
-    problem: Problem
+    problem: BrushProblem
     z: FloatArray
     covariance: FloatArray
     misfits: tuple[Misfit, ...]
@@ -52,7 +52,7 @@ class Study:
 def study_of(fit: BrushFit, data: ForceData) -> Study:
     """Return the study of a fit to data."""
     half = None if fit.tire is None else half_lengths(fit.tire, data.load, data.pressure)
-    problem = Problem(data, tuple(fit.rmse), fit.names, fit.held, fit.reference, half)
+    problem = BrushProblem(data, tuple(fit.rmse), fit.names, fit.held, fit.reference, half)
     z = problem.z_of(fit.value)
     problem = problem.weighed(problem.misfit(z))
     stiffness = stiffness_at(fit, np.array([fit.reference.load]))

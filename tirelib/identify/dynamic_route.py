@@ -30,8 +30,8 @@ from tirelib.identify.dynamic_route_problem import (
     AS_PRINTED,
     LEAST_LOADS,
     DynamicOptions,
+    DynamicProblem,
     LoadErrors,
-    Problem,
 )
 from tirelib.identify.dynamic_route_validation import (
     VerticalStiffness,
@@ -116,11 +116,11 @@ def dynamic_route(
         If the fit does not settle.
     """
     chosen = options or DynamicOptions()
-    problem = Problem(runs, start, chosen)
+    problem = DynamicProblem(runs, start, chosen)
     fit = problem.solve()
     reasons: list[str] = []
     try:
-        printed = Problem(runs, start, AS_PRINTED)
+        printed = DynamicProblem(runs, start, AS_PRINTED)
         before: LoadErrors | None = printed.load_errors(printed.solve())
     except (ConvergenceError, ParameterError) as error:
         before = None

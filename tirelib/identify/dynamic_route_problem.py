@@ -115,7 +115,7 @@ class Solved:
     load_std: FloatArray
 
 
-class Problem:
+class DynamicProblem:
     """Parameters, data and residuals of one fit."""
 
     def __init__(self, runs: StraightRuns, start: TireFile, options: DynamicOptions) -> None:

@@ -9,15 +9,13 @@ from tirelib.arrays import FloatArray
 from tirelib.contact import radial
 from tirelib.contact.exact import load_exact
 from tirelib.errors import ParameterError
-from tirelib.identify.campaign_data import StraightRuns
+from tirelib.identify.campaign_data import SAME_SERIES, StraightRuns
 from tirelib.model.state import Operating, State
 from tirelib.ring.compliance import compliance
 from tirelib.ring.frequencies import rim_stiffness
 from tirelib.waveforms import GRID
 
 N_MODES = 60
-ALIKE = 0.06
-"""Relative distance of pressures and speeds within which runs form one load series."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,9 +99,9 @@ def vertical_stiffness(runs: StraightRuns, predicted: FloatArray) -> VerticalSti
     rows: list[tuple[float, ...]] = []
     while left.size:
         first = left[0]
-        alike = np.isclose(c["pressure"][left], c["pressure"][first], rtol=ALIKE) & np.isclose(
-            c["speed"][left], c["speed"][first], rtol=ALIKE
-        )
+        alike = np.isclose(
+            c["pressure"][left], c["pressure"][first], rtol=SAME_SERIES
+        ) & np.isclose(c["speed"][left], c["speed"][first], rtol=SAME_SERIES)
         member, left = left[alike], left[~alike]
         load = c["Fz"][member]
         if member.size < 3 or load.max() < 1.25 * load.min():

@@ -34,7 +34,7 @@ PRESS = 0.02
 PRESS_SPAN = 0.1
 LEAST_GAIN = 0.9
 """What leaves more of the half-width than this share is no advice."""
-ALIKE = 1.6
+ABOUT_AS_MUCH = 1.6
 """Of what narrows an interval about as much, within this factor, the least effort is named."""
 
 
@@ -85,7 +85,7 @@ def _least_effort(found: Sequence[Remedy], now: float) -> Remedy | None:
     narrowest = min((remedy.half_width for remedy in found), default=np.inf)
     if narrowest > LEAST_GAIN * now:
         return None
-    good = [r for r in found if r.half_width <= min(ALIKE * narrowest, LEAST_GAIN * now)]
+    good = [r for r in found if r.half_width <= min(ABOUT_AS_MUCH * narrowest, LEAST_GAIN * now)]
     return min(good, key=lambda remedy: (remedy.effort, remedy.half_width))
 
 

@@ -28,7 +28,7 @@ import numpy as np
 from tirelib.arrays import FloatArray, IntArray
 from tirelib.contact.static import StaticContact
 from tirelib.errors import CalibrationError, ConvergenceError, ParameterError
-from tirelib.identify.campaign_data import StraightRuns
+from tirelib.identify.campaign_data import SAME_SERIES, StraightRuns
 from tirelib.identify.edges import Edges, corrected, edge_bias, read_edges
 from tirelib.identify.static_route_fit import FewFit, Quantity
 from tirelib.identify.static_route_problem import Conventional, StrainProblem
@@ -36,7 +36,6 @@ from tirelib.model.base import operating_points, values_of
 from tirelib.parameters import TireFile
 
 LEAST_LOADS = 3
-ALIKE = 0.06
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,8 +180,8 @@ def load_series(runs: StraightRuns) -> IntArray:
     for first in range(len(runs.waves)):
         member = np.flatnonzero(
             known
-            & np.isclose(c["pressure"], c["pressure"][first], rtol=ALIKE)
-            & np.isclose(c["speed"], c["speed"][first], rtol=ALIKE)
+            & np.isclose(c["pressure"], c["pressure"][first], rtol=SAME_SERIES)
+            & np.isclose(c["speed"], c["speed"][first], rtol=SAME_SERIES)
         )
         member = member[np.argsort(c["Fz"][member])]
         load = c["Fz"][member]

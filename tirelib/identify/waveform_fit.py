@@ -28,7 +28,7 @@ MAX_STEPS = 60
 LONGEST_STEP = 0.5
 SETTLED = 0.01
 """Gauss-Newton step, in standard deviations, below which the fit has settled."""
-NEAR = 1.0
+KEPT_WITHIN = 1.0
 """The same, below which whitening and the misfit's shapes are kept: they hardly change any more."""
 FOLLOWED = 25
 """Steps after which the cost is kept in any case: following the solution, it may go in circles."""
@@ -135,7 +135,7 @@ def fit_waveforms(
     solver = Solver(data, start, prior, free, changes, discrepancy, exact)
     moved = np.inf
     for steps in range(1, MAX_STEPS + 1):
-        solver.refresh(renew=moved > NEAR and steps <= FOLLOWED)
+        solver.refresh(renew=moved > KEPT_WITHIN and steps <= FOLLOWED)
         moved = solver.step()
         if progress is not None:
             progress(f"error {solver.cost.error(solver.model):.2f}")

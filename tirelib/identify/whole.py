@@ -16,7 +16,7 @@ from tirelib.identify.strain_notes import broken_gages, ring_expected
 from tirelib.parameters import Number, Tire, TireFile
 from tirelib.threads import one_thread
 
-ALIKE = 0.01
+SAME_RADIUS = 0.01
 """Relative difference up to which two free radii may be one tire's."""
 
 
@@ -120,7 +120,7 @@ def _start(campaign: Campaign, start: TireFile | None, reasons: list[str]) -> Ti
         )
         return None
     given, measured = start.numbers["free_radius"].value, campaign.header.tire.free_radius
-    if abs(given / measured - 1.0) > ALIKE:
+    if abs(given / measured - 1.0) > SAME_RADIUS:
         reasons.append(
             f"free_radius is {1e3 * given:.1f} mm in {start.name} and {1e3 * measured:.1f} mm in "
             f"campaign.toml of {campaign.header.name}: is it the same tire? The campaign's counts"

@@ -16,7 +16,7 @@ LEAST_SHOWN = 0.01
 _LEVELS = {"alarm": RED, "hint": BLUE, "quiet": FAINT}
 
 
-class Finding(Protocol):
+class ScoredEffect(Protocol):
     """A candidate effect with its final result."""
 
     @property
@@ -36,7 +36,7 @@ class Finding(Protocol):
         """Return alarm, hint or quiet."""
 
 
-def score_bars(findings: Sequence[Finding], alarm: float | None = None) -> Plot:
+def score_bars(findings: Sequence[ScoredEffect], alarm: float | None = None) -> Plot:
     """Return the scores over their thresholds.
 
     Marks are the threshold and, where there is one, the ratio from which on an effect is an alarm.

@@ -20,7 +20,7 @@ from tirelib.campaign import (
 )
 from tirelib.errors import ParameterError
 from tirelib.rig.hidden import hidden
-from tirelib.rig.measure import Chain, Recording, Stage, record, settle, slip_ratio
+from tirelib.rig.measure import MeasuringChain, Recording, Stage, record, settle, slip_ratio
 from tirelib.rig.mesh import mesh
 from tirelib.rig.observe import Forces, edges, forces, trace
 from tirelib.rig.plans import Plan, kind, with_repeats
@@ -85,7 +85,7 @@ class Job:
     run: int
     nominal: Nominal
     seed: int
-    chain: Chain
+    chain: MeasuringChain
     planted: tuple[tuple[str, float], ...] = ()
     place: float = 0.0
     friction: float = np.nan
@@ -168,7 +168,7 @@ def run_plan(
     seed: int = 0,
     repeats: int | None = None,
     jobs: int = 2,
-    chain: Chain | None = None,
+    chain: MeasuringChain | None = None,
     axes: str = "iso",
     overwrite: bool = False,
     planted: Mapping[str, float] | None = None,
@@ -196,7 +196,7 @@ def run_plan(
     ParameterError
         If the folder is not empty and `overwrite` is off, or an option is out of range.
     """
-    folder, chain = Path(out), chain or Chain()
+    folder, chain = Path(out), chain or MeasuringChain()
     if folder.exists() and any(folder.iterdir()) and not overwrite:
         raise ParameterError(
             f"{folder} is not empty; allowed is a new or empty folder; "
@@ -281,7 +281,7 @@ def _run(job: Job, recording: Recording) -> Run:
     )
 
 
-def _header(plan: Plan, tire: RigTire, chain: Chain, axes: str) -> CampaignHeader:
+def _header(plan: Plan, tire: RigTire, chain: MeasuringChain, axes: str) -> CampaignHeader:
     return CampaignHeader(
         name=f"rig-{plan.name}",
         axes=axes,

@@ -21,7 +21,7 @@ from tirelib.rig.tire import N_STRIPS, Array, Condition, RigTire
 
 
 @dataclass(frozen=True)
-class Chain:
+class MeasuringChain:
     """Constants of the measuring chain, one sigma where it is random, SI.
 
     A gage fault would be a change of these, or of `Gages`.
@@ -86,7 +86,7 @@ class Recording:
     rig_time: Array
 
 
-def gages(tire: RigTire, chain: Chain) -> Gages:
+def gages(tire: RigTire, chain: MeasuringChain) -> Gages:
     """Draw the gages of a tire; the same name gives the same gages."""
     rng = np.random.default_rng([crc32(tire.name.encode()), 1])
     return Gages(
@@ -96,7 +96,7 @@ def gages(tire: RigTire, chain: Chain) -> Gages:
     )
 
 
-def settle(nominal: Condition, chain: Chain, seed: int, run: int) -> Condition:
+def settle(nominal: Condition, chain: MeasuringChain, seed: int, run: int) -> Condition:
     """Return the true condition of a run: the rig does not hold its set points exactly."""
     rng = np.random.default_rng([seed, run, 0])
     e = rng.standard_normal(6)
@@ -121,7 +121,7 @@ def slip_ratio(state: State) -> float:
     return state.omega * state.free_radius / state.condition.speed - 1.0
 
 
-def record(stages: Sequence[Stage], chain: Chain, seed: int, run: int) -> Recording:
+def record(stages: Sequence[Stage], chain: MeasuringChain, seed: int, run: int) -> Recording:
     """Measure a state for some turns, or the states that a wheel passes through.
 
     Between two stages the turn rate, the rig's channels and the strain at each wheel angle lie on
@@ -202,19 +202,23 @@ def _sample(trace: Trace, phi: Array, extra_load: Array) -> Array:
     return np.asarray((strain + by_load * extra_load[:, None]).T)
 
 
-def _drift(chain: Chain, seed: int) -> Array:
+def _drift(chain: MeasuringChain, seed: int) -> Array:
     rng = np.random.default_rng([seed, 2])
     return chain.gage_drift * rng.standard_normal((N_STRIPS, 1))
 
 
-def _quantise(strain: Array, chain: Chain) -> Array:
+def _quantise(strain: Array, chain: MeasuringChain) -> Array:
     step = 2.0 * chain.gage_range / 2**chain.gage_bits
     code = np.clip(np.round(strain / step), -(2 ** (chain.gage_bits - 1)), None)
     return np.asarray(np.minimum(code, 2 ** (chain.gage_bits - 1) - 1) * step)
 
 
 def _rig(
-    stages: Sequence[Stage], time: Array, swing: Array, chain: Chain, rng: np.random.Generator
+    stages: Sequence[Stage],
+    time: Array,
+    swing: Array,
+    chain: MeasuringChain,
+    rng: np.random.Generator,
 ) -> dict[str, Array]:
     sigma = {
         "Fx": chain.force_noise,

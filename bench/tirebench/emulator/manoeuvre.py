@@ -32,7 +32,7 @@ import numpy as np
 
 from tirebench.errors import DeviceError, cause
 from tirelib.arrays import FloatArray
-from tirelib.rig.measure import Chain, gages
+from tirelib.rig.measure import MeasuringChain, gages
 from tirelib.rig.observe import forces, trace
 from tirelib.rig.ramp import Point, dense
 from tirelib.rig.solve import LIMITS, State, solve
@@ -288,14 +288,19 @@ class Rig:
 
 
 def waveform(
-    motion: Motion, tire: RigTire, rate: float, *, seed: int = 0, chain: Chain | None = None
+    motion: Motion,
+    tire: RigTire,
+    rate: float,
+    *,
+    seed: int = 0,
+    chain: MeasuringChain | None = None,
 ) -> FloatArray:
     """Return strain over time as the gages give it, shape (n, 5).
 
     The angle is the integral of the wheel's speed; gain, offset and noise are those of the rig's
     measuring chain.
     """
-    chain = chain or Chain()
+    chain = chain or MeasuringChain()
     n = int(motion.time[-1] * rate) + 1
     time = np.arange(n) / rate
     omega = np.interp(time, motion.time, motion.omega)

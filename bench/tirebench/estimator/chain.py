@@ -165,7 +165,7 @@ class _Segment:
         return [int(count) for count in counts]
 
 
-class Chain:
+class WheelChain:
     """The estimator of one wheel and what feeds it; the same blocks give the same estimates.
 
     Parameters

@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from tirebench.estimator.chain import RESTARTED, Chain, Estimator, Jump, Place, Turn
+from tirebench.estimator.chain import RESTARTED, Estimator, Jump, Place, Turn, WheelChain
 from tirebench.estimator.laps import Laps
 from tirebench.estimator.standing import Level, Levels
 from tirebench.estimator.wheels import Block
@@ -92,7 +92,7 @@ class WheelEstimation:
         laps: bool = True,
         turns: int = 0,
     ) -> None:
-        self._chain = Chain(estimator, conditions)
+        self._chain = WheelChain(estimator, conditions)
         self._jumps = list(jumps)
         self._turns = turns
         self._looked_at = laps

@@ -13,7 +13,7 @@ RAW = 8 * 2**20
 STRAIN, RESULTS = 4 * 2**20, 2**19
 """Decoded samples and turns that wait for the recorder, [bytes]: 2 s of four wheels at 10 kHz. What
 does not fit is missing beside the raw bytes, which hold it."""
-SAMPLES, LEAST = 27 * 2**18, 2**21
+SAMPLE_BYTES, LEAST_SAMPLE_BYTES = 27 * 2**18, 2**21
 """Samples of a wheel that wait for its estimator, [bytes]: 13 s at 10 kHz; 4 s where memory is
 short, which is more than the age at which samples are left out."""
 PORT, PORT_STATE = 2**22, 2**13
@@ -138,9 +138,9 @@ class Exchange:
         fixed = _STOP + RAW + ORDERS + STRAIN + RESULTS + LINE + STATE + slots * NEWS
         fixed += ports * (PORT + PORT_STATE)
         room = (free() - fixed - beside) / slots
-        if room < LEAST:
-            raise too_little(fixed + slots * LEAST + beside)
-        samples = int(min(SAMPLES, room)) // 64 * 64
+        if room < LEAST_SAMPLE_BYTES:
+            raise too_little(fixed + slots * LEAST_SAMPLE_BYTES + beside)
+        samples = int(min(SAMPLE_BYTES, room)) // 64 * 64
         shared = memory(fixed + slots * samples)
         fresh = tuple(context.Semaphore(0) for _ in range(slots))
         address = Address(

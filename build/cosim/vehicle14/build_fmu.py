@@ -80,7 +80,7 @@ def build_vehicle(out: str | Path) -> Path:
 
 def _page(table: list[Variable]) -> str:
     facts = {
-        "communication step": f"up to {port.MOST:g} s; divided by longest_step",
+        "communication step": f"up to {port.LONGEST_STEP:g} s; divided by longest_step",
         "needs": "CPython 3.11 or newer with numpy and scipy; linux64 or win64",
         "version": "{version}",
         "licences": "documentation/licenses: MIT, tirelib and pythonfmu",

@@ -35,7 +35,7 @@ BODY = (
 )
 INPUTS = ("steer_front", "steer_rear", *(f"{name}_{w}" for name in PER_WHEEL for w in WHEELS))
 PARAMETERS = ("start_speed", "start_yaw", "longest_step", "sprung_mass", "height")
-MOST = 1.0
+LONGEST_STEP = 1.0
 """Longest communication step [s]."""
 RIGHT = 0.5 * math.pi
 _START = {"start_speed": 100.0 / 3.6, "start_yaw": 0.0, "longest_step": LONGEST}
@@ -240,8 +240,11 @@ class Port:
     @staticmethod
     def refusal(step: float, given: Sequence[float]) -> str | None:
         """Return why a step cannot be done, if so."""
-        if not 0.0 < step <= MOST:
-            return f"communication step = {step} s; allowed are above 0 to {MOST:g} s; step by 1 ms"
+        if not 0.0 < step <= LONGEST_STEP:
+            return (
+                f"communication step = {step} s; allowed are above 0 to {LONGEST_STEP:g} s; "
+                "step by 1 ms"
+            )
         row = np.asarray(given, dtype=np.float64)
         bad = ~np.isfinite(row)
         bad[6:10] |= row[6:10] < 0.0  # brakes

@@ -26,7 +26,7 @@ NAMES = (
     "rolling",
 )
 FORMAT = "tirelib-vehicle-tire/1"
-LEAST = 1.0
+LEAST_LOAD = 1.0
 """Load below which a tire has no force [N]."""
 
 
@@ -68,7 +68,7 @@ class BrushTires:
             Scale of the road's friction, 1: as the constants say.
         """
         c = self.constants
-        n = np.maximum(load, LEAST) / NOMINAL
+        n = np.maximum(load, LEAST_LOAD) / NOMINAL
         a = c["a"] * np.sqrt(n)
         top = c["C_y_top"]
         shape = 2.0 / (1.0 / top + top)  # sin(2 atan(1 / top))
@@ -85,7 +85,7 @@ class BrushTires:
         found = self.law.predict_forces(
             brush, self.law.PointConditions(n * NOMINAL, alpha, kappa, camber)
         )
-        on = load > LEAST
+        on = load > LEAST_LOAD
         return found.Fx * on, found.Fy * on, found.Mz * on
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
 from tirelib.estimators.polynomial import Polynomial, Variable
-from tirelib.estimators.pulled import FEWEST, parted, pull_share
+from tirelib.estimators.pulled import FEWEST_PULLED, parted, pull_share
 from tirelib.estimators.train import Trained
 
 
@@ -29,7 +29,7 @@ def test_errors_that_come_with_traction_do_not_widen_free_rolling() -> None:
 
 def test_too_few_runs_with_traction_count_as_the_others() -> None:
     traction = np.zeros(50)
-    traction[: FEWEST - 1] = 0.2
+    traction[: FEWEST_PULLED - 1] = 0.2
     assert parted(np.ones(50), np.zeros(50), traction) is None
 
 

@@ -5,14 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tirelib.rig.measure import Chain, Recording, Stage, gages, record, settle
+from tirelib.rig.measure import MeasuringChain, Recording, Stage, gages, record, settle
 from tirelib.rig.mesh import mesh
 from tirelib.rig.observe import Forces, Trace
 from tirelib.rig.solve import State
 from tirelib.rig.tire import Condition, RigTire
 
 CONDITION = Condition(4800.0, 2.3e5, 18.0)
-QUIET = Chain(gage_gain=0.0, gage_offset=0.0, gage_drift=0.0, gain_repeatability=0.0, run_out=0.0)
+QUIET = MeasuringChain(
+    gage_gain=0.0, gage_offset=0.0, gage_drift=0.0, gain_repeatability=0.0, run_out=0.0
+)
 
 
 def made_up() -> tuple[State, Trace, Forces]:
@@ -28,22 +30,26 @@ def made_up() -> tuple[State, Trace, Forces]:
     return state, Trace(phi, strain, flat, flat + 1e-6), Forces(0.0, 0.0, 4800.0, 0.0, 0.0, 0.0)
 
 
-def measure(chain: Chain, seed: int = 0, run: int = 0) -> Recording:
+def measure(chain: MeasuringChain, seed: int = 0, run: int = 0) -> Recording:
     state, trace, force = made_up()
     return record([Stage(state, trace, force)], chain, seed, run)
 
 
 def test_a_seed_gives_the_same_recording_and_another_gives_another() -> None:
-    one, same, other = measure(Chain(), 3, 5), measure(Chain(), 3, 5), measure(Chain(), 4, 5)
+    one, same, other = (
+        measure(MeasuringChain(), 3, 5),
+        measure(MeasuringChain(), 3, 5),
+        measure(MeasuringChain(), 4, 5),
+    )
     np.testing.assert_array_equal(one.strain, same.strain)
     np.testing.assert_array_equal(one.rig["Fz"], same.rig["Fz"])
     n = min(one.strain.shape[1], other.strain.shape[1])
     assert np.any(one.strain[:, :n] != other.strain[:, :n])
-    assert np.any(measure(Chain(), 3, 6).strain[:, :n] != one.strain[:, :n])
+    assert np.any(measure(MeasuringChain(), 3, 6).strain[:, :n] != one.strain[:, :n])
 
 
 def test_gages_belong_to_the_tire_and_not_to_the_day() -> None:
-    chain = Chain()
+    chain = MeasuringChain()
     np.testing.assert_array_equal(gages(RigTire(), chain).gain, gages(RigTire(), chain).gain)
     other = gages(RigTire(name="another"), chain)
     assert np.all(other.gain != gages(RigTire(), chain).gain)
@@ -71,7 +77,7 @@ def test_gain_repeatability_is_of_the_stated_size() -> None:
 
 
 def test_strain_is_quantised_to_14_bits() -> None:
-    strain = measure(Chain()).strain
+    strain = measure(MeasuringChain()).strain
     step = 0.04 / 2**14
     np.testing.assert_allclose(strain / step, np.round(strain / step), atol=1e-6)
 
@@ -79,7 +85,7 @@ def test_strain_is_quantised_to_14_bits() -> None:
 def test_range_saturates() -> None:
     state, trace, force = made_up()
     huge = replace(trace, strain=10.0 * trace.strain)
-    strain = record([Stage(state, huge, force)], Chain(), 0, 0).strain
+    strain = record([Stage(state, huge, force)], MeasuringChain(), 0, 0).strain
     assert strain.max() == pytest.approx(0.02, rel=1e-3)
 
 
@@ -105,7 +111,7 @@ def test_run_out_swings_the_load_once_per_turn() -> None:
 
 
 def test_set_points_scatter_as_stated_and_the_rest_is_kept() -> None:
-    chain = Chain()
+    chain = MeasuringChain()
     true = [settle(CONDITION, chain, 0, run) for run in range(400)]
     load = np.array([c.load for c in true]) / 4800.0 - 1.0
     speed = np.array([c.speed for c in true]) / 18.0 - 1.0
@@ -117,7 +123,7 @@ def test_set_points_scatter_as_stated_and_the_rest_is_kept() -> None:
 
 
 def test_group_two_reports_the_truth_with_sensor_noise() -> None:
-    samples = np.concatenate([measure(Chain(), 0, run).rig["Fz"] for run in range(20)])
+    samples = np.concatenate([measure(MeasuringChain(), 0, run).rig["Fz"] for run in range(20)])
     assert samples.mean() == pytest.approx(4800.0, abs=5.0)
     # 30 N noise with the run-out's 20 N / sqrt(2)
     assert samples.std() == pytest.approx(np.hypot(30.0, 14.1), rel=0.1)

@@ -9,7 +9,7 @@ import pytest
 from tirelib.campaign import check_campaign, read_campaign
 from tirelib.errors import ParameterError
 from tirelib.rig.campaign import run_plan
-from tirelib.rig.measure import Chain, Recording, Stage, record
+from tirelib.rig.measure import MeasuringChain, Recording, Stage, record
 from tirelib.rig.mesh import mesh
 from tirelib.rig.observe import forces, trace
 from tirelib.rig.plans import Plan, kind, on_one_road, plan
@@ -17,7 +17,7 @@ from tirelib.rig.ramp import Point, Ramp, changed, dense, points_of, set_point
 from tirelib.rig.solve import solve
 from tirelib.rig.tire import Condition, RigTire
 
-EXACT = Chain(
+EXACT = MeasuringChain(
     gage_noise=0.0,
     gage_gain=0.0,
     gage_offset=0.0,
@@ -117,7 +117,7 @@ def test_strain_lies_between_that_of_the_two_states(stages: tuple[Stage, Stage])
 
 
 def test_a_ramp_that_does_not_move_is_the_steady_run(stages: tuple[Stage, Stage]) -> None:
-    chain = Chain()
+    chain = MeasuringChain()
     state = stages[0].state
     steady = record(stages[:1], chain, 3, 5)
     turns = chain.turns * 2.0 * np.pi / state.omega

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tirelib.axes import sign
-from tirelib.campaign.finding import Finding
+from tirelib.campaign.finding import RunFinding
 from tirelib.campaign.importing.columns import Column, Table, did_you_mean, row_list
 from tirelib.campaign.importing.defects import Clock
 from tirelib.campaign.importing.mapfile import ChannelRule, ImportMap
@@ -72,7 +72,7 @@ def clocks_of(rules: ImportMap, table: Table) -> list[Clock]:
     return [Clock(name, tuple(columns)) for name, columns in timed.items() if name]
 
 
-def convert(table: Table, rules: ImportMap, number: int) -> tuple[list[Piece], list[Finding]]:
+def convert(table: Table, rules: ImportMap, number: int) -> tuple[list[Piece], list[RunFinding]]:
     """Apply a map to the table of one file.
 
     Parameters
@@ -87,7 +87,7 @@ def convert(table: Table, rules: ImportMap, number: int) -> tuple[list[Piece], l
     pieces : list of Piece
         In the order of the rows; without those that the map skips. Empty when a column is missing
         or cannot be used.
-    findings : list of Finding
+    findings : list of RunFinding
         Every fault.
     """
     work = _Conversion(table, rules)
@@ -113,13 +113,13 @@ class _Conversion:
     def __init__(self, table: Table, rules: ImportMap) -> None:
         self.table = table
         self.rules = rules
-        self.found: list[Finding] = []
+        self.found: list[RunFinding] = []
 
     def fault(self, key: str, where: str, given: str, allowed: str, remedy: str) -> None:
         """Note a fault; `where` is a column or empty."""
         place = f"{self.table.file}, {where}" if where else self.table.file
         problem = Problem(place, given, allowed, remedy)
-        self.found.append(Finding(f"{key} {where}", self.table.file, where, problem))
+        self.found.append(RunFinding(f"{key} {where}", self.table.file, where, problem))
 
     def named(self, name: str, purpose: str) -> Column | None:
         """Return a column by its name, or None after noting the existing names."""
@@ -361,7 +361,7 @@ class _Conversion:
                 named = replace(
                     problem, allowed=problem.allowed.replace("campaign.toml", self.rules.file)
                 )
-                self.found.append(Finding("gage time", source, "", named))
+                self.found.append(RunFinding("gage time", source, "", named))
         trigger = values.get("trigger")
         piece = Piece(
             number=run,
@@ -412,7 +412,7 @@ class _Conversion:
                     "time must increase from row to row",
                     f"sort out the clock at its source, or say {choice} in the map",
                 )
-                self.found.append(Finding(given, source, "time", problem))
+                self.found.append(RunFinding(given, source, "time", problem))
 
     def points(self, source: str, span: slice) -> Iterator[tuple[str, float]]:
         """Yield the set points that columns give; note one that changes within the run."""
@@ -430,7 +430,7 @@ class _Conversion:
                     "one value a run is needed",
                     "map another column, divide the runs, or import a sweep",
                 )
-                self.found.append(Finding(f"point {target.name}", source, column.name, problem))
+                self.found.append(RunFinding(f"point {target.name}", source, column.name, problem))
             else:
                 si = to_si(low, rule.unit, target.dimension)
                 yield target.name, from_si(si, target.unit, target.dimension)

@@ -16,7 +16,7 @@ import numpy as np
 from tirelib.campaign import header as header_file
 from tirelib.campaign import plan as plan_file
 from tirelib.campaign.check import check_campaign
-from tirelib.campaign.finding import Finding, gathered
+from tirelib.campaign.finding import RunFinding, gathered
 from tirelib.campaign.importing.convert import Piece, clocks_of, convert
 from tirelib.campaign.importing.defects import mended
 from tirelib.campaign.importing.formats import read_table
@@ -131,7 +131,7 @@ class _Import:
     def survey(self) -> tuple[CampaignHeader, list[ImportedRun]]:
         """Read every file once; return the header with its rate, and the plan of every run."""
         faults = [str(problem) for problem in errors_of(self.problems)]
-        found: list[Finding] = []
+        found: list[RunFinding] = []
         imported: list[ImportedRun] = []
         clocks: list[tuple[str, int, float]] = []
         missing = False  # runs are missing, so that problems of the plan may be wrong
@@ -166,7 +166,7 @@ class _Import:
             raise FormatError(faults)
         return header, with_starts(imported) if self.rules.run_column else imported
 
-    def read(self, place: int) -> tuple[list[Piece], list[Finding]]:
+    def read(self, place: int) -> tuple[list[Piece], list[RunFinding]]:
         """Return the runs of a file and its faults."""
         if self._last is not None and self._last[0] == place:
             return self._last[1], []

@@ -6,7 +6,7 @@ import numpy as np
 
 from tirelib.campaign.check_order import force_sign_of
 from tirelib.campaign.check_rig import shown
-from tirelib.campaign.finding import Finding
+from tirelib.campaign.finding import RunFinding
 from tirelib.campaign.importing.mapfile import ImportMap
 from tirelib.campaign.model import FloatArray, Run, RunPlan
 from tirelib.campaign.problem import Problem
@@ -14,7 +14,7 @@ from tirelib.campaign.problem import Problem
 _PLAN = RunPlan(0, "", "sweep", *(float("nan"),) * 6)
 
 
-def sign_findings(source: str, rig: Mapping[str, FloatArray], rules: ImportMap) -> list[Finding]:
+def sign_findings(source: str, rig: Mapping[str, FloatArray], rules: ImportMap) -> list[RunFinding]:
     """Return the signs of one run that contradict the axes of the map.
 
     Parameters
@@ -25,7 +25,7 @@ def sign_findings(source: str, rig: Mapping[str, FloatArray], rules: ImportMap) 
         SI and ISO, if the map is right.
     rules : ImportMap
     """
-    found: list[Finding] = []
+    found: list[RunFinding] = []
     axes = rules.header.axes
     load = rig.get("Fz")
     if load is not None and load.size and float(np.median(load)) < 0.0:
@@ -65,9 +65,9 @@ def _finite(rig: Mapping[str, FloatArray]) -> bool:
 
 def _contradiction(
     source: str, quantity: str, given: str, allowed: str, rules: ImportMap
-) -> Finding:
+) -> RunFinding:
     column = rules.channels[quantity].column
     place = f"column {column!r} ({quantity})"
     remedy = f"correct axes in {rules.file}, or write sign = -1 for the column that is turned"
     problem = Problem(f"{source}, {place}", given, allowed, remedy)
-    return Finding(f"sign {quantity}", source, place, problem)
+    return RunFinding(f"sign {quantity}", source, place, problem)
