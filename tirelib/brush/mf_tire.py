@@ -114,7 +114,7 @@ class Inputs:
     in_range: BoolArray
 
 
-_LIMITS = MappingProxyType(
+LIMITS = MappingProxyType(
     {
         "load": ("FZMIN", "FZMAX"),
         "slip_ratio": ("KPUMIN", "KPUMAX"),
@@ -155,7 +155,7 @@ def magic_tire(tire: TirFile) -> MagicTire:
     if found["NOMPRES"] is None and any(v != 0.0 for n, v in values.items() if n[:2] == "PP"):
         problems.append("NOMPRES is missing; the pressure coefficients PP.. refer to it")
     limits = {}
-    for name, keys in _LIMITS.items():
+    for name, keys in LIMITS.items():
         low, high = (number(key) for key in keys)
         if (low, high) != (None, None):
             limits[name] = (-np.inf if low is None else low, np.inf if high is None else high)

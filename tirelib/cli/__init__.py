@@ -32,6 +32,8 @@ VERBS = {
     "studio": "Open the journey in the browser: see, suspect, add, take away.",
     "simulate": "Simulate the rolling ring on the road: shape, pressure, shear, strain and strain "
     "rate.",
+    "export": "Fit a Magic Formula 6.1 to a model's brush or to a force campaign, and write it as "
+    ".tir.",
     "fmu": "Export the estimator or the virtual tire as an FMU, check it, and run it.",
     "fleet": "Run TASK over every campaign and recording below PATHS, on Dask.",
     "rig": "Measure a virtual tire on the numerical rig and write a campaign.",
