@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tirelib.errors import ParameterError
 from tirelib.parameters import read_tire
 from tirelib.ring.compliance import Compliance, compliance
-from tirelib.ring.ring import Ring, modal_stiffness
+from tirelib.ring.ring import Ring, dashpots, modal_stiffness
 
 TIRE = read_tire("table-6-1").tire
 RING = replace(Ring.of(TIRE, TIRE.pressure), damping=0.0)
@@ -37,6 +37,14 @@ def test_without_damping_the_compliance_is_hermitian(option: str) -> None:
     across = matrix.conj().swapaxes(-1, -2)
     scale = np.sqrt(np.einsum("pnii,pnjj->pnij", np.abs(matrix), np.abs(matrix))) + 1e-300
     assert (np.abs(matrix - across) <= 1e-9 * scale).all()
+
+
+def test_each_dashpot_damps_the_spring_beside_it() -> None:
+    """The damping ratio c / (2 sqrt(k m)) is lambda, along the radius and along the belt."""
+    found = dashpots(replace(RING, dashpots=0.03))
+    for c, stiffness in zip(found, (RING.radial_stiffness, RING.tangential_stiffness), strict=True):
+        assert c.item() / (2.0 * np.sqrt(stiffness * RING.mass)) == pytest.approx(0.03)
+    assert found[0].item() > 1.2 * found[1].item()  # the two springs differ
 
 
 @every_option

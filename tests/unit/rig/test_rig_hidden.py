@@ -109,6 +109,19 @@ def test_the_stiffness_is_the_slope_of_the_pressure_whatever_the_tread() -> None
         assert (np.diff(q[:, 0]) >= 0.0).all()
 
 
+def test_a_rough_tread_carries_what_its_heights_carry_on_average() -> None:
+    """Heights are even between -half and half; each point presses as a smooth tread does."""
+    half = 2e-4
+    smooth = replace(TIRE, tread_hardening=0.0, tread_cubic=0.0)
+    heights = half * (2.0 * (np.arange(20_000) + 0.5) / 20_000 - 1.0)
+    for depth in half * np.array([-1.1, -0.6, 0.0, 0.4, 0.9, 1.5]):
+        wanted = pressure(smooth, depth + heights)[0].mean()
+        found, slope = pressure(replace(smooth, tread_roughness=half), np.array([depth]))
+        assert found.item() == pytest.approx(wanted, rel=1e-6, abs=1e-6 * half * TIRE.tread_normal)
+        touched = np.mean(depth + heights > 0.0)
+        assert slope.item() == pytest.approx(TIRE.tread_normal * touched, rel=1e-3)
+
+
 def test_laws_do_not_depend_on_the_mesh() -> None:
     tire = HIDDEN["sidewall_damping"].tire(TIRE, CONDITIONS[0], 0.0, 0.15)
     fine = solve(tire, CONDITIONS[0], None, mesh(0.012, 0.1))

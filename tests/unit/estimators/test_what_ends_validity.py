@@ -1,0 +1,79 @@
+"""What ends the validity of an estimate, and how much a law of a condition is doubted."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.synthetic import header, synthetic_run
+from tirelib.estimators.chain import QUANTITIES
+from tirelib.estimators.laws import ConditionLaws
+from tirelib.estimators.train import Trained
+from tirelib.features import Features
+from tirelib.flags import TurnFlag
+from tirelib.observations import measure_run
+
+
+@pytest.fixture(scope="module")
+def features() -> Features:
+    return measure_run(synthetic_run(0, slip_angle=np.deg2rad(1.0)), header())[0]
+
+
+@pytest.mark.parametrize(
+    "flag",
+    [
+        TurnFlag.FIRST_TURN,
+        TurnFlag.PERIOD_JUMP,
+        TurnFlag.ACCELERATING,
+        TurnFlag.TRIGGER_MISMATCH,
+        TurnFlag.REVERSED,
+        TurnFlag.CUT_OFF,
+        TurnFlag.NO_CONTACT,
+    ],
+)
+def test_a_turn_whose_angle_or_contact_is_in_doubt_gives_no_estimate(
+    flag: TurnFlag, trained: Trained, features: Features
+) -> None:
+    good = trained.calibration.estimate(features).turn_valid
+    assert good.sum() >= 3
+    marked = replace(features, flags=features.flags | int(flag))
+    found = trained.calibration.estimate(marked)
+    assert not found.turn_valid.any()
+    assert not any(found.valid[quantity].any() for quantity in QUANTITIES)
+
+
+@pytest.mark.parametrize(("std", "valid"), [(0.9, True), (1.2, False), (2.8, False)])
+def test_a_slip_angle_is_valid_up_to_a_standard_deviation_of_one_degree(
+    std: float, valid: bool, trained: Trained, features: Features
+) -> None:
+    chains = {}
+    for missing, chain in trained.calibration.chains.items():
+        assert chain.angle is not None
+        # the reading of a slippery road would replace the polynomial
+        sure = replace(chain.angle, blur=0.0, bend=0.0)
+        polynomial = replace(sure.polynomial, residual=np.deg2rad(std), floor=0.0)
+        chains[missing] = replace(chain, angle=replace(sure, polynomial=polynomial), sliding=None)
+    found = replace(trained.calibration, chains=chains).estimate(features)
+    usable = trained.calibration.estimate(features).turn_valid
+    told = np.rad2deg(found.std["alpha"][usable])
+    np.testing.assert_allclose(told, std, rtol=0.1)
+    assert (found.valid["alpha"][usable] == valid).all()
+    assert all(
+        ("alpha_saturated" in notes) != valid for notes in np.array(found.notes, object)[usable]
+    )
+    assert found.valid["Fz"][usable].all()
+
+
+LAWS = ConditionLaws((2e5, 2e5), (10.0, 20.0), False, False, 0.17, 0.3)
+
+
+def test_a_speed_outside_the_calibration_doubts_by_two_percent_per_1600_m2_s2() -> None:
+    speed = np.sqrt([15.0**2, 20.0**2 + 1600.0, 20.0**2 + 800.0, 36.0])
+    found = LAWS.spread({"speed": speed}, np.array([4e3, 4e3, -4e3, 4e3]))
+    np.testing.assert_allclose(found, [0.0, 80.0, 40.0, 80.0 * 64.0 / 1600.0])
+
+
+def test_a_lateral_force_doubts_three_tenths_of_what_the_pressure_law_changes() -> None:
+    factor, doubt = LAWS.force_factor({"pressure": np.array([2e5, 2.5e5, 1.6e5])})
+    np.testing.assert_allclose(factor, [1.0, 1.25**0.8, 0.8**0.8])
+    np.testing.assert_allclose(doubt, 0.3 * np.abs(factor - 1.0))
