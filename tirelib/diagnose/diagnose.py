@@ -16,7 +16,7 @@ from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.span import span
 from tirelib.identify.waveform_fit import Data
 from tirelib.infer.hypothesis import Hypothesis, p_value
-from tirelib.infer.plain import BASE, Family, load
+from tirelib.infer.plain import BASE, ROUGHLY, Family, load
 from tirelib.infer.select import Verdict, select
 from tirelib.infer.strain import StrainProblem
 from tirelib.threads import one_thread
@@ -169,7 +169,7 @@ def diagnose(
             final.waveform,
             data.points,
             left_of(data, final).edges,
-            lambda waveforms: final.whiten(waveforms),
+            final.whiten,
         )
     return Diagnosis(
         verdict,
@@ -264,6 +264,6 @@ def _twins(name: str, first: Hypothesis) -> tuple[tuple[str, float], ...]:
     near = [
         (other, first.null.angle(name, other))
         for other in effects
-        if other != name and not other.startswith(BASE) and not other.startswith("roughly ")
+        if other != name and not other.startswith(BASE) and not other.startswith(ROUGHLY)
     ]
     return tuple(sorted((pair for pair in near if pair[1] < TWIN_ANGLE), key=lambda pair: pair[1]))

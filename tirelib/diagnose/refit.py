@@ -30,9 +30,6 @@ ROUGH, SETTLED = 0.05, 0.005
 FOLLOWED = 0.01
 """Coordinate by which all steps together move where large displacements need no update: they follow
 to first order."""
-FELL = 0.05
-"""Least share of the squared error that an effect has to take: what takes less stands for
-structure."""
 WITHIN = 0.9
 """Share of a range in which a fit starts."""
 FLATTER = 0.9
@@ -113,15 +110,6 @@ class Refit:
         rows = slice(first, first + effect.components)
         deviation: FloatArray = effect.scale * np.sqrt(np.diag(self.covariance)[rows])
         return deviation
-
-    def needed(self, names: Sequence[str]) -> list[str]:
-        """Return those of some effects whose strength the fit does not take back to zero."""
-        kept = []
-        for index, effect in enumerate(self.effects):
-            strength, std = self.strengths[index], self.strength_std(index)
-            if effect.name in names and (np.abs(strength) > 3.0 * std).any():
-                kept.append(effect.name)
-        return sorted(kept, key=list(names).index)
 
 
 def refit(
@@ -233,11 +221,6 @@ def inside(effect: Effect, strength: FloatArray) -> FloatArray:
     """Return a start for a fit within an effect's range."""
     start: FloatArray = np.clip(strength, WITHIN * effect.low, WITHIN * effect.high)
     return start
-
-
-def fall(before: Refit, after: Refit) -> float:
-    """Return the share of the squared error that is gone."""
-    return 1.0 - (after.error / before.error) ** 2
 
 
 def _flatter(values: Mapping[str, float | FloatArray]) -> dict[str, float | FloatArray]:

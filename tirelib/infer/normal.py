@@ -5,12 +5,12 @@ needed of thousands of samples is G = B B' and g = B r. The covariance of r is C
 
     B C^-1 B' = G - G X G,   B C^-1 r = g - G X g,   X = D^1/2 (I + D^1/2 G D^1/2)^-1 D^1/2.
 
-The log evidence that a block of rows a has the variance t more than D says is
+A block of rows a with the prior variance t, at its likeliest, raises the log density of r by
 
-    1/2 q' (Q + 1/t)^-1 q - 1/2 log det(1 + t Q),   Q = a C^-1 a',  q = a C^-1 r.
+    1/2 q' (Q + 1/t)^-1 q,   Q = a C^-1 a',  q = a C^-1 r.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -141,10 +141,8 @@ class Weighed:
         return float(gain - 0.5 * self.normal.square)
 
 
-def evidence(
-    gram: FloatArray, right: FloatArray, blocks: Sequence[slice], more: Sequence[FloatArray]
-) -> FloatArray:
-    """Return the log evidence of more variance in each block, for each right-hand side.
+def taken(gram: FloatArray, right: FloatArray, block: slice, more: FloatArray) -> FloatArray:
+    """Return by how much a block at its likeliest raises the log density of k residuals, (k,).
 
     Parameters
     ----------
@@ -152,29 +150,12 @@ def evidence(
         B C^-1 B' (`Weighed.gram`).
     right : shape (m, k)
         B C^-1 r of k residuals (`Weighed.right`).
-    blocks : sequence of slice
-    more : sequence of shape (rows of the block,)
-        Variance beyond D, larger than zero.
-
-    Returns
-    -------
-    shape (n_blocks, k)
+    block : slice
+    more : shape (rows of the block,)
+        Variance beyond D, larger than zero: the prior of the block's coefficients.
     """
-    out = np.zeros((len(blocks), right.shape[1]))
-    sizes = [block.stop - block.start for block in blocks]
-    for size in sorted(set(sizes)):
-        which = [k for k, each in enumerate(sizes) if each == size]
-        rows = np.array([blocks[k].start for k in which])[:, None] + np.arange(size)
-        root = np.sqrt(np.array([more[k] for k in which]))
-        inner = (
-            np.eye(size)
-            + root[:, :, None] * gram[rows[:, :, None], rows[:, None, :]] * (root[:, None, :])
-        )
-        lower = np.linalg.cholesky(inner)
-        turned = np.linalg.solve(lower, root[:, :, None] * right[rows])
-        volume = np.sum(np.log(np.diagonal(lower, axis1=1, axis2=2)), axis=1)
-        out[which] = 0.5 * np.sum(turned**2, axis=1) - volume[:, None]
-    return out
+    inner = gram[block, block] + np.diag(1.0 / more)
+    return np.asarray(0.5 * np.sum(right[block] * np.linalg.solve(inner, right[block]), axis=0))
 
 
 def beside(
@@ -182,7 +163,7 @@ def beside(
 ) -> tuple[FloatArray, FloatArray]:
     """Return B C^-1 B' and B C^-1 r where C has more variance in one block.
 
-    The arguments are those of `evidence` for this block.
+    The arguments are those of `taken`.
     """
     inner = gram[block, block] + np.diag(1.0 / more)
     share = np.linalg.solve(inner, gram[block])

@@ -5,13 +5,13 @@ hypothesis that is further off than laws are - gains the likelihood ratio
 
     L_j = 2 [max over k of log p(r | H, a_j, k) - max over k of log p(r | H, k)],
 
-a_j at its likeliest, k the size of what this tire shows of everything and that of the misfit which
-each run has for itself. Were the model of plain tires exact, L_j would be a chi-square of as many
-degrees of freedom n_j as a_j has components. It is not exact, and by more for one effect than for
-another. So each L_j / n_j counts in units of its mean over the family's plain tires, planted in the
-user's plan, or of 1 (an exact model) where that is larger; the cube root makes chi-squares of
-different n_j comparable (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17 (1931) 684). The largest of
-these standard scores is what stands out.
+a_j at its likeliest with its prior, k the size of what this tire shows of everything and that of
+the misfit which each run has for itself. Were the model of plain tires exact, L_j would be a chi-
+square of as many degrees of freedom n_j as a_j has components. It is not exact, and by more for one
+effect than for another. So each L_j / n_j counts in units of its mean over the family's plain
+tires, planted in the user's plan, or of 1 (an exact model) where that is larger; the cube root
+makes chi-squares of different n_j comparable (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17 (1931)
+684). The largest of these standard scores is what stands out.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,7 +21,7 @@ import numpy as np
 from scipy import stats
 
 from tirelib.arrays import FloatArray
-from tirelib.infer.normal import Weighed, beside
+from tirelib.infer.normal import Weighed, beside, taken
 from tirelib.infer.plain import BASE, ROUGHLY, Family, View
 
 PRIOR = 0.5
@@ -109,12 +109,12 @@ class Null:
             level = weighed.gain(turned) - 0.5 * square + view.log_volume + size_prior(size)
             if given is not None:
                 block, more = self.blocks[given], self._more(given, weighed)
-                level = level + _taken(gram, here, block, more)
+                level = level + taken(gram, here, block, more)
                 gram, here = beside(gram, here, block, more)
             plain.append(level)
             free.append(
                 [
-                    level + _taken(gram, here, block, self._more(j, weighed))
+                    level + taken(gram, here, block, self._more(j, weighed))
                     for j, block in enumerate(self.blocks)
                 ]
             )
@@ -189,15 +189,6 @@ class Null:
         least = max(limit * np.sqrt(spread) + 1.0 - spread, 0.0) ** 3 * count * self.scale[j]
         size = strength**2 / float(np.mean(np.diag(covariance)))
         return float(stats.ncx2.sf(least, count, size))
-
-
-def _taken(gram: FloatArray, right: FloatArray, block: slice, more: FloatArray) -> FloatArray:
-    """Return by how much a block at its likeliest raises the log density of k residuals, (k,).
-
-    The arguments are those of `tirelib.infer.normal.evidence`.
-    """
-    inner = gram[block, block] + np.diag(1.0 / more)
-    return np.asarray(0.5 * np.sum(right[block] * np.linalg.solve(inner, right[block]), axis=0))
 
 
 def standard(ratio: FloatArray, count: FloatArray) -> FloatArray:

@@ -83,8 +83,8 @@ def select(
     least = max(1.0 / (len(family) + 1) for family in families)
     if false_alarm < least:
         raise ParameterError(
-            f"false-alarm probability {false_alarm:g}: {min(map(len, families))} plain tires of a "
-            f"family tell probabilities from {least:.3g} on; give a larger one"
+            f"false-alarm probability {false_alarm:g}: with {min(map(len, families))} plain tires "
+            f"of a family the least that can be had is {least:.3g}; give a larger one"
         )
     spread, own = pooled(families), max(family.own for family in families)
     had = problem.start.effects

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tirelib.infer.normal import Normal, Weighed, evidence
+from tirelib.infer.normal import Normal, Weighed, taken
 
 
 @pytest.fixture(scope="module")
@@ -21,22 +21,19 @@ def dense(rows: dict[str, np.ndarray], variance: dict[str, float]) -> np.ndarray
     return total
 
 
-def test_evidence_is_a_ratio_of_gaussian_densities(case: tuple) -> None:
+def test_what_a_block_takes_is_its_density_beside_the_volume_of_its_prior(case: tuple) -> None:
     rest, _, rows = case
     normal = Normal.of(rows, rest, lambda block: block)
     before, more = {"base": 9.0, "one": 0.01}, 0.25
     weighed = Weighed(normal, normal.spread(before))
-    found = evidence(
-        weighed.gram,
-        weighed.right(normal.right)[:, None],
-        [normal.blocks["one"]],
-        [np.full(2, more)],
-    )[0, 0]
+    block = normal.blocks["one"]
+    found = taken(weighed.gram, weighed.right(normal.right)[:, None], block, np.full(2, more))[0]
+    volume = np.linalg.slogdet(np.eye(2) + more * weighed.gram[block, block])[1]
     densities = [
         stats.multivariate_normal(cov=dense(rows, {**before, "one": one})).logpdf(rest)
         for one in (0.01 + more, 0.01)
     ]
-    assert found == pytest.approx(densities[0] - densities[1], abs=1e-8)
+    assert found - 0.5 * volume == pytest.approx(densities[0] - densities[1], abs=1e-8)
 
 
 def test_likelihood_is_that_of_the_samples(case: tuple) -> None:

@@ -33,7 +33,9 @@ def test_p_values_of_plain_tires_lie_under_the_diagonal() -> None:
 
 
 def test_a_probability_that_so_few_tires_cannot_tell_is_refused() -> None:
-    with pytest.raises(ParameterError, match=r"0\.01: 40 plain tires .* from 0\.0244 on"):
+    with pytest.raises(
+        ParameterError, match=r"0\.01: with 40 plain tires .* can be had is 0\.0244"
+    ):
         select(Toy(np.zeros(N)), FAMILIES, false_alarm=0.01)
 
 

@@ -1,0 +1,44 @@
+"""Standard scores, and the limit that plain tires of unlike families set."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from tests.unit.infer.linear_problem import Toy, drawn, family
+from tirelib.infer.hypothesis import Hypothesis, judged, p_value
+from tirelib.infer.null import standard
+from tirelib.infer.plain import Family
+from tirelib.infer.posterior import posterior
+
+FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
+LOUD = replace(family(40, 3, "loud"), draws=4.0 * family(40, 3).draws)
+"""Plain tires that show more than their family's variances say."""
+
+
+@pytest.mark.parametrize("count", [1, 2, 12])
+def test_a_chi_square_has_normal_scores(count: int) -> None:
+    square = stats.chi2(count).isf([0.5, 0.05, 0.001]) / count
+    found = standard(square, np.array(count))
+    assert found == pytest.approx(stats.norm.isf([0.5, 0.05, 0.001]), abs=0.1)
+
+
+def plain(families: tuple[Family, ...]) -> Hypothesis:
+    toy = Toy(drawn(np.random.default_rng(2)))
+    fit = posterior(toy, (), FAMILIES[0].spread(), 0.001)
+    return judged(toy, fit, families, 0.05, own_effects=0)
+
+
+def test_a_family_unlike_the_others_raises_the_limit() -> None:
+    """Its tires are judged by what the others show, in whose units they stand out."""
+    alike, unlike = plain(FAMILIES), plain((*FAMILIES, LOUD))
+    assert unlike.limit(0.05) > 1.5 * alike.limit(0.05)
+    assert np.median(unlike.plain[2]) > np.median(unlike.plain[0])
+
+
+def test_the_limit_is_where_the_p_value_falls_to_the_level() -> None:
+    found = plain(FAMILIES)
+    limit = found.limit(0.05)
+    assert p_value(np.nextafter(limit, np.inf), found.plain)[0] <= 0.05
+    assert p_value(0.5 * limit, found.plain)[0] > 0.05
