@@ -3,6 +3,7 @@
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from tirelib.arrays import FloatArray
 from tirelib.errors import CalibrationError
 from tirelib.planning.criterion import RESOLVED, NextTest, Trial
 
+CACHE = Path(__file__).parents[1] / "out" / "next_test"
 A_PLAN = 3
 """Pairs that each plan contributes at most."""
 CONFUSABLE = np.deg2rad(45.0)

@@ -1,8 +1,9 @@
 """Print how often a further run tells look-alikes apart: one at random, the advised, and another.
 
-    python build/next_test/run.py --seeds 6100-6101
-    python build/next_test/run.py --quantity Fy --seeds 6100-6103
-    python build/next_test/run.py --quantity Fy --scattered --seeds 6100-6103
+    python build/next_test/run.py --seeds 6100-6103
+    python build/next_test/run.py --scattered --seeds 6100-6103
+
+Side force; look-alikes of strain are judged by build/structure/advise.py.
 
 Resumable: verdicts are kept in build/out/next_test as long as the library's code is the same. Seeds
 from 6000 on judge the method and are never used to change it; 1000 to 1999 are for development.
@@ -25,14 +26,13 @@ from hidden.make import seeds as seeds_of
 from hidden.measured import keep
 
 import tirelib
-from next_test import forces, strain
-from next_test.pair import cases_of, open_still
-from next_test.rig import CACHE
+from next_test import forces
+from next_test.pair import CACHE, cases_of, open_still
 from tirelib.errors import TirelibError
 from tirelib.planning.document import PROMISING
 from tirelib.threads import one_thread
 
-VISIBLE = {"strain": 15.0, "Fy": 17.0}
+VISIBLE = 17.0
 """Chi-square by which the campaign alone shows the effect, against none, in the metric of
 structure: that at which a run at random parts about 45 % of the pairs, on seeds from 1400 on."""
 _PARTS = (
@@ -66,17 +66,17 @@ def fingerprint() -> str:
     return digest.hexdigest()[:12]
 
 
-def verdict(quantity: str, case: Any, code: str) -> Verdict:
+def verdict(case: Any, code: str) -> Verdict:
     """Return the verdict on one case, from the cache if it is there."""
     told = asdict(case)
     name = "-".join(str(value) for value in told.values())
-    file = CACHE / "verdicts" / code / f"{quantity}-{name}.json"
+    file = CACHE / "verdicts" / code / f"Fy-{name}.json"
     if file.exists():
         found: Verdict = json.loads(file.read_text(encoding="utf-8"))
         return found
     began = time.process_time()
     try:
-        found = told | (strain if quantity == "strain" else forces).measured(case)
+        found = told | forces.measured(case)
     except TirelibError as error:
         found = told | {"error": str(error)}
     found["cpu"] = time.process_time() - began
@@ -135,19 +135,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--quantity", choices=("strain", "Fy"), default="strain")
     parser.add_argument("--seeds", default="1000", help="such as 6000-6001; a tire each")
     parser.add_argument("--visible", type=float, help="chi-square of the planted effect")
     parser.add_argument(
-        "--scattered", action="store_true", help="Fy: runs are single points, not sweeps"
+        "--scattered", action="store_true", help="runs are single points, not sweeps"
     )
     given = parser.parse_args()
-    visible = given.visible or VISIBLE[given.quantity]
-    sides = given.quantity == "Fy"
-    pairs = forces.pairs(scattered=given.scattered) if sides else strain.pairs()
+    visible = given.visible or VISIBLE
+    pairs = forces.pairs(scattered=given.scattered)
     code, found = fingerprint(), []
     for case in [c for seed in seeds_of(given.seeds) for c in cases_of(pairs, seed, visible)]:
-        v = verdict(given.quantity, case, code)
+        v = verdict(case, code)
         said = {name: v.get(stage, {}).get("gap") for stage, name in STAGES.items()}
         gaps = ", ".join(f"{k} {x:.1f}" if x is not None else f"{k} -" for k, x in said.items())
         _say(f"{case.seed} {case.plan} {case.truth} / {case.rival}: {gaps}")

@@ -112,7 +112,6 @@ def _of_strain(
     from tirelib.diagnose.document import assess, diagnosis_document
     from tirelib.identify.campaign_data import straight_runs
     from tirelib.planning.document import next_test_document
-    from tirelib.planning.rivals import repeated_noise
     from tirelib.waveforms import measure_waveforms
 
     model = model_of(file, catalogue)
@@ -132,12 +131,7 @@ def _of_strain(
     if document["verdict"] == "indistinguishable":
         try:
             document["next_test"] |= next_test_document(
-                document,
-                found.data,
-                found.base,
-                catalogue,
-                noise=repeated_noise(runs, found.data, found.base),
-                progress=progress,
+                document, found.verdict.hypotheses, catalogue, progress=progress
             )
         except TirelibError as error:
             document["messages"].append(f"no next test: {error}")

@@ -21,6 +21,7 @@ from tirelib.cli.common import (
 from tirelib.cli.diagnose import of_forces
 from tirelib.cli.options import (
     effects_option,
+    false_alarm_option,
     json_option,
     members_option,
     model_option,
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from tirelib.campaign import Campaign
-    from tirelib.diagnose.refit import Refit
     from tirelib.effects import Effect
     from tirelib.parameters import TireFile
     from tirelib.planning.document import Plan
@@ -51,8 +51,9 @@ Examples:
 \b
 Without --diagnosis or --suspects the campaign is diagnosed first (a minute or so). Ranges that are
 not declared are the campaign's own, loads and speeds widened by 25 %, pressures by 15 %. The
-separation is the chi-square that one run is expected to add against the wrong suspect; 10 rules it
-out. Exit code: 0 done, also when nothing is in doubt; 2 bad input.
+separation is the chi-square that one run is expected to add against the wrong suspect. The chance
+to resolve is that of putting a suspect out of the confidence set of `tirelib diagnose`; for forces,
+of a chi-square of 10. Exit code: 0 done, also when nothing is in doubt; 2 bad input.
 """
 SHOWN = 8
 RANGES = {
@@ -113,6 +114,7 @@ DIAGNOSIS = "tirelib-diagnosis/1"
     help="Separation for which repeats are counted.",
 )
 @effects_option
+@false_alarm_option
 @members_option
 @seed_option
 @report_option("next_test")
@@ -126,6 +128,7 @@ def next_test(
     sweep: bool | None,
     wanted: float,
     effect_files: tuple[Path, ...],
+    false_alarm: float,
     members: int,
     seed: int,
     out: Path | None,
@@ -135,16 +138,15 @@ def next_test(
     """Tell which further run would separate the suspects of CAMPAIGN best."""
     from tirelib.compare.error import error_of
     from tirelib.compare.model import model_of
-    from tirelib.diagnose.candidates import in_base
-    from tirelib.diagnose.diagnose import diagnose
+    from tirelib.diagnose.diagnose import diagnose, fitted_problem, plain_tires
     from tirelib.diagnose.document import assess, diagnosis_document
-    from tirelib.diagnose.refit import refit
     from tirelib.identify.campaign_data import straight_runs
+    from tirelib.infer.select import Hypotheses
+    from tirelib.infer.strain import in_base
     from tirelib.model.registration import registered_effects
     from tirelib.parameters import read_tire
     from tirelib.planning.document import plan_document, plan_test
     from tirelib.planning.envelope import Envelope
-    from tirelib.planning.rivals import repeated_noise
     from tirelib.planning.suspects import given_suspects, suspects_of
     from tirelib.waveforms import measure_waveforms
 
@@ -195,7 +197,7 @@ def next_test(
         runs = straight_runs(measure_waveforms(campaign, progress=progress))
         data = runs.data(with_deflection=False)
         envelope = Envelope.of(data.points, **declared)
-        base: Refit | None = None
+        hypotheses: Hypotheses | None = None
         if suspects is None:
             found = diagnose(
                 runs,
@@ -203,19 +205,25 @@ def next_test(
                 list(catalogue.values()),
                 effects=effects,
                 strengths=strengths,
+                false_alarm=false_alarm,
                 progress=progress,
             )
             told = diagnosis_document(assess(found, model, progress=progress))
-            suspects, base = suspects_of(told, catalogue), found.base
+            suspects, hypotheses = suspects_of(told, catalogue), found.verdict.hypotheses
         elif suspects.effects:
-            base = refit(data, model.values, effects, strengths, progress=progress)
-        noise = np.nan if base is None else repeated_noise(runs, data, base)
+            _, problem = fitted_problem(
+                runs,
+                model.values,
+                list(catalogue.values()),
+                effects=effects,
+                strengths=strengths,
+                progress=progress,
+            )
+            hypotheses = Hypotheses(problem, plain_tires(), false_alarm, progress)
         plan = plan_test(
-            data,
-            base,
+            hypotheses,
             suspects,
             envelope,
-            noise=noise,
             campaign=campaign.header.name,
             wanted=wanted,
             progress=progress,

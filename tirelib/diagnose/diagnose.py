@@ -143,10 +143,10 @@ def diagnose(
     ConvergenceError
         If the model cannot be fitted to the runs.
     """
-    data = runs.data(with_deflection=False)
-    base = refit(data, values, effects, strengths, progress=progress)
-    refitted = Refits(data, progress)
-    problem = StrainProblem(runs, base.values, catalogue, effects, base.strengths)
+    base, problem = fitted_problem(
+        runs, values, catalogue, effects=effects, strengths=strengths, progress=progress
+    )
+    data, refitted = problem.data, Refits(problem.data, progress)
     verdict = select(problem, plain_tires(), false_alarm=false_alarm, progress=progress)
     best = verdict.best
     names = best.names[len(effects) :]
@@ -184,6 +184,21 @@ def diagnose(
         guess,
         refitted,
     )
+
+
+def fitted_problem(
+    runs: StraightRuns,
+    values: Mapping[str, float | FloatArray],
+    catalogue: Sequence[Effect],
+    *,
+    effects: Sequence[Effect] = (),
+    strengths: Sequence[FloatArray] = (),
+    progress: Callable[[str], None] | None = None,
+) -> tuple[Refit, StrainProblem]:
+    """Return a model fitted to straight runs, and the problem about it; arguments of `diagnose`."""
+    data = runs.data(with_deflection=False)
+    base = refit(data, values, effects, strengths, progress=progress)
+    return base, StrainProblem(runs, base.values, catalogue, effects, base.strengths)
 
 
 def _unexplained(best: Hypothesis) -> FloatArray:
@@ -239,7 +254,7 @@ def _findings(
                     ).all()
                 ),
                 _share(base.whiten(first.fit.rows[name]), own, rest),
-                _twins(name, first),
+                twins_of(name, first),
                 null.power(name, 1.0 / 3.0, limit),
             )
         )
@@ -258,7 +273,7 @@ def _share(white: FloatArray, own: FloatArray, rest: FloatArray) -> float:
     return float(1.0 - np.sum((rest - weights @ rows) ** 2) / np.sum(rest**2))
 
 
-def _twins(name: str, first: Hypothesis) -> tuple[tuple[str, float], ...]:
+def twins_of(name: str, first: Hypothesis) -> tuple[tuple[str, float], ...]:
     """Return the effects whose signature is near, nearest first."""
     effects = [other for other in first.null.names if other in first.fit.rows and "," not in other]
     near = [

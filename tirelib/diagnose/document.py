@@ -9,7 +9,7 @@ import numpy as np
 from tirelib.compare.error import ModelError, Yardstick, named_errors
 from tirelib.compare.model import Model
 from tirelib.diagnose.diagnose import Diagnosis, Finding
-from tirelib.diagnose.floor import MapUnit
+from tirelib.diagnose.floor import MapUnit, floor_of
 from tirelib.diagnose.guess import Guess
 from tirelib.diagnose.held_out import Fold, fold_entry, folds, held_out_errors, pooled
 from tirelib.diagnose.left import Left, left_of, told_powers
@@ -104,7 +104,7 @@ def assess(
     near = found.base.correction.contact
     refitted = yardstick.error(found.base.model, start=near)
     after = yardstick.error(final.model, start=final.correction.contact) if named else refitted
-    floor = _floor(found, after)
+    floor = floor_of(after, found.verdict.best, found.verdict.alpha)
     chosen = folds(data) if named else ()
     held_before = held_out_errors(data, found.base, chosen, yardstick, progress=progress)
     held_after = {
@@ -150,19 +150,6 @@ def _too_large(finding: Finding) -> str:
         f"{effect.high:g} is plausible: it is larger than thought, or something of the same kind; "
         "measure it in another way before it is believed"
     )
-
-
-def _floor(found: Diagnosis, after: ModelError) -> float:
-    """Return the part of an error that noise and what plain tires show explain.
-
-    It is all of it, unless something stands out of what they show.
-    """
-    if not found.exceeds or after.whiten is None:
-        return after.value
-    best = found.verdict.best
-    more, _ = best.null.beside(best.against)
-    taken = after.whiten(np.tensordot(more, best.fit.rows[best.against], axes=1))
-    return float(np.sqrt(max(after.value**2 - float(np.mean(taken**2)), 0.0)))
 
 
 def _hint(finding: Finding) -> Finding:

@@ -9,14 +9,17 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.compare.error import ModelError, Yardstick
 from tirelib.compare.model import Model
-from tirelib.diagnose.candidates import candidates, in_base
-from tirelib.diagnose.floor import FLOOR_MEMBERS, structural_floor
+from tirelib.diagnose.diagnose import FALSE_ALARM, plain_tires
+from tirelib.diagnose.floor import floor_of
 from tirelib.diagnose.held_out import Fold, folds, held_out
 from tirelib.diagnose.refit import Refit, refit
-from tirelib.effects import Effect
+from tirelib.effects import CATALOGUE, Effect
 from tirelib.errors import ParameterError
 from tirelib.extend.step import Step, added, removed
 from tirelib.identify.campaign_data import StraightRuns
+from tirelib.identify.span import span
+from tirelib.infer.select import Hypotheses
+from tirelib.infer.strain import StrainProblem, in_base
 from tirelib.threads import one_thread
 
 START_INSIDE = 0.9
@@ -51,7 +54,6 @@ def add_effect(
     effect: Effect,
     *,
     progress: Callable[[str], None] | None = None,
-    members: int = FLOOR_MEMBERS,
 ) -> Extension:
     """Return a model with one effect more; values and all strengths are fitted anew.
 
@@ -61,8 +63,6 @@ def add_effect(
     model : Model
     effect : Effect
     progress : callable, optional
-    members : int
-        Variants from which the floor is.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def add_effect(
     ConvergenceError
         If a fit does not settle.
     """
-    subject = _Strain(runs, model, progress, members)
+    subject = _Strain(runs, model, progress)
     return subject.extension(added(subject, effect))
 
 
@@ -83,13 +83,12 @@ def remove_effect(
     effect: Effect,
     *,
     progress: Callable[[str], None] | None = None,
-    members: int = FLOOR_MEMBERS,
 ) -> Extension:
     """Return a model without one of its effects; the rest is fitted anew.
 
     Parameters and errors as for `add_effect`.
     """
-    subject = _Strain(runs, model, progress, members)
+    subject = _Strain(runs, model, progress)
     return subject.extension(removed(subject, effect))
 
 
@@ -118,9 +117,8 @@ class _Strain:
         runs: StraightRuns,
         model: Model,
         progress: Callable[[str], None] | None,
-        members: int,
     ) -> None:
-        self.runs, self.model, self.progress, self.members = runs, model, progress, members
+        self.runs, self.model, self.progress = runs, model, progress
         self.name = model.name
         self.used = [each for each in model.used if each.effect.hook != "brush"]
         self.data = runs.data(with_deflection=False)
@@ -165,11 +163,21 @@ class _Strain:
 
     def dead(self, before: Refit, effect: Effect) -> str:
         """Return why the runs cannot show an effect, or an empty text."""
-        return candidates(self.data, before, [effect]).dead.get(effect.name, "")
+        return self._problem(before, [effect]).dead.get(effect.name, "")
+
+    def _problem(self, before: Refit, catalogue: Sequence[Effect]) -> StrainProblem:
+        effects, strengths = before.effects, before.strengths
+        return StrainProblem(self.runs, before.values, catalogue, effects, strengths)
 
     def with_effect(self, before: Refit, effect: Effect) -> Refit:
         """Return the fit with one effect more, from what serves best to first order."""
-        strength, _ = candidates(self.data, before, [effect]).living[0].alone(self.data, before)
+        problem = self._problem(before, [effect])
+        rows = before.whiten(problem.signature(problem.solve(problem.start), effect))
+        rows = rows.reshape(effect.components, -1)
+        basis = span(before.whiten(before.slopes).reshape(len(before.slopes), -1).T)
+        rest = before.whiten(self.data.strain - before.waveform).ravel()
+        own = rows - (rows @ basis) @ basis.T
+        strength = effect.scale * np.linalg.lstsq(own.T, rest, rcond=None)[0]
         start: FloatArray = np.clip(strength, START_INSIDE * effect.low, START_INSIDE * effect.high)
         return refit(
             self.data,
@@ -202,12 +210,8 @@ class _Strain:
         return tuple(float("nan") if error is None else error.value for error in found)
 
     def floor(self, after: Refit) -> float:
-        """Return the error that the structure of the ring leaves."""
-        return structural_floor(
-            self.yardstick.error(after.model, start=after.correction.contact),
-            self.runs,
-            self.data,
-            after,
-            members=self.members,
-            progress=self.progress,
-        )
+        """Return the error that noise and what plain tires show explain."""
+        error = self.yardstick.error(after.model, start=after.correction.contact)
+        problem = self._problem(after, list(CATALOGUE.values()))
+        base = Hypotheses(problem, plain_tires(), FALSE_ALARM, self.progress).base
+        return floor_of(error, base, FALSE_ALARM)

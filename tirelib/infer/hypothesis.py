@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
-from tirelib.infer.null import OWN, PRIOR, Null
+from tirelib.arrays import FloatArray, IntArray
+from tirelib.infer.null import OWN, PRIOR, Null, Products
 from tirelib.infer.plain import BASE, ROUGHLY, Family, View
 from tirelib.infer.posterior import Posterior
 from tirelib.infer.problem import Problem
@@ -34,6 +34,8 @@ class Hypothesis:
     fit : Posterior
     null : Null
         Of the family that excuses most.
+    nulls : tuple of Null
+        Of every family.
     plain : tuple of shape (n_tires,)
         Statistic of each plain tire by the families other than its own, by family.
     statistic : float
@@ -49,6 +51,7 @@ class Hypothesis:
 
     fit: Posterior
     null: Null
+    nulls: tuple[Null, ...]
     plain: tuple[FloatArray, ...]
     statistic: float
     against: str
@@ -105,15 +108,18 @@ def judged(
     own_effects : int
         How many of the fit's effects the model had already: they are part of it.
     """
-    null, plain, likelihood = _tested(problem, fit, families, 1.0)
+    nulls, plain, likelihood = _tested(problem, fit, families, 1.0)
+    null = min(nulls, key=lambda null: float(null.scores.max()))
     statistic = float(null.scores.max())
     p = free = p_value(statistic, plain)[0]
     if fit.effects and p <= alpha:
         loose, tires, _ = _tested(problem, fit, families, 1.0 / LAW)
-        free = max(p, p_value(float(loose.scores.max()), tires)[0])
+        least = min(float(each.scores.max()) for each in loose)
+        free = max(p, p_value(least, tires)[0])
     return Hypothesis(
         fit,
         null,
+        nulls,
         plain,
         statistic,
         null.names[int(np.argmax(null.scores))],
@@ -125,8 +131,8 @@ def judged(
 
 def _tested(
     problem: Problem, fit: Posterior, families: Sequence[Family], looser: float
-) -> tuple[Null, tuple[FloatArray, ...], float]:
-    """Return the family that excuses most, the statistics of plain tires, and the likelihood."""
+) -> tuple[tuple[Null, ...], tuple[FloatArray, ...], float]:
+    """Return the tests by every family, the statistics of plain tires, and the likelihood."""
     wide = fit.widths**2
     wide[len(fit.point.base) :] *= PRIOR**2
     laws = law_errors(fit, looser)
@@ -137,49 +143,75 @@ def _tested(
     ]
     best = int(np.argmax(levels))
     views = views[max(best - 1, 0) : best + 2]
-    nulls = [Null(views, family, {BASE: wide, **laws}) for family in families]
-    products = _planted(problem, fit, families, laws, views, OWN[best])
-    for null, own in zip(nulls, products, strict=True):
+    nulls = tuple(Null(views, family, {BASE: wide, **laws}) for family in families)
+    tires = [
+        products(problem, views, plain_tires(problem, fit, family, laws, OWN[best], number))
+        for number, family in enumerate(families)
+    ]
+    for null, own in zip(nulls, tires, strict=True):
         null.measure(own)
     plain = tuple(
-        np.min(
-            [null.scores_of(tires).max(axis=0) for null in nulls if null.family is not family],
-            axis=0,
-        )
-        for family, tires in zip(families, products, strict=True)
+        by_others(nulls, family, own)[0] for family, own in zip(families, tires, strict=True)
     )
-    return min(nulls, key=lambda null: float(null.scores.max())), plain, max(levels)
+    return nulls, plain, max(levels)
 
 
-def _planted(
+def by_others(
+    nulls: Sequence[Null], family: Family, tires: Products
+) -> tuple[FloatArray, IntArray]:
+    """Return the statistic of a family's tires by the other families, and the place of the test.
+
+    Shapes (k,): by the family that excuses most.
+    """
+    largest = np.array(
+        [
+            np.full(len(tires[0][1]), np.inf)
+            if null.family is family
+            else null.scores_of(tires).max(axis=0)
+            for null in nulls
+        ]
+    )
+    return largest.min(axis=0), np.argmin(largest, axis=0)
+
+
+def plain_tires(
     problem: Problem,
     fit: Posterior,
-    families: Sequence[Family],
+    family: Family,
     laws: Mapping[str, float | FloatArray],
-    views: Sequence[View],
     own: float,
-) -> list[list[tuple[FloatArray, FloatArray]]]:
-    """Return the plain tires of every family as residuals in the user's plan.
+    seed: int,
+) -> FloatArray:
+    """Return what a fitted hypothesis leaves of a family's plain tires in the user's plan.
 
     The hypothesis' laws are off, and every run has a misfit of its own, as they are for the user.
+
+    Returns
+    -------
+    shape (n_tires, ...)
     """
-    normal = views[0].normal
-    rows = np.concatenate(list(fit.rows.values()))
-    whiten, out = problem.whitener(own), []
-    for number, family in enumerate(families):
-        random = np.random.default_rng([len(family), number])
-        planted = family.on(normal)
-        for name, variance in laws.items():
-            block = normal.blocks[name]
-            size = (len(family), block.stop - block.start)
-            planted[:, block] = np.sqrt(variance) * random.standard_normal(size)
-        tires = whiten.coloured(random.standard_normal((len(family), normal.count)))
-        tires = tires + np.tensordot(planted, rows, axes=1)
-        products = []
-        for view in views:
-            white = problem.whitener(view.own)(tires)
-            products.append((view.white @ white.T, np.sum(white**2, axis=1)))
-        out.append(products)
+    whiten, rows = problem.whitener(own), np.concatenate(list(fit.rows.values()))
+    blocks, first = {}, 0
+    for name, each in fit.rows.items():
+        blocks[name] = slice(first, first + len(each))
+        first += len(each)
+    random = np.random.default_rng([len(family), seed])
+    planted = family.on(blocks, first)
+    for name, variance in laws.items():
+        block = blocks[name]
+        size = (len(family), block.stop - block.start)
+        planted[:, block] = np.sqrt(variance) * random.standard_normal(size)
+    count = whiten(fit.rest).size
+    tires = whiten.coloured(random.standard_normal((len(family), count)))
+    return np.asarray(tires + np.tensordot(planted, rows, axes=1))
+
+
+def products(problem: Problem, views: Sequence[View], tires: FloatArray) -> Products:
+    """Return the products of residuals (k, ...) with the rows of every view."""
+    out = []
+    for view in views:
+        white = problem.whitener(view.own)(tires)
+        out.append((view.white @ white.T, np.sum(white**2, axis=1)))
     return out
 
 

@@ -121,11 +121,11 @@ class Weighed:
         out: FloatArray = self.covariance @ right
         return out
 
-    def draw(self, random: np.random.Generator) -> FloatArray:
-        """Return one draw of beta from its posterior, shape (m,)."""
+    def draws(self, random: np.random.Generator, count: int = 1) -> FloatArray:
+        """Return draws of beta from its posterior, shape (count, m)."""
         values, vectors = np.linalg.eigh(self.covariance)
-        noise = np.sqrt(np.clip(values, 0.0, None)) * random.standard_normal(values.size)
-        out: FloatArray = self.mean(self.normal.right) + vectors @ noise
+        noise = np.sqrt(np.clip(values, 0.0, None)) * random.standard_normal((count, values.size))
+        out: FloatArray = self.mean(self.normal.right) + noise @ vectors.T
         return out
 
     def gain(self, right: FloatArray) -> FloatArray:

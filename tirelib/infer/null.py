@@ -56,7 +56,11 @@ class Null:
     Attributes
     ----------
     names : list of str
-        Of everything that may stand beside the hypothesis.
+        Of everything that may be there in addition to the hypothesis.
+    counts : shape (n_names,)
+        Components n_j of each.
+    scale : shape (n_names,)
+        Units of L_j / n_j, from `measure`.
     """
 
     def __init__(
@@ -66,7 +70,7 @@ class Null:
         allowed: Mapping[str, float | FloatArray],
     ) -> None:
         blocks = views[0].normal.blocks
-        self.views, self.family = views, family
+        self.views, self.family, self.allowed = views, family, allowed
         self.names = [name for name in blocks if name != BASE]
         self.blocks = [blocks[name] for name in self.names]
         self.counts = np.array([block.stop - block.start for block in self.blocks], dtype=float)
@@ -96,14 +100,26 @@ class Null:
         view, _, weighed = self._weighed[int(np.argmax(self._levels))]
         return view, weighed
 
-    def _ratios(self, products: Products, given: int | None = None) -> FloatArray:
+    def ratios_of(
+        self, products: Products, *, given: int | None = None, only: View | None = None
+    ) -> FloatArray:
         """Return L_j / n_j of k residuals, (n_names, k).
 
-        `given` is a further effect that the hypothesis counts with.
+        Parameters
+        ----------
+        products : sequence of (shape (m, k), shape (k,))
+            One for each view, or that of `only`.
+        given : int, optional
+            Place of a further effect that the hypothesis counts with.
+        only : View, optional
+            The only size of a run's own misfit.
         """
         plain, free = [], []
-        of_view = {id(view): each for view, each in zip(self.views, products, strict=True)}
+        views = self.views if only is None else [only]
+        of_view = {id(view): each for view, each in zip(views, products, strict=True)}
         for view, size, weighed in self._weighed:
+            if id(view) not in of_view:
+                continue
             turned, square = of_view[id(view)]
             gram, here = weighed.gram, weighed.right(turned)
             level = weighed.gain(turned) - 0.5 * square + view.log_volume + size_prior(size)
@@ -128,13 +144,28 @@ class Null:
             return np.asarray(MORE * weighed.root[block] ** 2)
         return np.full(block.stop - block.start, PRIOR**2)
 
+    @property
+    def size(self) -> float:
+        """The likeliest size of what this tire shows over what its family shows."""
+        return float(self._weighed[int(np.argmax(self._levels))][1])
+
+    def about(self, views: Sequence[View]) -> "Null":
+        """Return the same test, in the same units, of other normal equations."""
+        other = Null(views, self.family, self.allowed)
+        other.scale = self.scale
+        return other
+
     def measure(self, own: Products) -> None:
         """Take the family's own plain tires as the unit of every L_j / n_j."""
-        self.scale = np.maximum(self._ratios(own).mean(axis=1), 1.0)
+        self.scale = np.maximum(self.ratios_of(own).mean(axis=1), 1.0)
 
     def scores_of(self, products: Products) -> FloatArray:
         """Return the standard scores of k residuals, (n_names, k)."""
-        return standard(self._ratios(products) / self.scale[:, None], self.counts[:, None])
+        return self.standard(self.ratios_of(products))
+
+    def standard(self, ratios: FloatArray) -> FloatArray:
+        """Return the standard scores of L_j / n_j, (n_names, k)."""
+        return standard(ratios / self.scale[:, None], self.counts[:, None])
 
     @cached_property
     def scores(self) -> FloatArray:
@@ -146,13 +177,14 @@ class Null:
         return [(v.normal.right[:, None], np.array([v.normal.square])) for v in self.views]
 
     def left(self, names: Sequence[str]) -> dict[str, float]:
-        """Return the largest standard score beside the hypothesis with each further effect."""
-        out = {}
-        for name in names:
-            j = self.names.index(name)
-            ratio = self._ratios(self._measured, given=j)[:, 0]
-            out[name] = float(np.delete(standard(ratio / self.scale, self.counts), j).max())
-        return out
+        """Return the largest standard score of anything else, with each further effect fitted."""
+        return {name: float(self.left_of(self._measured, name)[0]) for name in names}
+
+    def left_of(self, products: Products, name: str) -> FloatArray:
+        """Return the same of k residuals with one further effect fitted, (k,)."""
+        j = self.names.index(name)
+        scores = self.standard(self.ratios_of(products, given=j))
+        return np.asarray(np.delete(scores, j, axis=0).max(axis=0))
 
     def explained(self) -> FloatArray:
         """Return coefficients of all rows by the hypothesis and what plain tires show, (m,)."""

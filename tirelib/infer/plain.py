@@ -69,15 +69,15 @@ class Family:
             least[which] = FLOOR[kind] ** 2 * float(np.max(mean, where=which, initial=0.0))
         return dict(zip(self.blocks, np.maximum(mean, least).tolist(), strict=True))
 
-    def on(self, normal: Normal) -> FloatArray:
-        """Return the tires' coefficients for rows of a user's plan, (n_tires, n_rows).
+    def on(self, blocks: Mapping[str, slice], count: int) -> FloatArray:
+        """Return the tires' coefficients for the rows of a user's plan, (n_tires, count).
 
         A block that a tire did not show, or the family does not know, is zero.
         """
-        out = np.zeros((len(self), len(normal.right)))
+        out = np.zeros((len(self), count))
         first = 0
         for name, rows in self.blocks.items():
-            block = normal.blocks.get(name)
+            block = blocks.get(name)
             if block is not None:
                 out[:, block] = self.draws[:, first : first + rows]
             first += rows
@@ -145,7 +145,7 @@ def learn(name: str, tires: Sequence[Sequence[View]], widths: FloatArray) -> Fam
     draws = np.full((len(tires), sum(blocks.values())), np.nan)
     for draw, each in zip(draws, likeliest, strict=True):
         normal = each.normal
-        drawn = Weighed(normal, normal.spread({**spread, BASE: widths**2})).draw(random)
+        drawn = Weighed(normal, normal.spread({**spread, BASE: widths**2})).draws(random)[0]
         first = 0
         for block, size in blocks.items():
             rows = normal.blocks.get(block)

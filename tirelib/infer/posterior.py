@@ -165,7 +165,7 @@ def posterior(
         normal = Normal.of({BASE: white_slopes, **whitened}, rest)
         metric = Weighed(normal, normal.spread(spread))
         block = normal.blocks[BASE]
-        here = _coordinates(point)
+        here = coordinates_of(point)
         gram = metric.gram[block, block] + np.diag(width**-2)
         gradient = metric.right(normal.right)[block] - here / width**2
         cost = _cost(metric, normal.right, normal.square, here, width)
@@ -179,7 +179,7 @@ def posterior(
             if trial is not None:
                 left = whiten(trial[1].rest)
                 after = _cost(
-                    metric, rows @ left, float(left @ left), _coordinates(trial[0]), width
+                    metric, rows @ left, float(left @ left), coordinates_of(trial[0]), width
                 )
                 if after < cost + GAINS:
                     break
@@ -201,20 +201,9 @@ def posterior(
             point,
             moved,
         )
-    slopes = problem.slopes(point, solved)
-    count = len(point.base) + sum(e.components for e in effects)
-    every = {BASE: slopes[:count]}
-    first = count
-    for effect in others:
-        every[effect.name] = slopes[first : first + effect.components]
-        first += effect.components
-    every |= problem.remainder(point, solved)
-    first = len(point.base)
-    for effect in effects:
-        every[ROUGHLY + effect.name] = problem.roughly(slopes[first : first + effect.components])
-        first += effect.components
-    here = _coordinates(point)
-    rest_from_start = solved.rest + np.tensordot(here, slopes, axes=1)
+    every, slopes = explaining(problem, point, solved, len(effects))
+    count = len(every[BASE])
+    rest_from_start = solved.rest + np.tensordot(coordinates_of(point), slopes, axes=1)
     normal = Normal.of(every, solved.rest, whiten)
     metric = Weighed(normal, normal.spread(spread))
     block = normal.blocks[BASE]
@@ -229,6 +218,28 @@ def posterior(
         covariance,
         after if np.isfinite(after) else cost,
     )
+
+
+def explaining(
+    problem: Problem, point: Point, solved: Any, count: int
+) -> tuple[dict[str, FloatArray], FloatArray]:
+    """Return everything that may explain what a model leaves, and the slopes of all coordinates.
+
+    The model has the first `count` of the point's effects. The rows are those of `Posterior.rows`.
+    """
+    slopes = problem.slopes(point, solved)
+    own, others = point.effects[:count], point.effects[count:]
+    first = len(point.base) + sum(e.components for e in own)
+    every = {BASE: slopes[:first]}
+    for effect in others:
+        every[effect.name] = slopes[first : first + effect.components]
+        first += effect.components
+    every |= problem.remainder(point, solved)
+    first = len(point.base)
+    for effect in own:
+        every[ROUGHLY + effect.name] = problem.roughly(slopes[first : first + effect.components])
+        first += effect.components
+    return every, slopes
 
 
 def _start(
@@ -246,8 +257,8 @@ def _start(
     return Point(base, tuple(effects), tuple(np.array(s, dtype=float) for s in given))
 
 
-def _coordinates(point: Point) -> FloatArray:
-    """Return the base's coordinates and the strengths in ranges."""
+def coordinates_of(point: Point) -> FloatArray:
+    """Return the base's coordinates and the strengths in ranges, (n_coordinates,)."""
     ranges = [s / e.scale for e, s in zip(point.effects, point.strengths, strict=True)]
     return np.concatenate([point.base, *ranges])
 

@@ -21,7 +21,7 @@ from tirelib.errors import ParameterError, TirelibError
 from tirelib.infer.hypothesis import Hypothesis, judged
 from tirelib.infer.normal import Weighed
 from tirelib.infer.plain import BASE, Family, pooled
-from tirelib.infer.posterior import posterior
+from tirelib.infer.posterior import Posterior, posterior
 from tirelib.infer.problem import Problem
 
 SINGLES, PARTNERS, LEADERS = 6, 3, 2
@@ -42,29 +42,33 @@ class Verdict:
         Smallest members, best first; empty for none and unknown.
     best : Hypothesis
         That the verdict's model is made of.
-    base : Hypothesis
-        No further effect.
-    tried : tuple of Hypothesis
-        All that were fitted exactly.
-    alpha : float
+    hypotheses : Hypotheses
+        All that were fitted.
     """
 
     kind: str
     sets: tuple[tuple[str, ...], ...]
     best: Hypothesis
-    base: Hypothesis
-    tried: tuple[Hypothesis, ...]
-    alpha: float
+    hypotheses: "Hypotheses"
+
+    @property
+    def base(self) -> Hypothesis:
+        """The hypothesis that nothing is missing."""
+        return self.hypotheses.base
+
+    @property
+    def tried(self) -> tuple[Hypothesis, ...]:
+        """All hypotheses with further effects that were fitted exactly."""
+        return self.hypotheses.tried
+
+    @property
+    def alpha(self) -> float:
+        """The false-alarm probability."""
+        return self.hypotheses.false_alarm
 
 
-def select(
-    problem: Problem,
-    families: Sequence[Family],
-    *,
-    false_alarm: float = 0.05,
-    progress: Callable[[str], None] | None = None,
-) -> Verdict:
-    """Return which effects, if any, a model lacks.
+class Hypotheses:
+    """Hypotheses about one problem, each fitted and tested once.
 
     Parameters
     ----------
@@ -75,78 +79,119 @@ def select(
         Probability with which a plain tire of any of the families is said to lack something.
     progress : callable, optional
 
+    Attributes
+    ----------
+    base : Hypothesis
+        No further effect.
+    effects : mapping of name to Effect
+        That may be missing.
+
     Raises
     ------
     ParameterError
         If the families have too few tires for this probability.
     """
-    least = max(1.0 / (len(family) + 1) for family in families)
-    if false_alarm < least:
-        raise ParameterError(
-            f"false-alarm probability {false_alarm:g}: with {min(map(len, families))} plain tires "
-            f"of a family the least that can be had is {least:.3g}; give a larger one"
-        )
-    spread, own = pooled(families), max(family.own for family in families)
-    had = problem.start.effects
-    effects = {effect.name: effect for effect in problem.living}
-    tried: dict[frozenset[str], Hypothesis | None] = {}
 
-    def at(names: Sequence[str], near: Hypothesis | None) -> Hypothesis | None:
+    def __init__(
+        self,
+        problem: Problem,
+        families: Sequence[Family],
+        false_alarm: float = 0.05,
+        progress: Callable[[str], None] | None = None,
+    ) -> None:
+        least = max(1.0 / (len(family) + 1) for family in families)
+        if false_alarm < least:
+            raise ParameterError(
+                f"false-alarm probability {false_alarm:g}: with {min(map(len, families))} plain "
+                f"tires of a family the least that can be had is {least:.3g}; give a larger one"
+            )
+        self.problem, self.families = problem, tuple(families)
+        self.false_alarm, self.progress = false_alarm, progress
+        self.spread = pooled(families)
+        self.own = max(family.own for family in families)
+        self.had = problem.start.effects
+        self.effects = {effect.name: effect for effect in problem.living}
+        self.base = self._tested(
+            posterior(problem, self.had, self.spread, self.own, strengths=problem.start.strengths)
+        )
+        self._made: dict[frozenset[str], Hypothesis | None] = {frozenset(): self.base}
+
+    def at(self, names: Sequence[str], near: Hypothesis | None = None) -> Hypothesis | None:
+        """Return the hypothesis that these effects are missing; None where no fit settles.
+
+        `near` is a fit from which this one starts.
+        """
         key = frozenset(names)
-        if key not in tried:
-            more = [effects[name] for name in names]
+        if key not in self._made:
+            near = near or self.base
+            more = [self.effects[name] for name in names]
             try:
                 fit = posterior(
-                    problem,
-                    [*had, *more],
-                    spread,
-                    own,
-                    near=None if near is None else near.fit,
-                    strengths=_start(problem, near, more, own, spread),
-                    progress=progress,
+                    self.problem,
+                    [*self.had, *more],
+                    self.spread,
+                    self.own,
+                    near=near.fit,
+                    strengths=_start(self.problem, near, more, self.own, self.spread),
+                    progress=self.progress,
                 )
-                tried[key] = judged(problem, fit, families, false_alarm, own_effects=len(had))
+                self._made[key] = self._tested(fit)
             except TirelibError:
-                tried[key] = None
-        return tried[key]
+                self._made[key] = None
+        return self._made[key]
 
-    first = posterior(problem, had, spread, own, strengths=problem.start.strengths)
-    base = judged(problem, first, families, false_alarm, own_effects=len(had))
+    def added(self, hypothesis: Hypothesis) -> tuple[str, ...]:
+        """Return the names of a hypothesis' further effects."""
+        return hypothesis.names[len(self.had) :]
+
+    @property
+    def tried(self) -> tuple[Hypothesis, ...]:
+        """All hypotheses with further effects that were fitted."""
+        made = (each for key, each in self._made.items() if key)
+        return tuple(each for each in made if each is not None)
+
+    def _tested(self, fit: Posterior) -> Hypothesis:
+        had = len(self.had)
+        return judged(self.problem, fit, self.families, self.false_alarm, own_effects=had)
+
+
+def select(
+    problem: Problem,
+    families: Sequence[Family],
+    *,
+    false_alarm: float = 0.05,
+    progress: Callable[[str], None] | None = None,
+) -> Verdict:
+    """Return which effects, if any, a model lacks; arguments and errors are `Hypotheses`'."""
+    hypotheses = Hypotheses(problem, families, false_alarm, progress)
+    base, alpha, at = hypotheses.base, false_alarm, hypotheses.at
 
     def done(kind: str, members: Sequence[Hypothesis]) -> Verdict:
         best = members[0] if members else base
-        sets = tuple(_added(member, len(had)) for member in members) if members else ()
-        every = tuple(each for each in tried.values() if each is not None)
-        return Verdict(kind, sets, best, base, every, false_alarm)
+        return Verdict(kind, tuple(hypotheses.added(m) for m in members), best, hypotheses)
 
-    if base.p > false_alarm:
+    if base.p > alpha:
         return done("none", ())
     leaders: list[Hypothesis] = [base]
-    added: list[tuple[str, ...]] = [()]
     for size in range(1, MOST + 1):
         level = [
-            at((*names, further), leader)
-            for leader, names in zip(leaders, added, strict=True)
-            for further in _further(leader, effects, SINGLES if size == 1 else PARTNERS)
+            at((*hypotheses.added(leader), further), leader)
+            for leader in leaders
+            for further in _further(leader, hypotheses.effects, SINGLES if size == 1 else PARTNERS)
         ]
         # two leaders may lead to one and the same set
         fitted = [h for h in dict.fromkeys(level) if h is not None and h.plausible]
         fitted.sort(key=lambda h: -h.likelihood)
-        members = [h for h in fitted if h.p > false_alarm]
+        members = [h for h in fitted if h.p > alpha]
         if members:
             return done("named" if len(members) == 1 else "indistinguishable", members)
         leaders = fitted[: LEADERS if size == 1 else 1]
-        added = [_added(leader, len(had)) for leader in leaders]
-    free = [h for h in tried.values() if h is not None and h.plausible and h.free_p > false_alarm]
+    free = [h for h in hypotheses.tried if h.plausible and h.free_p > alpha]
     if free:
         fewest = min(len(h.names) for h in free)
         likeliest = max((h for h in free if len(h.names) == fewest), key=lambda h: h.likelihood)
         return done("form_inadequate", [likeliest])
     return done("unknown", ())
-
-
-def _added(hypothesis: Hypothesis, had: int) -> tuple[str, ...]:
-    return hypothesis.names[had:]
 
 
 def _further(leader: Hypothesis, effects: dict[str, Effect], most: int) -> list[str]:
@@ -163,21 +208,18 @@ def _further(leader: Hypothesis, effects: dict[str, Effect], most: int) -> list[
 
 def _start(
     problem: Problem,
-    near: Hypothesis | None,
+    near: Hypothesis,
     more: Sequence[Effect],
     own: float,
     spread: dict[str, float],
 ) -> list[FloatArray]:
     """Return strengths to start from: those of the fit nearby, first order for what is new."""
-    had = [*problem.start.strengths]
-    if near is None:
-        return [*had, *(np.zeros(e.components) for e in more)]
     known = dict(zip(near.names, near.fit.strengths, strict=True))
     normal = near.fit.view(problem, own).normal
     wide = {e.name: 1.0 for e in more if e.name not in known}
     diagonal = normal.spread({**spread, BASE: near.fit.widths**2, **wide})
     mean = Weighed(normal, diagonal).mean(normal.right)
-    out = list(near.fit.strengths[: len(had)])
+    out = list(near.fit.strengths[: len(problem.start.strengths)])
     for effect in more:
         if effect.name in known:
             out.append(known[effect.name])

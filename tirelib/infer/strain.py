@@ -5,11 +5,12 @@ the gages against the trigger.
 """
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.arrays import FloatArray, IntArray
 from tirelib.effects import Effect
 from tirelib.errors import ParameterError
 from tirelib.identify.campaign_data import StraightRuns
@@ -29,6 +30,7 @@ from tirelib.model.base import coordinates, move
 from tirelib.model.chain import Changes
 from tirelib.model.rolled import RolledSlopes
 from tirelib.model.solution import Solution, added_by_values, by_effects, by_values
+from tirelib.model.state import Operating
 from tirelib.rolling.assemble import Unknowns
 from tirelib.rolling.solve import Rolling
 from tirelib.waveforms import GRID
@@ -152,6 +154,13 @@ class StrainProblem:
         self._last: tuple[StrainSolved, RolledSlopes] | None = None
         self._added: _Added | None = None
         self._strengths: _Added | None = None
+        self.noise = np.full(len(self.data.points), noise)
+        self._scale = scales(self.data.tolerance, self.data.angle_std)
+        self._refer()
+        self.living = self._alive(catalogue)
+
+    def _refer(self) -> None:
+        """Take the model as it is as the reference of contact lengths and of the whitening."""
         solved = self.solve(self.start)
         self.half_angle = 0.6 * np.sqrt(
             2.0 * solved.model.deflection / float(np.max(self.values["free_radius"]))
@@ -159,9 +168,53 @@ class StrainProblem:
         self.reference = solved
         slopes = by_values(solved.model, self.free)
         self._tangent = tangents(solved.waveform, slopes.waveform[-2], slopes.waveform[-1])
-        self._noise = noise
         self._whiteners: dict[float, Whitener] = {}
-        self.living = self._alive(catalogue)
+
+    def followed_by(self, points: Operating, repeats: FloatArray) -> "StrainProblem":
+        """Return the problem with runs ahead, whose strain is zero, behind the present ones.
+
+        Parameters
+        ----------
+        points : Operating
+        repeats : shape (n_ahead,)
+            Runs of which each is the mean: noise and set points average, the misfit that a run has
+            for itself does not.
+
+        Raises
+        ------
+        TirelibError
+            If the model has no solution at one of them.
+        """
+        data, n = self.data, len(points)
+        out = copy(self)
+        out.data = replace(
+            data,
+            strain=np.concatenate([data.strain, np.zeros((n, data.strain.shape[1]))]),
+            points=data.points.followed_by(points),
+            angle_std=np.concatenate([data.angle_std, np.full(n, np.mean(data.angle_std))]),
+            deflection=np.concatenate([data.deflection, np.full(n, np.nan)]),
+        )
+        share = 1.0 / np.sqrt(repeats)
+        out.noise = np.concatenate([self.noise, np.mean(self.noise) * share])
+        ahead = scales(data.tolerance, out.data.angle_std[-n:]) * share[:, None]
+        out._scale = np.concatenate([self._scale, ahead])
+        out.forget()
+        out._refer()
+        return out
+
+    @property
+    def run_ahead(self) -> IntArray:
+        """The run ahead that each whitened number is of, -1 for the present ones."""
+        present = len(self.runs.strain)
+        run = np.maximum(np.arange(len(self.data.points)) - present, -1)
+        return np.repeat(run, self.whitener(OWN).lower.shape[1])
+
+    def repeated(self, times: float) -> "StrainProblem":
+        """Return the problem of the same runs, each the mean of so many."""
+        out = copy(self)
+        out.noise, out._scale = self.noise / np.sqrt(times), self._scale / np.sqrt(times)
+        out._whiteners = {}
+        return out
 
     def whitener(self, own: float) -> Whitener:
         """Return the whitening for a misfit of each run of this size."""
@@ -169,14 +222,18 @@ class StrainProblem:
             self._whiteners[own] = Whitener.of(
                 self.reference.waveform,
                 self._tangent,
-                scales(self.data.tolerance, self.data.angle_std),
+                self._scale,
                 self.half_angle,
                 self.data.points,
                 self.data.low_pass,
-                noise=self._noise,
+                noise=self.noise,
                 own=own,
             )
         return self._whiteners[own]
+
+    def own_misfit(self, own: float) -> float:
+        """Return the standard deviation of a run's own misfit in the contact, as a mean, [-]."""
+        return own * float(np.sqrt(np.mean(self.reference.waveform**2)))
 
     def forget(self) -> None:
         """Forget slopes that only save time."""
@@ -184,17 +241,19 @@ class StrainProblem:
 
     def solve(self, point: Point, near: StrainSolved | None = None) -> StrainSolved:
         """Return the model at a point; raises TirelibError where it has none."""
-        values = {**move(self.values, point.base[:-1], self.free), "damping": 0.0}
-        model = solution.solved(
-            values,
-            self.data.points,
-            _changes(point),
-            low_pass=self.data.low_pass,
-            start=self._guess(point, near),
-        )
+        model = self.model_at(point, self.data.points, self._guess(point, near))
         delay = UNIT * float(point.base[-1])
         waveform = earlier(model.waveform, self.data.points.omega, -delay)
         return StrainSolved(self.data.strain - waveform, point, model, delay, waveform)
+
+    def model_at(
+        self, point: Point, points: Operating, start: Rolling | Unknowns | None = None
+    ) -> Solution:
+        """Return the model at operating points; raises TirelibError where it has none."""
+        values = {**move(self.values, point.base[:-1], self.free), "damping": 0.0}
+        return solution.solved(
+            values, points, _changes(point), low_pass=self.data.low_pass, start=start
+        )
 
     def _guess(self, point: Point, near: StrainSolved | None) -> Rolling | Unknowns | None:
         """Return a start of the contact: a solution nearby, moved along its slopes if known."""
@@ -248,7 +307,7 @@ class StrainProblem:
             for effect, s in zip(point.effects, point.strengths, strict=True)
         )
 
-    def _signature(self, solved: StrainSolved, effect: Effect) -> FloatArray:
+    def signature(self, solved: StrainSolved, effect: Effect) -> FloatArray:
         """Return changes (components, n_runs, n_phi) for a strength of one range."""
         changes = solved.model.changes
         there = [(effect.hook, [*changes, effect.at(trial)]) for trial in effect.trials]
@@ -289,7 +348,8 @@ class StrainProblem:
                 2.0 * p.order - 1.0,
             ]
         )
-        conditions = conditions - conditions.mean(axis=1, keepdims=True)
+        present = conditions[:, : len(self.runs.strain)]
+        conditions = conditions - present.mean(axis=1, keepdims=True)
         otherwise = (conditions[:, None, :, None] * rows[None]).reshape(-1, *rows.shape[1:])
         square = np.sum(rows**2, axis=0)
         size = np.sqrt(0.5 * np.mean(square, axis=1, keepdims=True) + 0.5 * self._nearby(square))
@@ -306,15 +366,15 @@ class StrainProblem:
 
     def _alive(self, catalogue: Sequence[Effect]) -> tuple[Effect, ...]:
         """Return the effects that this plan may show; the others go to `dead`, with the reason."""
-        numbers = {coordinate.name for coordinate in self.free}
+        has = {effect.name for effect in self.start.effects} | in_base(self.values)
         solved, living = self.solve(self.start), []
         for effect in catalogue:
-            if effect.hook == "brush" or IN_BASE.get(effect.name) in numbers:
+            if effect.hook == "brush" or effect.name in has:
                 continue
             reason = effect.untestable or self._idle(effect)
             if not reason:
                 try:
-                    rows = self.whitener(OWN)(self._signature(solved, effect))
+                    rows = self.whitener(OWN)(self.signature(solved, effect))
                     signal = float(np.linalg.norm(rows))
                     if signal < LEAST_SIGNAL:
                         reason = "changes nothing that this plan could show" + (
@@ -343,6 +403,12 @@ class StrainProblem:
             return f"no run has a {' or '.join(still).replace('_', ' ')}"
         missing = effect.unknown(points)
         return f"{', '.join(missing)} is not measured in every run" if missing else ""
+
+
+def in_base(values: Mapping[str, float | FloatArray]) -> set[str]:
+    """Return the effects that a tire's base model fits as numbers."""
+    numbers = {coordinate.name for coordinate in coordinates(values)}
+    return {effect for effect, number in IN_BASE.items() if number in numbers}
 
 
 def _changes(point: Point) -> Changes:

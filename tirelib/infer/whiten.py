@@ -63,7 +63,7 @@ class Whitener:
         points: Operating,
         low_pass: LowPass,
         *,
-        noise: float,
+        noise: float | FloatArray,
         own: float,
     ) -> "Whitener":
         """Return the whitening about a model.
@@ -79,7 +79,7 @@ class Whitener:
             Of the contact.
         points : Operating
         low_pass : LowPass
-        noise : float, [-]
+        noise : float or shape (n_runs,), [-]
             Standard deviation of a sample of a run's mean waveform.
         own : float, [-]
             rho, relative to the run's rms strain.
@@ -91,7 +91,8 @@ class Whitener:
         turn = np.outer(GRID, order)
         harmonics = np.concatenate([np.cos(turn), np.sin(turn)], axis=1) * np.sqrt(2.0 / GRID.size)
         gain = np.exp(-((sigma[:, None] * order) ** 2))
-        power = gain / np.sum(gain, axis=1, keepdims=True) * 0.5 * GRID.size * noise**2
+        power = gain / np.sum(gain, axis=1, keepdims=True) * 0.5 * GRID.size
+        power *= np.broadcast_to(noise, len(points))[:, None] ** 2
         power = np.maximum(power, FLOOR * power.max(axis=1, keepdims=True))
         scaled = np.arcsinh(GRID / half_angle[:, None])
         size = np.sqrt(np.mean(waveform**2, axis=1))
@@ -116,6 +117,12 @@ class Whitener:
         by_run = np.moveaxis(found.reshape(-1, *found.shape[-2:]), 0, 2)
         white = np.moveaxis(self.inverse @ by_run, 2, 0)
         return np.ascontiguousarray(white).reshape(*rows.shape[:-2], -1)
+
+    def take(self, index: slice) -> "Whitener":
+        """Return the whitening of some runs."""
+        lower = self.lower[index]
+        diagonal = np.diagonal(lower, axis1=1, axis2=2)
+        return Whitener(self.harmonics, lower, self.inverse[index], -float(np.log(diagonal).sum()))
 
     def coloured(self, white: FloatArray) -> FloatArray:
         """Return waveforms (k, n_runs, n_phi) whose whitened rows are these, (k, n)."""

@@ -52,6 +52,11 @@ class Operating:
         """Return the points repeated one after the other."""
         return Operating(*[np.tile(getattr(self, name), times) for name in self.__slots__])
 
+    def followed_by(self, more: "Operating") -> "Operating":
+        """Return these points and then others."""
+        pairs = ((getattr(self, name), getattr(more, name)) for name in self.__slots__)
+        return Operating(*[np.concatenate(pair) for pair in pairs])
+
     def take(self, index: Any) -> "Operating":
         """Return some of the points."""
         return Operating(*[getattr(self, name)[index] for name in self.__slots__])

@@ -161,6 +161,8 @@ class PairForecast:
     names : (str, str)
     gap : float
         Chi-square by which the second is worse on the present runs; negative: the first.
+    resolved : bool
+        Whether the present runs rule one of them out.
     separation : shape (n,)
         Expected further chi-square by one run.
     probability : shape (n,)
@@ -173,6 +175,7 @@ class PairForecast:
 
     names: Pair
     gap: float
+    resolved: bool
     separation: FloatArray
     probability: FloatArray
     repeats: Mapping[int, float]
@@ -182,11 +185,6 @@ class PairForecast:
     def better(self) -> str:
         """The rival that the present runs like better."""
         return self.names[0] if self.gap >= 0.0 else self.names[1]
-
-    @property
-    def resolved(self) -> bool:
-        """Whether the present runs rule one of them out."""
-        return abs(self.gap) >= RESOLVED
 
     def needed(self, wanted: float) -> int | None:
         """Return the fewest repeats of the best run with a separation, None beyond `REPEATS`."""
@@ -286,7 +284,11 @@ def judged(
         repeated = {n: _least(rivals, there, pair, noise, n) for n in REPEATS}
         names = (rivals[pair[0]].name, rivals[pair[1]].name)
         limit = _least(rivals, there, pair, noise, ENDLESS)
-        found.append(PairForecast(names, gap, size[order], likely[order], repeated, limit))
+        found.append(
+            PairForecast(
+                names, gap, abs(gap) >= RESOLVED, size[order], likely[order], repeated, limit
+            )
+        )
     return NextTest(
         envelope,
         points[order],

@@ -9,13 +9,13 @@ import numpy as np
 from tirelib.compare.forces import UNITS
 from tirelib.diagnose.forces.assess import ForceCase
 from tirelib.diagnose.forces.fit import fit_force
-from tirelib.diagnose.refit import Refit, refit
 from tirelib.effects import Effect
-from tirelib.identify.waveform_fit import Data
+from tirelib.infer.select import Hypotheses
+from tirelib.infer.strain import StrainProblem
 from tirelib.planning.criterion import ENDLESS, NOTHING, RESOLVED, WANTED, NextTest, PairForecast
 from tirelib.planning.envelope import AXES, Envelope
-from tirelib.planning.next_test import force_next_test, next_test
-from tirelib.planning.repeats import gains
+from tirelib.planning.next_test import force_next_test, gains, next_test
+from tirelib.planning.repeats import force_gains
 from tirelib.planning.suspects import Suspects, suspects_of
 
 FORMAT = "tirelib-next-test/1"
@@ -34,7 +34,9 @@ class Plan:
     test : NextTest or None
         None where nothing is in doubt.
     gains : mapping
-        What repeating the plan does for weak effects (`tirelib.planning.repeats.gains`).
+        What repeating the plan does for weak effects, by times: of strain the chance to show the
+        effect (`tirelib.planning.next_test.gains`), of forces the chi-square against no effect
+        (`tirelib.planning.repeats.force_gains`).
     wanted : float
         Separation asked for.
     campaign : str
@@ -50,33 +52,35 @@ class Plan:
     quantity: str = "strain"
 
     @property
+    def enough(self) -> float:
+        """Gain from which on the plan shows an effect: a chance, or the chi-square of a force."""
+        return PROMISING if self.quantity == "strain" else RESOLVED
+
+    @property
     def structure(self) -> str:
         """What hides effects and does not average out."""
-        return "the structure of the ring" if self.quantity == "strain" else "the brush's shape"
+        if self.quantity == "strain":
+            return "what plain tires show in addition to the model"
+        return "the brush's shape"
 
 
 def plan_test(
-    data: Data,
-    base: Refit | None,
+    hypotheses: Hypotheses | None,
     suspects: Suspects,
     envelope: Envelope,
     *,
-    noise: float,
     campaign: str = "",
     wanted: float = WANTED,
     progress: Callable[[str], None] | None = None,
 ) -> Plan:
-    """Judge the runs of an envelope for suspects.
+    """Judge the runs of an envelope for suspects of strain.
 
     Parameters
     ----------
-    data : Data
-    base : Refit or None
-        The model, fitted; needed if there are suspects.
+    hypotheses : Hypotheses or None
+        About the present runs; needed if there are suspects.
     suspects : Suspects
     envelope : Envelope
-    noise : float, [-]
-        Of a run's waveform, from repeats; NaN without.
     campaign : str
         Its name.
     wanted : float
@@ -85,31 +89,13 @@ def plan_test(
 
     Raises
     ------
-    ConvergenceError
-        If the model with undoubted effects cannot be fitted.
     ParameterError
         If no run in the envelope has a solution.
     """
-    if not suspects.effects or base is None:
+    if not suspects.effects or hypotheses is None:
         return Plan(suspects, None, {}, wanted, campaign)
-    if suspects.beside:
-        base = refit(
-            data,
-            base.values,
-            [*base.effects, *(effect for effect, _ in suspects.beside)],
-            [*base.strengths, *(strength for _, strength in suspects.beside)],
-            progress=progress,
-        )
-    test = next_test(
-        data,
-        base.on_time(data.points),
-        suspects.effects,
-        envelope,
-        noise=noise,
-        with_nothing=suspects.with_nothing,
-        progress=progress,
-    )
-    return Plan(suspects, test, gains(test.trial, test.noise), wanted, campaign)
+    test = next_test(hypotheses, suspects, envelope, progress=progress)
+    return Plan(suspects, test, gains(hypotheses, suspects, test), wanted, campaign)
 
 
 def plan_force_test(
@@ -146,51 +132,42 @@ def plan_force_test(
         with_nothing=suspects.with_nothing,
         progress=progress,
     )
-    again = gains(test.trial, test.noise)
+    again = force_gains(test.trial, test.noise)
     return Plan(suspects, test, again, wanted, case.name, case.quantity)
 
 
 def next_test_document(
     told: Mapping[str, Any],
-    data: Data,
-    base: Refit,
+    hypotheses: Hypotheses,
     catalogue: Mapping[str, Effect],
     *,
-    noise: float,
     progress: Callable[[str], None] | None = None,
 ) -> dict[str, Any]:
-    """Return the next test for a diagnosis, as ``tirelib-next-test/1``.
+    """Return the next test for a diagnosis of strain, as ``tirelib-next-test/1``.
 
     Parameters
     ----------
     told : mapping
         The diagnosis as JSON.
-    data : Data
-    base : Refit
+    hypotheses : Hypotheses
         Of the diagnosis.
     catalogue : mapping of name to Effect
-    noise : float, [-]
-        From repeats; NaN without.
     progress : callable, optional
 
     Raises
     ------
     TirelibError
-        As `plan_test`; and if the campaign tells no speed.
+        As `plan_test`; and if the campaign does not give its speed.
     """
-    suspects = suspects_of(told, catalogue)
+    suspects, campaign = suspects_of(told, catalogue), str(told.get("campaign", ""))
     if not suspects.effects:
-        return plan_document(Plan(suspects, None, {}, WANTED, str(told.get("campaign", ""))))
-    plan = plan_test(
-        data,
-        base,
-        suspects,
-        Envelope.of(data.points),
-        noise=noise,
-        campaign=str(told.get("campaign", "")),
-        progress=progress,
+        return plan_document(Plan(suspects, None, {}, WANTED, campaign))
+    problem = hypotheses.problem
+    assert isinstance(problem, StrainProblem)  # noqa: S101 - the diagnosis is of strain
+    envelope = Envelope.of(problem.data.points)
+    return plan_document(
+        plan_test(hypotheses, suspects, envelope, campaign=campaign, progress=progress)
     )
-    return plan_document(plan)
 
 
 def plan_document(plan: Plan) -> dict[str, Any]:
@@ -232,7 +209,7 @@ def plan_document(plan: Plan) -> dict[str, Any]:
         ],
         "left_out": dict(test.trial.left_out),
         "present": [_present(pair) for pair in test.pairs],
-        "resolved_at": RESOLVED,
+        **({} if plan.quantity == "strain" else {"resolved_at": RESOLVED}),
         "candidates": candidates,
         "best": candidates[0],
         "random_median": {
@@ -297,7 +274,7 @@ def _repeats(plan: Plan, test: NextTest) -> dict[str, Any]:
         "of_plan": {
             name: {
                 "times": next(
-                    (int(n) for n, x in by.items() if n < ENDLESS and x >= RESOLVED), None
+                    (int(n) for n, x in by.items() if n < ENDLESS and x >= plan.enough), None
                 ),
                 "gain_now": by[1],
                 "gain_limit": by[ENDLESS],
@@ -343,7 +320,8 @@ def advice(plan: Plan) -> str:
 def _said(pair: PairForecast) -> str:
     worse = pair.names[1] if pair.better == pair.names[0] else pair.names[0]
     return (
-        f"the present runs tell {pair.better} from {worse} already (chi-square {abs(pair.gap):.0f})"
+        f"the present runs already distinguish {pair.better} from {worse} "
+        f"(chi-square {abs(pair.gap):.0f})"
     )
 
 
@@ -377,13 +355,11 @@ def _weak(plan: Plan) -> list[str]:
     """Say what repeating the whole plan would do for hints."""
     said = []
     for name, by in plan.gains.items():
-        times = next((int(n) for n, x in by.items() if n < ENDLESS and x >= RESOLVED), None)
-        if max(by.values()) < 1.0:
-            said.append(f"the present runs show nothing of {name}, and repeats of them would not")
-        elif times == 1:
+        times = next((int(n) for n, x in by.items() if n < ENDLESS and x >= plan.enough), None)
+        if times == 1:
             said.append(
-                f"{name} stands out from the noise already (chi-square {by[1]:.0f}): what keeps it "
-                f"a hint is {plan.structure}, which repeats of the plan do not change"
+                f"the present plan should show {name} at this strength already "
+                f"({_gain(plan, by[1])}), so repeats of it would add little"
             )
         elif times is not None:
             said.append(
@@ -391,7 +367,14 @@ def _weak(plan: Plan) -> list[str]:
             )
         else:
             said.append(
-                f"repeats of the present plan will not show {name}: structure limits its "
-                f"chi-square to {by[ENDLESS]:.0f}, {RESOLVED:.0f} are needed"
+                f"repeats of the present plan will not show {name}: {plan.structure} limits it to "
+                f"{_gain(plan, by[ENDLESS])}, and {_gain(plan, plan.enough)} is needed"
             )
     return said
+
+
+def _gain(plan: Plan, size: float) -> str:
+    """Say a gain: a chance, or a chi-square."""
+    if plan.quantity == "strain":
+        return f"a chance of {100.0 * size:.0f} %"
+    return f"a chi-square of {size:.0f}"

@@ -17,7 +17,7 @@ from tirelib.arrays import FloatArray
 from tirelib.diagnose.forces.assess import ForceCase
 from tirelib.diagnose.forces.ensemble import variant
 from tirelib.diagnose.forces.fit import ForceFit, Problem, slopes_at, with_effect
-from tirelib.diagnose.stage import RANGE_SLACK
+from tirelib.diagnose.forces.search import RANGE_SLACK
 from tirelib.effects import Effect
 from tirelib.errors import CalibrationError, TirelibError
 from tirelib.identify.force_data import ForceData

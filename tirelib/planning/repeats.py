@@ -1,4 +1,4 @@
-"""What repeating the whole plan would do for a weak effect."""
+"""What repeating the whole plan would do for a weak effect of a force."""
 
 from tirelib.planning.criterion import ENDLESS, NOTHING, Noise, Trial
 
@@ -6,11 +6,11 @@ PLAN_REPEATS = (1, 2, 3, 4, 6, 8, 12)
 """Times that the plan is measured."""
 
 
-def gains(trial: Trial, noise: Noise) -> dict[str, dict[float, float]]:
+def force_gains(trial: Trial, noise: Noise) -> dict[str, dict[float, float]]:
     """Return by how much nothing is at most worse than each rival, by times of measuring.
 
     The present chi-square between them grows as the variance of what counts as noise falls: random
-    parts average out, small-scale misfit of the ring does not. The smooth misfit may keep it lower.
+    parts average out, the misfit of the brush does not. A smooth misfit may keep it lower.
     Empty unless that nothing is missing is a rival.
 
     Parameters

@@ -36,15 +36,18 @@ def write_selftest(document: Mapping[str, Any], folder: Path) -> tuple[Path, Pat
 
 def _summary(document: Mapping[str, Any]) -> str:
     return (
-        f"Campaign {document['campaign']}, strain; {document['repeats']} tires for each effect and "
-        f"error ratio; thresholds from {document['members']} variants, seed {document['seed']}."
+        f"Campaign {document['campaign']}, strain; {document['repeats']} tires for each effect "
+        f"and error ratio; false-alarm probability {document['false_alarm']:g}, seed "
+        f"{document['seed']}."
     )
 
 
 def _answer(document: Mapping[str, Any]) -> str:
     said = [
-        f"at an error ratio of {entry['ratio']:g} the planted effect is found in "
-        f"{100 * entry['found']:.0f}\u00a0% and another named in {100 * entry['wrong']:.0f}\u00a0% "
+        f"at an error ratio of {entry['ratio']:g} the planted effect alone is named in "
+        f"{100 * entry['found']:.0f}\u00a0% of the tires, is in the set in "
+        f"{100 * entry['in_set']:.0f}\u00a0%, and only others are in "
+        f"{100 * entry['wrong']:.0f}\u00a0% "
         f"({entry['effects']} of {len(document['effects'])} effects could be planted)"
         for entry in document["summary"]
         if entry["n"]
@@ -86,7 +89,7 @@ def _map(document: Mapping[str, Any]) -> Plot:
                 chance[i, j] = 100.0 * result["found"]
                 words[i][j] = f"{chance[i, j]:.0f} %"
             else:
-                words[i][j] = "no solution" if result["reachable"] else "beyond range"
+                words[i][j] = "beyond range"
             rows.append([entry["effect"], *(result[key] for key in _KEYS)])
     figure = go.Figure(
         go.Heatmap(
@@ -108,7 +111,7 @@ def _map(document: Mapping[str, Any]) -> Plot:
     styled_figure(figure, 150 + 26 * len(names))
     return Plot(
         "chance",
-        "Chance that the planted effect comes first",
+        "Chance that the planted effect is named, and no other",
         "Beyond range: no plausible strength makes the error that much larger.",
         figure,
         ["effect", *_KEYS],
@@ -116,7 +119,7 @@ def _map(document: Mapping[str, Any]) -> Plot:
     )
 
 
-_KEYS = ("ratio", "strength", "n", "found", "found_low", "found_high", "wrong", "ratio_reached")
+_KEYS = ("ratio", "strength", "n", "found", "found_low", "found_high", "in_set", "wrong", "seen")
 
 
 def _effects(document: Mapping[str, Any]) -> Table:
@@ -133,29 +136,29 @@ def _effects(document: Mapping[str, Any]) -> Table:
                     number(result["ratio"]),
                     number(result["strength"], 3),
                     entry["unit"],
-                    number(result["ratio_reached"], 3),
                     _percent(result["found"]) if some else DASH,
                     f"{_percent(result['found_low'])} to {_percent(result['found_high'])}"
                     if some
                     else DASH,
+                    _percent(result["in_set"]) if some else DASH,
                     _percent(result["wrong"]) if some else DASH,
-                    _percent(result["wrong_twin"]) if some else DASH,
+                    _percent(result["seen"]) if some else DASH,
                 ]
             )
     return Table(
         "Effects",
         [
             "effect",
-            "named",
+            "in a set",
             "twins (angle)",
             "error ratio",
             "strength",
             "unit",
-            "ratio reached",
             "found [%]",
             "95 %",
-            "another named [%]",
-            "of these a twin [%]",
+            "in the set [%]",
+            "only others [%]",
+            "something missing [%]",
         ],
         rows,
         texts=3,

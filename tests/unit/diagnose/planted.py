@@ -66,5 +66,5 @@ def model_file(*effects: tuple[str, float]) -> TireFile:
 def added() -> tuple[Extension, TireFile]:
     """Return the planted effect added to a model without it, and the file."""
     file = model_file()
-    done = add_effect(runs(EFFECT, STRENGTH), model_of(file), CATALOGUE[EFFECT], members=4)
+    done = add_effect(runs(EFFECT, STRENGTH), model_of(file), CATALOGUE[EFFECT])
     return done, extended_file(file, done, "hash")

@@ -101,7 +101,7 @@ def test_an_effect_that_comes_late_is_added_from_what_no_delay_could_do() -> Non
     planted = runs("low_pass", LAG).data(with_deflection=False)
     base = refit(planted, values_of(TIRE))
     assert base.delay > 1e-4, "it looks like a delay at first"
-    subject = _Strain(runs("low_pass", LAG), model_of(model_file()), None, 4)
+    subject = _Strain(runs("low_pass", LAG), model_of(model_file()), None)
     after = subject.with_effect(base, CATALOGUE["low_pass"])
     assert after.strengths[0] == pytest.approx(LAG, abs=0.01)
     assert abs(after.delay) < 1e-5

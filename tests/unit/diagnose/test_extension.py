@@ -108,7 +108,7 @@ def test_undo_restores_every_digit(tmp_path: Path) -> None:
 
 def test_removing_restores_the_fit_without_the_effect() -> None:
     done, file = added()
-    out = remove_effect(runs(EFFECT, STRENGTH), model_of(file), CATALOGUE[EFFECT], members=4)
+    out = remove_effect(runs(EFFECT, STRENGTH), model_of(file), CATALOGUE[EFFECT])
     assert out.after.effects == ()
     # both are the minimum of one cost; wide priors about different starts move it by little:
     # a hundredth of what a whitened sample scatters
@@ -142,7 +142,7 @@ def test_a_misspelt_effect_is_answered_with_the_nearest() -> None:
 
 def test_a_needless_effect_is_flagged_as_not_significant() -> None:
     file = model_file()
-    done = add_effect(runs(), model_of(file), CATALOGUE["hydroplaning"], members=4)
+    done = add_effect(runs(), model_of(file), CATALOGUE["hydroplaning"])
     assert "not_significant" in done.flags
     # one more coordinate never makes the fit worse
     assert done.after.error <= done.before.error * (1.0 + 1e-3)

@@ -11,14 +11,15 @@ from tests.unit.diagnose.planted import EFFECT, LOADS, STRENGTH, model_file, run
 from tests.unit.identify.model_waves import TIRE
 from tirelib.compare.error import Yardstick, error_of
 from tirelib.compare.model import model_of
+from tirelib.diagnose.diagnose import fitted_problem, plain_tires
 from tirelib.diagnose.document import next_test
-from tirelib.diagnose.floor import floor_of, structural_floor
+from tirelib.diagnose.floor import floor_of
 from tirelib.diagnose.held_out import folds, held_out_errors, part_of, pooled
 from tirelib.diagnose.left import left_of
-from tirelib.diagnose.noise import white_noise
 from tirelib.diagnose.refit import Refit, refit
 from tirelib.effects import CATALOGUE
 from tirelib.identify.waveform_fit import Data
+from tirelib.infer.select import Hypotheses
 from tirelib.model.base import values_of
 from tirelib.waveforms import GRID
 
@@ -90,30 +91,20 @@ def test_held_out_errors_are_of_runs_that_the_fit_has_not_seen(
     assert error > 10.0 * spoiled.take(~load.out).error(model.model, model.delay).value
 
 
-def test_the_floor_is_the_error_without_what_neither_noise_nor_structure_explains() -> None:
-    planted = runs(EFFECT, STRENGTH)
-    data = planted.data(with_deflection=False)
-    model = refit(data, values_of(TIRE))
-    error = Yardstick.of(planted).error(model.model)
-    nothing, white = np.zeros_like(data.strain), model.whiten(data.strain - model.waveform)
-    assert floor_of(error, planted, data, model, nothing, np.inf) == error.value
-    # all of the residual beyond structure: the noise is left
-    noise = white_noise(planted, model, data.strain).sample / np.sqrt(np.mean(white**2))
-    told = floor_of(error, planted, data, model, white, np.inf)
-    assert told == pytest.approx(noise * error.value)
-    # nor more than variants leave
-    usual = 0.1 * float(np.sqrt(np.mean(white**2)))
-    assert floor_of(error, planted, data, model, nothing, usual) == pytest.approx(0.1 * error.value)
-    told = structural_floor(error, planted, data, model, members=4)
-    assert 1.0 < told < 0.9 * error.value, "an effect is missing"
-
-
-def test_nothing_but_structure_leaves_the_error_at_the_floor(fitted: tuple[Data, Refit]) -> None:
-    data, model = fitted
-    error = Yardstick.of(runs()).error(model.model)
-    told = structural_floor(error, runs(), data, model, members=4)
-    assert told == pytest.approx(error.value, rel=0.05)
-    assert told <= error.value
+@pytest.mark.parametrize(("effect", "strength"), [("", 0.0), (EFFECT, STRENGTH)])
+def test_the_floor_is_the_error_unless_more_is_missing_than_plain_tires_show(
+    effect: str, strength: float
+) -> None:
+    planted = runs(effect, strength)
+    base, problem = fitted_problem(planted, values_of(TIRE), list(CATALOGUE.values()))
+    hypothesis = Hypotheses(problem, plain_tires()).base
+    error = Yardstick.of(planted).error(base.model)
+    floor = floor_of(error, hypothesis, 0.05)
+    if effect:
+        assert hypothesis.p <= 0.05
+        assert 0.5 < floor < 0.9 * error.value
+    else:
+        assert floor == error.value
 
 
 def test_errors_are_in_noise_or_without_repeats_in_microstrain() -> None:

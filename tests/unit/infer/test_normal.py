@@ -55,6 +55,6 @@ def test_draws_have_the_posterior(case: tuple) -> None:
     normal = Normal.of(rows, rest, lambda block: block)
     weighed = Weighed(normal, normal.spread({"base": 9.0, "one": 0.5}))
     random = np.random.default_rng(0)
-    draws = np.array([weighed.draw(random) for _ in range(4000)])
+    draws = weighed.draws(random, 4000)
     assert draws.mean(axis=0) == pytest.approx(weighed.mean(normal.right), abs=0.02)
     assert np.cov(draws.T) == pytest.approx(weighed.covariance, abs=3e-3)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy import linalg
 
 from tirelib.arrays import FloatArray
-from tirelib.diagnose.candidates import TWIN_ANGLE
+from tirelib.diagnose.diagnose import TWIN_ANGLE
 from tirelib.diagnose.forces.fit import ForceFit, Problem
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError

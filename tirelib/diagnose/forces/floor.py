@@ -1,6 +1,6 @@
 """What part of a force's error noise and the structure of the brush explain.
 
-As for strain (`tirelib.diagnose.floor`): with V the residuals of m measured variants that lack no
+With V the residuals of m measured variants that lack no
 effect and s the noise, the best linear prediction of a residual r by structure is
 
     V' (V V' + m s^2 I)^-1 V r,
@@ -13,8 +13,10 @@ import numpy as np
 from scipy import linalg
 
 from tirelib.arrays import FloatArray
-from tirelib.diagnose.floor import SIZE
 from tirelib.diagnose.forces.fit import ForceFit, Problem
+
+SIZE = 0.95
+"""Share of the variants whose size still counts as the brush's: one less the false-alarm rate."""
 
 
 def force_floor(problem: Problem, fit: ForceFit, rests: FloatArray, noise: float) -> float:

@@ -9,7 +9,6 @@ from tirelib.diagnose.forces.candidates import ForceCandidates, force_candidates
 from tirelib.diagnose.forces.fit import ForceFit, Problem, fit_force
 from tirelib.diagnose.forces.ranking import ForceRanking, ForceScores
 from tirelib.diagnose.refit import inside
-from tirelib.diagnose.stage import RANGE_SLACK
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
 
@@ -22,6 +21,8 @@ LEAST_SHARE = 0.03
 LAW = 0.2
 """Share by which the law of an effect may be off: a twin has to explain more than its square."""
 ROUNDS = 3
+RANGE_SLACK = 2.0
+"""Standard deviations by which a strength may leave its range."""
 
 
 class Search:

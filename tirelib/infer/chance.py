@@ -1,0 +1,140 @@
+"""What a plan can find: effects planted in plain tires and judged by the statistic of the verdict.
+
+Plain tires of every family are put into the user's plan (`tirelib.infer.hypothesis.plain_tires`),
+with an effect at a given strength in addition. Each is judged by the families other than its own,
+to first order: nothing is missing while its statistic stays within the limit; else an effect is a
+member of the confidence set if nothing further exceeds the limit once it is fitted. The law is that
+of the catalogue, and the exact fits of a verdict are left out: the chances are optimistic.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.arrays import BoolArray, FloatArray
+from tirelib.infer.hypothesis import Hypothesis, by_others, plain_tires, products
+from tirelib.infer.null import Products
+from tirelib.infer.problem import Problem
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judged:
+    """Verdicts on plain tires with something planted, k tires.
+
+    Attributes
+    ----------
+    effects : tuple of str
+    rejected : shape (k,)
+        Whether that nothing is missing is out of the confidence set.
+    members : shape (n_effects, k)
+        Whether each effect alone is in it; False where nothing is missing.
+    """
+
+    effects: tuple[str, ...]
+    rejected: BoolArray
+    members: BoolArray
+
+    def named(self) -> tuple[tuple[str, ...], ...]:
+        """Return the effects of every tire's confidence set, by tire."""
+        columns = self.members.T
+        return tuple(
+            tuple(name for name, isin in zip(self.effects, column, strict=True) if isin)
+            for column in columns
+        )
+
+
+class Plans:
+    """The user's plan with plain tires in it.
+
+    Parameters
+    ----------
+    problem : Problem
+    base : Hypothesis
+        That nothing is missing.
+    alpha : float
+        False-alarm probability.
+    repeats : int
+        Tires that a planting takes, by turns of every family.
+    seed : int
+        Of the choice of tires.
+    """
+
+    def __init__(
+        self, problem: Problem, base: Hypothesis, alpha: float, repeats: int, seed: int = 0
+    ) -> None:
+        self.problem, self.base = problem, base
+        self.limit = base.limit(alpha)
+        self.effects = tuple(effect.name for effect in problem.living)
+        view, _ = base.null.likeliest
+        families = [null.family for null in base.nulls]
+        random = np.random.default_rng(seed)
+        self.tires = []
+        for number, family in enumerate(families):
+            count = len(range(number, repeats, len(families)))
+            every = plain_tires(problem, base.fit, family, {}, view.own, number)
+            chosen = random.permutation(len(family))[:count]
+            self.tires.append((family, every[chosen]))
+
+    def plain(self) -> Judged:
+        """Return the verdicts on tires with nothing planted."""
+        return self._judged([waves for _, waves in self.tires])
+
+    def planted(self, name: str, strength: float) -> Judged:
+        """Return the verdicts on tires that have an effect too.
+
+        Parameters
+        ----------
+        name : str
+        strength : float
+            Of its first component, in ranges.
+        """
+        rows = strength * self.base.fit.rows[name][0]
+        return self._judged([tires + rows for _, tires in self.tires])
+
+    def _judged(self, waves: Sequence[FloatArray]) -> Judged:
+        nulls = self.base.nulls
+        rejected, members = [], []
+        for (family, _), tires in zip(self.tires, waves, strict=True):
+            if not len(tires):
+                continue
+            turned = products(self.problem, nulls[0].views, tires)
+            statistic, by = by_others(nulls, family, turned)
+            out = statistic > self.limit
+            rejected.append(out)
+            inside = np.zeros((len(self.effects), len(tires)), dtype=bool)
+            for place in np.unique(by[out]):
+                chosen = np.flatnonzero(out & (by == place))
+                some = _columns(turned, chosen)
+                null = nulls[place]
+                inside[:, chosen] = np.array(
+                    [null.left_of(some, name) <= self.limit for name in self.effects]
+                )
+            members.append(inside)
+        return Judged(self.effects, np.concatenate(rejected), np.concatenate(members, axis=1))
+
+    def ratio(self, name: str, strength: float) -> float:
+        """Return the error with an effect planted over that without, to first order.
+
+        Parameters
+        ----------
+        strength : float
+            Of its first component, in ranges.
+        """
+        return float(np.sqrt(1.0 + strength**2 * self._share(name)))
+
+    def strength(self, name: str, ratio: float) -> float:
+        """Return the strength in ranges at which the error is larger by a ratio."""
+        return float(np.sqrt((ratio**2 - 1.0) / self._share(name)))
+
+    def _share(self, name: str) -> float:
+        """Return the squares of what the base cannot take of an effect, over those it leaves."""
+        fit = self.base.fit
+        base = fit.rows["base"].reshape(len(fit.rows["base"]), -1)
+        both = np.stack([fit.rows[name][0].ravel(), fit.rest.ravel()])
+        own = both - np.linalg.lstsq(base.T, both.T, rcond=None)[0].T @ base
+        return float(np.sum(own[0] ** 2) / np.sum(own[1] ** 2))
+
+
+def _columns(turned: Products, chosen: np.ndarray) -> Products:
+    return [(right[:, chosen], square[chosen]) for right, square in turned]
