@@ -140,6 +140,7 @@ def definition(tire: RigTire, pressure: float) -> dict[str, float]:
         "tread_poisson": 0.0,
         "contact_crown": 0.0,
         "creep": 0.0,
+        "tread_spread": 0.0,
         "tread_shear_stiffness": tire.tread_shear_x * tire.belt_width * (tire.friction > 0.0),
         "tread_hardening": tire.tread_hardening,
     }

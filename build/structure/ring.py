@@ -155,7 +155,8 @@ class Ring:
             found = solve(_constants(tire, settings, load, omega), start=found)
         omega = speed / found.rolling_radius
         more = solve(_constants(tire, settings, load + NUDGE, omega), start=found)
-        gage = Gage(np.full(load.size, tire.innerliner_offset), np.zeros(load.size))
+        zero = np.zeros(load.size)
+        gage = Gage(np.full(load.size, tire.innerliner_offset), zero, zero)
         strain = found.strain(gage, POINTS)
         by_load = (more.strain(gage, POINTS) - strain) / NUDGE
         stiffness = NUDGE / (more.deflection - found.deflection)

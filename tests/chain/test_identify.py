@@ -95,6 +95,7 @@ def true() -> dict[str, float]:
         "tread_poisson": 0.0,
         "contact_crown": 0.0,
         "creep": 0.0,
+        "tread_spread": 0.0,
     }
 
 

@@ -20,8 +20,8 @@ from tirelib.rolling.mesh import mesh
 from tirelib.rolling.solve import Rolling, _column, solve
 
 LOADS = np.array([1500.0, 4000.0, 7000.0])
-GAGE = Gage(np.full(3, -0.003), np.zeros(3))
-LINED = Gage(np.full(3, -0.003), np.full(3, 0.6))
+GAGE = Gage(np.full(3, -0.003), np.zeros(3), np.zeros(3))
+LINED = Gage(np.full(3, -0.003), np.full(3, 0.6), np.full(3, 0.004))
 N = 360
 BARE: dict[str, Any] = {
     "radius": 0.303,
@@ -157,7 +157,7 @@ def test_sidewalls_that_pull_leave_the_belt_round_and_keep_their_direction(
 def test_a_gage_on_a_thick_liner_turns_with_the_belts_line() -> None:
     """Its fibre follows the curve (u, v), whatever the sections of the belt do."""
     found = solve(ring(WHOLE), fine=40, coarse=14)
-    wholly = Gage(LINED.offset, np.ones(3))
+    wholly = Gage(LINED.offset, np.ones(3), np.zeros(3))
     turn = found.on_turn(1440)
     slope = 1j * np.arange(721)
 
@@ -174,9 +174,24 @@ def test_a_gage_on_a_thick_liner_turns_with_the_belts_line() -> None:
     assert rms(strain(found, 1440) - expected) > 0.05 * rms(expected), "the belt shears"
 
 
+def test_a_tread_that_spreads_pressure_smooths_the_strain_as_a_normal_density() -> None:
+    """The strain is the sharp one, averaged over the turn with the density of sigma / R."""
+    found = solve(ring(WHOLE), fine=40, coarse=14)
+    sharp = found.strain(GAGE, 1440)
+    sigma = 0.006
+    told = found.strain(Gage(GAGE.offset, GAGE.liner, np.full(3, sigma)), 1440)
+    step = 2.0 * np.pi / 1440
+    places = np.arange(-60, 61)
+    density = np.exp(-0.5 * (places * step * BARE["radius"] / sigma) ** 2)
+    weights = density / density.sum()
+    expected = sum(w * np.roll(sharp, k, axis=1) for w, k in zip(weights, places, strict=True))
+    np.testing.assert_allclose(told, expected, atol=1e-6 * float(np.abs(sharp).max()))
+    assert rms(told - sharp) > 0.02 * rms(sharp)
+
+
 def test_a_belt_that_does_not_shear_shows_the_same_on_every_liner() -> None:
     found = solve(ring(WHOLE, GA=np.inf))
-    lined = smooth(found.strain(LINED, N))
+    lined = smooth(found.strain(Gage(LINED.offset, LINED.liner, np.zeros(3)), N))
     assert rms(lined - strain(found)) < 1e-3 * rms(lined)
 
 
@@ -336,7 +351,7 @@ def test_it_is_solved_for_every_tire(
 def test_one_point_does_not_depend_on_those_solved_beside_it() -> None:
     together = solve(ring(WHOLE)).strain(LINED, N)
     for k, load in enumerate(LOADS):
-        gage = Gage(LINED.offset[:1], LINED.liner[:1])
+        gage = Gage(LINED.offset[:1], LINED.liner[:1], LINED.spread[:1])
         alone = solve(ring(WHOLE, load=np.array([load]))).strain(gage, N)
         np.testing.assert_allclose(alone[0], together[k], atol=1e-9)
 

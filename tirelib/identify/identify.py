@@ -46,6 +46,11 @@ _PLAIN: Mapping[str, tuple[float, float, str]] = {
     "liner_share": (0.3, 1.3, "0 of a gage on the belt itself, .8 under a thick liner"),
     "tread_poisson": (0.3, 1.0, "0 of narrow blocks, .8 of solid rubber"),
     "contact_crown": (0.12, 1.3, "assumed: crowns of .2 to 1.2 1/m, of which a belt keeps some"),
+    "tread_spread": (
+        0.3,
+        1.3,
+        "0 of a tread that stands like a brush, about .4 of finite-element treads",
+    ),
     "creep": (0.004, 1.3, "assumed: rubber's friction grows up to .01 to 1 m/s of sliding, Grosch"),
 }
 """Value, relative standard deviation and source of what no campaign header holds."""

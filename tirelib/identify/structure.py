@@ -31,6 +31,7 @@ STRUCTURE_STD: Mapping[str, float] = MappingProxyType(
         "tread_poisson": 1.0,
         "contact_crown": 1.3,
         "creep": 1.3,
+        "tread_spread": 1.3,
     }
 )
 """Relative standard deviation by parameter, in units of the value (slopes: of a typical slope)."""

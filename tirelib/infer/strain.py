@@ -53,6 +53,7 @@ WIDTH = {
     "tread_poisson": 1.0,
     "contact_crown": 1.3,
     "creep": 1.3,
+    "tread_spread": 1.3,
 }
 """Prior standard deviations of the base's coordinates: wide, the campaign informs them."""
 IN_BASE = {

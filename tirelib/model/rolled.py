@@ -71,11 +71,10 @@ def made_of(values: Values, points: Operating) -> Made:
         load=points.load,
         torque=0.0,
     )
-    offset, liner = (
-        np.broadcast_to(np.asarray(v[name], dtype=float), (len(points),))
-        for name in ("innerliner_offset", "liner_share")
-    )
-    return Made(constants, Gage(offset, liner))
+    spread = np.asarray(v["tread_spread"]) * np.asarray(v["tread_thickness"])
+    each = (v["innerliner_offset"], v["liner_share"], spread)
+    places = [np.broadcast_to(np.asarray(x, dtype=float), (len(points),)) for x in each]
+    return Made(constants, Gage(*places))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -152,7 +152,8 @@ def made_with(
         tension=made.constants.tension + after.tension,
         half_width=0.5 * after.width,
     )
-    return Made(k, Gage(after.offset, made.gage.liner))
+    spread = made.gage.spread * after.thickness / before.thickness
+    return Made(k, Gage(after.offset, made.gage.liner, spread))
 
 
 def by_values(found: Solution, free: Sequence[Coordinate]) -> SolutionSlopes:

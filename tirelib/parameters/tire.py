@@ -77,6 +77,9 @@ FIELDS: Mapping[str, Field] = MappingProxyType(
         "contact_crown": Field(
             "tread", "1/m", "curvature", 0.0, 20.0, "curvature across that the belt keeps on a road"
         ),
+        "tread_spread": Field(
+            "tread", "1", "ratio", 0.0, 3.0, "sigma over which it spreads the pressure, over h0"
+        ),
         "friction": Field("tread", "1", "ratio", 0.0, 5.0, "mu, tread on road"),
         "creep": Field(
             "tread", "1", "ratio", 0.0, 1.0, "slip at 71 % of full friction; 0 sticks fully"
@@ -165,6 +168,7 @@ class Tire:
     tread_shear_stiffness: float = 0.0
     tread_poisson: float = 0.0
     contact_crown: float = 0.0
+    tread_spread: float = 0.0
     friction: float = 1.0
     creep: float = 0.0
     crown_curvature: float = 0.7

@@ -238,7 +238,11 @@ def _simulation(
         turn = rolling.on_turn(TURN.size)
         u = u - _on_turn(plain.belt[..., 0]) + turn.u
         v = v - _on_turn(plain.belt[..., 1]) + turn.v
-        gage = Gage(state.offset, np.full(state.offset.shape, tire.liner_share))
+        gage = Gage(
+            state.offset,
+            np.full(state.offset.shape, tire.liner_share),
+            tire.tread_spread * state.thickness,
+        )
         strain = strain - _on_turn(plain.strain) + rolling.strain(gage, TURN.size)
         edges = edges - plain.contact.edges + turn.edges
         pressure = pressure - plain.contact.pressure_at(TURN) + turn.pressure

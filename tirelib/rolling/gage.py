@@ -9,11 +9,22 @@ none, so that its fibres turn with the line. With the share s of the gage's leve
 Shear that is spread over a homogeneous belt of thickness t as a parabola gives
 s = 1 - 5 t / (12 |y|).
 
+The tread spreads the road's pressure over its own thickness before the belt feels it. In a ring
+that is linear, each harmonic n of the pressure, and with it of the strain, is less by
+
+.. math:: \exp(-(n \sigma / R)^2 / 2)
+
+with the standard deviation :math:`\sigma` of what a line load becomes below the tread. Here the
+strain alone is spread: pressure and length of the contact are those of a tread that stands like a
+brush.
+
 Sources: Reddy, J. Appl. Mech. 51 (1984), for the parabola; Murakami, J. Appl. Mech. 53 (1986), for
 layers that shear one more than the other.
 """
 
 from dataclasses import dataclass
+
+import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.rolling import belt
@@ -31,10 +42,13 @@ class Gage:
         y < 0 from the neutral line.
     liner : shape (n_points,), [-]
         Share of the offset that lies in layers which carry no shear force.
+    spread : shape (n_points,), [m]
+        sigma over which the tread spreads the pressure.
     """
 
     offset: FloatArray
     liner: FloatArray
+    spread: FloatArray
 
 
 def strain(z: FloatArray, k: Constants, gage: Gage, size: tuple[int, int], n: int) -> FloatArray:
@@ -51,8 +65,12 @@ def strain(z: FloatArray, k: Constants, gage: Gage, size: tuple[int, int], n: in
     """
     rows = len(k)
     out: FloatArray = belt.strain(z, k, gage.offset).reshape(rows, -1) @ to_grid(*size, n).T
-    if not gage.liner.any():
-        return out
-    turned = belt.shear_angle(z, k).reshape(rows, -1) @ to_grid_slope(*size, n).T
-    lever = gage.liner * gage.offset / (k.radius + gage.offset)
-    return out - lever[:, None] * turned
+    if gage.liner.any():
+        turned = belt.shear_angle(z, k).reshape(rows, -1) @ to_grid_slope(*size, n).T
+        lever = gage.liner * gage.offset / (k.radius + gage.offset)
+        out = out - lever[:, None] * turned
+    if gage.spread.any():
+        order = np.fft.rfftfreq(n, 1.0 / n)
+        gain = np.exp(-0.5 * ((gage.spread / k.radius)[:, None] * order) ** 2)
+        out = np.fft.irfft(np.fft.rfft(out) * gain, n=n)
+    return out

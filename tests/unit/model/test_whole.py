@@ -33,6 +33,7 @@ GRIPPING = {
     "tread_poisson": 0.5,
     "contact_crown": 0.3,
     "creep": 0.005,
+    "tread_spread": 0.3,
 }
 CASES: dict[str, tuple[Mapping[str, float | FloatArray], Changes]] = {
     "plain": (VALUES, ()),
