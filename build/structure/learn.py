@@ -82,23 +82,24 @@ def say(text: str) -> None:
 
 def fits_of(out: Path, name: str, chosen: Sequence[int]) -> dict[int, Fit]:
     """Return the fits of a family's plain tires by seed; those that fail are left out."""
-    folder = out / "fits"
-    folder.mkdir(parents=True, exist_ok=True)
-    found = {}
-    every = (case_file(out, name, seed, NONE, 1.0) for seed in chosen)
-    for file in (each for each in every if each.exists()):
-        kept = folder / f"{name}-{file.stem}.pkl"
-        if not kept.exists():
-            kept.write_bytes(pickle.dumps(fit_of(file)))
-            say(f"{name} {file.stem}")
-        fit = pickle.loads(kept.read_bytes())
-        if fit is not None:
-            found[int(file.stem.split("-")[0])] = fit
-    return found
+    files = {seed: case_file(out, name, seed, NONE, 1.0) for seed in chosen}
+    fits = {seed: kept_fit(out, file) for seed, file in files.items() if file.exists()}
+    return {seed: fit for seed, fit in fits.items() if fit is not None}
+
+
+def kept_fit(out: Path, file: Path) -> Fit | None:
+    """Return the fitted model of a campaign's file, from build/out/structure/fits if it is there."""
+    kept = out / "fits" / f"{file.parent.name}-{file.stem}.pkl"
+    if not kept.exists():
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        kept.write_bytes(pickle.dumps(fit_of(file)))
+        say(f"{file.parent.name} {file.stem}")
+    fit: Fit | None = pickle.loads(kept.read_bytes())
+    return fit
 
 
 def fit_of(file: Path) -> Fit | None:
-    """Return the fitted model of a plain tire, or None if there is none."""
+    """Return the model without effects fitted to a campaign, or None if there is none."""
     runs = straight_runs(load_case(file).waves)
     try:
         _, identified, _ = estimated(runs)

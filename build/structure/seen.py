@@ -13,7 +13,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from structure.learn import FAMILIES, OUT, TABLE, fit_of, say
+from structure.learn import FAMILIES, OUT, TABLE, kept_fit, say
 from structure.make import seeds
 from tirelib.infer.hypothesis import judged
 from tirelib.infer.plain import load
@@ -37,7 +37,7 @@ def main() -> None:
         seen, right, count = dict.fromkeys(tables, 0), dict.fromkeys(tables, 0), 0
         for file in files:
             seed, kind, _ = file.stem.split("-")
-            fitted = fit_of(file) if int(seed) in options.seeds else None
+            fitted = kept_fit(options.out, file) if int(seed) in options.seeds else None
             if fitted is None:
                 continue
             count += 1
