@@ -129,7 +129,7 @@ def _told(h: Hypothesis) -> dict[str, Any]:
         "limit": round(h.limit(0.05), 2),
         "against": h.against,
         "p": round(h.p, 4),
-        "free_p": round(h.free_p, 4),
+        "looseness": h.looseness,
         "plausible": h.plausible,
         "strengths": [np.round(s, 5).tolist() for s in h.fit.strengths],
     }

@@ -88,7 +88,7 @@ def fits_of(out: Path, name: str, chosen: Sequence[int]) -> dict[int, Fit]:
 
 
 def kept_fit(out: Path, file: Path) -> Fit | None:
-    """Return the fitted model of a campaign's file, from build/out/structure/fits if it is there."""
+    """Return the fitted model of a campaign's file, kept in build/out/structure/fits."""
     kept = out / "fits" / f"{file.parent.name}-{file.stem}.pkl"
     if not kept.exists():
         kept.parent.mkdir(parents=True, exist_ok=True)

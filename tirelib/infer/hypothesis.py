@@ -21,6 +21,9 @@ from tirelib.infer.problem import Problem
 
 LAW = 0.15
 """Relative standard deviation by which a law is off as conditions change."""
+LOOSER = (2.0, 1.0 / LAW)
+"""Factors of `LAW` that are tried where a hypothesis is rejected; the last lets a law be off by as
+much as itself."""
 SLACK = 2.0
 """Standard deviations by which a strength may leave its range, those of its law included."""
 
@@ -41,8 +44,9 @@ class Hypothesis:
     statistic : float
     against : str
         What has this score: a further effect, a group of shapes, or the law of an effect.
-    free_p : float
-        p-value with laws that may be off by as much as themselves.
+    looseness : float
+        By how much more than usual laws have to be off for the hypothesis to stay: 1, one of
+        `LOOSER`, or infinity.
     plausible : bool
         Whether the strengths lie in their ranges.
     likelihood : float
@@ -55,7 +59,7 @@ class Hypothesis:
     plain: tuple[FloatArray, ...]
     statistic: float
     against: str
-    free_p: float
+    looseness: float
     plausible: bool
     likelihood: float
 
@@ -111,11 +115,13 @@ def judged(
     nulls, plain, likelihood = _tested(problem, fit, families, 1.0)
     null = min(nulls, key=lambda null: float(null.scores.max()))
     statistic = float(null.scores.max())
-    p = free = p_value(statistic, plain)[0]
-    if fit.effects and p <= alpha:
-        loose, tires, _ = _tested(problem, fit, families, 1.0 / LAW)
-        least = min(float(each.scores.max()) for each in loose)
-        free = max(p, p_value(least, tires)[0])
+    rejected = p_value(statistic, plain)[0] <= alpha
+    looseness = np.inf if rejected else 1.0
+    for looser in LOOSER if rejected and fit.effects else ():
+        loose, tires, _ = _tested(problem, fit, families, looser)
+        if p_value(min(float(each.scores.max()) for each in loose), tires)[0] > alpha:
+            looseness = looser
+            break
     return Hypothesis(
         fit,
         null,
@@ -123,7 +129,7 @@ def judged(
         plain,
         statistic,
         null.names[int(np.argmax(null.scores))],
-        free,
+        looseness,
         plausible(fit, own_effects),
         likelihood,
     )

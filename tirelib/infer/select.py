@@ -186,11 +186,13 @@ def select(
         if members:
             return done("named" if len(members) == 1 else "indistinguishable", members)
         leaders = fitted[: LEADERS if size == 1 else 1]
-    free = [h for h in hypotheses.tried if h.plausible and h.free_p > alpha]
+    free = [h for h in hypotheses.tried if h.plausible and np.isfinite(h.looseness)]
     if free:
-        fewest = min(len(h.names) for h in free)
-        likeliest = max((h for h in free if len(h.names) == fewest), key=lambda h: h.likelihood)
-        return done("form_inadequate", [likeliest])
+        # the laws of what is there are off by less than those of what is not
+        return done(
+            "form_inadequate",
+            [min(free, key=lambda h: (h.looseness, len(h.names), -h.likelihood))],
+        )
     return done("unknown", ())
 
 
