@@ -121,7 +121,7 @@ def test_the_planted_effect_is_preferred_and_that_is_said(planned: Any) -> None:
     (present,) = planned.told["present"]
     assert present["better"] == EFFECT
     assert present["resolved"]
-    assert f"the present runs tell {EFFECT} from temperature already" in planned.said
+    assert f"the present runs already distinguish {EFFECT} from temperature" in planned.said
 
 
 def test_the_report_is_one_page_and_the_same_in_words(planned: Any) -> None:
@@ -194,13 +194,11 @@ def test_a_selftest_tells_chances_on_page_and_screen(model: Path, tmp_path: Path
         "--model",
         model,
         "--effects-of",
-        "low_pass",
+        "sidewall_load",
         "--ratio",
         1.1,
         "--repeats",
         2,
-        "--members",
-        8,
         "--out",
         tmp_path,
         "--json",
@@ -209,7 +207,7 @@ def test_a_selftest_tells_chances_on_page_and_screen(model: Path, tmp_path: Path
     assert found.exit_code == 0, found.output
     told = json.loads((tmp_path / "S.json").read_text())
     assert told["format"] == "tirelib-selftest/1"
-    assert [entry["effect"] for entry in told["effects"]] == ["low_pass"]
+    assert [entry["effect"] for entry in told["effects"]] == ["sidewall_load"]
     assert told["effects"][0]["results"][0]["n"] == 2
     page, words = (tmp_path / "selftest.html").read_text(), (tmp_path / "selftest.md").read_text()
     assert 'id="plot-chance"' in page

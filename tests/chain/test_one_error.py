@@ -42,8 +42,6 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
         call("compare")
         call(
             "selftest",
-            "--members",
-            4,
             "--repeats",
             1,
             "--effects-of",
