@@ -16,10 +16,17 @@ STORED = json.loads(GOLDEN.read_text())
 def test_the_p_values_are_those_of_the_table_that_is_shipped() -> None:
     assert STORED["sha256"] == hashlib.sha256(TABLE.read_bytes()).hexdigest()
     assert {family.name for family in plain_tires()} == set(STORED["families"])
-    assert all(len(family) >= 20 for family in plain_tires())
+    assert all(len(family) >= 40 for family in plain_tires())
 
 
-@pytest.mark.parametrize("name", STORED["families"])
+UNLIKE = pytest.mark.xfail(
+    strict=True,
+    reason="the continuum differs more from rig and ring than these do from each other: 6 of 40 of "
+    "its tires are rejected at 5 % (docs/theory/inference.md)",
+)
+
+
+@pytest.mark.parametrize("name", ["rig", "ring", pytest.param("continuum", marks=UNLIKE)])
 @pytest.mark.parametrize("level", [0.05, 0.1, 0.2])
 def test_plain_tires_of_a_family_left_out_are_rejected_no_more_often_than_the_level(
     name: str, level: float
