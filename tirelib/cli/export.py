@@ -1,23 +1,19 @@
 """``tirelib export``: the forces of a model or of a campaign as a Magic Formula file."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
-import numpy as np
 
-from tirelib.brush.mf_file import tir_of, words
-from tirelib.brush.mf_fit import MagicFit, fit_magic
-from tirelib.brush.tir import write_tir
-from tirelib.campaign import read_campaign
 from tirelib.cli.common import NEW_FILE, output, write_json
 from tirelib.cli.options import effects_option, json_option
-from tirelib.compare.force_model import force_model_of
-from tirelib.compare.magic_points import campaign_points, model_points
 from tirelib.documents import new_file
 from tirelib.errors import CalibrationError
-from tirelib.model.registration import registered_effects
-from tirelib.parameters import TireFile, read_tire
 from tirelib.units import to_si
+
+if TYPE_CHECKING:
+    from tirelib.brush.mf_fit import MagicFit
+    from tirelib.parameters import TireFile
 
 FORMAT = "tirelib-export/1"
 
@@ -81,6 +77,15 @@ def export(
     json_file: Path | None,
 ) -> None:
     """Fit a Magic Formula 6.1 to a model's brush or to a force campaign, and write it as .tir."""
+    from tirelib.brush.mf_file import tir_of, words
+    from tirelib.brush.mf_fit import fit_magic
+    from tirelib.brush.tir import write_tir
+    from tirelib.campaign import read_campaign
+    from tirelib.compare.force_model import force_model_of
+    from tirelib.compare.magic_points import campaign_points, model_points
+    from tirelib.model.registration import registered_effects
+    from tirelib.parameters import read_tire
+
     given = None if radius is None else to_si(radius, "mm", "length")
     if Path(source).is_dir():
         campaign = read_campaign(source)
@@ -92,7 +97,7 @@ def export(
         model = force_model_of(file, registered_effects(effect_files))
         points = model_points(
             model,
-            slip_angle=float(np.deg2rad(slip_angle)),
+            slip_angle=to_si(slip_angle, "deg", "angle"),
             slip_ratio=slip_ratio,
             speed=to_si(speed, "km/h", "speed"),
             radius=unloaded,
@@ -109,7 +114,7 @@ def export(
         console.print(f"written: {json_file}")
 
 
-def _free_radius(file: TireFile) -> float:
+def _free_radius(file: "TireFile") -> float:
     if "free_radius" not in file.numbers:
         raise CalibrationError(
             f"model {file.name} states no free_radius, which a .tir file needs as UNLOADED_RADIUS; "
@@ -118,7 +123,7 @@ def _free_radius(file: TireFile) -> float:
     return file.numbers["free_radius"].value
 
 
-def _document(fit: MagicFit, what: str) -> dict[str, object]:
+def _document(fit: "MagicFit", what: str) -> dict[str, object]:
     return {
         "format": FORMAT,
         "source": what,
