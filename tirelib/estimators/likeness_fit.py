@@ -45,7 +45,7 @@ def fit_likeness(
     unit, rows : shape (n_turns,)
         Measurement of each turn, and whether it counts.
     """
-    from scipy.stats import f
+    from scipy.special import fdtri  # calibrating only; scipy.stats takes a second to import
 
     names = tuple(name for name in DRIFT if np.isfinite(values[name]).all())
     conditions = np.unique(groups).size
@@ -67,7 +67,7 @@ def fit_likeness(
     single -= _mean_of(single, unit[rows])
     covariance = known.covariance + np.cov(single.T)
     seen = np.einsum("ij,ij->i", held_out, np.linalg.solve(covariance, held_out.T).T) / len(names)
-    limit = f.isf(FALSE_ALARM, len(names), freedom) * (conditions - 1) / freedom
+    limit = fdtri(len(names), freedom, 1.0 - FALSE_ALARM) * (conditions - 1) / freedom
     limit = max(float(limit), float(seen.max()))
     return Likeness(variables, terms, names, share, covariance, limit)
 

@@ -1,13 +1,16 @@
 """Features as a table: one row per turn and gage."""
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-import pandas as pd
 
 from tirelib.features.extract import Features
 from tirelib.flags import flag_names
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 PER_GAGE = {
     "lead": "rad",
@@ -46,7 +49,7 @@ PER_TURN = {
 """Columns of one turn with their units."""
 
 
-def feature_frame(features: Features, **extra: npt.ArrayLike) -> pd.DataFrame:
+def feature_frame(features: Features, **extra: npt.ArrayLike) -> "pd.DataFrame":
     """Return one row per turn and gage, SI units, ISO axes.
 
     Parameters
@@ -55,6 +58,8 @@ def feature_frame(features: Features, **extra: npt.ArrayLike) -> pd.DataFrame:
     **extra
         Further columns, constant or of shape (n,), for example ``run=3``.
     """
+    import pandas as pd  # slow to import
+
     n, gages = len(features), features.lateral.size
     columns: dict[str, npt.ArrayLike | list[str]] = {
         name: np.repeat(value, gages) if np.ndim(value) else value for name, value in extra.items()

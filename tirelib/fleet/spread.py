@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtr, stdtrit
 
 from tirelib.arrays import BoolArray, FloatArray
 
@@ -75,7 +75,7 @@ def spread_of(values: FloatArray, stds: FloatArray, tests: int = 1) -> Spread:
         others = kept.copy()
         others[worst] = False
         score = _scores(values[worst : worst + 1], stds[worst : worst + 1], values, stds, others)[0]
-        limit = student.ppf(1.0 - level / left, left - 2)
+        limit = stdtrit(left - 2, 1.0 - level / left)
         kept[worst] = False
         order.append(worst)
         if abs(score) > limit:
@@ -188,7 +188,7 @@ def change_of(
     # a value that never varies has no scatter but that of its digits
     variance = max(variance, (np.finfo(np.float32).eps * float(np.abs(values).max())) ** 2)
     std = float(np.sqrt(variance * np.linalg.inv(x.T @ x)[1, 1]))
-    p = 2.0 * float(student.sf(abs(beta[1]) / std, free)) if std > 0.0 else 1.0
+    p = 2.0 * float(stdtr(free, -abs(beta[1]) / std)) if std > 0.0 else 1.0
     return Change(float(beta[1]) / span, std / span, float(beta[1]), p)
 
 

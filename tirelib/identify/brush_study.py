@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy.special import stdtrit
 
 from tirelib.arrays import FloatArray
 from tirelib.identify.brush_cells import cells_of
@@ -46,7 +46,7 @@ class Study:
     @property
     def quantile(self) -> float:
         """Student's factor of a 95 % interval."""
-        return float(stats.t.ppf(0.975, max(self.misfit.freedom, 1)))
+        return float(stdtrit(max(self.misfit.freedom, 1), 0.975))
 
 
 def study_of(fit: BrushFit, data: ForceData) -> Study:

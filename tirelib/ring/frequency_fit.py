@@ -9,7 +9,7 @@ from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import norm, t
+from scipy.special import ndtri, stdtrit
 
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.errors import ParameterError, ShapeError
@@ -142,7 +142,7 @@ def fit_stiffness(
     unknown = np.isinf(np.diag(cov))
     if sigma is None:
         cov = np.where(np.isinf(cov), cov, cov * misfit)
-    half = np.sqrt(np.diag(cov)) * (norm.ppf(level) if sigma is not None else t.ppf(level, freedom))
+    half = np.sqrt(np.diag(cov)) * (ndtri(level) if sigma is not None else stdtrit(freedom, level))
     reference = np.abs(_reference(solved, law, float(p.mean())))
     return StiffnessFit(
         names,

@@ -74,6 +74,52 @@ _PORT_OPTIONS = (
 )
 
 
+setup_option = click.option(
+    "--setup",
+    metavar="S.toml",
+    type=FILE,
+    help="Setup file (TOML) of several sources, each with its protocol, wheel and device file.",
+)
+"""Several sources at once."""
+
+sidecar_option = click.option(
+    "--conditions",
+    "sidecar",
+    metavar="F.json",
+    type=FILE,
+    help="File with the conditions over time, as `tirebench emulate --conditions` writes it.",
+)
+"""Conditions over time."""
+
+duration_option = click.option(
+    "--duration", metavar="S", type=click.FloatRange(min=0.0), help="End after this time."
+)
+"""An end by time."""
+
+silence_option = click.option(
+    "--silence",
+    metavar="S",
+    type=click.FloatRange(min=0.0),
+    help="End when nothing came for this time.",
+)
+"""An end by silence."""
+
+trust_option = click.option(
+    "--trust",
+    is_flag=True,
+    help="Run this FMU although it is unknown, and add it to the list of trusted FMUs.",
+)
+"""Leave to run native code."""
+
+pace_option = click.option(
+    "--pace",
+    metavar="X",
+    type=click.FloatRange(0.001, 1000.0),
+    help="Replay speed as a multiple of real time. [default: as fast as possible]",
+)
+"""How fast a recording is read."""
+
+
 def port_options(command: Command) -> Command:
     """Add the options of a port to a command."""
     for option in reversed(_PORT_OPTIONS):

@@ -6,7 +6,15 @@ from typing import Any
 import click
 
 from tirebench.cli.live import counters
-from tirebench.cli.options import PORTS, devices_of, port_options
+from tirebench.cli.options import (
+    PORTS,
+    devices_of,
+    duration_option,
+    port_options,
+    setup_option,
+    sidecar_option,
+    silence_option,
+)
 from tirebench.cli.recording import at_start, recording_options
 from tirebench.cli.run_inputs import given_live, live_sources
 from tirebench.cli.stop import start_in_order
@@ -23,7 +31,7 @@ from tirebench.recording.header import RecordingHeader
 from tirebench.recording.new_file import keep_recordings
 from tirebench.setup.source_plan import SourcePlan
 from tirebench.wire.conditions import read_conditions
-from tirelib.cli.common import FILE, NEW_FILE, write_json
+from tirelib.cli.common import NEW_FILE, write_json
 
 _EXAMPLE = f"""\b
 Examples:
@@ -45,12 +53,7 @@ Exit code: 0 done, 1 the port was lost or not one good frame came, 2 bad input.
     multiple=True,
     help="Port to read; may be given several times; the forms are listed below.",
 )
-@click.option(
-    "--setup",
-    metavar="S.toml",
-    type=FILE,
-    help="Setup file (TOML) of several sources, each with its protocol, wheel and device file.",
-)
+@setup_option
 @click.option(
     "--out",
     metavar="FILE.mcap",
@@ -59,13 +62,7 @@ Exit code: 0 done, 1 the port was lost or not one good frame came, 2 bad input.
     help="New recording to write (.mcap).",
 )
 @recording_options
-@click.option(
-    "--conditions",
-    "sidecar",
-    metavar="F.json",
-    type=FILE,
-    help="File with the conditions over time, as `tirebench emulate --conditions` writes it.",
-)
+@sidecar_option
 @click.option(
     "--device",
     "device_texts",
@@ -74,15 +71,8 @@ Exit code: 0 done, 1 the port was lost or not one good frame came, 2 bad input.
     help="Device file (scale and zero of the gages), stored in the recording.",
 )
 @port_options
-@click.option(
-    "--duration", metavar="S", type=click.FloatRange(min=0.0), help="End after this time."
-)
-@click.option(
-    "--silence",
-    metavar="S",
-    type=click.FloatRange(min=0.0),
-    help="End when nothing came for this time.",
-)
+@duration_option
+@silence_option
 @click.option(
     "--json",
     "json_file",

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from tirebench.cli.options import pace_option, trust_option
 from tirebench.cli.run import run
 from tirelib.cli.common import FILE, NEW_FILE
 
@@ -29,17 +30,8 @@ Exit code: as for `tirebench run`.
     required=True,
     help="FMU of the estimator, made by `tirelib fmu build`.",
 )
-@click.option(
-    "--trust",
-    is_flag=True,
-    help="Run this FMU although it is unknown, and add it to the list of trusted FMUs.",
-)
-@click.option(
-    "--pace",
-    metavar="X",
-    type=click.FloatRange(0.001, 1000.0),
-    help="Replay speed as a multiple of real time. [default: as fast as possible]",
-)
+@trust_option
+@pace_option
 @click.option(
     "--wheel",
     "numbers",

@@ -10,7 +10,17 @@ from rich.console import Console
 
 from tirebench.cli.bridges import Bridges, bridge_options
 from tirebench.cli.live import Screen, counters
-from tirebench.cli.options import PORTS, devices_of, port_options
+from tirebench.cli.options import (
+    PORTS,
+    devices_of,
+    duration_option,
+    pace_option,
+    port_options,
+    setup_option,
+    sidecar_option,
+    silence_option,
+    trust_option,
+)
 from tirebench.cli.page import Shown, page_choice, page_options
 from tirebench.cli.recording import at_start, recording_options
 from tirebench.cli.run_inputs import (
@@ -74,12 +84,7 @@ the run in good order.
     multiple=True,
     help="Port to read; may be given several times; see below and `tirebench ports`.",
 )
-@click.option(
-    "--setup",
-    metavar="S.toml",
-    type=FILE,
-    help="Setup file (TOML) of several sources, each with its protocol, wheel and device file.",
-)
+@setup_option
 @click.option(
     "--port-file",
     metavar="FILE",
@@ -96,12 +101,7 @@ the run in good order.
     help="Wait for ports that do not exist yet, 60 s unless a time is given.",
 )
 @click.option("--replay", metavar="FILE", type=FILE, help="Recording to read instead of a port.")
-@click.option(
-    "--pace",
-    metavar="X",
-    type=click.FloatRange(0.001, 1000.0),
-    help="Replay speed as a multiple of real time. [default: as fast as possible]",
-)
+@pace_option
 @click.option(
     "--fmu",
     "fmu_file",
@@ -110,11 +110,7 @@ the run in good order.
     required=True,
     help="FMU of the estimator, made by `tirelib fmu build`; each wheel gets its own instance.",
 )
-@click.option(
-    "--trust",
-    is_flag=True,
-    help="Run this FMU although it is unknown, and add it to the list of trusted FMUs.",
-)
+@trust_option
 @click.option("--speed", metavar="KMH", type=float, help="Travel speed.")
 @click.option("--pressure", metavar="BAR", type=click.FloatRange(min=0.0), help="Gauge pressure.")
 @click.option("--camber", metavar="DEG", type=float, help="ISO 8855.")
@@ -125,13 +121,7 @@ the run in good order.
     multiple=True,
     help="Any other condition by its name, such as friction=0.8 or tread_depth=5 (mm).",
 )
-@click.option(
-    "--conditions",
-    "sidecar",
-    metavar="F.json",
-    type=FILE,
-    help="File with the conditions over time, as `tirebench emulate --conditions` writes it.",
-)
+@sidecar_option
 @click.option(
     "--device",
     "device_texts",
@@ -161,15 +151,8 @@ the run in good order.
     type=NEW_FILE,
     help="Write every turn as JSON, as it comes.",
 )
-@click.option(
-    "--duration", metavar="S", type=click.FloatRange(min=0.0), help="End after this time."
-)
-@click.option(
-    "--silence",
-    metavar="S",
-    type=click.FloatRange(min=0.0),
-    help="End when nothing came for this time.",
-)
+@duration_option
+@silence_option
 @click.option(
     "--turns", metavar="N", type=click.IntRange(min=1), help="End after this number of turns."
 )

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from tirelib.arrays import FloatArray
 from tirelib.errors import CalibrationError
@@ -100,7 +100,7 @@ def _draw(panels: list[Axes], row: _Residuals, quantity: str) -> None:
     for axes in panels[1:3]:
         axes.sharey(panels[0])
         axes.tick_params(labelleft=False)
-    place = norm.ppf((np.arange(error.size) + 0.5) / error.size)
+    place = ndtri((np.arange(error.size) + 0.5) / error.size)
     panels[3].plot(place, np.sort(error), "o", markersize=3.5, color="#333333")
     panels[3].plot(place, place * float(np.std(error)), color=FAINT, linewidth=1.0)
     panels[3].set_title("against a normal law")
