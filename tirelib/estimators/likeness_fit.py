@@ -67,8 +67,9 @@ def fit_likeness(
     single -= _mean_of(single, unit[rows])
     covariance = known.covariance + np.cov(single.T)
     seen = np.einsum("ij,ij->i", held_out, np.linalg.solve(covariance, held_out.T).T) / len(names)
-    limit = fdtri(len(names), freedom, 1.0 - FALSE_ALARM) * (conditions - 1) / freedom
-    limit = max(float(limit), float(seen.max()))
+    edge = float(fdtri(len(names), freedom, 1.0 - FALSE_ALARM))
+    limit = edge * (conditions - 1) / freedom
+    limit = max(limit, float(seen.max()))
     return Likeness(variables, terms, names, share, covariance, limit)
 
 

@@ -142,7 +142,8 @@ def fit_stiffness(
     unknown = np.isinf(np.diag(cov))
     if sigma is None:
         cov = np.where(np.isinf(cov), cov, cov * misfit)
-    half = np.sqrt(np.diag(cov)) * (ndtri(level) if sigma is not None else stdtrit(freedom, level))
+    wide = float(ndtri(level) if sigma is not None else stdtrit(freedom, level))
+    half = np.sqrt(np.diag(cov)) * wide
     reference = np.abs(_reference(solved, law, float(p.mean())))
     return StiffnessFit(
         names,

@@ -1,11 +1,13 @@
 """What ends the validity of an estimate, and how much a law of a condition is doubted."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tests.synthetic import header, synthetic_run
+from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.chain import QUANTITIES
 from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.train import Trained
@@ -19,6 +21,12 @@ def features() -> Features:
     return measure_run(synthetic_run(0, slip_angle=np.deg2rad(1.0)), header())[0]
 
 
+BOTH = pytest.mark.parametrize("estimate", [Calibration.estimate, Calibration.reference_estimate])
+"""The compiled core, where there is one, and numpy."""
+Estimate = Callable[[Calibration, Features], Estimates]
+
+
+@BOTH
 @pytest.mark.parametrize(
     "flag",
     [
@@ -32,19 +40,20 @@ def features() -> Features:
     ],
 )
 def test_a_turn_whose_angle_or_contact_is_in_doubt_gives_no_estimate(
-    flag: TurnFlag, trained: Trained, features: Features
+    flag: TurnFlag, estimate: Estimate, trained: Trained, features: Features
 ) -> None:
-    good = trained.calibration.estimate(features).turn_valid
+    good = estimate(trained.calibration, features).turn_valid
     assert good.sum() >= 3
     marked = replace(features, flags=features.flags | int(flag))
-    found = trained.calibration.estimate(marked)
+    found = estimate(trained.calibration, marked)
     assert not found.turn_valid.any()
     assert not any(found.valid[quantity].any() for quantity in QUANTITIES)
 
 
+@BOTH
 @pytest.mark.parametrize(("std", "valid"), [(0.9, True), (1.2, False), (2.8, False)])
 def test_a_slip_angle_is_valid_up_to_a_standard_deviation_of_one_degree(
-    std: float, valid: bool, trained: Trained, features: Features
+    std: float, valid: bool, estimate: Estimate, trained: Trained, features: Features
 ) -> None:
     chains = {}
     for missing, chain in trained.calibration.chains.items():
@@ -53,7 +62,7 @@ def test_a_slip_angle_is_valid_up_to_a_standard_deviation_of_one_degree(
         sure = replace(chain.angle, blur=0.0, bend=0.0)
         polynomial = replace(sure.polynomial, residual=np.deg2rad(std), floor=0.0)
         chains[missing] = replace(chain, angle=replace(sure, polynomial=polynomial), sliding=None)
-    found = replace(trained.calibration, chains=chains).estimate(features)
+    found = estimate(replace(trained.calibration, chains=chains), features)
     usable = trained.calibration.estimate(features).turn_valid
     told = np.rad2deg(found.std["alpha"][usable])
     np.testing.assert_allclose(told, std, rtol=0.1)
