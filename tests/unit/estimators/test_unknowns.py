@@ -13,7 +13,16 @@ from tirelib.estimators.calibration import LARGEST_ANGLE_STD
 from tirelib.estimators.fit_sliding import Runs, fit_sliding
 from tirelib.estimators.sliding import SlidingCurve, Told
 from tirelib.estimators.train import Trained
-from tirelib.estimators.unknowns import DEPTH, EDGE, FRICTION, TWO_SIGMA, Road, spread
+from tirelib.estimators.unknowns import (
+    DEPTH,
+    EDGE,
+    FRICTION,
+    TIRES,
+    TWO_SIGMA,
+    UNDER_GROOVES,
+    Road,
+    spread,
+)
 from tirelib.flags import TurnFlag
 from tirelib.observations import Observations
 
@@ -237,21 +246,32 @@ def conditions(**known: float) -> dict[str, FloatArray]:
     return {name: one(known.get(name, np.nan)) for name in names}
 
 
-def test_an_unknown_tread_holds_95_percent_of_those_that_may_be() -> None:
-    _, std = Road(tread_temperature=(300.0, 300.0)).worn(conditions())
-    lost = DEPTH[1] - np.random.default_rng(1).uniform(*DEPTH, 20_000)
-    assert np.mean(lost <= TWO_SIGMA * std[0]) == pytest.approx(0.95, abs=0.01)
+def test_an_unknown_tread_holds_95_percent_of_all_treads_of_all_tires() -> None:
+    rng = np.random.default_rng(7)
+    depth, tires = rng.uniform(*DEPTH, 100_000), 1.0 + TIRES * rng.standard_normal(100_000)
+    road, unknown = Road(tread_temperature=(313.0, 313.0)), conditions(tread_temperature=313.0)
+    harder = np.log((DEPTH[1] + UNDER_GROOVES) / (depth + UNDER_GROOVES)) * tires
+    lost = (DEPTH[1] - depth) * tires
+    for departure, (_, std) in ((harder, road.hardened(unknown)), (lost, road.worn(unknown))):
+        assert np.mean(np.abs(departure) <= TWO_SIGMA * std) == pytest.approx(0.95, abs=0.004)
     assert spread(np.array([-1.0, 1.0])) == pytest.approx(1.0 / TWO_SIGMA)
 
 
-@pytest.mark.parametrize("own", [0.0105, 0.0107, 0.0111])
-def test_the_load_that_an_unknown_tread_hides_is_held_by_90_to_99_percent(own: float) -> None:
-    """`own` is `EDGE` of one tire of the rig, straight runs on treads of 8, 6 and 4 mm."""
+def test_the_load_that_an_unknown_tread_hides_is_held_on_eleven_tires() -> None:
+    """`EDGE` of the rig's three tires and of eight drawn ones, as their worn treads show it.
+
+    The other errors of the load, 30 N, are 0.45 mm of contact length. With what `EDGE` and its
+    spread were over three tires 91 % would be held, and 81 % on one of them.
+    """
+    own = 1e-3 * np.array([10.5, 11.1, 10.7, 12.6, 13.2, 10.5, 13.3, 11.7, 9.5, 9.4, 13.1])
     road, none = Road(tread_temperature=(300.0, 300.0)), conditions(tread_temperature=300.0)
-    depth = np.linspace(*DEPTH, 2001)
+    depth, other = np.linspace(*DEPTH, 4001), 0.45e-3
     harder, _ = road.hardened({**none, "tread_depth": depth})
-    held = np.mean(own * harder <= TWO_SIGMA * EDGE * road.hardened(none)[1][0])
-    assert 0.90 < held < 0.99
+    error = np.outer(own, harder) + other * np.random.default_rng(1).standard_normal(depth.size)
+    std = np.hypot(EDGE * road.hardened(none)[1][0], other)
+    held = np.mean(np.abs(error) <= TWO_SIGMA * std, axis=1)
+    assert held.mean() == pytest.approx(0.945, abs=0.007)
+    assert held.min() > 0.85
 
 
 def test_a_calibration_that_varied_the_tread_knows_more_of_it() -> None:
