@@ -35,6 +35,7 @@ lint: $(STAMP)
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
 
+# Runs the tutorials and shows them with their figures; about two minutes of one core.
 docs: $(STAMP)
 	$(BIN)/sphinx-build --fail-on-warning --quiet docs build/out/docs
 	@echo "open build/out/docs/index.html"

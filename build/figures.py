@@ -1,6 +1,7 @@
 """Draw the dissertation's figures of the ring model (chapters 5 and 6) from the tires in `models`.
 
     .venv/bin/python build/figures.py
+    .venv/bin/python build/figures.py --gallery     and the pictures of docs/theory/gallery.md
 
 Everything lands in ``build/out/figures``; open its ``index.html``.
 """
@@ -9,6 +10,7 @@ import argparse
 from functools import cache
 from pathlib import Path
 
+from PIL import Image
 from rich.console import Console
 from ring_figures import cases, contact, lateral, speed, static
 from ring_figures import loads as over_load
@@ -230,7 +232,9 @@ def main() -> None:
     """Draw everything and write the page."""
     parser = argparse.ArgumentParser(description="Figures of chapters 5 and 6 from the ring model.")
     parser.add_argument("--out", type=Path, default=ROOT / "build/out/figures", metavar="DIR")
-    folder = parser.parse_args().out.resolve()
+    parser.add_argument("--gallery", action="store_true", help="renew docs/theory/gallery")
+    given = parser.parse_args()
+    folder = given.out.resolve()
     console, sections, missing = Console(), [], []
     for number, (title, drawings) in enumerate(CHAPTERS.items(), 1):
         with console.status(f"drawing: {title}"):
@@ -243,6 +247,10 @@ def main() -> None:
         title="The ring model: figures of chapters 5 and 6",
         sections=sections,
     )
+    if given.gallery:
+        for png in (folder / "figures").glob("*.png"):
+            small = Image.open(png).convert("RGB").quantize(64)
+            small.save(ROOT / "docs/theory/gallery" / png.name, optimize=True)
     for picture in missing:
         console.print(f"not drawn: {picture.title}: {picture.reason}", highlight=False)
     console.print(f"open {page}", highlight=False, soft_wrap=True)

@@ -22,7 +22,7 @@ Examples:
   tirelib rig --plan short --hide sidewall_load=0.3 --out build/out/hidden
 
 \b
-The folder is a campaign (campaign.toml, runs.csv, runs/*.mf4). Its truth.csv holds the noise-free
+The folder is a campaign (campaign.toml, runs.csv, runs/NNN.mf4). Its truth.csv holds the noise-free
 forces, slip, contact lengths and edges of each run (of each solved state of a ramp),
 in SI and ISO signs.
 """

@@ -1,0 +1,96 @@
+"""JSON Schemas of the documents that verbs write with ``--json``, learned from real documents.
+
+    python build/schemas.py FOLDER...    writes docs/reference/schemas
+
+Every document below the folders is read: the output of any work with ``--json``, or a session of
+the studio. A schema holds for what was seen: keys and types. Titles and descriptions are below.
+"""
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from genson import SchemaBuilder
+
+OUT = Path(__file__).resolve().parent.parent / "docs/reference/schemas"
+ABOUT = {
+    "tirelib-calibrate/1": "`tirelib calibrate`: statistics of all estimators.",
+    "tirelib-campaign-check/1": "`tirelib campaign check`: every finding of a folder.",
+    "tirelib-campaign-show/1": "`tirelib campaign show`: header and runs of a campaign.",
+    "tirelib-comparison/1": "`tirelib compare`: where a model fails, and under which conditions.",
+    "tirelib-diagnosis/1": "`tirelib diagnose`: the verdict, and every effect with its strength.",
+    "tirelib-effects/1": "`tirelib effects`: what each effect is.",
+    "tirelib-estimate/1": "`tirelib estimate`, `fmu run`, `tirebench run`: every turn, a summary.",
+    "tirelib-explanation/1": "`tirelib explain`: the whole journey.",
+    "tirelib-extension/1": "`tirelib add`: the errors before and after an effect.",
+    "tirelib-features/1": "`tirelib features`: what was extracted.",
+    "tirelib-fleet-run/1": "`tirelib fleet`: what became of each campaign.",
+    "tirelib-fmu-check/1": "`tirelib fmu check`: every check of an FMU.",
+    "tirelib-identification/1": "`tirelib identify`: constants with intervals; what narrows them.",
+    "tirelib-import/1": "`tirelib import`: what was imported.",
+    "tirelib-import-list/1": "`tirelib import --list`: the columns of each file.",
+    "tirelib-next-test/1": "`tirelib next-test`: the runs that separate the suspects.",
+    "tirelib-rig/1": "`tirelib rig`: what was measured, or the plans and tires.",
+    "tirelib-selftest/1": "`tirelib selftest`: the chance of finding each effect.",
+    "tirelib-simulation/1": "`tirelib simulate`: each condition with its results.",
+    "tirebench-emulation/1": "`tirebench emulate`: what was sent.",
+    "tirebench-export/1": "`tirebench export`: what was written.",
+    "tirebench-load/1": "`tirebench load`: bus load of a plan, and plans that fit.",
+    "tirebench-ports/1": "`tirebench ports`: the serial ports.",
+    "tirebench-record/1": "`tirebench record`: what was recorded.",
+}
+"""Documents that verbs write, and what each holds."""
+NAMED = 12
+"""An object with more keys than this, none of which every document has, is a table by names."""
+
+
+def learned(documents: list[Any]) -> dict[str, Any]:
+    """Return the schema that all documents fulfil."""
+    builder = SchemaBuilder("https://json-schema.org/draft/2020-12/schema")
+    for document in documents:
+        builder.add_object(document)
+    return dict(by_name(builder.to_schema()))
+
+
+def by_name(schema: Any) -> Any:
+    """Return the schema with objects whose keys are names (of effects, gages, runs) as tables."""
+    if isinstance(schema, list):
+        return [by_name(part) for part in schema]
+    if not isinstance(schema, dict):
+        return schema
+    out = {key: by_name(value) for key, value in schema.items()}
+    properties = out.get("properties")
+    if isinstance(properties, dict) and len(properties) > NAMED and not out.get("required"):
+        kinds = [json.dumps(value, sort_keys=True) for value in properties.values()]
+        values = [json.loads(kind) for kind in dict.fromkeys(kinds)]
+        out.pop("properties")
+        out["additionalProperties"] = values[0] if len(values) == 1 else {"anyOf": values}
+    return out
+
+
+def main() -> None:
+    """Write a schema for each format that was seen."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("folder", type=Path, nargs="+")
+    given = parser.parse_args()
+    seen: dict[str, list[Any]] = {}
+    for path in sorted(path for folder in given.folder for path in folder.rglob("*.json")):
+        document = json.loads(path.read_text(encoding="utf-8"))
+        if isinstance(document, dict) and "format" in document:
+            seen.setdefault(document["format"], []).append(document)
+    OUT.mkdir(parents=True, exist_ok=True)
+    for name, documents in seen.items():
+        if name not in ABOUT:
+            continue
+        schema = learned(documents)
+        schema["properties"]["format"] = {"const": name, "type": "string"}
+        head = {"title": name, "description": ABOUT[name]}
+        path = OUT / f"{name.replace('/', '-')}.schema.json"
+        path.write_text(json.dumps({**head, **schema}, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,154 @@
+"""Tables of the reference that are made from the code: flags, variables of the FMUs, documents."""
+
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from sphinx.pycode import ModuleAnalyzer
+
+from tirelib.flags import INVALIDATING, TurnFlag
+from tirelib.fmu.variables import Variable, inputs, outputs, parameters
+from tirelib.fmu.virtual import table as virtual
+from tirelib.fmu.virtual.spec import friction_surface
+from tirelib.fmu.virtual.surface import shared_surface
+from tirelib.stream.estimator import RATES
+
+ORDER = (
+    "strain_to_load",
+    "missing_effect",
+    "own_measurements",
+    "vehicle_loop",
+    "bench_transmitter",
+    "extend",
+)
+"""Tutorials in the order of a first hour."""
+SCHEMAS = Path(__file__).parent / "reference/schemas"
+LATERAL = (0.06, 0.03, 0.0, -0.03, -0.06)
+REMEDIES = {
+    "FIRST_TURN": "Nothing: from the second turn on there are estimates.",
+    "GAP": "Look at the losses of the line (`line` in the JSON of the bench), and at the rate.",
+    "BRIDGED": "Nothing; if it comes often, look at the line as for a gap.",
+    "SPIKE": "Nothing if rare; else look for a loose contact or interference.",
+    "SATURATED": "Lower the gain of the amplifier, or zero the gage again (`tirebench zero`).",
+    "DEAD_GAGE": "Look at the wiring of the gage named; estimates go on without one outer gage.",
+    "PERIOD_JUMP": "Nothing after a stop or a lock; else the contacts of this turn were misread.",
+    "TRIGGER_MISMATCH": "Look at the trigger's sensor; the contacts are found in the strain.",
+    "DRIFT": "Let the gages warm up, or zero them again; look at the glue.",
+    "NO_SPEED": "Give the travel speed (`--speed`, input `speed`); without it there is no kappa.",
+    "REVERSED": "Drive forward, or turn the sign of the speed: calibrations hold forward only.",
+    "OUT_OF_RANGE": "Calibrate where you measure: more loads, speeds, pressures, slip angles.",
+    "CUT_OFF": "Leave out `--cut-off`, or raise the sample rate of the gages.",
+    "REDUCED_GAGES": "Repair the gage; until then intervals are those without it.",
+    "TOO_FEW_GAGES": "Repair the gages: the centre gage and all but one of the others are needed.",
+    "NO_CONDITION": "Give pressure and camber: the calibration varied them.",
+    "WEAK_EDGE": "Look at the load: at very low loads the contact has no clear edges.",
+    "NO_CONTACT": "The wheel stands, or the gages are dead or frozen.",
+    "FAULT": "Read the log, and report it: this is an error of the estimator.",
+    "OTHER_TIRE": "Use the calibration of the tire that is on the wheel; check pressure and tread.",
+    "ACCELERATING": "Give the turn rate of the wheel (`omega`), from a speed sensor or the rig.",
+}
+"""What to do about a flag; `tests/unit/test_documentation.py` asks for one for each."""
+
+
+def in_order(name: str) -> int:
+    """Return the place of a tutorial."""
+    return ORDER.index(Path(name).stem)
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table in Markdown."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join(
+        "| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |" for line in lines
+    )
+
+
+def flags() -> str:
+    """Return bit, name, meaning, consequence and remedy of every flag."""
+    said = ModuleAnalyzer.for_module("tirelib.flags").find_attr_docs()
+    rows = [
+        (
+            flag.value,
+            f"`{name.lower()}`",
+            " ".join(" ".join(said["TurnFlag", name]).split()).replace("``", "`"),
+            "not valid" if flag in INVALIDATING else "still used",
+            REMEDIES[name],
+        )
+        for name, flag in sorted(TurnFlag.__members__.items(), key=lambda item: item[1])
+    ]
+    return table(("bit", "flag", "what it means", "the turn is", "what to do"), rows)
+
+
+def variables(every: Sequence[Variable]) -> str:
+    """Return a table for each causality."""
+    parts = []
+    for causality in ("parameter", "input", "output"):
+        rows = [
+            (f"`{v.name}`", v.kind, v.unit or "", _limits(v), v.start, v.description)
+            for v in every
+            if v.causality == causality
+        ]
+        head = ("name", "type", "unit", "allowed", "start", "meaning")
+        parts.append(f"### {causality.capitalize()}s\n\n{table(head, rows)}")
+    return "\n\n".join(parts)
+
+
+def _limits(variable: Variable) -> str:
+    ends = ["" if end is None else f"{float(end):.4g}" for end in (variable.low, variable.high)]
+    return " .. ".join(ends) if any(ends) else ""
+
+
+def strain_variables() -> str:
+    """Return the variables of ``StrainTire.fmu`` for one sample a step."""
+    return variables(
+        [*parameters(1e4, RATES), *inputs(LATERAL, 1, buffered=True), *outputs(LATERAL)]
+    )
+
+
+def virtual_variables() -> str:
+    """Return the variables of ``VirtualTire.fmu`` for one sample a step."""
+    surface = shared_surface(friction_surface())
+    return variables(
+        [
+            *virtual.parameters(1e4),
+            *virtual.inputs(surface),
+            *virtual.outputs(surface, 1),
+        ]
+    )
+
+
+def documents() -> str:
+    """Return each document with its keys, from the schemas."""
+    parts = []
+    for path in sorted(SCHEMAS.glob("*.schema.json")):
+        schema = json.loads(path.read_text(encoding="utf-8"))
+        always = schema.get("required", ())
+        rows = [
+            (f"`{key}`", _kind(value), "always" if key in always else "where it applies")
+            for key, value in schema["properties"].items()
+        ]
+        parts.append(
+            f"## {schema['title']}\n\n{schema['description']} "
+            f"{{download}}`Schema </reference/schemas/{path.name}>`\n\n"
+            + table(("key", "type", "present"), rows)
+        )
+    return "\n\n".join(parts)
+
+
+def _kind(value: dict[str, Any]) -> str:
+    if "anyOf" in value:
+        return ", ".join(dict.fromkeys(_kind(one) for one in value["anyOf"]))
+    kinds = value.get("type", "any")
+    if kinds == "array" and "items" in value:
+        return f"array of {_kind(value['items'])}"
+    return kinds if isinstance(kinds, str) else ", ".join(kinds)
+
+
+def write_all(folder: Path) -> None:
+    """Write every table where it has changed."""
+    folder.mkdir(exist_ok=True)
+    for make in (flags, strain_variables, virtual_variables, documents):
+        path, text = folder / f"{make.__name__}.md", make() + "\n"
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            path.write_text(text, encoding="utf-8")

@@ -1,0 +1,149 @@
+"""The documentation: it builds, its links lead somewhere, its commands exist, its tutorials run."""
+
+import json
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from tirebench.cli import program as bench
+from tirelib.cli import program
+from tirelib.flags import TurnFlag
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+BUILT = ("_build", "_generated", "_tutorials")
+PAGES = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    *(p for p in sorted(DOCS.rglob("*.md")) if not {*p.parts} & {*BUILT}),
+]
+SPHINX = pytest.importorskip("sphinx", reason="Sphinx comes with the extra tirelib[docs]")
+
+
+def test_the_readme_is_short() -> None:
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 120
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_links_lead_to_files(page: Path) -> None:
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    targets = re.findall(r"\]\(\s*([^)\s#]+)(?:#[^)]*)?\)", text)
+    inside = [t for t in targets if "://" not in t and "_tutorials/" not in t]
+    assert [t for t in inside if not (page.parent / t).exists()] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_commands_have_the_options_that_pages_show(page: Path) -> None:
+    for line in commands(page.read_text(encoding="utf-8")):
+        words = shlex.split(line, comments=True)
+        command: click.Command = {"tirelib": program, "tirebench": bench}[words.pop(0)]
+        while isinstance(command, click.Group) and words and not words[0].startswith("-"):
+            found = command.get_command(click.Context(command), words.pop(0))
+            assert found is not None, line
+            command = found
+        known = {
+            name for option in command.params for name in (*option.opts, *option.secondary_opts)
+        }
+        known |= {"--help", "--version"}
+        shown = {word.partition("=")[0] for word in words if re.match(r"--?[a-z]", word)}
+        assert shown <= known, line
+
+
+def commands(text: str) -> list[str]:
+    """Command lines of indented and fenced blocks, one each, with their continuations."""
+    joined = re.sub(r"\\\n\s*", " ", text)
+    lines = re.findall(r"^(?: {4}|)(?:\.venv/bin/)?((?:tirelib|tirebench) [a-z-].*)$", joined, re.M)
+    return [re.split(r" [|&>] | &$| > |  #", line)[0] for line in lines if "..." not in line]
+
+
+def test_every_flag_has_a_remedy() -> None:
+    tables = imported("tables", DOCS)
+    assert set(tables.REMEDIES) == {flag.name for flag in TurnFlag}
+
+
+def imported(name: str, folder: Path) -> Any:
+    sys.path.insert(0, str(folder))
+    try:
+        return __import__(name)
+    finally:
+        sys.path.remove(str(folder))
+
+
+def test_the_site_builds_without_a_warning_and_is_searched_offline(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "sphinx", "-D", "plot_gallery=0", "--fail-on-warning"]
+    done = subprocess.run(
+        [*command, "--quiet", "--keep-going", str(DOCS), str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    index = (tmp_path / "searchindex.js").read_text(encoding="utf-8")
+    assert "sidewall_damp" in index
+    for page in ("index.html", "reference/cli.html", "theory/ring_static.html"):
+        text = (tmp_path / page).read_text(encoding="utf-8")
+        loaded = re.findall(r'<(?:script|link|img)[^>]+(?:src|href)="(https?://[^"]+)"', text)
+        assert loaded == []  # nothing comes from a network
+
+
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        ("effects", "tirelib-effects-1"),
+        ("rig --list", "tirelib-rig-1"),
+        ("simulate --model table-6-1 --load 1500,3000 --speed 65", "tirelib-simulation-1"),
+        ("bench load --bus fd --format RAW12 --wheels 4", "tirebench-load-1"),
+    ],
+)
+def test_a_document_fulfils_its_schema(words: str, name: str, tmp_path: Path) -> None:
+    jsonschema = pytest.importorskip("jsonschema", reason="jsonschema is not installed")
+    given = words.split()
+    chosen = bench if given[0] == "bench" else program
+    done = CliRunner().invoke(
+        chosen, [*given[chosen is bench :], "--json", str(tmp_path / "d.json")]
+    )
+    assert done.exit_code in (0, 1), done.output
+    schema = json.loads((DOCS / f"reference/schemas/{name}.schema.json").read_text())
+    document = json.loads((tmp_path / "d.json").read_text())
+    jsonschema.validate(document, schema)
+    document.pop("format")
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(document, schema)
+
+
+NUMBERS = {
+    "strain_to_load": lambda found: (found["rmse"], 0.0, 20.0),
+    "missing_effect": lambda found: (found["errors"][-1], 0.5, 1.5),
+    "own_measurements": lambda found: (found["difference"], 0.0, 1e-9),
+    "vehicle_loop": lambda found: (found["share"].mean(), 0.19, 0.22),
+    "bench_transmitter": lambda found: (found["mine"].mean(), 4100.0, 4250.0),
+    "extend": lambda found: (found["samples"], 1000, 1000),
+}
+"""The number of each tutorial that is checked, and between what it must lie."""
+
+
+def test_every_tutorial_has_a_number() -> None:
+    scripts = {path.stem for path in (DOCS / "tutorials").glob("*.py")} - {"example_rig"}
+    assert set(NUMBERS) == scripts == set(imported("tables", DOCS).ORDER)
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_a_tutorial_runs_and_ends_with_its_number(name: str, monkeypatch: Any) -> None:
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("agg")
+    monkeypatch.syspath_prepend(str(DOCS / "tutorials"))
+    path = DOCS / "tutorials" / f"{name}.py"
+    found: dict[str, Any] = {"__name__": name, "__file__": str(path)}
+    try:
+        exec(compile(path.read_text(encoding="utf-8"), path, "exec"), found)
+    finally:
+        matplotlib.pyplot.close("all")
+    value, low, high = NUMBERS[name](found)
+    assert low <= value <= high
