@@ -17,7 +17,7 @@ from click.testing import CliRunner
 from tests.unit.brush.test_mf import PLAIN
 from tests.unit.force_campaigns import steady_runs, write_forces
 from tirelib.brush.mf6 import magic_forces_6
-from tirelib.brush.mf_fit import MagicFit, MagicPoints, fit_magic
+from tirelib.brush.mf_fit import STAGES, MagicFit, MagicPoints, _Fit, fit_magic
 from tirelib.brush.mf_tire import Coefficients, MagicTire, magic_tire
 from tirelib.brush.tir import read_tir
 from tirelib.cli import program
@@ -62,6 +62,26 @@ def test_a_tire_of_the_formula_is_found_also_between_the_points(force: str, shar
     assert np.abs(getattr(found, force) - wanted).max() < share * np.abs(wanted).max()
     assert found.curved_well.all()
     assert found.in_range.all()
+
+
+def test_a_coefficient_is_fitted_as_its_values_at_the_ends_of_the_loads() -> None:
+    """So E <= 1 and a friction above zero hold at every load between them."""
+    points, (low, high) = made(), (LOADS[0] / 4000.0 - 1.0, LOADS[-1] / 4000.0 - 1.0)
+    for stage in STAGES[:5]:
+        fit = _Fit(points, stage, np.ones(points.load.size, dtype=bool), (low, high))
+        random = np.random.default_rng(1).uniform(0.1, 0.9, fit.size)
+        ends: dict[str, float] = {}
+        fit._put(random, ends)
+        rest, most = iter(random), dict(zip(fit.names, fit._column("high"), strict=True))
+        for term in fit.terms:
+            first = next(rest)
+            if term.slope:
+                assert ends[term.name] + ends[term.slope] * low == pytest.approx(first)
+                assert ends[term.name] + ends[term.slope] * high == pytest.approx(next(rest))
+            else:
+                assert ends[term.name] == first
+            if term.name[1] == "E":
+                assert most[term.name] == most[term.slope] == 1.0
 
 
 def test_what_does_not_vary_is_not_fitted_and_what_is_missing_is_named() -> None:

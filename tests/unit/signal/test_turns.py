@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from tests.synthetic import LATERAL, RATE, frames, record
 from tirelib.errors import ParameterError, ShapeError
 from tirelib.flags import INVALIDATING, TurnFlag
-from tirelib.signal import LowPass, Turn, TurnCutter, Turns, cut_turns
+from tirelib.signal import LowPass, Turn, TurnCutter, Turns, cut_turns, stack_turns
 
 
 def turns_of(strain: np.ndarray, **options: object) -> Turns:
@@ -244,6 +244,20 @@ def test_drift_within_a_turn_is_flagged() -> None:
     turns = turns_of(drifting)
     assert has(turns, TurnFlag.DRIFT, 3, 1)
     assert not has(turns, TurnFlag.DRIFT, 3, 0)
+
+
+@pytest.mark.parametrize(("share", "flagged"), [(0.03, False), (0.075, True)])
+def test_a_drift_counts_from_a_twentieth_of_the_swing_in_a_turn(
+    share: float, flagged: bool
+) -> None:
+    strain, _, omega = record()
+    passed = omega * np.arange(strain.shape[1]) / RATE / (2.0 * np.pi)
+    strain[1] += share * np.ptp(strain[1]) * passed
+    # the compiled core, where there is one, and numpy
+    cut = TurnCutter(LATERAL, RATE).push(strain, speed=18.0)
+    by_numpy = stack_turns(cut, np.array(LATERAL), RATE)
+    for turns in (turns_of(strain), by_numpy):
+        assert has(turns, TurnFlag.DRIFT, 3, 1) == flagged
 
 
 @pytest.mark.parametrize("cut_off", [0.5, 40.0, 2000.0, 4000.0])
