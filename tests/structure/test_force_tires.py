@@ -47,9 +47,10 @@ def test_a_string_without_stiffness_of_the_belt_is_the_bristles_alone() -> None:
     assert side[0] == pytest.approx(-tire.slope * tire.nominal * angle[0], rel=0.02)
 
 
-def test_the_table_is_that_of_the_families_as_they_are() -> None:
+@pytest.mark.parametrize("quantity", ["Fy", "Fx", "Mz"])
+def test_the_tables_are_those_of_the_families_as_they_are(quantity: str) -> None:
     code = b"".join((HERE / name).read_bytes() for name in ("families.py", "plans.py"))
-    families, provenance = load(OUT / "plain_Fy.npz")
+    families, provenance = load(OUT / f"plain_{quantity}.npz")
     assert {family.name for family in families} == set(FAMILIES)
     assert all(len(family) >= 20 for family in families)
     assert provenance["families_sha256"] == hashlib.sha256(code).hexdigest()
