@@ -122,9 +122,12 @@ def test_out_writes_figure_curves_and_document(tmp_path: Path) -> None:
     assert carried == pytest.approx(4000.0, rel=1e-3)
 
 
-def test_without_out_and_json_it_only_prints(tmp_path: Path) -> None:
+def test_without_out_and_json_it_only_prints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     words = ("simulate", "--model", "table-6-1", "--load", "4000")
-    done = run(*words, cwd=tmp_path)
+    done = run(*words)
     assert done.returncode == 0, done.stderr
     assert list(tmp_path.iterdir()) == []
     for text in ("vertical load", "4000.0", "entry", "CP1", "entry < 0 < exit"):
