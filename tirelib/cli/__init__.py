@@ -27,8 +27,8 @@ VERBS = {
     "effects": "List the effects of the catalogue, or register effects of your own.",
     "next-test": "Tell which further run would separate the suspects of CAMPAIGN best.",
     "add": "Add EFFECT to a model, fit it to CAMPAIGN and show how the error changes.",
-    "selftest": "Plant each effect at the plan and noise of CAMPAIGN and tell the chance of "
-    "finding it.",
+    "selftest": "Plant each effect at the plan and noise of CAMPAIGN and count how often it is "
+    "found.",
     "studio": "Open the journey in the browser: see, suspect, add, take away.",
     "simulate": "Simulate the rolling ring on the road: shape, pressure, shear, strain and strain "
     "rate.",
