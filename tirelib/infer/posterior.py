@@ -22,7 +22,7 @@ from tirelib.infer.normal import LEAST, Normal, Weighed
 from tirelib.infer.plain import BASE, ROUGHLY, View
 from tirelib.infer.problem import Point, Problem
 
-MOST_STEPS = 30
+MOST_STEPS = 60
 SETTLED = 0.1
 """Step, in posterior standard deviations, below which a fit has settled."""
 GAINS = 0.1
