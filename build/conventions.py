@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Arc, Circle, FancyBboxPatch
 
 from tirelib.axes import FLIPPED, sign
+from tirelib.threads import one_thread
 
 OUT = Path(__file__).resolve().parent.parent / "docs/reference/signs"
 NAMES = {
@@ -166,4 +167,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

@@ -13,6 +13,8 @@ from typing import Any
 
 from genson import SchemaBuilder
 
+from tirelib.threads import one_thread
+
 OUT = Path(__file__).resolve().parent.parent / "docs/reference/schemas"
 ABOUT = {
     "tirelib-calibrate/1": "`tirelib calibrate`: statistics of all estimators.",
@@ -93,4 +95,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()

@@ -93,7 +93,7 @@ class Asked:
         (diagnose_force, 3, ("noise", "repeats")),
         (add_effect, 3, ()),
         (add_brush_effect, 2, ()),
-        (next_test, 4, ("noise",)),
+        (next_test, 3, ()),
         (selftest, 3, ()),
         (train, 1, ()),
         (simulate, 1, ("load",)),

@@ -10,7 +10,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.guess import Guess, guess_law
 from tirelib.diagnose.left import left_of
-from tirelib.diagnose.refit import Refit, Refits, inside, refit
+from tirelib.diagnose.refit import Refit, Refits, inside, refit, settled
 from tirelib.effects import Effect
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.span import span
@@ -198,6 +198,11 @@ def fitted_problem(
     """Return a model fitted to straight runs, and the problem about it; arguments of `diagnose`."""
     data = runs.data(with_deflection=False)
     base = refit(data, values, effects, strengths, progress=progress)
+    found = StrainProblem(runs, base.values, (), effects, base.strengths)
+    given = StrainProblem(runs, values, (), effects, strengths)
+    if np.sum(given.reference.rest**2) < np.sum(found.reference.rest**2):
+        # the linear ring of the refit has led away from what fits the rolling ring
+        base = settled(data, values, effects, strengths)
     return base, StrainProblem(runs, base.values, catalogue, effects, base.strengths)
 
 

@@ -179,6 +179,19 @@ def refit(
     return _result(fitter)
 
 
+def settled(
+    data: Data,
+    values: Mapping[str, float | FloatArray],
+    effects: Sequence[Effect],
+    strengths: Sequence[FloatArray],
+) -> Refit:
+    """Return the model at values and strengths that have been fitted elsewhere, without a delay."""
+    fitter = Fitter(data, dict(values), tuple(effects), list(strengths), 0.0, None)
+    fitter.refresh()
+    fitter.renew()
+    return _result(fitter)
+
+
 class Refits:
     """Fits of one campaign with effects added to a model, each made once.
 
