@@ -3,8 +3,6 @@
     python build/next_test/run.py --seeds 6100-6103
     python build/next_test/run.py --scattered --seeds 6100-6103
 
-Side force; look-alikes of strain are judged by build/structure/advise.py.
-
 Resumable: verdicts are kept in build/out/next_test as long as the library's code is the same. Seeds
 from 6000 on judge the method and are never used to change it; 1000 to 1999 are for development.
 """
