@@ -7,8 +7,8 @@
     python build/fleet_proof.py endurance --minutes 10
 
 Each prints one line of numbers a case; docs/howto/fleet.md holds them. Campaigns and recordings
-are of the tests' made-up tire. On a machine that others use, wall times say little: the processor
-time of workers is beside them.
+are of the tests' made-up tire. On a machine that others use, wall times say little: each line gives
+the processor time of the workers too.
 """
 
 import argparse
@@ -31,6 +31,7 @@ from distributed import Client, LocalCluster
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
+# the tests can be imported only once the checkout is on the path
 from tests.fleet.recordings import describe, write_drive  # noqa: E402
 from tests.synthetic import cornering_runs, synthetic_run, write  # noqa: E402
 from tirelib.campaign import read_campaign  # noqa: E402

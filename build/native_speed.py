@@ -22,6 +22,7 @@ from fmpy import read_model_description
 ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT)]
 
+# the tests can be imported only once the checkout is on the path
 from tests.fmu import live  # noqa: E402
 from tests.synthetic import record  # noqa: E402
 from tirelib.fmu.build import build_fmu  # noqa: E402

@@ -49,7 +49,7 @@ def floor_of(error: ModelError, hypothesis: Hypothesis, alpha: float) -> float:
     Parameters
     ----------
     error : ModelError
-        Of the model of the hypothesis.
+        The error of the model that the hypothesis describes.
     hypothesis : Hypothesis
     alpha : float
         False-alarm probability.

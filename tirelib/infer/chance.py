@@ -57,7 +57,7 @@ class Plans:
     repeats : int
         Tires that a planting takes, by turns of every family.
     seed : int
-        Of the choice of tires.
+        It decides which plain tires are chosen.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class Plans:
         ----------
         name : str
         strength : float
-            Of its first component, in ranges.
+            Strength of the effect's first component, in ranges.
         """
         rows = strength * self.base.fit.rows[name][0]
         return self._judged([tires + rows for _, tires in self.tires])
@@ -119,7 +119,7 @@ class Plans:
         Parameters
         ----------
         strength : float
-            Of its first component, in ranges.
+            Strength of the effect's first component, in ranges.
         """
         return float(np.sqrt(1.0 + strength**2 * self._share(name)))
 

@@ -137,7 +137,7 @@ def selftest(
     false_alarm : float
         Probability with which a plain tire is said to lack something.
     seed : int
-        Of the choice of tires.
+        It decides which plain tires are chosen.
     progress : callable, optional
 
     Raises
