@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tirebench.protocols.decoder import SerialDecoder
 from tirebench.wire.device import Device
 from tirebench.wire.frames import FrameFlag, Frames, encode, select, strain_frames
-from tirebench.wire.rate_check import JUDGED, LONGEST_WAIT
+from tirebench.wire.rate_check import BASELINE, JUDGED, LONGEST_WAIT
 from tirebench.wire.timeline import LATEST_FRAME, Samples, Timeline
 
 PERIOD = 1000  # ticks: 10 kHz
@@ -198,6 +198,18 @@ def test_a_rate_is_judged_anew_after_each_start_and_is_not_waited_for_without_en
         begun,
         waited,
     ]
+
+
+@pytest.mark.parametrize("heard", [BASELINE + 1, 60, JUDGED + 40])
+def test_pauses_of_the_transmitter_while_the_cable_is_out_are_no_slower_clock(heard: int) -> None:
+    """Between two runs time goes on and the frames' numbers do not; no receiver hears it here."""
+    count = 8 * JUDGED
+    frames = paced(count, 0.0)
+    part = np.arange(count) // heard
+    paused = replace(frames, t_us=frames.t_us + part // 2 * 100_000)
+    timeline = Timeline(Device())
+    timeline.push(select(paused, part % 2 == 0))
+    assert not timeline.contradiction
 
 
 @given(

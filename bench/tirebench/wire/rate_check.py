@@ -30,7 +30,9 @@ class RateCheck:
     """Find a sample rate that the clock of one wheel contradicts.
 
     Lost frames, or one jump of the clock, sway nothing: the middle third of the rates is judged,
-    and one jump lies between a third of the pairs of frames.
+    and one jump lies between a third of the pairs of frames. The check begins anew after a gap of
+    more than `BASELINE` frames, because a transmitter may have paused in it: two such pauses would
+    be a slower clock in two thirds of the pairs.
 
     Parameters
     ----------
@@ -67,8 +69,11 @@ class RateCheck:
             return
         for seq, t_us in zip(frames.seq.tolist(), frames.t_us.tolist(), strict=True):
             place = time = 0
+            steps = (seq - self._seq) % 2**16
+            if self._places and steps > BASELINE:
+                self._collect()
             if self._places:
-                place = self._places[-1] + (seq - self._seq) % 2**16 * self._samples
+                place = self._places[-1] + steps * self._samples
                 elapsed = t_us - self._times[-1]
                 time = self._times[-1] + (elapsed + 2**31) % 2**32 - 2**31
             else:
