@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: all demo studio test lint docs bench figures fem proof hidden next-test cosim cosim-all bench-demo faults endurance soak \
+.PHONY: all demo studio test suite lint docs bench figures fem proof hidden next-test cosim cosim-all bench-demo faults endurance soak \
 	measured package clean
 
 all: $(STAMP)
@@ -23,9 +23,13 @@ demo: $(STAMP)
 studio: $(STAMP)
 	$(BIN)/tirelib studio
 
+# The checks of the source take one core for a minute: they run beside the tests.
+test: $(STAMP)
+	$(MAKE) --jobs=2 lint suite
+
 # A file to each process; one process more than cores, as tests of the bench and the browser wait.
 # In the order of the folders: what is short, tests/unit, comes last. One thread in each process.
-test: lint
+suite: $(STAMP)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --dist=loadfile \
 		--no-loadscope-reorder --numprocesses=$$($(BIN)/python -c "import os; print(os.cpu_count() + 1)")
 
