@@ -1,5 +1,6 @@
 """Shared by the tests of the bench: a tiny campaign, toy FMUs, programs in their own process."""
 
+import os
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -33,6 +34,17 @@ def terminal_that_hangs_up() -> Iterator[None]:
     yield
     if hang_up is not None:
         signal.signal(hang_up, before)
+
+
+@pytest.fixture(autouse=True)
+def ordinary_priority() -> Iterator[None]:
+    """Give back the real-time priority that a run of the bench takes for the process of the tests.
+
+    All later tests of this process would go before the programs that they start and wait for.
+    """
+    yield
+    if hasattr(os, "sched_setscheduler"):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
 @pytest.fixture(scope="module")
