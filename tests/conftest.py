@@ -18,7 +18,6 @@ settings.register_profile(
 )
 settings.register_profile("new", settings.get_profile("same"), derandomize=False)
 settings.load_profile(os.environ.get("TIRELIB_EXAMPLES", "same"))
-os.environ["TIRELIB_CACHE"] = "off"  # no ensemble of an earlier version, none left behind
 ROOT = Path(__file__).parents[1]
 os.environ["PYTHONPATH"] = os.pathsep.join(  # what tests start imports this checkout as well
     [str(ROOT), str(ROOT / "bench"), *filter(None, [os.environ.get("PYTHONPATH")])]

@@ -37,7 +37,6 @@ class Folder:
 
 
 def use(patch: pytest.MonkeyPatch, measured: Waveforms) -> None:
-    patch.setenv("TIRELIB_CACHE", "off")
     for verb in ("diagnose", "add"):
         patch.setattr(f"tirelib.cli.{verb}.read_campaign", lambda path: Folder(measured))
     patch.setattr("tirelib.waveforms.measure_waveforms", lambda c, progress: c.measured)

@@ -63,7 +63,6 @@ def strain(tmp_path_factory: pytest.TempPathFactory) -> Any:
     write_tire(model_file(), folder / "M.toml", "tirelib-model/1")
     measured = waves(EFFECT, STRENGTH)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("TIRELIB_CACHE", "off")
         for verb in ("compare", "diagnose", "add", "explain"):
             patch.setattr(f"tirelib.cli.{verb}.read_campaign", lambda path: Folder(measured))
         for module in (waveforms, sys.modules["tirelib.compare.compare"]):

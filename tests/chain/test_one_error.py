@@ -34,7 +34,6 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
         out[verb] = json.loads(target.read_text())
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("TIRELIB_CACHE", "off")
         for verb in VERBS:
             patch.setattr(f"tirelib.cli.{verb}.read_campaign", lambda path: Folder(measured))
         for module in (waveforms, sys.modules["tirelib.compare.compare"]):

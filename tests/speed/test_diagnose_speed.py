@@ -18,11 +18,6 @@ pytestmark = pytest.mark.speed
 EFFECTS = [effect for effect in CATALOGUE.values() if effect.hook != "brush"]
 
 
-@pytest.fixture(autouse=True)
-def no_store(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("TIRELIB_CACHE", "off")
-
-
 def cost(work: Callable[[], object]) -> float:
     """Return the least processor time of two calls."""
     times = []
