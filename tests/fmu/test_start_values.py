@@ -14,7 +14,7 @@ from tests.fmu.virtual_host import QUIET, TYPICAL, Host, file
 from tirelib.fmu.run import LoadedFmu
 from tirelib.fmu.variables import outputs
 
-NAMES = [v.name for v in outputs(live.calibration().lateral)]
+NAMES = [v.name for v in outputs(live.HEADER.gage_lateral)]
 
 
 @pytest.fixture(scope="module")
