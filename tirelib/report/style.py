@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
@@ -150,12 +151,19 @@ def legend_below(
 
 
 def save(figure: Figure, folder: Path, name: str) -> str:
-    """Write PNG and SVG files, make the folder if needed, and return the PNG's name."""
+    """Write PNG and SVG files, make the folder if needed, and return the PNG's name.
+
+    Each file is drawn once; `Figure.savefig` would go through all artists twice for each.
+    """
     folder.mkdir(parents=True, exist_ok=True)
+    canvas, engine, dots = figure.canvas, figure.get_layout_engine(), figure.dpi
     with mpl.rc_context(STYLE):
-        figure.savefig(folder / f"{name}.png", dpi=RESOLUTION)
-        engine = figure.get_layout_engine()
+        figure.dpi = RESOLUTION
+        FigureCanvasAgg(figure).print_png(folder / f"{name}.png")
+        figure.dpi = dots  # of what an SVG file holds as pixels
         figure.set_layout_engine("none")  # the places are found; do not look for them twice
-        figure.savefig(folder / f"{name}.svg", metadata={"Date": None})
+        FigureCanvasSVG(figure).print_svg(folder / f"{name}.svg", metadata={"Date": None})
         figure.set_layout_engine(engine)
+    figure.dpi = dots
+    figure.set_canvas(canvas)
     return f"{name}.png"
