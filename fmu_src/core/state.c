@@ -9,7 +9,7 @@ typedef struct {
     int64_t gages, samples, axes, queued, first, rows, live, cutter, calibration;
 } Head;
 
-static const char FORMAT[16] = "tire-state/1";
+static const char FORMAT[16] = "tire-state/2";
 
 /* Hash of bytes, so that damage is seen (FNV-1a, G. Fowler, L. C. Noll, K.-P. Vo, 1991). */
 static uint64_t hash(const unsigned char *bytes, size_t n) {

@@ -163,31 +163,35 @@ static int window_of(Cutter *c, Turn *turn, double sigma) {
     return 1;
 }
 
-/* Offset at the contact, its std, and how it moved since the turn before; keeps what was read.
+static void nothing_read(Cutter *c) {
+    for (int g = 0; g < GAGES; g++) {
+        c->first.time[g] = c->first.value[g] = NAN;
+        c->last.time[g] = c->last.value[g] = NAN;
+    }
+}
+
+static double or_zero(double x) {
+    return isnan(x) ? 0.0 : x;
+}
+
+/* Offset at the contact, its std, and how it moved since it was last read; keeps what was read.
  * Reference: TurnCutter._offset */
 static void follow_offset(Cutter *c, const double *opposite, Turn *turn, double *moved) {
-    Opposite now = {0};
-    now.time = law_sample(&c->law, -PI);
+    double time = law_sample(&c->law, -PI);
     for (int g = 0; g < c->gages; g++) {
-        double follow = 0.0, left = 0.0;
-        now.value[g] = opposite[g];
-        moved[g] = 0.0;
-        for (int k = 0; k < c->opposites; k++) {
-            const Opposite *start = &c->opposite[k];
-            const Opposite *stop = k + 1 < c->opposites ? &c->opposite[k + 1] : &now;
-            double before = moved[g];
-            double share = (c->law.middle - now.time) / (stop->time - start->time);
-            moved[g] = stop->value[g] - start->value[g];
-            double followed = minmod(moved[g], before);
-            follow = share * followed;
-            left = share * fabs(moved[g] - followed);
-        }
-        turn->offset[g] = opposite[g] + follow;
-        turn->offset_std[g] = left;
+        double before = or_zero(c->last.value[g] - c->first.value[g]);
+        double share = or_zero((c->law.middle - time) / (time - c->last.time[g]));
+        double followed;
+        moved[g] = or_zero(opposite[g] - c->last.value[g]);
+        followed = minmod(moved[g], before);
+        turn->offset[g] = opposite[g] + share * followed;
+        turn->offset_std[g] = isnan(opposite[g]) ? NAN : share * fabs(moved[g] - followed);
+        if (isnan(opposite[g])) continue;
+        c->first.time[g] = c->last.time[g];
+        c->first.value[g] = c->last.value[g];
+        c->last.time[g] = time;
+        c->last.value[g] = opposite[g];
     }
-    if (c->opposites == 2) c->opposite[0] = c->opposite[1];
-    c->opposites = c->opposites ? 2 : 1;
-    c->opposite[c->opposites - 1] = now;
 }
 
 /* Wheel angle of the contact's middle from the trigger. Reference: TurnCutter._trigger */
@@ -268,7 +272,7 @@ static void take_strain(Cutter *c, double start, double stop, Turn *turn) {
             if (turn->strain[k] > high) high = turn->strain[k];
         }
         turn->mean[g] = unusable ? NAN : mean[g] - turn->offset[g];
-        if (fabs(moved[g]) > DRIFT_SHARE * (high - low)) turn->gage_flags[g] |= DRIFT;
+        if (!unusable && fabs(moved[g]) > DRIFT_SHARE * (high - low)) turn->gage_flags[g] |= DRIFT;
         turn->flags |= turn->gage_flags[g];
     }
     if (out > 1 || (turn->gage_flags[c->centre] & UNUSABLE))
@@ -340,7 +344,7 @@ int cutter_next(Cutter *c, Turn *turn) {
         c->previous = taken_from_queue(c);
         c->has_previous = 1;
         c->previous_period = NAN;
-        c->opposites = 0;
+        nothing_read(c);
         c->past.n = 0;
         c->rolled.ratio = c->rolled.pull = NAN;
         first_turn(c, &c->previous, turn);

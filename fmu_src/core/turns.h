@@ -24,9 +24,9 @@ typedef struct {
     double number[14], offset[GAGES], offset_std[GAGES], mean[GAGES];
 } TurnHead;
 
-/* What each gage read opposite the contact, and when [samples]. */
+/* What each gage read opposite the contact, and when [samples]; NaN: nothing was read. */
 typedef struct {
-    double time, value[GAGES];
+    double time[GAGES], value[GAGES];
 } Opposite;
 
 /* Where the work on the first waiting contact stands. */
@@ -43,8 +43,7 @@ typedef struct {
     int has_previous;
     Contact previous;
     double previous_period;
-    int opposites; /* how many of the last two turns are known */
-    Opposite opposite[2];
+    Opposite first, last; /* of the last two turns in which a gage was read there */
     Past past;
     Rolled rolled; /* in the contact before */
     int stage;

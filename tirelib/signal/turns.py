@@ -16,7 +16,6 @@ whole record, by the compiled core where there is one; both agree to 1e-9, flags
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 from typing import Unpack
 
 import numpy as np
@@ -95,7 +94,7 @@ class TurnCutter:
         self._waiting: deque[Contact] = deque()
         self._previous: Contact | None = None
         self._previous_period = np.nan
-        self._offsets: tuple[tuple[float, FloatArray], ...] = ()  # of two turns, with their times
+        self._offsets = self._nothing_read()
         self._past: Past = ()
         self._rolled: Rolled = NOTHING  # in the contact before
 
@@ -170,7 +169,8 @@ class TurnCutter:
         if contact.fresh or before is None:
             self._waiting.popleft()
             self._previous = replace(contact, damaged=self._damaged(contact))
-            self._previous_period, self._offsets, self._past = np.nan, (), ()
+            self._previous_period, self._past = np.nan, ()
+            self._offsets = self._nothing_read()
             self._rolled = NOTHING
             return self._first_turn(contact)
         law, stop = self._needs(contact, before)
@@ -306,7 +306,7 @@ class TurnCutter:
         strain[unusable], rate[unusable] = np.nan, np.nan
         swing = np.fmax.reduce(strain, axis=1, initial=0.0)
         swing -= np.fmin.reduce(strain, axis=1, initial=0.0)
-        gage_flags[np.abs(moved) > DRIFT_SHARE * swing] |= int(TurnFlag.DRIFT)
+        gage_flags[~unusable & (np.abs(moved) > DRIFT_SHARE * swing)] |= int(TurnFlag.DRIFT)
         conditions, _ = self._mean(
             slice(self._gages, self._gages + len(HELD)), before.middle, contact.middle
         )
@@ -369,25 +369,28 @@ class TurnCutter:
             self._rolled = rolled
         return float(np.hypot(law.slip_std, law.late * unseen))
 
+    def _nothing_read(self) -> FloatArray:
+        """Return times and offsets of two turns, shape (2, 2, n_gages), none of them known."""
+        return np.full((2, 2, self._gages), np.nan)
+
     def _offset(
         self, opposite: FloatArray, law: AngleLaw
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the offset at the contact, its std, and how it moved since the turn before.
+        """Return the offset at the contact, its std, and how it moved since it was last read.
 
         What is read half a turn before the contact moves on until there: the hoop strain with the
         square of the turn rate, the gage's zero with its temperature. It is followed as the turn
-        rate is, see `tirelib.signal.angle`.
+        rate is, see `tirelib.signal.angle`. Each gage is compared with the last turns in which its
+        samples are not missing there.
         """
-        time = law.sample(-np.pi)
-        earlier, self._offsets = self._offsets, (*self._offsets[-1:], (time, opposite))
-        moved: FloatArray = np.zeros(self._gages)
-        followed = left = moved
-        for (start, first), (stop, second) in pairwise((*earlier, (time, opposite))):
-            before, moved = moved, second - first
-            share = (law.middle - time) / (stop - start)
-            followed = minmod(moved, before)
-            followed, left = share * followed, share * np.abs(moved - followed)
-        return opposite + followed, left, moved
+        time = np.where(np.isnan(opposite), np.nan, law.sample(-np.pi))
+        (first, last), now = self._offsets, np.array([time, opposite])
+        self._offsets = np.where(np.isnan(now), self._offsets, [last, now])
+        moved, before = np.nan_to_num(opposite - last[1]), np.nan_to_num(last[1] - first[1])
+        share = np.nan_to_num((law.middle - time) / (time - last[0]))
+        followed = minmod(moved, before)
+        left = np.where(np.isnan(opposite), np.nan, share * np.abs(moved - followed))
+        return opposite + share * followed, left, moved
 
     def _window(
         self, law: AngleLaw, sigma: float | None, pulse: float, stop: int

@@ -30,7 +30,7 @@ from tirelib.stream.estimate import TurnEstimate
 from tirelib.stream.estimator import StreamEstimator
 from tirelib.stream.snapshot import from_plain, to_plain
 
-STATE_FORMAT = "tirelib-core-state/1"
+STATE_FORMAT = "tirelib-core-state/2"
 
 
 class CompiledEstimator(StreamEstimator):

@@ -329,6 +329,37 @@ def test_spikes_away_from_the_contact_do_not_move_the_offset() -> None:
     np.testing.assert_allclose(turns.offset[1:], clean.offset[1:], atol=2e-6)
 
 
+@pytest.mark.parametrize("rising", [0.0, 1e-4])
+def test_a_gap_opposite_the_contact_leaves_the_next_turn_a_doubt_of_its_offset(
+    rising: float,
+) -> None:
+    """How far the offset moved is read over the two turns that are known."""
+    strain, _, omega = record(turns=6.0)
+    turn = 2.0 * np.pi / omega * RATE
+    strain += rising * np.arange(strain.shape[1]) / turn
+    at = middle_of(turns_of(strain), 2) - int(turn / 2.0)
+    holed = strain.copy()
+    holed[:, at - 100 : at + 100] = np.nan
+    cut = TurnCutter(LATERAL, RATE).push(holed, speed=18.0)  # numpy, which the core must equal
+    for turns in (turns_of(holed), stack_turns(cut, np.array(LATERAL), RATE)):
+        assert has(turns, TurnFlag.TOO_FEW_GAGES, 2)
+        assert np.isnan(turns.offset_std[2]).all()
+        assert (turns.flags[3] & int(INVALIDATING)) == 0
+        # in half a turn it may have moved by half of what it moved in the two turns before
+        np.testing.assert_allclose(turns.offset_std[3], 0.25 * 2.0 * rising, atol=3e-6)
+        assert np.isfinite(turns.offset_std[3:]).all()
+
+
+def test_a_gage_whose_swing_is_not_known_does_not_drift() -> None:
+    strain, _, _ = record(noise=4e-6)
+    at = middle_of(turns_of(strain), 2)
+    strain[1, at - 20 : at + 20] = np.nan
+    cut = TurnCutter(LATERAL, RATE).push(strain, speed=18.0)
+    for turns in (turns_of(strain), stack_turns(cut, np.array(LATERAL), RATE)):
+        assert has(turns, TurnFlag.GAP, 2, 1)
+        assert not has(turns, TurnFlag.DRIFT, 2)
+
+
 @pytest.mark.parametrize("length", [2, 3, 16, 64])
 @pytest.mark.parametrize("shift", [-40, -34, -30, 20, 30, 34, 40])
 def test_a_gap_at_one_contact_does_not_spoil_the_next_turn(length: int, shift: int) -> None:

@@ -200,6 +200,18 @@ def test_a_gap_in_the_contact_makes_a_flag_and_no_number_and_the_next_turn_is_we
     np.testing.assert_allclose(turns[-1].value("Fz"), clean[-1].value("Fz"), rtol=1e-5)
 
 
+def test_a_valid_turn_after_a_gap_opposite_the_contact_has_every_standard_deviation() -> None:
+    strain, _ = live.strain_of(4e3, 0.05, turns=5.4)
+    clean = played(strain)
+    at = int((1.5 * clean[1].time - 0.5 * clean[0].time) * live.RATE)
+    strain[:, at - 100 : at + 100] = np.nan
+    *_, bad, after, _ = played(strain)
+    assert "too_few_gages" in flag_names(bad.flags)
+    for quantity in QUANTITIES:
+        assert after.is_valid(quantity)
+        assert np.isfinite(after.std(quantity))
+
+
 @pytest.mark.parametrize("speed", [np.nan, 0.0])
 def test_without_a_speed_kappa_is_unknown_and_flagged(speed: float) -> None:
     turn = played(live.strain_of(4e3, 0.05)[0], speed=speed)[-1]
