@@ -49,7 +49,12 @@ def test_a_condition_that_the_calibration_needs_is_missed_before_the_first_turn(
 
 def test_what_only_makes_it_worse_is_a_note() -> None:
     text = said(RunInputs((serial("a", 0),), Conditions.constant(pressure=2e5, camber=0.0), ()))
-    assert text.startswith("note: no speed: the slip ratio cannot be estimated; give --speed KMH")
+    assert text.startswith(
+        "note: no speed: the slip ratio cannot be estimated, so no turn is valid"
+    )
+    assert (
+        "Fz, alpha and Fy are estimated, and --json has the validity of each; give --speed" in text
+    )
     assert text.count("\n") == 1
 
 

@@ -28,7 +28,8 @@ LOOK = 0.05
 """Time between two looks for a file that is waited for, [s]."""
 _OPTIONS = {"speed": "--speed KMH, ", "pressure": "--pressure BAR, ", "camber": "--camber DEG, "}
 _WITHOUT = {
-    "speed": "the slip ratio cannot be estimated",
+    "speed": "the slip ratio cannot be estimated, so no turn is valid as a whole and the run ends "
+    "with exit code 1; Fz, alpha and Fy are estimated, and --json has the validity of each",
     "pressure": "standard deviations grow by the possible effect of the pressure",
     "camber": "standard deviations of Fy and alpha grow by the possible effect of camber, and "
     "turns where camber dominates carry the flag camber_unknown",
