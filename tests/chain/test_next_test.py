@@ -1,6 +1,11 @@
-"""`tirelib next-test` and `tirelib selftest`: keys, files, exit codes, messages."""
+"""`tirelib next-test` and `tirelib selftest`: keys, files, exit codes, messages.
+
+The error that they report is that of `tirelib compare`; `test_identify` and `test_explain` hold the
+same for the other verbs.
+"""
 
 import json
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -8,18 +13,13 @@ from typing import Any
 import pytest
 from click.testing import CliRunner, Result
 
+from tests.chain.test_diagnose import Folder
 from tests.unit.diagnose.planted import EFFECT, STRENGTH, model_file, waves
+from tirelib import waveforms
 from tirelib.cli import program
 from tirelib.errors import TirelibError
 from tirelib.parameters import write_tire
 from tirelib.waveforms import Waveforms
-
-
-class Folder:
-    """Stands in for a campaign's files; the waveforms are the model's own."""
-
-    def __init__(self, measured: Waveforms) -> None:
-        self.measured, self.header = measured, measured.header
 
 
 @pytest.fixture(autouse=True)
@@ -28,9 +28,10 @@ def campaign(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def use(patch: pytest.MonkeyPatch, measured: Waveforms) -> None:
-    for verb in ("next_test", "selftest"):
+    for verb in ("compare", "next_test", "selftest"):
         patch.setattr(f"tirelib.cli.{verb}.read_campaign", lambda path: Folder(measured))
-    patch.setattr("tirelib.waveforms.measure_waveforms", lambda c, progress: c.measured)
+    for module in (waveforms, sys.modules["tirelib.compare.compare"]):
+        patch.setattr(module, "measure_waveforms", lambda c, progress: c.measured)
 
 
 def call(*words: object) -> Result:
@@ -187,31 +188,64 @@ def test_bad_input_is_told(model: Path, tmp_path: Path, monkeypatch: pytest.Monk
     assert "at least 4" in refused(*run, "--suspects", "low_pass")
 
 
-def test_a_selftest_tells_chances_on_page_and_screen(model: Path, tmp_path: Path) -> None:
-    found = call(
-        "selftest",
-        "x",
-        "--model",
-        model,
-        "--effects-of",
-        "sidewall_load",
-        "--ratio",
-        1.1,
-        "--repeats",
-        2,
-        "--out",
-        tmp_path,
-        "--json",
-        tmp_path / "S.json",
-    )
+@pytest.fixture(scope="module")
+def judged(model: Path) -> Any:
+    out, target = model.parent / "judged", model.parent / "S.json"
+    with pytest.MonkeyPatch.context() as patch:
+        use(patch, waves(EFFECT, STRENGTH))
+        found = call(
+            "selftest",
+            "x",
+            "--model",
+            model,
+            "--effects-of",
+            "sidewall_load",
+            "--ratio",
+            1.1,
+            "--repeats",
+            2,
+            "--out",
+            out,
+            "--json",
+            target,
+        )
     assert found.exit_code == 0, found.output
-    told = json.loads((tmp_path / "S.json").read_text())
+    return SimpleNamespace(told=json.loads(target.read_text()), out=out, said=found.output)
+
+
+def test_a_selftest_tells_chances_on_page_and_screen(judged: Any) -> None:
+    told = judged.told
     assert told["format"] == "tirelib-selftest/1"
     assert [entry["effect"] for entry in told["effects"]] == ["sidewall_load"]
     assert told["effects"][0]["results"][0]["n"] == 2
-    page, words = (tmp_path / "selftest.html").read_text(), (tmp_path / "selftest.md").read_text()
+    page, words = (
+        (judged.out / "selftest.html").read_text(),
+        (judged.out / "selftest.md").read_text(),
+    )
     assert 'id="plot-chance"' in page
     for text in ("optimistic", "Dead effects", "no run has a camber"):
         assert text in page
         assert text in words
-        assert text in found.output or text == "Dead effects"
+        assert text in judged.said or text == "Dead effects"
+
+
+@pytest.fixture(scope="module")
+def compared(model: Path) -> dict[str, Any]:
+    target = model.parent / "C.json"
+    with pytest.MonkeyPatch.context() as patch:
+        use(patch, waves(EFFECT, STRENGTH))
+        found = call("compare", "x", "--model", model, "--json", target)
+    assert found.exit_code == 0, found.output
+    return dict(json.loads(target.read_text()))
+
+
+@pytest.mark.parametrize("planning", ["planned", "judged"])
+def test_planning_reports_the_error_that_compare_reports(
+    compared: dict[str, Any], planning: str, request: pytest.FixtureRequest
+) -> None:
+    told = request.getfixturevalue(planning).told
+    assert compared["error"] > 5.0
+    for key in ("error", "noise", "residual_rms_raw"):
+        # contacts solved from another start differ by rounding
+        assert told[key] == pytest.approx(compared[key], rel=1e-6), key
+    assert told["error_unit"] == compared["error_unit"] == "noise"
