@@ -73,11 +73,12 @@ def _print_problems(folder: Path, problems: list[Problem], errors: int) -> None:
         console.print(f"[bold {colour}]{problem.severity:>7}[/]  ", end="")
         console.print(str(problem), markup=False)
     warnings = len(problems) - errors
-    verdict = (
-        "[bold red]not usable until the errors are corrected[/]"
-        if errors
-        else "[bold green]sound[/]"
-    )
+    if errors:
+        verdict = "[bold red]not usable until the errors are corrected[/]"
+    elif warnings:
+        verdict = "[bold yellow]usable, but read the warnings[/]"
+    else:
+        verdict = "[bold green]sound[/]"
     counts = f"{_count(errors, 'error')}, {_count(warnings, 'warning')}"
     console.print(f"{folder}: {counts}: ", markup=False, end="")
     console.print(verdict)

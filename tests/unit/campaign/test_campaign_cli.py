@@ -54,7 +54,21 @@ def test_errors_exit_1_and_all_are_listed_and_counted(
 def test_warnings_alone_exit_0(write: Write, sound_runs: tuple[Run, ...]) -> None:
     result = call("check", write(sound_runs[:10]))
     assert result.exit_code == 0
-    assert "0 errors, 1 warning: sound" in result.stdout
+    assert "0 errors, 1 warning: usable, but read the warnings" in result.stdout
+
+
+def test_swapped_gages_that_nothing_can_show_are_not_called_sound(
+    write: Write, sound_runs: tuple[Run, ...]
+) -> None:
+    straight = [
+        replace(run, strain=run.strain[[1, 0, 2, 3, 4]])
+        for run in sound_runs
+        if run.plan.slip_angle == 0.0
+    ]
+    result = call("check", write(straight))
+    assert result.exit_code == 0
+    assert "the order of the gages was not checked" in result.stdout
+    assert "sound" not in result.stdout
 
 
 def test_what_is_no_folder_exits_2_without_traceback(tmp_path: Path) -> None:
