@@ -73,9 +73,14 @@ def sine_curve(
     >>> float(sine_curve(1e3, 1.0, 1.0, 4000.0, 0.0))
     3999.998
     """
-    b = np.asarray(B, dtype=np.float64) * np.asarray(x, dtype=np.float64)
-    inner = b - np.asarray(E) * (b - np.arctan(b))
-    return np.asarray(np.asarray(D) * np.sin(np.asarray(C) * np.arctan(inner)), dtype=np.float64)
+    angle = magic_angle(np.asarray(x, np.float64), np.asarray(B, np.float64), np.asarray(E))
+    return np.asarray(np.asarray(D) * np.sin(np.asarray(C) * angle), dtype=np.float64)
+
+
+def magic_angle(x: FloatArray, B: FloatArray, E: FloatArray) -> FloatArray:
+    """Return the angle under the sine or cosine of the Magic Formula, over C."""
+    b = B * x
+    return np.asarray(np.arctan(b - E * (b - np.arctan(b))))
 
 
 def lateral_curve(slip_angle: npt.ArrayLike, coefficients: Mapping[str, float]) -> FloatArray:

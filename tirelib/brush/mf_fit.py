@@ -1,7 +1,7 @@
 """The Magic Formula 6.1 fitted to forces: pure slips first, then their combination.
 
 Each stage fits the coefficients of one force with all others held, by least squares on
-`tirelib.brush.mf6`. A coefficient that changes linearly with load is fitted as its values at the
+`tirelib.brush.mf`. A coefficient that changes linearly with load is fitted as its values at the
 lowest and the highest load, so that a bound, such as E <= 1, holds at every load between them. What
 the data do not vary (load, camber, pressure) and forces that they lack are not fitted.
 """
@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from tirelib.arrays import BoolArray, FloatArray
-from tirelib.brush.mf6 import magic_forces_6
+from tirelib.brush.mf import magic_forces
 from tirelib.brush.mf_tire import Coefficients, MagicTire
 from tirelib.errors import CalibrationError
 
@@ -269,7 +269,7 @@ def _rows(points: MagicPoints, stage: _Stage) -> BoolArray:
 
 def _forces(points: MagicPoints, rows: BoolArray, tire: MagicTire, combined: bool) -> FloatArray:
     """Return Fx, Fy, Mz of the formula, shape (3, n)."""
-    at = magic_forces_6(
+    at = magic_forces(
         tire,
         points.load[rows],
         points.slip_angle[rows],
@@ -363,7 +363,7 @@ def _assume(
     if "PKX1" in values:
         return {}
     values |= {"PCX1": 1.5, "PDX1": values["PDY1"], "PKX1": 1.0}
-    stiffness = float(magic_forces_6(tire(), nominal, 0.0).cornering_stiffness)
+    stiffness = float(magic_forces(tire(), nominal, 0.0).cornering_stiffness)
     values["PKX1"] = abs(stiffness) / nominal
     return {
         "PCX1": "a usual value",

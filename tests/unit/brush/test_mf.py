@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from tirelib.brush.mf import magic_forces
-from tirelib.brush.mf6 import magic_forces_6
-from tirelib.brush.mf52 import magic_forces_5
 from tirelib.brush.mf_tire import Coefficients, MagicTire, magic_tire
 from tirelib.brush.tir import parse_tir
 from tirelib.errors import FormatError, ParameterError, ShapeError
@@ -301,26 +299,6 @@ def test_residual_moment_at_zero_slip() -> None:
     np.testing.assert_allclose(lean, LOADS * R0 * (0.15 * 1.02 * g + 0.2 * g * g), rtol=1e-9)
 
 
-def test_version_5_equals_version_6_where_they_coincide() -> None:
-    """Same coefficients, no camber: 5 at tan(alpha) is 6 at alpha. Two separate programs."""
-    values = {**PLAIN, **{k: v for k, v in SHIFTS.items() if k[0] in "PR"}}
-    alpha = np.array([[-0.12], [0.01], [0.09]])
-    six = magic_forces_6(tire(values), LOADS, alpha, -0.05)
-    five = magic_forces_5(tire(values, 52), LOADS, np.tan(alpha), -0.05)
-    np.testing.assert_allclose(five.Fx, six.Fx, rtol=1e-12)
-    np.testing.assert_allclose(five.Fy, six.Fy, rtol=1e-12)
-    pure6 = magic_forces_6(tire({**PLAIN, **SHIFTS}), LOADS, alpha, combined=False)
-    pure5 = magic_forces_5(tire({**PLAIN, **SHIFTS}, 52), LOADS, np.tan(alpha), combined=False)
-    cosine = np.cos(np.tan(alpha)) / np.cos(alpha)
-    np.testing.assert_allclose(pure5.Mz, pure6.Mz * cosine, rtol=1e-10)
-
-
-def test_version_5_camber_shifts_the_curve() -> None:
-    one = tire({**PLAIN, "PHY3": 0.03, "LGAY": 2.0}, 6)
-    lean, up = (magic_forces(one, LOADS, a, camber=g) for a, g in ((0.02, 0.1), (0.026, 0.0)))
-    np.testing.assert_allclose(lean.Fy, up.Fy, rtol=1e-12)
-
-
 @pytest.mark.parametrize(
     ("values", "fit"),
     [
@@ -369,10 +347,8 @@ def test_bad_inputs_are_refused() -> None:
         magic_forces(PURE, 4000.0, 5.0)
     with pytest.raises(ParameterError, match="has no pressure terms"):
         magic_forces(FIVE, 4000.0, 0.1, pressure=2e5)
-    with pytest.raises(ParameterError, match="magic_forces_5 takes 5, 6 and 52"):
-        magic_forces_5(PURE, 4000.0, 0.1)
-    with pytest.raises(ParameterError, match="magic_forces_6 takes 60, 61 and 62"):
-        magic_forces_6(FIVE, 4000.0, 0.1)
+    with pytest.raises(ParameterError, match="fit type 7; allowed are 5, 6, 52, 60, 61, 62"):
+        magic_forces(replace(PURE, fit_type=7), 4000.0, 0.1)
     with pytest.raises(ParameterError, match="pressure coefficients PPX1"):
         magic_forces(tire({**PLAIN, "PPX1": 0.1}, 6), 4000.0, 0.1)
     with pytest.raises(ParameterError, match="camber is not finite"):

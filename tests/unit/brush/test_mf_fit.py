@@ -16,7 +16,7 @@ from click.testing import CliRunner
 
 from tests.unit.brush.test_mf import PLAIN
 from tests.unit.force_campaigns import steady_runs, write_forces
-from tirelib.brush.mf6 import magic_forces_6
+from tirelib.brush.mf import magic_forces
 from tirelib.brush.mf_fit import STAGES, MagicFit, MagicPoints, _Fit, fit_magic
 from tirelib.brush.mf_tire import Coefficients, MagicTire, magic_tire
 from tirelib.brush.tir import read_tir
@@ -44,7 +44,7 @@ def made(slips: np.ndarray = BOTH, loads: tuple[float, ...] = LOADS) -> MagicPoi
     load, pressure, camber, pair = (np.array(x) for x in zip(*rows, strict=True))
     alpha, kappa = pair.T
     tire = MagicTire(61, Coefficients(TRUTH), 0.32, 4000.0, 2.2e5, 2.2e5, {})
-    at = magic_forces_6(tire, load, alpha, kappa, camber, pressure)
+    at = magic_forces(tire, load, alpha, kappa, camber, pressure)
     return MagicPoints(load, alpha, kappa, camber, pressure, at.Fx, at.Fy, at.Mz)
 
 
@@ -57,7 +57,7 @@ def refitted() -> MagicFit:
 def test_a_tire_of_the_formula_is_found_also_between_the_points(force: str, share: float) -> None:
     between = made(0.5 * (BOTH[1:] + BOTH[:-1]), (2200.0, 3700.0, 5200.0))
     names = ("load", "slip_angle", "slip_ratio", "camber", "pressure")
-    found = magic_forces_6(refitted().tire, *(getattr(between, name) for name in names))
+    found = magic_forces(refitted().tire, *(getattr(between, name) for name in names))
     wanted = getattr(between, force)
     assert np.abs(getattr(found, force) - wanted).max() < share * np.abs(wanted).max()
     assert found.curved_well.all()
@@ -96,7 +96,7 @@ def test_what_does_not_vary_is_not_fitted_and_what_is_missing_is_named() -> None
     }
     assert set(fit.errors) == {"Fy"}
     assert set(fit.assumed) == {"PCX1", "PDX1", "PKX1"}
-    stiffness = magic_forces_6(fit.tire, 3000.0, 0.0)
+    stiffness = magic_forces(fit.tire, 3000.0, 0.0)
     assert stiffness.slip_stiffness == pytest.approx(-stiffness.cornering_stiffness)
 
 
@@ -163,7 +163,7 @@ def test_an_independent_reader_gets_the_forces_of_the_brush(written: Path, press
         rows &= np.isclose(points.pressure, pressure)
         assert rows.sum() > 15
         read = side_force(c, load, points.slip_angle[rows], pressure)
-        ours = magic_forces_6(tire, load, points.slip_angle[rows], pressure=pressure).Fy
+        ours = magic_forces(tire, load, points.slip_angle[rows], pressure=pressure).Fy
         np.testing.assert_allclose(read, ours, atol=1e-6 * load)
         assert np.abs(read - points.Fy[rows]).max() <= 1.01 * told["largest"]
 
