@@ -20,18 +20,17 @@ import numpy as np
 from hidden.measured import CACHE, Plain, Planted, blank, keep, plain, traces, waveforms
 from hidden.plan import day
 from tirelib.arrays import BoolArray, FloatArray
-from tirelib.diagnose.refit import Refit, refit
-from tirelib.errors import ConvergenceError, TirelibError
+from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import straight_runs
-from tirelib.identify.identify import estimated, start_file
-from tirelib.identify.waveform_fit import Data
-from tirelib.model.base import values_of
+from tirelib.identify.delay import earlier
+from tirelib.identify.identify import estimated
+from tirelib.identify.waveform_fit import Data, WaveformFit
 from tirelib.rig.hidden import HIDDEN
 from tirelib.rig.observe import Trace
 from tirelib.waveforms import Waveforms
 
 NONE = "none"
-VERSION = 6
+VERSION = 7
 """Of everything that decides a case's numbers; raised when a law or the plan changes."""
 NODES = 1
 """The same of solved states with one effect."""
@@ -93,20 +92,9 @@ def fitted_data(waves: Waveforms, held_out: BoolArray) -> Data:
     return straight_runs(waves.take(~held_out)).data(with_deflection=False)
 
 
-def base_fit(waves: Waveforms, held_out: BoolArray, start: Refit | None = None) -> Refit:
-    """Fit the base model, from literature values or from another fit."""
-    runs = straight_runs(waves.take(~held_out))
-    data = runs.data(with_deflection=False)
-    values = start.values if start else values_of(start_file(waves.header, runs, None).tire)
-    try:
-        return refit(data, values)
-    except ConvergenceError:  # a long way from literature values: through identification
-        return refit(data, estimated(runs)[1].values)
-
-
-def residual(data: Data, model: Refit) -> float:
-    """Return the rms residual of a fitted model, in strain."""
-    return float(np.sqrt(np.mean((data.strain - model.waveform) ** 2)))
+def base_fit(waves: Waveforms, held_out: BoolArray) -> WaveformFit:
+    """Identify the base model from the runs that are fitted."""
+    return estimated(straight_runs(waves.take(~held_out)))[1]
 
 
 def make_case(
@@ -156,7 +144,7 @@ class _Search:
         self.progress, self.held_out = progress, base.day.held_out
         self.plain_data = fitted_data(floor_waves, self.held_out)
         self.plain_fit = base_fit(floor_waves, self.held_out)
-        self.floor = residual(self.plain_data, self.plain_fit)
+        self.floor = self.plain_fit.rms
         self.nodes: dict[str, dict[float, Waveforms]] = {}
 
     def case(self, ratio: float) -> Case:
@@ -170,8 +158,7 @@ class _Search:
         else:  # each alone would reach the ratio
             planted = {n: self._single(n, sign[n], ratio) for n in names}
         waves = self._waves(planted)
-        data, model = fitted_data(waves, self.held_out), None
-        model = base_fit(waves, self.held_out, self.plain_fit)
+        model = base_fit(waves, self.held_out)
         return Case(
             self.base.day.seed,
             self.kind,
@@ -180,7 +167,7 @@ class _Search:
             self.floor_waves,
             self.held_out,
             dict(planted),
-            residual(data, model) / self.floor,
+            model.rms / self.floor,
             model.error / self.plain_fit.error,
             self.floor,
         )
@@ -236,9 +223,8 @@ class _Search:
 
     def _ratio(self, planted: Planted) -> float:
         waves = self._waves(planted)
-        model = base_fit(waves, self.held_out, self.plain_fit)
-        ratio = residual(fitted_data(waves, self.held_out), model) / self.floor
-        return min(ratio, model.error / self.plain_fit.error)
+        model = base_fit(waves, self.held_out)
+        return min(model.rms / self.floor, model.error / self.plain_fit.error)
 
     def _single(self, name: str, sign: float, ratio: float) -> float:
         """Return the strength of one effect at which the ratio is reached."""
@@ -271,10 +257,12 @@ class _Search:
         waves, fit = self._waves({name: strength}), self.plain_fit
         used = straight_runs(self.floor_waves.take(~self.held_out)).gages
         change = (waves.strain - self.floor_waves.strain)[~self.held_out][:, used].mean(axis=1)
-        white = fit.whiten(fit.slopes).reshape(len(fit.slopes), -1)
+        slopes = fit.linear.waveform_slopes
+        white = fit.whiten(slopes).reshape(len(slopes), -1)
         moved = np.linalg.lstsq(white.T, fit.whiten(change).ravel(), rcond=None)[0]
-        own = change - np.tensordot(moved, fit.slopes, axes=1)
-        rest = self.plain_data.strain - fit.waveform
+        own = change - np.tensordot(moved, slopes, axes=1)
+        data = self.plain_data
+        rest = earlier(data.strain, data.points.omega, fit.delay) - fit.linear.waveform
         return max(
             _root(own, rest, self.floor, ratio),
             _root(fit.whiten(own), fit.whiten(rest), fit.error, ratio),

@@ -14,11 +14,12 @@ from tirelib.arrays import BoolArray, FloatArray
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.identify import estimated
 from tirelib.model.base import operating_points, values_of
+from tirelib.model.solution import solved
 from tirelib.model.state import Operating
-from tirelib.model.whole import solve_whole
 from tirelib.parameters import Tire
 from tirelib.rig.solve import inflated
 from tirelib.rig.tire import RigTire
+from tirelib.signal import LowPass
 from tirelib.waveforms import Waveforms
 
 LOAD, PRESSURE = 4800.0, 2.1e5
@@ -169,7 +170,7 @@ def vertical_stiffness(tire: Tire) -> float:
         order=none,
         temperature=np.full(2, np.nan),
     )
-    depth = solve_whole(values_of(tire), press).deflection
+    depth = solved(values_of(tire), press, low_pass=LowPass()).deflection
     return float(np.diff(loads)[0] / np.diff(depth)[0])
 
 
@@ -188,7 +189,7 @@ def _ratio(waves: Waveforms, out: BoolArray) -> float:
     _, fit, _ = estimated(kept)
     rest = straight_runs(waves.take(~out | out))
     points = operating_points(rest.waves)
-    wave = solve_whole(fit.values, points, low_pass=rest.waves.low_pass).waveform
+    wave = solved(fit.values, points, low_pass=rest.waves.low_pass).waveform
     error = np.mean((wave - rest.strain) ** 2, axis=1)
     share: FloatArray = error / np.mean(rest.strain**2, axis=1)
     return float(np.sqrt(share[out].mean() / share[~out].mean()))

@@ -29,7 +29,7 @@ from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.identify import estimate, prior_std, start_file
 from tirelib.identify.waveform_fit import Prior, WaveformFit, fit_waveforms
 from tirelib.model.base import PLAIN, values_of
-from tirelib.model.whole import solve_whole
+from tirelib.model.solution import solved
 from tirelib.threads import one_thread
 
 NUMBERS: Mapping[str, str] = {
@@ -114,9 +114,12 @@ def row(case: Case, without: Sequence[str], prior: Mapping[str, float]) -> Row:
 def _stiffness(fit: WaveformFit, runs: StraightRuns, case: Case) -> float:
     """Return the median relative error of the vertical stiffness over the runs."""
     points = runs.data().points
-    here = solve_whole(fit.values, points)
-    more = solve_whole(
-        fit.values, replace(points, load=points.load * (1.0 + NUDGE)), start=here.contact
+    here = solved(fit.values, points, low_pass=fit.cost.data.low_pass)
+    more = solved(
+        fit.values,
+        replace(points, load=points.load * (1.0 + NUDGE)),
+        low_pass=fit.cost.data.low_pass,
+        start=here.rolling,
     )
     found = points.load * NUDGE / (more.deflection - here.deflection)
     return float(np.median(found / np.array(case.truth["vertical_stiffness"]) - 1.0))

@@ -17,7 +17,7 @@ from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.delay import by_delay
 from tirelib.identify.identify import estimated
 from tirelib.identify.random_effects import Whitening, scales, tangents, whitening_of
-from tirelib.model.whole import solve_whole, whole_slopes
+from tirelib.model.solution import slopes_of, solved
 from tirelib.waveforms import Waveforms
 
 DELAY_STD = 1.0
@@ -53,8 +53,8 @@ class Yard:
         runs = straight_runs(waves)
         _, fit, _ = estimated(runs)
         data = runs.data()
-        found = solve_whole(fit.values, data.points, low_pass=data.low_pass)
-        by = whole_slopes(found, fit.values, data.points, fit.free, low_pass=data.low_pass)
+        found = solved(fit.values, data.points, low_pass=data.low_pass)
+        by = slopes_of(found, fit.free)
         k, wave = len(fit.free), found.waveform
         tangent = tangents(wave, by.waveform[k], by.waveform[k + 1])
         late = by_delay(wave, data.points.omega)[None] * DELAY_STD

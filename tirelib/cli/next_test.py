@@ -138,8 +138,9 @@ def next_test(
     """Tell which further run would separate the suspects of CAMPAIGN best."""
     from tirelib.compare.error import error_of
     from tirelib.compare.model import model_of
-    from tirelib.diagnose.diagnose import diagnose, fitted_problem, plain_tires
+    from tirelib.diagnose.diagnose import diagnose, plain_tires
     from tirelib.diagnose.document import assess, diagnosis_document
+    from tirelib.diagnose.fitted import fitted_problem
     from tirelib.identify.campaign_data import straight_runs
     from tirelib.infer.select import Hypotheses
     from tirelib.infer.strain import in_base
@@ -211,10 +212,11 @@ def next_test(
             told = diagnosis_document(assess(found, model, progress=progress))
             suspects, hypotheses = suspects_of(told, catalogue), found.verdict.hypotheses
         elif suspects.effects:
-            _, problem = fitted_problem(
+            problem = fitted_problem(
                 runs,
                 model.values,
                 list(catalogue.values()),
+                plain_tires(),
                 effects=effects,
                 strengths=strengths,
                 progress=progress,

@@ -73,11 +73,14 @@ class ModelError:
         """Whether there are repeats."""
         return self.unit == NOISE
 
+    def white_of(self, waveforms: FloatArray) -> FloatArray:
+        """Return waveforms (..., n_runs, n_phi) in `unit`: whitened, or microstrain."""
+        return 1e6 * waveforms if self.whiten is None else self.whiten(waveforms)
+
     @property
     def by_run(self) -> FloatArray:
         """The same for each run, shape (n_runs,); their mean square is that of `value`."""
-        white = 1e6 * self.rest if self.whiten is None else self.whiten(self.rest)
-        return np.asarray(np.sqrt(np.mean(white**2, axis=1)))
+        return np.asarray(np.sqrt(np.mean(self.white_of(self.rest) ** 2, axis=1)))
 
     @property
     def told(self) -> dict[str, Any]:

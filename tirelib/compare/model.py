@@ -9,8 +9,9 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.errors import CalibrationError, FormatError, ParameterError, TirelibError
-from tirelib.model.base import Correction, large_displacements, predict, values_of
-from tirelib.model.chain import Changes
+from tirelib.model.base import predict, values_of
+from tirelib.model.chain import Change, Changes
+from tirelib.model.solution import slopes_of, solved
 from tirelib.model.state import Operating, State
 from tirelib.parameters import TireFile
 from tirelib.rolling.solve import Start
@@ -18,7 +19,7 @@ from tirelib.signal import LowPass
 from tirelib.waveforms import N_PHI
 
 TRIAL = 1e-3
-"""Relative step by which slopes by load and pressure are taken."""
+"""Relative step by which slopes of the linear ring by load and pressure are taken."""
 RINGS = ("large displacements", "linear")
 
 
@@ -210,44 +211,75 @@ def _predict_runs(
     low_pass: LowPass,
     start: Start | None,
 ) -> Prediction:
-    n = len(points)
     places = lateral if model.across else np.zeros(1)
-    correction = None
-    if model.large:
-        correction = large_displacements(model.values, points, low_pass=low_pass, start=start)
+    one = _rolling if model.large else _linear
+    found: list[Prediction] = []
+    for place in places:
+        changes = [("constants", _at(place)), *model.changes] if model.across else model.changes
+        found.append(one(model.values, points, changes, low_pass, start))
+    gages = np.concatenate([each.gages for each in found], axis=1)
+    return replace(
+        found[0],
+        strain=np.mean([each.strain for each in found], axis=0),
+        gages=np.broadcast_to(gages, (len(points), lateral.size, N_PHI)),
+        by_load=np.mean([each.by_load for each in found], axis=0),
+        by_pressure=np.mean([each.by_pressure for each in found], axis=0),
+    )
+
+
+def _at(lateral: float) -> Change:
+    """Return the change that puts the gage at a lateral position [m]."""
+
+    def change(state: State) -> State:
+        return state.but(lateral=lateral)
+
+    return change
+
+
+def _rolling(
+    values: Mapping[str, float | FloatArray],
+    points: Operating,
+    changes: Changes,
+    low_pass: LowPass,
+    start: Start | None,
+) -> Prediction:
+    """Return what the rolling ring says of one gage."""
+    found = solved(values, points, changes, low_pass=low_pass, start=start)
+    by = slopes_of(found)
+    return Prediction(
+        found.waveform,
+        found.waveform[:, None],
+        by.waveform[0],
+        by.waveform[1],
+        found.deflection,
+        by.deflection[0],
+        found.rolling.on_turn(N_PHI).edges,
+    )
+
+
+def _linear(
+    values: Mapping[str, float | FloatArray],
+    points: Operating,
+    changes: Changes,
+    low_pass: LowPass,
+    start: Start | None,
+) -> Prediction:
+    """Return what the linear ring alone says of one gage."""
+    n = len(points)
     three = points.tiled(3)
     load, pressure = three.load.copy(), three.pressure.copy()
     load[n : 2 * n] *= 1.0 + TRIAL
     pressure[2 * n :] *= 1.0 + TRIAL
     three = replace(three, load=load, pressure=pressure)
-    states = [_at(model, three, place, correction, low_pass) for place in places]
-    waves = []
-    for state in states:
-        waves.append(state.wave.reshape(3, n, N_PHI))
-    mean = np.mean(waves, axis=0)
-    gages = np.stack([wave[0] for wave in waves], axis=1)
-    depth = states[0].deflection.reshape(3, n)
-    contact = states[0].contact
-    assert contact is not None  # noqa: S101 - the chain sets it
+    state = predict(values, three, changes, low_pass=low_pass)
+    wave, depth = state.wave.reshape(3, n, N_PHI), state.deflection.reshape(3, n)
+    assert state.contact is not None  # noqa: S101 - the chain sets it
     return Prediction(
-        mean[0],
-        np.broadcast_to(gages, (n, lateral.size, N_PHI)),
-        (mean[1] - mean[0]) / TRIAL,
-        (mean[2] - mean[0]) / TRIAL,
+        wave[0],
+        wave[0][:, None],
+        (wave[1] - wave[0]) / TRIAL,
+        (wave[2] - wave[0]) / TRIAL,
         depth[0],
         (depth[1] - depth[0]) / TRIAL,
-        contact.edges[:n],
+        state.contact.edges[:n],
     )
-
-
-def _at(
-    model: Model, points: Operating, lateral: float, correction: Correction | None, lp: LowPass
-) -> State:
-    """Return the state of three copies of the points for a gage at one place."""
-
-    def place(state: State) -> State:
-        return state.but(lateral=lateral)
-
-    changes = [("constants", place), *model.changes] if model.across else model.changes
-    several = correction.tiled(3) if correction is not None else None
-    return predict(model.values, points, changes, low_pass=lp, correction=several)

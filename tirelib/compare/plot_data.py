@@ -16,6 +16,7 @@ from tirelib.arrays import FloatArray
 from tirelib.campaign import Campaign
 from tirelib.compare.force_model import force_model_of
 from tirelib.compare.forces import ForceComparison, usable_points
+from tirelib.compare.model import Model
 from tirelib.compare.strain import Comparison
 from tirelib.documents import new_file
 from tirelib.effects import Effect
@@ -25,9 +26,12 @@ from tirelib.identify.force_data import force_data
 from tirelib.identify.force_points import force_points
 from tirelib.identify.random_effects import scales, whitening_of
 from tirelib.identify.span import span
-from tirelib.model.base import coordinates, large_displacements, linearised, operating_points
-from tirelib.model.base import predict as predict_waves
+from tirelib.model.base import coordinates, linearised, operating_points, predict
+from tirelib.model.chain import Changes
+from tirelib.model.solution import by_values, solved
+from tirelib.model.state import Operating
 from tirelib.parameters import TireFile
+from tirelib.signal import LowPass
 from tirelib.waveforms import GRID
 
 FORMAT = "tirelib-plot-data/1"
@@ -137,31 +141,53 @@ def _strain(found: Comparison) -> dict[str, Any]:
 def _strain_traces(found: Comparison) -> Callable[[Effect, tuple[float, ...]], FloatArray]:
     model, waves = found.model, found.chosen.waves
     at = operating_points(waves)
-    correction = None
-    if model.large:
-        correction = large_displacements(model.values, at, low_pass=waves.low_pass)
-    options: dict[str, Any] = {"low_pass": waves.low_pass, "correction": correction}
-    linear = linearised(model.values, at, coordinates(model.values), model.changes, **options)
+    solve = _rolling if model.large else _linear
+    here, by, planted_on = solve(model, at, waves.low_pass)
     scale, spread = scales(found.chosen.tolerance, waves.angle_std), float(np.std(found.difference))
     tangent = found.points.tangent
     noise = found.noise.std if found.noise.known else spread
     shifts = tangent[..., :4] * scale[:, None, :]
     inside = shifts.swapaxes(1, 2) @ shifts + noise**2 * np.eye(4)
     whiten = whitening_of(tangent, scale, noise)
-    slopes = np.concatenate([linear.waveform_slopes, by_delay(linear.waveform, at.omega)[None]])
+    slopes = np.concatenate([by, by_delay(here, at.omega)[None]])
     rows = whiten(slopes)
     columns = rows.reshape(len(rows), -1).T
 
     def trace(effect: Effect, strength: tuple[float, ...]) -> FloatArray:
         planted = effect.at(strength[0] if effect.components == 1 else strength)
-        wave = predict_waves(model.values, at, [*model.changes, planted], **options).wave
-        raw = wave - linear.waveform
+        raw = planted_on([*model.changes, planted]) - here
         share = np.linalg.lstsq(columns, whiten(raw).ravel(), rcond=1e-9)[0]
         own = raw - np.tensordot(share, slopes, axes=1)
         moved = np.linalg.solve(inside, shifts.swapaxes(1, 2) @ own[:, :, None])
         return np.asarray(1e6 * ((shifts @ moved)[:, :, 0] - own))
 
     return trace
+
+
+Solved = tuple[FloatArray, FloatArray, Callable[[Changes], FloatArray]]
+"""Waveforms, their slopes by the tire's numbers, and what waveforms other effects give."""
+
+
+def _rolling(model: Model, at: Operating, low_pass: LowPass) -> Solved:
+    """Return the rolling ring with the model's effects."""
+    free = coordinates(model.values)
+    found = solved(model.values, at, model.changes, low_pass=low_pass)
+
+    def planted(changes: Changes) -> FloatArray:
+        return solved(model.values, at, changes, low_pass=low_pass, start=found.rolling).waveform
+
+    return found.waveform, by_values(found, free).waveform[: len(free)], planted
+
+
+def _linear(model: Model, at: Operating, low_pass: LowPass) -> Solved:
+    """Return the linear ring with the model's effects."""
+    free = coordinates(model.values)
+    found = linearised(model.values, at, free, model.changes, low_pass=low_pass)
+
+    def planted(changes: Changes) -> FloatArray:
+        return predict(model.values, at, changes, low_pass=low_pass).wave
+
+    return found.waveform, found.waveform_slopes, planted
 
 
 def _forces(found: ForceComparison) -> dict[str, Any]:

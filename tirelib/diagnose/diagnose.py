@@ -8,13 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from tirelib.arrays import FloatArray
+from tirelib.compare.error import Yardstick
+from tirelib.diagnose.fitted import Fitted, fitted, fitted_problem
 from tirelib.diagnose.guess import Guess, guess_law
-from tirelib.diagnose.left import left_of
-from tirelib.diagnose.refit import Refit, Refits, inside, refit, settled
 from tirelib.effects import Effect
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.span import span
-from tirelib.identify.waveform_fit import Data
 from tirelib.infer.hypothesis import Hypothesis, p_value
 from tirelib.infer.plain import BASE, ROUGHLY, Family, load
 from tirelib.infer.select import Verdict, select
@@ -77,29 +76,32 @@ class Diagnosis:
     findings : tuple of Finding
         By rank.
     dead : mapping of name to reason
-    base, final : Refit
+    base, final : Fitted
         Without further effects and with those of the best member.
-    runs : StraightRuns
-    data : Data
-    beyond : shape (n_runs, n_phi)
-        Whitened part of model less measured that neither the best member nor plain tires explain.
+    problem : StrainProblem
+    yardstick : Yardstick
+    beyond : shape (n_runs, n_phi) or None
+        Whitened part of model less measured that neither the best member nor plain tires explain;
+        None where a member of the set is right.
     guess : Guess or None
-        A law for it, where no member of the set is right and a sparse law holds.
-    refitted : Refits
-        Fits of these data, made so far and to come.
+        A law for it, where a sparse law holds.
     """
 
     verdict: Verdict
     named: tuple[str, ...]
     findings: tuple[Finding, ...]
     dead: Mapping[str, str]
-    base: Refit
-    final: Refit
-    runs: StraightRuns
-    data: Data
-    beyond: FloatArray
+    base: Fitted
+    final: Fitted
+    problem: StrainProblem
+    yardstick: Yardstick
+    beyond: FloatArray | None
     guess: Guess | None
-    refitted: Refits
+
+    @property
+    def runs(self) -> StraightRuns:
+        """The straight runs."""
+        return self.problem.runs
 
     @property
     def exceeds(self) -> bool:
@@ -143,67 +145,43 @@ def diagnose(
     ConvergenceError
         If the model cannot be fitted to the runs.
     """
-    base, problem = fitted_problem(
-        runs, values, catalogue, effects=effects, strengths=strengths, progress=progress
+    problem = fitted_problem(
+        runs,
+        values,
+        catalogue,
+        plain_tires(),
+        effects=effects,
+        strengths=strengths,
+        progress=progress,
     )
-    data, refitted = problem.data, Refits(problem.data, progress)
     verdict = select(problem, plain_tires(), false_alarm=false_alarm, progress=progress)
-    best = verdict.best
-    names = best.names[len(effects) :]
-    final = base
-    if names:
-        strength = [
-            inside(effect, s)
-            for effect, s in zip(
-                best.fit.effects[len(effects) :], best.fit.strengths[len(effects) :], strict=True
-            )
-        ]
-        added = list(best.fit.effects[len(effects) :])
-        found = refitted(base, [*effects, *added], [*base.strengths, *strength])
-        final = base if found is None else found
-    beyond, guess = np.zeros_like(data.strain), None
+    yardstick, best = Yardstick.of(runs), verdict.best
+    base = final = fitted(verdict.hypotheses, verdict.base, yardstick)
+    if best is not verdict.base:
+        final = fitted(verdict.hypotheses, best, yardstick)
+    beyond, guess = None, None
     if verdict.kind in ("unknown", "form_inadequate"):
-        beyond = -final.whiten(_unexplained(best))
+        reached = final.reached
+        beyond = -reached.white_of(_unexplained(best))
         guess = guess_law(
-            data.strain - final.waveform,
-            final.waveform,
-            data.points,
-            left_of(data, final).edges,
-            final.whiten,
+            reached.rest,
+            reached.prediction.strain,
+            problem.data.points,
+            reached.prediction.edges,
+            reached.white_of,
         )
     return Diagnosis(
         verdict,
         tuple(dict.fromkeys(name for names in verdict.sets for name in names)),
-        _findings(problem, verdict, base, data),
+        _findings(verdict, problem, base),
         problem.dead,
         base,
         final,
-        runs,
-        data,
+        problem,
+        yardstick,
         beyond,
         guess,
-        refitted,
     )
-
-
-def fitted_problem(
-    runs: StraightRuns,
-    values: Mapping[str, float | FloatArray],
-    catalogue: Sequence[Effect],
-    *,
-    effects: Sequence[Effect] = (),
-    strengths: Sequence[FloatArray] = (),
-    progress: Callable[[str], None] | None = None,
-) -> tuple[Refit, StrainProblem]:
-    """Return a model fitted to straight runs, and the problem about it; arguments of `diagnose`."""
-    data = runs.data(with_deflection=False)
-    base = refit(data, values, effects, strengths, progress=progress)
-    found = StrainProblem(runs, base.values, (), effects, base.strengths)
-    given = StrainProblem(runs, values, (), effects, strengths)
-    if np.sum(given.reference.rest**2) < np.sum(found.reference.rest**2):
-        # the linear ring of the refit has led away from what fits the rolling ring
-        base = settled(data, values, effects, strengths)
-    return base, StrainProblem(runs, base.values, catalogue, effects, base.strengths)
 
 
 def _unexplained(best: Hypothesis) -> FloatArray:
@@ -212,9 +190,7 @@ def _unexplained(best: Hypothesis) -> FloatArray:
     return best.fit.rest - np.tensordot(best.null.explained(), rows, axes=1)
 
 
-def _findings(
-    problem: StrainProblem, verdict: Verdict, base: Refit, data: Data
-) -> tuple[Finding, ...]:
+def _findings(verdict: Verdict, problem: StrainProblem, base: Fitted) -> tuple[Finding, ...]:
     """Return every effect that the plan may show, by rank."""
     first, null = verdict.base, verdict.base.null
     limit = first.limit(verdict.alpha)
@@ -228,8 +204,10 @@ def _findings(
         if not verdict.sets
         else dict(zip(verdict.best.names, range(len(verdict.best.names)), strict=True))
     )
-    own = span(base.whiten(base.own_slopes).reshape(len(base.own_slopes), -1).T)
-    rest = base.beside_delay(base.whiten(data.strain - base.waveform)).ravel()
+    white_of = base.reached.white_of
+    own = span(white_of(first.fit.rows[BASE]).reshape(len(first.fit.rows[BASE]), -1).T)
+    rest = white_of(base.reached.rest).ravel()
+    rest = rest - own @ (own.T @ rest)
     rows = []
     for name, effect in living.items():
         alone = tried.get(name)
@@ -258,7 +236,7 @@ def _findings(
                         (strength >= effect.low - 2.0 * std) & (strength <= effect.high + 2.0 * std)
                     ).all()
                 ),
-                _share(base.whiten(first.fit.rows[name]), own, rest),
+                _share(white_of(first.fit.rows[name]), own, rest),
                 twins_of(name, first),
                 null.power(name, 1.0 / 3.0, limit),
             )

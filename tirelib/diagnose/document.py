@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.compare.error import ModelError, Yardstick, named_errors
+from tirelib.compare.error import ModelError, named_errors
 from tirelib.compare.model import Model
 from tirelib.diagnose.diagnose import Diagnosis, Finding
-from tirelib.diagnose.floor import MapUnit, floor_of
+from tirelib.diagnose.fitted import Fitted, fitted
+from tirelib.diagnose.floor import floor_of
 from tirelib.diagnose.guess import Guess
 from tirelib.diagnose.held_out import Fold, fold_entry, folds, held_out_errors, pooled
 from tirelib.diagnose.left import Left, left_of, told_powers
-from tirelib.diagnose.refit import Refit, inside
-from tirelib.identify.waveform_fit import Data
+from tirelib.errors import TirelibError
 
 FORMAT = "tirelib-diagnosis/1"
 NO_REPEATS = (
@@ -30,8 +30,6 @@ class Assessment:
     Attributes
     ----------
     diagnosis : Diagnosis
-    unit : MapUnit
-        Of the maps of the residual.
     verdict : str
     named : tuple of str
         Empty without repeats.
@@ -54,7 +52,6 @@ class Assessment:
     """
 
     diagnosis: Diagnosis
-    unit: MapUnit
     verdict: str
     named: tuple[str, ...]
     findings: tuple[Finding, ...]
@@ -70,7 +67,7 @@ class Assessment:
     messages: tuple[str, ...]
 
     @property
-    def final(self) -> Refit:
+    def final(self) -> Fitted:
         """The model with the named effects."""
         return self.diagnosis.final if self.named else self.diagnosis.base
 
@@ -93,27 +90,28 @@ def assess(
         The model that was diagnosed, as its file has it.
     progress : callable, optional
     """
-    data, yardstick = found.data, Yardstick.of(found.runs)
-    unit = MapUnit.of(found.runs, data)
+    yardstick = found.yardstick
     verdict, named, findings, messages = found.verdict.kind, found.named, found.findings, []
-    if not unit.known:
+    refitted = found.base.reached
+    if not refitted.known:
         verdict, named = "none", ()
         findings = tuple(_hint(finding) for finding in findings)
         messages.append(NO_REPEATS)
     final = found.final if named else found.base
-    near = found.base.correction.contact
-    refitted = yardstick.error(found.base.model, start=near)
-    after = yardstick.error(final.model, start=final.correction.contact) if named else refitted
-    floor = floor_of(after, found.verdict.best, found.verdict.alpha)
-    chosen = folds(data) if named else ()
-    held_before = held_out_errors(data, found.base, chosen, yardstick, progress=progress)
+    floor = floor_of(final.reached, found.verdict.best, found.verdict.alpha)
+    chosen = folds(found.problem.data) if named else ()
+
+    def held(model: Fitted) -> tuple[float, ...]:
+        if progress is not None and chosen:
+            progress("fits without some of the runs")
+        return held_out_errors(model, chosen, yardstick)
+
+    held_before = held(found.base)
     held_after = {
-        name: held_out_errors(data, single, chosen, yardstick, progress=progress)
-        for name in named
-        if (single := _with_one(found, name)) is not None
+        name: held(single) for name in named if (single := _with_one(found, name)) is not None
     }
     alone = next((held_after[name] for name in named if (name,) == named), None)
-    held_final = alone or held_out_errors(data, final, chosen, yardstick, progress=progress)
+    held_final = alone or held(final)
     if named and not chosen:
         messages.append(
             "nothing can be held out: three loads or two pressures, and four other runs, are needed"
@@ -125,19 +123,18 @@ def assess(
     ]
     return Assessment(
         found,
-        unit,
         verdict,
         named,
         findings,
-        yardstick.error(given, start=near),
+        yardstick.error(given, start=found.base.rolling),
         refitted,
-        after,
+        final.reached,
         floor,
         chosen,
         held_before,
         held_after,
         held_final,
-        _left(found, data, final),
+        _left(found, final),
         tuple(messages),
     )
 
@@ -156,15 +153,17 @@ def _hint(finding: Finding) -> Finding:
     return replace(finding, level="hint") if finding.level == "alarm" else finding
 
 
-def _with_one(found: Diagnosis, name: str) -> Refit | None:
+def _with_one(found: Diagnosis, name: str) -> Fitted | None:
     """Return the base model with one effect fitted, or None if that fails."""
-    added = found.final.effects[len(found.base.effects) :]
-    if [effect.name for effect in added] == [name]:
+    if found.verdict.hypotheses.added(found.verdict.best) == (name,):
         return found.final
-    finding = next(f for f in found.findings if f.effect.name == name)
-    effect = finding.effect
-    base, start = found.base, inside(effect, finding.strength)
-    return found.refitted(base, [*base.effects, effect], [*base.strengths, start])
+    alone = found.verdict.hypotheses.at((name,))
+    if alone is None:
+        return None
+    try:
+        return fitted(found.verdict.hypotheses, alone, found.yardstick)
+    except TirelibError:
+        return None
 
 
 def diagnosis_document(told: Assessment) -> dict[str, Any]:
@@ -188,7 +187,7 @@ def diagnosis_document(told: Assessment) -> dict[str, Any]:
                 told.folds, told.held_before, told.held_final, strict=True
             )
         ],
-        "delay_us": 1e6 * found.final.delay,
+        "delay_us": 1e6 * told.after.delay,
         "false_alarm": found.verdict.alpha,
         "misfit": found.verdict.best.statistic,
         "misfit_floor": found.verdict.best.limit(found.verdict.alpha),
@@ -240,11 +239,12 @@ def _plain(strength: Sequence[float] | np.ndarray) -> float | list[float]:
     return numbers[0] if len(numbers) == 1 else numbers
 
 
-def _left(found: Diagnosis, data: Data, final: Refit) -> Left:
+def _left(found: Diagnosis, final: Fitted) -> Left:
     """Return what is left; how it grows by the guessed law, where there is one."""
-    if not found.exceeds:
-        return left_of(data, final)
-    left = left_of(data, final, found.beyond)
+    points = found.problem.data.points
+    if found.beyond is None:
+        return left_of(final.reached, points)
+    left = left_of(final.reached, points, found.beyond)
     if found.guess is None:
         return left
     powers = {**left.powers, **found.guess.powers}
@@ -288,7 +288,7 @@ def _gages(told: Assessment) -> list[dict[str, float]]:
     waves = found.runs.waves
     out = []
     for gage in found.runs.gages:
-        rest = told.final.waveform - waves.strain[:, gage]
+        rest = told.after.prediction.strain - waves.strain[:, gage]
         out.append(
             {
                 "lateral_mm": 1e3 * waves.header.gage_lateral[gage],
@@ -344,7 +344,7 @@ def next_test(told: Assessment) -> dict[str, Any]:
             f"the misfit stands {told.left.where}; it {told.left.scaling}: more levels there, or "
             "an effect of your own (--effects)"
         )
-    elif not told.unit.known:
+    elif not told.after.known:
         what = "repeat some runs at equal set points, best at the ends of load, pressure and speed"
     else:
         what = "none is needed for the effects that this plan can show"

@@ -1,43 +1,11 @@
 """What part of an error noise and what plain tires show explain."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from tirelib.compare.error import MICROSTRAIN, NOISE, ModelError
-from tirelib.identify.campaign_data import StraightRuns
+from tirelib.compare.error import ModelError
 from tirelib.identify.span import span
-from tirelib.identify.waveform_fit import Data
 from tirelib.infer.hypothesis import Hypothesis
 from tirelib.infer.plain import BASE
-
-
-@dataclass(frozen=True, slots=True)
-class MapUnit:
-    """How whitened residuals of a fit are drawn: in the noise, in microstrain without repeats.
-
-    Attributes
-    ----------
-    factor : float
-        By which a whitened residual, in units of noise and structural misfit, is multiplied.
-    name : str
-        noise or ustrain.
-    """
-
-    factor: float
-    name: str
-
-    @classmethod
-    def of(cls, runs: StraightRuns, data: Data) -> "MapUnit":
-        """Return the unit that a campaign allows."""
-        if runs.noise.known:
-            return cls(data.noise / runs.noise.std, NOISE)
-        return cls(1e6 * data.noise, MICROSTRAIN)
-
-    @property
-    def known(self) -> bool:
-        """Whether there are repeats."""
-        return self.name == NOISE
 
 
 def floor_of(error: ModelError, hypothesis: Hypothesis, alpha: float) -> float:

@@ -7,11 +7,10 @@ import numpy as np
 from scipy import stats
 
 from tirelib.arrays import FloatArray
+from tirelib.compare.error import ModelError
 from tirelib.compare.sectors import SECTORS, sectors_of
-from tirelib.diagnose.refit import Refit
 from tirelib.identify.error_bands import levels
-from tirelib.identify.waveform_fit import Data
-from tirelib.model.base import predict
+from tirelib.model.state import Operating
 from tirelib.waveforms import GRID
 
 FLAT = 0.2
@@ -45,7 +44,7 @@ class Left:
     Attributes
     ----------
     white : shape (n_runs, n_phi)
-        Whitened residual, model less measured.
+        Model less measured in the unit of errors: whitened, or microstrain.
     where, scaling : str
         In words.
     span : tuple of float, [rad]
@@ -67,34 +66,26 @@ class Left:
     edges: FloatArray
 
 
-def left_of(data: Data, model: Refit, beyond: FloatArray | None = None) -> Left:
+def left_of(error: ModelError, points: Operating, beyond: FloatArray | None = None) -> Left:
     """Return what a fitted model leaves of the waveforms that it was fitted to.
 
     Parameters
     ----------
-    data : Data
-    model : Refit
+    error : ModelError
+    points : Operating
     beyond : shape (n_runs, n_phi), optional
         The part of the whitened residual that structure does not explain: place and scaling are
         told of it; of the whole residual if it is not given.
     """
-    white = model.whiten(model.waveform - data.strain)
-    told = white if beyond is None else beyond
-    state = predict(
-        model.values,
-        data.points,
-        model.changes,
-        low_pass=data.low_pass,
-        correction=model.correction,
-    )
-    assert state.contact is not None  # noqa: S101 - the chain sets it
-    sector = sectors_of(state.contact.edges)
+    white = -error.white_of(error.rest)
+    told, edges = white if beyond is None else beyond, error.prediction.edges
+    sector = sectors_of(edges)
     squares = told**2
     total = max(float(squares.sum()), 1e-300)
     shares = {name: float(squares[sector == k].sum() / total) for k, name in enumerate(SECTORS)}
     first = max(shares, key=lambda name: shares[name])
     start, stop = _span(squares.mean(axis=0))
-    powers = _powers(data, np.sqrt(squares.mean(axis=1)))
+    powers = _powers(points, np.sqrt(squares.mean(axis=1)))
     return Left(
         white,
         f"{_PLACES[first]} ({100 * shares[first]:.0f} % of the squares), most of it from "
@@ -103,7 +94,7 @@ def left_of(data: Data, model: Refit, beyond: FloatArray | None = None) -> Left:
         (start, stop),
         shares,
         powers,
-        state.contact.edges,
+        edges,
     )
 
 
@@ -129,14 +120,14 @@ def _span(squares: FloatArray) -> tuple[float, float]:
     return float(GRID[first]), float(GRID[first] + step * (stop[first] - first))
 
 
-def _powers(data: Data, rms: FloatArray) -> dict[str, Power | None]:
+def _powers(points: Operating, rms: FloatArray) -> dict[str, Power | None]:
     """Return the powers of the conditions that tell the runs' rms, with intervals."""
-    names = [name for name in CONDITIONS if _varies(np.asarray(getattr(data.points, name)))]
+    names = [name for name in CONDITIONS if _varies(np.asarray(getattr(points, name)))]
     out: dict[str, Power | None] = dict.fromkeys(CONDITIONS)
     free = len(rms) - len(names) - 1
     if free < 1 or not names:
         return out
-    columns = [np.log(np.abs(getattr(data.points, name))) for name in names]
+    columns = [np.log(np.abs(getattr(points, name))) for name in names]
     matrix = np.stack([np.ones(len(rms)), *columns], axis=1)
     response = np.log(np.maximum(rms, 1e-12))
     found = np.linalg.lstsq(matrix, response, rcond=None)[0]

@@ -37,7 +37,7 @@ def extension_document(done: Extension, file: TireFile) -> dict[str, Any]:
         "error_refitted": done.refitted.value,
         "runs": run_errors(done),
         "floor": done.floor,
-        "delay_us": 1e6 * done.after.delay,
+        "delay_us": 1e6 * done.reached.delay,
         "heldout_error_before": pooled(done.held_before, done.folds),
         "heldout_error_after": pooled(done.held_after, done.folds),
     }

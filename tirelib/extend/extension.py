@@ -10,24 +10,20 @@ from tirelib.arrays import FloatArray
 from tirelib.compare.error import ModelError, Yardstick
 from tirelib.compare.model import Model
 from tirelib.diagnose.diagnose import FALSE_ALARM, plain_tires
+from tirelib.diagnose.fitted import Fitted, fitted, fitted_problem
 from tirelib.diagnose.floor import floor_of
 from tirelib.diagnose.held_out import Fold, folds, held_out
-from tirelib.diagnose.refit import Refit, refit
 from tirelib.effects import CATALOGUE, Effect
-from tirelib.errors import ParameterError
+from tirelib.errors import ConvergenceError, ParameterError
 from tirelib.extend.step import Step, added, removed
 from tirelib.identify.campaign_data import StraightRuns
-from tirelib.identify.span import span
 from tirelib.infer.select import Hypotheses
-from tirelib.infer.strain import StrainProblem, in_base
+from tirelib.infer.strain import in_base
 from tirelib.threads import one_thread
-
-START_INSIDE = 0.9
-"""Share of the range within which a refit starts."""
 
 
 @dataclass(frozen=True, eq=False)
-class Extension(Step[Refit]):
+class Extension(Step[Fitted]):
     """A step of a model of strain.
 
     Attributes
@@ -73,7 +69,7 @@ def add_effect(
     ConvergenceError
         If a fit does not settle.
     """
-    subject = _Strain(runs, model, progress)
+    subject = _Strain(runs, model, effect, progress)
     return subject.extension(added(subject, effect))
 
 
@@ -88,7 +84,7 @@ def remove_effect(
 
     Parameters and errors as for `add_effect`.
     """
-    subject = _Strain(runs, model, progress)
+    subject = _Strain(runs, model, effect, progress)
     return subject.extension(removed(subject, effect))
 
 
@@ -116,23 +112,23 @@ class _Strain:
         self,
         runs: StraightRuns,
         model: Model,
+        effect: Effect,
         progress: Callable[[str], None] | None,
     ) -> None:
         self.runs, self.model, self.progress = runs, model, progress
+        self.own = [effect]  # it may be one of the user's
         self.name = model.name
         self.used = [each for each in model.used if each.effect.hook != "brush"]
-        self.data = runs.data(with_deflection=False)
         self.yardstick = Yardstick.of(runs)
         self.seen: list[tuple[ModelError | None, ...]] = []
 
-    def extension(self, step: Step[Refit]) -> Extension:
+    def extension(self, step: Step[Fitted]) -> Extension:
         """Return a step with its runs and errors."""
-        near = step.before.correction.contact
         return Extension(
             **vars(step),
-            given=self.yardstick.error(self.model, start=near),
-            refitted=self.yardstick.error(step.before.model, start=near),
-            reached=self.yardstick.error(step.after.model, start=step.after.correction.contact),
+            given=self.yardstick.error(self.model, start=step.before.rolling),
+            refitted=step.before.reached,
+            reached=step.after.reached,
             out_before=self.seen[0],
             out_after=self.seen[1],
             runs=self.runs,
@@ -156,62 +152,64 @@ class _Strain:
                 "effect of another stage"
             )
 
-    def fitted(self) -> Refit:
+    def fitted(self) -> Fitted:
         """Return the model as it is, fitted."""
         strengths = [np.atleast_1d(np.asarray(x.strength, dtype=float)) for x in self.used]
-        return refit(self.data, self.model.values, self.effects, strengths, progress=self.progress)
+        return self._fitted(self.model.values, self.effects, strengths)
 
-    def dead(self, before: Refit, effect: Effect) -> str:
-        """Return why the runs cannot show an effect, or an empty text."""
-        return self._problem(before, [effect]).dead.get(effect.name, "")
-
-    def _problem(self, before: Refit, catalogue: Sequence[Effect]) -> StrainProblem:
-        effects, strengths = before.effects, before.strengths
-        return StrainProblem(self.runs, before.values, catalogue, effects, strengths)
-
-    def with_effect(self, before: Refit, effect: Effect) -> Refit:
-        """Return the fit with one effect more, from what serves best to first order."""
-        problem = self._problem(before, [effect])
-        rows = before.whiten(problem.signature(problem.solve(problem.start), effect))
-        rows = rows.reshape(effect.components, -1)
-        basis = span(before.whiten(before.slopes).reshape(len(before.slopes), -1).T)
-        rest = before.whiten(self.data.strain - before.waveform).ravel()
-        own = rows - (rows @ basis) @ basis.T
-        strength = effect.scale * np.linalg.lstsq(own.T, rest, rcond=None)[0]
-        start: FloatArray = np.clip(strength, START_INSIDE * effect.low, START_INSIDE * effect.high)
-        return refit(
-            self.data,
-            before.values,
-            [*before.effects, effect],
-            [*before.strengths, start],
-            delay=before.delay,
+    def _fitted(
+        self,
+        values: Mapping[str, float | FloatArray],
+        effects: Sequence[Effect],
+        strengths: Sequence[FloatArray],
+    ) -> Fitted:
+        """Return the model of a tire and effects, fitted."""
+        problem = fitted_problem(
+            self.runs,
+            values,
+            [*CATALOGUE.values(), *(e for e in self.own if e.name not in CATALOGUE)],
+            plain_tires(),
+            effects=effects,
+            strengths=strengths,
             progress=self.progress,
         )
+        among = Hypotheses(problem, plain_tires(), FALSE_ALARM, self.progress)
+        return fitted(among, among.base, self.yardstick)
 
-    def without(self, before: Refit, kept: Sequence[int]) -> Refit:
+    def dead(self, before: Fitted, effect: Effect) -> str:
+        """Return why the runs cannot show an effect, or an empty text."""
+        return str(before.hypotheses.problem.dead.get(effect.name, ""))
+
+    def with_effect(self, before: Fitted, effect: Effect) -> Fitted:
+        """Return the fit with one effect more."""
+        found = before.hypotheses.at((effect.name,))
+        if found is None:
+            raise ConvergenceError(
+                f"effect {effect.name!r}: its fit did not settle; the model with it does not "
+                "fit these runs: look at them with `tirelib compare`, or add another effect first",
+                before.values,
+                np.inf,
+            )
+        return fitted(before.hypotheses, found, self.yardstick)
+
+    def without(self, before: Fitted, kept: Sequence[int]) -> Fitted:
         """Return the fit with some of the effects."""
-        return refit(
-            self.data,
+        return self._fitted(
             before.values,
             [before.effects[k] for k in kept],
             [before.strengths[k] for k in kept],
-            delay=before.delay,
-            progress=self.progress,
         )
 
     def left_out(self) -> Sequence[Fold]:
         """Return the runs that are left out in turn."""
-        return folds(self.data)
+        return folds(self.runs.data(with_deflection=False))
 
-    def held_out(self, fit: Refit, left: Sequence[Fold]) -> tuple[float, ...]:
+    def held_out(self, fit: Fitted, left: Sequence[Fold]) -> tuple[float, ...]:
         """Return the errors on left-out runs."""
-        found = held_out(self.data, fit, tuple(left), self.yardstick, progress=self.progress)
+        found = held_out(fit, tuple(left), self.yardstick)
         self.seen.append(found)
         return tuple(float("nan") if error is None else error.value for error in found)
 
-    def floor(self, after: Refit) -> float:
+    def floor(self, after: Fitted) -> float:
         """Return the error that noise and what plain tires show explain."""
-        error = self.yardstick.error(after.model, start=after.correction.contact)
-        problem = self._problem(after, list(CATALOGUE.values()))
-        base = Hypotheses(problem, plain_tires(), FALSE_ALARM, self.progress).base
-        return floor_of(error, base, FALSE_ALARM)
+        return floor_of(after.reached, after.hypothesis, FALSE_ALARM)

@@ -19,8 +19,8 @@ from tirelib.campaign import Tolerance
 from tirelib.identify.delay import STD, UNIT, by_delay
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.random_effects import Whitening, scales, tangents, whitening_of
+from tirelib.model.solution import Solution, SolutionSlopes
 from tirelib.model.state import Operating
-from tirelib.model.whole import Whole, WholeSlopes
 from tirelib.signal import LowPass
 from tirelib.waveforms import GRID
 
@@ -164,8 +164,8 @@ class Cost:
         prior_std: FloatArray,
         discrepancy: Discrepancy | None,
         free_radius: float,
-        model: Whole,
-        slopes: WholeSlopes,
+        model: Solution,
+        slopes: SolutionSlopes,
     ) -> Self:
         """Return the cost about a solution of the model and its slopes."""
         scale = scales(data.tolerance, data.angle_std)
@@ -202,7 +202,7 @@ class Cost:
         return np.concatenate([white, self.depth(strain, deflection)], axis=1)
 
     def normal(
-        self, model: Whole, slopes: WholeSlopes, z: FloatArray
+        self, model: Solution, slopes: SolutionSlopes, z: FloatArray
     ) -> tuple[FloatArray, FloatArray, float]:
         """Return normal matrix and gradient by the free coordinates, and the cost, at z."""
         k = self.prior_std.size
@@ -214,30 +214,30 @@ class Cost:
         normal = gram[:-1, :-1] + np.diag(weight)
         return normal, gram[:-1, -1] - weight * z, float(gram[-1, -1] + np.sum(weight * z**2))
 
-    def value(self, model: Whole, z: FloatArray) -> float:
+    def value(self, model: Solution, z: FloatArray) -> float:
         """Return the cost of a solution at coordinates z."""
         white = self.rows(*self._rest(model))
         taken = np.sum(self._eliminate(white) ** 2)
         return float(np.sum(white**2) + np.sum((z / self.prior_std) ** 2) - taken)
 
-    def misfit(self, model: Whole) -> FloatArray:
+    def misfit(self, model: Solution) -> FloatArray:
         """Return the structural misfit that serves the residual best, (n_runs, n_phi)."""
         return np.asarray(np.tensordot(self._weights(model)[1:], self.shapes[1:], axes=1))
 
-    def delay(self, model: Whole) -> float:
+    def delay(self, model: Solution) -> float:
         """Return the delay that the residual has beside what the data were made earlier by, [s]."""
         return STD * float(self._weights(model)[0])
 
-    def error(self, model: Whole) -> float:
+    def error(self, model: Solution) -> float:
         """Return the rms of the whitened residual of the model alone."""
         return float(np.sqrt(np.mean(self.whiten(self.data.strain - model.waveform) ** 2)))
 
-    def _weights(self, model: Whole) -> FloatArray:
+    def _weights(self, model: Solution) -> FloatArray:
         """Return the coefficients of the shapes that serve the residual best."""
         white = self.rows(*self._rest(model))
         return np.asarray(linalg.solve_triangular(self.inner, self._eliminate(white)[:, 0]))
 
-    def _rest(self, model: Whole) -> tuple[FloatArray, FloatArray]:
+    def _rest(self, model: Solution) -> tuple[FloatArray, FloatArray]:
         """Return measured less model of strain and deflection, as one row each."""
         rest = self.data.strain - model.waveform
         return rest[None], (self.data.deflection - model.deflection)[None]
@@ -251,7 +251,7 @@ class Cost:
 
 
 def nuisance_shapes(
-    discrepancy: Discrepancy | None, model: Whole, points: Operating, free_radius: float
+    discrepancy: Discrepancy | None, model: Solution, points: Operating, free_radius: float
 ) -> FloatArray:
     """Return the shapes of delay and misfit about a solution, (n_shapes, n_runs, n_phi).
 

@@ -24,8 +24,8 @@ from tirelib.identify.fit_cost import nuisance_shapes
 from tirelib.identify.laboratory import Test, laboratory_tests
 from tirelib.identify.random_effects import scales, tangents, whitening_of
 from tirelib.identify.waveform_fit import WaveformFit
+from tirelib.model.solution import Solution, SolutionSlopes, slopes_of, solved
 from tirelib.model.state import Operating
-from tirelib.model.whole import Whole, WholeSlopes, solve_whole, whole_slopes
 
 BELOW, ABOVE = 0.8, 1.2
 """How far the envelope of loads, pressures and speeds is extended."""
@@ -217,12 +217,12 @@ def _run(points: Operating, which: Sequence[int]) -> str:
     )
 
 
-def _solved(fit: WaveformFit, points: Operating) -> tuple[Whole, WholeSlopes] | None:
+def _solved(fit: WaveformFit, points: Operating) -> tuple[Solution, SolutionSlopes] | None:
     """Return the fitted model at points; None where it has no solution."""
     low_pass = fit.cost.data.low_pass
     try:
-        model = solve_whole(fit.values, points, low_pass=low_pass)
-        return model, whole_slopes(model, fit.values, points, fit.free, low_pass=low_pass)
+        model = solved(fit.values, points, low_pass=low_pass)
+        return model, slopes_of(model, fit.free)
     except TirelibError:
         return None
 
@@ -231,10 +231,10 @@ def _information(
     fit: WaveformFit, discrepancy: Discrepancy | None, points: Operating
 ) -> FloatArray | None:
     """Return what one run would add, over coordinates and misfit; None without a solution."""
-    solved = _solved(fit, points)
-    if solved is None:
+    at = _solved(fit, points)
+    if at is None:
         return None
-    model, slopes = solved
+    model, slopes = at
     data, k = fit.cost.data, len(fit.free)
     known = data.angle_std[np.isfinite(data.angle_std)]
     angle = float(np.median(known)) if known.size else np.inf
@@ -264,10 +264,10 @@ def _press_test(fit: WaveformFit) -> Test | None:
             for name in Operating.__slots__
         ]
     )
-    solved = _solved(fit, points)
-    if solved is None:
+    at = _solved(fit, points)
+    if at is None:
         return None
-    model, slopes = solved
+    model, slopes = at
     row = -np.diff(slopes.deflection[: len(fit.free)], axis=1).T / np.diff(model.deflection)
     words = f"a press test (vertical stiffness to {PRESS:.0%}) at {load:.0f} N"
     return Test(words, row, PRESS**2 * np.eye(1), False)

@@ -20,7 +20,7 @@ from tirelib.identify.fit_cost import Cost, Data
 from tirelib.identify.random_effects import Whitening
 from tirelib.model.base import FREE, Coordinate, Linear, move
 from tirelib.model.chain import Changes
-from tirelib.model.whole import Whole, WholeSlopes, solve_whole, whole_slopes
+from tirelib.model.solution import Solution, SolutionSlopes, slopes_of, solved
 
 __all__ = ["Data", "Prior", "Solver", "WaveformFit", "fit_waveforms"]
 
@@ -105,7 +105,6 @@ def fit_waveforms(
     free: tuple[Coordinate, ...] = FREE,
     changes: Changes = (),
     discrepancy: Discrepancy | None = None,
-    exact: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> WaveformFit:
     """Fit the free coordinates.
@@ -122,8 +121,6 @@ def fit_waveforms(
         Effects that the model has.
     discrepancy : Discrepancy or None
         None leaves the structural misfit out: smallest residual, intervals of noise alone.
-    exact : bool
-        False leaves large displacements out.
     progress : callable, optional
         Called with a label after each step.
 
@@ -132,7 +129,7 @@ def fit_waveforms(
     ConvergenceError
         If the steps do not settle; carries the last values.
     """
-    solver = Solver(data, start, prior, free, changes, discrepancy, exact)
+    solver = Solver(data, start, prior, free, changes, discrepancy)
     moved = np.inf
     for steps in range(1, MAX_STEPS + 1):
         solver.refresh(renew=moved > KEPT_WITHIN and steps <= FOLLOWED)
@@ -160,15 +157,14 @@ class Solver:
         free: tuple[Coordinate, ...],
         changes: Changes,
         discrepancy: Discrepancy | None,
-        exact: bool,
     ) -> None:
         self.data, self.prior, self.free, self.changes = data, prior, free, changes
-        self.discrepancy, self.exact = discrepancy, exact
+        self.discrepancy = discrepancy
         self.start = dict(start)
         self.z = np.zeros(len(free))
         self.delay = 0.0
         self.damping = 1e-3
-        self.slopes: WholeSlopes | None = None
+        self.slopes: SolutionSlopes | None = None
         self.model = self.at(self.z)
 
     @property
@@ -176,35 +172,27 @@ class Solver:
         """The tire's values at z."""
         return move(self.start, self.z, self.free)
 
-    def at(self, z: FloatArray) -> Whole:
+    def at(self, z: FloatArray) -> Solution:
         """Return the model at coordinates, from the solution at hand where there is one."""
         start = None
         if self.slopes is not None:
             start = self.slopes.start(self.model, z - self.z)
-        return solve_whole(
+        return solved(
             move(self.start, z, self.free),
             self.data.points,
             self.changes,
             low_pass=self.data.low_pass,
             start=start,
-            exact=self.exact,
         )
 
     def refresh(self, *, renew: bool = True) -> None:
         """Bring the slopes up to the present solution, and if asked for the cost as well."""
-        self.slopes = whole_slopes(
-            self.model,
-            self.values,
-            self.data.points,
-            self.free,
-            self.changes,
-            low_pass=self.data.low_pass,
-        )
+        self.slopes = slopes_of(self.model, self.free)
         if renew:
             self.renew(self.slopes)
         self.normal, self.gradient, self.height = self.cost.normal(self.model, self.slopes, self.z)
 
-    def renew(self, slopes: WholeSlopes) -> None:
+    def renew(self, slopes: SolutionSlopes) -> None:
         """Take the cost about the present solution, after what is known of the delay."""
         radius = float(np.max(self.start["free_radius"]))
 

@@ -9,7 +9,8 @@ with strengths s of the model's effects and a of all others, sigma that of plain
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,8 @@ GAINS = 0.1
 """Fall of the cost, in units of a chi-square, below which a step is the last."""
 LONGEST = 0.5
 """Longest move of a coordinate in one step."""
+SHARES = (1.0, 0.5, 0.25, 0.0)
+"""Shares of a start's strengths that are tried where the model has no solution at them."""
 HARDEST = 1e4
 """Damping at which there is no way down."""
 
@@ -151,7 +154,7 @@ def posterior(
     widths += [np.full(e.components, np.sqrt(max(spread.get(e.name, 0.0), LEAST))) for e in others]
     width = np.concatenate(widths)
     low, high = _ends(others, len(width))
-    solved = problem.solve(point, near.solved if near else None)
+    point, solved = _solvable(problem, point, near)
     slopes = problem.slopes(point, solved)
     shapes = problem.remainder(point, solved)
     white = whiten(np.concatenate(list(shapes.values())))
@@ -255,6 +258,21 @@ def _start(
         given.append(np.zeros(effect.components) if known is None else known)
     base = problem.start.base if near is None else near.point.base
     return Point(base, tuple(effects), tuple(np.array(s, dtype=float) for s in given))
+
+
+def _solvable(problem: Problem, point: Point, near: Posterior | None) -> tuple[Point, Any]:
+    """Return a point with its solution, its strengths nearer to those known where it has none."""
+    start = near.solved if near else None
+    known = [None if near is None else near.strength(e.name) for e in point.effects]
+    for share in SHARES:
+        strengths = tuple(
+            share * s + (0.0 if k is None else (1.0 - share) * k)
+            for s, k in zip(point.strengths, known, strict=True)
+        )
+        trial = replace(point, strengths=strengths)
+        with suppress(TirelibError):
+            return trial, problem.solve(trial, start)
+    return trial, problem.solve(trial, start)
 
 
 def coordinates_of(point: Point) -> FloatArray:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tirelib.arrays import FloatArray, IntArray
+from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.effects import Effect
 from tirelib.errors import ParameterError
 from tirelib.identify.campaign_data import StraightRuns
@@ -156,6 +156,7 @@ class StrainProblem:
         self._added: _Added | None = None
         self._strengths: _Added | None = None
         self.noise = np.full(len(self.data.points), noise)
+        self.present = len(self.data.points)  # runs that are measured: the first ones
         self._scale = scales(self.data.tolerance, self.data.angle_std)
         self._refer()
         self.living = self._alive(catalogue)
@@ -203,11 +204,32 @@ class StrainProblem:
         out._refer()
         return out
 
+    def part(self, chosen: BoolArray, start: Point) -> "StrainProblem":
+        """Return the problem of some of the runs (n_runs,), without effects that may be missing.
+
+        Parameters
+        ----------
+        start : Point
+            The model that its whitening is about.
+        """
+        data, out = self.data, copy(self)
+        out.data = replace(
+            data,
+            strain=data.strain[chosen],
+            points=data.points.take(chosen),
+            angle_std=data.angle_std[chosen],
+            deflection=data.deflection[chosen],
+        )
+        out.noise, out._scale = self.noise[chosen], self._scale[chosen]
+        out.start, out.living, out.present = start, (), int(chosen.sum())
+        out.forget()
+        out._refer()
+        return out
+
     @property
     def run_ahead(self) -> IntArray:
         """The run ahead that each whitened number is of, -1 for the present ones."""
-        present = len(self.runs.strain)
-        run = np.maximum(np.arange(len(self.data.points)) - present, -1)
+        run = np.maximum(np.arange(len(self.data.points)) - self.present, -1)
         return np.repeat(run, self.whitener(OWN).lower.shape[1])
 
     def repeated(self, times: float) -> "StrainProblem":
@@ -251,7 +273,7 @@ class StrainProblem:
         self, point: Point, points: Operating, start: Rolling | Unknowns | None = None
     ) -> Solution:
         """Return the model at operating points; raises TirelibError where it has none."""
-        values = {**move(self.values, point.base[:-1], self.free), "damping": 0.0}
+        values = move(self.values, point.base[:-1], self.free)
         return solution.solved(
             values, points, _changes(point), low_pass=self.data.low_pass, start=start
         )
@@ -349,7 +371,7 @@ class StrainProblem:
                 2.0 * p.order - 1.0,
             ]
         )
-        present = conditions[:, : len(self.runs.strain)]
+        present = conditions[:, : self.present]
         conditions = conditions - present.mean(axis=1, keepdims=True)
         otherwise = (conditions[:, None, :, None] * rows[None]).reshape(-1, *rows.shape[1:])
         square = np.sum(rows**2, axis=0)

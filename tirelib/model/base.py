@@ -1,17 +1,16 @@
 """The base model and the parameters that a campaign may inform."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.contact import free_boundary
 from tirelib.model.chain import Changes, waveform
-from tirelib.model.rolled import RolledSlopes, made_of
+from tirelib.model.rolled import made_of
 from tirelib.model.state import Operating, State
 from tirelib.parameters import Tire
-from tirelib.rolling.assemble import Unknowns
 from tirelib.rolling.solve import Rolling, Start, solve
 from tirelib.signal import LowPass
 from tirelib.waveforms import GRID, Waveforms
@@ -132,27 +131,8 @@ def predict(
     if correction is None:
         return waveform(state, changes, low_pass=low_pass)
     state = state.but(start=correction.start)
-    if correction.depth is not None:
-        state = state.but(deflection=correction.depth)
     state = waveform(state, [("gage", correction.change), *changes], low_pass=low_pass)
     return state.but(deflection=state.deflection + correction.deflection)
-
-
-@dataclass(frozen=True, slots=True)
-class CorrectionSlopes:
-    """How a correction changes with free coordinates, at those that it was made for.
-
-    Attributes
-    ----------
-    waveform : shape (n_free, n_points, n_phi), [-]
-    deflection : shape (n_free, n_points), [m]
-    contact : RolledSlopes
-        Slopes of the rolling ring; its last two directions are load and pressure.
-    """
-
-    waveform: FloatArray
-    deflection: FloatArray
-    contact: RolledSlopes
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,18 +147,12 @@ class Correction:
         The solution behind it: a start for one nearby, and for slopes.
     start : Start or None
         Solution of the linear ring's contact.
-    depth : shape (n_points,) or None, [m]
-        A deflection of the linear ring nearby, from which constants that follow it start.
-    slopes : CorrectionSlopes or None
-        By free coordinates (`tirelib.model.whole.with_slopes`).
     """
 
     waveform: FloatArray
     deflection: FloatArray
     contact: Rolling | None = None
     start: free_boundary.Start | None = None
-    depth: FloatArray | None = None
-    slopes: CorrectionSlopes | None = None
 
     def change(self, state: State) -> State:
         """Add the correction to a waveform."""
@@ -190,35 +164,6 @@ class Correction:
             np.tile(self.waveform, (times, 1)),
             np.tile(self.deflection, times),
             start=self.start.tiled(times) if self.start else None,
-            depth=None if self.depth is None else np.tile(self.depth, times),
-        )
-
-    @property
-    def by_waveform(self) -> FloatArray:
-        """Slopes of the waveform (n_free, n_points, n_phi); one zero for all where it has none."""
-        return self.slopes.waveform if self.slopes else np.zeros((1, 1, 1))
-
-    def moved(self, dz: FloatArray) -> "Correction":
-        """Return the correction after a move, to first order where it has slopes.
-
-        `dz` is of shape (n_free,), or (n_free, n_points) where points move by themselves.
-        """
-        if self.slopes is None:
-            return self
-        by, deeper = self.slopes.waveform, self.slopes.deflection
-        each = np.broadcast_to(dz.T, deeper.shape[::-1]).T
-        return replace(
-            self,
-            waveform=self.waveform + np.einsum("kp,kpn->pn", each, by),
-            deflection=self.deflection + np.sum(each * deeper, axis=0),
-        )
-
-    def guess(self, dz: FloatArray) -> Unknowns | None:
-        """Return a start for the contact after a move (n_free,)."""
-        if self.contact is None:
-            return None
-        return (
-            self.contact.x if self.slopes is None else self.slopes.contact.start(self.contact, dz)
         )
 
 
@@ -292,7 +237,7 @@ def linearised(
 ) -> Linear:
     """Return the model and its slopes: one shifted copy per free coordinate, all in one batch.
 
-    A correction's slopes have to be by the same coordinates.
+    A correction is held.
     """
     n, k = len(points), len(free)
     columns = dict(values)
@@ -312,7 +257,4 @@ def linearised(
     waves = state.wave.reshape(k + 1, n, -1)
     depth = state.deflection.reshape(k + 1, n)
     by_wave, by_depth = (waves[1:] - waves[0]) / step, (depth[1:] - depth[0]) / step
-    if correction is not None and correction.slopes is not None:
-        by_wave = by_wave + correction.slopes.waveform
-        by_depth = by_depth + correction.slopes.deflection
     return Linear(waves[0], depth[0], by_wave, by_depth)

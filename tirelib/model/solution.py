@@ -3,6 +3,8 @@
 constants        change what the rolling ring is made of, and may follow its deflection
 contact, strain  add what they change in the linear ring with the same constants
 gage             change the filtered waveform
+
+Modal damping, which the rolling ring has not, adds what it changes in the linear ring as well.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,7 +13,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.errors import ConvergenceError
+from tirelib.errors import ConvergenceError, ParameterError
 from tirelib.model.base import Coordinate, smoothed
 from tirelib.model.chain import (
     FIRST_DEPTH,
@@ -44,6 +46,8 @@ LINEAR_ONLY = ("damping", "inertia_share")
 """Fields of a state that the rolling ring has not: a change of them acts on the linear ring."""
 SMALL = 1e-4
 """Change of a waveform, over its largest value, by which a gage is differentiated."""
+LINEAR_STEP = 1e-4
+"""Relative change of numbers, load and pressure by which the linear ring is differentiated."""
 DEPTH_STEP = 1e-6
 """Change of the deflection by which constants that follow it are differentiated, [m]."""
 
@@ -66,6 +70,10 @@ class Solution:
     shown : shape (n_points, n_phi), [-]
         Filtered waveform without the effects at the gage.
     waveform : shape (n_points, n_phi), [-]
+    phi : shape (n_phi,), [rad]
+    linear : tuple of State or None
+        The linear ring without and with what it adds to the rolling one, up to the gage; None where
+        it adds nothing.
     """
 
     values: Values
@@ -76,11 +84,16 @@ class Solution:
     made: Made
     shown: FloatArray
     waveform: FloatArray
+    phi: FloatArray
+    linear: tuple[State, State] | None = None
 
     @property
     def deflection(self) -> FloatArray:
         """d0, (n_points,), [m]."""
-        return self.rolling.deflection
+        depth = self.rolling.deflection
+        if self.linear is not None:
+            depth = depth + self.linear[1].deflection - self.linear[0].deflection
+        return depth
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,6 +110,27 @@ class SolutionSlopes:
     waveform: FloatArray
     rolled: RolledSlopes | None
 
+    @property
+    def deflection(self) -> FloatArray:
+        """Slopes of the rolling ring's deflection, (n_directions, n_points), [m].
+
+        Raises
+        ------
+        ParameterError
+            If no direction moves the rolling ring.
+        """
+        return self._moved.deflection
+
+    def start(self, found: Solution, dz: FloatArray) -> Unknowns:
+        """Return a first guess of the contact after a move (n_free,) of the first directions."""
+        return self._moved.start(found.rolling, dz)
+
+    @property
+    def _moved(self) -> RolledSlopes:
+        if self.rolled is None:
+            raise ParameterError("slopes: none of their directions moves the rolling ring")
+        return self.rolled
+
 
 def solved(
     values: Values,
@@ -105,19 +139,22 @@ def solved(
     *,
     low_pass: LowPass,
     start: Rolling | Unknowns | None = None,
+    phi: FloatArray = GRID,
 ) -> Solution:
     """Return the solved model.
 
     Parameters
     ----------
     values : mapping
-        Parameters of a tire without modal damping.
+        Parameters of a tire.
     points : Operating
     changes : sequence of (stage, change)
         Effects.
     low_pass : LowPass
     start : Rolling or Unknowns, optional
         A solution nearby; it saves time only.
+    phi : shape (n_phi,), [rad]
+        Even angles from -pi.
 
     Raises
     ------
@@ -126,12 +163,14 @@ def solved(
     """
     own, linear = _split(values, points, changes)
     rolling, made = _followed(values, points, own, start)
-    shown = smoothed(rolling.strain(made.gage, GRID.size), points, low_pass)
-    if linear:
-        shown = shown + added(values, points, own, linear, low_pass)
-    state = State.of(values, points, GRID).but(deflection=rolling.deflection, waveform=shown)
-    waveform = apply(state, changes, "gage").wave
-    return Solution(values, points, changes, low_pass, rolling, made, shown, waveform)
+    shown = smoothed(rolling.strain(made.gage, phi.size), points, low_pass)
+    found = Solution(values, points, changes, low_pass, rolling, made, shown, shown, phi)
+    if linear or _damped(values):
+        plain = _plain(values, points, own, phi)
+        before, after = _beside(values, points, own, linear, low_pass, plain)
+        shown = shown + after.wave - before.wave
+        found = replace(found, linear=(before, after))
+    return replace(found, shown=shown, waveform=_at_gage(found, shown, changes))
 
 
 def made_with(
@@ -173,16 +212,33 @@ def by_values(found: Solution, free: Sequence[Coordinate]) -> SolutionSlopes:
 
 
 def added_by_values(found: Solution, free: Sequence[Coordinate], step: float) -> FloatArray:
-    """Return how coordinates move what effects add through the linear ring, (n_free, ...)."""
-    own, linear = _split(found.values, found.points, found.changes)
-    if not linear:
+    """Return how coordinates move what is added through the linear ring, (n_free, ...)."""
+    if found.linear is None:
         return np.zeros((len(free), 1, 1))
-    here, rows = _added(found.values, found, own, linear), []
+    own, linear = _split(found.values, found.points, found.changes)
+    here, rows = _added(found, found.values, found.points, own, linear), []
     for coordinate in free:
         value = np.asarray(found.values[coordinate.name], dtype=float)
         moved = {**found.values, coordinate.name: coordinate.moved(value, step)}
-        rows.append((_added(moved, found, own, linear) - here) / step)
+        rows.append((_added(found, moved, found.points, own, linear) - here) / step)
     return _through_gage(found, np.stack(rows))
+
+
+def slopes_of(found: Solution, free: Sequence[Coordinate] = ()) -> SolutionSlopes:
+    """Return slopes by coordinates, then by relative load and relative pressure, all included."""
+    by = by_values(found, free)
+    if found.linear is None:
+        return by
+    own, linear = _split(found.values, found.points, found.changes)
+    p, v, step = found.points, found.values, LINEAR_STEP
+    heavier = replace(p, load=p.load * (1.0 + step))
+    firmer = replace(p, pressure=p.pressure * (1.0 + step))
+    here = _added(found, v, p, own, linear)
+    rows = [(_added(found, v, at, own, linear) - here) / step for at in (heavier, firmer)]
+    more = _through_gage(found, np.stack(rows))
+    if free:
+        more = np.concatenate([added_by_values(found, free, step), more])
+    return replace(by, waveform=by.waveform + more)
 
 
 def by_effects(
@@ -210,9 +266,10 @@ def by_effects(
             rolled.append(k)
             continue
         if plain is None or here is None:
-            plain = _plain(found.values, found.points, own)
-            here = _added(found.values, found, own, linear, plain)
-        shown[k] = (_added(found.values, found, own_there, linear_there, plain) - here) / step
+            plain = _plain(found.values, found.points, own, found.phi)
+            here = _added(found, found.values, found.points, own, linear, plain)
+        there_too = _added(found, found.values, found.points, own_there, linear_there, plain)
+        shown[k] = (there_too - here) / step
     by = None
     if rolled:
         moved = [(found.values, found.points, there[k][1]) for k in rolled]
@@ -221,47 +278,55 @@ def by_effects(
     return SolutionSlopes(rows, by)
 
 
-def _plain(values: Values, points: Operating, own: Sequence[Change]) -> State:
-    return pressed(State.of(values, points, GRID), [("constants", change) for change in own])
+def _damped(values: Values) -> bool:
+    return bool(np.any(values["damping"]))
+
+
+def _plain(values: Values, points: Operating, own: Sequence[Change], phi: FloatArray) -> State:
+    """Return the linear ring as the rolling one is: undamped, with the same constants."""
+    still = {**values, "damping": 0.0}
+    return pressed(State.of(still, points, phi), [("constants", change) for change in own])
 
 
 def _added(
-    values: Values,
     found: Solution,
+    values: Values,
+    points: Operating,
     own: Sequence[Change],
     linear: Changes,
     plain: State | None = None,
 ) -> FloatArray:
-    """Return what changes of the linear ring change there, filtered, (n_points, n_phi)."""
-    return added(values, found.points, own, linear, found.low_pass, plain)
+    """Return what is added through the linear ring, filtered, (n_points, n_phi).
+
+    `own` changes the constants of both rings; `plain` is the linear ring with them alone.
+    """
+    if plain is None:
+        plain = _plain(values, points, own, found.phi)
+    before, after = _beside(values, points, own, linear, found.low_pass, plain)
+    return after.wave - before.wave
 
 
-def added(
+def _beside(
     values: Values,
     points: Operating,
     own: Sequence[Change],
     linear: Changes,
     low_pass: LowPass,
-    plain: State | None = None,
-) -> FloatArray:
-    """Return what changes of the linear ring change there, filtered, (n_points, n_phi).
-
-    `own` changes the constants of both rings; `plain` is the linear ring with them alone.
-    """
-    if not linear:
-        return np.zeros((len(points), GRID.size))
-    if plain is None:
-        plain = _plain(values, points, own)
+    plain: State,
+) -> tuple[State, State]:
+    """Return the filtered linear ring without and with its changes; `plain` is pressed."""
     with_them = plain
-    if any(stage == "constants" for stage, _ in linear):
+    if _damped(values) or any(stage == "constants" for stage, _ in linear):
         every = [*(("constants", change) for change in own), *linear]
-        with_them = pressed(State.of(values, points, GRID), every)
-    return strained(with_them, linear, low_pass).wave - strained(plain, (), low_pass).wave
+        with_them = pressed(State.of(values, points, plain.phi), every)
+    return strained(plain, (), low_pass), strained(with_them, linear, low_pass)
 
 
 def _at_gage(found: Solution, shown: FloatArray, changes: Changes) -> FloatArray:
     """Return a waveform (n_points, n_phi) after the effects at the gage."""
-    state = State.of(found.values, found.points, GRID)
+    if not any(stage == "gage" for stage, _ in changes):
+        return shown
+    state = State.of(found.values, found.points, found.phi)
     return apply(state.but(deflection=found.deflection, waveform=shown), changes, "gage").wave
 
 
@@ -284,7 +349,7 @@ def _towards(
     steps: float | Sequence[float],
 ) -> tuple[FloatArray, RolledSlopes]:
     """Return slopes of the filtered waveform before the gage, and of the rolling ring."""
-    depth = found.deflection
+    depth = found.rolling.deflection
     moved = [made_with(v, p, _split(v, p, changes)[0], depth) for v, p, changes in there]
     each = [*np.broadcast_to(np.asarray(steps, dtype=float), (len(there),)).tolist()]
     own = _split(found.values, found.points, found.changes)[0]
@@ -292,7 +357,7 @@ def _towards(
     follow = not _same(deeper.constants, found.made.constants)
     if follow:
         moved, each = [*moved, deeper], [*each, DEPTH_STEP]
-    by = rolled_slopes(found.rolling, found.made, moved, each, GRID.size)
+    by = rolled_slopes(found.rolling, found.made, moved, each, found.phi.size)
     if follow:
         by = _following(by)
     return smoothed(by.strain, found.points, found.low_pass), by

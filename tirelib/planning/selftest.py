@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.diagnose.diagnose import FALSE_ALARM, fitted_problem, plain_tires, twins_of
+from tirelib.diagnose.diagnose import FALSE_ALARM, plain_tires, twins_of
+from tirelib.diagnose.fitted import fitted_problem
 from tirelib.effects import Effect
 from tirelib.errors import ParameterError
 from tirelib.identify.campaign_data import StraightRuns
@@ -154,8 +155,8 @@ def selftest(
             f"selftest: {repeats} tires are asked for each planting; the library has {most}: give "
             "a smaller --repeats"
         )
-    _, problem = fitted_problem(
-        runs, values, catalogue, effects=effects, strengths=strengths, progress=progress
+    problem = fitted_problem(
+        runs, values, catalogue, families, effects=effects, strengths=strengths, progress=progress
     )
     base = Hypotheses(problem, families, false_alarm, progress).base
     plans = Plans(problem, base, false_alarm, repeats, seed)

@@ -94,7 +94,7 @@ def parts_of(told: Assessment, history: Sequence[Mapping[str, Any]] = ()) -> lis
     """Return the parts of the page."""
     found = told.diagnosis
     fall = waterfall_of(history, "strain")
-    before = left_of(found.data, found.base)
+    before = left_of(told.refitted, found.problem.data.points)
     plots = [_map(told, before, "before", "Without the named effects")]
     if told.named:
         plots.append(_map(told, told.left, "after", f"With {', '.join(told.named)}"))
@@ -126,7 +126,7 @@ def _summary(told: Assessment) -> str:
 
 
 def _unit(told: Assessment) -> str:
-    return "noise" if told.unit.known else "microstrain"
+    return "noise" if told.after.known else "microstrain"
 
 
 def _strength(values: Sequence[float] | np.ndarray) -> str:
@@ -238,11 +238,11 @@ def _sources(told: Assessment) -> list[str]:
 
 
 def _map(told: Assessment, left: Left, name: str, title: str) -> Plot:
-    points, run = told.diagnosis.data.points, told.diagnosis.runs.waves.run
+    points, run = told.diagnosis.problem.data.points, told.diagnosis.runs.waves.run
     order = np.lexsort((points.speed, points.pressure, np.round(points.load, -2)))
-    data = told.unit.factor * left.white[order]
+    data = left.white[order]
     unit = _unit(told)
-    limit = told.unit.factor * limit_of(left_of(told.diagnosis.data, told.diagnosis.base).white)
+    limit = limit_of(told.refitted.white_of(told.refitted.rest))
     degrees = np.rad2deg(GRID)
     figure = go.Figure(
         go.Heatmap(

@@ -1,7 +1,7 @@
-"""A model file on the road: the solve that `identify` fits and `compare` uses, effects included.
+"""A model file on the road: the solve that `compare` and `diagnose` use, effects included.
 
-Effects add what they change in the linear ring to the rolling one (`tirelib.model.base.predict`).
-Belt, pressure and strain are put together in the same way; the shear is that of the rolling ring.
+Belt, pressure and strain are those of the rolling ring, with what effects and damping add through
+the linear one (`tirelib.model.solution`); the shear is that of the rolling ring.
 """
 
 from collections.abc import Mapping
@@ -12,7 +12,8 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.compare.model import Model
 from tirelib.errors import ConvergenceError, ParameterError
-from tirelib.model.base import Correction, large_displacements, predict
+from tirelib.model.base import predict
+from tirelib.model.solution import Solution, solved
 from tirelib.model.state import Operating, State
 from tirelib.parameters import FIELDS, Tire
 from tirelib.report.simulation import (
@@ -23,7 +24,6 @@ from tirelib.report.simulation import (
     points_of,
 )
 from tirelib.ring.ring import ComplexArray
-from tirelib.rolling.gage import Gage
 from tirelib.signal import LowPass
 from tirelib.threads import one_thread
 
@@ -152,8 +152,13 @@ def simulate_model(
         assert deflection is not None  # noqa: S101 - the caller has looked
         load = _load_at(model, values, conditions, deflection, low_pass, tire)
     points = conditions.at(load, tire.ring_radius)
-    state, correction = _solved(model, values, points, low_pass)
-    return _simulation(tire, values, state, correction, low_pass, points)
+    if model.large:
+        found = _solved(model, values, points, low_pass)
+        curves, depth = _of_rolling(found), found.deflection
+    else:
+        state = _linear(model, values, points, low_pass)
+        curves, depth = _of_linear(state), state.deflection
+    return _simulation(tire, curves, depth, points)
 
 
 def _check_known(model: Model, conditions: Conditions) -> None:
@@ -167,15 +172,16 @@ def _check_known(model: Model, conditions: Conditions) -> None:
 
 def _solved(
     model: Model, values: Mapping[str, float | FloatArray], points: Operating, low_pass: LowPass
-) -> tuple[State, Correction | None]:
-    """Return the state over `TURN` as `compare` predicts it, and the exact ring behind it."""
-    correction = None
-    if model.large:
-        correction = large_displacements(values, points, low_pass=low_pass, phi=TURN)
-    state = predict(
-        values, points, model.changes, low_pass=low_pass, correction=correction, phi=TURN
-    )
-    return state, correction
+) -> Solution:
+    """Return the rolling ring over `TURN` as `compare` predicts it."""
+    return solved(values, points, model.changes, low_pass=low_pass, phi=TURN)
+
+
+def _linear(
+    model: Model, values: Mapping[str, float | FloatArray], points: Operating, low_pass: LowPass
+) -> State:
+    """Return the linear ring over `TURN`."""
+    return predict(values, points, model.changes, low_pass=low_pass, phi=TURN)
 
 
 def _load_at(
@@ -190,8 +196,9 @@ def _load_at(
 
     def depth(load: FloatArray) -> FloatArray:
         points = conditions.at(load, tire.ring_radius)
-        found: FloatArray = _solved(model, values, points, low_pass)[0].deflection
-        return found
+        if model.large:
+            return _solved(model, values, points, low_pass).deflection
+        return _linear(model, values, points, low_pass).deflection
 
     load = 1.2e5 * deflection  # a third less than a usual tire's 180 N/mm: an easy first solve
     more = load * (1.0 + TRIAL)
@@ -214,43 +221,52 @@ def _load_at(
     )
 
 
-def _simulation(
-    tire: Tire,
-    values: Mapping[str, float | FloatArray],
-    state: State,
-    correction: Correction | None,
-    low_pass: LowPass,
-    points: Operating,
-) -> Simulation:
-    """Return the curves of a solved model."""
+@dataclass(frozen=True, slots=True)
+class _Curves:
+    """Curves (n_points, n) over `TURN`, and where the contact begins and ends, (n_points, 2)."""
+
+    u: FloatArray
+    v: FloatArray
+    pressure: FloatArray
+    up: FloatArray
+    along: FloatArray
+    strain: FloatArray
+    gage: FloatArray
+    edges: FloatArray
+
+
+def _of_linear(state: State) -> _Curves:
+    """Return the curves of the linear ring; its contact pushes along the belt's normal."""
     assert state.contact is not None  # noqa: S101 - the chain sets it
     assert state.belt is not None  # noqa: S101
     assert state.strain is not None  # noqa: S101
     u, v, strain = (_on_turn(h) for h in (state.belt[..., 0], state.belt[..., 1], state.strain))
-    pressure, edges = state.contact.pressure_at(TURN), state.contact.edges
-    rolling = correction.contact if correction is not None else None
+    pressure = state.contact.pressure_at(TURN)
     up, along = pressure * np.cos(TURN), -pressure * np.sin(TURN)
-    if rolling is not None:
-        plain = predict({**values, "damping": 0.0}, points, low_pass=low_pass, phi=TURN)
-        assert plain.contact is not None  # noqa: S101
-        assert plain.belt is not None  # noqa: S101
-        assert plain.strain is not None  # noqa: S101
-        turn = rolling.on_turn(TURN.size)
-        u = u - _on_turn(plain.belt[..., 0]) + turn.u
-        v = v - _on_turn(plain.belt[..., 1]) + turn.v
-        gage = Gage(
-            state.offset,
-            np.full(state.offset.shape, tire.liner_share),
-            tire.tread_spread * state.thickness,
-        )
-        strain = strain - _on_turn(plain.strain) + rolling.strain(gage, TURN.size)
-        edges = edges - plain.contact.edges + turn.edges
-        pressure = pressure - plain.contact.pressure_at(TURN) + turn.pressure
+    return _Curves(u, v, pressure, up, along, strain, state.wave, state.contact.edges)
+
+
+def _of_rolling(found: Solution) -> _Curves:
+    """Return the curves of the rolling ring, with what the linear one adds."""
+    turn = found.rolling.on_turn(TURN.size)
+    u, v, pressure, edges = turn.u, turn.v, turn.pressure, turn.edges
+    strain = found.rolling.strain(found.made.gage, TURN.size)
+    if found.linear is not None:
+        plain, added = (_of_linear(state) for state in found.linear)
+        u, v, strain = u + added.u - plain.u, v + added.v - plain.v, strain - plain.strain
+        strain, edges = strain + added.strain, edges + added.edges - plain.edges
+        pressure = pressure + added.pressure - plain.pressure
         pressure = np.where(_inside(edges), np.maximum(pressure, 0.0), 0.0)
-        up, along = pressure, turn.shear
-    rate = _slope(strain)
-    curves = (_closed(x) for x in (u, v, pressure, up, along, strain, rate, state.wave))
-    u, v, pressure, up, along, strain, rate, wave = curves
+    return _Curves(u, v, pressure, pressure, turn.shear, strain, found.waveform, edges)
+
+
+def _simulation(
+    tire: Tire, found: _Curves, deflection: FloatArray, points: Operating
+) -> Simulation:
+    """Return the curves of a solved model."""
+    rate = _slope(found.strain)
+    closed = (found.u, found.v, found.pressure, found.up, found.along, found.strain, rate)
+    u, v, pressure, up, along, strain, rate = (_closed(x) for x in closed)
     phi = np.append(TURN, np.pi)
     return Simulation(
         tire,
@@ -258,9 +274,9 @@ def _simulation(
         points.pressure,
         points.omega,
         points.load,
-        state.deflection,
-        edges,
-        _at_middle(phi, pressure, edges),
+        deflection,
+        found.edges,
+        _at_middle(phi, pressure, found.edges),
         _centre(phi, pressure, tire.ring_radius),
         phi,
         u,
@@ -270,7 +286,7 @@ def _simulation(
         along,
         strain,
         rate,
-        gage=wave,
+        gage=_closed(found.gage),
     )
 
 

@@ -83,7 +83,7 @@ def test_an_unknown_name_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    "first", ["", "import tirelib.compare.model, tirelib.identify.whole, tirelib.diagnose.refit"]
+    "first", ["", "import tirelib.compare.model, tirelib.identify.whole, tirelib.diagnose.fitted"]
 )
 def test_a_verb_may_be_called_whatever_was_imported_before(first: str) -> None:
     code = f"""{first}

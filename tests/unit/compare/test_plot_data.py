@@ -17,7 +17,8 @@ from tirelib.compare.strain import compare_strain
 from tirelib.effects import CATALOGUE
 from tirelib.errors import ParameterError
 from tirelib.identify.delay import by_delay
-from tirelib.model.base import coordinates, linearised, operating_points
+from tirelib.model.base import coordinates, operating_points
+from tirelib.model.solution import by_values, solved
 from tirelib.parameters import Number
 
 
@@ -38,9 +39,10 @@ def test_the_trace_of_the_planted_effect_looks_like_what_is_left(tmp_path: Path)
     white, whiten = data["white"], found.error.whiten
     assert np.sqrt(np.mean(white**2)) == pytest.approx(found.error.value)
     at, low_pass = operating_points(found.chosen.waves), found.chosen.waves.low_pass
-    linear = linearised(model.values, at, coordinates(model.values), low_pass=low_pass)
+    free = coordinates(model.values)
+    here = solved(model.values, at, low_pass=low_pass)
     assert whiten is not None
-    slopes = [*linear.waveform_slopes, by_delay(linear.waveform, at.omega)]
+    slopes = [*by_values(here, free).waveform[: len(free)], by_delay(here.waveform, at.omega)]
     basis = np.linalg.qr(whiten(np.stack(slopes)).reshape(len(slopes), -1).T)[0]
     rest = white.ravel() - basis @ (basis.T @ white.ravel())
     own = data[f"trace_{EFFECT}"]

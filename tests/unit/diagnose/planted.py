@@ -12,7 +12,8 @@ from tirelib.effects.effect import Strength
 from tirelib.extend.extension import Extension, add_effect
 from tirelib.extend.model_file import extended_file
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
-from tirelib.model.base import large_displacements, operating_points, predict, values_of
+from tirelib.model.base import operating_points, values_of
+from tirelib.model.solution import solved
 from tirelib.parameters import Number, TireFile
 from tirelib.waveforms import Waveforms
 
@@ -34,10 +35,8 @@ def waves(effect: str = "", strength: Strength = 0.0, repeats: int = 2) -> Wavef
     fields = {name: getattr(plain, name) for name in plain.__dataclass_fields__}
     turning = Waveforms(**(fields | {"conditions": fixed}))
     points, values = operating_points(turning), values_of(TIRE)
-    fix = large_displacements(values, points, low_pass=turning.low_pass)
     changes = [CATALOGUE[effect].at(strength)] if effect else []
-    wave = predict(values, points, changes, low_pass=turning.low_pass, correction=fix).waveform
-    assert wave is not None
+    wave = solved(values, points, changes, low_pass=turning.low_pass).waveform
     random = np.random.default_rng(3)
     strain = wave[:, None] + NOISE * random.standard_normal((len(plain), len(LATERAL), 360))
     return Waveforms(**(fields | {"conditions": fixed, "strain": strain}))

@@ -19,10 +19,8 @@ from tirelib.parameters import read_tire, write_tire
 
 def test_adding_the_planted_effect_takes_the_error_away() -> None:
     done, _ = added()
-    # whitened with noise and a structural share of 1.6 %, which model-made data lack
-    assert done.after.error < 0.35 * done.before.error
-    # the base takes up part of a change of stiffness with load; a tenth of the range is kept apart
-    assert done.strength[0] == pytest.approx(STRENGTH, abs=0.1 * CATALOGUE[EFFECT].scale)
+    assert done.after.error < 0.05 * done.before.error
+    assert done.strength[0] == pytest.approx(STRENGTH, abs=0.02)
     assert done.flags == ()
 
 
@@ -39,7 +37,9 @@ def test_errors_are_those_of_the_model_files_before_and_after() -> None:
     assert told["error_unit"] == "noise"
     assert told["error_before"] == pytest.approx(error_of(measured, model_of(model_file())).value)
     assert told["error_after"] == pytest.approx(error_of(measured, model_of(file)).value)
-    assert told["error_after"] < told["error_refitted"] <= told["error_before"]
+    assert told["error_after"] < 0.1 * told["error_refitted"]
+    # the given numbers are all but the truth: fitted anew they gain nothing
+    assert told["error_refitted"] == pytest.approx(told["error_before"], rel=0.05)
     assert told["noise"] == pytest.approx(1e6 * done.runs.noise.std)
     assert told["floor"] <= told["error_after"]
     assert {"heldout_error_before", "heldout_error_after", "strength", "std"} <= set(told)
@@ -110,10 +110,9 @@ def test_removing_restores_the_fit_without_the_effect() -> None:
     done, file = added()
     out = remove_effect(runs(EFFECT, STRENGTH), model_of(file), CATALOGUE[EFFECT])
     assert out.after.effects == ()
-    # both are the minimum of one cost; wide priors about different starts move it by little:
-    # a hundredth of what a whitened sample scatters
-    assert out.after.error == pytest.approx(done.before.error, abs=0.01)
-    assert out.before.error == pytest.approx(done.after.error, abs=0.01)
+    # both are the bottom of one cost; wide priors about different starts move it by little
+    assert out.after.error == pytest.approx(done.before.error, rel=0.02)
+    assert out.before.error == pytest.approx(done.after.error, abs=0.2)
     gone = extended_file(file, out, "hash")
     assert gone.extra["effects"] == []
     assert [step["action"] for step in gone.extra["history"]] == ["add", "remove"]

@@ -7,34 +7,41 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.unit.diagnose.planted import EFFECT, LOADS, STRENGTH, model_file, runs
+from tests.unit.diagnose.planted import EFFECT, LOADS, model_file, runs
 from tests.unit.identify.model_waves import TIRE
+from tirelib.arrays import BoolArray
 from tirelib.compare.error import Yardstick, error_of
-from tirelib.compare.model import model_of
-from tirelib.diagnose.diagnose import fitted_problem, plain_tires
+from tirelib.compare.model import Model, model_of
+from tirelib.diagnose.diagnose import plain_tires
 from tirelib.diagnose.document import next_test
+from tirelib.diagnose.fitted import Fitted, fitted, fitted_problem
 from tirelib.diagnose.floor import floor_of
-from tirelib.diagnose.held_out import folds, held_out_errors, part_of, pooled
+from tirelib.diagnose.held_out import folds, held_out_errors, pooled
 from tirelib.diagnose.left import left_of
-from tirelib.diagnose.refit import Refit, refit
 from tirelib.effects import CATALOGUE
-from tirelib.identify.waveform_fit import Data
+from tirelib.identify.campaign_data import StraightRuns
 from tirelib.infer.select import Hypotheses
 from tirelib.model.base import values_of
 from tirelib.waveforms import GRID
 
 
+def base_of(measured: StraightRuns) -> Fitted:
+    """Return the base model fitted to runs, among hypotheses of the whole catalogue."""
+    problem = fitted_problem(measured, values_of(TIRE), list(CATALOGUE.values()), plain_tires())
+    among = Hypotheses(problem, plain_tires())
+    return fitted(among, among.base, Yardstick.of(measured))
+
+
 @pytest.fixture(scope="module")
-def fitted() -> tuple[Data, Refit]:
-    data = runs().data(with_deflection=False)
-    return data, refit(data, values_of(TIRE))
+def plain() -> Fitted:
+    return base_of(runs())
 
 
-def test_a_misfit_is_told_where_it_is_and_how_it_grows(fitted: tuple[Data, Refit]) -> None:
-    data, model = fitted
+def test_a_misfit_is_told_where_it_is_and_how_it_grows(plain: Fitted) -> None:
+    points = runs().data().points
     bump = np.exp(-(((GRID - 2.0) / 0.05) ** 2))
-    size = 1e-3 * (data.points.load / 4000.0) ** 2
-    left = left_of(replace(data, strain=model.waveform - size[:, None] * bump), model)
+    size = 1e-3 * (points.load / 4000.0) ** 2
+    left = left_of(replace(plain.reached, rest=-size[:, None] * bump), points)
     assert left.where.startswith("away from the contact")
     assert left.sectors["far side"] == pytest.approx(1.0, abs=0.05)
     power = left.powers["load"]
@@ -61,8 +68,8 @@ def test_the_highest_load_and_the_highest_pressure_are_held_out() -> None:
 
 def test_two_loads_or_one_pressure_are_not_held_out() -> None:
     data = runs().data(with_deflection=False)
-    few = part_of(data, (data.points.load < 5000.0) & (data.points.pressure < 2e5))
-    assert folds(few) == ()
+    few = (data.points.load < 5000.0) & (data.points.pressure < 2e5)
+    assert folds(replace(data, points=data.points.take(few))) == ()
 
 
 def test_pooled_errors_are_weighed_by_runs_and_nothing_is_no_number() -> None:
@@ -75,36 +82,52 @@ def test_pooled_errors_are_weighed_by_runs_and_nothing_is_no_number() -> None:
 
 
 def test_held_out_errors_are_of_runs_that_the_fit_has_not_seen(
-    fitted: tuple[Data, Refit], monkeypatch: pytest.MonkeyPatch
+    plain: Fitted, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    data, model = fitted
+    data = runs().data()
     (load, _), seen = folds(data), []
-    monkeypatch.setattr(
-        "tirelib.diagnose.held_out.refit",
-        lambda part, *_, **__: seen.append(part.points.load) or model,
-    )
+
+    def trained(_: Fitted, out: BoolArray) -> tuple[Model, float]:
+        seen.append(data.points.load[~out])
+        return plain.model, 0.0
+
+    monkeypatch.setattr(Fitted, "without_runs", trained)
     strain = data.strain + 1e-3 * load.out[:, None] * np.cos(3.0 * GRID)
     spoiled = Yardstick.of(replace(runs(), strain=strain))
-    (error,) = held_out_errors(data, model, [load], spoiled)
+    (error,) = held_out_errors(plain, [load], spoiled)
     assert seen[0].max() < LOADS[-1]
-    assert error == pytest.approx(spoiled.take(load.out).error(model.model, model.delay).value)
-    assert error > 10.0 * spoiled.take(~load.out).error(model.model, model.delay).value
+    assert error == pytest.approx(spoiled.take(load.out).error(plain.model, 0.0).value)
+    assert error > 10.0 * spoiled.take(~load.out).error(plain.model, 0.0).value
 
 
-@pytest.mark.parametrize(("effect", "strength"), [("", 0.0), (EFFECT, STRENGTH)])
+def test_what_is_held_out_moves_no_number(plain: Fitted) -> None:
+    """Spoiled runs that are left out change nothing; the same runs in the fit do."""
+    load, _ = folds(runs().data())
+    strain = runs().strain + 1e-4 * load.out[:, None] * np.cos(3.0 * GRID)
+    spoiled = base_of(replace(runs(), strain=strain))
+    alone, _ = plain.without_runs(load.out)
+    again, _ = spoiled.without_runs(load.out)
+    name = "radial_stiffness"
+    assert float(again.values[name]) == pytest.approx(float(alone.values[name]), rel=2e-3)
+    moved = abs(float(spoiled.values[name]) / float(plain.values[name]) - 1.0)
+    assert moved > 1e-2
+
+
+WEAK = 0.05
+"""Strength that acts to first order."""
+
+
+@pytest.mark.parametrize(("effect", "strength"), [("", 0.0), (EFFECT, WEAK)])
 def test_the_floor_is_the_error_unless_more_is_missing_than_plain_tires_show(
     effect: str, strength: float
 ) -> None:
-    planted = runs(effect, strength)
-    base, problem = fitted_problem(planted, values_of(TIRE), list(CATALOGUE.values()))
-    hypothesis = Hypotheses(problem, plain_tires()).base
-    error = Yardstick.of(planted).error(base.model)
-    floor = floor_of(error, hypothesis, 0.05)
+    base = base_of(runs(effect, strength))
+    floor = floor_of(base.reached, base.hypothesis, 0.05)
     if effect:
-        assert hypothesis.p <= 0.05
-        assert 0.5 < floor < 0.9 * error.value
+        assert base.hypothesis.p <= 0.05
+        assert 0.0 < floor < 0.9 * base.error
     else:
-        assert floor == error.value
+        assert floor == base.error
 
 
 def test_errors_are_in_noise_or_without_repeats_in_microstrain() -> None:
@@ -127,7 +150,7 @@ def _told(verdict: str, *named: str) -> Any:
             dead={"camber": "no run has a camber", "gage_gain": "always"}, like=None
         ),
         left=SimpleNamespace(where="in the contact", scaling="grows with load"),
-        unit=SimpleNamespace(known=True),
+        after=SimpleNamespace(known=True),
     )
 
 

@@ -1,24 +1,56 @@
 """Effects act on the rolling ring: a changed constant is that of another tire, slopes are exact."""
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from tests.unit.model.test_whole import GRIPPING, POINTS
+from tests.unit.identify.model_waves import TIRE, operating
 from tirelib.arrays import FloatArray
 from tirelib.effects import CATALOGUE
-from tirelib.model.base import coordinates, move, predict
+from tirelib.errors import ParameterError
+from tirelib.model.base import BARE, coordinates, large_displacements, move, predict, values_of
 from tirelib.model.chain import Changes
 from tirelib.model.solution import (
     Solution,
+    SolutionSlopes,
     added_by_values,
     by_effects,
     by_values,
     made_with,
+    slopes_of,
     solved,
 )
 from tirelib.model.state import State
 from tirelib.signal import LowPass
 
+VALUES = values_of(TIRE)
+POINTS = operating(np.array([2500.0, 4500.0, 6500.0]), np.array([1.8e5, 2.1e5, 2.4e5]))
+
+
+def softer(state: State) -> State:
+    return state.but(k_u=0.9 * state.k_u)
+
+
+GRIPPING = {
+    **VALUES,
+    "shear_stiffness": 5e4,
+    "rotary_inertia": 8e-5,
+    "tread_shear_stiffness": 2e7,
+    "tread_hardening": 1.0,
+    "section_pull": 0.03,
+    "liner_share": 0.4,
+    "tread_poisson": 0.5,
+    "contact_crown": 0.3,
+    "creep": 0.005,
+    "tread_spread": 0.3,
+}
+CASES: dict[str, tuple[Mapping[str, float | FloatArray], Changes]] = {
+    "plain": (VALUES, ()),
+    "damped": ({**VALUES, "damping": 0.05}, ()),
+    "of the plain tire": (GRIPPING, ()),
+}
 LOW_PASS = LowPass()
 FREE = coordinates(GRIPPING)
 
@@ -105,3 +137,54 @@ def test_slopes_are_differences(effects: dict[str, float]) -> None:
         less = {**effects, name: effects[name] - h}
         difference = (with_them(zero, moved) - with_them(zero, less)) / (2.0 * h)
         assert np.linalg.norm(row - difference) < 0.02 * np.linalg.norm(difference), name
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_it_is_the_chain_with_the_correction_of_a_tire_without_effects(case: str) -> None:
+    values, changes = CASES[case]
+    fix = replace(large_displacements(values, POINTS), start=None)  # both from the same start
+    state = predict(values, POINTS, changes, correction=fix)
+    found = at(values, changes)
+    assert found.waveform == pytest.approx(state.wave, abs=1e-10)
+    assert found.deflection == pytest.approx(state.deflection, abs=1e-12)
+
+
+@pytest.mark.parametrize("case", [*CASES, "with an effect"])
+def test_slopes_by_numbers_and_set_points_are_differences(case: str) -> None:
+    values, changes = CASES.get(case, (VALUES, [("constants", softer)]))
+    found = at(values, changes)
+    free = coordinates(values)
+    slopes = slopes_of(found, free)
+    h = 1e-5
+    for k in range(len(free) + 2):
+        ends = []
+        for step in (-h, h):
+            z = np.zeros(len(free))
+            points = POINTS
+            if k < len(free):
+                z[k] = step
+            else:
+                name = ("load", "pressure")[k - len(free)]
+                points = replace(POINTS, **{name: getattr(POINTS, name) * (1.0 + step)})
+            there = move(values, z, free)
+            ends.append(solved(there, points, changes, low_pass=LOW_PASS, start=found.rolling))
+        wave = (ends[1].waveform - ends[0].waveform) / (2.0 * h)
+        depth = (ends[1].deflection - ends[0].deflection) / (2.0 * h)
+        # the linear part's one-sided step of 1e-4; where it plays no part, a thousandth of that
+        close = 3e-3 if values["damping"] else 1e-5
+        assert slopes.waveform[k] == pytest.approx(wave, abs=close * np.abs(wave).max() + 1e-9)
+        assert slopes.deflection[k] == pytest.approx(depth, abs=close * np.abs(depth).max() + 1e-9)
+
+
+def test_a_start_along_the_slopes_is_near() -> None:
+    found = at(VALUES)
+    dz = np.array([0.05, -0.04, 0.1, 0.05, 0.1, -0.05, 0.02, 0.1])
+    start = slopes_of(found, BARE).start(found, dz)
+    there = at(move(VALUES, dz, BARE))
+    moved = np.abs(there.deflection - found.deflection)
+    assert (np.abs(start.depth - there.deflection) < 0.1 * moved).all()
+
+
+def test_directions_that_move_no_ring_have_no_deflection() -> None:
+    with pytest.raises(ParameterError, match="none of their directions"):
+        _ = SolutionSlopes(np.zeros((1, 3, 360)), None).deflection

@@ -7,7 +7,8 @@ import numpy as np
 
 from tests.synthetic import LATERAL
 from tests.unit.identify.model_waves import TIRE, made_waves, operating
-from tirelib.diagnose.diagnose import fitted_problem, plain_tires
+from tirelib.diagnose.diagnose import plain_tires
+from tirelib.diagnose.fitted import fitted_problem
 from tirelib.effects import CATALOGUE
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.infer.select import Hypotheses
@@ -72,7 +73,7 @@ def runs(further: tuple[float, float, float] | None = None) -> StraightRuns:
 
 
 def hypotheses(measured: StraightRuns) -> Hypotheses:
-    _, problem = fitted_problem(measured, values_of(TIRE), list(CATALOGUE.values()))
+    problem = fitted_problem(measured, values_of(TIRE), list(CATALOGUE.values()), plain_tires())
     return Hypotheses(problem, plain_tires())
 
 

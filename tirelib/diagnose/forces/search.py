@@ -8,7 +8,6 @@ from tirelib.arrays import BoolArray, FloatArray
 from tirelib.diagnose.forces.candidates import ForceCandidates, force_candidates
 from tirelib.diagnose.forces.fit import ForceFit, Problem, fit_force
 from tirelib.diagnose.forces.ranking import ForceRanking, ForceScores
-from tirelib.diagnose.refit import inside
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
 
@@ -121,6 +120,12 @@ class Search:
             if self.model.error > HELPS * less.error or not inside.all():
                 self.model = less
                 self.named.remove(name)
+
+
+def inside(effect: Effect, strength: FloatArray) -> FloatArray:
+    """Return a start for a fit within an effect's range."""
+    start: FloatArray = np.clip(strength, 0.9 * effect.low, 0.9 * effect.high)
+    return start
 
 
 def ratio_of(

@@ -1,0 +1,174 @@
+"""A model fitted to straight runs: where it starts, what it reaches, which delay it finds."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.unit.diagnose.planted import EFFECT, STRENGTH, runs
+from tests.unit.identify.model_waves import TIRE
+from tirelib.arrays import FloatArray
+from tirelib.compare.error import Yardstick, error_of
+from tirelib.diagnose.diagnose import plain_tires
+from tirelib.diagnose.fitted import Fitted, fitted, fitted_problem
+from tirelib.effects import CATALOGUE
+from tirelib.effects.effect import Effect, effect
+from tirelib.errors import ParameterError
+from tirelib.identify.campaign_data import StraightRuns
+from tirelib.identify.delay import UNIT, by_delay, earlier, late
+from tirelib.infer.select import Hypotheses
+from tirelib.infer.strain import WIDTH
+from tirelib.model.base import BARE, move, values_of
+from tirelib.model.state import State
+from tirelib.waveforms import GRID
+
+DELAY = 4e-5
+LAG = (0.2, 0.02)
+"""Of first order: s_2 = s_1^2 / 2, [ms]."""
+
+
+def hypotheses(
+    measured: StraightRuns, values: Mapping[str, float | FloatArray], *catalogue: Effect
+) -> Hypotheses:
+    return Hypotheses(fitted_problem(measured, values, catalogue, plain_tires()), plain_tires())
+
+
+def base_of(
+    measured: StraightRuns, values: Mapping[str, float | FloatArray] | None = None
+) -> Fitted:
+    found = hypotheses(measured, values or values_of(TIRE))
+    return fitted(found, found.base, Yardstick.of(measured))
+
+
+def delay_of(model: Fitted) -> float:
+    return UNIT * float(model.hypothesis.fit.point.base[-1])
+
+
+def delay_std(model: Fitted) -> float:
+    k = len(model.hypothesis.fit.point.base) - 1
+    return UNIT * float(np.sqrt(model.covariance[k, k]))
+
+
+def late_runs(measured: StraightRuns, delay: float) -> StraightRuns:
+    """Return runs as gages show them that are late."""
+    state = State.of(values_of(TIRE), measured.data().points, GRID).but(waveform=measured.strain)
+    return replace(measured, strain=late(delay)[1](state).wave)
+
+
+@pytest.fixture(scope="module")
+def plain() -> Fitted:
+    return base_of(runs())
+
+
+@pytest.fixture(scope="module")
+def lacking() -> Fitted:
+    """Return a fit that lacks the runs' effect, so that it leaves much."""
+    return base_of(runs(EFFECT, STRENGTH))
+
+
+def test_a_tire_of_the_model_is_fitted_to_the_noise(plain: Fitted) -> None:
+    assert plain.error == pytest.approx(1.0, abs=0.1)
+
+
+def test_its_error_is_that_of_the_model_file(lacking: Fitted) -> None:
+    told = error_of(runs(EFFECT, STRENGTH), lacking.model)
+    assert lacking.error == pytest.approx(told.value, rel=1e-6)
+    assert lacking.error > 10.0
+
+
+@pytest.mark.parametrize("k", range(len(BARE)), ids=[each.name for each in BARE])
+def test_no_coordinate_goes_much_lower(plain: Fitted, k: int) -> None:
+    """The likeliest numbers beside what plain tires show give little of the error away."""
+    measured, step = runs(), 0.02 * float(WIDTH[BARE[k].name])
+    for side in (-step, step):
+        z = np.zeros(len(BARE))
+        z[k] = side
+        there = error_of(measured, replace(plain.model, values=move(plain.values, z, BARE)))
+        assert there.value > 0.96 * plain.error, f"{BARE[k].name} moved by {side:g}"
+
+
+@pytest.mark.parametrize("factor", [0.75, 1.3])
+def test_a_start_far_away_ends_where_one_nearby_does(plain: Fitted, factor: float) -> None:
+    near = values_of(TIRE)
+    moved = ("radial_stiffness", "radial_pressure_slope", "extension_stiffness", "tread_stiffness")
+    far = base_of(runs(), {**near, **{n: factor * np.asarray(near[n]) for n in moved}})
+    assert far.error == pytest.approx(plain.error, rel=0.01)
+    apart = plain.reached.prediction.strain - far.reached.prediction.strain
+    assert np.sqrt(np.mean(plain.reached.white_of(apart) ** 2)) < 0.3, "a third of the noise"
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_law_that_ends_at_zero_is_fitted_from_there(lacking: Fitted, side: float) -> None:
+    def softer(state: State, strength: float) -> State:
+        if side * strength < 0.0:
+            raise ParameterError("no such law")
+        return state.but(k_u=state.k_u * (1.0 - 0.5 * np.abs(strength) * state.deflection / 0.02))
+
+    low, high = sorted((0.0, 0.5 * side))
+    law = effect(
+        "softer",
+        stage="stiffness",
+        unit="1",
+        low=low,
+        high=high,
+        varies_with=("load",),
+        source="test",
+    )(softer)
+    measured = runs(EFFECT, STRENGTH)
+    among = hypotheses(measured, lacking.values, law)
+    found = among.at(("softer",))
+    assert found is not None
+    with_it = fitted(among, found, Yardstick.of(measured))
+    assert side * with_it.strengths[0][0] > 0.1
+    assert with_it.error < 0.7 * lacking.error
+
+
+def test_each_run_comes_later_by_its_speed() -> None:
+    points = runs().data().points
+    wave = np.cos(3.0 * GRID) + 0.2 * np.sin(7.0 * GRID)
+    state = State.of(values_of(TIRE), points, GRID)
+    moved = late(DELAY)[1](state.but(waveform=np.tile(wave, (len(points), 1)))).wave
+    angle = GRID - DELAY * np.asarray(points.omega)[:, None]
+    np.testing.assert_allclose(moved, np.cos(3.0 * angle) + 0.2 * np.sin(7.0 * angle), atol=1e-12)
+    assert np.ptp(points.omega) > 10.0, "speeds differ"
+
+
+def test_delays_add_up_and_none_changes_no_bit(plain: Fitted) -> None:
+    measured, omega = runs(), runs().data().points.omega
+    assert np.array_equal(late_runs(measured, 0.0).strain, measured.strain)
+    smooth = replace(measured, strain=plain.reached.prediction.strain)
+    twice = late_runs(late_runs(smooth, DELAY), DELAY).strain
+    np.testing.assert_allclose(twice, late_runs(smooth, 2.0 * DELAY).strain, atol=1e-12)
+    np.testing.assert_allclose(earlier(twice, omega, 2.0 * DELAY), smooth.strain, atol=1e-12)
+
+
+def test_the_slope_is_the_derivative() -> None:
+    measured, step = runs(), 1e-7
+    change = late_runs(measured, step).strain - late_runs(measured, -step).strain
+    slope = by_delay(measured.strain, measured.data().points.omega) / UNIT
+    np.testing.assert_allclose(slope, change / (2.0 * step), atol=1e-6 * np.abs(slope).max())
+
+
+def test_a_late_campaign_is_fitted_as_well_as_one_on_time(plain: Fitted) -> None:
+    behind = base_of(late_runs(runs(), DELAY))
+    # the runs' own misfits could be part of it, so the fit takes a little less than all
+    assert abs(delay_of(behind) - delay_of(plain) - DELAY) < 2.0 * delay_std(behind)
+    assert delay_std(behind) < 0.3 * DELAY
+    assert abs(delay_of(plain)) < 2e-6
+    assert behind.error == pytest.approx(plain.error, rel=0.01)
+    apart = behind.reached.delay - plain.reached.delay
+    assert apart == pytest.approx(delay_of(behind) - delay_of(plain), abs=2e-6)
+
+
+def test_an_effect_that_comes_late_is_told_from_a_delay() -> None:
+    measured = runs("low_pass", LAG)
+    among = hypotheses(measured, values_of(TIRE), CATALOGUE["low_pass"])
+    base = fitted(among, among.base, Yardstick.of(measured))
+    found = among.at(("low_pass",))
+    assert found is not None
+    after = fitted(among, found, Yardstick.of(measured))
+    assert (np.abs(after.strengths[0] - LAG) < 3.0 * after.strength_std(0)).all()
+    assert (after.strength_std(0) < 0.05).all()
+    assert abs(delay_of(after)) < 1e-5
+    assert after.error < 0.3 * base.error

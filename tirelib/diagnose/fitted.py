@@ -1,0 +1,166 @@
+"""A model with effects, fitted to straight runs by the inference (`tirelib.infer.posterior`).
+
+The numbers are the likeliest ones beside everything that plain tires show; the model that they make
+is judged alone, without what plain tires show.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.arrays import BoolArray, FloatArray
+from tirelib.compare.error import ModelError, Yardstick
+from tirelib.compare.model import Model
+from tirelib.effects import Effect
+from tirelib.identify.campaign_data import StraightRuns
+from tirelib.identify.delay import UNIT
+from tirelib.infer.hypothesis import Hypothesis
+from tirelib.infer.plain import Family, pooled
+from tirelib.infer.posterior import posterior
+from tirelib.infer.problem import Point
+from tirelib.infer.select import Hypotheses
+from tirelib.infer.strain import StrainProblem
+from tirelib.model.base import move
+from tirelib.model.solution import Values
+from tirelib.rolling.solve import Rolling
+
+ROUNDS = 6
+"""Most times that the whitening follows the fit of the base model."""
+FOLLOWED = 0.1
+"""Move of a base coordinate below which the whitening need not follow."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fitted:
+    """A fitted model.
+
+    Attributes
+    ----------
+    hypotheses : Hypotheses
+        About the problem that it is fitted to.
+    hypothesis : Hypothesis
+        That its effects and no other are there.
+    values : mapping
+        Of the tire.
+    reached : ModelError
+        Of the model alone.
+    """
+
+    hypotheses: Hypotheses
+    hypothesis: Hypothesis
+    values: Mapping[str, float | FloatArray]
+    reached: ModelError
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """That the model has."""
+        return self.hypothesis.fit.effects
+
+    @property
+    def strengths(self) -> tuple[FloatArray, ...]:
+        """One array of components per effect, in its unit."""
+        return self.hypothesis.fit.strengths
+
+    @property
+    def model(self) -> Model:
+        """The tire with its effects, without the delay: what a model file holds."""
+        return Model.fitted(self.values, self.effects, self.strengths)
+
+    @property
+    def error(self) -> float:
+        """Error of the model alone, in the unit of `reached`."""
+        return self.reached.value
+
+    @property
+    def rolling(self) -> Rolling:
+        """The solution at the runs: a start for one nearby."""
+        found: Rolling = self.hypothesis.fit.solved.model.rolling
+        return found
+
+    def strength_std(self, index: int) -> FloatArray:
+        """Return standard deviations of an effect's strength, in its unit."""
+        return self.hypothesis.fit.std(index)
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Of the tire's coordinates, the delay, and strengths in ranges, (n, n)."""
+        return self.hypothesis.fit.covariance
+
+    def without_runs(self, out: BoolArray) -> tuple[Model, float]:
+        """Return the model fitted without some of the runs, and the delay [s] found there.
+
+        Smooth misfits of plain tires take part in the fit; other effects do not.
+
+        Raises
+        ------
+        TirelibError
+            If the fit does not settle.
+        """
+        among, fit = self.hypotheses, self.hypothesis.fit
+        start = Point(fit.point.base, self.effects, self.strengths)
+        assert isinstance(among.problem, StrainProblem)  # noqa: S101 - of strain
+        part = among.problem.part(~out, start)
+        found = posterior(part, self.effects, among.spread, among.own, strengths=self.strengths)
+        values = move(part.values, found.point.base[:-1], part.free)
+        model = Model.fitted(values, found.effects, found.strengths)
+        return model, UNIT * float(found.point.base[-1])
+
+
+def fitted(hypotheses: Hypotheses, hypothesis: Hypothesis, yardstick: Yardstick) -> Fitted:
+    """Return the model of a hypothesis.
+
+    Raises
+    ------
+    CalibrationError
+        If the model alone, without what plain tires show, has no solution.
+    """
+    problem, fit = hypotheses.problem, hypothesis.fit
+    assert isinstance(problem, StrainProblem)  # noqa: S101 - of strain
+    values = move(problem.values, fit.point.base[:-1], problem.free)
+    model = Model.fitted(values, fit.effects, fit.strengths)
+    reached = yardstick.error(model, start=fit.solved.model.rolling)
+    return Fitted(hypotheses, hypothesis, values, reached)
+
+
+def fitted_problem(
+    runs: StraightRuns,
+    values: Values,
+    catalogue: Sequence[Effect],
+    families: Sequence[Family],
+    *,
+    effects: Sequence[Effect] = (),
+    strengths: Sequence[FloatArray] = (),
+    progress: Callable[[str], None] | None = None,
+) -> StrainProblem:
+    """Return the problem about a model fitted to straight runs.
+
+    The given model may be far from the runs, and a whitening is right nearby only.
+
+    Parameters
+    ----------
+    runs : StraightRuns
+    values : mapping
+        Of the model's tire, where the fit starts.
+    catalogue : sequence of Effect
+        That may be missing.
+    families : sequence of Family
+        Plain tires, whose smooth misfits take part in the fit.
+    effects, strengths
+        That the model has already.
+    progress : callable, optional
+
+    Raises
+    ------
+    ConvergenceError
+        If the model cannot be fitted to the runs.
+    """
+    spread, own = pooled(families), max(family.own for family in families)
+    for _ in range(ROUNDS):
+        problem = StrainProblem(runs, values, (), effects, strengths)
+        fit = posterior(problem, effects, spread, own, strengths=strengths, progress=progress)
+        values = move(problem.values, fit.point.base[:-1], problem.free)
+        strengths = fit.strengths
+        if float(np.abs(fit.point.base[:-1]).max()) < FOLLOWED:
+            break
+    return StrainProblem(runs, values, catalogue, effects, strengths)
