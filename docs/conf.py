@@ -11,6 +11,8 @@ from pathlib import Path
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE / "tutorials")]
 
+import equations
+import plots
 import tables
 
 project = "tirelib"
@@ -49,7 +51,14 @@ def setup(app):
     """Write the generated tables before anything is read."""
     app.connect("config-inited", without_figures)
     app.connect("sphinx-click-process-epilog", as_printed)
-    app.connect("builder-inited", lambda _: tables.write_all(HERE / "_generated"))
+    app.connect("builder-inited", lambda _: write_generated(HERE / "_generated"))
+
+
+def write_generated(folder):
+    """Write the tables and the equations, and draw their plots."""
+    tables.write_all(folder)
+    for name in equations.plots():
+        plots.draw(name, folder / "plots")
 
 
 def without_figures(app, config):

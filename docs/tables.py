@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from equations import page as equations
 from sphinx.pycode import ModuleAnalyzer
 
 from tirelib.flags import INVALIDATING, TurnFlag
@@ -145,10 +146,20 @@ def _kind(value: dict[str, Any]) -> str:
     return kinds if isinstance(kinds, str) else ", ".join(kinds)
 
 
+TABLES = {
+    "flags": flags,
+    "strain_variables": strain_variables,
+    "virtual_variables": virtual_variables,
+    "documents": documents,
+    "equations": equations,
+}
+"""Generated parts of pages, by the name of their file."""
+
+
 def write_all(folder: Path) -> None:
-    """Write every table where it has changed."""
-    folder.mkdir(exist_ok=True)
-    for make in (flags, strain_variables, virtual_variables, documents):
-        path, text = folder / f"{make.__name__}.md", make() + "\n"
+    """Write every table, and the equations, where they have changed."""
+    (folder / "plots").mkdir(parents=True, exist_ok=True)
+    for name, make in TABLES.items():
+        path, text = folder / f"{name}.md", make() + "\n"
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")

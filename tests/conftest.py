@@ -2,11 +2,13 @@
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
+
+from tests.schema_check import wrong_documents
 
 settings.register_profile(
     "same",
@@ -25,6 +27,14 @@ os.environ["PYTHONPATH"] = os.pathsep.join(  # what tests start imports this che
 # Programs that tests start, Dask's workers among them, would compile every module each time.
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def documents_are_as_their_schemas_say(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Check every JSON document that the tests of this process left in their folders."""
+    yield
+    wrong = list(wrong_documents(tmp_path_factory.getbasetemp()))
+    assert not wrong, "\n".join(wrong)
 
 
 NOT_HERE = (

@@ -4,11 +4,11 @@ Sources: dissertation Eq. (28) and (53), both in their corrected form, and the c
 x points forward, so the contact runs from its trailing edge a1 to its leading edge a2 > a1; a
 symmetric contact of half length a has a1 = -a and a2 = +a. Pressure is never negative.
 
-A profile carries quadrature nodes, weights and pressures for many operating points at once, and the
-curve itself, so that a user of it may cut the contact where it must (at the edge of sliding) and
-still integrate exactly. The nodes are Gauss-Legendre in a stretched variable, half of them on each
-side of the middle: every end power of the edges, and a cusp in the middle, is integrated to about
-1e-12.
+A profile carries quadrature nodes, weights and pressures for many operating points at once, whose
+sum is the load, Eq. (24), and the curve itself, so that a user of it may cut the contact where it
+must (at the edge of sliding) and still integrate exactly. The nodes are Gauss-Legendre in a
+stretched variable, half of them on each side of the middle: every end power of the edges, and a
+cusp in the middle, is integrated to about 1e-12.
 """
 
 from dataclasses import dataclass

@@ -78,7 +78,7 @@ def shrunk_covariance(errors: FloatArray) -> FloatArray:
 
     The share that is drawn makes the expected squared error least (Ledoit and Wolf, *A
     well-conditioned estimator for large-dimensional covariance matrices*, J. Multivariate Analysis
-    88, 2004, Eq. 14).
+    88, 2004, equation 14).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The rotating ring on its sidewall: modal stiffness, Eq. (55)-(62), (74)-(89), (107).
+"""The rotating ring on its sidewall: modal stiffness, Eq. (55)-(77), (82)-(90), (107).
 
 The belt is a circular beam of radius R on radial and tangential springs, under the tension
 N = p b R + rho A R^2 Omega^2. Three displacements describe it over the wheel angle: u radial
