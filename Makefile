@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
 .PHONY: all demo studio test suite lint docs bench figures fem proof hidden next-test cosim cosim-all bench-demo faults endurance soak \
-	measured package clean
+	measured package release clean
 
 all: $(STAMP)
 
@@ -106,6 +106,10 @@ measured: $(STAMP)
 # The wheel in an empty environment and an empty folder: every verb of the core, then the bench's extra.
 package: $(STAMP)
 	$(BIN)/python build/package.py
+
+# Versions that agree, nothing uncommitted, then `make package`; the wheel stays in build/out/release.
+release: $(STAMP)
+	$(BIN)/python build/release.py
 
 clean:
 	rm -rf build/out .pytest_cache .mypy_cache .ruff_cache

@@ -6,6 +6,7 @@ Then the extra of the bench. The exit code is 1 if anything differs from what is
 
 import argparse
 import os
+import shutil
 import subprocess
 import sys
 import venv
@@ -46,9 +47,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--python", default=sys.executable, help="Interpreter of the environment.")
     parser.add_argument("--core-only", action="store_true", help="Leave out the bench's extra.")
+    parser.add_argument(
+        "--keep", type=Path, metavar="DIR", help="Copy the wheel there if all is good."
+    )
     given = parser.parse_args()
     with TemporaryDirectory(prefix="tirelib-package-") as folder:
-        sys.exit(0 if _used(Path(folder), given.python, given.core_only) else 1)
+        if not _used(Path(folder), given.python, given.core_only):
+            sys.exit(1)
+        if given.keep is not None:
+            given.keep.mkdir(parents=True, exist_ok=True)
+            for wheel in Path(folder).glob("*.whl"):
+                shutil.copy(wheel, given.keep)
 
 
 def _used(folder: Path, python: str, core_only: bool) -> bool:

@@ -6,6 +6,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import release
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
@@ -51,3 +52,24 @@ def test_the_wheel_installs_two_packages_with_their_types() -> None:
     packages = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]
     assert packages == ["tirelib", "bench/tirebench"]
     assert all((ROOT / package / "py.typed").is_file() for package in packages)
+
+
+def test_a_release_is_refused_while_versions_differ_or_have_no_date() -> None:
+    project = '[project]\nversion = "1.2.0"\n'
+    good = (
+        project,
+        "version: 1.2.0\n",
+        "# Changelog\n\n## 1.2.0 - 2027-01-31\n\n## 1.1.0 - 2026-12-01\n",
+    )
+    assert list(release.findings(*good)) == []
+    (other,) = release.findings(project, "version: 1.1.0\n", good[2])
+    assert "CITATION.cff names version 1.1.0, pyproject.toml 1.2.0" in other
+    (undated,) = release.findings(project, good[1], "## Unreleased\n\n## 1.2.0 - 2027-01-31\n")
+    assert "'## 1.2.0 - YEAR-MONTH-DAY'" in undated
+
+
+def test_the_citation_names_the_version_of_the_package() -> None:
+    files = [
+        (ROOT / name).read_text() for name in ("pyproject.toml", "CITATION.cff", "CHANGELOG.md")
+    ]
+    assert not [finding for finding in release.findings(*files) if "CITATION" in finding]
