@@ -23,9 +23,7 @@ def findings(pyproject: str, citation: str, changelog: str) -> Iterator[str]:
     cited = re.search(r"^version: (\S+)$", citation, re.MULTILINE)
     named = cited[1] if cited else "none"
     if named != version:
-        yield (
-            f"CITATION.cff names version {named}, pyproject.toml {version}; write the same into both"
-        )
+        yield (f"CITATION.cff names version {named}, pyproject.toml {version}; write one into both")
     top = re.search(r"^## (.+)$", changelog, re.MULTILINE)
     heading = top[1] if top else "none"
     if re.fullmatch(rf"\[?{re.escape(version)}\]? - \d{{4}}-\d\d-\d\d", heading) is None:

@@ -29,7 +29,8 @@ VERBS = {
     "add": "Add EFFECT to a model, fit it to CAMPAIGN and show how the error changes.",
     "selftest": "Plant each effect at the plan and noise of CAMPAIGN and count how often it is "
     "found.",
-    "studio": "Open the journey in the browser: see, suspect, add, take away.",
+    "studio": "See in the browser where a model fails, add the effect that is missing, take it "
+    "away.",
     "simulate": "Simulate the rolling ring on the road: shape, pressure, shear, strain and strain "
     "rate.",
     "export": "Fit a Magic Formula 6.1 to a model's brush or to a force campaign, and write it as "

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 _EXAMPLE = """\b
 Examples:
-  tirelib add sidewall_damping --model M.toml --data build/out/straight --out M2.toml \
-                               --report build/out/added
+  tirelib add sidewall_damping --model M.toml --data build/out/straight --out M2.toml \\
+      --report build/out/added
   tirelib add sidewall_damping --remove --model M2.toml --data build/out/straight --out M3.toml
   tirelib add --undo --model M2.toml --out M1.toml
   tirelib add friction_load --model M.toml --data build/out/cornering --out M2.toml

@@ -22,8 +22,8 @@ Examples:
   tirelib identify build/out/straight --out build/out/M.toml
   tirelib compare build/out/straight --model build/out/M.toml --out build/out/compared
   tirelib compare build/out/set1 --model build/out/M.toml --quantity Fy --json build/out/Fy.json
-  tirelib compare build/out/straight --model build/out/M.toml --trace sidewall_load=0.2 \
-                  --data build/out/traces.npz
+  tirelib compare build/out/straight --model build/out/M.toml --trace sidewall_load=0.2 \\
+      --data build/out/traces.npz
 
 \b
 DIR/index.html holds everything in one file; comparison.md and comparison.json hold the same as

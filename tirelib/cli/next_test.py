@@ -88,13 +88,13 @@ DIAGNOSIS = "tirelib-diagnosis/1"
     "diagnosis_file",
     metavar="D.json",
     type=FILE,
-    help="Of `tirelib diagnose` on this campaign and model.",
+    help="Document that `tirelib diagnose --json` wrote for this campaign and model.",
 )
 @click.option(
     "--suspects",
     "names",
     metavar="A,B",
-    help="Effects to tell apart; one alone stands against nothing.",
+    help="Effects to tell apart; a single one is told apart from no effect at all.",
 )
 @range_options
 @click.option(

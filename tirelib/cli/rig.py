@@ -80,7 +80,9 @@ in SI and ISO signs.
     metavar="NAME",
     help="Axis system of the files: iso, sae or adapted_sae.",
 )
-@click.option("--jobs", default=2, show_default=True, type=click.IntRange(min=1), help="Processes.")
+@click.option(
+    "--jobs", default=2, show_default=True, type=click.IntRange(min=1), help="Number of processes."
+)
 @click.option("--force", is_flag=True, help="Write into a folder that is not empty.")
 @click.option("--list", "show_list", is_flag=True, help="List plans and tires, and stop.")
 @json_option("a summary")

@@ -65,7 +65,7 @@ def studio(
     port: int,
     no_browser: bool,
 ) -> None:
-    """Open the journey in the browser: see, suspect, add, take away."""
+    """See in the browser where a model fails, add the effect that is missing, take it away."""
     import starlette  # noqa: F401 - what the extra brings is named before anything is written
     import uvicorn  # noqa: F401
     import websockets  # noqa: F401

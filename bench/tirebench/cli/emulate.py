@@ -119,7 +119,13 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
     help="Path of a symbolic link to the port, which stays the same when the port is plugged in "
     "again.",
 )
-@click.option("--device", "device_file", metavar="D.toml", type=FILE, help="Scale and zero.")
+@click.option(
+    "--device",
+    "device_file",
+    metavar="D.toml",
+    type=FILE,
+    help="Device file (scale and zero of the gages).",
+)
 @click.option(
     "--wheel",
     "wheels",

@@ -25,21 +25,44 @@ Exit code: 0 it fits, 1 it does not (a plan that would fit is printed), 2 bad in
 
 
 @click.command(epilog=_EXAMPLE)
-@click.option("--bus", required=True, type=click.Choice(["classic", "fd", "serial"]))
-@click.option("--bitrate", default=500_000, show_default=True, type=click.IntRange(min=1000))
+@click.option(
+    "--bus",
+    required=True,
+    type=click.Choice(["classic", "fd", "serial"]),
+    help="Classic CAN, CAN FD, or a serial line.",
+)
+@click.option(
+    "--bitrate",
+    default=500_000,
+    show_default=True,
+    type=click.IntRange(min=1000),
+    help="Bit rate of the CAN bus [bit/s].",
+)
 @click.option(
     "--data-bitrate",
     type=click.IntRange(min=1000),
-    help="Bit rate of the data phase of CAN FD. [default: 2000000]",
+    help="Bit rate of the data phase of CAN FD [bit/s]. [default: 2000000]",
 )
-@click.option("--baud", default=2_000_000, show_default=True, type=click.IntRange(min=1200))
+@click.option(
+    "--baud",
+    default=2_000_000,
+    show_default=True,
+    type=click.IntRange(min=1200),
+    help="Baud rate of the serial line.",
+)
 @click.option(
     "--format",
     "kind",
     type=click.Choice([RAW16, RAW12, RAW12C]),
-    help="[default: RAW16 on fd, RAW12C on classic]",
+    help="Frame format on CAN. [default: RAW16 on fd, RAW12C on classic]",
 )
-@click.option("--wheels", default=1, show_default=True, type=click.IntRange(1, 8))
+@click.option(
+    "--wheels",
+    default=1,
+    show_default=True,
+    type=click.IntRange(1, 8),
+    help="Number of wheels that send on it.",
+)
 @click.option(
     "--rate",
     default=10_000.0,

@@ -113,7 +113,7 @@ the run in good order.
 @trust_option
 @click.option("--speed", metavar="KMH", type=float, help="Travel speed.")
 @click.option("--pressure", metavar="BAR", type=click.FloatRange(min=0.0), help="Gauge pressure.")
-@click.option("--camber", metavar="DEG", type=float, help="ISO 8855.")
+@click.option("--camber", metavar="DEG", type=float, help="Camber angle (ISO 8855 signs).")
 @click.option(
     "--condition",
     "named",
