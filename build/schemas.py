@@ -24,7 +24,7 @@ ABOUT = {
     "tirelib-diagnosis/1": "`tirelib diagnose`: the verdict, and every effect with its strength.",
     "tirelib-effects/1": "`tirelib effects`: what each effect is.",
     "tirelib-estimate/1": "`tirelib estimate`, `fmu run`, `tirebench run`: every turn, a summary.",
-    "tirelib-explanation/1": "`tirelib explain`: the whole journey.",
+    "tirelib-explanation/1": "`tirelib explain`: all steps from the model to the added effect.",
     "tirelib-extension/1": "`tirelib add`: the errors before and after an effect.",
     "tirelib-features/1": "`tirelib features`: what was extracted.",
     "tirelib-fleet-run/1": "`tirelib fleet`: what became of each campaign.",
