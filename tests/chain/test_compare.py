@@ -212,7 +212,7 @@ def test_forces_without_repeats_have_no_noise_and_no_statement(place: Path) -> N
     assert found["error_unit"] in ("N", "Nm")
     assert found["error"] == found["residual_rms_raw"]
     assert found["statements"] == []
-    assert "errors stand in N" in found["messages"][0]
+    assert "errors are given in N" in found["messages"][0]
 
 
 @pytest.mark.parametrize(

@@ -408,9 +408,9 @@ def _messages(
         )
     if not repeats:
         out.append(
-            f"{where} repeats no condition ({CELLS}): the noise is unknown, so errors stand in "
-            f"{UNITS[name]} and nothing is said on whether they are more than noise. Repeat three "
-            "conditions or more."
+            f"{where} repeats no condition ({CELLS}): the noise is unknown, so errors are given in "
+            f"{UNITS[name]}, and whether they exceed the noise is open. Repeat three conditions or "
+            "more."
         )
     elif points.sweep.any():
         out.append(

@@ -297,8 +297,8 @@ def _messages(chosen: Chosen, noise: RepeatNoise, fit: Fit) -> tuple[str, ...]:
         )
     if not noise.known:
         out.append(
-            f"{name} has no repeated run: the noise is unknown, so errors stand in microstrain "
-            "and nothing is said on whether they are more than noise. Repeat three set points or "
+            f"{name} has no repeated run: the noise is unknown, so errors are given in "
+            "microstrain, and whether they exceed the noise is open. Repeat three set points or "
             "more."
         )
     factors = [f.name for f in chosen.factors if f.name in ("load", "pressure", "speed")]

@@ -102,8 +102,8 @@ def _say(track: Track, limit: str, mean: float, std: float, runs: int, offset: f
     text += f"\N{PLUS-MINUS SIGN} {_short(1.96 * track.scale * std)}, {runs} runs)"
     if track.constant:
         text += (
-            f", beside a constant {_short(track.scale * offset)} {track.unit} in all runs, which "
-            "may be the zero of the rig's loaded radius"
+            f", apart from a constant {_short(track.scale * offset)} {track.unit} in all runs, "
+            "which may be the zero of the rig's loaded radius"
         )
     return text + "."
 

@@ -217,8 +217,8 @@ def _likeness(known: likeness.Likeness | None) -> Iterator[float]:
     names = known.names
     if len(names) > NAMES:
         raise FormatError(
-            f"native core: a tire is told by {len(names)} features; {NAMES} are allowed; build the "
-            "FMU with --python"
+            f"native core: another tire is recognised by {len(names)} features; at most {NAMES} "
+            "are allowed; build the FMU with --python"
         )
     yield 1.0
     yield from _form(known.variables, known.terms)

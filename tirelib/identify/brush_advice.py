@@ -33,7 +33,7 @@ _SHARE = 0.05
 """Assumed error of a force that was not recorded, over mu Fz (of a moment: mu Fz a)."""
 _MOST_VARIANCE = 1e6
 NO_RUN = (
-    "none of the runs weighed: the brush's own misfit limits it (`tirelib diagnose` with "
+    "no further run would narrow it: the brush's own misfit limits it (`tirelib diagnose` with "
     "--quantity says what is missing)"
 )
 

@@ -229,7 +229,7 @@ def _forces(data: ForceData, forces: Sequence[str] | None) -> tuple[str, ...]:
         if not useful[name]:
             slip = "slip ratio" if name == "Fx" else "slip angle"
             raise CalibrationError(
-                f"brush fit: the {slip} does not vary, so {name} tells nothing of the brush; "
+                f"brush fit: the {slip} does not vary, so {name} does not determine the brush; "
                 f"leave {name} out, or add runs"
             )
     return tuple(dict.fromkeys(forces))

@@ -118,7 +118,7 @@ def straight_runs(waves: Waveforms) -> StraightRuns:
         raise CalibrationError(
             f"{name}: loads from {loads.min():.0f} to {loads.max():.0f} N; the largest has to be "
             f"{LEAST_LOAD_RATIO} times the smallest or more, else stiffness and tread cannot be "
-            "told apart; add a run at another load"
+            "separated; add a run at another load"
         )
     _refuse_geometry(chosen)
     _refuse_conditions(chosen)

@@ -217,8 +217,8 @@ def fit_damping(
     if not fastest >= LEAST_RATIO * slowest:
         raise CalibrationError(
             f"{runs.waves.header.name}: turn rates from {slowest:.1f} to {fastest:.1f} rad/s; the "
-            f"fastest has to be {LEAST_RATIO} times the slowest or more to tell damping from the "
-            "angle's zero; add runs at a low and at a high speed"
+            f"fastest has to be {LEAST_RATIO} times the slowest or more to separate damping from "
+            "the angle's zero; add runs at a low and at a high speed"
         )
     noise = runs.waves.scatter / np.sqrt(np.maximum(runs.waves.turns, 1))
     read = read_edges(strain, low_pass=low_pass, noise=noise, labels=runs.waves.run.tolist())

@@ -47,10 +47,10 @@ def force_notes(campaign: Campaign) -> tuple[str, ...]:
             "number; left out of the brush"
         )
     out += [
-        f"{_runs(runs)}: {name} not measured, its set point stands in"
+        f"{_runs(runs)}: {name} was not measured; its set point is used"
         for name, runs in stood.items()
     ]
-    out += [f"{_runs(runs)}: {name} unknown, taken as zero" for name, runs in blank.items()]
+    out += [f"{_runs(runs)}: {name} is unknown and taken as zero" for name, runs in blank.items()]
     return tuple(out)
 
 

@@ -151,23 +151,23 @@ def _remarks(fit: BrushFit, estimates: tuple[BrushEstimate, ...], data: ForceDat
     angles = np.unique(np.round(np.abs(np.rad2deg(data.slip_angle)), 1))
     if "Fy" in fit.rmse and "Fx" not in fit.rmse and angles[angles > 0.3].size < 2:
         out.append(
-            "one size of slip angle only: cornering stiffness and friction cannot be told apart; "
+            "one size of slip angle only: cornering stiffness and friction cannot be separated; "
             "add a small and a large slip angle"
         )
     if fit.held.get("load_power", (0.0, ""))[1] == "one load only":
         out.append(
             f"one load only, {fit.reference.load:.0f} N: how the contact length follows the load "
-            "is not told and taken as constant; do not use this brush at other loads"
+            "is unknown, so it is taken as constant; do not use this brush at other loads"
         )
     if "half_length" in fit.held and fit.tire is None:
         out.append(
-            "the contact length is assumed, since neither Mz nor a ring tells it: the product "
-            "c_py a^2, that is the cornering stiffness, is told, c_py alone is not"
+            "the contact length is assumed, since neither Mz nor a ring determines it: the product "
+            "c_py a^2, which gives the cornering stiffness, is known, c_py alone is not"
         )
     if any("beyond_geometry" in each.flags for each in estimates):
         out.append(
             "half_length is longer than any contact of this tire: Mz is larger than a brush on a "
-            "rigid carcass explains. Forces do not depend on it; take it as no contact length"
+            "rigid carcass explains. Forces do not depend on it; do not read it as a contact length"
         )
     if not np.isfinite(data.pressure).any():
         out.append("the inflation pressure is unknown: the brush holds at the one of the test")

@@ -71,8 +71,8 @@ def run_notes(waves: Waveforms, plans: Sequence[RunPlan]) -> tuple[str, ...]:
     silent = waves.straight & ~some_gage_works(waves)
     if silent.any():
         out.append(
-            f"{named(waves.run[silent])}: no gage gives a whole waveform, samples are no numbers "
-            "or contacts stand where none are; left out of the ring"
+            f"{named(waves.run[silent])}: no gage gives a whole waveform (samples are not "
+            "numbers, or contacts were found where there are none); left out of the ring"
         )
     set_point = {plan.run: (plan.load, plan.pressure) for plan in plans}
     point = np.array([set_point.get(int(run), (np.nan, np.nan)) for run in waves.run])

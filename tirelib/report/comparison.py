@@ -83,7 +83,7 @@ def answer_of(found: Comparison | ForceComparison) -> str:
         "lack_of_fit": "The model does not fit to within the noise: its error is "
         f"{number(error, 3)} times the noise of the repeats; {left}.",
         "does_not_fit": f"The model does not fit: {left}.",
-        "noise_unknown": f"Noise unknown: {left}; whether that is more than noise cannot be said.",
+        "noise_unknown": f"The noise is unknown: {left}; whether that exceeds the noise is open.",
     }[verdict]
 
 

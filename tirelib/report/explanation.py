@@ -68,15 +68,17 @@ def explained(told: Mapping[str, Any], model: str = "M.toml", folder: str = "DIR
 def _missing(told: Mapping[str, Any]) -> str:
     named, verdict = list(told["named"]), told["verdict"]
     if verdict == "none":
-        return "Nothing: these measurements need no effect of the catalogue beside the model."
+        return (
+            "Nothing: these measurements need no effect of the catalogue in addition to the model."
+        )
     if verdict == "unknown":
         where = told["unexplained"].get("where")
         text = where.get("text") if isinstance(where, Mapping) else where
-        stands = f" It stands {text}." if text else ""
+        stands = f" It appears {text}." if text else ""
         return f"Something that no effect of the catalogue explains.{stands}"
     if verdict == "indistinguishable":
         listed = " or ".join(f"{name} ({_title(told, name)})" for name in named)
-        return f"One of these, and these measurements cannot tell which: {listed}."
+        return f"One of these, and these measurements do not show which: {listed}."
     effects = "; ".join(
         f"{name} ({_title(told, name)}), strength {_strength(told, name)}" for name in named
     )
@@ -90,8 +92,8 @@ def _missing(told: Mapping[str, Any]) -> str:
 def _sure(told: Mapping[str, Any]) -> str:
     if told["error_unit"] != "noise":
         return (
-            "That cannot be said: no set point was measured twice, so the noise is unknown and "
-            "nothing is named."
+            "This is open: no set point was measured twice, so the noise is unknown and nothing is "
+            "named."
         )
     return " ".join([*_evidence(told), *_alternatives(told), *_blind(told)])
 
@@ -179,7 +181,7 @@ def _alternatives(told: Mapping[str, Any]) -> list[str]:
     if rivals:
         return [f"Held back, since others would serve as well: {_some(rivals)}."]
     if others:
-        return [f"Also conspicuous, but not needed beside what is named: {_some(others)}."]
+        return [f"Also conspicuous, but not needed in addition to what is named: {_some(others)}."]
     return ["No other effect of the catalogue explains these measurements as well."]
 
 

@@ -97,7 +97,7 @@ def undetermined_part(radial: npt.ArrayLike) -> FloatArray:
         As in `full_ring_deformation`.
     """
     u = np.asarray(radial, dtype=np.float64)
-    spectrum = _turn_spectrum("untold part", u)
+    spectrum = _turn_spectrum("undetermined part", u)
     spectrum[..., 2:] = 0.0
     return np.fft.irfft(spectrum, n=u.shape[-1])
 

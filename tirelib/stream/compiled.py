@@ -47,7 +47,7 @@ class CompiledEstimator(StreamEstimator):
         known = core_calibration(self.calibration)
         if known is None:
             raise FormatError(
-                "compiled core: there is none for this machine, or it does not know this "
+                "compiled core: there is none for this machine, or it cannot compute this "
                 "calibration; use StreamEstimator, which falls back to numpy"
             )
         self._known, self._core = known, known.core

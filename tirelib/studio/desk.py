@@ -282,7 +282,7 @@ class Desk:
     def _job(self, wish: Mapping[str, Any]) -> Job:
         job = self.jobs.all.get(wish.get("job", 0))
         if job is None:
-            raise ParameterError(f"job {wish.get('job')!r}: there is none of this number")
+            raise ParameterError(f"job {wish.get('job')!r}: no job has this number")
         return job
 
     def _cancel(self, wish: Mapping[str, Any]) -> None:

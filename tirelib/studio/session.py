@@ -127,7 +127,7 @@ class Opened:
         place = self.place / "models" / number
         told = read_document(place / "model.json") if _MODEL.fullmatch(number) else None
         if told is None:
-            raise FormatError(f"model {number!r}: there is none of this number; choose another")
+            raise FormatError(f"model {number!r}: no model has this number; choose another")
         return Model(place, told)
 
     def new_model(self, parent: str | None, action: str, effect: str, quantity: str) -> Model:

@@ -171,7 +171,7 @@ def test_unknown_noise_is_null_and_the_page_speaks_microstrain(tmp_path: Path) -
     assert document["p"] is None
     assert document["verdict"] == "noise_unknown"
     html, words = write_comparison(found, tmp_path)
-    assert "Noise unknown" in html.read_text()
+    assert "The noise is unknown" in html.read_text()
     assert "in microstrain" in words.read_text()
     assert "[noise]" not in json.dumps(
         [list(plot.columns) for part in strain_parts(found) for plot in part.plots]

@@ -248,7 +248,7 @@ class TestRing:
             make(np.zeros(8), ratios=(0.0, 0.1)),
             {"forces": ("Fy",)},
             CalibrationError,
-            "the slip angle does not vary, so Fy tells nothing",
+            "the slip angle does not vary, so Fy does not determine",
         ),
         (make(WIDE), {"forces": ("Fx",)}, CalibrationError, "the slip ratio does not vary"),
         (make(WIDE), {"forces": ("Fz",)}, ParameterError, "'Fz'; allowed are Fy, Fx, Mz"),

@@ -57,7 +57,7 @@ def test_a_sample_that_is_no_number_costs_its_run(tmp_path: Path) -> None:
 def test_set_points_that_stand_in_are_named(tmp_path: Path) -> None:
     bare = {name: value for name, value in FULL.items() if name != "slip_angle"}
     assert notes(tmp_path, bare, FULL, bare) == (
-        "2 runs (0, 2): slip_angle not measured, its set point stands in",
+        "2 runs (0, 2): slip_angle was not measured; its set point is used",
     )
 
 
@@ -81,6 +81,6 @@ def test_a_sweep_without_load_or_slip_is_useless(tmp_path: Path, name: str) -> N
 def test_slips_that_nobody_recorded_are_zero_and_said(tmp_path: Path) -> None:
     bare = {key: FULL[key] for key in ("Fz", "Fy", "slip_angle")}
     assert notes(tmp_path, bare, kind="sweep") == (
-        "run 0: slip ratio unknown, taken as zero",
-        "run 0: camber unknown, taken as zero",
+        "run 0: slip ratio is unknown and taken as zero",
+        "run 0: camber is unknown and taken as zero",
     )

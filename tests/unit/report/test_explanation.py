@@ -100,7 +100,7 @@ def test_what_does_not_fall_on_what_was_held_out_is_said() -> None:
         ({"verdict": "none", "named": []}, "Nothing", "most conspicuous effect reaches 7 times"),
         (
             {"verdict": "indistinguishable", "named": ["damping", "shear"]},
-            "cannot tell which: damping (what damping does) or shear",
+            "do not show which: damping (what damping does) or shear",
             "equally well",
         ),
         (
@@ -109,7 +109,7 @@ def test_what_does_not_fall_on_what_was_held_out_is_said() -> None:
                 "named": [],
                 "unexplained": {"where": {"text": "in the contact"}},
             },
-            "no effect of the catalogue explains. It stands in the contact",
+            "no effect of the catalogue explains. It appears in the contact",
             "More is left",
         ),
         ({"verdict": "form_inadequate"}, "a law is not right, or more is missing", "7 times"),
@@ -129,7 +129,7 @@ def test_alternatives_and_doubts_are_named() -> None:
     hint = candidate("drift", level="hint")
     told = explained(diagnosis(candidates=[candidate("damping", in_range=False), hint]))
     assert "outside the plausible 0 to 0.3" in told.sure
-    assert "not needed beside what is named: drift." in told.sure
+    assert "not needed in addition to what is named: drift." in told.sure
     blind = explained(diagnosis(dead=["camber", "a", "b", "c", "d"]))
     assert "cannot show 5 effects at all (camber, a, b and 2 more)" in blind.sure
 

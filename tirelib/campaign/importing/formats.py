@@ -206,7 +206,9 @@ def _mdf(path: Path) -> Table:
             elif key not in left_out:
                 values = channel.samples.astype(np.float64)
                 columns[key] = Column(key, values, channel.unit, clock)
-    notes = (f"names that several groups have stand as GROUP/NAME: {', '.join(sorted(twice))}",)
+    notes = (
+        f"names that occur in several groups are written as GROUP/NAME: {', '.join(sorted(twice))}",
+    )
     return Table(str(path), "MDF 4", columns, left_out, notes if twice else ())
 
 

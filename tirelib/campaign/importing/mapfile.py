@@ -313,7 +313,7 @@ def _channel(reader: MapReader, where: str, quantity: str, entry: Mapping[str, A
     if "rate_hz" in entry and clock and (column or not rate > 0.0):
         reader.fault(
             where,
-            f"rate_hz = {rate:g}" + (" beside a column" if column else ""),
+            f"rate_hz = {rate:g}" + (" together with a column" if column else ""),
             "a rate above 0 instead of a column",
             "give one of them",
         )
@@ -332,7 +332,7 @@ def _channel(reader: MapReader, where: str, quantity: str, entry: Mapping[str, A
         reader.fault(
             f"{where} override_unit",
             f"{override!r} is given" + ("" if unit else " without a unit"),
-            "true or false, beside a unit",
+            "true or false, and a unit as well",
             "correct it",
         )
     rule = ChannelRule(quantity, column, unit, turn * factor, offset, rate, override is True)

@@ -134,7 +134,7 @@ def read_csv_options(reader: MapReader) -> CsvOptions:
     if lines[1] is not None and lines[0] is None:
         reader.fault(
             "[csv] units_line",
-            "names_line is missing beside it",
+            "it is given without names_line",
             "both are needed",
             "add names_line",
         )

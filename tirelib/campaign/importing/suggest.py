@@ -205,14 +205,17 @@ def _guessed_axes(table: Table, known: Mapping[str, ColumnSummary]) -> tuple[str
     """Return the axis system that the signs fit (empty if not exactly one), and the reason."""
     load, force, angle = (_values(table, known, name) for name in ("Fz", "Fy", "slip_angle"))
     if load is None:
-        return "", "required: iso, sae or adapted_sae; without Fz the file does not tell"
+        return "", "required: iso, sae or adapted_sae; the file has no Fz, whose sign would show it"
     if float(np.nanmedian(load)) < 0.0:
         return "sae", "a guess: Fz is negative; check it"
     if force is None or angle is None or force.size != angle.size:
         return "", "required: iso or adapted_sae; Fz is positive, Fy or slip angle is missing"
     agreement = float(np.nansum(np.sign(force) * np.sign(angle)))
     if abs(agreement) < 0.5 * force.size:
-        return "", "required: iso or adapted_sae; Fy against slip angle does not tell"
+        return (
+            "",
+            "required: iso or adapted_sae; the signs of Fy and slip angle do not agree on one",
+        )
     if agreement < 0.0:
         return "iso", "a guess: Fz > 0, Fy and slip angle have opposite signs; check it"
     return "adapted_sae", "a guess: Fz > 0, Fy and slip angle have the same sign; check it"
