@@ -3,11 +3,14 @@
     python build/schemas.py FOLDER...    writes docs/reference/schemas
 
 Every document below the folders is read: the output of any work with ``--json``, or a session of
-the studio. A schema holds for what was seen: keys and types. Titles and descriptions are below.
+the studio. A schema holds for what was seen: keys and types; any number may be null. What each
+document is, and which objects are tables by names, is said below.
 """
 
 import argparse
 import json
+import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +26,10 @@ ABOUT = {
     "tirelib-comparison/1": "`tirelib compare`: where a model fails, and under which conditions.",
     "tirelib-diagnosis/1": "`tirelib diagnose`: the verdict, and every effect with its strength.",
     "tirelib-effects/1": "`tirelib effects`: what each effect is.",
-    "tirelib-estimate/1": "`tirelib estimate`, `fmu run`, `tirebench run`: every turn, a summary.",
+    "tirelib-estimate/1": "`tirelib estimate`, `tirelib fmu run`, `tirebench run`, "
+    "`tirebench replay`: every turn, a summary.",
     "tirelib-explanation/1": "`tirelib explain`: all steps from the model to the added effect.",
+    "tirelib-export/1": "`tirelib export`: coefficients, errors and range of a Magic Formula.",
     "tirelib-extension/1": "`tirelib add`: the errors before and after an effect.",
     "tirelib-features/1": "`tirelib features`: what was extracted.",
     "tirelib-fleet-run/1": "`tirelib fleet`: what became of each campaign.",
@@ -43,8 +48,14 @@ ABOUT = {
     "tirebench-record/1": "`tirebench record`: what was recorded.",
 }
 """Documents that verbs write, and what each holds."""
-NAMED = 12
-"""An object with more keys than this, none of which every document has, is a table by names."""
+BY_NAME = {
+    *("wheels", "processes", "cpu_s", "restarts", "faults", "flags", "coefficients"),
+    *("dead", "dead_reasons", "would_revive", "separation", "bands", "powers", "forces"),
+    *("widened_percent", "levels", "force_errors", "errors", "left_out"),
+}
+"""Keys that hold a table by names: of wheels, processes, flags, effects, conditions, quantities."""
+BY_GAGE = {"^contact_length_[1-9][0-9]*(_std)?_mm$": {"type": ["number", "null"]}}
+"""Keys with the number of a gage in them."""
 
 
 def learned(documents: list[Any]) -> dict[str, Any]:
@@ -52,22 +63,42 @@ def learned(documents: list[Any]) -> dict[str, Any]:
     builder = SchemaBuilder("https://json-schema.org/draft/2020-12/schema")
     for document in documents:
         builder.add_object(document)
-    return dict(by_name(builder.to_schema()))
+    return dict(general(builder.to_schema()))
 
 
-def by_name(schema: Any) -> Any:
-    """Return the schema with objects whose keys are names (of effects, gages, runs) as tables."""
+def merged(schemas: Iterable[Any]) -> Any:
+    """Return one schema for what each of several holds for."""
+    builder = SchemaBuilder(None)
+    for schema in schemas:
+        builder.add_schema(schema)
+    return builder.to_schema()
+
+
+def general(schema: Any, key: str = "") -> Any:
+    """Return the schema with tables by names, gages of any number, and numbers that may be null."""
     if isinstance(schema, list):
-        return [by_name(part) for part in schema]
+        return [general(part) for part in schema]
     if not isinstance(schema, dict):
         return schema
-    out = {key: by_name(value) for key, value in schema.items()}
-    properties = out.get("properties")
-    if isinstance(properties, dict) and len(properties) > NAMED and not out.get("required"):
-        kinds = [json.dumps(value, sort_keys=True) for value in properties.values()]
-        values = [json.loads(kind) for kind in dict.fromkeys(kinds)]
-        out.pop("properties")
-        out["additionalProperties"] = values[0] if len(values) == 1 else {"anyOf": values}
+    if schema.get("type") in ("number", "integer") and len(schema) == 1:
+        return {"type": [schema["type"], "null"]} if schema["type"] == "number" else schema
+    properties = schema.get("properties")
+    out = {
+        name: general(value, "" if name == "items" else key)
+        for name, value in schema.items()
+        if name != "properties"
+    }
+    if isinstance(properties, dict):
+        if key in BY_NAME:
+            out["additionalProperties"] = general(merged(properties.values()))
+            out.pop("required", None)
+        else:
+            values = {name: general(value, name) for name, value in properties.items()}
+            own = {n: v for n, v in values.items() if not any(re.match(p, n) for p in BY_GAGE)}
+            out["properties"] = own
+            if len(own) < len(values):
+                out["patternProperties"] = BY_GAGE
+                out["required"] = [name for name in out.get("required", ()) if name in own]
     return out
 
 
