@@ -81,6 +81,7 @@ def planned(model: Path) -> Any:
 def diagnosis(folder: Path, **changes: Any) -> Path:
     told = {
         "format": "tirelib-diagnosis/1",
+        "made_by_hand": True,
         "quantity": "strain",
         "verdict": "none",
         "named": [],

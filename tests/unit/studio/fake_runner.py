@@ -13,6 +13,7 @@ from pathlib import Path
 
 VERDICT = {
     "format": "tirelib-diagnosis/1",
+    "made_by_hand": True,
     "verdict": "named",
     "named": ["sidewall_load"],
     "dead": ["camber"],
