@@ -3,11 +3,15 @@
 import errno
 import pickle
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from tirebench.cli import program, record
 from tirebench.errors import RecordingError
 from tirebench.links import BACK, LOST, PASSED, RESUMED, Read
 from tirebench.live.exchange import Exchange
@@ -255,3 +259,31 @@ def test_a_long_time_before_a_trigger_is_written_piece_by_piece_and_the_queue_st
     assert complete
     assert data == PIECES[: len(data)]
     assert len(data) > 5
+
+
+def test_an_incomplete_recording_is_said_before_the_counters_fail_on_the_same_disk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    full = "No space left on device"
+
+    def unwritable(*_: Any) -> None:
+        raise RecordingError(f"record.json: cannot be written ({full})")
+
+    chain = MagicMock()
+    chain.__enter__.return_value.counts.return_value = {"recording": {"error": full}}
+    session = MagicMock()
+    session.return_value.run.return_value = SimpleNamespace(message="", reason="duration")
+    stand_ins = {
+        "LiveChain": lambda *_: chain,
+        "Session": session,
+        "realtime": lambda _: "",
+        "counters": lambda _: "",
+        "line_document": MagicMock(),
+        "write_json": unwritable,
+    }
+    for name, stand_in in stand_ins.items():
+        monkeypatch.setattr(record, name, stand_in)
+    line = ["--port", "tcp://127.0.0.1:9", "--out", str(tmp_path / "a.mcap")]
+    result = CliRunner().invoke(program, ["record", *line, "--json", str(tmp_path / "record.json")])
+    assert isinstance(result.exception, RecordingError)
+    assert f"the recording is incomplete: {full}" in result.output

@@ -133,6 +133,9 @@ def record(
     if outcome.message:
         click.echo(f"unplugged: {outcome.message}")
     click.echo(f"ended: {outcome.reason}; {recorded} bytes; {counters(wheels)}")
+    failed = counts["recording"]["error"]
+    if failed:
+        click.secho(f"the recording is incomplete: {failed}", fg="red")
     if json_file is not None:
         write_json(
             json_file,
@@ -145,9 +148,6 @@ def record(
                 "wheels": {n: wheel_document(wheels, n) for n in wheels.heard},
             },
         )
-    failed = counts["recording"]["error"]
-    if failed:
-        click.secho(f"the recording is incomplete: {failed}", fg="red")
     good = wheels.counts[0].ok > 0 and outcome.reason != "unplugged" and not failed
     context.exit(0 if good else 1)
 
