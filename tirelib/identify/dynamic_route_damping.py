@@ -61,7 +61,8 @@ STRUCTURE = 0.08
 STRUCTURE_MIDDLE = 0.2
 """The same of the middle's slope: it depends on how tread and road share the drag."""
 SHEAR_SHARE = 1.0 / 3.0
-"""Shear over normal stiffness of the tread where none is known: G = E / 3 of rubber."""
+"""Shear over normal stiffness of the tread where none is known: E = 2 (1 + nu) G, and rubber keeps
+its volume (nu = 1/2). Half and double of it move the ratio of the rig's tire by 2 % of itself."""
 SHEAR_STD = 0.4
 
 LEAST_DAMPING = 0.02

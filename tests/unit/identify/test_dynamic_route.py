@@ -294,3 +294,17 @@ def test_a_damped_waveform_without_damping_is_symmetric() -> None:
     strain = damped_waveform(values_of(TRUE), points, 0.0, "sidewall", sheared=False)
     # phi and -phi; the grid's first point is -pi
     np.testing.assert_allclose(strain[:, 1:], strain[:, :0:-1], atol=1e-12)
+
+
+def test_a_tread_of_unknown_shear_stiffness_is_rubber_that_keeps_its_volume() -> None:
+    """E = 2 (1 + nu) G with nu = 1/2, so that the shear stiffness is a third of the normal one."""
+    unknown = values_of(TRUE) | {"tread_shear_stiffness": 0.0}
+    known = unknown | {"tread_shear_stiffness": TRUE.tread_stiffness / (2.0 * (1.0 + 0.5))}
+    points = operating_points(waves(TRUE, SPEEDS[:2]))
+    strains = [damped_waveform(values, points, 0.06, "sidewall") for values in (unknown, known)]
+    np.testing.assert_allclose(*strains, rtol=0.0, atol=1e-12)
+    given = asdict(TRUE) | {"tread_shear_stiffness": 0.0}, asdict(TRUE) | known
+    tractions = [
+        dynamic_pressure(values, 4000.0, 2.1e5, 80.0, model="sheared").traction for values in given
+    ]
+    np.testing.assert_allclose(*tractions, rtol=1e-9)
