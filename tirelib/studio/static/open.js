@@ -115,7 +115,7 @@ export class Open {
     if (!check) findings.append(h("p", { class: "quiet" }, "The campaign is being checked."));
     else if (!check.problems.length) findings.append(h("p", { class: "good" }, "The check found nothing wrong."));
     else {
-      findings.append(h("p", {}, `${check.errors} errors, ${check.warnings} warnings. ${check.errors ? "No model is fitted before the errors are corrected." : ""}`),
+      findings.append(h("p", {}, `${check.errors} ${check.errors === 1 ? "error" : "errors"}, ${check.warnings} ${check.warnings === 1 ? "warning" : "warnings"}. ${check.errors ? "No model is fitted before the errors are corrected." : ""}`),
         h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ["", "where", "what was found", "what to do"].map((t) => h("th", {}, t)))),
           h("tbody", {}, check.problems.map((p) => h("tr", {}, h("td", { class: p.severity === "error" ? "bad" : "warn" }, p.severity), h("td", {}, p.where), h("td", {}, `${p.given}. Allowed: ${p.allowed}`), h("td", {}, p.remedy)))))));
     }

@@ -139,7 +139,7 @@ export class Suspect {
       rest = sliced(data, "difference", row.index);
       own = trace && trace.subarray(row.index * data.angle.length, (row.index + 1) * data.angle.length);
     }
-    this.plot.show({ title: `${title}; ${row.label}`, unit: unitOf(data), y: `model less measured [${unitOf(data)}]`, x, series: [{ name: "residual", values: rest, color: "rest", points }, { name: "what the effect would leave", values: own || new Array(x.values.length).fill(null), color: "trace", dash: [6, 4], points, hollow: points }] });
+    this.plot.show({ title: `${title}; ${row.label}`, unit: unitOf(data), y: unitOf(data), x, series: [{ name: "residual, model less measured", values: rest, color: "rest", points }, { name: "what the effect would leave", values: own || new Array(x.values.length).fill(null), color: "trace", dash: [6, 4], points, hollow: points }] });
     app.drawn = performance.now() - begun; // how long a hover takes, [ms]
     if (this.field.trace?.name !== (trace ? name : undefined)) {
       clearTimeout(this.later);
