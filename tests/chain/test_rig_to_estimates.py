@@ -38,13 +38,14 @@ def plan(name: str, loads: tuple[float, ...], angles: tuple[float, ...]) -> Plan
 @pytest.fixture(scope="module")
 def days(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("rig")
-    run_plan(plan("first", LOADS, ANGLES), TIRES["reference"], folder / "first", seed=1)
+    run_plan(plan("first", LOADS, ANGLES), TIRES["reference"], folder / "first", seed=1, jobs=1)
     # loads and slip angles that lie between those of the first day
     run_plan(
         plan("second", (2200.0, 5200.0, 6700.0), (-3.0, 0.5, 3.0)),
         TIRES["reference"],
         folder / "second",
         seed=2,
+        jobs=1,
     )
     return {name: folder / name for name in ("first", "second")}
 
@@ -121,7 +122,9 @@ def test_a_tilted_wheel_whose_camber_nobody_gives_holds_its_intervals(
         Condition(load, 2.3e5, 65 / 3.6, float(np.deg2rad(angle)), float(np.deg2rad(camber)))
         for load, angle, camber in ((3000.0, 1.5, 0.8), (4500.0, -1.5, 0.8), (6500.0, 1.5, -0.8))
     )
-    run_plan(Plan("tilted", "tilted", runs), TIRES["reference"], tmp_path / "tilted", seed=3)
+    run_plan(
+        Plan("tilted", "tilted", runs), TIRES["reference"], tmp_path / "tilted", seed=3, jobs=1
+    )
     observed = observe([read_campaign(tmp_path / "tilted")])
     found = blind(observed, trained)
     assert not (found.flags & int(TurnFlag.OTHER_TIRE)).any()
