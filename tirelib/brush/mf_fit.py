@@ -126,18 +126,41 @@ def _free(needs: str, *names: str) -> tuple[_Term, ...]:
     return tuple(_Term(name, 0.0, needs=needs) for name in names)
 
 
+def _curve(axis: str, shape: float, *stiffness: _Term) -> tuple[_Term, ...]:
+    """Return the terms of a pure force: shape, peak, curvature, stiffness, shifts."""
+    return (
+        _Term(f"PC{axis}1", shape, 1.0, 2.0),
+        _Term(f"PD{axis}1", 1.0, 0.05, 3.0, f"PD{axis}2"),
+        _Term(f"PE{axis}1", -0.5, -20.0, 1.0, f"PE{axis}2"),
+        *stiffness,
+        _Term(f"PH{axis}1", 0.0, slope=f"PH{axis}2"),
+        _Term(f"PV{axis}1", 0.0, slope=f"PV{axis}2"),
+    )
+
+
+def _weight(axis: str, slope: float, *more: _Term) -> tuple[_Term, ...]:
+    """Return the terms of the weight that the other slip gives a force."""
+    return (
+        _Term(f"RB{axis}1", slope, 0.1, 200.0),
+        _Term(f"RB{axis}2", 8.0, -200.0, 200.0),
+        *more,
+        _Term(f"RC{axis}1", 1.0, 0.5, 1.5),
+        _Term(f"RE{axis}1", 0.0, -50.0, 1.0, f"RE{axis}2"),
+        _Term(f"RH{axis}1", 0.0),
+    )
+
+
 STAGES = (
     _Stage(
         "Fy",
         False,
         (
-            _Term("PCY1", 1.3, 1.0, 2.0),
-            _Term("PDY1", 1.0, 0.05, 3.0, "PDY2"),
-            _Term("PEY1", -0.5, -20.0, 1.0, "PEY2"),
-            _Term("PKY1", -20.0, -200.0, -0.5),
-            _Term("PKY2", 1.8, 0.2, 10.0, needs="load"),
-            _Term("PHY1", 0.0, slope="PHY2"),
-            _Term("PVY1", 0.0, slope="PVY2"),
+            *_curve(
+                "Y",
+                1.3,
+                _Term("PKY1", -20.0, -200.0, -0.5),
+                _Term("PKY2", 1.8, 0.2, 10.0, needs="load"),
+            ),
             *_free("camber", "PDY3", "PKY3", "PKY6", "PVY3"),
             *_free("pressure", "PPY1", "PPY2", "PPY3", "PPY4"),
         ),
@@ -146,12 +169,7 @@ STAGES = (
         "Fx",
         False,
         (
-            _Term("PCX1", 1.5, 1.0, 2.0),
-            _Term("PDX1", 1.0, 0.05, 3.0, "PDX2"),
-            _Term("PEX1", -0.5, -20.0, 1.0, "PEX2"),
-            _Term("PKX1", 20.0, 0.5, 200.0, "PKX2"),
-            _Term("PHX1", 0.0, slope="PHX2"),
-            _Term("PVX1", 0.0, slope="PVX2"),
+            *_curve("X", 1.5, _Term("PKX1", 20.0, 0.5, 200.0, "PKX2")),
             *_free("camber", "PDX3"),
             *_free("pressure", "PPX1", "PPX2", "PPX3", "PPX4"),
         ),
@@ -170,29 +188,8 @@ STAGES = (
             *_free("pressure", "PPZ1"),
         ),
     ),
-    _Stage(
-        "Fx",
-        True,
-        (
-            _Term("RBX1", 10.0, 0.1, 200.0),
-            _Term("RBX2", 8.0, -200.0, 200.0),
-            _Term("RCX1", 1.0, 0.5, 1.5),
-            _Term("REX1", 0.0, -50.0, 1.0, "REX2"),
-            _Term("RHX1", 0.0),
-        ),
-    ),
-    _Stage(
-        "Fy",
-        True,
-        (
-            _Term("RBY1", 8.0, 0.1, 200.0),
-            _Term("RBY2", 8.0, -200.0, 200.0),
-            _Term("RBY3", 0.0),
-            _Term("RCY1", 1.0, 0.5, 1.5),
-            _Term("REY1", 0.0, -50.0, 1.0, "REY2"),
-            _Term("RHY1", 0.0),
-        ),
-    ),
+    _Stage("Fx", True, _weight("X", 10.0)),
+    _Stage("Fy", True, _weight("Y", 8.0, _Term("RBY3", 0.0))),
     _Stage("Mz", True, (_Term("SSZ1", 0.0), _Term("SSZ2", 0.0))),
 )
 """In the order of the fit: what a stage finds, the later ones hold."""
