@@ -49,13 +49,21 @@ ABOUT = {
 }
 """Documents that verbs write, and what each holds."""
 BY_NAME = {
-    *("wheels", "processes", "cpu_s", "restarts", "faults", "flags", "coefficients"),
+    *("wheels", "processes", "cpu_s", "restarts", "faults", "flags", "coefficients", "given_up"),
     *("dead", "dead_reasons", "would_revive", "separation", "bands", "powers", "forces"),
     *("widened_percent", "levels", "force_errors", "errors", "left_out"),
 }
 """Keys that hold a table by names: of wheels, processes, flags, effects, conditions, quantities."""
 BY_GAGE = {"^contact_length_[1-9][0-9]*(_std)?_mm$": {"type": ["number", "null"]}}
 """Keys with the number of a gage in them."""
+
+
+INSTEAD = {"slip_angle_deg": "slip_ratio", "slip_angles_deg": "slip_ratios"}
+"""Keys that a longitudinal force has in the place of others."""
+
+
+COUNTED = ("frames", "runs", "samples")
+"""What an export has written, by its format; one of them is a key of its document."""
 
 
 def learned(documents: list[Any]) -> dict[str, Any]:
@@ -77,14 +85,16 @@ def merged(schemas: Iterable[Any]) -> Any:
 def general(schema: Any, key: str = "") -> Any:
     """Return the schema with tables by names, gages of any number, and numbers that may be null."""
     if isinstance(schema, list):
-        return [general(part) for part in schema]
+        return [general(part, key) for part in schema]
     if not isinstance(schema, dict):
         return schema
+    if schema == {"type": "null"}:  # nothing else was seen, and anything may come
+        return {}
     if schema.get("type") in ("number", "integer") and len(schema) == 1:
         return {"type": [schema["type"], "null"]} if schema["type"] == "number" else schema
     properties = schema.get("properties")
     out = {
-        name: general(value, "" if name == "items" else key)
+        name: general(value, "" if name == "items" and key in BY_NAME else key)
         for name, value in schema.items()
         if name != "properties"
     }
@@ -95,6 +105,8 @@ def general(schema: Any, key: str = "") -> Any:
         else:
             values = {name: general(value, name) for name, value in properties.items()}
             own = {n: v for n, v in values.items() if not any(re.match(p, n) for p in BY_GAGE)}
+            if key in ("best", "candidates", "envelope"):
+                own |= {INSTEAD[name]: value for name, value in own.items() if name in INSTEAD}
             out["properties"] = own
             if len(own) < len(values):
                 out["patternProperties"] = BY_GAGE
@@ -120,6 +132,9 @@ def main() -> None:
             continue
         schema = learned(documents)
         schema["properties"]["format"] = {"const": name, "type": "string"}
+        if name == "tirebench-export/1":
+            schema["properties"] |= {key: {"type": "integer"} for key in COUNTED}
+            schema["required"] = [key for key in schema["required"] if key not in COUNTED]
         head = {"title": name, "description": ABOUT[name]}
         path = OUT / f"{name.replace('/', '-')}.schema.json"
         path.write_text(json.dumps({**head, **schema}, indent=1) + "\n", encoding="utf-8")
