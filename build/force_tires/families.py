@@ -3,8 +3,9 @@
 - `Magic`: a Magic Formula with random shape, curvature, shifts and trail (Pacejka, Tire and Vehicle
   Dynamics, 3rd ed., sections 4.3.2 and 13.1, and the ranges of published parameter files).
 - `String`: bristles on a stretched string, solved node by node (the same, section 5.3).
-- `Strips`: strips of bristles across the width under their own share of the load, on a carcass that
-  turns, with a friction that falls once a bristle slides (the same, section 3.3).
+- `Strips`: strips of bristles across the width under their own share of the load, with a friction
+  that falls once a bristle slides (the same, section 3.3). The carcass turns only where that is
+  hidden: it is an effect of the catalogue, and a tire that has it is not plain.
 
 Signs are those of ISO 8855. A hidden effect comes in as `Changes`: factors of friction and
 stiffness, a shift of the slip angle and a force beside the contact's, each of shape (n,).
@@ -158,7 +159,7 @@ class String:
 
 
 class Strips:
-    """Strips of bristles across the width, on a carcass that turns."""
+    """Strips of bristles across the width."""
 
     name = "strips"
     nodes, count, steps = 60, 5, 60
@@ -169,14 +170,13 @@ class Strips:
         self.mu, self.kinetic, self.settle = u(0.95, 1.35), u(0.8, 1.0), u(0.3, 3.0)
         self.half, self.power, self.crown = u(0.045, 0.08), u(0.4, 0.6), u(0.0, 0.35)
         self.slope, self.slope_x = u(10.0, 18.0), u(14.0, 26.0)
-        self.yaw = u(0.0, 0.5) * 1e-4 * 4000.0 / self.nominal
         self.flat = u(-0.3, 1.0)
         self.shift, self.cone = random.normal(0.0, 0.003), random.normal(0.0, 0.004)
 
     def forces(self, at: Setting, by: Changes) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the forces, in balance with the turn of the contact."""
         turn = np.zeros_like(at.load)
-        yaw = self.yaw + 1e-4 * by.turn * 4000.0 / self.nominal
+        yaw = 1e-4 * by.turn * 4000.0 / self.nominal
         out = self._at(at, by, turn)
         for _ in range(self.steps):
             new = turn + 0.6 * (yaw * out[2] - turn)

@@ -21,7 +21,7 @@ from force_tires.families import FAMILIES
 from force_tires.learn import OUT, say, seeds
 from force_tires.plans import KNOWN, UNKNOWN, case
 from tirelib.errors import TirelibError
-from tirelib.infer.plain import load
+from tirelib.infer.plain import covering, load
 from tirelib.infer.select import Verdict, select
 from tirelib.threads import one_thread
 
@@ -43,7 +43,8 @@ def main() -> None:
     kinds = groups.get(given.kinds, given.kinds.split(","))
     table = load(given.tables / f"plain_{given.quantity}.npz")[0]
     for family in given.families.split(","):
-        others, counts = [each for each in table if each.name != family], Counter[str]()
+        others = covering([each for each in table if each.name != family])
+        counts = Counter[str]()
         for k, seed in enumerate(given.seeds):
             kind, began = kinds[k % len(kinds)], time.process_time()
             try:

@@ -22,7 +22,7 @@ from scipy import stats
 
 from tirelib.arrays import FloatArray
 from tirelib.infer.normal import Weighed, beside, taken
-from tirelib.infer.plain import BASE, ROUGHLY, Family, View
+from tirelib.infer.plain import BASE, LARGEST, ROUGHLY, Family, View
 
 PRIOR = 0.5
 """Standard deviation of a further effect's strength, in ranges."""
@@ -77,8 +77,11 @@ class Null:
         typical = family.spread()
         self._weighed = []
         for view in views:
-            for size in SIZES:
-                variance = {name: size**2 * each for name, each in typical.items()}
+            for size in _sizes(family.largest):
+                variance = {
+                    name: (size if "," in name else min(size, LARGEST)) ** 2 * each
+                    for name, each in typical.items()
+                }
                 spread = view.normal.spread({**variance, **allowed})
                 self._weighed.append((view, size, Weighed(view.normal, spread)))
 
@@ -227,6 +230,14 @@ def standard(ratio: FloatArray, count: FloatArray) -> FloatArray:
     """Return the normal score of a mean square of `count` numbers over its expectation."""
     spread = 2.0 / (9.0 * count)
     return np.asarray((np.cbrt(np.maximum(ratio, 0.0)) - (1.0 - spread)) / np.sqrt(spread))
+
+
+def _sizes(largest: float) -> list[float]:
+    """Return `SIZES`, and further ones up to the largest of a family's tires."""
+    out: list[float] = SIZES.tolist()
+    while out[-1] < largest:
+        out.append(2.0 * out[-1])
+    return out
 
 
 def size_prior(size: float) -> float:

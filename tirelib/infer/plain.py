@@ -11,7 +11,7 @@ where nothing is hidden.
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +25,10 @@ SETTLED = 0.01
 START = 0.02**2
 FLOOR = {"effect": 0.1, "shape": 0.3}
 """Least size of an effect, or of a group of shapes, over that of the largest in its family: what
-twenty tires of one family hardly show, those of another may."""
+forty tires of one family hardly show, those of another may. It does not hold where families cover
+each other (`covering`)."""
+LARGEST = 2.0
+"""Most by which one tire shows more of everything than its family."""
 TINY = 1e-8
 """Least variance while they are learned."""
 BASE, ROUGHLY = "base", "roughly "
@@ -46,6 +49,11 @@ class Family:
         show the block.
     squares : shape (n_tires, n_blocks)
         Expected mean squares of each block's coefficients; NaN likewise.
+    largest : float
+        Most by which one tire shows more of the smooth shapes than its family. Of effects it is
+        never more than `LARGEST`.
+    least : mapping of block to variance
+        What the tire may show at least (`covering`). Where it is empty, `FLOOR` of the largest.
     """
 
     name: str
@@ -53,21 +61,32 @@ class Family:
     blocks: Mapping[str, int]
     draws: FloatArray
     squares: FloatArray
+    largest: float = LARGEST
+    least: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.draws)
 
-    def spread(self) -> dict[str, float]:
-        """Return the variances by block."""
+    def shown(self) -> dict[str, float]:
+        """Return the mean squares of coefficients by block."""
         known = np.isfinite(self.squares)
         total = np.where(known, self.squares, 0.0).sum(axis=0)
         count = known.sum(axis=0)
         mean = np.where(count > 0, total / np.maximum(count, 1), START)
-        shapes = np.array(["," in name for name in self.blocks])
-        least = np.zeros(len(mean))
-        for kind, which in (("effect", ~shapes), ("shape", shapes)):
-            least[which] = FLOOR[kind] ** 2 * float(np.max(mean, where=which, initial=0.0))
-        return dict(zip(self.blocks, np.maximum(mean, least).tolist(), strict=True))
+        return dict(zip(self.blocks, mean.tolist(), strict=True))
+
+    def spread(self) -> dict[str, float]:
+        """Return the variances by block."""
+        shown = self.shown()
+        if self.least:
+            return {name: max(least, shown.get(name, 0.0)) for name, least in self.least.items()}
+        largest = {True: 0.0, False: 0.0}
+        for name, each in shown.items():
+            largest["," in name] = max(largest["," in name], each)
+        return {
+            name: max(each, FLOOR["shape" if "," in name else "effect"] ** 2 * largest["," in name])
+            for name, each in shown.items()
+        }
 
     def on(self, blocks: Mapping[str, slice], count: int) -> FloatArray:
         """Return the tires' coefficients for the rows of a user's plan, (n_tires, count).
@@ -104,7 +123,12 @@ class View:
     white: FloatArray
 
 
-def learn(name: str, tires: Sequence[Sequence[View]], widths: FloatArray) -> Family:
+def learn(
+    name: str,
+    tires: Sequence[Sequence[View]],
+    widths: FloatArray,
+    largest: float = LARGEST,
+) -> Family:
     """Return a family from its plain tires.
 
     Parameters
@@ -115,6 +139,8 @@ def learn(name: str, tires: Sequence[Sequence[View]], widths: FloatArray) -> Fam
         tire takes its most likely one.
     widths : shape (n_base,)
         Prior standard deviations of the base.
+    largest : float
+        Most by which one tire shows more of the smooth shapes than its family.
     """
     blocks: dict[str, int] = {}
     for tire in tires:
@@ -153,7 +179,7 @@ def learn(name: str, tires: Sequence[Sequence[View]], widths: FloatArray) -> Fam
                 draw[first : first + size] = drawn[rows]
             first += size
     own = float(np.median([each.own for each in likeliest]))
-    return Family(name, own, blocks, draws, squares)
+    return Family(name, own, blocks, draws, squares, largest)
 
 
 def save(path: Path, families: Sequence[Family], provenance: Mapping[str, object]) -> None:
@@ -163,7 +189,11 @@ def save(path: Path, families: Sequence[Family], provenance: Mapping[str, object
     for family in families:
         arrays[f"{family.name}/draws"] = family.draws.astype(np.float32)
         arrays[f"{family.name}/squares"] = family.squares.astype(np.float32)
-        about[family.name] = {"own": family.own, "blocks": dict(family.blocks)}
+        about[family.name] = {
+            "own": family.own,
+            "blocks": dict(family.blocks),
+            "largest": family.largest,
+        }
     text = json.dumps({"families": about, "provenance": dict(provenance)}, indent=1)
     np.savez_compressed(path, about=np.array(text), **arrays)  # type: ignore[arg-type]
 
@@ -179,10 +209,24 @@ def load(path: Path) -> tuple[tuple[Family, ...], dict[str, object]]:
                 dict(each["blocks"]),
                 file[f"{name}/draws"].astype(float),
                 file[f"{name}/squares"].astype(float),
+                float(each.get("largest", LARGEST)),
             )
             for name, each in about["families"].items()
         )
         return families, about["provenance"]
+
+
+def covering(families: Sequence[Family]) -> tuple[Family, ...]:
+    """Return families each of which shows at least what these show on the average.
+
+    What tires of one family hardly show, those of another may.
+    """
+    each = [family.shown() for family in families]
+    names = dict.fromkeys(name for shown in each for name in shown)
+    least = {
+        name: float(np.mean([shown[name] for shown in each if name in shown])) for name in names
+    }
+    return tuple(replace(family, least=least) for family in families)
 
 
 def pooled(families: Sequence[Family]) -> dict[str, float]:
