@@ -25,10 +25,10 @@ from tirelib.model.base import move
 from tirelib.model.solution import Values
 from tirelib.rolling.solve import Rolling
 
-ROUNDS = 6
-"""Most times that the whitening follows the fit of the base model."""
-FOLLOWED = 0.1
-"""Move of a base coordinate below which the whitening need not follow."""
+ROUNDS = 3
+"""Most fits of the base model until the whitening is about a model that is near."""
+FOLLOWED = 0.01
+"""Change of the waveforms, over the strain, below which the whitening need not follow a fit."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,7 +160,7 @@ def fitted_problem(
         problem = StrainProblem(runs, values, (), effects, strengths)
         fit = posterior(problem, effects, spread, own, strengths=strengths, progress=progress)
         values = move(problem.values, fit.point.base[:-1], problem.free)
-        strengths = fit.strengths
-        if float(np.abs(fit.point.base[:-1]).max()) < FOLLOWED:
+        strengths, change = fit.strengths, fit.solved.waveform - problem.reference.waveform
+        if np.std(change) < FOLLOWED * np.std(runs.strain):
             break
     return StrainProblem(runs, values, catalogue, effects, strengths)
