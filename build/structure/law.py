@@ -22,8 +22,7 @@ from tirelib.effects import CATALOGUE
 from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.infer.hypothesis import LAW, law_errors
-from tirelib.infer.normal import Weighed
-from tirelib.infer.null import OWN, SIZES, size_prior, sized
+from tirelib.infer.null import OWN, Null
 from tirelib.infer.plain import BASE, Family, load, pooled
 from tirelib.infer.posterior import posterior
 from tirelib.infer.strain import StrainProblem
@@ -71,22 +70,11 @@ def likelihoods(file: Path, kind: str, others: list[Family], out: Path) -> np.nd
     except TirelibError as error:
         say(f"{file.name}: {error}")
         return None
+    views = [fit.view(problem, width) for width in OWN]
     found = []
     for looser in LOOSER:
-        each = []
-        for family in others:
-            for width in OWN:
-                normal = fit.view(problem, width).normal
-                for size in SIZES:
-                    allowed = {
-                        **sized(family.spread(), size),
-                        BASE: fit.widths**2,
-                        **law_errors(fit, looser),
-                    }
-                    weighed = Weighed(normal, normal.spread(allowed))
-                    volume = problem.whitener(width).log_volume
-                    each.append(weighed.log_likelihood() + volume + size_prior(size))
-        found.append(max(each))
+        allowed = {BASE: fit.widths**2, **law_errors(fit, looser)}
+        found.append(max(Null(views, family, allowed).likelihood for family in others))
     return np.array(found)
 
 
