@@ -79,7 +79,8 @@ def test_five_clicks_add_the_effect_that_forces_lack(browser: Any, tmp_path: Pat
     assert fit["error_after"] < fit["error_before"]
     diagnosis = json.loads((place.parent / "001" / "Fy" / "diagnosis.json").read_text())
     assert "friction_load" in diagnosis["named"]
-    assert complaints == [] or all("WebSocket" in said for said in complaints), complaints
+    # the killed server leaves connections and answers unfinished; the page itself says nothing
+    assert all("WebSocket" in said or "net::ERR_" in said for said in complaints), complaints
     host = re.split("[/?]", url)[2]
     assert {re.split("[/?]", one)[2] for one in addresses if "://" in one} == {host}
 

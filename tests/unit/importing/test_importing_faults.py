@@ -57,7 +57,10 @@ FZ = {"column": "FZ", "unit": "N"}
         (with_channels(Fz={**FZ, "factor": 0.0}), ["Fz factor: 0 is given"]),
         (with_channels(Fz={**FZ, "offset": "1"}), ["Fz offset: '1' is given", "finite number"]),
         (with_channels(Fz={"column": "FY", "unit": "N"}), ["column 'FY' is that of Fy already"]),
-        (with_channels(time={"column": "ET", "unit": "s", "rate_hz": 9}), ["beside a column"]),
+        (
+            with_channels(time={"column": "ET", "unit": "s", "rate_hz": 9}),
+            ["together with a column"],
+        ),
         (with_channels(time={"rate_hz": -1.0}), ["rate_hz = -1", "above 0"]),
         (with_channels(Fz={**FZ, "override_unit": 1}), ["override_unit: 1 is given"]),
         (
