@@ -105,13 +105,27 @@ def spawn(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Spawn]:
         yield start
 
 
+def with_own_name(arguments: tuple[object, ...]) -> tuple[object, ...]:
+    """Return a program's arguments with a link on the port of an emulator.
+
+    The system gives a number in /dev/pts anew as soon as it is free. A reader of another test that
+    waits for its lost port to come back would take that of the next emulator; a link is not reused.
+    """
+    if arguments[0] != "emulate" or "--port-file" not in arguments:
+        return arguments
+    if "--link" in arguments or "--bus" in arguments:
+        return arguments
+    file = arguments[arguments.index("--port-file") + 1]
+    return (*arguments, "--link", f"{file}.tty")
+
+
 @contextmanager
 def spawning(folders: pytest.TempPathFactory) -> Iterator[Spawn]:
     """Give what starts programs, and end those that are left."""
     started: list[Program] = []
 
     def start(*arguments: object) -> Program:
-        started.append(Program(folders.mktemp("program"), *arguments))
+        started.append(Program(folders.mktemp("program"), *with_own_name(arguments)))
         return started[-1]
 
     try:
