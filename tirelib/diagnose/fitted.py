@@ -42,9 +42,9 @@ class Fitted:
     hypothesis : Hypothesis
         That its effects and no other are there.
     values : mapping
-        Of the tire.
+        The tire's numbers, SI.
     reached : ModelError
-        Of the model alone.
+        Error of the model without what plain tires show.
     """
 
     hypotheses: Hypotheses
