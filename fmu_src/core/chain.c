@@ -258,6 +258,10 @@ void chain_predict(const Calibration *calibration, const Chain *c, double *value
     if (c->force.there) find_lateral(&t, values[V_LOAD], calibrated, result);
     if (c->load.there)
         widen(&result->of[FZ], c->load_per_hardening * hardening_std(&t, k->law_doubt));
+    /* Reference: Chain._slip_calibrated */
+    if (c->radius.there && !own_inside(&c->guard[KAPPA], result->of[KAPPA].value))
+        for (int q = 0; q < QUANTITIES; q++)
+            if (q != KAPPA) result->of[q].valid = 0;
 }
 
 int chain_unlike(const Calibration *calibration, const Chain *c, double values[3][VALUES],

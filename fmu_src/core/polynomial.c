@@ -75,12 +75,23 @@ double slope_by(const Polynomial *p, const double *values, int value) {
     return sum;
 }
 
+static int inside(const double *range, double x) {
+    return x >= range[RANGE_LOW] && x <= range[RANGE_HIGH];
+}
+
 int all_inside(const Guard *guard, const double *values, double own) {
     for (int i = 0; i < guard->ranges; i++) {
         const double *range = guard->range + RANGE_WIDTH * i;
         double x = range[RANGE_NUMBER] < 0.0 ? own : values[(int)range[RANGE_NUMBER]];
-        int inside = x >= range[RANGE_LOW] && x <= range[RANGE_HIGH];
-        if (!inside && !(range[RANGE_OPTIONAL] != 0.0 && isnan(x))) return 0;
+        if (!inside(range, x) && !(range[RANGE_OPTIONAL] != 0.0 && isnan(x))) return 0;
+    }
+    return 1;
+}
+
+int own_inside(const Guard *guard, double own) {
+    for (int i = 0; i < guard->ranges; i++) {
+        const double *range = guard->range + RANGE_WIDTH * i;
+        if (range[RANGE_NUMBER] < 0.0 && !isnan(own) && !inside(range, own)) return 0;
     }
     return 1;
 }

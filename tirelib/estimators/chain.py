@@ -232,6 +232,10 @@ class Chain:
         if "Fz" in result:
             doubt = self._load_per_hardening() * np.hypot(unknown, LAW_DOUBT * harder)
             result["Fz"] = result["Fz"].widened(doubt)
+        if "kappa" in result:
+            checked = self._slip_calibrated(result["kappa"].value)
+            for name in result.keys() - {"kappa"}:
+                result[name] = replace(result[name], valid=result[name].valid & checked)
         return result, radius
 
     def _lateral(
@@ -436,6 +440,17 @@ class Chain:
             hidden = self._load_per_hardening() * np.hypot(unknown, LAW_DOUBT * harder)
             doubt = doubt + per_load * hidden  # one tread is behind both
         return radius - share * worn, np.hypot(std, doubt)
+
+    def _slip_calibrated(self, kappa: FloatArray) -> BoolArray:
+        """Tell which slip ratios were calibrated, or are not known, shape (n,).
+
+        What the contact does at a slip ratio that was not calibrated nobody has checked; the
+        traction alone does not show it where most of the contact slides.
+        """
+        own = tuple(guard for guard in self.guards["kappa"] if guard.name == "kappa")
+        if not own:
+            return np.ones(kappa.shape, dtype=np.bool_)
+        return np.isnan(kappa) | all_inside(own, [kappa])
 
     def _valid(
         self,

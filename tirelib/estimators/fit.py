@@ -41,13 +41,24 @@ class Fit:
     """A fitted polynomial and what cross-validation says of it.
 
     `held_out` holds, for each row, the prediction by a fit that did not see its condition; `ends`
-    what fits without them say of the outermost data, and of loads between others.
+    what fits without them say of the outermost data, and of loads between others. `between` is what
+    the error between load levels adds to the standard deviation, in the unit of y.
     """
 
     model: Polynomial
     held_out: FloatArray
     candidates: tuple[tuple[int, float], ...]
     ends: tuple[End, ...] = ()
+    between: float = 0.0
+
+    def at_any_load(self, model: Polynomial) -> Polynomial:
+        """Return a model of this fit whose deviation is that of any load, not of the levels only.
+
+        A wheel's load lies anywhere. The error there is taken as the one by which the terms were
+        chosen: half of the squared error at a condition that was left out, whose neighbours at the
+        same load stay, and half of that at a whole load that was left out.
+        """
+        return replace(model, residual=float(np.hypot(model.residual, self.between)))
 
 
 def variables_for(
@@ -155,7 +166,8 @@ def fit_best(
                 far=inflation * reach,
             ),
         )
-        best = (score, Fit(model, held_out, (), ends))
+        more = float(np.sqrt(max(score**2 - squares[0], 0.0)))
+        best = (score, Fit(model, held_out, (), ends, more))
     if best is None:
         raise CalibrationError(
             f"{what}: {conditions} distinct conditions are too few for "

@@ -75,7 +75,8 @@ def fit_load(
         return None, mean
     keep(links, "Fz", fit, fit.held_out + correction)
     links.values["load"] = fit.held_out + correction
-    return _with_pull(fit.model, values, truth - correction - fit.held_out), mean
+    model = _with_pull(fit.model, values, truth - correction - fit.held_out)
+    return fit.at_any_load(model), mean
 
 
 def _with_pull(
@@ -139,7 +140,7 @@ def fit_force(links: Links, say: Callable[[str], None]) -> Polynomial | None:
     say("Fy")
     fit = _fit_odd(links, truth, "Fy")
     keep(links, "Fy", fit, fit.held_out)
-    return fit.model
+    return fit.at_any_load(fit.model)
 
 
 def _fit_odd(links: Links, truth: FloatArray, what: str) -> Fit:

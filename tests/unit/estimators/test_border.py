@@ -122,3 +122,34 @@ def test_more_conditions_of_the_same_range_do_not_make_it_narrower() -> None:
     for n in (120, 240, 480):
         assert evenly(n, banded=True).model.judge(outer)[2].all()
     assert not evenly(240, banded=False).model.judge(outer)[2].any()
+
+
+def held_between_levels(fit: Fit, y_of: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Error over standard deviation midway between the levels of `at_levels`."""
+    between = np.arange(-0.75, 0.8, 0.5)
+    value, std = fit.at_any_load(fit.model).predict({"a": between})
+    return np.asarray((value - y_of(between)) / std)
+
+
+def at_levels(y_of: Callable[[np.ndarray], np.ndarray]) -> Fit:
+    """A fourth power of what was measured at five levels, eight times each."""
+    level = np.repeat(np.arange(5), 8)
+    a = -1.0 + 0.5 * level
+    y = y_of(a) + 0.002 * np.random.default_rng(6).standard_normal(a.size)
+    terms = [{}, *({"a": power} for power in range(1, 4))]
+    return fit_best({"a": a}, y, np.arange(a.size), [terms], level=level)
+
+
+def test_between_load_levels_the_deviation_holds_what_the_polynomial_errs() -> None:
+    """Conditions at the same level stay in the fit: they say nothing of what lies between levels."""
+
+    def wavy(a: np.ndarray) -> np.ndarray:
+        return np.asarray(0.1 * np.cos(2.0 * np.pi * a) + a)
+
+    fit = at_levels(wavy)
+    value, std = fit.model.predict({"a": np.arange(-0.75, 0.8, 0.5)})
+    alone = (value - wavy(np.arange(-0.75, 0.8, 0.5))) / std
+    assert np.sqrt(np.mean(held_between_levels(fit, wavy) ** 2)) < 2.0
+    assert np.sqrt(np.mean(alone**2)) > 1.5 * np.sqrt(np.mean(held_between_levels(fit, wavy) ** 2))
+    straight = at_levels(lambda a: a)
+    assert straight.between < 0.5 * straight.model.residual

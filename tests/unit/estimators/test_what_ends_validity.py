@@ -10,6 +10,7 @@ from tests.synthetic import header, synthetic_run
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.chain import QUANTITIES
 from tirelib.estimators.laws import ConditionLaws
+from tirelib.estimators.polynomial import Range
 from tirelib.estimators.train import Trained
 from tirelib.features import Features
 from tirelib.flags import TurnFlag
@@ -74,6 +75,29 @@ def test_a_slip_angle_is_valid_up_to_a_standard_deviation_of_one_degree(
 
 
 LAWS = ConditionLaws((2e5, 2e5), (10.0, 20.0), False, False, 0.17, 0.3)
+
+
+@BOTH
+@pytest.mark.parametrize(("kappa", "valid"), [(0.05, True), (0.08, False), (-0.08, False)])
+def test_a_slip_ratio_that_was_not_calibrated_ends_load_force_and_slip_angle(
+    kappa: float, valid: bool, estimate: Estimate, trained: Trained, features: Features
+) -> None:
+    """Calibrated from -0.07 to 0.05; the traction of these turns says nothing against them."""
+    own = Range("kappa", -0.07, 0.05, 0.003)
+    chains = {
+        missing: replace(chain, guards={**chain.guards, "kappa": (own,)})
+        for missing, chain in trained.calibration.chains.items()
+    }
+    good = trained.calibration.estimate(features)
+    quick = features.omega * (1.0 + kappa) / (1.0 + np.median(good.value["kappa"][good.turn_valid]))
+    found = estimate(replace(trained.calibration, chains=chains), replace(features, omega=quick))
+    usable = good.turn_valid
+    np.testing.assert_allclose(found.value["kappa"][usable], kappa, atol=0.003)
+    for quantity in QUANTITIES:
+        assert (found.valid[quantity][usable] == valid).all(), quantity
+    blind = replace(features, omega=quick, speed=np.full_like(features.speed, np.nan))
+    unknown = estimate(replace(trained.calibration, chains=chains), blind)
+    assert unknown.valid["Fz"][usable].all()
 
 
 def test_a_speed_outside_the_calibration_doubts_by_two_percent_per_1600_m2_s2() -> None:
