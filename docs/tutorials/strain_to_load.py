@@ -99,8 +99,8 @@ print(f"error of Fz: {rmse:.1f} N rms; {100 * held:.0f} % of the turns lie in th
 # The first turn of each run is not valid: nothing is known of the turn before it. Every other
 # reason is a flag of its own (:doc:`/reference/flags`).
 #
-# Try four loads instead of seven: the error is ten times as large, and the interval is wider, but no
-# load can be left out to say by how much (:doc:`/theory/estimators`, "Standard deviations").
+# Try four loads instead of seven: the error is ten times as large, and the interval is wider, but
+# no load can be left out to say by how much (:doc:`/theory/estimators`, "Standard deviations").
 # Measure more levels than you think you need, and read the error of a load left out in the report.
 
 fig, ax = plt.subplots(figsize=(7, 3.6))

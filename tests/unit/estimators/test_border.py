@@ -141,7 +141,7 @@ def at_levels(y_of: Callable[[np.ndarray], np.ndarray]) -> Fit:
 
 
 def test_between_load_levels_the_deviation_holds_what_the_polynomial_errs() -> None:
-    """Conditions at the same level stay in the fit: they say nothing of what lies between levels."""
+    """Conditions at the same level stay in the fit: they say nothing of others."""
 
     def wavy(a: np.ndarray) -> np.ndarray:
         return np.asarray(0.1 * np.cos(2.0 * np.pi * a) + a)
