@@ -120,6 +120,7 @@ def test_the_planted_effect_is_named_with_errors_that_fall(planted: Any) -> None
     assert told["p_without"] <= told["false_alarm"] == 0.05
     assert told["sets"] == [[EFFECT]]
     assert first["error_after"] == told["error_after"] < 0.5 * told["error_before"]
+    assert told["error_after"] < told["error_refitted"] < told["error_before"]
     assert first["heldout_error_after"] < told["heldout_error_before"]
     assert all(entry["heldout_error_after"] is None for entry in told["candidates"][1:])
 

@@ -9,7 +9,7 @@ import numpy as np
 from tirelib.compare.error import ModelError, named_errors
 from tirelib.compare.model import Model
 from tirelib.diagnose.diagnose import Diagnosis, Finding
-from tirelib.diagnose.fitted import Fitted, fitted
+from tirelib.diagnose.fitted import Fitted, fitted, least_error
 from tirelib.diagnose.floor import floor_of
 from tirelib.diagnose.guess import Guess
 from tirelib.diagnose.held_out import Fold, fold_entry, folds, held_out_errors, pooled
@@ -36,7 +36,8 @@ class Assessment:
     findings : tuple of Finding
         At most hints without repeats.
     before, refitted, after : ModelError
-        Of the model as it is given, fitted anew, and with the named effects.
+        Of the model as it is given, with the numbers of the least error, and with the named
+        effects.
     floor : float
         Part of `after` that noise and what plain tires show explain.
     folds : tuple of Fold
@@ -92,13 +93,14 @@ def assess(
     """
     yardstick = found.yardstick
     verdict, named, findings, messages = found.verdict.kind, found.named, found.findings, []
-    refitted = found.base.reached
+    before, refitted = least_error(found.base, given, yardstick)
     if not refitted.known:
         verdict, named = "none", ()
         findings = tuple(_hint(finding) for finding in findings)
         messages.append(NO_REPEATS)
     final = found.final if named else found.base
-    floor = floor_of(final.reached, found.verdict.best, found.verdict.alpha)
+    after = final.reached if named else refitted
+    floor = floor_of(after, found.verdict.best, found.verdict.alpha)
     chosen = folds(found.problem.data) if named else ()
 
     def held(model: Fitted) -> tuple[float, ...]:
@@ -126,9 +128,9 @@ def assess(
         verdict,
         named,
         findings,
-        yardstick.error(given, start=found.base.rolling),
+        before,
         refitted,
-        final.reached,
+        after,
         floor,
         chosen,
         held_before,

@@ -10,7 +10,7 @@ from tirelib.arrays import FloatArray
 from tirelib.compare.error import ModelError, Yardstick
 from tirelib.compare.model import Model
 from tirelib.diagnose.diagnose import FALSE_ALARM, plain_tires
-from tirelib.diagnose.fitted import Fitted, fitted, fitted_problem
+from tirelib.diagnose.fitted import Fitted, fitted, fitted_problem, least_error
 from tirelib.diagnose.floor import floor_of
 from tirelib.diagnose.held_out import Fold, folds, held_out
 from tirelib.effects import CATALOGUE, Effect
@@ -29,7 +29,7 @@ class Extension(Step[Fitted]):
     Attributes
     ----------
     given, refitted, reached : ModelError
-        Of the model as it was given, with its numbers fitted anew, and with the change.
+        Of the model as it was given, with the numbers of the least error, and with the change.
     out_before, out_after : tuple of ModelError or None
         On what was held out, one per fold.
     runs : StraightRuns
@@ -124,10 +124,11 @@ class _Strain:
 
     def extension(self, step: Step[Fitted]) -> Extension:
         """Return a step with its runs and errors."""
+        given, refitted = least_error(step.before, self.model, self.yardstick)
         return Extension(
             **vars(step),
-            given=self.yardstick.error(self.model, start=step.before.rolling),
-            refitted=step.before.reached,
+            given=given,
+            refitted=refitted,
             reached=step.after.reached,
             out_before=self.seen[0],
             out_after=self.seen[1],

@@ -26,7 +26,7 @@ from tirelib.infer.problem import Point, Problem
 MOST_STEPS = 60
 SETTLED = 0.1
 """Step, in posterior standard deviations, below which a fit has settled."""
-GAINS = 0.1
+GAIN = 0.1
 """Fall of the cost, in units of a chi-square, below which a step is the last."""
 LONGEST = 0.5
 """Longest move of a coordinate in one step."""
@@ -120,6 +120,8 @@ def posterior(
     *,
     near: Posterior | None = None,
     strengths: Sequence[FloatArray] | None = None,
+    whiten: Callable[[FloatArray], FloatArray] | None = None,
+    gain: float = GAIN,
     progress: Callable[[str], None] | None = None,
 ) -> Posterior:
     """Fit the model with effects.
@@ -139,6 +141,10 @@ def posterior(
         A fit nearby.
     strengths : sequence of shape (components,), optional
         From where the strengths start.
+    whiten : callable, optional
+        Turns rows (k, ...) into whitened ones (k, n); the problem's whitening by default.
+    gain : float
+        Fall of the cost below which a step is the last.
     progress : callable, optional
 
     Raises
@@ -149,7 +155,7 @@ def posterior(
     names = {effect.name for effect in effects}
     others = [effect for effect in problem.living if effect.name not in names]
     point = _start(problem, [*effects, *others], near, strengths)
-    whiten = problem.whitener(own)
+    whiten = whiten or problem.whitener(own)
     widths = [problem.widths, np.ones(sum(e.components for e in effects))]
     widths += [np.full(e.components, np.sqrt(max(spread.get(e.name, 0.0), LEAST))) for e in others]
     width = np.concatenate(widths)
@@ -184,16 +190,16 @@ def posterior(
                 after = _cost(
                     metric, rows @ left, float(left @ left), coordinates_of(trial[0]), width
                 )
-                if after < cost + GAINS:
+                if after < cost + GAIN:
                     break
             damping = max(10.0 * damping, 1e-2)
-        if trial is None or after >= cost + GAINS:
+        if trial is None or after >= cost + GAIN:
             break  # no way down: the bottom, or its edge
         (point, solved), rest = trial, left
         damping = max(0.1 * damping, 1e-9)
         if progress is not None:
             progress(f"fit of {', '.join(e.name for e in effects) or 'the base'}, cost {after:.0f}")
-        if moved < SETTLED or cost - after < GAINS:
+        if moved < SETTLED or cost - after < gain:
             break
         slopes = problem.slopes(point, solved, near=True)
     else:

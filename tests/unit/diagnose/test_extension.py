@@ -38,8 +38,9 @@ def test_errors_are_those_of_the_model_files_before_and_after() -> None:
     assert told["error_before"] == pytest.approx(error_of(measured, model_of(model_file())).value)
     assert told["error_after"] == pytest.approx(error_of(measured, model_of(file)).value)
     assert told["error_after"] < 0.1 * told["error_refitted"]
-    # the given numbers are all but the truth: fitted anew they gain nothing
-    assert told["error_refitted"] == pytest.approx(told["error_before"], rel=0.05)
+    # other numbers take a part of what the effect is needed for
+    assert told["error_refitted"] < 0.9 * told["error_before"]
+    assert told["error_refitted"] < done.before.error
     assert told["noise"] == pytest.approx(1e6 * done.runs.noise.std)
     assert told["floor"] <= told["error_after"]
     assert {"heldout_error_before", "heldout_error_after", "strength", "std"} <= set(told)

@@ -5,13 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import optimize
 
-from tests.unit.diagnose.planted import EFFECT, STRENGTH, runs
+from tests.unit.diagnose.planted import EFFECT, STRENGTH, model_file, runs
 from tests.unit.identify.model_waves import TIRE
 from tirelib.arrays import FloatArray
 from tirelib.compare.error import Yardstick, error_of
+from tirelib.compare.model import model_of
 from tirelib.diagnose.diagnose import plain_tires
-from tirelib.diagnose.fitted import Fitted, fitted, fitted_problem
+from tirelib.diagnose.fitted import Fitted, fitted, fitted_problem, least_error
 from tirelib.effects import CATALOGUE
 from tirelib.effects.effect import Effect, effect
 from tirelib.errors import ParameterError
@@ -86,6 +88,28 @@ def test_no_coordinate_goes_much_lower(plain: Fitted, k: int) -> None:
         z[k] = side
         there = error_of(measured, replace(plain.model, values=move(plain.values, z, BARE)))
         assert there.value > 0.96 * plain.error, f"{BARE[k].name} moved by {side:g}"
+
+
+def test_no_other_numbers_have_less_than_the_least_error(lacking: Fitted) -> None:
+    measured = runs(EFFECT, STRENGTH)
+    yardstick = Yardstick.of(measured)
+    given, least = least_error(lacking, model_of(model_file()), yardstick)
+    assert given.value == pytest.approx(error_of(measured, model_of(model_file())).value)
+    assert least.value < min(given.value, lacking.error)
+
+    def left(z: FloatArray) -> FloatArray:
+        model = replace(lacking.model, values=move(lacking.values, z, BARE))
+        return np.asarray(error_of(measured, model).by_run)
+
+    found = optimize.least_squares(left, np.zeros(len(BARE)), diff_step=1e-3, max_nfev=12)
+    assert least.value < 1.05 * np.sqrt(np.mean(found.fun**2))
+
+
+def test_numbers_that_have_the_least_error_already_are_kept(plain: Fitted) -> None:
+    measured = runs()
+    given, least = least_error(plain, plain.model, Yardstick.of(measured))
+    assert given.value == pytest.approx(plain.error, rel=1e-6)
+    assert 0.9 * given.value < least.value <= given.value
 
 
 @pytest.mark.parametrize("factor", [0.75, 1.3])
