@@ -23,7 +23,7 @@ from fmpy.fmi2 import FMU2Slave
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.errors import ParameterError
-from tirelib.estimators.chain import QUANTITIES
+from tirelib.estimators.estimate import QUANTITIES
 from tirelib.fmu.run import LoadedFmu
 from tirelib.fmu.virtual.coordinates import FRICTION, INPUTS
 from tirelib.fmu.virtual.table import START

@@ -9,7 +9,8 @@ from tirelib.arrays import FloatArray
 from tirelib.campaign import CampaignHeader, TireGeometry
 from tirelib.estimators.calibrate import calibrate_chain
 from tirelib.estimators.calibration import LARGEST_ANGLE_STD
-from tirelib.estimators.chain import Chain, Estimate
+from tirelib.estimators.chain import Chain
+from tirelib.estimators.estimate import Estimate
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.unknowns import FRICTION, TWO_SIGMA
 from tirelib.features.extract import extract_features

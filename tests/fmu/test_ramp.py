@@ -13,7 +13,7 @@ from tests.synthetic import waveform
 from tirelib.campaign import CampaignHeader, Run, RunPlan, TireGeometry, write_campaign
 from tirelib.campaign.read import read_campaign
 from tirelib.estimators.calibration import Calibration, Estimates
-from tirelib.estimators.chain import QUANTITIES
+from tirelib.estimators.estimate import QUANTITIES
 from tirelib.estimators.train import train
 from tirelib.features.extract import Features, extract_features
 from tirelib.fmu.run import LoadedFmu

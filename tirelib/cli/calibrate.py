@@ -25,7 +25,6 @@ from tirelib.cli.limits import not_checked, not_given
 from tirelib.cli.options import json_option, low_pass_options
 from tirelib.errors import CalibrationError
 from tirelib.estimators.calibration_file import write_calibration
-from tirelib.estimators.chain import QUANTITIES
 from tirelib.estimators.costs import costs_of
 from tirelib.estimators.crossval import (
     FACTOR,
@@ -36,6 +35,7 @@ from tirelib.estimators.crossval import (
 )
 from tirelib.estimators.dissertation import SMALL_ANGLE, Regression
 from tirelib.estimators.edge import VARIED
+from tirelib.estimators.estimate import QUANTITIES
 from tirelib.estimators.mixed import strangers
 from tirelib.estimators.result import cost_rows
 from tirelib.estimators.train import Trained, train

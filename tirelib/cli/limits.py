@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tirelib.estimators.calibration import Calibration
-from tirelib.estimators.chain import QUANTITIES
 from tirelib.estimators.edge import EDGE_UNIT
+from tirelib.estimators.estimate import QUANTITIES
 
 REPORTED_STD_RATIO = 1.2
 """Ratio of standard deviations from which an unknown condition is reported."""

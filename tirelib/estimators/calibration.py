@@ -7,9 +7,10 @@ import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.errors import CalibrationError
-from tirelib.estimators.chain import QUANTITIES, Chain
+from tirelib.estimators.chain import Chain
 from tirelib.estimators.contact_length import contact_lengths
 from tirelib.estimators.doubt import doubt, with_moved
+from tirelib.estimators.estimate import QUANTITIES
 from tirelib.estimators.reference_turn import ReferenceTurn
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.unknowns import PLAUSIBLE

@@ -17,10 +17,11 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.errors import FormatError
+from tirelib.estimators.angle_model import AngleModel
 from tirelib.estimators.border import Border
 from tirelib.estimators.calibration import Calibration, Rolling
 from tirelib.estimators.calibration_check import BORDER, faults
-from tirelib.estimators.chain import AngleModel, Chain
+from tirelib.estimators.chain import Chain
 from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.likeness import Likeness
 from tirelib.estimators.polynomial import Cloud, Polynomial, Range, Variable

@@ -21,8 +21,10 @@ import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.estimators import tilt
+from tirelib.estimators.angle_model import WIDEST, AngleModel
 from tirelib.estimators.any_road import Seen, tell
 from tirelib.estimators.doubt import moved_by
+from tirelib.estimators.estimate import Estimate
 from tirelib.estimators.laws import (
     RADIUS_DOUBT,
     RADIUS_SHARE,
@@ -40,64 +42,10 @@ from tirelib.estimators.sliding import (
 )
 from tirelib.estimators.unknowns import BENT, CORNERING, EDGE, FORCE, LAW_DOUBT, Road
 
-WIDEST = 0.5
-"""Largest slip angle and largest standard deviation of one, [rad]: for a flat cornering curve the
-latter has no end. Half and double change no validity, which ends at 1 deg."""
-QUANTITIES = ("Fz", "alpha", "kappa", "Fy")
 STANDS_ON = {"Fz": ("Fz",), "Fy": ("Fy",), "alpha": ("Fz", "Fy"), "kappa": ()}
 """Models on whose calibrated data a quantity stands. The slip ratio has none: where the load is not
 known, its own doubt of the radius holds. The slip angle's own polynomial is judged by its standard
 deviation."""
-
-
-@dataclass(frozen=True, slots=True)
-class Estimate:
-    """One quantity for n turns: value, standard deviation (SI), and whether it may be trusted.
-
-    `by_camber` is the part of the standard deviation that a camber leaves which nobody gave;
-    `sliding` how far the sliding share may be from that at the calibrated friction, NaN where no
-    slip angle fits. Both belong to the lateral force.
-    """
-
-    value: FloatArray
-    std: FloatArray
-    valid: BoolArray
-    by_camber: FloatArray | None = None
-    sliding: FloatArray | None = None
-
-    @property
-    def camber_decides(self) -> BoolArray:
-        """Which turns owe more than half their variance to a camber that nobody gave."""
-        if self.by_camber is None:
-            return np.zeros(self.value.shape, dtype=np.bool_)
-        return np.asarray(self.by_camber**2 > 0.5 * self.std**2, dtype=np.bool_)
-
-    def widened(self, more: FloatArray) -> "Estimate":
-        """Return it with a further standard deviation; valid only where that is a number."""
-        return replace(self, std=np.hypot(self.std, more), valid=self.valid & np.isfinite(more))
-
-
-@dataclass(frozen=True, slots=True)
-class AngleModel:
-    """Slip angle from utilisation; less certain where the cornering curve is flat.
-
-    With s the slope d alpha / d utilisation, the variance of a turn is the polynomial's plus
-    ``(blur s)^2 + (bend s^2)^2``; blur is the uncertainty of the utilisation over the calibration,
-    for which that of the turn itself stands where it is larger.
-    """
-
-    polynomial: Polynomial
-    blur: float
-    bend: float
-
-    def predict(
-        self, values: Mapping[str, FloatArray], spread: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return slip angle and standard deviation, [rad]; `spread` is the utilisation's own."""
-        value, std = self.polynomial.predict(values)
-        slope = self.polynomial.slope(values, "utilisation")
-        blur = np.maximum(self.blur, spread)
-        return value, np.sqrt(std**2 + (blur * slope) ** 2 + (self.bend * slope**2) ** 2)
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,8 +19,8 @@ from tirelib.core import (
 )
 from tirelib.errors import FormatError
 from tirelib.estimators.calibration import Calibration, Estimates
-from tirelib.estimators.chain import QUANTITIES
 from tirelib.estimators.core_table import flat_table
+from tirelib.estimators.estimate import QUANTITIES
 from tirelib.features.extract import Features
 
 NOTES = (

@@ -12,9 +12,9 @@ import numpy as np
 from tirelib.campaign.recording import Recording
 from tirelib.documents import new_file, plain
 from tirelib.estimators.calibration import Calibration
-from tirelib.estimators.chain import QUANTITIES
 from tirelib.estimators.continuous import WheelTurns
 from tirelib.estimators.edge import EDGE_UNIT, FORMAT
+from tirelib.estimators.estimate import QUANTITIES
 from tirelib.estimators.likeness import suspected
 from tirelib.estimators.result import other_tire, turn_row
 from tirelib.flags import flag_names

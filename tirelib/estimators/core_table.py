@@ -14,9 +14,9 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.errors import FormatError
 from tirelib.estimators import (
+    angle_model,
     any_road,
     calibration,
-    chain,
     contact_length,
     doubt,
     laws,
@@ -28,7 +28,8 @@ from tirelib.estimators import (
     unknowns,
 )
 from tirelib.estimators.calibration import Calibration
-from tirelib.estimators.chain import QUANTITIES, Chain
+from tirelib.estimators.chain import Chain
+from tirelib.estimators.estimate import QUANTITIES
 from tirelib.estimators.polynomial import Cloud, Polynomial, Range, Term, Variable
 
 MAGIC, VERSION = 20220117.0, 1.0
@@ -59,7 +60,7 @@ CONSTANTS = (
     tilt.LEAST_LOAD,
     *(likeness.ROAD_DOUBT, likeness.PRESSURE_DOUBT, likeness.SPEED_DOUBT, likeness.EDGE),
     likeness.ROAD_DRIFT["angle_slope"][1],
-    *(chain.WIDEST, doubt.ANGLE_STEP, calibration.LARGEST_ANGLE_STD),
+    *(angle_model.WIDEST, doubt.ANGLE_STEP, calibration.LARGEST_ANGLE_STD),
     *(contact_length.BIAS, contact_length.MIDDLE, contact_length.WIDTH),
     *(contact_length.LEAST_STD, contact_length.SHORT_STD, contact_length.SHORT_WIDTH),
 )
@@ -117,7 +118,7 @@ def _chain(part: Chain, lateral: FloatArray) -> Iterator[float]:
     yield from regressors._fitted(places, 2)[2].tolist()
     yield from (float(name in needed) for name in ("pressure", "camber", "speed"))
     yield from (_uses(part.force, "camber"), _uses(part.radius, "load"))
-    yield from (part.mean_load, part._load_per_hardening(), max(widest or [chain.WIDEST]))
+    yield from (part.mean_load, part._load_per_hardening(), max(widest or [angle_model.WIDEST]))
     yield from (camber[0].low, camber[0].high) if camber else (np.nan, np.nan)
     for quantity in QUANTITIES:
         yield from _guard(quantity, part.guards[quantity])

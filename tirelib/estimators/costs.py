@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tirelib.estimators.calibration import Calibration, Estimates
-from tirelib.estimators.chain import QUANTITIES, Chain
+from tirelib.estimators.chain import Chain
+from tirelib.estimators.estimate import QUANTITIES
 from tirelib.features.extract import Features
 
 COLUMN = {

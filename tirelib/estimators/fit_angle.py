@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 
 from tirelib.arrays import FloatArray
 from tirelib.estimators import basis
-from tirelib.estimators.chain import AngleModel
+from tirelib.estimators.angle_model import AngleModel
 from tirelib.estimators.ends import End, growth
 from tirelib.estimators.fit import fit_best
 from tirelib.estimators.links import VARIES, Links, frozen_with_slip, keep, varying_of

@@ -10,9 +10,10 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.estimators.calibration import Calibration, Estimates
-from tirelib.estimators.chain import QUANTITIES, Chain
+from tirelib.estimators.chain import Chain
 from tirelib.estimators.costs import COLUMN, Cost
 from tirelib.estimators.edge import EDGE_UNIT, FORMAT, VARIED
+from tirelib.estimators.estimate import QUANTITIES
 from tirelib.estimators.likeness import suspected
 from tirelib.features.extract import Features
 from tirelib.flags import TurnFlag, flag_names

@@ -13,8 +13,8 @@ from tirelib import __version__
 from tirelib.arrays import FloatArray, IntArray
 from tirelib.documents import new_file
 from tirelib.estimators.calibration import Estimates
-from tirelib.estimators.chain import QUANTITIES
 from tirelib.estimators.edge import EDGE_UNIT
+from tirelib.estimators.estimate import QUANTITIES
 from tirelib.features.extract import Features
 from tirelib.flags import flag_names
 from tirelib.signal.quality import UNUSABLE

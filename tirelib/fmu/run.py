@@ -15,7 +15,7 @@ from tirelib.arrays import BoolArray, FloatArray
 from tirelib.campaign import Campaign, Run, conditions_of
 from tirelib.errors import CalibrationError, FormatError
 from tirelib.estimators.calibration import Calibration, Estimates
-from tirelib.estimators.chain import QUANTITIES
+from tirelib.estimators.estimate import QUANTITIES
 from tirelib.features.extract import Features
 from tirelib.flags import INVALIDATING, flag_names
 from tirelib.fmu.build import embedded_calibration

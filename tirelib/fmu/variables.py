@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from tirelib.estimators.chain import QUANTITIES
+from tirelib.estimators.estimate import QUANTITIES
 from tirelib.estimators.unknowns import Road
 from tirelib.flags import TurnFlag
 

@@ -12,7 +12,7 @@ from tirelib.axes import sign
 from tirelib.errors import ParameterError
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration
-from tirelib.estimators.chain import QUANTITIES
+from tirelib.estimators.estimate import QUANTITIES
 from tirelib.flags import TurnFlag, flag_names
 from tirelib.fmu.refusals import FAULT, StepError, status_entry
 from tirelib.signal.turns import LONGEST_TURN

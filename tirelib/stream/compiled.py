@@ -18,8 +18,8 @@ from tirelib.core import (
     memory,
 )
 from tirelib.errors import FormatError
-from tirelib.estimators.chain import QUANTITIES
 from tirelib.estimators.compiled import core_calibration, estimates_of
+from tirelib.estimators.estimate import QUANTITIES
 from tirelib.features.compiled import attributes_of
 from tirelib.features.extract import Features
 from tirelib.flags import TurnFlag

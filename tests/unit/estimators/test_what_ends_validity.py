@@ -8,7 +8,7 @@ import pytest
 
 from tests.synthetic import header, synthetic_run
 from tirelib.estimators.calibration import Calibration, Estimates
-from tirelib.estimators.chain import QUANTITIES
+from tirelib.estimators.estimate import QUANTITIES
 from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.polynomial import Range
 from tirelib.estimators.train import Trained
