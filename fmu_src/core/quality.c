@@ -3,7 +3,7 @@
 #include "order.h"
 
 enum { LONGEST_BRIDGE = 2, FLAT_SAMPLES = 6 };
-static const double SPIKE_SHARE = 0.05, DEAD_SHARE = 0.25;
+static const double SPIKE_SHARE = 0.05, SPIKE_BEND = 350.0, DEAD_SHARE = 0.25;
 static const double FLAT_ANGLE = 0.04, CORNER_ANGLE = 0.02, CORNER_SHARE = 0.02;
 
 /* Reference: _longest_run */
@@ -83,17 +83,18 @@ static double swing_of(const double *x, size_t n, double step, int *flags) {
 }
 
 /* Mark the samples that stand apart from their neighbours as missing. Reference: _spikes */
-static int spikes(const double *x, size_t n, double swing, unsigned char *missing) {
+static int spikes(const double *x, size_t n, double least, unsigned char *missing) {
     int any = 0;
-    for (size_t i = 2; i + 2 < n && swing > 0.0; i++)
-        if (fabs(x[i] - around(x, i)) > SPIKE_SHARE * swing) any = missing[i] = 1;
+    for (size_t i = 2; i + 2 < n && least > 0.0; i++)
+        if (fabs(x[i] - around(x, i)) > least) any = missing[i] = 1;
     return any;
 }
 
 void inspect(double *window, size_t stride, size_t n, int gages, double step, int *flags,
              unsigned char *missing) {
-    double swing[GAGES];
+    double swing[GAGES], share = SPIKE_BEND * (step * step);
     int bent = 0; /* where no gage bends sharply, none is looked at for spikes */
+    if (share < SPIKE_SHARE) share = SPIKE_SHARE;
     for (int g = 0; g < gages; g++) {
         double *x = window + (size_t)g * stride;
         int lost = 0;
@@ -103,7 +104,7 @@ void inspect(double *window, size_t stride, size_t n, int gages, double step, in
         }
         flags[g] = !lost ? 0 : longest_run(missing, n) > LONGEST_BRIDGE ? GAP : BRIDGED;
         swing[g] = swing_of(x, n, step, &flags[g]);
-        for (size_t i = 1; i + 1 < n && !bent; i++) bent = bend(x, i) > SPIKE_SHARE * swing[g];
+        for (size_t i = 1; i + 1 < n && !bent; i++) bent = bend(x, i) > share * swing[g];
     }
     for (int g = 0; g < gages; g++) {
         double *x = window + (size_t)g * stride;
@@ -112,7 +113,7 @@ void inspect(double *window, size_t stride, size_t n, int gages, double step, in
             missing[i] = (unsigned char)(isnan(x[i]) != 0);
             lost |= missing[i];
         }
-        if (bent && n >= 5 && spikes(x, n, swing[g], missing)) {
+        if (bent && n >= 5 && spikes(x, n, share * swing[g], missing)) {
             flags[g] |= SPIKE | BRIDGED;
             lost = 1;
         }

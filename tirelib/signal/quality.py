@@ -12,7 +12,10 @@ from tirelib.flags import TurnFlag
 LONGEST_BRIDGE = 2
 """Samples in a row that a straight line may replace."""
 SPIKE_SHARE = 0.05
-"""A sample is a spike when it departs from its neighbours' median by this share of the swing."""
+"""A sample is a spike when it departs from its neighbours' median by this share of the swing ..."""
+SPIKE_BEND = 350.0
+"""... and by this share for each squared radian of wheel angle between samples, [rad^-2]: a peak of
+the strain itself departs by up to 305 of it. ``python build/spike_bend.py`` has the source."""
 DEAD_SHARE = 0.25
 """A gage shows no contact when its flanks have less than this share of the median gage's steepness.
 The belt bulges over a shoulder that is lifted off the road, so a strain that only swings is no
@@ -68,7 +71,7 @@ def inspect(window: FloatArray, step: float) -> tuple[FloatArray, IntArray]:
         for row in np.flatnonzero((length >= needed) & (swing > 0.0)):
             if _has_corner(known[row], extreme[row], CORNER_SHARE * swing[row], step):
                 flags[row] |= int(TurnFlag.SATURATED)
-    spiked = _spikes(known, swing)
+    spiked = _spikes(known, max(SPIKE_SHARE, SPIKE_BEND * step**2) * swing)
     if spiked.any():
         rows = spiked.any(axis=1)
         flags[rows] |= int(TurnFlag.SPIKE | TurnFlag.BRIDGED)
@@ -99,16 +102,16 @@ def _has_corner(samples: FloatArray, extreme: float, jump: float, step: float) -
     return bool((np.abs(samples[ends] - extreme) > jump).any())
 
 
-def _spikes(known: FloatArray, swing: FloatArray) -> BoolArray:
-    """Mark samples that stand apart from the median of their four neighbours."""
+def _spikes(known: FloatArray, least: FloatArray) -> BoolArray:
+    """Mark samples further than `least`, shape (n_gages,), from the median of four neighbours."""
     apart = np.zeros(known.shape, dtype=np.bool_)
     bend = np.abs(known[:, 2:] - 2.0 * known[:, 1:-1] + known[:, :-2])
-    limit = SPIKE_SHARE * swing[:, None]
+    limit = least[:, None]
     if known.shape[1] < 5 or not (bend > limit).any():
         return apart
     around = np.stack((known[:, :-4], known[:, 1:-3], known[:, 3:-1], known[:, 4:]))
     apart[:, 2:-2] = np.abs(known[:, 2:-2] - np.median(around, axis=0)) > limit
-    return apart & (swing[:, None] > 0.0)
+    return apart & (limit > 0.0)
 
 
 def _longest_run(mask: BoolArray) -> IntArray:

@@ -11,7 +11,10 @@ from hypothesis import strategies as st
 from tests.synthetic import LATERAL, RATE, frames, record
 from tirelib.errors import ParameterError, ShapeError
 from tirelib.flags import INVALIDATING, TurnFlag
+from tirelib.fmu.virtual.spec import default_surface
+from tirelib.fmu.virtual.surface import shared_surface
 from tirelib.signal import LowPass, Turn, TurnCutter, Turns, cut_turns, stack_turns
+from tirelib.signal.quality import SPIKE_BEND, inspect
 
 
 def turns_of(strain: np.ndarray, **options: object) -> Turns:
@@ -196,6 +199,27 @@ def test_a_spike_is_flagged_and_does_not_bend_the_trace(size: float) -> None:
     assert has(turns, TurnFlag.SPIKE, 2, 3)
     assert not has(turns, TurnFlag.SPIKE, 1, 3)
     np.testing.assert_allclose(turns.trace.strain[2, 3], clean.trace.strain[2, 3], atol=3e-5)
+
+
+@pytest.mark.parametrize("step", [0.006, 0.0136, 0.03])
+@pytest.mark.parametrize("degrees", [0.0, 4.0])
+def test_a_contact_of_few_samples_is_no_spike_and_a_spike_in_it_is_one(
+    step: float, degrees: float
+) -> None:
+    """A transmitter of 10 kHz at 65 and 150 km/h, and one of 2 kHz at 65 km/h."""
+    surface = shared_surface(default_surface())
+    angle = np.arange(-np.pi, np.pi, step)
+    for load in (1500.0, 3000.0, 6500.0):
+        state = np.array([[load, np.deg2rad(degrees), 0.0, 0.0, 18.0, 2.3e5]])
+        strain = surface.strain(surface.answers(state), angle).T
+        assert not (inspect(strain, step)[1] & TurnFlag.SPIKE).any(), load
+        at = int(np.argmin(np.abs(angle)))  # the middle of the contact
+        share = max(0.05, SPIKE_BEND * step**2)  # of a swing that holds the spike
+        spiked = strain.copy()
+        spiked[2, at] += (1.1 + share / (1.0 - share)) * np.ptp(strain[2])
+        flags = inspect(spiked, step)[1]
+        assert flags[2] & TurnFlag.SPIKE
+        assert not (flags[[0, 1, 3, 4]] & TurnFlag.SPIKE).any()
 
 
 def test_a_clipped_gage_is_flagged_saturated() -> None:
